@@ -157,6 +157,20 @@ TEST(Configurator, TheFlagOfAProgramThatOnlyWorksIsWatchedForHalfASecond) {
   EXPECT_EQ(desk.codeAt(2.0), OutcomeCode::Pending);
 }
 
+/// A program that tells results is not judged by what it has stopped to show.
+TEST(Configurator, OnlyAProgramThatTellsNothingElseIsJudgedByItsFlag) {
+  Desk desk;
+  desk.start();
+  desk.at(0.005);
+  desk.m.krl.ints[2] = desk.asked(3);  // it works on the request
+  EXPECT_EQ(desk.codeAt(1.0), OutcomeCode::Pending);
+  desk.m.krl.ints[2] = 0;
+  EXPECT_EQ(desk.codeAt(1.6), OutcomeCode::Pending);
+  EXPECT_EQ(desk.codeAt(9.9), OutcomeCode::Pending);
+  desk.enter();
+  EXPECT_EQ(desk.codeAt(9.95), OutcomeCode::Done);
+}
+
 TEST(Configurator, AnotherStrategyALostCommandModeAndSilenceEndAStart) {
   Desk other;
   other.start();

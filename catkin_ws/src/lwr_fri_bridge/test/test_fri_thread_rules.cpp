@@ -78,12 +78,14 @@ TEST(FriThreadRules, BeforeTheFirstDatagramNobodyIsNamed) {
 TEST(FriThreadRules, TheNewestOfThoseThatWaitIsAnswered) {
   Bridge bridge(patient());
   std::atomic<bool> held{false}, waits{false};
+  std::atomic<int> idle{0};
   FriThreadOptions options = anyPort();
   options.after_answer = [&](bool answered) {  // off the beat of 1 ms, however quick the test is
     for (int i = 0; i < 1000 && answered && held; ++i) {
       waits = true;
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     }
+    idle += answered ? 0 : 1;
   };
   FriThread fri(bridge, options);
   fri.start();
@@ -103,6 +105,9 @@ TEST(FriThreadRules, TheNewestOfThoseThatWaitIsAnswered) {
   EXPECT_EQ(fri.statistics().superseded, 3U);
   EXPECT_EQ(bridge.snapshot().session.lost_measurements, 3U);
   EXPECT_EQ(fri.statistics().foreign, 0U);
+  const int before = idle;  // what is counted is shown then
+  EXPECT_TRUE(eventually([&] { return idle > before; }));
+  EXPECT_EQ(bridge.snapshot().session.rejected(), 0U);  // they were not even looked at
 }
 
 /// Each of the controller's datagrams that waits behind another is a cycle of lateness; those of

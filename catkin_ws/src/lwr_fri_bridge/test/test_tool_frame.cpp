@@ -158,5 +158,28 @@ TEST(ToolFrame, JointsGoOntoTheWireAndBackInOneOrder) {
   for (int i = 0; i < 7; ++i) EXPECT_EQ(wire[i], static_cast<float>(10 + i));
 }
 
+/// Arrays lie one behind the other in a datagram: what fills one leaves the next as it was.
+TEST(ToolFrame, AFieldIsFilledWithoutTouchingTheNext) {
+  const Frame pose = flange(posture(1));
+  fri::MeasurementDatagram m{};
+  toWire(pose, m.commanded_frame);
+  for (const bool offset : {false, true}) {
+    if (offset) toWire(Frame::Identity(), m.commanded_frame_offset);
+    fri::CommandDatagram c{};
+    c.joint_torque[0] = c.cartesian_frame[0] = c.cartesian_damping[0] = 9.0F;
+    fri::jointsToWire(posture(2), c.joint_position);
+    EXPECT_EQ(c.cartesian_frame[0], 9.0F);
+    fri::cartesianSetPointOf(m, c.cartesian_frame);
+    EXPECT_EQ(c.joint_torque[0], 9.0F);
+    CartesianSetPoint set_point;
+    set_point.anchor(posture(1), c.cartesian_frame);
+    set_point.frame(posture(2), c.cartesian_frame);
+    EXPECT_EQ(c.joint_torque[0], 9.0F);
+    fri::wrenchToWire(Vector6::Constant(2.0), c.cartesian_stiffness);
+    EXPECT_EQ(c.cartesian_damping[0], 9.0F);
+    EXPECT_EQ(c.cartesian_stiffness[5], 2.0F);
+  }
+}
+
 }  // namespace
 }  // namespace lwr_fri_bridge
