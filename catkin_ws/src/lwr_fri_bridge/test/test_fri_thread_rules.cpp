@@ -39,7 +39,7 @@ TEST(FriThreadRules, IdleTicksAreToldAndKeepThePeer) {
   test::SmallController robot(0.005);
   fri::CommandDatagram c{};
   peer.send(robot.measure());
-  ASSERT_TRUE(peer.receive(c));
+  ASSERT_TRUE(peer.receiveSoon(c));
   EXPECT_TRUE(eventually([&] { return answers == 1; }));
   const int before = idle;
   EXPECT_TRUE(eventually([&] { return idle >= before + 3; }));
@@ -94,12 +94,12 @@ TEST(FriThreadRules, TheNewestOfThoseThatWaitIsAnswered) {
   fri::CommandDatagram c{};
   held = true;
   peer.send(robot.measure());
-  ASSERT_TRUE(peer.receive(c));
+  ASSERT_TRUE(peer.receiveSoon(c));
   ASSERT_TRUE(eventually([&] { return waits.load(); }));
   fri::MeasurementDatagram newest{};
   for (int i = 0; i < 4; ++i) peer.send(newest = robot.measure());
   held = false;
-  ASSERT_TRUE(peer.receive(c));
+  ASSERT_TRUE(peer.receiveSoon(c));
   EXPECT_EQ(c.header.reflected, newest.header.counter);
   EXPECT_TRUE(eventually([&] { return fri.statistics().answers == 2; }));
   EXPECT_EQ(fri.statistics().superseded, 3U);
@@ -134,7 +134,7 @@ TEST(FriThreadRules, WhatWaitsForTheThreadIsItsLateness) {
   int sent = 0;
   for (; sent < 200 && start.code == OutcomeCode::Pending; ++sent) {
     peer.send(robot.measure());
-    ASSERT_TRUE(peer.receive(c));
+    ASSERT_TRUE(peer.receiveSoon(c));
     robot.take(&c);
     start = bridge.outcome(ticket);
   }
@@ -142,7 +142,7 @@ TEST(FriThreadRules, WhatWaitsForTheThreadIsItsLateness) {
   ASSERT_TRUE(eventually([&] { return served == sent; }));  // it waits for the next one
   held = true;
   peer.send(robot.measure());
-  ASSERT_TRUE(peer.receive(c));
+  ASSERT_TRUE(peer.receiveSoon(c));
   robot.take(&c);
   ASSERT_TRUE(eventually([&] { return waits.load(); }));
   for (int i = 0; i < 4; ++i) {
@@ -153,14 +153,16 @@ TEST(FriThreadRules, WhatWaitsForTheThreadIsItsLateness) {
   robot.state = fri::FriState::Monitor;
   peer.send(robot.measure());
   held = false;
-  ASSERT_TRUE(peer.receive(c));
+  ASSERT_TRUE(peer.receiveSoon(c));
   EXPECT_TRUE(eventually([&] { return bridge.snapshot().fall_backs == 1; }));
   EXPECT_EQ(bridge.snapshot().loss.cause, LossCause::ComputerLate);
 }
 
 /// A controller on 127.0.0.1 runs here, so its silence is this computer's doing.
 TEST(FriThreadRules, AControllerOnTheLoopbackRunsOnThisComputer) {
-  Bridge bridge(test::defaultConfig());
+  BridgeConfig config = test::defaultConfig();
+  config.receive_timeout = 1.0;
+  Bridge bridge(config);
   FriThread fri(bridge, anyPort());
   fri.start();
   Peer peer(fri.port());
@@ -170,7 +172,8 @@ TEST(FriThreadRules, AControllerOnTheLoopbackRunsOnThisComputer) {
   Outcome start;
   for (int i = 0; i < 200 && start.code == OutcomeCode::Pending; ++i) {
     peer.send(robot.measure());
-    robot.take(peer.receive(c) ? &c : nullptr);
+    ASSERT_TRUE(peer.receiveSoon(c));
+    robot.take(&c);
     start = bridge.outcome(ticket);
   }
   ASSERT_TRUE(start.success()) << describe(start);
@@ -264,7 +267,7 @@ TEST(FriThreadRules, AThreadThatWasStoppedStartsAgain) {
   test::SmallController robot(0.005);
   fri::CommandDatagram c{};
   peer.send(robot.measure());
-  EXPECT_TRUE(peer.receive(c));
+  EXPECT_TRUE(peer.receiveSoon(c));
 }
 
 TEST(AnswerTimes, NothingWasTakenYet) {

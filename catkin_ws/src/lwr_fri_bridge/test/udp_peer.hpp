@@ -43,6 +43,13 @@ class Peer {
   bool receive(fri::CommandDatagram& c) {
     return recv(fd_, &c, sizeof c, 0) == static_cast<ssize_t>(sizeof c);
   }
+  /// As receive(), for an answer that must come, on a computer that may be busy: within 6 s.
+  bool receiveSoon(fri::CommandDatagram& c) {
+    for (int i = 0; i < 20; ++i) {
+      if (receive(c)) return true;
+    }
+    return false;
+  }
   /// "address:port" of this end, as the bridge tells it.
   std::string name() const {
     sockaddr_in own{};
