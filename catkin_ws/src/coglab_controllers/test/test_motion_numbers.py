@@ -90,7 +90,6 @@ def test_a_goal_that_moves_moves_faster_on_a_slowed_clock(reach: cc.Primitive) -
 def test_a_running_primitive_tells_its_clock_and_its_acceleration(reach: cc.Primitive) -> None:
     dmp = cc.Dmp(reach, [0] * 3, [0.5, 0, 0.1], ratio=2.0)
     assert (dmp.tau, dmp.phase, dmp.progress, dmp.remaining_time) == pytest.approx((2.4, 1.0, 0.0, 2.4))
-    before = dmp.velocity
     for i in range(1, 241):
         dmp.step(CYCLE, [0.5, 0, 0.1])
         assert dmp.progress == pytest.approx(i * CYCLE / 2.4, abs=1e-9)
