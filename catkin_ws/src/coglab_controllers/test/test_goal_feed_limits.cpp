@@ -283,5 +283,29 @@ TEST_F(Table, TheWorkspaceIsThatOfTheBaseAndTheTopicHasTheFrame) {
   EXPECT_NE(lost.message.find("'table' (dmp_frame_name) is not known"), std::string::npos);
 }
 
+/// A hand that never stands quite still is left standing after half a second, within 0.3 s more.
+TEST(Settling, TheLoopIsOpenedSlowlyWhereTheHandDoesNotComeToRest) {
+  VirtualRobot robot;
+  robot.loadBoth();
+  robot.see("human_hand", kGoal);
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
+  int settled = 0, moved = 0;
+  double early = 0.0, late = 0.0;
+  for (int i = 0; i < 1200 && settled < 200; ++i) {
+    robot.see("human_hand", kGoal);
+    robot.tick();
+    if (robot.state() != MotionState::Reached) continue;
+    ++settled;
+    robot.sample.position[0] += settled % 2 == 0 ? 0.003 : -0.003;
+    const double speed = robot.command.velocity.norm();
+    if (speed > 0.0) moved = settled;
+    if (settled > 10 && settled <= 98) early = std::max(early, speed);
+    if (settled > 150) late = std::max(late, speed);
+  }
+  EXPECT_NEAR(moved, 160, 2) << "0.5 s, and 0.3 s to fade";
+  EXPECT_GT(early, 0.01);
+  EXPECT_LT(late, 0.3 * early);
+}
+
 }  // namespace
 }  // namespace coglab_controllers

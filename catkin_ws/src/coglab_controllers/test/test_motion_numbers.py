@@ -205,8 +205,8 @@ def test_a_motion_tells_what_it_does(reach: cc.Primitive) -> None:
     goal = np.array([0.4, 0.1, 0.0])
     motion.switch_to(reach, goal, UNIT)
     assert motion.phase == "idle", "there is nothing to switch"
-    motion.start(reach, [0] * 3, UNIT, goal, UNIT, orientation_control=False)
-    assert motion.remaining_distance == pytest.approx(np.linalg.norm(goal)) and motion.remaining_time == pytest.approx(
+    motion.start(reach, [0.1, 0.2, 0.0], UNIT, goal, UNIT, orientation_control=False)
+    assert motion.remaining_distance == pytest.approx(math.hypot(0.3, 0.1)) and motion.remaining_time == pytest.approx(
         1.2
     )
     assert not motion.step(CYCLE, goal, UNIT).orientation_control

@@ -262,11 +262,17 @@ TEST_F(Runner, ArgumentsAreTakenAtTheEndsOfTheirRanges) {
   EXPECT_NE(turn.describeArguments().find("duration: 1 s, 0 to 100\n"), std::string::npos);
 }
 
-/// Knows nothing of limits and borders.
+/// Knows nothing of limits and borders; notes what it is told of the robot.
 class Plain : public MotionController {
  public:
+  static inline bool allowed = false;
+  static inline int adopted = 0;
+
   void configure(const MotionSetup&) override {}
-  void adopt(const CycleInput&) override {}
+  void adopt(const CycleInput& input) override {
+    allowed = input.motion_allowed;
+    ++adopted;
+  }
   void start(const CycleInput&) override {}
   void stop() override {}
   void abort(const Reason&) override {}
@@ -278,6 +284,24 @@ class Plain : public MotionController {
  private:
   Reason reason_;
 };
+
+MotionController* makePlain() { return new Plain(); }
+
+TEST_F(Runner, AControllerIsToldWhetherItMayMoveInEveryCycleAndNotWithoutAJointState) {
+  MotionTypes::instance().insert("test/Plain", {makePlain, nullptr});
+  ASSERT_TRUE(arm.manager->load("plain", "test/Plain").success);
+  std::string type;
+  ASSERT_TRUE(arm.manager->switchTo("plain", type).success);
+  arm.tick();
+  EXPECT_TRUE(Plain::allowed);
+  const int before = Plain::adopted;
+  arm.manager->cycle().idle(arm.now_ns + 1'000'000);
+  EXPECT_FALSE(Plain::allowed);
+  EXPECT_EQ(Plain::adopted, before + 1);
+  arm.sample.block = MotionBlock::Held;
+  arm.tick();
+  EXPECT_FALSE(Plain::allowed);
+}
 
 TEST(Defaults, OfAControllerAreThatItSlowsNothingAndWaitsForNothing) {
   EXPECT_EQ(Plain().limitScale(), 1.0);
