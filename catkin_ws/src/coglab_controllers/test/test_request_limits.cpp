@@ -323,6 +323,12 @@ TEST(RequestsWithoutACycle, AreWithdrawnAndLeaveNothing) {
   EXPECT_TRUE(robot.sample.position == kHome) << "the motion was withdrawn";
   EXPECT_EQ(robot.manager->report().active.str(), "ptp");
   EXPECT_EQ(robot.manager->profile(), "");
+  // A cancel is waited for as long as it says, by default for two seconds.
+  EXPECT_TRUE(refused(robot.manager->cancel("ptp", 0.05, ""),
+                      {"not taken the cancel over within 0.", "as soon as it runs again"}));
+  const CancelAnswer unheard = robot.manager->cancel("ptp", 0.0, "");
+  EXPECT_EQ(unheard.code, ReasonCode::NotAdopted);
+  EXPECT_TRUE(refused(unheard, {"not taken the cancel over within 2."}));
 }
 
 }  // namespace
