@@ -12,6 +12,8 @@
 namespace coglab_controllers {
 namespace {
 
+std::atomic<int> extra_ms{0};  // that Timer takes
+
 /// Adds up the dt of its cycles.
 class Timer : public ctrl_more::FeedbackController {
  public:
@@ -30,6 +32,7 @@ class Timer : public ctrl_more::FeedbackController {
   void update(const ctrl_more::Cycle& cycle, const ctrl_more::RobotStates&,
               const ctrl_more::ControlStates&, ctrl_more::ModifiedControlStates&) override {
     passed_ns_ += std::llround(1e9 * cycle.dt);
+    if (extra_ms > 0) std::this_thread::sleep_for(std::chrono::milliseconds(extra_ms));
   }
 
  private:
@@ -72,7 +75,9 @@ class Robot {
 
 class ControlThreadTest : public ::testing::Test {
  protected:
-  void SetUp() override {
+  void SetUp() override { prepare("{overrun_time: 0.0}"); }
+  void prepare(const std::string& parameters) {
+    manager = makeManager(parameters);
     options.priority = 0;
     options.after_cycle = [this](const VelocityCommand&) { ++robot.cycles_run; };
     ctrl_more::ControllerEntry entry;
@@ -94,12 +99,12 @@ class ControlThreadTest : public ::testing::Test {
   void TearDown() override {
     if (thread) thread->stop();
   }
-  std::unique_ptr<ControllerManager> makeManager() {
+  std::unique_ptr<ControllerManager> makeManager(const std::string& parameters) {
     const coglab_rt::JointLimits limits =
         coglab_rt::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
     ManagerSettings settings = readManagerSettings(
-        YAML::Load("{overrun_time: 0.0}"),
-        readText(std::string(DESCRIPTION_DIR) + "/urdf/lwr_ih2.urdf"), limits, false);
+        YAML::Load(parameters), readText(std::string(DESCRIPTION_DIR) + "/urdf/lwr_ih2.urdf"),
+        limits, false);
     settings.logger = &logger;
     return std::make_unique<ControllerManager>(std::move(settings));
   }
@@ -107,7 +112,7 @@ class ControlThreadTest : public ::testing::Test {
   coglab_rt::ArmMailboxes mailboxes;
   ctrl_more::Logger logger;
   std::atomic<std::int64_t> passed_ns{0};
-  std::unique_ptr<ControllerManager> manager = makeManager();
+  std::unique_ptr<ControllerManager> manager;
   Robot robot{mailboxes};
   ControlThreadOptions options;
   std::unique_ptr<ControlThread> thread;
@@ -177,6 +182,25 @@ TEST_F(ControlThreadTest, AMeasurementWhoseWakingWasLostIsFoundAfterTheIdlePerio
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   EXPECT_EQ(robot.cycles_run, before + 1);
   EXPECT_EQ(passed_ns, 5'000'000);
+}
+
+TEST_F(ControlThreadTest, TheReportSaysHowLongTheCycleTookAndTheLongest) {
+  prepare("{overrun_time: 0.5}");
+  start();
+  extra_ms = 50;
+  const auto begin = std::chrono::steady_clock::now();
+  ASSERT_TRUE(robot.measure(*manager, *thread, 1));
+  const std::chrono::duration<double> outside = std::chrono::steady_clock::now() - begin;
+  extra_ms = 0;
+  const CycleReport slow = manager->report();
+  EXPECT_GE(slow.duration, 0.05);
+  EXPECT_LE(slow.duration, outside.count());
+  EXPECT_EQ(slow.longest, slow.duration);
+  ASSERT_TRUE(robot.measure(*manager, *thread, 1));
+  const CycleReport quick = manager->report();
+  EXPECT_GT(quick.duration, 0.0);
+  EXPECT_LT(quick.duration, slow.duration);
+  EXPECT_EQ(quick.longest, slow.longest);
 }
 
 TEST_F(ControlThreadTest, WithoutAPriorityThereIsNothingToWarnOfAndItStopsAtOnce) {
