@@ -127,6 +127,7 @@ def test_a_side_of_the_box_is_approached_with_two_metres_per_second_squared(chai
     result = guard.limit(chain, HOME, request)
     assert (
         result.reason == "workspace border"
+        and result.joint == -1
         and result.border == f"{'upper' if upper else 'lower'} side of the workspace box"
     )
     assert result.scale == pytest.approx(stopping_speed(0.02, 2.0, 0.015) / 0.7, rel=1e-9)
@@ -140,7 +141,7 @@ def test_sphere_and_stretch_are_approached_as_the_box_is(chain, limits) -> None:
     inward = np.linalg.pinv(chain.jacobian(HOME)[:3]) @ np.array([-0.7, 0.0, 0.0])
     guard = guard_of(chain, limits, sphere, hand_speed=0.0, elbow_speed=0.0)
     result = guard.limit(chain, HOME, inward)
-    assert result.border == "sphere around the base"
+    assert result.border == "sphere around the base" and result.joint == -1
     assert result.scale == pytest.approx(stopping_speed(0.02, 2.0, 0.015) / 0.7, rel=1e-9)
     assert guard.limit(chain, HOME, -inward).scale == 1.0
     q = np.where(AXES[3] > 0, -0.5, HOME)
@@ -153,7 +154,7 @@ def test_sphere_and_stretch_are_approached_as_the_box_is(chain, limits) -> None:
     rate = (stretch(-0.5 + 1e-6) - stretch(-0.5 - 1e-6)) / 2e-6
     guard = guard_of(chain, limits, {**EVERYWHERE, "max_stretch": share}, hand_speed=0.0, elbow_speed=0.0)
     result = guard.limit(chain, q, 1.5 * AXES[3])
-    assert result.border == "arm fully stretched"
+    assert result.border == "arm fully stretched" and result.joint == -1
     assert result.scale == pytest.approx(stopping_speed(0.004, 2.0, 0.015) / (1.5 * rate), rel=1e-5)
     assert guard.limit(chain, q, -1.5 * AXES[3]).scale == 1.0
 
