@@ -81,6 +81,22 @@ TEST(GoalGate, ThreeFramesThatAgreeWithinFiftyMillimetresAreBelieved) {
   EXPECT_EQ(gate.goal().position.x(), 0.0);
 }
 
+TEST(GoalGate, WhatIsExactlyAtALimitIsWithinIt) {
+  GoalGateParameters exact;  // numbers that a computer has exactly
+  exact.max_jump = 0.25;
+  exact.agreement = 0.125;
+  exact.max_age = 0.5;
+  GoalGate gate = begun(1.0, exact);
+  EXPECT_EQ(gate.update(kSecond + 1, sight(1.25, kSecond + 1)), State::Fresh);
+  EXPECT_EQ(gate.goal().position.x(), 1.25);
+  for (int i = 0; i < 3; ++i) gate.update(kSecond + 2 + i, sight(2.0 + 0.125 * i, kSecond + 2 + i));
+  EXPECT_EQ(gate.state(), State::Fresh);
+  EXPECT_EQ(gate.goal().position.x(), 2.25);
+  const GoalObservation last = sight(2.25, 2 * kSecond);
+  EXPECT_EQ(gate.update(2 * kSecond + 500 * kMs, last), State::Fresh);
+  EXPECT_EQ(gate.update(2 * kSecond + 500 * kMs + 1, last), State::Old);
+}
+
 TEST(GoalGate, FramesThatJumpForASecondAreALostGoal) {
   GoalGate gate = begun(0.0);
   for (int i = 1; i <= 100; ++i) {
