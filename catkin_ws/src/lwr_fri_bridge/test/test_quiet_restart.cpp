@@ -50,8 +50,18 @@ TEST(CommandModeWatch, ThreeLostPacketsCount) {
   EXPECT_EQ(cause(0, 0.005, 2), LossCause::LeftByController);
   EXPECT_EQ(cause(0, 0.005, 3), LossCause::PacketsLost);
   EXPECT_EQ(cause(2, 0.005, 2), LossCause::PacketsLost);
-  EXPECT_EQ(cause(2, 1.0, 2), LossCause::LeftByController);  // 2.7
-  EXPECT_EQ(cause(3, 1.0, 2), LossCause::PacketsLost);       // 3.1
+  EXPECT_EQ(cause(2, 1.4, 2), LossCause::LeftByController);  // 2.49
+  EXPECT_EQ(cause(2, 1.3, 2), LossCause::PacketsLost);       // 2.55
+}
+
+TEST(CommandModeWatch, ThreeInSuccessionCountHoweverLongTheCycles) {
+  for (const double period : {0.001, 0.005, 0.02, 0.1}) {
+    CommandModeWatch watch;
+    for (int i = 0; i < 2; ++i) watch.tick(period, 1, 0.0, 0.0);
+    EXPECT_EQ(watch.judge(leftByItself()).cause, LossCause::LeftByController);
+    watch.tick(period, 1, 0.0, 0.0);
+    EXPECT_EQ(watch.judge(leftByItself()).cause, LossCause::PacketsLost) << period;
+  }
 }
 
 TEST(CommandModeWatch, RestIsHalfASecondOfCommandedAndMeasuredStandstill) {

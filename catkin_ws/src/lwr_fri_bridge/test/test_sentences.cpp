@@ -270,6 +270,7 @@ TEST(Diagnosis, JointsWithErrorsHeatAndWarningsAreNamed) {
   EXPECT_EQ(diagnoseArm(s, 70.0).text,
             "drive error: lwr_a1, lwr_a2, lwr_e1, lwr_a3, lwr_a4, lwr_a5, lwr_a6");
   s = connected();
+  s.drive_error = s.drive_warning = 0xFF80;  // of no drive
   EXPECT_EQ(diagnoseArm(s, 70.0).text, "motion is allowed");
   EXPECT_EQ(diagnoseArm(s, 70.0).severity, Severity::Ok);
   EXPECT_EQ(diagnoseArm(s, 70.0).code, ReasonCode::None);
