@@ -49,11 +49,12 @@ TEST_F(Cycle, AJointStateCountsIfEachOfItsNumbersIsFinite) {
                                               &RobotSample::torque,
                                               &RobotSample::external_torque,
                                               &RobotSample::commanded_position,
-                                              &RobotSample::commanded_velocity};
+                                              &RobotSample::commanded_velocity,
+                                              &RobotSample::commanded_acceleration};
   std::uint64_t stale = 0;
-  for (int i = 0; i < 7; ++i) {
+  for (int i = 0; i < 8; ++i) {
     RobotSample bad = robot->sample;
-    if (i < 6) {
+    if (i < 7) {
       (bad.*fields[i])[i] = i % 2 == 0 ? kNan : INFINITY;
     } else {
       bad.tool_wrench[5] = kNan;

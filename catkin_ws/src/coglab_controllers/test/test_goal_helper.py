@@ -119,16 +119,25 @@ def test_a_static_frame_is_told_at_once_and_then_once_a_second_where_it_is_asked
 
 
 @pytest.mark.parametrize(
-    "name, value",
-    [("rate", 0.09), ("rate", 1001.0), ("offset", [0.0, 0.0]), ("frame", [1.0]), ("dmp_frame_name", [1.0])],
+    "name, value, expected",
+    [
+        ("rate", 0.09375, "a number from 0.1 to 1000, got 0.09375"),
+        ("rate", 1001.0, "a number from 0.1 to 1000, got 1001"),
+        ("offset", [0.0, 0.0], "3 finite numbers, got "),
+        ("frame", [1.0], "a text, got "),
+        ("dmp_frame_name", [1.0], "a text, got "),
+        ("topic", [1.0], "a text, got "),
+    ],
 )
-def test_a_parameter_that_cannot_be_used_ends_the_start(name: str, value: object) -> None:
+def test_a_parameter_that_cannot_be_used_ends_the_start_and_is_named(name: str, value: object, expected: str) -> None:
     rospy.set_param(f"/goal_helper/{name}", value)
     try:
-        ended = subprocess.run([helper()], timeout=60.0, check=False)
+        ended = subprocess.run([helper()], timeout=60.0, check=False, stderr=subprocess.PIPE, text=True)
     finally:
         rospy.delete_param(f"/goal_helper/{name}")
     assert ended.returncode == 1
+    told = f"parameter goal_helper/{name}: expected {expected}"
+    assert ended.stderr.count(told) == 1, ended.stderr
 
 
 def test_the_ends_of_the_range_of_rates_are_taken() -> None:
