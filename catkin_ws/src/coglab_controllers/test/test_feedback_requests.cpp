@@ -1,4 +1,6 @@
 // What a request to the feedback controllers may carry, as FeedbackSelect.srv says.
+#include <cstdio>
+
 #include <gtest/gtest.h>
 
 #include "coglab_controllers/manager/feedback_requests.hpp"
@@ -58,6 +60,73 @@ TEST(FeedbackRequests, WhatCannotBeShownAsItIsIsRefusedWithoutBeingShown) {
     EXPECT_NE(status.message().find("expected printable text"), std::string::npos);
     for (const char c : status.message()) EXPECT_TRUE(c >= ' ' && c <= '~') << status.message();
   }
+}
+
+/// A character as UTF-8.
+std::string utf8(std::uint32_t c) {
+  const auto last = [](std::uint32_t bits) { return static_cast<char>(0x80 | (bits & 0x3f)); };
+  if (c < 0x80) return {static_cast<char>(c)};
+  if (c < 0x800) return {static_cast<char>(0xc0 | c >> 6), last(c)};
+  if (c < 0x10000) return {static_cast<char>(0xe0 | c >> 12), last(c >> 6), last(c)};
+  return {static_cast<char>(0xf0 | c >> 18), last(c >> 12), last(c >> 6), last(c)};
+}
+
+TEST(FeedbackRequests, EachCharacterIsShownIsBlankOrSteersTheDisplay) {
+  for (const std::uint32_t shown :
+       {0x21u,   0x7eu,   0xa1u,   0x61bu,  0x61du,  0x7ffu,  0x800u,  0x167fu,  0x1681u,
+        0x1fffu, 0x200bu, 0x200du, 0x2010u, 0x2027u, 0x2030u, 0x205eu, 0x2060u,  0x2065u,
+        0x206au, 0x2fffu, 0x3001u, 0xd7ffu, 0xe000u, 0xfffdu, 0xffffu, 0x10000u, 0x10ffffu}) {
+    EXPECT_TRUE(judgeReason(utf8(shown)).ok()) << std::hex << shown;
+  }
+  for (const std::uint32_t blank :
+       {0x20u, 0xa0u, 0x1680u, 0x2000u, 0x2005u, 0x200au, 0x202fu, 0x205fu, 0x3000u}) {
+    const Status alone = judgeReason(utf8(blank));
+    EXPECT_NE(alone.message().find("has only spaces"), std::string::npos) << std::hex << blank;
+    EXPECT_TRUE(judgeReason("a" + utf8(blank)).ok()) << std::hex << blank;
+    EXPECT_TRUE(judgeReason(utf8(blank) + "a").ok()) << std::hex << blank;
+  }
+  for (const std::uint32_t steers :
+       {0x1u, 0x1fu, 0x7fu, 0x80u, 0x9fu, 0x61cu, 0x200eu, 0x200fu, 0x2028u, 0x2029u, 0x202au,
+        0x202eu, 0x2066u, 0x2067u, 0x2069u}) {
+    char number[40];
+    std::snprintf(number, sizeof number, "U+%04X at byte 1", static_cast<unsigned>(steers));
+    const Status status = judgeReason("a" + utf8(steers) + "b");
+    EXPECT_NE(status.message().find(number), std::string::npos) << status.message();
+  }
+}
+
+TEST(FeedbackRequests, BytesThatAreNoUtf8AreToldWithTheirPlace) {
+  for (const char* wrong :
+       {"\xc1\xbf", "\xc2", "\xc2x", "\xe0\x9f\xbf", "\xe1\x80", "\xe1\x80x", "\xe1x\x80",
+        "\xed\xbf\xbf", "\xf0\x8f\xbf\xbf", "\xf1\x80\x80", "\xf1\x80\x80x", "\xf4\x90\x80\x80",
+        "\xf5\x80\x80\x80", "\x80", "\xbf", "\xff"}) {
+    const Status status = judgeReason(std::string("ab") + wrong);
+    EXPECT_NE(status.message().find("is no UTF-8 at byte 2"), std::string::npos)
+        << status.message();
+  }
+  EXPECT_NE(judgeReason(std::string(201, 'x'))
+                .message()
+                .find("has 201 bytes; expected printable "
+                      "text of at most 200 bytes"),
+            std::string::npos);
+  EXPECT_EQ(kLongestReason, 200u);
+}
+
+TEST(FeedbackRequests, WhoIsPausedForWhatIsNamedWhereNothingCanBeWithdrawn) {
+  const std::vector<ControllerStatus> loaded = {
+      controller("a", {"lunch", "tea"}), controller("b", {}),
+      controller("d", {"fault: it threw"}, PauseCause::Fault)};
+  const std::string all = judgeResume(loaded, {}, "supper").message();
+  for (const std::string word :
+       {"'supper'", "a for ", "lunch", "tea", "; b for no reason", "; d for "}) {
+    EXPECT_NE(all.find(word), std::string::npos) << all;
+  }
+  const std::string one = judgeResume(loaded, {"b"}, "lunch").message();
+  EXPECT_NE(one.find(": b for no reason, it is not paused"), std::string::npos) << one;
+  EXPECT_EQ(one.find("a for"), std::string::npos) << one;
+  EXPECT_TRUE(judgeResume(loaded, {"a"}, "tea").ok());
+  EXPECT_TRUE(judgeResume(loaded, {}, "fault").ok());
+  EXPECT_TRUE(judgeResume({}, {}, "lunch").ok()) << "nobody is there to be paused";
 }
 
 TEST(FeedbackRequests, AnEmptyNameIsNotAllOfThem) {

@@ -7,6 +7,7 @@
 #include <random>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "coglab_controllers/ideal/ideal_arm.hpp"
 #include "coglab_rt/joint_limits_table.hpp"
@@ -231,6 +232,112 @@ TEST(IdealArm, ATickAllocatesNothing) {
     counting = false;
   }
   EXPECT_EQ(allocations, 0U);
+}
+
+TEST(IdealArm, ParametersAreTakenAtTheEndsOfTheirRanges) {
+  const IdealArmConfig standard;
+  EXPECT_EQ(standard.period, 0.005);
+  EXPECT_EQ(standard.command_timeout, 0.05);
+  const auto fine = [](auto&& change) {
+    IdealArmConfig changed = config();
+    change(changed);
+    try {
+      changed.check();
+    } catch (const std::invalid_argument&) {
+      return false;
+    }
+    return true;
+  };
+  for (const auto& [value, taken] :
+       {std::pair(0.001, true), {0.1, true}, {0.000999, false}, {0.1001, false}}) {
+    EXPECT_EQ(fine([v = value](IdealArmConfig& c) { c.period = v; }), taken) << value;
+  }
+  for (const auto& [value, taken] :
+       {std::pair(0.005, true), {1.0, true}, {0.00499, false}, {1.001, false}}) {
+    EXPECT_EQ(fine([v = value](IdealArmConfig& c) { c.command_timeout = v; }), taken) << value;
+  }
+  const coglab_rt::JointLimits limits = config().limits;
+  for (int joint = 0; joint < 7; ++joint) {
+    const double upper = limits.upper_position[joint] - limits.position_margin;
+    const double lower = limits.lower_position[joint] + limits.position_margin;
+    for (const auto& [value, taken] : {std::pair(upper - 1e-9, true),
+                                       {upper + 1e-9, false},
+                                       {lower + 1e-9, true},
+                                       {lower - 1e-9, false}}) {
+      EXPECT_EQ(fine([v = value, joint](IdealArmConfig& c) { c.start_position[joint] = v; }), taken)
+          << joint << ": " << value;
+    }
+  }
+}
+
+TEST(IdealArm, TellsItsStateInItsViewAndSaysWhatARequestDid) {
+  IdealArm arm(config());
+  EXPECT_TRUE(arm.stands());
+  EXPECT_EQ(arm.requested(), 0U);
+  EXPECT_EQ(arm.served(), 0U);
+  IdealArmView view;
+  EXPECT_FALSE(arm.newestView(view));
+  EXPECT_FALSE(view.hold_latched);
+  EXPECT_EQ(view.state, IdealArmState::Monitor);
+  std::int64_t now = 1'000'000'000;
+  const auto state = [&] {
+    arm.tick(now += 5'000'000);
+    EXPECT_TRUE(arm.newestView(view));
+    return std::string(nameOf(view.state));
+  };
+  EXPECT_EQ(state(), "monitor");
+  EXPECT_EQ(view.sample.stamp_ns, now);
+  EXPECT_EQ(view.sample.controller_ns, 5'000'000);
+  EXPECT_EQ(view.sample.cycle_time, 0.005);
+  EXPECT_EQ(view.sample.stop_delay, coglab_rt::lostTime(0.005));
+  EXPECT_EQ(view.sample.stop_rounding, 2.0 * coglab_rt::kWireRounding);
+  for (const auto& [event, answer] : {std::pair("stop", "stop: nothing to do"),
+                                      {"start", "start: done"},
+                                      {"start", "start: nothing to do"},
+                                      {"reset", "reset: nothing to do"},
+                                      {"hold", "hold: done"},
+                                      {"hold", "hold: done"},
+                                      {"reset", "reset: done"},
+                                      {"reset", "reset: nothing to do"},
+                                      {"position", "position: nothing to do, it is the only mode"},
+                                      {"stop", "stop: done"}}) {
+    const coglab_rt::Answer said = arm.request(event);
+    EXPECT_TRUE(said.success);
+    EXPECT_EQ(said.message, answer);
+  }
+  EXPECT_EQ(arm.requested(), 10U);
+  EXPECT_EQ(arm.served(), 0U);
+  state();
+  EXPECT_EQ(arm.served(), 10U);
+  arm.request("start");
+  EXPECT_EQ(state(), "command");
+  arm.request("hold");
+  EXPECT_EQ(state(), "holding");
+  EXPECT_TRUE(view.hold_latched);
+  arm.request("reset");
+  state();
+  EXPECT_EQ(state(), "command");
+  EXPECT_FALSE(view.hold_latched);
+  for (const char* event : {"joint_impedance", "cartesian_impedance 1"}) {
+    EXPECT_EQ(arm.request(event).code, coglab_rt::ReasonCode::NotSupported) << event;
+  }
+  EXPECT_EQ(arm.request("a joint_impedance").code, coglab_rt::ReasonCode::InvalidArgument);
+  Arm moving;
+  moving.ask("start");
+  moving.drive(100, Vector7::Constant(0.3));
+  moving.ask("stop");
+  EXPECT_TRUE(moving.arm.newestView(view));
+  EXPECT_STREQ(nameOf(view.state), "stopping");
+}
+
+TEST(IdealArm, WithLongPeriodsACommandLastsForTwoAndAHalfOfThem) {
+  Arm arm(config(0.1));
+  arm.ask("start");
+  arm.drive(15, Vector7::Constant(0.1));
+  arm.tick();  // the last command is 0.2 s old
+  EXPECT_TRUE(arm.sample.velocity.isApprox(Vector7::Constant(0.1)));
+  arm.tick();
+  EXPECT_LT(arm.sample.velocity.maxCoeff(), 0.1 - 1e-6);
 }
 
 TEST(IdealArm, RefusesWhatItCannotDoAndParametersOutOfRange) {

@@ -1,5 +1,6 @@
 // What every motion gets from the runner: queue, replacement, arrival, abort, stand-still.
 #include <limits>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -51,6 +52,46 @@ class Turn : public Motion<> {
   ArgumentIndex speed_, duration_, fault_;
   MotionArguments request_;
   SetPoint from_;
+  double time_ = 0.0;
+};
+
+/// Declares one argument more than there may be, or exactly as many.
+template <int count>
+class Many : public Motion<> {
+ public:
+  void configure(MotionConfiguration& configuration) override {
+    for (int i = 0; i < count; ++i) {
+      configuration.argument("a" + std::to_string(i), "", 0.0, 0.0, 1.0);
+    }
+  }
+  void start(const MotionStart<>&) override {}
+  void computeReference(const MotionCycle&, MotionReference&) override {}
+  MotionState state() const override { return MotionState::Reached; }
+};
+
+/// Moves the hand along x with a constant speed for a second.
+class Slide : public Motion<> {
+ public:
+  void configure(MotionConfiguration&) override {}
+  void start(const MotionStart<>& start) override {
+    from_ = start.from.pose;
+    time_ = 0.0;
+  }
+  void computeReference(const MotionCycle& cycle, MotionReference& reference) override {
+    time_ = cycle.next;
+    reference.pose(at(cycle.time), at(cycle.next));
+  }
+  MotionState state() const override {
+    return time_ >= 1.0 ? MotionState::Reached : MotionState::Running;
+  }
+
+ private:
+  Pose at(double time) const {
+    Pose pose = from_;
+    pose.position.x() += 0.05 * std::min(time, 1.0);
+    return pose;
+  }
+  Pose from_;
   double time_ = 0.0;
 };
 
@@ -136,6 +177,142 @@ TEST_F(Runner, AnArmThatDoesNotArriveAborts) {
   EXPECT_EQ(arm.manager->report().reason.code(), ReasonCode::TargetNotReached);
 }
 
+TEST_F(Runner, AnArmThatIsHeldIsGivenUpAfterItsTimeInTheWordsOfItsKind) {
+  VirtualArm hand{DESCRIPTION_DIR, "slide: {settle_time: 0.5}"};
+  AuthoredController& slide = hand.load("slide", "test/Slide");
+  ASSERT_TRUE(slide.startMotion({}).success);
+  ASSERT_TRUE(ask(0.2, 1.0, false).success);
+  for (VirtualArm* one : {&arm, &hand}) {
+    one->run(0.5);
+    const JointVector held = one->sample.position;
+    int cycles = 0;
+    for (; cycles < 400 && one->state() == MotionState::Running; ++cycles) {
+      one->tick();
+      one->sample.position = held;
+    }
+    EXPECT_EQ(one->state(), MotionState::Aborted);
+    EXPECT_NEAR(cycles * one->period, 0.5 + 0.5, 0.03);
+  }
+  EXPECT_NE(arm.reason().find("the arm does not reach the target"), std::string::npos);
+  EXPECT_NE(hand.reason().find("the hand does not come to the goal"), std::string::npos);
+}
+
+TEST_F(Runner, AMotionThatIsReplacedBeforeItBeganIsToldToo) {
+  EXPECT_EQ(ask(0.2, 1.0, false).id, 0);
+  EXPECT_EQ(ask(0.2, 1.0, true).status, MotionAnswer::kQueued);
+  EXPECT_EQ(ask(-0.2, 1.0, false).id, 2);
+  const std::vector<EndedMotion> all = ends();
+  ASSERT_EQ(all.size(), 2u);
+  EXPECT_EQ(all[0].id, 0);
+  EXPECT_EQ(all[1].id, 1);
+  arm.run(1.5);
+  EXPECT_LT(joint(), kHome[0] - 0.15) << "the newest one";
+  ASSERT_EQ(ends().size(), 1u);
+}
+
+TEST_F(Runner, ALongRowOfMotionsKeepsItsOrderAcrossTheEndOfTheRing) {
+  std::vector<int> asked, done;
+  for (int i = 0; i < 9; ++i) {
+    for (int tries = 0; tries < 400; ++tries) {
+      const MotionAnswer answer = ask(0.1, 0.1 + 0.01 * i, true);
+      if (answer.success) asked.push_back(answer.id);
+      if (answer.success) break;
+      arm.run(0.05);
+    }
+  }
+  arm.run(3.0);
+  for (const EndedMotion& end : ends()) {
+    EXPECT_TRUE(end.executed);
+    done.push_back(end.id);
+  }
+  EXPECT_EQ(done, asked);
+  EXPECT_EQ(done.size(), 9u);
+}
+
+TEST_F(Runner, ASwitchAwayLeavesWhatWasReachedBehind) {
+  ask(0.1, 0.2, false);
+  arm.run(1.0);
+  ASSERT_EQ(arm.state(), MotionState::Reached);
+  std::string type;
+  ASSERT_TRUE(arm.manager->switchTo("", type).success);
+  MotionProgress progress;
+  ASSERT_TRUE(turn.readProgress(progress));
+  EXPECT_EQ(progress.state, MotionState::Idle);
+  EXPECT_EQ(MotionProgress().id, -1);
+  EXPECT_EQ(EndedMotion().id, -1);
+  EXPECT_FALSE(EndedMotion().executed);
+  EXPECT_EQ(MotionAnswer().status, MotionAnswer::kRejected);
+}
+
+TEST_F(Runner, AMotionHasSixteenArgumentsAtMost) {
+  EXPECT_TRUE(arm.manager->load("sixteen", "test/Sixteen").success);
+  const Answer one_more = arm.manager->load("seventeen", "test/Seventeen");
+  EXPECT_FALSE(one_more.success);
+  EXPECT_NE(one_more.message.find("at most 16 arguments; 'a16' is one more"), std::string::npos)
+      << one_more.message;
+}
+
+TEST_F(Runner, ArgumentsAreTakenAtTheEndsOfTheirRanges) {
+  for (const auto& [speed, fine] :
+       {std::pair(1.0, true), {-1.0, true}, {1.0001, false}, {-1.0001, false}}) {
+    EXPECT_EQ(ask(speed, 0.0, false).success, fine) << speed;
+    arm.tick();
+  }
+  EXPECT_EQ(turn.startMotion({{"speed", "speed"}, {0.1}, false}).code, ReasonCode::InvalidArgument);
+  EXPECT_NE(turn.describeArguments().find("duration: 1 s, 0 to 100\n"), std::string::npos);
+}
+
+/// Knows nothing of limits and borders; notes what it is told of the robot.
+class Plain : public MotionController {
+ public:
+  static inline bool allowed = false;
+  static inline int adopted = 0;
+
+  void configure(const MotionSetup&) override {}
+  void adopt(const CycleInput& input) override {
+    allowed = input.motion_allowed;
+    ++adopted;
+  }
+  void start(const CycleInput&) override {}
+  void stop() override {}
+  void abort(const Reason&) override {}
+  void computeReference(const CycleInput&, References&) override {}
+  void resolve(const CycleInput&, References&) override {}
+  MotionState state() const override { return MotionState::Idle; }
+  const Reason& reason() const override { return reason_; }
+
+ private:
+  Reason reason_;
+};
+
+MotionController* makePlain() { return new Plain(); }
+
+TEST_F(Runner, AControllerIsToldWhetherItMayMoveInEveryCycleAndNotWithoutAJointState) {
+  MotionTypes::instance().insert("test/Plain", {makePlain, nullptr});
+  ASSERT_TRUE(arm.manager->load("plain", "test/Plain").success);
+  std::string type;
+  ASSERT_TRUE(arm.manager->switchTo("plain", type).success);
+  arm.tick();
+  EXPECT_TRUE(Plain::allowed);
+  const int before = Plain::adopted;
+  arm.manager->cycle().idle(arm.now_ns + 1'000'000);
+  EXPECT_FALSE(Plain::allowed);
+  EXPECT_EQ(Plain::adopted, before + 1);
+  arm.sample.block = MotionBlock::Held;
+  arm.tick();
+  EXPECT_FALSE(Plain::allowed);
+}
+
+TEST(Defaults, OfAControllerAreThatItSlowsNothingAndWaitsForNothing) {
+  EXPECT_EQ(Plain().limitScale(), 1.0);
+  EXPECT_FALSE(Plain().waitsAtBorder());
+  const RunnerPolicy policy;
+  EXPECT_FALSE(policy.open_end);
+  EXPECT_FALSE(policy.waits_at_border);
+  EXPECT_EQ(policy.longest_queue, 64);
+  EXPECT_STREQ(policy.id_name, "motion_id");
+}
+
 TEST_F(Runner, FaultsOfAMotionEndInStandStillWithTheReason) {
   EXPECT_TRUE(ask(0.2, 1.0, false, 4.0).success);
   arm.run(1.0);
@@ -170,3 +347,21 @@ TEST_F(Runner, ProgressTellsIdStateTimeAndQueue) {
 }  // namespace coglab_controllers
 
 COGLAB_REGISTER_MOTION("test/Turn", coglab_controllers::Turn)
+
+namespace {
+using coglab_controllers::AuthoredController;
+using coglab_controllers::MotionRegistration;
+const MotionRegistration slide("test/Slide", {[] {
+                                                return AuthoredController::make(
+                                                    std::make_unique<coglab_controllers::Slide>());
+                                              },
+                                              nullptr});
+const MotionRegistration sixteen(
+    "test/Sixteen",
+    {[] { return AuthoredController::make(std::make_unique<coglab_controllers::Many<16>>()); },
+     nullptr});
+const MotionRegistration seventeen(
+    "test/Seventeen",
+    {[] { return AuthoredController::make(std::make_unique<coglab_controllers::Many<17>>()); },
+     nullptr});
+}  // namespace

@@ -72,6 +72,73 @@ TEST(Touch, BadMessagesAreRefusedWithWords) {
   EXPECT_EQ(refusal(message), "expected finite forces, got one that is not");
 }
 
+TEST(Touch, EachFingerAndEachDirectionHasItsPlace) {
+  for (int finger = 0; finger < 5; ++finger) {
+    coglab_msgs::FingertipForces message;
+    message.header.frame_id = "tool";
+    message.fingers = {static_cast<decltype(message.fingers)::value_type>(finger)};
+    message.forces = {vector(1, 2, 3)};
+    message.palm = vector(4, 5, 6);
+    TouchForces forces{};
+    for (int axis = 0; axis < 3; ++axis) {
+      forces[static_cast<std::size_t>(3 * finger + axis)] = 1.0 + axis;
+      forces[static_cast<std::size_t>(15 + axis)] = 4.0 + axis;
+    }
+    EXPECT_EQ(touchForcesOf(message, "tool"), forces) << finger;
+  }
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const auto& bad : {vector(nan, 0, 0), vector(0, nan, 0), vector(0, 0, nan)}) {
+    auto message = touched();
+    message.forces[1] = bad;
+    EXPECT_THROW(touchForcesOf(message, "ih2_palm"), std::invalid_argument);
+  }
+  auto message = touched();
+  message.fingers.push_back(0);
+  EXPECT_THROW(touchForcesOf(message, "ih2_palm"), std::invalid_argument);
+  message = touched();
+  message.fingers[2] = -1;
+  EXPECT_THROW(touchForcesOf(message, "ih2_palm"), std::invalid_argument);
+}
+
+TEST(RobotStates, AreThoseOfTheMeasurementWithTheWrenchTurnedIntoTheBase) {
+  using ctrl_more::RobotSource;
+  FeedbackStage stage(*setup("{wrench_link: lwr_link_7}"), 0.005, true);
+  CycleInput input;
+  for (int i = 0; i < 7; ++i) {
+    input.robot.position[i] = 0.1 * i;
+    input.robot.velocity[i] = 1.0 + i;
+    input.robot.torque[i] = 10.0 + i;
+    input.robot.external_torque[i] = 20.0 + i;
+  }
+  input.robot.tool_wrench << 1, 2, 3, 4, 5, 6;
+  input.robot.stamp_ns = 77;
+  const auto robot = setup("{wrench_link: lwr_link_7}");
+  input.chain = robot->chain.evaluate(input.robot.position);
+  ASSERT_TRUE(stage.fill(input));
+  const auto read = [&](RobotSource source, const char* name, int size) {
+    const auto signal = stage.robot().find(source, name);
+    EXPECT_EQ(signal.size(), size) << name;
+    EXPECT_EQ(stage.robot().stamp(signal), 77) << name;
+    const auto view = stage.robot().view(signal);
+    return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(view.data(), view.size()));
+  };
+  EXPECT_EQ(read(RobotSource::Measured, "joint_position", 7), input.robot.position);
+  EXPECT_EQ(read(RobotSource::Measured, "joint_velocity", 7), input.robot.velocity);
+  EXPECT_EQ(read(RobotSource::Measured, "joint_torque", 7), input.robot.torque);
+  EXPECT_EQ(read(RobotSource::Measured, "external_torque", 7), input.robot.external_torque);
+  const Eigen::VectorXd pose = read(RobotSource::Estimated, "ee", 7);
+  EXPECT_EQ(pose.head<3>(), input.chain.tool.position);
+  EXPECT_EQ(pose.tail<4>(), input.chain.tool.orientation.coeffs());
+  const Chain flange(readText(std::string(DESCRIPTION_DIR) + "/urdf/lwr_ih2.urdf"), "lwr_base_link",
+                     "lwr_link_7");
+  const Quaternion turn = flange.evaluate(input.robot.position).tool.orientation;
+  const Eigen::VectorXd wrench = read(RobotSource::Measured, "wrench", 6);
+  EXPECT_LT((wrench.head<3>() - turn * Vector3(1, 2, 3)).norm(), 1e-9);
+  EXPECT_LT((wrench.tail<3>() - turn * Vector3(4, 5, 6)).norm(), 1e-9);
+  input.robot.torque[3] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(stage.fill(input));
+}
+
 TEST(Touch, SignalIsThereOnlyIfTheHandHasSensors) {
   using ctrl_more::RobotSource;
   FeedbackStage without(*setup("{}"), 0.005, true);

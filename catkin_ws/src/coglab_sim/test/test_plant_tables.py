@@ -253,3 +253,11 @@ def test_phalanges_weigh_less_than_the_whole_hand(tmp_path):
     hand(tmp_path, replaced("mass: 0.018", f"mass: {whole - rest - 0.003:f}", HAND))
     with pytest.raises(ValueError, match=r"phalanges weigh 0.\d+ kg, more than the whole hand ih2_base_link in .*, 0"):
         hand(tmp_path, replaced("mass: 0.018", f"mass: {whole - rest + 1e-3:f}", HAND))
+
+
+@pytest.mark.parametrize("text", ["<robot", "<robot name='a'/>", "no robot at all", ""])
+def test_a_description_that_holds_no_robot_is_refused_with_its_name(tmp_path, text):
+    path = tmp_path / "robot.urdf"
+    path.write_text(text)
+    with pytest.raises(RuntimeError, match="robot.urdf"):
+        _cell.arm_terms(str(path), [0.0] * 7, [0.0] * 7)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 import pathlib
+import re
 import signal
 import subprocess
 import sys
@@ -15,17 +16,20 @@ import rospy
 import rostest
 from coglab_msgs.msg import LwrState, ReasonCode
 from coglab_msgs.srv import LwrCommand
+from diagnostic_msgs.msg import DiagnosticStatus
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import JointState
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
-from lwr_node_support import LIMIT, Twist, bound_port, node_binary, wait_for
+from lwr_node_support import LIMIT, Diagnostics, Twist, bound_port, node_binary, wait_for
 from udp_controller import UdpController
 
 
 class LwrNodeProcesses(unittest.TestCase):
-    def second_node(self, name: str) -> tuple[subprocess.Popen, UdpController, Twist]:
+    def second_node(self, name: str, **parameters) -> tuple[subprocess.Popen, UdpController, Twist]:
         """Another bridge with a controller of its own, moving A1 at 0.5 rad/s."""
+        for parameter, value in parameters.items():
+            rospy.set_param(f"/{name}/{parameter}", value)
         rospy.set_param(f"/{name}/fri_port", 0)
         rospy.set_param(f"/{name}/rt_priority", 0)
         rospy.set_param(f"/{name}/receive_timeout", 2.0)  # of a controller played in Python
@@ -97,14 +101,25 @@ class LwrNodeProcesses(unittest.TestCase):
         rospy.set_param("/lwr_six/rt_priority", 0)
         told: list[str] = []
         rospy.Subscriber("/rosout", Log, lambda m: told.append(m.msg))
+        commands, connection = Diagnostics("lwr_six: commands"), Diagnostics("lwr_six: FRI connection")
+        began = time.monotonic()
         node = subprocess.Popen([node_binary(), "__name:=lwr_six", "_lwr_namespace:=/lwr_six"], env=os.environ)
         try:
             port = bound_port("/lwr_six")
-            wait_for(
-                lambda: any(f"no valid packet received on port {port} for" in m for m in told),
-                "the warning",
-            )
+            said = re.compile(rf"no valid packet received on port {port} for (\d+) s")
+            warning = wait_for(lambda: next((m for m in map(said.search, told) if m), None), "the warning")
+            self.assertGreater(time.monotonic() - began, 4.9)
+            self.assertTrue(5 <= int(warning[1]) < 10, warning[0])
+            # Nothing was asked of it and nothing refused; of the connection it says the same.
+            quiet = wait_for(lambda: commands.told, "diagnostics")[0]
+            self.assertEqual((quiet.level, quiet.message), (DiagnosticStatus.OK, "ok"))
+            self.assertEqual({int(v.value) for v in quiet.values}, {0})
+            status = wait_for(lambda: connection.told, "diagnostics")[-1]
+            self.assertEqual((status.level, status.values[0].value), (2, str(ReasonCode.ROBOT_DISCONNECTED)))
+            self.assertLess(int(said.search(status.message)[1]), LIMIT)
         finally:
+            commands.close()
+            connection.close()
             node.send_signal(signal.SIGINT)
             self.assertEqual(node.wait(timeout=LIMIT), 0)
 
@@ -163,6 +178,34 @@ class LwrNodeProcesses(unittest.TestCase):
             subscriber.unregister()
             self.end(node, robot, twist)
 
+    def test_without_quiet_restart_every_start_is_the_users(self) -> None:
+        node, robot, twist = self.second_node("lwr_eleven", quiet_restart=False, joint_states_rate=20.0)
+        states: list[LwrState] = []
+        joints: list[float] = []
+        subscribers = [
+            rospy.Subscriber("/lwr_eleven/state", LwrState, states.append),
+            rospy.Subscriber("/lwr_eleven/joint_states", JointState, lambda _: joints.append(time.monotonic())),
+        ]
+        try:
+            twist.stop()
+            wait_for(lambda: robot.steps and max(robot.steps[-200:]) < 1e-6, "standing still")
+            joints.clear()
+            wait_for(lambda: len(joints) > 40, "forty joint states")
+            self.assertGreater(joints[40] - joints[0], 0.9)  # at 20 Hz 1.8 s
+            robot.silent = True
+            wait_for(lambda: states and states[-1].supervisor == "disconnected", "the loss")
+            robot.silent = False
+            wait_for(lambda: states[-1].supervisor == "stopped", "the controller again")
+            answered = robot.answered
+            wait_for(lambda: robot.answered > answered + 200, "a second")
+            self.assertEqual({s.supervisor for s in states[-3:]}, {"stopped"})
+            start = rospy.ServiceProxy("/lwr_eleven/command", LwrCommand)("start")
+            self.assertTrue(start.success, start.message)
+        finally:
+            for subscriber in subscribers:
+                subscriber.unregister()
+            self.end(node, robot, twist)
+
     def test_parameters_out_of_range_are_refused_at_start(self) -> None:
         for name, value, expected in (
             ("set_point_leash/position", 7.0, "= 7 is outside its range 0.005..0.5"),
@@ -192,7 +235,7 @@ class LwrNodeProcesses(unittest.TestCase):
                 text=True,
                 timeout=LIMIT,
             )
-            self.assertNotEqual(run.returncode, 0, name)
+            self.assertEqual(run.returncode, 1, name)
             self.assertIn(expected, run.stdout)
             self.assertIn(name.split("/")[-1] if name != "limits_profile" else "t9", run.stdout)
 

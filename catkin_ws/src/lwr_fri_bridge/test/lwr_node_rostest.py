@@ -14,14 +14,14 @@ import rospy
 import rostest
 from coglab_msgs.msg import LwrState, ReasonCode
 from coglab_msgs.srv import LwrCommand
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import WrenchStamped
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import JointState
-from std_msgs.msg import String
+from std_msgs.msg import Float64, String
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
-from lwr_node_support import LIMIT, Twist, bound_port, refusals, target_message, wait_for
+from lwr_node_support import LIMIT, Diagnostics, Twist, bound_port, refusals, target_message, wait_for
 from udp_controller import UdpController
 
 
@@ -180,6 +180,24 @@ class LwrNode(unittest.TestCase):
         wait_for(lambda: self.robot.position[0] > before[0], "motion made after the reset")
         self.ask("stop")
 
+    def test_outcomes_of_events_go_to_the_log_once(self) -> None:
+        told: list[str] = []
+        subscriber = rospy.Subscriber("/rosout", Log, lambda m: told.append(m.msg))
+
+        def said(line: str, event: str) -> bool:
+            self.events.publish(event)
+            return wait_for(lambda: any(line in one for one in told), line)
+
+        # Until the log is connected.
+        wait_for(lambda: self.events.publish("reset") or any("lwr: reset: nothing to do" in m for m in told), "the log")
+        said("lwr: hold: done", "hold")
+        said("lwr: start refused: hold is latched", "start")
+        said("lwr: ros_events: unknown event 'jump'", "jump")
+        said("lwr: reset: done", "reset")
+        subscriber.unregister()
+        self.assertEqual(sum("lwr: hold: done" in line for line in told), 1)
+        self.assertFalse([line for line in told if "not finished yet" in line])
+
     def test_modes_change_in_monitor_mode_only(self) -> None:
         self.ask("joint_impedance stiffness 500 damping 0.7")
         self.assertIn("JNT_IMP", self.ask("start"))
@@ -200,7 +218,59 @@ class LwrNode(unittest.TestCase):
         known = (str(ReasonCode.NONE), str(ReasonCode.SECOND_SENDER))
         self.assertIn(found["FRI connection"]["reason_code"], known)
         self.assertTrue(all("reason_code" in values for values in found.values()))
-        self.assertEqual(float(found["arm"]["temperature lwr_a6 (degC)"]), 36.0)
+        for joint, degrees in zip(("a1", "a2", "e1", "a3", "a4", "a5", "a6"), range(30, 37), strict=True):
+            self.assertEqual(float(found["arm"][f"temperature lwr_{joint} (degC)"]), degrees)
+
+    def test_refusals_are_counted_by_their_reason_and_warned_of_once(self) -> None:
+        self.ask("start")
+        wait_for(lambda: self.states[-1].motion_allowed, "permission")
+        epoch = self.states[-1].motion_epoch
+        told = Diagnostics("lwr: commands")
+        self.refused_as(told, "not valid", [0.2] * 6)
+        self.refused_as(told, "stamp missing", [0.2] * 7, age=0.15)  # topic_timeout is 0.1 s
+        self.refused_as(told, "made before motion", [0.2] * 7, epoch=str(epoch - 1))
+        self.ask("stop")
+        self.refused_as(told, "motion not allowed", [0.2] * 7)
+        told.close()
+
+    def refused_as(self, told: Diagnostics, reason: str, velocity: list[float], **made) -> None:
+        """Publishes such velocities: they are refused for that reason alone, and warned of as long as they come."""
+
+        def counts(status: DiagnosticStatus) -> dict[str, int]:
+            return {v.key[9:]: int(v.value) for v in status.values if v.key.startswith("refused: ")}
+
+        before = counts(told.next(lambda status: status.level == DiagnosticStatus.OK, "a quiet status"))
+        known = len(told.told)
+        for _ in range(5):
+            self.target.publish(target_message(velocity, **made))
+            time.sleep(0.02)
+        status = wait_for(lambda: next((s for s in told.told[known:] if counts(s) != before), None), reason)
+        after = counts(status)
+        changed = [key for key in after if after[key] != before[key]]
+        self.assertEqual(len(changed), 1, changed)
+        self.assertTrue(changed[0].startswith(reason), changed)
+        self.assertGreater(after[changed[0]], before[changed[0]])
+        self.assertEqual((status.level, status.message), (DiagnosticStatus.WARN, "target velocities were refused"))
+        self.assertEqual(status.values[0].value, str(ReasonCode.COMMANDS_REFUSED))
+
+    def test_hot_drives_are_named(self) -> None:
+        told = Diagnostics("lwr: arm")
+        try:
+            self.robot.temperature[0] = 71.0
+            status = told.next(lambda s: "hot" in s.message, "the heat")
+            self.assertEqual((status.level, status.message), (DiagnosticStatus.WARN, "drives are hot: lwr_a1"))
+        finally:
+            self.robot.temperature[0] = 30.0
+        told.next(lambda s: s.level == DiagnosticStatus.OK, "the drive has cooled")
+        told.close()
+
+    def test_latency_is_told_at_most_20_times_a_second(self) -> None:
+        told: list[tuple[float, float]] = []
+        subscriber = rospy.Subscriber("/lwr/fri_latency", Float64, lambda m: told.append((time.monotonic(), m.data)))
+        wait_for(lambda: len(told) > 20, "twenty latencies")
+        subscriber.unregister()
+        self.assertGreater(told[20][0] - told[0][0], 0.7)
+        self.assertAlmostEqual(told[0][1], 0.0021, places=6)
 
     def test_a_second_sender_is_ignored_and_named(self) -> None:
         told: list[str] = []
@@ -240,6 +310,7 @@ class LwrNode(unittest.TestCase):
             )
             rospy.sleep(1.0)
             self.assertEqual(self.robot.position[6], before)
+            self.assertGreater(refusals("another publisher"), 0)
             twist.stop()  # a pause longer than topic_timeout: now the other one may
             wait_for(lambda: self.robot.position[6] > before + 0.05, "the other one's motion")
         finally:

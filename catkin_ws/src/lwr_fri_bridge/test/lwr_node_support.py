@@ -6,7 +6,7 @@ import subprocess
 import time
 
 import rospy
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from sensor_msgs.msg import JointState
 
 LIMIT = 20.0  # s, for everything that is waited for
@@ -49,6 +49,26 @@ def refusals(reason: str) -> int:
 
     values = wait_for(commands, "diagnostics of the commands").values
     return next(int(v.value) for v in values if v.key.startswith(f"refused: {reason}"))
+
+
+class Diagnostics:
+    """Every status of /diagnostics with one name, such as "lwr: arm", from now on."""
+
+    def __init__(self, name: str) -> None:
+        self.told: list[DiagnosticStatus] = []
+        self._name = name
+        self._subscriber = rospy.Subscriber("/diagnostics", DiagnosticArray, self._take)
+
+    def _take(self, message: DiagnosticArray) -> None:
+        self.told += [status for status in message.status if status.name.split("/")[-1] == self._name]
+
+    def next(self, condition, what: str) -> DiagnosticStatus:
+        """The first one from now on that meets the condition."""
+        known = len(self.told)
+        return wait_for(lambda: next((s for s in self.told[known:] if condition(s)), None), what)
+
+    def close(self) -> None:
+        self._subscriber.unregister()
 
 
 class Twist:

@@ -6,68 +6,27 @@
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
-#include <functional>
 #include <random>
 #include <stdexcept>
 #include <thread>
 #include <vector>
 
-#include <arpa/inet.h>
-#include <netinet/in.h>
 #include <sys/resource.h>
-#include <sys/socket.h>
-#include <sys/time.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "lwr_fri_bridge/bridge/fri_thread.hpp"
 #include "small_controller.hpp"
+#include "udp_peer.hpp"
 
 namespace lwr_fri_bridge {
 namespace {
 
-class Peer {
- public:
-  explicit Peer(int port, std::uint32_t address = INADDR_LOOPBACK)
-      : fd_(socket(AF_INET, SOCK_DGRAM, 0)) {
-    sockaddr_in own{};
-    own.sin_family = to_.sin_family = AF_INET;
-    own.sin_addr.s_addr = htonl(address);
-    bind(fd_, reinterpret_cast<sockaddr*>(&own), sizeof own);
-    to_.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    to_.sin_port = htons(static_cast<std::uint16_t>(port));
-    timeval timeout{};
-    timeout.tv_usec = 300'000;
-    setsockopt(fd_, SOL_SOCKET, SO_RCVTIMEO, &timeout, sizeof timeout);
-  }
-  ~Peer() { close(fd_); }
-  void send(const void* data, std::size_t size) {
-    sendto(fd_, data, size, 0, reinterpret_cast<sockaddr*>(&to_), sizeof to_);
-  }
-  void send(const fri::MeasurementDatagram& m) { send(&m, sizeof m); }
-  bool receive(fri::CommandDatagram& c) {
-    return recv(fd_, &c, sizeof c, 0) == static_cast<ssize_t>(sizeof c);
-  }
-
- private:
-  int fd_;
-  sockaddr_in to_{};
-};
-
-bool eventually(const std::function<bool()>& condition) {
-  for (int i = 0; i < 500 && !condition(); ++i)
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  return condition();
-}
+using test::eventually;
+using test::Peer;
 
 struct Fixture : testing::Test {
   Fixture() : bridge(test::defaultConfig()), fri(bridge, options()), robot(0.005) { fri.start(); }
-  static FriThreadOptions options() {
-    FriThreadOptions o;
-    o.port = 0;
-    o.priority = 0;
-    return o;
-  }
+  static FriThreadOptions options() { return test::anyPort(); }
   Bridge bridge;
   FriThread fri;
   test::SmallController robot;

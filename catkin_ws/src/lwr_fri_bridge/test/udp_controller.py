@@ -21,6 +21,7 @@ class UdpController:
         self.offset = [0.0] * 7
         self.state, self.control = 1, 1
         self.obeys, self.silent = True, False
+        self.temperature = [30.0, 31.0, 32.0, 33.0, 34.0, 35.0, 36.0]
         self.answered = 0
         self.steps: list[float] = []  # largest joint step per cycle in command mode, rad
         self.requests: list[tuple[int, float]] = []  # request, largest step of the cycle before it
@@ -79,7 +80,8 @@ class UdpController:
                         "external_wrench": [1, 2, 3, 4, 5, 6],
                         "measured_torque": [1, 2, 3, 4, 5, 6, 7],
                         "external_torque": [7, 6, 5, 4, 3, 2, 1],
-                        "temperature": [30, 31, 32, 33, 34, 35, 36],
+                        "temperature": self.temperature,
+                        "latency": 0.0021,
                         "krl_ints": [self._finished, 1 if self._finished else 0] + [0] * 13 + [4010],
                     }
                 ),

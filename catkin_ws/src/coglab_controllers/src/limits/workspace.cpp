@@ -35,8 +35,8 @@ Workspace::Workspace(const WorkspaceParameters& parameters, double reach)
         "workspace base sphere: expected a finite centre and a radius from 0 to 10 m, got " +
         std::to_string(p.base_radius));
   }
-  if (!(p.max_stretch > 0.2 && p.max_stretch <= 1.0)) {
-    throw std::invalid_argument("max_stretch: expected a share above 0.2 and up to 1, got " +
+  if (!(p.max_stretch >= 0.2 && p.max_stretch <= 1.0)) {
+    throw std::invalid_argument("max_stretch: expected a share from 0.2 to 1, got " +
                                 std::to_string(p.max_stretch));
   }
   bool room = false;

@@ -22,7 +22,8 @@ JointVector furthest(const RobotSample& sample, const JointVector& velocity) {
 bool finite(const RobotSample& sample) {
   return sample.position.allFinite() && sample.velocity.allFinite() && sample.torque.allFinite() &&
          sample.external_torque.allFinite() && sample.tool_wrench.allFinite() &&
-         sample.commanded_position.allFinite() && sample.commanded_velocity.allFinite();
+         sample.commanded_position.allFinite() && sample.commanded_velocity.allFinite() &&
+         sample.commanded_acceleration.allFinite();
 }
 
 }  // namespace

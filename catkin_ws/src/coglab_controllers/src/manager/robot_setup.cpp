@@ -60,7 +60,7 @@ std::shared_ptr<const RobotSetup> makeRobotSetup(const std::string& urdf,
   guard.workspace.box_max = space.numbers("box_max", guard.workspace.box_max);
   guard.workspace.base_centre = space.numbers("base_centre", guard.workspace.base_centre);
   guard.workspace.base_radius = space.number("base_radius", guard.workspace.base_radius, 0.0, 5.0);
-  guard.workspace.max_stretch = space.number("max_stretch", guard.workspace.max_stretch, 0.1, 1.0);
+  guard.workspace.max_stretch = space.number("max_stretch", guard.workspace.max_stretch, 0.2, 1.0);
   guard.workspace_deceleration =
       space.number("deceleration", guard.workspace_deceleration, 0.05, 20.0);
 

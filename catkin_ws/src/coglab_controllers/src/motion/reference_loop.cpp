@@ -27,7 +27,7 @@ void ReferenceLoop::configure(const MotionSetup& setup) {
       parameters.number("rot_clik_gain", std::min(ik.rot_clik_gain, most), 0.0, most);
   ik.correction_speed = parameters.number("correction_speed", kCorrectionSpeed, 1e-3, 10.0);
   ik.singularity_threshold =
-      parameters.number("singularity_threshold", ik.singularity_threshold, 0.0, 1.0);
+      parameters.number("singularity_threshold", ik.singularity_threshold, 1e-6, 1.0);
   ik.rotation_first_scaling = parameters.flag("rotation_first_scaling", ik.rotation_first_scaling);
   ik.velocity_limit = robot_->limits.velocity;
   ik.acceleration_limit = robot_->limits.acceleration;

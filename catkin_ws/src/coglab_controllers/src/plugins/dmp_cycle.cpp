@@ -50,7 +50,7 @@ MotionEndParameters readEnd(const Parameters& parameters) {
   end.turning = parameters.number("end_turning", end.turning, 1e-6, 10.0);
   end.distance = parameters.number("end_distance", end.distance, 1e-6, 0.5);
   end.follow_distance = parameters.number("follow_distance", end.follow_distance, 1e-3, 1.0);
-  end.follow_time = parameters.number("follow_time", end.follow_time, 0.0, 10.0);
+  end.follow_time = parameters.number("follow_time", end.follow_time, 1e-6, 10.0);
   return end;
 }
 

@@ -1,5 +1,6 @@
 // The tf2 helper of D4.10: any frame, with an offset, to dmp_goal in dmp_frame_name.
 #include <cstdint>
+#include <cstdio>
 #include <exception>
 #include <string>
 
@@ -106,7 +107,8 @@ int main(int argc, char** argv) {
     coglab_rt::LoggerServices logger_services;
     coglab_controllers::GoalHelper(ros::NodeHandle(), ros::NodeHandle("~")).run();
   } catch (const std::exception& error) {
-    ROS_FATAL("%s", error.what());
+    // ROS ended with the node's last handle, and its log would print nothing any more.
+    std::fprintf(stderr, "goal_helper_node: %s\n", error.what());
     return 1;
   }
   return 0;

@@ -69,15 +69,15 @@ Diagnosis diagnoseConnection(const Snapshot& s, const FriThreadStatistics& threa
 Diagnosis diagnoseArm(const Snapshot& s, double hot) {
   if (s.supervisor == SupervisorState::Disconnected)
     return {Severity::Warning, "not connected", ReasonCode::RobotDisconnected};
-  if (s.drive_error != 0)
-    return {Severity::Error, "drive error: " + jointsIn(s.drive_error), ReasonCode::DriveError};
+  // Only seven drives are there; the bits above them say nothing.
+  if (const unsigned drives = s.drive_error & fri::kAllDrivesOn; drives != 0)
+    return {Severity::Error, "drive error: " + jointsIn(drives), ReasonCode::DriveError};
   unsigned hot_joints = 0;
   for (unsigned i = 0; i < 7; ++i) hot_joints |= s.temperature[i] > hot ? 1U << i : 0U;
   if (hot_joints != 0)
     return {Severity::Warning, "drives are hot: " + jointsIn(hot_joints), ReasonCode::DriveWarning};
-  if (s.drive_warning != 0)
-    return {Severity::Warning, "drive warning: " + jointsIn(s.drive_warning),
-            ReasonCode::DriveWarning};
+  if (const unsigned drives = s.drive_warning & fri::kAllDrivesOn; drives != 0)
+    return {Severity::Warning, "drive warning: " + jointsIn(drives), ReasonCode::DriveWarning};
   const std::string reason = reasonOf(s.sample.block, s.sample.blocking_joint, s.loss);
   return {Severity::Ok, reason.empty() ? "motion is allowed" : reason,
           codeOf(s.sample.block, s.loss)};

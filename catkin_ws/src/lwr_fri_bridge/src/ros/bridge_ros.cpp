@@ -173,6 +173,7 @@ void BridgeRos::onEvent(const std_msgs::String& message) {
 bool BridgeRos::onCommand(coglab_msgs::LwrCommand::Request& request,
                           coglab_msgs::LwrCommand::Response& response) {
   if (closing_) {
+    response.reason_code = coglab_msgs::ReasonCode::STOPPING;
     response.message = "this node is ending: the arm stops and takes no command";
     return true;
   }

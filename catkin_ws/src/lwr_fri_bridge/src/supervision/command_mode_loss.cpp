@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kFading = 1.0;       // s, time constant of what is remembered
 constexpr double kLateCycles = 3.0;   // lateness that may cost command mode
-constexpr double kLostPackets = 3.0;  // the same for packets lost on the way
+constexpr double kLostPackets = 2.5;  // of packets lost on the way: three, of which the first fade
 constexpr double kRestSpeed = 0.02;   // rad/s; the velocity filter's noise lies far below
 constexpr double kRestTime = 0.5;     // s at rest before the loss
 constexpr double kCalmTime = 0.1;     // s at rest before a restart

@@ -1,0 +1,146 @@
+"""The goal helper on ROS: which frames it passes on, where, how often, and what its parameters may be."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+import rosgraph
+import rospy
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from coglab_msgs.msg import DmpGoal
+from geometry_msgs.msg import TransformStamped
+from own_master import own_master
+from robot_fixture import wait_until
+from tf2_msgs.msg import TFMessage
+
+TOPIC = "/controller_manager/dmp/dmp_goal"
+
+
+def helper() -> str:
+    """Path of the node in the sourced workspace."""
+    for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(":"):
+        path = Path(prefix) / "lib" / "coglab_controllers" / "goal_helper_node"
+        if path.is_file():
+            return str(path)
+    pytest.fail("goal_helper_node is not built, or its workspace not sourced: ./coglab build, then ./coglab test")
+
+
+class Tracker:
+    """Tells frames, and hears the goals that come of them."""
+
+    def __init__(self, topic: str) -> None:
+        self.goals: list[DmpGoal] = []
+        self.moving = rospy.Publisher("/tf", TFMessage, queue_size=100)
+        self.still = rospy.Publisher("/tf_static", TFMessage, queue_size=10, latch=True)
+        self.heard = rospy.Subscriber(topic, DmpGoal, self.goals.append)
+        wait_until(
+            lambda: self.heard.get_num_connections() > 0 and self.moving.get_num_connections() > 0, 20.0, "the helper"
+        )
+
+    @staticmethod
+    def frame(name: str, x: float, base: str = "lwr_base_link") -> TransformStamped:
+        """Turned by a quarter about z."""
+        message = TransformStamped(child_frame_id=name)
+        message.header.frame_id, message.header.stamp = base, rospy.Time.now()
+        message.transform.translation.x = x
+        message.transform.rotation.z = message.transform.rotation.w = 0.5**0.5
+        return message
+
+    def see(self, name: str, x: float, wait: float = 0.04) -> rospy.Time:
+        """One frame of a camera of 25 Hz; its stamp."""
+        message = self.frame(name, x)
+        self.moving.publish(TFMessage([message]))
+        rospy.sleep(wait)
+        return message.header.stamp
+
+
+@contextmanager
+def running(hear: str = TOPIC, **parameters: object) -> Iterator[tuple[Tracker, subprocess.Popen]]:
+    for name, value in parameters.items():
+        rospy.set_param(f"/goal_helper/{name}", value)
+    node = subprocess.Popen([helper()], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        tracker = Tracker(hear)
+        yield tracker, node
+        tracker.heard.unregister()
+    finally:
+        node.kill()
+        node.wait(timeout=20.0)
+        for name in parameters:
+            rospy.delete_param(f"/goal_helper/{name}")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def master() -> Iterator[rosgraph.Master]:
+    with own_master() as running_master:
+        rospy.init_node("goal_helper_test", disable_signals=True)
+        yield running_master
+        rospy.signal_shutdown("the test is over")
+
+
+def test_a_frame_that_moves_is_passed_on_once_it_agrees_each_once_and_without_what_leaps() -> None:
+    with running(offset=[0.1, 0.0, 0.02]) as (tracker, node):
+        stamps = [tracker.see("human_hand", 0.5 + 0.001 * i) for i in range(12)]
+        wait_until(lambda: len(tracker.goals) >= 10, 5.0, "goals from the third frame on")
+        told = [goal.header.stamp for goal in tracker.goals]
+        assert told == stamps[2:] and len(told) == 10
+        goal = tracker.goals[-1]
+        assert goal.header.frame_id == "lwr_base_link"
+        place = (goal.goal.x, goal.goal.y, goal.goal.z)
+        assert place == pytest.approx((0.511, 0.1, 0.02), abs=1e-9), "the offset turns with the frame"
+        leap = tracker.see("human_hand", 0.9)
+        back = tracker.see("human_hand", 0.512)
+        wait_until(lambda: tracker.goals[-1].header.stamp == back, 5.0, "the frame after the leap")
+        assert leap not in [goal.header.stamp for goal in tracker.goals]
+        node.send_signal(signal.SIGINT)
+        assert node.wait(timeout=10.0) == 0
+
+
+def test_a_static_frame_is_told_at_once_and_then_once_a_second_where_it_is_asked_for() -> None:
+    with running("/elsewhere", topic="elsewhere", frame="cup", dmp_frame_name="table") as (tracker, _):
+        tracker.still.publish(TFMessage([Tracker.frame("cup", 0.3, "table")]))
+        wait_until(lambda: len(tracker.goals) == 1, 5.0, "the first one")
+        begun = rospy.get_time()
+        wait_until(lambda: len(tracker.goals) >= 3, 10.0, "two more")
+        assert rospy.get_time() - begun > 1.8
+        goal = tracker.goals[-1]
+        assert (goal.header.frame_id, goal.header.stamp) == ("table", rospy.Time())
+        assert (goal.goal.x, goal.goal.y, goal.goal.z) == pytest.approx((0.3, 0.0, 0.0), abs=1e-9), (
+            "no offset by default"
+        )
+
+
+@pytest.mark.parametrize(
+    "name, value, expected",
+    [
+        ("rate", 0.09375, "a number from 0.1 to 1000, got 0.09375"),
+        ("rate", 1001.0, "a number from 0.1 to 1000, got 1001"),
+        ("offset", [0.0, 0.0], "3 finite numbers, got "),
+        ("frame", [1.0], "a text, got "),
+        ("dmp_frame_name", [1.0], "a text, got "),
+        ("topic", [1.0], "a text, got "),
+    ],
+)
+def test_a_parameter_that_cannot_be_used_ends_the_start_and_is_named(name: str, value: object, expected: str) -> None:
+    rospy.set_param(f"/goal_helper/{name}", value)
+    try:
+        ended = subprocess.run([helper()], timeout=60.0, check=False, stderr=subprocess.PIPE, text=True)
+    finally:
+        rospy.delete_param(f"/goal_helper/{name}")
+    assert ended.returncode == 1
+    told = f"parameter goal_helper/{name}: expected {expected}"
+    assert ended.stderr.count(told) == 1, ended.stderr
+
+
+def test_the_ends_of_the_range_of_rates_are_taken() -> None:
+    for rate in (0.1, 1000.0):
+        with running(rate=rate) as (_, node):
+            assert node.poll() is None

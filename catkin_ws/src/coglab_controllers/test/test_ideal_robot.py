@@ -1,0 +1,318 @@
+"""The ideal arm and the manager on ROS, in one process: topics, services, states and ends as docs/reference.md says."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+import rosgraph
+import rospy
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from coglab_msgs.msg import ControllerStatus, DmpFeedback, FinishedPtp, LwrState, ReasonCode, UnfinishedPtp
+from coglab_msgs.srv import (
+    AddPtp,
+    CancelMotion,
+    GetActiveController,
+    ListControllers,
+    LoadController,
+    LwrCommand,
+    SetSpeedScale,
+    SwitchController,
+    UnloadController,
+)
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from own_master import own_master
+from robot_fixture import JOINTS, wait_until
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64, String
+
+SOURCES = Path(__file__).resolve().parents[2]
+START = [-1.2, -0.6, 1.4, 1.7, 0.2, 0.2, 0.7]
+PERIOD = 0.01  # s
+
+
+def built(*parts: str) -> Path:
+    """A file below a prefix of the sourced workspace."""
+    for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(":"):
+        path = Path(prefix).joinpath(*parts)
+        if prefix and path.exists():
+            return path
+    pytest.fail("coglab_controllers is not built, or its workspace not sourced: ./coglab build, then ./coglab test")
+
+
+def parameters(master: rosgraph.Master) -> None:
+    """An arm with a start of its own, two controllers that load by themselves, and one that stalls."""
+    master.setParam("/robot_description", (SOURCES / "lwr_description" / "urdf" / "lwr_ih2.urdf").read_text())
+    arm = {"arm": "ideal", "rt_priority": 0, "ideal_period": PERIOD, "start_position": START, "joint_states_rate": 50.0}
+    master.setParam("/lwr", arm)
+    manager = {
+        "cycle_time": PERIOD,
+        "load": {"dmp": "coglab/DmpController", "ptp": "coglab/PtpController"},
+        "active": "ptp",
+        "speed_scale": 0.75,
+        "types": {"test": {"Misbehaving": "libcoglab_test_misbehaving.so"}},
+        "plugin_paths": [str(built("lib"))],
+        "odd": {"fault": "stall", "after": 0},
+        "bad": {"fault": "throw", "after": 0},
+        "overrun_time": 5.0,
+    }
+    master.setParam("/controller_manager", manager)
+
+
+class Robot:
+    """What the node tells, as it comes."""
+
+    def __init__(self) -> None:
+        self.joints: list[JointState] = []
+        self.states: list[LwrState] = []
+        self.statuses: list[ControllerStatus] = []
+        self.feedbacks: list[DmpFeedback] = []
+        self.targets: list[JointState] = []
+        self.finished: list[int] = []
+        self.unfinished: list[UnfinishedPtp] = []
+        self.diagnostics: list[DiagnosticStatus] = []
+        rospy.Subscriber("lwr/joint_states", JointState, self.joints.append)
+        rospy.Subscriber("lwr/target_joint_states", JointState, self.targets.append)
+        rospy.Subscriber("lwr/state", LwrState, self.states.append)
+        rospy.Subscriber("controller_manager/status", ControllerStatus, self.statuses.append)
+        rospy.Subscriber("controller_manager/dmp/feedback", DmpFeedback, self.feedbacks.append)
+        rospy.Subscriber("controller_manager/ptp/finished_ptp", FinishedPtp, lambda m: self.finished.append(m.ptp_id))
+        rospy.Subscriber("controller_manager/ptp/unfinished_ptp", UnfinishedPtp, self.unfinished.append)
+        rospy.Subscriber("/diagnostics", DiagnosticArray, lambda m: self.diagnostics.extend(m.status))
+
+    @staticmethod
+    def call(name: str, kind: type, *arguments: object):
+        rospy.wait_for_service(name, 20.0)
+        return rospy.ServiceProxy(name, kind)(*arguments)
+
+    def command(self, event: str):
+        return self.call("lwr/command", LwrCommand, event)
+
+    def manager(self, name: str, kind: type, *arguments: object):
+        return self.call("controller_manager/" + name, kind, *arguments)
+
+    def until(self, condition: Callable[[LwrState, ControllerStatus], bool], what: str) -> None:
+        """Waits for the newest state and status to be so."""
+        wait_until(lambda: condition(self.states[-1], self.statuses[-1]), 10.0, what)
+
+    def started(self) -> None:
+        assert self.command("reset").success and self.command("start").success
+        self.until(lambda state, _: state.motion_allowed, "motion allowed")
+
+    def cycle(self) -> DiagnosticStatus:
+        return next(s for s in reversed(self.diagnostics) if s.name.endswith("control cycle"))
+
+
+@pytest.fixture(scope="module")
+def system() -> Iterator[tuple[Robot, subprocess.Popen]]:
+    with own_master() as master:
+        parameters(master)
+        rospy.init_node("ideal_robot_test", disable_signals=True)
+        node = subprocess.Popen([str(built("lib", "coglab_controllers", "robot_node"))])
+        try:
+            robot = Robot()
+            wait_until(lambda: bool(robot.joints and robot.states and robot.statuses), 30.0, "the node's topics")
+            yield robot, node
+        finally:
+            rospy.signal_shutdown("the test is over")
+            node.kill()
+            node.wait(timeout=20.0)
+
+
+@pytest.fixture
+def robot(system: tuple[Robot, subprocess.Popen]) -> Robot:
+    return system[0]
+
+
+def test_it_stands_at_its_start_and_says_so(robot: Robot) -> None:
+    wait_until(lambda: len(robot.joints) > 30, 10.0, "joint states")
+    newest = robot.joints[-1]
+    assert list(newest.name) == JOINTS
+    assert list(newest.position) == START and list(newest.velocity) == [0.0] * 7 and list(newest.effort) == [0.0] * 7
+    told = [m.header.stamp.to_sec() for m in robot.joints[5:30]]
+    assert all(a < b for a, b in zip(told, told[1:], strict=False))
+    assert (told[-1] - told[0]) / (len(told) - 1) > 0.019, "50 Hz are asked for"
+    assert abs(time.time() - robot.joints[-1].header.stamp.to_sec()) < 5.0
+    state = robot.states[-1]
+    assert (state.supervisor, state.fri_state, state.quality, state.control_mode) == (
+        "monitor",
+        "MON",
+        "PERFECT",
+        "POSITION",
+    )
+    assert (state.power, state.motion_allowed, state.hold_latched, state.motion_epoch) == (0x7F, False, False, 0)
+    assert state.reason_code == ReasonCode.NOT_IN_COMMAND_MODE and state.cycle_time == PERIOD
+    assert "rosservice call /lwr/command start" in state.reason
+    known = len(robot.states)
+    wait_until(lambda: len(robot.states) > known + 4, 10.0, "the state that is told again")
+    again = [s.header.stamp.to_sec() for s in robot.states[-4:]]
+    assert (again[-1] - again[0]) / 3 > 0.2, "four times a second without a change"
+
+
+def test_what_the_parameters_name_is_loaded_and_active(robot: Robot) -> None:
+    listed = robot.manager("list_controllers", ListControllers)
+    assert sorted(listed.controller_ids) == ["dmp", "ptp"]
+    active = robot.manager("get_active_controller", GetActiveController)
+    assert (active.controller_id, active.controller_type) == ("ptp", "coglab/PtpController")
+    robot.until(lambda _, status: status.active_controller == "ptp" and status.standing, "the status of ptp")
+    status = robot.statuses[-1]
+    assert (status.active_type, status.state, status.speed_scale) == ("coglab/PtpController", "idle", 0.75)
+    assert status.reason_code == ReasonCode.NOT_IN_COMMAND_MODE and status.plan_generation >= 1
+    known = len(robot.statuses)
+    wait_until(lambda: len(robot.statuses) > known + 4, 10.0, "the status that is told again")
+    again = [s.header.stamp.to_sec() for s in robot.statuses[-4:]]
+    assert 0.2 < (again[-1] - again[0]) / 3, "four times a second without a change"
+    wait_until(lambda: any(s.name.endswith("control cycle") for s in robot.diagnostics), 10.0, "/diagnostics")
+    values = {v.key: v.value for v in robot.cycle().values}
+    assert values["active controller"] == "ptp" and values["reason_code"] == str(ReasonCode.NOT_IN_COMMAND_MODE)
+    assert robot.cycle().level == DiagnosticStatus.WARN and values["guard"] == "not limited"
+    assert float(values["guard scale"]) == 1.0 and float(values["speed scale"]) == 0.75
+    assert 0.0 < float(values["longest cycle (us)"]) < 6e7 and values["state"] == "idle"
+    assert int(values["cycles"]) >= int(values["cycles with a joint state"]) > 0
+    assert values["cycles with an unusable joint state"] == "0" and values["transforms refused"] == "0"
+    refused = robot.call("controller_manager/ptp/add_ptp", AddPtp, START, [], [])
+    assert (refused.status, refused.ptp_id, refused.reason_code) == (2, -1, ReasonCode.NOT_IN_COMMAND_MODE)
+
+
+def test_commands_have_their_answers(robot: Robot) -> None:
+    for event, code in (
+        ("joint_impedance stiffness 500", ReasonCode.NOT_SUPPORTED),
+        ("jump", ReasonCode.INVALID_ARGUMENT),
+    ):
+        answer = robot.command(event)
+        assert (answer.success, answer.reason_code) == (False, code) and answer.message
+    assert robot.command("position").success
+    robot.started()
+    state = robot.states[-1]
+    assert (state.supervisor, state.fri_state, state.reason_code, state.motion_epoch) == ("command", "CMD", 0, 1)
+    events = rospy.Publisher("lwr/ros_events", String, queue_size=10)
+    wait_until(lambda: events.get_num_connections() > 0, 10.0, "connection")
+    events.publish("hold")
+    robot.until(lambda state, _: state.hold_latched, "hold by the topic")
+    state = robot.states[-1]
+    assert (state.supervisor, state.reason_code, state.motion_allowed) == ("holding", ReasonCode.HELD, False)
+    assert "command reset" in state.reason
+    assert robot.command("start").reason_code == ReasonCode.HELD
+    robot.started()
+    robot.until(lambda state, _: state.motion_epoch == 3 and not state.hold_latched, "two changes more")
+
+
+def test_a_motion_is_made_shown_and_cancelled(robot: Robot) -> None:
+    robot.started()
+    robot.until(lambda _, status: status.reason_code == 0, "nothing wrong")
+    there = [START[0] + 0.3, *START[1:]]
+    answer = robot.call("controller_manager/ptp/add_ptp", AddPtp, there, [], [])
+    assert (answer.status, answer.success, answer.reason_code) == (0, True, 0), answer.message
+    robot.until(lambda _, status: status.state == "running" and not status.standing, "running")
+    wait_until(lambda: any(m.velocity[0] > 0.1 for m in robot.targets), 10.0, "target velocities")
+    assert list(robot.targets[-1].name) == JOINTS and len(robot.targets[-1].velocity) == 7
+    wait_until(lambda: answer.ptp_id in robot.finished, 20.0, "finished_ptp")
+    wait_until(lambda: abs(robot.joints[-1].position[0] - there[0]) < 3e-3, 5.0, "the arm there")
+    assert max(abs(a - b) for a, b in zip(robot.joints[-1].position, there, strict=True)) < 3e-3
+    far = robot.call("controller_manager/ptp/add_ptp", AddPtp, [START[0] - 0.6, *START[1:]], [], [])
+    robot.until(lambda _, status: status.state == "running", "running again")
+    done = robot.call("controller_manager/ptp/cancel", CancelMotion, 0.0, "a test")
+    assert done.success and done.was_running and done.reason_code == 0, done.message
+    wait_until(lambda: bool(robot.unfinished), 5.0, "unfinished_ptp")
+    assert (robot.unfinished[-1].ptp_id, robot.unfinished[-1].reason_code) == (far.ptp_id, ReasonCode.CANCELLED)
+    assert "a test" in robot.unfinished[-1].reason
+    none = robot.call("controller_manager/ptp/cancel", CancelMotion, 1.0, "")
+    assert none.success and not none.was_running and "no motion of 'ptp'" in none.message
+
+
+def test_a_speed_scale_is_taken_by_service_and_topic(robot: Robot) -> None:
+    for scale in (2.0, -0.1):
+        assert robot.manager("speed_scale", SetSpeedScale, scale).reason_code == ReasonCode.OUT_OF_RANGE
+    assert robot.manager("speed_scale", SetSpeedScale, 0.5).success
+    robot.until(lambda _, status: status.speed_scale == 0.5, "0.5 by the service")
+    topic = rospy.Publisher("controller_manager/speed_scale", Float64, queue_size=1)
+    wait_until(lambda: topic.get_num_connections() > 0, 10.0, "connection")
+    topic.publish(1.0)
+    robot.until(lambda _, status: status.speed_scale == 1.0, "1 by the topic")
+
+
+def services(name: str) -> list[str]:
+    return [s for s, _ in rosgraph.Master("/test").getSystemState()[2] if f"/controller_manager/{name}/" in s]
+
+
+def test_a_controller_comes_and_goes_with_its_services_and_no_others(robot: Robot) -> None:
+    loaded = robot.manager("load_controller", LoadController, "more", "coglab/PtpController")
+    assert loaded.success and list(loaded.controller_ids)[-1] == "more"
+    assert sorted(services("more")) == ["/controller_manager/more/add_ptp", "/controller_manager/more/cancel"]
+    again = robot.manager("load_controller", LoadController, "more", "coglab/PtpController")
+    assert (again.success, again.reason_code) == (False, ReasonCode.INVALID_ARGUMENT) and "in use" in again.message
+    gone = robot.manager("unload_controller", UnloadController, "more")
+    assert gone.success and "more" not in gone.controller_ids and services("more") == []
+    feedback = robot.manager("load_controller", LoadController, "extra_limits", "JointLimits")
+    assert feedback.success, feedback.message
+    assert services("extra_limits") == [], "a feedback controller has no motion to cancel"
+    refused = robot.manager("unload_controller", UnloadController, "ptp")
+    assert (refused.success, refused.reason_code) == (False, ReasonCode.BUSY)
+
+
+def test_without_an_active_controller_nothing_is_shown_as_a_target(robot: Robot) -> None:
+    assert robot.manager("switch_controller", SwitchController, "").success
+    robot.until(lambda _, status: status.active_controller == "" and status.standing, "none active")
+    time_of = robot.targets[-1].header.stamp
+    known = len(robot.statuses)
+    wait_until(lambda: len(robot.statuses) > known + 3, 10.0, "more of the status")
+    later = [m for m in robot.targets if m.header.stamp > time_of]
+    assert len(later) < 20, "what was under way"
+    answer = robot.manager("switch_controller", SwitchController, "ptp")
+    assert answer.success and answer.controller_type == "coglab/PtpController"
+
+
+def test_a_controller_that_stalls_or_throws_is_told_and_left_again(robot: Robot) -> None:
+    for name in ("odd", "bad"):
+        assert robot.manager("load_controller", LoadController, name, "test/Misbehaving").success
+    robot.started()
+    seen = len(robot.statuses)
+    robot.manager("switch_controller", SwitchController, "odd")
+    wait_until(lambda: any(s.reason_code == ReasonCode.CYCLE_STALLED for s in robot.statuses[seen:]), 20.0, "the stall")
+    stalled = next(s for s in robot.statuses[seen:] if s.reason_code == ReasonCode.CYCLE_STALLED)
+    assert (stalled.state, stalled.standing) == ("fault", False)
+    assert "'odd' has stalled in its code" in stalled.reason
+    wait_until(lambda: robot.manager("switch_controller", SwitchController, "bad").success, 30.0, "a switch away")
+    robot.until(lambda _, status: status.state == "fault" and status.active_controller == "bad", "the fault")
+    assert robot.statuses[-1].reason_code == ReasonCode.CONTROLLER_FAULT
+    assert "threw in computeReference: told to throw" in robot.statuses[-1].reason
+    wait_until(lambda: robot.cycle().level == DiagnosticStatus.ERROR, 10.0, "the fault on /diagnostics")
+    assert robot.manager("switch_controller", SwitchController, "ptp").success
+    robot.until(lambda _, status: status.state == "idle" and status.reason_code == 0, "all is well")
+    wait_until(lambda: robot.cycle().level == DiagnosticStatus.OK, 10.0, "that on /diagnostics")
+    assert robot.cycle().message == "idle"
+
+
+def test_it_ends_in_order_when_it_is_asked_to(system: tuple[Robot, subprocess.Popen]) -> None:
+    _, node = system
+    node.send_signal(signal.SIGINT)
+    assert node.wait(timeout=20.0) == 0
+
+
+@pytest.mark.parametrize(
+    "name, value, words",
+    [
+        ("lwr/arm", "toy", "'toy': expected fri or ideal"),
+        ("lwr/ideal_period", 0.2, "period = 0.2 is outside its range 0.001..0.1"),
+        ("lwr/start_position", [0.0] * 6, "expected 7 numbers, got 6"),
+        ("lwr/command_timeout", 2.0, "command_timeout = 2 is outside its range 0.005..1"),
+        ("lwr/rt_priority", 99, "rt_priority"),
+        ("lwr/joint_states_rate", 0.5, "joint_states_rate"),
+        ("controller_manager/speed_scale", 1.5, "speed_scale: expected a number from 0 to 1, got 1.5"),
+    ],
+)
+def test_a_parameter_out_of_range_ends_the_start_in_words(name: str, value: object, words: str) -> None:
+    with own_master() as master:
+        parameters(master)
+        master.setParam("/" + name, value)
+        ended = subprocess.run(
+            [str(built("lib", "coglab_controllers", "robot_node"))], capture_output=True, text=True, timeout=60.0
+        )
+    assert ended.returncode == 1 and words in ended.stderr, ended.stderr[-2000:]

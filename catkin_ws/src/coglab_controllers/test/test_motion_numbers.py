@@ -1,0 +1,354 @@
+"""Motions, goals and the arm's dynamics against formulas written here: exact profiles, clocks, thresholds, torques."""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import coglab_controllers as cc
+import numpy as np
+import pytest
+
+PACKAGE = Path(__file__).resolve().parent.parent
+URDF = PACKAGE.parent / "lwr_description" / "urdf" / "lwr_ih2.urdf"
+HOME = np.array([0.1, 0.6, -0.2, -1.3, 0.3, 0.9, 0.2])
+ZERO, ONE, UNIT = np.zeros(7), np.ones(7), [0.0, 0.0, 0.0, 1.0]
+CYCLE = 0.005
+
+
+@pytest.fixture(scope="module")
+def chain() -> cc.Chain:
+    return cc.Chain(URDF.read_text())
+
+
+@pytest.fixture(scope="module")
+def reach() -> cc.Primitive:
+    times = np.linspace(0.0, 1.2, 121)
+    u = times / 1.2
+    return cc.learn(
+        "reach", [(times, np.outer(u**3 * (10 - 15 * u + 6 * u**2), [0.5, 0.0, 0.1]))], mapping="similarity"
+    )
+
+
+@pytest.mark.parametrize("joint", [0, 3, 6])
+@pytest.mark.parametrize("way, trapezoid", [(1.0, True), (-0.8, True), (0.2, False), (-0.05, False)])
+def test_a_profile_from_rest_is_as_fast_as_its_slowest_joint(joint: int, way: float, trapezoid: bool) -> None:
+    speed, acceleration = 0.5, 1.0
+    target = 0.01 * ONE
+    target[joint] = way
+    motion = cc.PtpTrajectory(ZERO, ZERO, target, speed * ONE, acceleration * ONE)
+    up = speed / acceleration if trapezoid else math.sqrt(abs(way) / acceleration)
+    top = speed if trapezoid else acceleration * up
+    assert motion.duration == pytest.approx(abs(way) / speed + up if trapezoid else 2.0 * up, rel=1e-12)
+    sign = math.copysign(1.0, way)
+    for t in (0.0, 0.3 * up, 0.9 * up):
+        position, velocity, now = motion.at(t)
+        assert (position[joint], velocity[joint]) == pytest.approx((sign * 0.5 * t * t, sign * t), abs=1e-12)
+        assert now[joint] == pytest.approx(sign * acceleration) and now[(joint + 1) % 7] > 0.0
+    middle = motion.at(0.5 * motion.duration)
+    assert middle[0][joint] == pytest.approx(0.5 * way) and middle[1][joint] == pytest.approx(sign * top)
+    if trapezoid:
+        np.testing.assert_array_equal(middle[2], ZERO)
+    left = 0.4 * up
+    position, velocity, now = motion.at(motion.duration - left)
+    assert position[joint] == pytest.approx(way - sign * 0.5 * left * left)
+    assert (velocity[joint], now[joint]) == pytest.approx((sign * left, -sign * acceleration))
+    for t in (motion.duration, motion.duration + 1.0):
+        np.testing.assert_array_equal(motion.at(t)[0], target)
+        assert not motion.at(t)[1].any() and not motion.at(t)[2].any()
+    np.testing.assert_array_equal(motion.at(-1.0)[0], ZERO)
+    np.testing.assert_array_equal(motion.target, target)
+
+
+def test_a_motion_that_begins_too_fast_brakes_first_and_one_that_overshoots_comes_back() -> None:
+    fast = cc.PtpTrajectory(ZERO, 2.0 * ONE, 3.0 * ONE, 0.5 * ONE, ONE)
+    assert fast.duration == pytest.approx(1.5 + (3.0 - 1.875 - 0.125) / 0.5 + 0.5)
+    assert fast.at(0.5)[2][2] == pytest.approx(-1.0) and fast.at(2.0)[1][2] == pytest.approx(0.5)
+    back = cc.PtpTrajectory(ZERO, ONE, 0.25 * ONE, 5.0 * ONE, ONE)
+    peak = math.sqrt(0.25)  # 0.5 m beyond when it stands, then 0.25 back
+    assert back.duration == pytest.approx(1.0 + 2.0 * peak)
+    assert back.at(1.0)[0][0] == pytest.approx(0.5) and back.at(1.25)[1][0] == pytest.approx(-0.25)
+    only = cc.PtpTrajectory(HOME, ZERO, HOME + 0.3, ONE, ONE, 6)
+    assert only.at(9.0)[0][6] == HOME[6] and only.at(9.0)[0][5] == pytest.approx(HOME[5] + 0.3)
+    assert only.at(0.1)[0][6] == HOME[6]
+
+
+def test_a_goal_that_moves_moves_faster_on_a_slowed_clock(reach: cc.Primitive) -> None:
+    """But for a clock that nearly stands: below a tenth nobody runs after the goal."""
+    goal, speed = np.array([0.5, 0.1, 0.0]), np.array([0.0, 0.1, 0.05])
+    for rate, seen in ((0.5, 2.0), (0.1, 10.0), (0.05, 10.0)):
+        slow, plain = cc.Dmp(reach, [0] * 3, goal), cc.Dmp(reach, [0] * 3, goal)
+        for i in range(100):
+            now = goal + 0.002 * i * speed
+            slow.step(0.005 / rate, now, speed, rate)
+            plain.step(0.005, now, seen * speed)
+        np.testing.assert_allclose(slow.position, plain.position, atol=1e-12)
+        np.testing.assert_allclose(slow.velocity, plain.velocity, atol=1e-11)
+
+
+def test_a_running_primitive_tells_its_clock_and_its_acceleration(reach: cc.Primitive) -> None:
+    dmp = cc.Dmp(reach, [0] * 3, [0.5, 0, 0.1], ratio=2.0)
+    assert (dmp.tau, dmp.phase, dmp.progress, dmp.remaining_time) == pytest.approx((2.4, 1.0, 0.0, 2.4))
+    for i in range(1, 241):
+        dmp.step(CYCLE, [0.5, 0, 0.1])
+        assert dmp.progress == pytest.approx(i * CYCLE / 2.4, abs=1e-9)
+        if i % 40 == 0:
+            h = 1e-5
+            before = dmp.velocity
+            dmp.step(h, [0.5, 0, 0.1])
+            np.testing.assert_allclose((dmp.velocity - before) / h, dmp.acceleration, atol=2e-3)
+            dmp = replay(reach, i)
+    assert dmp.phase == pytest.approx(0.1, abs=1e-9) and dmp.remaining_time == pytest.approx(1.2, abs=1e-9)
+    dmp.set_ratio(1.0)
+    assert dmp.tau == pytest.approx(1.2)
+    for _ in range(400):
+        dmp.step(CYCLE, [0.5, 0, 0.1])
+    assert (dmp.progress, dmp.remaining_time) == (1.0, 0.0)
+    times, positions, _ = cc.Dmp(reach, [0] * 3, [0.5, 0, 0.1]).roll_out([0.5, 0, 0.1], 0.1)
+    np.testing.assert_allclose(times, np.arange(21) * 0.005, atol=1e-15)
+    np.testing.assert_array_equal(positions[0], [0, 0, 0])
+
+
+def replay(reach: cc.Primitive, steps: int) -> cc.Dmp:
+    dmp = cc.Dmp(reach, [0] * 3, [0.5, 0, 0.1], ratio=2.0)
+    for _ in range(steps):
+        dmp.step(CYCLE, [0.5, 0, 0.1])
+    return dmp
+
+
+def test_long_cycles_are_integrated_as_exactly_as_short_ones(reach: cc.Primitive) -> None:
+    fine = cc.Dmp(reach, [0] * 3, [0.5, 0.1, 0.1]).roll_out([0.5, 0.1, 0.1], 1.0, 1e-4)[1][-1]
+    for dt, within in ((0.005, 2e-8), (0.05, 2e-6), (1.0, 2e-6)):
+        coarse = cc.Dmp(reach, [0] * 3, [0.5, 0.1, 0.1]).roll_out([0.5, 0.1, 0.1], 1.0, dt)[1][-1]
+        assert np.linalg.norm(coarse - fine) < within, (dt, np.linalg.norm(coarse - fine))
+
+
+def test_the_estimate_after_a_step_is_that_of_three_equal_poles_at_sixty_milliseconds() -> None:
+    for constant in (None, 0.06, 0.2):
+        estimator = cc.GoalEstimator() if constant is None else cc.GoalEstimator(constant)
+        k, x = 1.0 / (constant or 0.06), 0.01
+        estimator.reset([1.0, 0.0, 0.0])
+        for i in range(1, 200):
+            position, velocity = estimator.update(CYCLE, [1.0 + x, 0.0, 0.0])
+            t = k * i * CYCLE
+            rate = 0.5 * x * k * t * t * math.exp(-t)
+            assert velocity[0] == pytest.approx(rate, abs=1e-12) and rate < 0.15
+            way = x * (1.0 - (1.0 + t + 0.5 * t * t) * math.exp(-t))
+            assert position[0] == pytest.approx(1.0 + way + 3.0 / k * rate, abs=1e-12)
+    # What is farther than 0.15 m pulls as if it were there, and g' is 0.15 m/s at most.
+    near, far = cc.GoalEstimator(0.5), cc.GoalEstimator(0.5)
+    for _ in range(10):
+        at_limit, beyond = near.update(CYCLE, [0.15, 0, 0])[0], far.update(CYCLE, [7.0, 0, 0])[0]
+    assert beyond[0] == pytest.approx(at_limit[0], rel=0.05)
+    quick = cc.GoalEstimator()
+    assert max(quick.update(CYCLE, [0.1, 0.1, 0.0])[1][0] for _ in range(40)) == pytest.approx(0.15 / math.sqrt(2.0))
+    still = np.array(quick.position)
+    np.testing.assert_array_equal(quick.update(0.0, [5.0, 0, 0])[0], still)
+
+
+def watch_of(retreat: float = 0.0, drop: float = 0.0, region: tuple = ([0.0] * 3, [0.0] * 3)) -> cc.GoalWatch:
+    return cc.GoalWatch(region[0], region[1], retreat, drop, [-0.5, 0.0, 0.0], [0.5, 0.0, 0.0])
+
+
+def test_a_goal_may_go_back_by_its_retreat_from_where_it_was_nearest() -> None:
+    watch = watch_of(retreat=0.1)
+    assert watch.update(CYCLE, [0.59, 0, 0]) == (0, "")
+    assert watch.update(CYCLE, [0.2, 0, 0]) == (0, "")
+    assert watch.update(CYCLE, [0.29, 0, 0]) == (0, "")
+    code, words = watch.update(CYCLE, [0.3101, 0, 0])
+    assert code != 0 and "went back by 0.11" in words
+    assert watch_of().update(CYCLE, [9.0, 0, 0]) == (0, "")
+
+
+def test_a_goal_may_sink_by_its_drop_below_its_average_of_150_milliseconds() -> None:
+    watch = watch_of(drop=0.08)
+    assert watch.update(CYCLE, [0.5, 0, -0.0799]) == (0, "")
+    height = (1.0 - math.exp(-CYCLE / 0.15)) * -0.0799
+    assert watch.update(CYCLE, [0.5, 0, height - 0.0799]) == (0, "")
+    height += (1.0 - math.exp(-CYCLE / 0.15)) * (height - 0.0799 - height)
+    code, words = watch.update(CYCLE, [0.5, 0, height - 0.0801])
+    assert code != 0 and "falls" in words and "0.08" in words
+    rising = watch_of(drop=0.08)
+    assert rising.update(CYCLE, [0.5, 0, 0.9]) == (0, "")
+
+
+def test_a_goal_leaves_its_region_by_twenty_millimetres_once_it_was_inside() -> None:
+    region = ([0.4, -0.3, 0.0], [0.6, 0.3, 0.8])
+    for axis in range(3):
+        for side, sign in zip(region, (-1.0, 1.0), strict=True):
+            point = np.where(np.arange(3) == axis, side[axis] + sign * 0.021, [0.5, 0.0, 0.1])
+            watch = watch_of(region=region)
+            assert watch.update(CYCLE, point) == (0, ""), "it was never inside"
+            assert watch.update(CYCLE, [0.5, 0, 0.1]) == (0, "")
+            code, words = watch.update(CYCLE, point)
+            assert code != 0 and "left its region" in words
+    near = watch_of(region=region)
+    for point in ([0.5, 0, 0.1], [0.619, 0, 0.1], [0.381, 0, 0.1], [0.5, 0.319, 0.819], [0.5, -0.319, -0.019]):
+        assert near.update(CYCLE, point) == (0, "")
+
+
+def test_a_curve_stays_at_its_ends_and_its_target_may_move() -> None:
+    turn = cc.exp_rotation([0.0, 0.0, 1.0])
+    curve = cc.OrientationCurve(UNIT, turn)
+    for progress, expected in ((-1.0, UNIT), (0.0, UNIT), (1.0, turn), (2.0, turn)):
+        np.testing.assert_allclose(curve.at(progress), expected, atol=1e-12)
+    curve.set_target(cc.exp_rotation([0.0, 0.5, 0.0]))
+    np.testing.assert_allclose(curve.at(1.0), cc.exp_rotation([0.0, 0.5, 0.0]), atol=1e-12)
+    led = cc.OrientationCurve(UNIT, UNIT, 2.0, [0.0, 0.0, 0.4])
+    np.testing.assert_allclose(cc.rotation_between(UNIT, led.at(1e-5)) / 2e-5, [0, 0, 0.4], atol=1e-4)
+
+
+def test_a_motion_tells_what_it_does(reach: cc.Primitive) -> None:
+    motion = cc.CartesianMotion()
+    assert (motion.phase, motion.event, motion.remaining_distance, motion.remaining_time) == ("idle", "", 0.0, 0.0)
+    goal = np.array([0.4, 0.1, 0.0])
+    motion.switch_to(reach, goal, UNIT)
+    assert motion.phase == "idle", "there is nothing to switch"
+    motion.start(reach, [0.1, 0.2, 0.0], UNIT, goal, UNIT, orientation_control=False)
+    assert motion.remaining_distance == pytest.approx(math.hypot(0.3, 0.1)) and motion.remaining_time == pytest.approx(
+        1.2
+    )
+    assert not motion.step(CYCLE, goal, UNIT).orientation_control
+    np.testing.assert_allclose(motion.goal, goal, atol=1e-12)
+    still = motion.position
+    motion.step(0.0, goal, UNIT)
+    np.testing.assert_array_equal(motion.position, still)
+    seen = [(motion.step(CYCLE, goal, UNIT), motion.event, motion.phase)[1:] for _ in range(400)]
+    assert seen.count(("ended", "ended")) == 1 and seen[-1] == ("", "ended") and motion.remaining_time == 0.0
+    away = goal + [0.0, 0.05, 0.0]
+    events = [(motion.step(CYCLE, away, UNIT), motion.event)[1] for _ in range(50)]
+    assert events.index("follows_again") == 39, "0.2 s outside its ball"
+    motion.stop()
+    assert motion.phase == "idle" and not motion.step(CYCLE, goal, UNIT).velocity.any()
+    standard, told = cc.CartesianMotion(), cc.CartesianMotion(0.06)
+    for one in (standard, told):
+        one.start(reach, [0] * 3, UNIT, goal, UNIT)
+    for i in range(60):
+        moved = goal + [0.0, 0.0005 * i, 0.0]
+        np.testing.assert_array_equal(standard.step(CYCLE, moved).velocity, told.step(CYCLE, moved).velocity)
+
+
+class Links:
+    """Masses of the URDF and where they are, by its text alone; joints that are not named stand at zero."""
+
+    def __init__(self, text: str) -> None:
+        self.root = ElementTree.fromstring(text)
+        self.joints = {j.find("child").get("link"): j for j in self.root.findall("joint")}
+
+    @staticmethod
+    def origin(element) -> np.ndarray:
+        frame, found = np.eye(4), element.find("origin") if element is not None else None
+        if found is None:
+            return frame
+        r, p, y = (float(v) for v in found.get("rpy", "0 0 0").split())
+        turn = [np.array(cc.exp_rotation(v)) for v in ([r, 0, 0], [0, p, 0], [0, 0, y])]
+        frame[:3, :3] = matrix(turn[2]) @ matrix(turn[1]) @ matrix(turn[0])
+        frame[:3, 3] = [float(v) for v in found.get("xyz", "0 0 0").split()]
+        return frame
+
+    def frame(self, link: str, angles: dict[str, float]) -> np.ndarray:
+        if link not in self.joints:
+            return np.eye(4)
+        joint = self.joints[link]
+        move = np.eye(4)
+        if joint.find("axis") is not None:
+            axis = np.array([float(v) for v in joint.find("axis").get("xyz").split()])
+            move[:3, :3] = matrix(cc.exp_rotation(angles.get(joint.get("name"), 0.0) * axis))
+        return self.frame(joint.find("parent").get("link"), angles) @ self.origin(joint) @ move
+
+    def energy(self, angles: dict[str, float]) -> float:
+        """9.81 m/s^2 times the sum of masses times heights, J."""
+        total = 0.0
+        for link in self.root.findall("link"):
+            inertial = link.find("inertial")
+            if inertial is None or not self.moves(link.get("name")):
+                continue
+            place = self.frame(link.get("name"), angles) @ self.origin(inertial)
+            total += 9.81 * float(inertial.find("mass").get("value")) * place[2, 3]
+        return total
+
+    def moves(self, link: str) -> bool:
+        while link in self.joints:
+            if self.joints[link].get("name").startswith("lwr_a1"):
+                return True
+            link = self.joints[link].find("parent").get("link")
+        return False
+
+
+def matrix(xyzw) -> np.ndarray:
+    x, y, z, w = xyzw
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def test_gravity_is_the_slope_of_the_height_of_every_link_hand_and_fingers_included(chain: cc.Chain) -> None:
+    links, names = Links(URDF.read_text()), chain.joint_names
+    gravity = cc.ArmDynamics(URDF.read_text()).evaluate(HOME, ZERO).gravity
+    h = 1e-5
+    for joint in range(7):
+        at = [dict(zip(names, HOME + s * h * np.eye(7)[joint], strict=True)) for s in (1.0, -1.0)]
+        slope = (links.energy(at[0]) - links.energy(at[1])) / (2.0 * h)
+        assert gravity[joint] == pytest.approx(slope, abs=1e-5), joint
+
+
+def test_a_payload_adds_its_weight_and_its_inertia_at_its_place(chain: cc.Chain) -> None:
+    dynamics = cc.ArmDynamics(URDF.read_text())
+    bare = dynamics.evaluate(HOME, ONE)
+    _, orientation = chain.fk(HOME)
+    turn, jacobian = matrix(orientation), chain.jacobian(HOME)
+    for mass, centre in ((0.4, [0.0, 0.0, 0.0]), (0.7, [0.02, -0.03, 0.1])):
+        dynamics.set_payload(mass, centre)
+        x, y, z = turn @ np.array(centre)
+        at_load = jacobian[:3] - np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]) @ jacobian[3:]
+        loaded = dynamics.evaluate(HOME, ONE)
+        np.testing.assert_allclose(loaded.gravity - bare.gravity, at_load.T @ [0, 0, 9.81 * mass], atol=1e-9)
+        np.testing.assert_allclose(loaded.mass - bare.mass, mass * at_load.T @ at_load, atol=1e-9)
+    dynamics.set_payload(0.0)
+    np.testing.assert_array_equal(dynamics.evaluate(HOME, ONE).gravity, bare.gravity)
+    dynamics.set_payload(0.5)
+    assert np.abs(dynamics.evaluate(HOME, ONE).gravity - bare.gravity).max() > 0.1
+    for mass, centre in ((-1e-9, [0] * 3), (math.nan, [0] * 3), (math.inf, [0] * 3), (0.1, [0, math.nan, 0])):
+        with pytest.raises(ValueError, match="a mass of 0 kg or more and a finite centre"):
+            dynamics.set_payload(mass, centre)
+
+
+def test_momentum_and_velocity_torques_belong_to_the_mass_matrix() -> None:
+    dynamics, h = cc.ArmDynamics(URDF.read_text()), 1e-4
+    for dq in (np.array([0.5, -0.8, 0.3, 1.1, -0.4, 0.9, 0.2]), 0.01 * np.arange(7)):
+        terms = dynamics.evaluate(HOME, dq)
+        np.testing.assert_allclose(terms.mass, terms.mass.T, atol=1e-12)
+        assert np.linalg.eigvalsh(terms.mass).min() > 0.0
+        np.testing.assert_allclose(terms.momentum, terms.mass @ dq, atol=1e-12)
+        slope = np.zeros((7, 7))
+        for speed, e in zip(dq, np.eye(7), strict=True):
+            ahead, behind = (dynamics.evaluate(HOME + s * h * e, ZERO).mass for s in (1.0, -1.0))
+            slope += speed * (ahead - behind) / (2.0 * h)
+        np.testing.assert_allclose(terms.coriolis + terms.transposed, slope @ dq, atol=1e-6)
+        energy = [0.5 * dq @ (dynamics.evaluate(HOME + s * h * e, ZERO).mass) @ dq for e in np.eye(7) for s in (1, -1)]
+        pull = np.array([(energy[2 * k] - energy[2 * k + 1]) / (2.0 * h) for k in range(7)])
+        np.testing.assert_allclose(terms.coriolis, slope @ dq - pull, atol=1e-6)
+    rest = dynamics.evaluate(HOME, ZERO)
+    assert not rest.coriolis.any() and not rest.transposed.any() and not rest.momentum.any()
+
+
+def test_an_arm_without_dynamics_is_refused_in_words() -> None:
+    text = URDF.read_text()
+    base = "lwr_base_link"
+    for arguments, words in (
+        (("<robot/>",), "one tree of links"),
+        ((text, base, "nowhere"), "to link 'nowhere' in the URDF, found none"),
+        ((text, base, "lwr_link_4"), f"expected 7 movable joints between '{base}' and 'lwr_link_4', found"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            cc.ArmDynamics(*arguments)
+    dynamics = cc.ArmDynamics(text)
+    bad = np.full(7, math.nan)
+    for q, dq, words in ((bad, ZERO, "q: expected finite"), (HOME, bad, "velocity: expected finite")):
+        with pytest.raises(ValueError, match=words):
+            dynamics.evaluate(q, dq)

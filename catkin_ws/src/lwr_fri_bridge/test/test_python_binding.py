@@ -1,0 +1,192 @@
+"""The Python module: parameters go where their names say, dictionaries are complete, what is wrong is named."""
+
+from __future__ import annotations
+
+import pathlib
+
+import lwr_fri_bridge
+import pytest
+
+LIMITS = str(pathlib.Path(__file__).parents[2] / "lwr_description" / "config" / "joint_limits.yaml")
+IDENTITY = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]
+
+
+@pytest.mark.parametrize(
+    ("name", "told", "bounds"),
+    [
+        ("position_margin", "position_margin", "0..0.5"),
+        ("leash_position", "set_point_leash/position", "0.005..0.5"),
+        ("leash_impedance", "set_point_leash/impedance", "0.005..0.5"),
+        ("leash_load", "set_point_leash/load", "0..70"),
+        ("velocity_filter_time", "velocity_filter_time", "0..0.2"),
+        ("command_timeout", "command_timeout", "0.005..1"),
+        ("topic_timeout", "topic_timeout", "0.005..1"),
+        ("receive_timeout", "receive_timeout", "0.05..5"),
+        ("start_timeout", "start_timeout", "0.5..120"),
+        ("stop_timeout", "stop_timeout", "0.1..30"),
+        ("silent_stop_timeout", "silent_stop_timeout", "0.1..30"),
+        ("tool_number", "tool_number", "0..16"),
+    ],
+)
+def test_a_parameter_goes_where_its_name_says(name: str, told: str, bounds: str) -> None:
+    with pytest.raises(ValueError) as error:
+        lwr_fri_bridge.Bridge(LIMITS, **{name: -7})
+    assert str(error.value) == f"parameter {told} = -7 is outside its range {bounds}"
+
+
+def test_parameters_that_are_words_and_those_that_are_unknown() -> None:
+    with pytest.raises(ValueError, match="unknown krl_convention 'orocos'"):
+        lwr_fri_bridge.Bridge(LIMITS, krl_convention="orocos")
+    with pytest.raises(ValueError, match="unknown event 'jump'"):
+        lwr_fri_bridge.Bridge(LIMITS, control_mode="jump")
+    with pytest.raises(ValueError, match="unknown parameter 'leash'"):
+        lwr_fri_bridge.Bridge(LIMITS, leash=0.1)
+    with pytest.raises(Exception, match="t9"):
+        lwr_fri_bridge.Bridge(LIMITS, "t9")
+
+
+class Controller:
+    """Our own KRL program in lockstep, as short as it can be."""
+
+    def __init__(self, **parameters: object) -> None:
+        self.bridge = lwr_fri_bridge.Bridge(LIMITS, **parameters)
+        self.fields: dict[str, object] = {
+            "size": 916,
+            "id": 0x2006,
+            "state": 1,
+            "quality": 3,
+            "control": 1,
+            "power": 0x7F,
+            "measurement_period": 0.005,
+            "command_period": 0.005,
+            "commanded_frame": IDENTITY,
+            "commanded_frame_offset": IDENTITY,
+        }
+        self.counter = self.reflected = self.finished = 0
+        self.position = [0.1] * 7
+        self.now = 10**9
+
+    def cycle(self) -> dict[str, object]:
+        """One cycle; the answer."""
+        self.counter += 1
+        self.now += 5_000_000
+        answer = self.bridge.answer(
+            lwr_fri_bridge.encode_measurement(
+                self.fields
+                | {
+                    "counter": self.counter,
+                    "reflected": self.reflected,
+                    "measured_position": self.position,
+                    "commanded_position": self.position,
+                    "krl_ints": [self.finished, 1] + [0] * 13 + [4010],
+                }
+            ),
+            self.now,
+        )
+        command = lwr_fri_bridge.decode_command(answer)
+        self.reflected = command["counter"]
+        request, strategy, number = command["krl_ints"][:3]
+        if self.fields["state"] == 2:
+            self.position = command["joint_position"]
+        if request in (1, 2) and number != self.finished:
+            self.finished = number
+            self.fields |= {"state": 2 if request == 1 else 1, "control": strategy // 10}
+        return command
+
+
+def test_a_start_and_a_motion_in_lockstep() -> None:
+    cell = Controller()
+    cell.cycle()
+    before = cell.bridge.snapshot()
+    assert before["motion_allowed"] is False and "monitor mode" in before["reason"]
+    assert (before["supervisor"], before["fri_state"]) == ("monitor", "MON")
+    ticket = cell.bridge.submit("start")
+    assert cell.bridge.outcome(ticket) is None
+    for _ in range(4):
+        cell.cycle()
+    success, message = cell.bridge.outcome(ticket)
+    assert success and "POSITION" in message
+    state = cell.bridge.snapshot()
+    assert state["motion_allowed"] is True and state["reason"] == ""
+    assert (state["supervisor"], state["fri_state"], state["quality"]) == ("command", "CMD", "PERFECT")
+    assert (state["control_mode"], state["hold_latched"], state["loss"]) == ("POSITION", False, "")
+    for _ in range(60):
+        cell.bridge.send_velocity([0.2, 0, 0, 0, 0, 0, -0.1], cell.now)
+        cell.cycle()
+    state = cell.bridge.snapshot()
+    assert list(state["commanded_velocity"]) == pytest.approx([0.2, 0, 0, 0, 0, 0, -0.1], abs=1e-9)
+    assert cell.position[0] > 0.1 + 0.03 and cell.position[6] < 0.1 - 0.015
+    assert state["accepted"] == state["sequence"] == cell.counter
+    assert state["stamp_ns"] == cell.now and state["cycle_time"] == pytest.approx(0.005)
+    counters = (
+        *("wrong_size", "wrong_id", "implausible", "duplicate", "out_of_order", "lost_measurements", "lost_answers"),
+        *("restarts", "new_periods", "commands_invalid", "commands_old_epoch", "command_timeouts"),
+        *("resumed_after_gap", "position_bounds", "leash_trips", "requests_dropped", "fall_backs"),
+    )
+    assert {name: state[name] for name in counters} == dict.fromkeys(counters, 0)
+
+
+def test_what_is_refused_has_no_answer_and_is_counted_by_its_name() -> None:
+    cell = Controller()
+    cell.cycle()
+    assert cell.bridge.answer(bytes(915), cell.now) is None
+    assert cell.bridge.answer(bytes(916), cell.now) is None
+    good = cell.fields | {"counter": 1, "measured_position": cell.position, "commanded_position": cell.position}
+    assert cell.bridge.answer(lwr_fri_bridge.encode_measurement(good), cell.now) is None
+    assert cell.bridge.answer(lwr_fri_bridge.encode_measurement(good | {"counter": 5000}), cell.now) is None
+    assert cell.bridge.answer(lwr_fri_bridge.encode_measurement(good | {"counter": 2, "state": 0}), cell.now) is None
+    names = ("wrong_size", "wrong_id", "duplicate", "out_of_order", "implausible", "accepted")
+    cell.bridge.idle(cell.now)  # shows what was counted
+    state = cell.bridge.snapshot()
+    assert [state[name] for name in names] == [1] * 6
+
+
+def test_lenient_headers_and_the_tool_are_taken() -> None:
+    zeros = Controller(lenient_headers=True)
+    zeros.fields |= {"size": 0, "id": 0}
+    assert zeros.cycle()["size"] == 376
+    strict = Controller()
+    strict.fields |= {"size": 0, "id": 0}
+    data = lwr_fri_bridge.encode_measurement(strict.fields)
+    assert strict.bridge.answer(data, strict.now) is None
+    assert Controller(krl_convention="rtt_lwr", tool_number=7).cycle()["krl_ints"][2] == 7
+    assert Controller(control_mode="joint_impedance").cycle()["flags"] == 0x0035
+
+
+def test_dictionaries_leave_out_and_refuse() -> None:
+    assert lwr_fri_bridge.encode_command({}) == bytes(376) == bytes(lwr_fri_bridge.COMMAND_SIZE)
+    assert lwr_fri_bridge.encode_measurement({}) == bytes(916) == bytes(lwr_fri_bridge.MEASUREMENT_SIZE)
+    for count in (6, 8):
+        with pytest.raises(ValueError, match=f"^joint_torque: expected 7 values, got {count}$"):
+            lwr_fri_bridge.encode_command({"joint_torque": [0.0] * count})
+    with pytest.raises(ValueError, match="^expected 376 bytes, got 3$"):
+        lwr_fri_bridge.decode_command(bytes(3))
+
+
+def test_limits_have_profiles() -> None:
+    full, slow = lwr_fri_bridge.JointLimits(LIMITS), lwr_fri_bridge.JointLimits(LIMITS, "t1")
+    assert max(slow.velocity) == pytest.approx(0.24 / 1.04)
+    assert min(full.velocity) > 1.0
+    assert list(full.upper_position) == list(-full.lower_position)
+    assert lwr_fri_bridge.known_events().startswith("start, hold, reset, stop, position")
+
+
+def test_motion_functions_agree_with_each_other() -> None:
+    distance = lwr_fri_bridge.braking_distance(1.0, 10.0, 500.0)
+    # At constant acceleration 0.05 m, and half the time that the acceleration takes to come, twice.
+    assert distance == pytest.approx(0.5 * 1.0 * (1.0 / 10.0 + 10.0 / 500.0), rel=1e-9)
+    assert lwr_fri_bridge.braking_speed(distance, 10.0, 500.0, 0.0) == pytest.approx(1.0, rel=1e-6)
+    assert lwr_fri_bridge.time_to_velocity(0.0, 0.0, 1.0, 10.0, 500.0) == pytest.approx(0.12)
+    state = lwr_fri_bridge.step_axis(0.0, 0.0, 0.0, 1.0, 10.0, 500.0, 0.12)
+    assert state == pytest.approx((0.06, 1.0, 0.0), abs=1e-9)
+    interpolator = lwr_fri_bridge.Interpolator(lwr_fri_bridge.JointLimits(LIMITS))
+    interpolator.reset([0.5] * 7)
+    assert list(interpolator.position) == [0.5] * 7
+    interpolator.resume([0.1] * 7, [0.2] * 7, [0.0] * 7)
+    interpolator.step([0.2] * 7, 0.005)
+    assert list(interpolator.position) == pytest.approx([0.101] * 7)
+    velocity = lwr_fri_bridge.VelocityFilter(0.0)
+    velocity.update([0.0] * 7, 1, 0.005)
+    assert list(velocity.update([0.01] * 7, 2, 0.005)) == pytest.approx([1.0] * 7)
+    assert lwr_fri_bridge.VelocityFilter.delay(0.0, 0.005) == pytest.approx(0.0025)
+    assert lwr_fri_bridge.VelocityFilter.noise_gain(0.0, 0.005) == pytest.approx(200.0 * 2**0.5)
