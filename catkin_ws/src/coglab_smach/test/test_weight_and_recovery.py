@@ -10,7 +10,7 @@ from coglab_smach.clocks.virtual_clock import using
 from coglab_smach.machines import recovery
 from coglab_smach.machines.recovery import SecureHand, WhatIsHeld
 from coglab_smach.ports.interfaces import ContactEvent, HandState
-from coglab_smach.ports.pending import PortError, Ready
+from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states import arm, weight
 from coglab_smach.states.arm import HomeRobot
 from coglab_smach.states.base import TimeLimit
@@ -40,6 +40,47 @@ class Lifted:
         monkeypatch.setattr(weight, "palm_at", lambda ctx: np.array([0.0, 0.0, self.z]))
         monkeypatch.setattr(weight, "hand_from_palm", lambda s: self.away)
         monkeypatch.setattr(weight, "rise", lambda ctx, by, speed: self.rises.append((by, speed)) or Ready())
+
+
+def test_the_fingers_follow_with_the_lowest_force_four_times_a_second_at_most(monkeypatch):
+    lifted, asked = Lifted(monkeypatch), []
+    ctx, done, cancelled = lifted.ctx, [True], []
+    closing = Polled(lambda: done[0], lambda: None, lambda: cancelled.append(1))
+    ctx.hand.close = lambda speed: asked.append((ctx.clock.now(), speed)) or closing
+    with using(lifted.trial.clock):
+        begin = ctx.clock.now()
+        for _ in range(100):
+            lifted.state._follow()
+            ctx.clock.sleep(0.01)
+        assert [(at - begin, speed) for at, speed in asked] == [
+            (pytest.approx(0.25 * i, abs=0.011), 60) for i in range(4)
+        ]
+        ctx.clock.sleep(0.3)
+        lifted.state._follow()
+        done[0] = False
+        for _ in range(100):  # nothing is asked of fingers that still close
+            ctx.clock.sleep(0.01)
+            lifted.state._follow()
+        assert len(asked) == 5 and not cancelled
+
+
+@pytest.mark.parametrize("stop", [True, False])
+def test_a_stop_ends_the_closing_of_fingers_that_follow(stop):
+    trial, cancelled = Trial(), []
+    trial.ctx.hand.close = lambda speed: Polled(lambda: False, lambda: None, lambda: cancelled.append(speed))
+    trial.cell.partner.let_go_after = None
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.start(RECEIVE)
+        t.until(lambda: "arm lift" in t.cell.called())
+        t.clock.sleep(0.5)
+        if stop:
+            t.ctx.stop.press("test")
+        t.until(lambda: t.ctx.journal.results)
+
+    trial.run(script)
+    assert cancelled == ([60] if stop else [])
 
 
 def test_the_whole_rise_is_3_cm_and_no_shorter_one_than_5_mm_is_begun(monkeypatch):

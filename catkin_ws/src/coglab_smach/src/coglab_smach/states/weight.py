@@ -9,7 +9,7 @@ from coglab_msgs.msg import ReasonCode, Say
 
 from coglab_smach.context.awaited import PERSON
 from coglab_smach.context.context import Context
-from coglab_smach.ports.pending import PortError
+from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.base import CoglabState, TimeLimit
 from coglab_smach.states.hand import AT_HAND
 from coglab_smach.states.motion import rise
@@ -18,6 +18,9 @@ from coglab_smach.states.yielding import LEAST_WAY, GivesWay
 
 MOST_RISES = 8
 """the first one, and those that go on where the weight or somebody's pull has ended one"""
+
+FOLLOWS = 0.25
+"""s from one closing of the fingers to the next at least"""
 
 
 class TakeWeight(CoglabState):
@@ -32,7 +35,8 @@ class TakeWeight(CoglabState):
     and then the weight has to have come by the end of the whole rise, or the hand to be seen AWAY. Where the
     tracker has lost the hand since, the person may have gone: nothing is opened, the arm stays and says so.
 
-    The palm goes along with who pulls (GivesWay), and the rise goes on afterwards.
+    The palm goes along with who pulls (GivesWay), and the rise goes on afterwards. The fingers close again and again
+    (``give.close_speed``, the lowest force).
     """
 
     default_time_limit = 16.0
@@ -47,6 +51,10 @@ class TakeWeight(CoglabState):
         self._told = self._seen_away = False
         self._on: float | None = None
         """s, when it rises on with the weight; None: the weight has not come"""
+        self._closing: Pending | None = None
+        """of the fingers, once more"""
+        self._closes = 0.0
+        """s, from when they may do so again"""
 
     def run(self, ud: Any) -> str:
         limit, contact = float(self.ctx.config.get("hand.load_timeout", 5.0)), self.ctx.contact
@@ -59,6 +67,7 @@ class TakeWeight(CoglabState):
         }
         self._way, self._rises, self._on, self._told = GivesWay(self.ctx), 0, None, False
         self._seen_away = False
+        self._closing, self._closes = None, 0.0
         self.await_pending(contact.arm("lift", limit, settings), "arming of the contact detector", 2.0)
         try:
             self.pause(float(self.ctx.config.get("hand.lift_after", 0.1)))
@@ -71,6 +80,8 @@ class TakeWeight(CoglabState):
         finally:
             contact.disarm()
             self._way.stop()
+            if self._closing is not None and self.ctx.stop.pressed():
+                self._closing.cancel()
         event = contact.event()
         self.reason = event.message if event is not None else "the person's hand has left it"
         self.ctx.shared, ud.hand_seen_away = False, self._seen_away
@@ -81,6 +92,7 @@ class TakeWeight(CoglabState):
     def _has_let_go(self, farther: float | None) -> bool:
         """Whether the person has; meanwhile rise until the weight has come, or give way."""
         carried = self.ctx.contact.event() is not None
+        self._follow()
         if carried:
             self.ctx.journal.mark("loaded")
             self._tell()
@@ -103,6 +115,14 @@ class TakeWeight(CoglabState):
             self._on = now + step / speed + float(self.ctx.config.get("hand.lift_pause", 0.5))
             self._rise(step)
         return False
+
+    def _follow(self) -> None:
+        """Again and again, with the lowest force: what the person holds less and less shifts between the fingers, and
+        those that stand where they closed would lose it."""
+        now = self.ctx.clock.now()
+        if now >= self._closes and (self._closing is None or self._closing.done()):
+            self._closes = now + FOLLOWS
+            self._closing = self.ctx.hand.close(int(self.ctx.config.get("give.close_speed", 60)))
 
     def _tell(self) -> None:
         """Once: the robot carries the object."""
