@@ -4,9 +4,9 @@
 #include <set>
 #include <stdexcept>
 
+#include <urdf_parser/urdf_parser.h>
 #include <kdl/tree.hpp>
 #include <kdl_parser/kdl_parser.hpp>
-#include <urdf_parser/urdf_parser.h>
 
 namespace coglab_sim {
 namespace {

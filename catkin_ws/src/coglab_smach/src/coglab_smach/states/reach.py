@@ -21,10 +21,8 @@ from coglab_smach.states.where import off_grasp, palm_axis
 
 BUMPS = 2
 """touches of something else after which the arm still comes again"""
-DRAWN_BACK = 0.06
-"""m"""
-DRAWING_BACK = 5.0
-"""s that drawing back may take beyond what limits and speed scale ask for"""
+DRAWN_BACK, DRAWING_BACK = 0.06, 5.0
+"""m; and s that drawing back may take beyond what limits and speed scale ask for"""
 SEATED = 0.03
 """m off its grasp at most, for an object that the fingers may close on at a touch"""
 FIRM = 2.5
