@@ -214,7 +214,6 @@ TEST(Defaults, OfGoalAndEndAreTheDocumentedOnes) {
   EXPECT_EQ(anything.retreat, 0.0);
   EXPECT_EQ(anything.drop, 0.0);
   EXPECT_STREQ(anything.wrong(), "");
-  EXPECT_EQ(GoalWatch::kBorder, 0.02);
   EXPECT_EQ(GoalWatch::kDropTime, 0.15);
 }
 

@@ -159,7 +159,7 @@ def push_rows(records, thresholds: Thresholds, what: str, push: str, touch: bool
     for record in records:
         event, when, _ = watch(record, thresholds, touch)
         delay = when - record.one_newton
-        if event is not None and delay <= 0.0:
+        if event is not None and delay < 0.0:
             early, delay = early + 1, float("inf")
         delays.append(delay)
         speeds.append(record.speed)

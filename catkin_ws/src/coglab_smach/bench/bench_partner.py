@@ -54,7 +54,6 @@ its own: contact_motion.
 from __future__ import annotations
 
 import json
-import re
 import sys
 from collections.abc import Mapping
 from types import SimpleNamespace
@@ -63,10 +62,11 @@ import campaign
 import numpy as np
 import partner_motion_rows as motion
 from campaign import Job
+from coglab_controllers import GoalWatch
 from coglab_py.packages import package_path
 from coglab_sim.conditions import HARDSHIPS
 from coglab_smach.context.config import Config
-from coglab_smach.states.knowledge import unless_withdrawn
+from coglab_smach.states.region import unless_withdrawn
 from partner_rows import (
     ALL_TOGETHER,
     FELL,
@@ -92,8 +92,6 @@ SAME = {
     "handover.hand_margin": 0.10,
 }
 """home and region when the goals were set, and the profile that they are for"""
-HEADER = ("include", "coglab_controllers", "goal", "goal_watch.hpp")
-"""of the watch that ends a motion whose goal has left its region"""
 
 
 def row(figure: str, value: float, unit: str, goal: str = "", ok: bool = True) -> dict:
@@ -117,33 +115,34 @@ def settings_rows(row: Row) -> list[dict]:
     changed = row(
         f"settings of home, region and timing that were changed ({', '.join(other) or 'none'})", len(other),
         "settings", "<= 0", not other)  # fmt: skip
-    seen, believed = (beyond(config, frame) for frame in ("object_mug", "object_mug_ahead"))
-    border = goal_border()
     still, hand = (config.get(f"handover.{name}_margin") for name in ("still", "hand"))
+    frames = {"where it is seen": "object_mug", "to where it will be": "object_mug_ahead"}
+    ways = {way: followed(config, frame) for way, frame in frames.items()}
     words = (
         f"offered in it as at 5828bb3: handover.still_margin {still} m where it is held still, hand_margin {hand} m "
-        f"for a hand that asks; on the way, which 5828bb3 did not watch: {seen:.2f} m where it is seen "
-        f"(handover.edge), {believed:.2f} m where it is believed to end (edge and still_margin), and GoalWatch's "
-        f"border of {border:.2f} m"
+        f"for a hand that asks; on the way, of what has been in it, by the controller's own watch, "
+        f"{', '.join(f'{way} {1000.0 * far:.0f} mm' for way, far in ways.items())}"
     )
-    most = max(seen, believed) + border
+    most = max(ways.values())
     return [changed, row(f"a reach follows what is outside the region ({words}), most", most, "m", "<= 0", most <= 0.0)]
 
 
-def beyond(config: Config, frame: str) -> float:
-    """m outside the handover region to which the machines let a reach follow this frame."""
-    goal = unless_withdrawn(SimpleNamespace(config=config), {"frame": frame})
+def followed(config: Config, frame: str) -> float:
+    """m beyond the handover region to which a reach follows this frame, which was in it and goes out, mm by mm, at each
+    of its sides: the controller's watch with the limits that the machines give it."""
     region = np.array([config.get("handover.region_low"), config.get("handover.region_high")])
-    followed = np.array([goal["limits"][f"goal_region_{side}"] for side in ("low", "high")])
-    return float(np.max(np.abs(followed - region)))
-
-
-def goal_border() -> float:
-    """m beyond its limits at which the controller ends a motion, as its header has it."""
-    text = package_path("coglab_controllers", *HEADER).read_text(encoding="utf-8")
-    found = re.search(r"kBorder = ([0-9.]+);", text)
-    assert found is not None, "goal_watch.hpp has no kBorder any more"
-    return float(found.group(1))
+    middle, farthest = region.mean(axis=0), 0.0
+    goal = unless_withdrawn(SimpleNamespace(config=config), {"frame": frame, "place": middle})
+    sides = [goal["limits"][f"goal_region_{side}"] for side in ("low", "high")]
+    for side, axis in np.ndindex(2, 3):
+        watch = GoalWatch(*sides, 0.0, 0.0, middle, middle)
+        place, out = middle.copy(), 1 if side else -1
+        for beyond in np.arange(0.0, 1.0, 0.001):
+            place[axis] = region[side, axis] + out * beyond
+            if watch.update(0.005, place)[0]:
+                break
+            farthest = max(farthest, float(beyond))
+    return farthest
 
 
 def rows_of(row: Row, commit: str, jobs: Mapping[str, list[Job]]) -> list[dict]:

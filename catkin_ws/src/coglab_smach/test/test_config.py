@@ -94,8 +94,8 @@ def test_a_timing_may_have_every_delay_that_studies_vary(tmp_path, name, value):
 
 def test_a_timing_has_no_settings_that_are_no_delays(tmp_path):
     path = tmp_path / "machines.yaml"
-    path.write_text(SHIPPED.read_text().replace("    handover.belief: 0.0\n", "    handover.edge: 0.3\n"))
-    with pytest.raises(ConfigError, match="'handover.edge' was unexpected"):
+    path.write_text(SHIPPED.read_text().replace("    handover.belief: 0.0\n", "    handover.hand_margin: 0.3\n"))
+    with pytest.raises(ConfigError, match="'handover.hand_margin' was unexpected"):
         Config.load(str(path))
 
 

@@ -15,14 +15,13 @@ from coglab_smach.states.knowledge import (
     await_offer,
     believed,
     first_reachable,
-    handover_region,
     locate,
     off_the_board,
     paced,
     palm_of,
     refused_as,
-    unless_withdrawn,
 )
+from coglab_smach.states.region import HandoverRegion, unless_withdrawn
 from conftest import Trial
 
 GOAL = {"frame": "", "offset": [0.0, 0.0, 0.0], "orientation": [0.0, 0.0, 0.0, 1.0], "primitive": "p", "dmp_ratio": 2.0}
@@ -103,7 +102,6 @@ def ahead(offer=0.0, request=0.0, object_id="mug", place=INSIDE, frame="object_m
 
 
 LOCATED = {"frame": "object_mug", "xyz": [1.3, 0.0, 0.4], "quaternion": list(IDENTITY)}
-LOWEST, HIGHEST = np.array(LOW), np.array(HIGH)
 
 
 @pytest.mark.parametrize(
@@ -126,14 +124,14 @@ LOWEST, HIGHEST = np.array(LOW), np.array(HIGH)
 )
 def test_where_something_will_be_is_believed_from_the_timings_probability_on(seen, person, is_believed):
     offers = Offers()
-    offers.ahead = seen
-    found = believed(offers.ctx, "mug", LOCATED, person, LOWEST, HIGHEST)
+    offers.ahead, region = seen, HandoverRegion(offers.ctx)
+    found = believed(offers.ctx, "mug", LOCATED, person, region)
     assert (found is not None) == is_believed
     if found is not None:
         assert found == {**LOCATED, "frame": seen.frame, "xyz": list(seen.place)}
     offers.ctx.config.set("handover.belief", 0.0)
     offers.ctx.config.set("handover.belief_request", 0.0)
-    assert believed(offers.ctx, "mug", LOCATED, person, LOWEST, HIGHEST) is None, "the timing starts on no belief"
+    assert believed(offers.ctx, "mug", LOCATED, person, region) is None, "the timing starts on no belief"
 
 
 def test_a_reach_begins_on_a_belief_before_the_object_is_there():
@@ -177,29 +175,36 @@ def test_a_refusal_without_a_code_gets_one():
 # --- limits of a reach ------------------------------------------------------------------------------------------------
 
 
-def test_a_goal_that_is_seen_may_leave_the_region_by_5_cm_go_back_by_10_and_fall_by_8():
+def test_a_goal_may_not_leave_the_region_nor_go_back_by_10_cm_nor_fall_by_8():
     ctx = Offers().ctx
-    limits = unless_withdrawn(ctx, {**GOAL, "frame": "object_mug"})["limits"]
-    assert limits["goal_region_low"] == pytest.approx([0.40, -0.55, 0.0])
-    assert limits["goal_region_high"] == pytest.approx([0.91, 0.55, 0.90])
+    limits = unless_withdrawn(ctx, {**GOAL, "frame": "object_mug", "place": INSIDE})["limits"]
+    assert (limits["goal_region_low"], limits["goal_region_high"]) == (LOW, HIGH)
     assert (limits["goal_retreat"], limits["goal_drop"]) == (0.10, 0.08)
-    hand = unless_withdrawn(ctx, {**GOAL, "frame": "human_hand"}, 0.1, may_fall=False)
-    assert (
-        hand["limits"]["goal_region_low"] == pytest.approx([0.30, -0.65, -0.1]) and hand["limits"]["goal_drop"] == 0.0
-    )
-    assert "early" not in hand and hand["primitive"] == "p"
+    hand = unless_withdrawn(ctx, {**GOAL, "frame": "human_hand", "place": INSIDE}, 0.1, may_fall=False)
+    assert hand["limits"]["goal_region_low"] == pytest.approx([0.35, -0.60, -0.05])
+    assert hand["limits"]["goal_region_high"] == pytest.approx([0.96, 0.60, 0.95])
+    assert hand["limits"]["goal_drop"] == 0.0 and "early" not in hand and hand["primitive"] == "p"
 
 
-def test_a_goal_that_is_predicted_is_watched_by_the_state_and_may_be_as_unsure_as_a_still_object():
-    early = unless_withdrawn(Offers().ctx, {**GOAL, "frame": "object_mug_ahead"}, 0.1)
-    limits, own = early["limits"], early["early"]
-    assert limits["goal_region_low"] == pytest.approx([0.20, -0.75, -0.2])
-    assert limits["goal_region_high"] == pytest.approx([1.11, 0.75, 1.10])
+def test_what_was_held_still_outside_may_go_no_farther_than_that_counts():
+    for outside in ((0.93, 0.0, 0.4), (0.6, -0.55, 0.4)):
+        limits = unless_withdrawn(Offers().ctx, {**GOAL, "frame": "object_mug", "place": outside})["limits"]
+        assert limits["goal_region_low"] == pytest.approx([0.35, -0.60, -0.05])
+        assert limits["goal_region_high"] == pytest.approx([0.96, 0.60, 0.95])
+
+
+def test_a_goal_that_is_predicted_has_to_lie_in_the_region_and_is_watched_further_by_the_state():
+    early = unless_withdrawn(Offers().ctx, {**GOAL, "frame": "object_mug_ahead", "place": INSIDE}, 0.1)
+    limits = early["limits"]
+    assert limits["goal_region_low"] == pytest.approx([0.35, -0.60, -0.05])
+    assert limits["goal_region_high"] == pytest.approx([0.96, 0.60, 0.95])
     assert (limits["goal_retreat"], limits["goal_drop"]) == (0.0, 0.0)
-    assert own["low"] == pytest.approx([0.30, -0.65, -0.1]) and own["high"] == pytest.approx([1.01, 0.65, 1.0])
-    assert (own["retreat"], own["drop"], own["unsure"]) == (0.10, 0.08, 0.10)
-    low, high = handover_region(Offers().ctx, 0.2)
-    assert low == pytest.approx([0.25, -0.7, -0.15]) and high == pytest.approx([1.06, 0.7, 1.05])
+    assert early["early"] == {"retreat": 0.10, "drop": 0.08, "margin": 0.1}
+
+
+def test_a_region_without_a_configuration_is_what_the_arm_can_reach():
+    region = HandoverRegion(SimpleNamespace(config={}))
+    assert (region.low.tolist(), region.high.tolist()) == ([-1.0, -1.0, -1.0], [1.5, 1.0, 2.0])
 
 
 def test_a_reach_has_the_pace_of_the_timing_and_arrives_slowly():

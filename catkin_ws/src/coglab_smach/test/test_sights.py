@@ -27,12 +27,12 @@ class Watched:
         ctx = SimpleNamespace(
             clock=SimpleNamespace(now=lambda: self.t),
             perception=SimpleNamespace(ahead=lambda: self.ahead),
-            config={},
+            config={"handover.region_low": LOW, "handover.region_high": HIGH},
         )
         goal = {
             "frame": "human_hand_ahead",
             "limits": {"goal_region_low": LOW, "goal_region_high": HIGH},
-            "early": {"retreat": 0.10, "drop": 0.0, "low": LOW, "high": HIGH, "unsure": 0.10},
+            "early": {"retreat": 0.10, "drop": 0.0, "margin": 0.0},
         }
         self.reach = early_reach.EarlyReach(SimpleNamespace(ctx=ctx), goal, None)
 
@@ -104,18 +104,17 @@ def test_who_lowers_the_hand_goes_on(monkeypatch):
         hand.see(0.4, 0.0, 0.4 - 0.025 * k)
 
 
-@pytest.mark.parametrize("deviation, followed", [(0.01, False), (0.06, True)])
-def test_a_reach_that_will_end_outside_the_region_is_followed_only_as_far_as_that_is_unsure(
-    monkeypatch, deviation, followed
-):
+@pytest.mark.parametrize("beyond, followed", [(-0.01, True), (0.01, False)])
+def test_a_reach_that_will_end_outside_the_region_is_not_followed(monkeypatch, beyond, followed):
     hand = Watched(monkeypatch)
     hand.see(0.4, 0.0, 0.4, frames=5)
-    hand.ahead = Ahead(0.0, 1.0, "", "human_hand_ahead", (HIGH[0] + 0.08, 0.0, 0.4), deviation)
+    hand.ahead = Ahead(0.0, 1.0, "", "human_hand_ahead", (HIGH[0] + beyond, 0.0, 0.4), 0.06)
     begin, doubted = hand.t, False
     while hand.t < begin + 1.0 and not doubted:
         hand.t += FRAME
+        hand.place = np.array([0.4, 0.2 * (hand.t - begin), 0.4])
         doubted = hand.reach.doubted()
-    assert doubted == (not followed)
+    assert doubted == (not followed), "a hand that passes through the region offers nothing there"
     if doubted:
         assert hand.t - begin < early_reach.DOUBT_TIME + 3 * FRAME
         assert hand.reach.doubt()[0] == ReasonCode.GOAL_AHEAD_OUTSIDE

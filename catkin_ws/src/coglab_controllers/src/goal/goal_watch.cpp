@@ -27,9 +27,9 @@ void GoalWatch::begin(const GoalLimits& limits, const Vector3& hand, const Vecto
   was_inside_ = false;
 }
 
-bool GoalWatch::outside(const Vector3& goal, double border) const noexcept {
-  return (goal - limits_.region_high).maxCoeff() > border ||
-         (limits_.region_low - goal).maxCoeff() > border;
+bool GoalWatch::outside(const Vector3& goal) const noexcept {
+  return (goal - limits_.region_high).maxCoeff() > 0.0 ||
+         (limits_.region_low - goal).maxCoeff() > 0.0;
 }
 
 Reason GoalWatch::update(double dt, const Vector3& goal) noexcept {
@@ -46,8 +46,8 @@ Reason GoalWatch::update(double dt, const Vector3& goal) noexcept {
            << distance - nearest_ << " m; the reach ends";
   }
   if (limits_.region_low == limits_.region_high) return {};
-  was_inside_ = was_inside_ || !outside(goal, 0.0);
-  if (!was_inside_ || !outside(goal, kBorder)) return {};
+  if (!outside(goal)) was_inside_ = true;
+  if (!was_inside_ || !outside(goal)) return {};
   return Reason(ReasonCode::GoalLeftRegion, "the goal has left its region: it is at (")
          << goal.x() << ", " << goal.y() << ", " << goal.z() << ") m; the reach ends";
 }

@@ -21,7 +21,6 @@ struct GoalLimits {
 /// Watches the goal of one motion, so that nothing is chased. No allocation, no throw.
 class GoalWatch {
  public:
-  static constexpr double kBorder = 0.02;    ///< m by which a goal has to be outside its region
   static constexpr double kDropTime = 0.15;  ///< s
 
   /// A motion from `hand` (m, in dmp_frame_name) toward `goal` begins.
@@ -32,7 +31,7 @@ class GoalWatch {
   Reason update(double dt, const Vector3& goal) noexcept;
 
  private:
-  bool outside(const Vector3& goal, double border) const noexcept;
+  bool outside(const Vector3& goal) const noexcept;
 
   GoalLimits limits_;
   Vector3 hand_ = Vector3::Zero();

@@ -9,8 +9,10 @@ import coglab_controllers as cc
 import numpy as np
 from coglab_msgs.msg import ReasonCode
 
+from coglab_smach.context.awaited import ARM
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState, TimeLimit
+from coglab_smach.states.region import HandoverRegion
 from coglab_smach.states.where import hand_name, palm_at, sight_of, sight_or_refusal
 
 PERIOD = 0.03
@@ -20,14 +22,12 @@ DOUBT_TIME = 0.2
 JUMP, SWAPPED = 0.12, 0.2
 """m between two sights that no person's hand goes, nor anything that falls: the tracker has taken something else for
 it, unless it stays there for so long (s)"""
-UNSURE = 2.0
-"""standard deviations by which a predicted place may be outside the region"""
 BACKWARD = 0.6
 """share of the way that a hand may go back from which on the arm waits to see whether it does"""
 SLIPPED = 0.06
 """m by which an object is lower against the person's hand than at first when it has left it"""
 TOGETHER, LOOK = 0.05, 0.4
-"""s between a sight of the hand and one of the object that tell how they are apart, and s in which such a pair comes"""
+"""s between a sight of the hand and one of the object that tell how they are apart; s of them that are looked at"""
 
 
 def target_of(goal: Mapping[str, Any]) -> str:
@@ -44,25 +44,32 @@ class PersonsGrip:
 
     def __init__(self, state: CoglabState, target: str) -> None:
         self._state, self._target = state, target
-        self._at_first = self._apart(0.0)
+        self._at_first: float | None = None
+        self.look()
 
-    def _apart(self, limit: float) -> float | None:
-        """m from the object up to the person's hand, as they are seen together within ``limit`` s. Seen one after the
-        other they would be apart wherever a hand goes fast, and so they are aside."""
-        clock, hand = self._state.ctx.clock, hand_name(self._state.ctx)
-        end = clock.now() + limit
-        while True:
-            at, thing = sight_of(self._state, hand), sight_of(self._state, self._target)
-            if at is not None and thing is not None and abs(at.age - thing.age) <= TOGETHER:
-                return float(at.xyz[2] - thing.xyz[2])
-            if clock.now() >= end:
-                return None
-            self._state.pause(PERIOD)
+    def look(self) -> None:
+        """Takes how they are apart before anything falls, once they are seen together."""
+        if self._at_first is None:
+            self._at_first = self._apart()
+
+    def _apart(self) -> float | None:
+        """m from the object up to the person's hand. Seen one after the other they would be apart wherever a hand goes
+        fast, and so they are aside."""
+        at, thing = sight_of(self._state, hand_name(self._state.ctx)), sight_of(self._state, self._target)
+        if at is None or thing is None or abs(at.age - thing.age) > TOGETHER:
+            return None
+        return float(at.xyz[2] - thing.xyz[2])
 
     def fell_or_withdrawn(self) -> int:
-        """ReasonCode of what has gone down."""
-        apart = self._apart(LOOK)
-        if self._at_first is None or apart is None or apart > self._at_first + SLIPPED:
+        """ReasonCode of what has gone down. What has left the hand is soon far below it; one that is lowered may seem
+        so for a sight or two."""
+        clock, found = self._state.ctx.clock, []
+        end = clock.now() + LOOK
+        while clock.now() < end:
+            apart = self._apart()
+            found += [] if apart is None else [apart]
+            self._state.pause(PERIOD)
+        if self._at_first is None or not found or float(np.median(found)) > self._at_first + SLIPPED:
             return int(ReasonCode.GOAL_FELL)
         return int(ReasonCode.GOAL_WITHDRAWN)
 
@@ -86,6 +93,7 @@ class EarlyReach:
         """m, the palm when the reach began"""
         self._nearest, self._back = np.inf, 0.0
         """m from there to where the hand was nearest, and by which it has gone back since"""
+        self._region = HandoverRegion(state.ctx, self.early["margin"])
         self._outside = False
         """the person offers or asks, but not in the region"""
         self._untold: PortError | None = None
@@ -122,21 +130,24 @@ class EarlyReach:
             return False
         ahead = ctx.perception.ahead()
         believed = max(ahead.offer, ahead.request) >= float(ctx.config.get("handover.doubt", 0.1))
-        most = self.early["unsure"]
-        if not believed:
-            self._outside = False
-            return place is not None and self._inside(place, most)
-        there = ahead.frame == "" or self._inside(np.array(ahead.place), min(UNSURE * ahead.deviation, most))
-        self._outside = not there
-        return there
+        predicted = believed and ahead.frame != ""
+        outside = predicted and not self._region.holds(ahead.place)
+        # Who passes through the region on the way out of it offers nothing there.
+        offered = place is not None and self._region.offers(now, place, moving=not outside)
+        if believed and not outside:
+            offered = offered or predicted or place is None
+        self._outside = believed and not offered
+        return offered
 
     def goal_now(self) -> dict[str, Any]:
         """What the reach is for: where it will be as long as that is believed, else where it is seen."""
-        if self.state.ctx.perception.ahead().frame == self.goal["frame"]:
+        ahead = self.state.ctx.perception.ahead()
+        if ahead.frame == self.goal["frame"] and self._region.holds(ahead.place):
             return dict(self.goal)
         watched = {"goal_retreat": self.early["retreat"], "goal_drop": self.early["drop"]}
+        limits = self.limits if self._last is None else self._region.limits(self._last[1])
         seen = str(self.goal["frame"]).removesuffix("_ahead")
-        return {**self.goal, "frame": seen, "limits": {**self.limits, **watched}}
+        return {**self.goal, "frame": seen, "limits": {**limits, **watched}}
 
     def forgive(self) -> None:
         """The doubt is over."""
@@ -166,6 +177,9 @@ class EarlyReach:
         self._back = distance - self._nearest
         code, sentence = self._watch.update(passed, place)
         if code == ReasonCode.GOAL_FELL and self._grip is not None:
+            # The arm goes no further while it is found out.
+            resting = self.state.ctx.arm.cancel_motion(sentence)
+            self.state.await_pending(resting, "rest of the arm", 3.0, code=ARM)
             code = self._grip.fell_or_withdrawn()
         if code:
             raise TimeLimit(f"the reach was given up: {sentence}", (), code)
@@ -177,8 +191,3 @@ class EarlyReach:
             return True
         self._last = (now, place)
         return False
-
-    def _inside(self, place: np.ndarray, unsure: float = 0.0) -> bool:
-        """Whether a place (m) lies in the region, which is ``unsure`` m wider."""
-        low, high = np.array(self.early["low"]), np.array(self.early["high"])
-        return bool(np.all(place >= low - unsure) and np.all(place <= high + unsure))

@@ -18,6 +18,7 @@ from coglab_smach.kinematics.grasp_choice import ranked
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState
 from coglab_smach.states.hand import closes_gently, firm_speed, gentle
+from coglab_smach.states.region import HandoverRegion, unless_withdrawn
 from coglab_smach.states.where import hand_name, palm_at, person_at
 
 Goals = Callable[[Mapping[str, Any]], list[dict[str, Any]]]
@@ -123,11 +124,9 @@ def await_offer(state: CoglabState, target: str, goals: Goals, margin: float = 0
     object it holds or asks for. PortError if nobody comes within ``handover.offer_timeout``; nothing has moved then.
     """
     config = state.ctx.config
-    low, high = handover_region(state.ctx, margin)
-    wider = float(config.get("handover.still_margin", 0.10))
+    region = HandoverRegion(state.ctx, margin)
     limit = float(config.get("handover.offer_timeout", 8.0))
     end = state.ctx.clock.now() + limit
-    seen: list[tuple[float, np.ndarray]] = []
     since: float | None = None
     person = target == hand_name(state.ctx)
     offer = "the person's hand within reach" if person else f"'{target}' on offer"
@@ -135,12 +134,8 @@ def await_offer(state: CoglabState, target: str, goals: Goals, margin: float = 0
         while True:
             located = locate(state, target)
             now, place = state.ctx.clock.now(), np.array(located["xyz"])
-            seen = [(t, p) for t, p in seen if now - t <= 0.4] + [(now, place)]
-            still = now - seen[0][0] > 0.3 and float(np.linalg.norm(place - seen[0][1])) < 0.025
-            offered = bool(np.all(place >= low) and np.all(place <= high)) or (
-                still and bool(np.all(place >= low - wider) and np.all(place <= high + wider))
-            )
-            early = believed(state.ctx, target, located, person, low, high)
+            offered = region.offers(now, place)
+            early = believed(state.ctx, target, located, person, region)
             candidates = goals(located)
             goal = first_reachable(state.ctx, located, candidates) if offered else None
             if goal is None and early is not None:
@@ -164,7 +159,7 @@ def await_offer(state: CoglabState, target: str, goals: Goals, margin: float = 0
 
 
 def believed(
-    ctx: Context, target: str, located: Mapping[str, Any], person: bool, low: np.ndarray, high: np.ndarray
+    ctx: Context, target: str, located: Mapping[str, Any], person: bool, region: HandoverRegion
 ) -> dict[str, Any] | None:
     """Where ``target`` will be at a handover that is believed to have begun: its frame ahead, turned as it is seen now;
     None where nothing is believed yet, or something outside the handover region."""
@@ -174,44 +169,9 @@ def believed(
         level = float(ctx.config.get("handover.belief_request", level))
     ahead = ctx.perception.ahead()
     mine = (ahead.request if person else ahead.offer) >= level and (person or ahead.object_id == target)
-    place = np.array(ahead.place)
-    if level <= 0.0 or not (mine and ahead.frame and np.all(place >= low) and np.all(place <= high)):
+    if level <= 0.0 or not (mine and ahead.frame and region.holds(ahead.place)):
         return None
     return {**located, "frame": ahead.frame, "xyz": list(ahead.place)}
-
-
-def handover_region(ctx: Context, margin: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """Corners (m, base frame) of the box in which something counts as offered, ``margin`` m wider on all sides."""
-    low = np.array(ctx.config.get("handover.region_low", [-1.0, -1.0, -1.0]), dtype=float) - margin
-    high = np.array(ctx.config.get("handover.region_high", [1.5, 1.0, 2.0]), dtype=float) + margin
-    return low, high
-
-
-def unless_withdrawn(
-    ctx: Context, goal: Mapping[str, Any], margin: float = 0.0, may_fall: bool = True
-) -> dict[str, Any]:
-    """The goal of a motion that ends by itself when what it follows leaves the region, goes back or, where it
-    ``may_fall``, falls."""
-    # Who offers at the edge of the region does not leave it with a tremor or a sight that is a little off.
-    edge = float(ctx.config.get("handover.edge", 0.05))
-    low, high = handover_region(ctx, margin + edge)
-    limits = {
-        "goal_region_low": low.tolist(),
-        "goal_region_high": high.tolist(),
-        "goal_retreat": float(ctx.config.get("handover.retreat", 0.10)),
-        "goal_drop": float(ctx.config.get("handover.drop", 0.08)) if may_fall else 0.0,
-    }
-    if not str(goal["frame"]).endswith("_ahead"):
-        return {**goal, "limits": limits}
-    # A predicted place goes to and fro as the prediction is corrected: going back and falling are watched in what is
-    # seen, by the state that waits for the reach; and so is whether it lies outside the region, which is wider by how
-    # unsure the prediction is, but by no more than for an object that is held still.
-    most = float(ctx.config.get("handover.still_margin", 0.10))
-    early = {"retreat": limits["goal_retreat"], "drop": limits["goal_drop"], "unsure": most}
-    early |= {"low": limits["goal_region_low"], "high": limits["goal_region_high"]}
-    low, high = handover_region(ctx, margin + edge + most)
-    limits = {"goal_region_low": low.tolist(), "goal_region_high": high.tolist(), "goal_retreat": 0.0, "goal_drop": 0.0}
-    return {**goal, "limits": limits, "early": early}
 
 
 def palm_of(seen: Mapping[str, Any], goal: Mapping[str, Any]) -> Pose:
@@ -225,7 +185,7 @@ def first_reachable(ctx: Context, seen: Mapping[str, Any], goals: list[dict[str,
     unchecked = not bool(ctx.config.get("handover.check_reach", True))
     for goal in goals:
         if unchecked or ctx.reachable(palm_of(seen, goal)):
-            return {**goal, "frame": seen["frame"]}
+            return {**goal, "frame": seen["frame"], "place": list(seen["xyz"])}
     return None
 
 

@@ -326,6 +326,8 @@ class WaitStop(CoglabState):
 
     def _reached(self) -> bool:
         progress = self.ctx.arm.dmp_progress()
+        if self._grip is not None:
+            self._grip.look()
         if progress.state == "aborted" and progress.code == ReasonCode.GOAL_LEFT_REGION and self._early is not None:
             # It may have been believed so for a moment only.
             self._pause(self._early, *OUTSIDE)
@@ -336,8 +338,7 @@ class WaitStop(CoglabState):
                 code = self._grip.fell_or_withdrawn()
                 why = why if code == ReasonCode.GOAL_FELL else "it was lowered with the hand that holds it"
             raise TimeLimit("the reach was aborted", (why,), code)
-        blocked = self.ctx.arm.motion_allowed()
-        if not blocked.ok:
+        if not (blocked := self.ctx.arm.motion_allowed()).ok:
             raise TimeLimit("the arm does not follow any more", (blocked.why,), blocked.code)
         if self._early is not None and progress.state != "reached" and self._early.doubted():
             self._pause(self._early, *self._early.doubt())
