@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from coglab_bringup import bench, figures
+from coglab_bringup.commit import git
 
 TOP = Path(__file__).resolve().parents[4]
 ROW = dict(zip(bench.COLUMNS, ("one", "time of a | step", 1.23456, "us", "<= 2", "KDL", 3.0, True), strict=True))
@@ -254,6 +255,25 @@ def test_every_row_that_was_kept_stands_on_the_page():
     missing = [figures.line_of(name, row) for name, run in runs.items() for row in run["rows"]
                if figures.line_of(name, row) not in lines]  # fmt: skip
     assert runs and not missing, "run ./coglab bench --report\n" + "\n".join(missing)
+
+
+def test_no_row_of_the_page_is_of_other_sources():
+    if git(TOP, "status", "--porcelain", "--", "catkin_ws/src", "coglab"):
+        pytest.skip("sources are changed and not committed: nothing is measured on them")
+    text = (TOP / "docs" / "figures.md").read_text(encoding="utf-8")
+    sections = dict(zip(*[iter(re.split(r"^## (\w+)$", text, flags=re.M)[1:])] * 2, strict=True))
+    old = [name for name, section in sections.items() if figures.NOT_MEASURED not in section
+           and figures.measured(TOP, name) is None]  # fmt: skip
+    assert not old, f"measured before these were changed; run ./coglab bench --report: {', '.join(old)}"
+
+
+def test_a_test_that_a_bench_names_is_one_of_its_sources():
+    """It runs it, so that what it measures is defined there."""
+    words = 'find("p_test_cycle"), TEST / "fuzz.test", test_one_oracle'
+    for path in ("p/test/test_cycle.cpp", "p/test/fuzz.test", "p/test/fuzz_rostest.py", "p/test/test_one_oracle.py"):
+        assert figures._is_source(path, words=words) and not figures._is_source(path)
+    for path in ("p/test/test_cycle_limits.cpp", "p/test/test_one.py", "p/test/test_fuzz_rules.py", "p/README.md"):
+        assert not figures._is_source(path, words=words)
 
 
 def test_the_page_knows_every_bench_and_the_readme_quotes_it():

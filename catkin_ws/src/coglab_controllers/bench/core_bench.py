@@ -25,13 +25,15 @@ def row(
     peer_value: float | None = None,
     below_peer: bool = False,
 ) -> Row:
-    """One row; `goal` is "" (reported only), "<= number" or "< number"; `below_peer` also asks to beat the peer."""
+    """One row; `goal` is "" (reported only), "<= number" or "< number"; `below_peer` also asks to beat the peer, which
+    nobody does where the peer is not there."""
     ok = True
     if goal:
         sign, number = goal.split()
         ok = value <= float(number) if sign == "<=" else value < float(number)
-    if below_peer and peer_value is not None:
-        ok = ok and value < peer_value
+    if below_peer:
+        ok = ok and peer_value is not None and value < peer_value
+        goal = f"{goal}, < peer" if goal else "< peer"
     return {
         "bench": bench,
         "figure": figure,

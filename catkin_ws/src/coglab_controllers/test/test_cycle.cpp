@@ -5,7 +5,10 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <cerrno>
 #include <cstdlib>
+#include <mutex>
+#include <shared_mutex>
 #include <thread>
 
 #include "coglab_rt/joint_limits_table.hpp"
@@ -21,6 +24,7 @@ extern "C" {
 void* __libc_malloc(std::size_t);
 void* __libc_calloc(std::size_t, std::size_t);
 void* __libc_realloc(void*, std::size_t);
+void* __libc_memalign(std::size_t, std::size_t);
 void __libc_free(void*);
 
 // Everything in the process allocates through these.
@@ -40,12 +44,27 @@ void free(void* pointer) {
   if (counting && pointer != nullptr) ++allocations;
   __libc_free(pointer);
 }
-int pthread_mutex_lock(pthread_mutex_t* mutex) {
-  using Lock = int (*)(pthread_mutex_t*);
-  static const Lock original = reinterpret_cast<Lock>(dlsym(RTLD_NEXT, "pthread_mutex_lock"));
-  if (counting) ++locks;
-  return original(mutex);
+void* aligned_alloc(std::size_t alignment, std::size_t size) {
+  if (counting) ++allocations;
+  return __libc_memalign(alignment, size);
 }
+int posix_memalign(void** pointer, std::size_t alignment, std::size_t size) {
+  if (counting) ++allocations;
+  *pointer = __libc_memalign(alignment, size);
+  return *pointer != nullptr ? 0 : ENOMEM;
+}
+
+#define COGLAB_COUNTED_LOCK(name, type)                                                     \
+  int name(type* lock) {                                                                    \
+    static const auto original = reinterpret_cast<int (*)(type*)>(dlsym(RTLD_NEXT, #name)); \
+    if (counting) ++locks;                                                                  \
+    return original(lock);                                                                  \
+  }
+COGLAB_COUNTED_LOCK(pthread_mutex_lock, pthread_mutex_t)
+COGLAB_COUNTED_LOCK(pthread_mutex_trylock, pthread_mutex_t)
+COGLAB_COUNTED_LOCK(pthread_rwlock_rdlock, pthread_rwlock_t)
+COGLAB_COUNTED_LOCK(pthread_rwlock_wrlock, pthread_rwlock_t)
+#undef COGLAB_COUNTED_LOCK
 }
 
 namespace coglab_controllers {
@@ -54,9 +73,26 @@ namespace {
 TEST(Cycle, TheCounterCounts) {
   counting = true;
   void* volatile pointer = std::malloc(16);
+  void* volatile aligned = std::aligned_alloc(64, 64);
   counting = false;
   std::free(pointer);
-  EXPECT_EQ(allocations.exchange(0), 1u);
+  std::free(aligned);
+  EXPECT_EQ(allocations.exchange(0), 2u);
+}
+
+TEST(Cycle, TheLocksAreCounted) {
+  std::mutex mutex;
+  std::shared_mutex shared;
+  counting = true;
+  mutex.lock();
+  mutex.unlock();
+  if (mutex.try_lock()) mutex.unlock();
+  shared.lock();
+  shared.unlock();
+  shared.lock_shared();
+  shared.unlock_shared();
+  counting = false;
+  EXPECT_EQ(locks.exchange(0), 4u);
 }
 
 TEST(Cycle, TheCounterOfSystemCallsCounts) {

@@ -191,7 +191,8 @@ def request_time() -> list[Row]:
     ):
         ratio = statistics.median(block[0] / block[1 + i] for block in times)
         rows.append(row(f"driver time per request / {whose}", ratio, "ratio", "<= 1.25", ratio <= 1.25, loop, peers[i]))
-    return [*rows, row("driver time per request on the pty", ours, "us", None, True, wire, wire_us)]
+    left_out = row(f"blocks left out of {BLOCKS}, the line was disturbed", BLOCKS - len(times), "blocks", None, True)
+    return [*rows, left_out, row("driver time per request on the pty", ours, "us", None, True, wire, wire_us)]
 
 
 # -- node ------------------------------------------------------------------------------------------

@@ -7,9 +7,10 @@ between the two marks are taken from that page: what `is_quoted` says of the ben
 what is missed besides.
 
 The sources of a bench are its package, the packages that its own files name, what all these depend on (package.xml),
-and `coglab`; documents and tests are none. Programs beside the tests, which benches share with them, are. Those of
-`mutants` are all packages with their tests, which are what it measures, and its list of equivalent changes; below its
-rows the page lists the survivors of docs/mutants.json, which the report keeps, too.
+and `coglab`; documents and tests are none. Programs beside the tests, which benches share with them, are, and so are
+the tests that a bench names, because it runs them. Those of `mutants` are all packages with their tests, which are what
+it measures, and its list of equivalent changes; below its rows the page lists the survivors of docs/mutants.json, which
+the report keeps, too.
 """
 
 from __future__ import annotations
@@ -54,9 +55,9 @@ Definitions, goals and peers are fixed before anything is measured: they stand i
 TABLE = "| figure | value | goal | | peer | its value |\n| --- | --- | --- | --- | --- | --- |"
 
 
-def _needed(packages: dict[str, Path], files: list[Path]) -> list[Path]:
-    """Folders of the packages that a bench of these files runs; all of them where the files are not known."""
-    words = " ".join(path.read_text(encoding="utf-8") for path in files)
+def _needed(packages: dict[str, Path], files: list[Path], words: str) -> list[Path]:
+    """Folders of the packages that a bench of these files, with these words, runs; all of them where the files are not
+    known."""
     found = [
         name for name, folder in packages.items() if name in words or any(folder in path.parents for path in files)
     ]
@@ -67,22 +68,33 @@ def _needed(packages: dict[str, Path], files: list[Path]) -> list[Path]:
     return [packages[name] for name in found or packages]
 
 
-def _is_source(path: str, tests: bool = False) -> bool:
-    """Whether a figure may depend on this file: documents measure nothing, nor do tests but where they are measured."""
+def _is_source(path: str, tests: bool = False, words: str = "") -> bool:
+    """Whether a figure may depend on this file: documents measure nothing, nor do tests but where they are measured, or
+    run by the bench, whose files hold these words."""
     folder, _, name = path.rpartition("/")
     test = f"{folder}/".count("/test/") and (name.startswith("test_") or name.endswith((".test", "_rostest.py")))
-    return not (test and not tests or name.endswith(".md"))
+    stem = name.partition(".")[0]
+    # A rostest is named by its launch file, a program by the end of its name.
+    call = stem if name.startswith("test_") else f"{stem.removesuffix('_rostest')}.test"
+    run = re.search(rf"(?:\b|_){re.escape(call)}\b", words) is not None
+    return not (test and not tests and not run or name.endswith(".md"))
 
 
 def sources_of(top: Path, bench: str) -> dict[str, str]:
     """Commit of a checkout, and one word for the sources of a bench: the same where only others change."""
     source = top / "catkin_ws" / "src"
-    folders = _needed(package_folders(source), find_benches(source).get(bench, []))
+    its_files = find_benches(source).get(bench, [])
+    words = " ".join(path.read_text(encoding="utf-8") for path in its_files)
+    folders = _needed(package_folders(source), its_files, words)
     places = ["coglab", *sorted(str(folder.relative_to(top)) for folder in folders)]
     tests = bench == MUTANTS
     places += [EQUIVALENT] if tests else []
-    changed = any(_is_source(line[3:], tests) for line in git(top, "status", "--porcelain", "--", *places).splitlines())
-    files = [line for line in git(top, "ls-tree", "-r", "HEAD", "--", *places).splitlines() if _is_source(line, tests)]
+
+    def kept(lines: str) -> list[str]:
+        return [line for line in lines.splitlines() if _is_source(line, tests, words)]
+
+    changed = bool(kept(git(top, "status", "--porcelain", "--", *places)))
+    files = kept(git(top, "ls-tree", "-r", "HEAD", "--", *places))
     digest = hashlib.sha256("\n".join(files).encode()).hexdigest() if files else ""
     return {
         "commit": git(top, "rev-parse", "--short=7", "HEAD") + (" with changes" if changed else ""),

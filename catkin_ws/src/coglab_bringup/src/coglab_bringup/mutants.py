@@ -47,13 +47,13 @@ from coglab_bringup.mutants_kept import entry_of, further, mutants_of, own_seeds
 from coglab_bringup.mutator import ENDINGS, Change, changes, code_lines
 from coglab_bringup.usage import Refused
 
-NOT_SHIPPED = {"test", "bench", "example", "examples", "template", "testing"}
+NOT_SHIPPED = {"test", "bench"}
 SLOWER = 4.0
 """by which a test may take longer than it did on the unchanged sources before it counts as one that hangs"""
 
 
 def shipped(folder: Path) -> list[Path]:
-    """The source files of a package that ship, in a fixed order: not its tests, benches, examples and templates."""
+    """The source files of a package that ship, in a fixed order: not its tests and benches."""
     found = [path for path in folder.rglob("*") if path.suffix in ENDINGS and path.is_file()]
     return sorted(
         path
