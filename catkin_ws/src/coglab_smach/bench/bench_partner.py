@@ -28,13 +28,13 @@ the action. An arm that does not start is infinitely late, and so is every direc
 person did not reach; how many of each is a row. Other motions: 200 (coglab_perception/test/other_motions.py), kinds in
 turn, half with the object in the hand that moves, half with one in the robot's, which the drawn person has given it
 before; palm: farthest from where it was, from the motion's beginning to 0.8 s after its end. Those that were not
-carried out, because that person had failed, are counted.
+carried out, because that person had failed, count as ones for which the palm moved, and are a row.
 
 Human taker: starts 0.2 s after the onset and touches human_time(way from the palm at home to the object's middle)
 later, but not before the object is there: the person's hand stands (below 0.02 m/s for 0.1 s), or the robot touches
 it. Touch: 0.5 N on palm and fingers, all together. Weight carried: the robot's fingers hold the object, as the physics
-has it, and at least half of the weight is on them, for 0.1 s. Holding on: from where the object is there until the
-person's grip is below a half.
+has it, and at least half of the weight is on them, for 0.1 s; nine tenths is a row beside it. Holding on: from where
+the object is there until the person's grip is below a half.
 
 Speed near: the palm's own velocity along the line to the person's hand, within 0.25 m. Withdrawal and fall: while the
 true distance from palm to object is a share of that at the reach's beginning, uniform in 0.30 .. 0.95; all the same

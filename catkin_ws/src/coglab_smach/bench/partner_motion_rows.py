@@ -77,8 +77,9 @@ def other_rows(group: Group, hub: bool) -> list[dict]:
     done = [each for each in found if each["moved_mm"] is not None]
     what = "the hub left by recognition" if hub else "asked for by the operator"
     where = f"hand motions that are neither offer nor request, {what}"
-    moved = share([each["moved_mm"] > 30.0 for each in done]) if done else 1.0
-    rows = [group.row(f"{where}: palm moves over 30 mm, of {len(done)}", moved, "share", "" if hub else "<= 0.05")]
+    # One that was not carried out shows nothing, and counts as one for which the palm moved.
+    moved = share([each["moved_mm"] is None or each["moved_mm"] > 30.0 for each in found])
+    rows = [group.row(f"{where}: palm moves over 30 mm, of {len(found)}", moved, "share", "" if hub else "<= 0.05")]
     for holds, who in ((False, "object in the moving hand"), (True, "object in the robot's")):
         part = [each["moved_mm"] > 30.0 for each in done if each["robot_holds"] == holds]
         rows.append(group.row(f"{where}, {who}: palm moves over 30 mm, of {len(part)}", share(part), "share"))
@@ -102,6 +103,7 @@ def receiving_rows(group: Group) -> list[dict]:
     return [
         *times("touch_late", "receiving: first touch later than a human taker's", "<= 0.5"),
         *times("carry", "receiving: touch to grip closed and weight carried", "<= 1.2"),
+        *times("carry_most", "receiving: touch to grip closed and nine tenths of the weight carried", ""),
         *times("holding_on", "receiving: the person's hand stands still and holds on", "<= 2"),
         group.row("receiving: the palm still moves at touch", moving, "share"),
     ]

@@ -19,8 +19,8 @@ from reach_figures import human_time, sparc
 RATE = 1.0 / DT
 TOUCH = 0.5
 """N on palm and fingers, from which something touches the robot's hand"""
-CARRIED = 0.5
-"""share of the weight on the robot's hand from which it carries the object"""
+CARRIED, MOST = 0.5, 0.9
+"""shares of the weight on the robot's hand from which it carries the object, and carries most of it"""
 AT_TOUCH = 0.10
 """s of contact of which the largest force counts as that at touch"""
 NEAR = 0.25
@@ -183,10 +183,11 @@ def of_action(part: dict[str, np.ndarray], action: str) -> dict[str, Any]:
 
 
 def of_receiving(part: dict[str, np.ndarray], found: dict[str, Any]) -> dict[str, Any]:
-    """``touch_late``: s from the touch of a human taker to that of the robot; ``carry``: s from touch until the robot
-    holds and carries; ``holding_on``: s from the person's hand at rest (or touched) until it lets go; ``touch_force``:
-    N; ``touch_moving``: the palm moved then. None: never."""
-    out: dict[str, Any] = dict.fromkeys(("touch_late", "carry", "holding_on", "touch_force", "touch_moving"))
+    """``touch_late``: s from the touch of a human taker to that of the robot; ``carry``, ``carry_most``: s from touch
+    until the robot holds, and carries half or nine tenths of the weight; ``holding_on``: s from the person's hand at
+    rest (or touched) until it lets go; ``touch_force``: N; ``touch_moving``: the palm moved then. None: never."""
+    names = ("touch_late", "carry", "carry_most", "holding_on", "touch_force", "touch_moving")
+    out: dict[str, Any] = dict.fromkeys(names)
     times = part["time"]
     if found["onset"] is None:
         return out
@@ -206,10 +207,11 @@ def of_receiving(part: dict[str, np.ndarray], found: dict[str, Any]) -> dict[str
     out["touch_late"] = float(times[touch] - taker)
     out["touch_force"] = float(np.max(part["force"][touch : touch + round(AT_TOUCH * RATE)]))
     out["touch_moving"] = bool(np.linalg.norm(part["velocity"][touch]) > motion_figures.MOVES)
-    holds = np.isin(part["held_by"], ("robot", "both")) & (part["share"] >= CARRIED)
-    carried = motion_figures.onset(np.where(holds[touch:], 1.0, 0.0), RATE)
-    if carried is not None:
-        out["carry"] = float(times[touch + carried] - times[touch])
+    for name, least in (("carry", CARRIED), ("carry_most", MOST)):
+        holds = np.isin(part["held_by"], ("robot", "both")) & (part["share"] >= least)
+        carried = motion_figures.onset(np.where(holds[touch:], 1.0, 0.0), RATE)
+        if carried is not None:
+            out[name] = float(times[touch + carried] - times[touch])
     return out
 
 

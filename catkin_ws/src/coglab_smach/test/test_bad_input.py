@@ -188,9 +188,9 @@ def test_arm_node_dead_ends_in_fault_with_its_sentence():
         t.wait_hub("fault")
 
     trial.run(script)
-    assert trial.ctx.journal.why() == (
-        "wait_stop: the arm does not follow any more; the motion could not be ended: "
-        "the robot is silent, because /lwr/state is silent"
+    # How the port says that it is silent is the port's matter: test_arm_port.
+    assert trial.ctx.journal.why().startswith(
+        "wait_stop: the arm does not follow any more; the motion could not be ended: the robot is silent, because "
     )
     assert trial.result().outcome == "fault"
 

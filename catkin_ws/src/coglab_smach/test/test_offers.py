@@ -141,6 +141,19 @@ def test_a_reach_begins_on_a_belief_before_the_object_is_there():
     assert goal["frame"] == "object_mug_ahead" and when == 0.0
 
 
+@pytest.mark.parametrize(("believed_end", "frame"), [(0.9, ""), (0.4, "object_mug_ahead")])
+def test_who_passes_through_the_region_offers_nothing_there(believed_end, frame):
+    """The object goes through the region at 0.8 m/s, and is believed to stop outside, or in it."""
+    offers = Offers(lambda t: (0.7, min(-0.6 + 0.8 * t, 0.9), 0.4))
+    offers.ahead = ahead(offer=0.99, place=(0.7, believed_end, 0.4))
+    if frame:
+        assert offers.wait()[0]["frame"] == frame
+    else:
+        with pytest.raises(PortError) as error:
+            offers.wait()
+        assert error.value.code == ReasonCode.OBJECT_NOT_SEEN
+
+
 @pytest.mark.parametrize(("age", "good"), [(0.5, True), (0.51, False)])
 def test_a_sight_for_a_goal_is_half_a_second_old_at_most(age, good):
     offers = Offers(age=age)
@@ -183,7 +196,7 @@ def test_a_goal_may_not_leave_the_region_nor_go_back_by_10_cm_nor_fall_by_8():
     hand = unless_withdrawn(ctx, {**GOAL, "frame": "human_hand", "place": INSIDE}, 0.1, may_fall=False)
     assert hand["limits"]["goal_region_low"] == pytest.approx([0.35, -0.60, -0.05])
     assert hand["limits"]["goal_region_high"] == pytest.approx([0.96, 0.60, 0.95])
-    assert hand["limits"]["goal_drop"] == 0.0 and "early" not in hand and hand["primitive"] == "p"
+    assert hand["limits"]["goal_drop"] == 0.0 and "watch" in hand and hand["primitive"] == "p"
 
 
 def test_what_was_held_still_outside_may_go_no_farther_than_that_counts():
@@ -199,7 +212,7 @@ def test_a_goal_that_is_predicted_has_to_lie_in_the_region_and_is_watched_furthe
     assert limits["goal_region_low"] == pytest.approx([0.35, -0.60, -0.05])
     assert limits["goal_region_high"] == pytest.approx([0.96, 0.60, 0.95])
     assert (limits["goal_retreat"], limits["goal_drop"]) == (0.0, 0.0)
-    assert early["early"] == {"retreat": 0.10, "drop": 0.08, "margin": 0.1}
+    assert early["watch"] == {"retreat": 0.10, "drop": 0.08, "margin": 0.1}
 
 
 def test_a_region_without_a_configuration_is_what_the_arm_can_reach():

@@ -335,14 +335,18 @@ def test_a_sample_is_true_and_makes_all_rows(monkeypatch):
     assert len(set(names)) == len(names)
     shown = {row["figure"].partition(" [sample of")[0]: row for row in rows}
     assert shown["withdrawals that came about"]["value"] == 1.0 and shown["reaches"]["value"] >= 4.0
-    changed = "settings of home, region and timing that were changed (none)"
-    assert shown[changed]["ok"]
-    assert not [row["figure"] for row in rows if row["goal"] and row["ok"] and row is not shown[changed]]
+    assert rows[0]["figure"] == "settings of home, region and timing that were changed (none)"
+    assert rows[0]["ok"] and rows[1]["ok"] and rows[1]["figure"].startswith("a reach follows what is outside")
+    assert not [row["figure"] for row in rows[2:] if row["goal"] and row["ok"]]
     assert names[2].endswith("[sample of 2 of 500 asked: missed]"), names[2]
 
 
-def test_what_a_reach_follows_beyond_the_region_is_a_row():
+def test_what_a_reach_follows_beyond_the_region_is_a_row(monkeypatch):
     region = bench_partner.settings_rows(bench_partner.row)[1]
-    assert region["value"] == pytest.approx(0.17) and not region["ok"]
-    for part in ("0.05 m where it is seen", "0.15 m where it is believed to end", "border of 0.02 m"):
+    assert region["value"] == 0.0 and region["ok"]
+    for part in ("where it is seen 0 mm", "to where it will be 0 mm"):
         assert part in region["figure"]
+    wider = {"goal_region_low": [0.40, -0.52, 0.04], "goal_region_high": [0.87, 0.51, 0.86]}
+    monkeypatch.setattr(bench_partner, "unless_withdrawn", lambda ctx, goal: {**goal, "limits": wider})
+    region = bench_partner.settings_rows(bench_partner.row)[1]
+    assert region["value"] == pytest.approx(0.05) and not region["ok"] and "seen 50 mm" in region["figure"]

@@ -267,8 +267,8 @@ class Reaching:
         self.state._deadline = 1e9
         self.trial.ctx.arm.dmp_progress = lambda: progress
         self.trial.ctx.arm.motion_allowed = lambda: Verdict(True)
-        self.state._early = SimpleNamespace(
-            doubted=lambda: doubted, doubt=lambda: (1, "doubt"), goal_now=lambda: self.goal
+        self.state._watched = SimpleNamespace(
+            predicted=True, doubted=lambda: doubted, doubt=lambda: (1, "doubt"), goal_now=lambda: self.goal
         )
         self.goal = {"frame": "f", "offset": [0.0, 0.0, 0.0], "primitive": "p", "approach": [0.0, 0.0, 0.1]}
         self.state._pause = lambda early, code, why: self.paused.append((code, why))

@@ -9,10 +9,11 @@ from coglab_msgs.msg import ReasonCode
 from coglab_smach.clocks.virtual_clock import using
 from coglab_smach.ports.interfaces import Ahead, ContactEvent, DmpProgress, Located, Verdict
 from coglab_smach.ports.pending import Polled, PortError, Ready
-from coglab_smach.states import early_reach, reach
+from coglab_smach.states import reach, reach_watch
 from coglab_smach.states.base import TimeLimit
-from coglab_smach.states.early_reach import EarlyReach, PersonsGrip, target_of
-from coglab_smach.states.reach import ExecuteDmp, MonitorDmp, WaitStop, dmp_request, start
+from coglab_smach.states.monitor import MonitorDmp
+from coglab_smach.states.reach import ExecuteDmp, WaitStop, dmp_request, start
+from coglab_smach.states.reach_watch import PersonsGrip, ReachWatch, target_of
 from conftest import Trial
 
 LOW, HIGH = [-1.0, -1.0, -1.0], [2.0, 1.0, 2.0]
@@ -25,23 +26,23 @@ GOAL = {
     "primitive": "reach_human",
     "dmp_ratio": 1.5,
     "limits": {"goal_retreat": 0.0, "goal_drop": 0.0, "goal_region_low": LOW, "goal_region_high": HIGH},
-    "early": {"retreat": 0.10, "drop": 0.08, "margin": 0.0},
+    "watch": {"retreat": 0.10, "drop": 0.08, "margin": 0.0},
 }
 
 
 class Early:
-    """An EarlyReach of a palm at the origin; the test says what is seen and believed, and what time it is."""
+    """An ReachWatch of a palm at the origin; the test says what is seen and believed, and what time it is."""
 
-    def __init__(self, monkeypatch, grip=None):
+    def __init__(self, monkeypatch, grip=None, frame="object_mug_ahead"):
         self.t, self.place, self.ahead = 0.0, (0.4, 0.0, 0.4), Ahead(1.0, 0.0, "mug", "object_mug_ahead", (0.4, 0, 0.4))
-        monkeypatch.setattr(early_reach, "sight_or_refusal", lambda state, target: self.seen())
-        monkeypatch.setattr(early_reach, "palm_at", lambda ctx: np.zeros(3))
+        monkeypatch.setattr(reach_watch, "sight_or_refusal", lambda state, target: self.seen())
+        monkeypatch.setattr(reach_watch, "palm_at", lambda ctx: np.zeros(3))
         ctx = SimpleNamespace(
             clock=SimpleNamespace(now=lambda: self.t),
             perception=SimpleNamespace(ahead=lambda: self.ahead),
             config=REGION,
         )
-        self.reach = EarlyReach(SimpleNamespace(ctx=ctx), GOAL, grip)
+        self.reach = ReachWatch(SimpleNamespace(ctx=ctx), {**GOAL, "frame": frame}, grip)
 
     def seen(self):
         return None if self.place is None else Located("mug", "world", tuple(self.place), IDENTITY, 0.0)
@@ -110,9 +111,23 @@ def test_what_is_seen_outside_and_moves_is_not_offered_where_no_place_is_told(mo
     early = Early(monkeypatch)
     early.ahead = Ahead(1.0, 0.0, "mug")
     assert early.look(HIGH[0] - 0.01, 0.0, 0.4) and not early.look(HIGH[0] + 0.01, 0.0, 0.4)
-    assert early.reach.doubt()[0] == ReasonCode.GOAL_AHEAD_OUTSIDE
+    assert early.reach.doubt()[0] == ReasonCode.GOAL_LEFT_REGION
     early.place = None
     assert early.look(), "of what is hidden, and believed, nothing is said"
+
+
+def test_a_reach_toward_what_is_seen_goes_on_without_a_belief_and_stops_for_one_that_leads_outside(monkeypatch):
+    seen = Early(monkeypatch, frame="object_mug")
+    assert not seen.reach.predicted
+    seen.ahead, seen.place = Ahead(), None
+    assert seen.look(), "it is merely hidden; for how long, the controller minds"
+    assert seen.look(0.4, 0.0, 0.4)
+    seen.ahead = Ahead(1.0, 0.0, "mug", "object_mug_ahead", (0.4, 0.0, 0.4))
+    assert seen.look(0.42, 0.0, 0.4) and seen.reach.goal_now()["frame"] == "object_mug"
+    seen.ahead = Ahead(1.0, 0.0, "mug", "object_mug_ahead", (0.4, 1.2, 0.4))
+    assert not seen.look(0.45, 0.05, 0.4) and seen.reach.doubt()[0] == ReasonCode.GOAL_AHEAD_OUTSIDE
+    seen.ahead = Ahead(0.0, 1.0, "", "human_hand_ahead", (0.4, 1.2, 0.4))
+    assert seen.look(0.45, 0.08, 0.4), "another thing's place says nothing of this one"
 
 
 @pytest.mark.parametrize(("back", "waits"), [(0.055, False), (0.065, True)])
@@ -150,7 +165,7 @@ class Grip:
     def __init__(self, monkeypatch, above=0.05):
         self.t, self.above, self.ages, self.asked = 0.0, above, (0.0, 0.0), 0
         self.first: list[float] = []
-        monkeypatch.setattr(early_reach, "sight_of", self.sight)
+        monkeypatch.setattr(reach_watch, "sight_of", self.sight)
         ctx = SimpleNamespace(clock=SimpleNamespace(now=lambda: self.t), config={})
         self.grip = PersonsGrip(SimpleNamespace(ctx=ctx, pause=self.pause), "mug")
 
@@ -278,7 +293,8 @@ def test_the_hand_slides_in_for_six_tenths_of_a_second_at_most(monkeypatch, off,
 
 def received(monkeypatch, off):
     """A reach of the whole machine with the object seen ``off(touches)`` m off its grasp."""
-    trial, looks = Trial(**{"handover.close_within": 0.0}), []
+    # In this cell the object hangs at the palm from the touch on, and goes with it.
+    trial, looks = Trial(**{"handover.close_within": 0.0, "handover.retreat": 1.0}), []
     monkeypatch.setattr(reach, "off_grasp", lambda state, goal: off(looks.append(1) or len(looks)))
     trial.cell.partner.touch_after = 0.3
 

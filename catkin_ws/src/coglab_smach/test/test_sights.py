@@ -7,7 +7,7 @@ import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_smach.ports.interfaces import Ahead, DmpProgress, Located
 from coglab_smach.ports.pending import PortError
-from coglab_smach.states import early_reach
+from coglab_smach.states import reach_watch
 from coglab_smach.states.base import TimeLimit
 from coglab_smach.states.reach import WaitStop
 
@@ -22,8 +22,8 @@ class Watched:
     def __init__(self, monkeypatch):
         self.t, self.place, self.refusal = 0.0, np.array([0.4, 0.0, 0.4]), None
         self.ahead = Ahead(0.0, 1.0, "", "human_hand_ahead", (0.4, 0.0, 0.4))
-        monkeypatch.setattr(early_reach, "sight_or_refusal", lambda state, target: self.refusal or self.sight())
-        monkeypatch.setattr(early_reach, "palm_at", lambda ctx: np.zeros(3))
+        monkeypatch.setattr(reach_watch, "sight_or_refusal", lambda state, target: self.refusal or self.sight())
+        monkeypatch.setattr(reach_watch, "palm_at", lambda ctx: np.zeros(3))
         ctx = SimpleNamespace(
             clock=SimpleNamespace(now=lambda: self.t),
             perception=SimpleNamespace(ahead=lambda: self.ahead),
@@ -32,9 +32,9 @@ class Watched:
         goal = {
             "frame": "human_hand_ahead",
             "limits": {"goal_region_low": LOW, "goal_region_high": HIGH},
-            "early": {"retreat": 0.10, "drop": 0.0, "margin": 0.0},
+            "watch": {"retreat": 0.10, "drop": 0.0, "margin": 0.0},
         }
-        self.reach = early_reach.EarlyReach(SimpleNamespace(ctx=ctx), goal, None)
+        self.reach = reach_watch.ReachWatch(SimpleNamespace(ctx=ctx), goal, None)
 
     def sight(self):
         return Located("human_hand", "world", tuple(self.place), (0.0, 0.0, 0.0, 1.0), 0.0)
@@ -80,7 +80,7 @@ def test_a_hand_that_was_hidden_while_it_went_back_is_believed_after_a_moment(mo
     hand.see(0.4, 0.0, 0.4, frames=10)
     with pytest.raises(TimeLimit, match="went back"):
         hand.see(0.7, 0.0, 0.4, frames=12)
-    assert hand.t < 10 * FRAME + early_reach.SWAPPED + 3 * FRAME
+    assert hand.t < 10 * FRAME + reach_watch.SWAPPED + 3 * FRAME
 
 
 @pytest.mark.parametrize("code, told", [(ReasonCode.NOT_PERCEIVED, True), (ReasonCode.OBJECT_NOT_SEEN, False)])
@@ -92,7 +92,7 @@ def test_of_a_hand_that_cannot_be_told_from_another_it_is_said(monkeypatch, code
     begin = hand.t
     while not hand.reach.doubted():
         hand.t += FRAME
-        assert hand.t < begin + early_reach.DOUBT_TIME + 3 * FRAME
+        assert hand.t < begin + reach_watch.DOUBT_TIME + 3 * FRAME
     assert hand.reach.doubt() == ((int(code), "2 people are in view") if told else WITHDRAWN)
     hand.refusal = None
     assert hand.reach.hopeful() and hand.reach.doubt() == WITHDRAWN
@@ -116,14 +116,14 @@ def test_a_reach_that_will_end_outside_the_region_is_not_followed(monkeypatch, b
         doubted = hand.reach.doubted()
     assert doubted == (not followed), "a hand that passes through the region offers nothing there"
     if doubted:
-        assert hand.t - begin < early_reach.DOUBT_TIME + 3 * FRAME
+        assert hand.t - begin < reach_watch.DOUBT_TIME + 3 * FRAME
         assert hand.reach.doubt()[0] == ReasonCode.GOAL_AHEAD_OUTSIDE
 
 
 def test_a_hand_that_is_hidden_while_it_goes_down_has_not_lost_what_it_holds(monkeypatch):
     """Its last sight is older than that of the object, which seems to have left it, until it is seen again."""
     t, sights = [0.0], {"human_hand": ((0.8, 0.0, 0.45), 0.05), "mug": ((0.75, 0.0, 0.42), 0.05)}
-    monkeypatch.setattr(early_reach, "sight_of", lambda state, name: Located(name, "world", *sight(*sights[name])))
+    monkeypatch.setattr(reach_watch, "sight_of", lambda state, name: Located(name, "world", *sight(*sights[name])))
 
     def sight(place, age):
         return place, (0.0, 0.0, 0.0, 1.0), age
@@ -134,7 +134,7 @@ def test_a_hand_that_is_hidden_while_it_goes_down_has_not_lost_what_it_holds(mon
             sights["human_hand"] = ((1.0, 0.0, 0.23), 0.05)
 
     state = SimpleNamespace(ctx=SimpleNamespace(clock=SimpleNamespace(now=lambda: t[0]), config={}), pause=pause)
-    grip = early_reach.PersonsGrip(state, "mug")
+    grip = reach_watch.PersonsGrip(state, "mug")
     sights["mug"], sights["human_hand"] = ((0.95, 0.0, 0.20), 0.05), ((0.85, 0.0, 0.40), 0.30)
     assert grip.fell_or_withdrawn() == ReasonCode.GOAL_WITHDRAWN
     sights["mug"] = ((1.0, 0.0, 0.10), 0.05)
@@ -144,7 +144,7 @@ def test_a_hand_that_is_hidden_while_it_goes_down_has_not_lost_what_it_holds(mon
 class Reach(WaitStop):
     """Waits for somebody who never goes on."""
 
-    def __init__(self, progress, doubted):
+    def __init__(self, progress, doubted, predicted=True):
         self.ctx = SimpleNamespace(
             config={},
             arm=SimpleNamespace(
@@ -154,8 +154,10 @@ class Reach(WaitStop):
             ),
             journal=SimpleNamespace(mark=lambda name: None),
         )
-        self._early, self._grip = (
-            SimpleNamespace(doubted=lambda: doubted, hopeful=lambda: False, doubt=lambda: WITHDRAWN),
+        self._watched, self._grip = (
+            SimpleNamespace(
+                predicted=predicted, doubted=lambda: doubted, hopeful=lambda: False, doubt=lambda: WITHDRAWN
+            ),
             None,
         )
 
@@ -180,3 +182,10 @@ def test_a_reach_that_is_given_up_says_for_which_of_the_two_reasons(state, code,
     with pytest.raises(TimeLimit) as found:
         Reach(DmpProgress(state, "", "reach_human", 0.5, 0.2, code), doubted)._reached()
     assert found.value.code == expected
+
+
+def test_a_goal_that_is_seen_to_leave_the_region_has_its_own_reason():
+    left = DmpProgress("aborted", "it left", "reach_human", 0.5, 0.2, ReasonCode.GOAL_LEFT_REGION)
+    with pytest.raises(TimeLimit) as found:
+        Reach(left, False, predicted=False)._reached()
+    assert found.value.code == ReasonCode.GOAL_LEFT_REGION and found.value.causes == (reach_watch.LEFT[1],)

@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_smach.ports.interfaces import Located
-from coglab_smach.states import early_reach, reach
+from coglab_smach.states import reach, reach_watch
 from conftest import Trial
 
 
 def receive(monkeypatch, away, **constants):
     """Receive where the palm is ``away(s since the first look)`` m off its grasp at a touch. Returns seconds from the
     first look to the closing, and the trial."""
-    trial, looked = Trial(), []
+    # In this cell the object hangs at the palm from the touch on, and goes with it.
+    trial, looked = Trial(**{"handover.retreat": 1.0}), []
 
     def off_grasp(state, goal):
         looked.append(trial.clock.now())
@@ -63,8 +64,8 @@ def test_what_is_still_at_the_hand_has_not_fallen(monkeypatch, apart, code):
     def pause(duration):
         t[0] += duration
 
-    monkeypatch.setattr(early_reach, "sight_of", sight)
+    monkeypatch.setattr(reach_watch, "sight_of", sight)
     ctx = SimpleNamespace(clock=SimpleNamespace(now=lambda: t[0]), config={})
-    grip = early_reach.PersonsGrip(SimpleNamespace(ctx=ctx, pause=pause), "mug")
+    grip = reach_watch.PersonsGrip(SimpleNamespace(ctx=ctx, pause=pause), "mug")
     hand[0] = None if apart is None else thing + [0.03, 0.0, apart]
     assert grip.fell_or_withdrawn() == getattr(ReasonCode, code)

@@ -210,6 +210,47 @@ def test_a_partner_who_pushes_the_arm_away_while_it_receives(after, outcomes):
     assert trial.rig.robot.limit_violations == 0
 
 
+@pytest.mark.parametrize("timing", ["calm", "natural"])
+@pytest.mark.parametrize("offered_before", [False, True])
+def test_who_pushes_the_arm_and_goes_is_not_chased(timing, offered_before):
+    """40 N for a second; as the arm draws back, the person takes the object away. What the arm then begins anew toward
+    was in the region before, whether the reach had begun on a belief or on a sight."""
+    trial = VirtualTrial(seed=4, profile="accustomed", perfect=True, timing=timing)
+    pushed, gone, toward = [], [], []
+
+    def beside(t):
+        if not pushed and t._reach is not None and t.rig.t > t._reach.begin + 0.3:
+            pushed.append(t.rig.t)
+        if pushed:
+            t.rig.cell.set_push([-40.0 if t.rig.t < pushed[0] + 1.0 else 0.0, 0.0, 0.0])
+        if pushed and not gone and t.ctx.journal.marked("bumped"):
+            gone.append(t.rig.t)
+            t.rig.human.command("rest")
+        if gone and t.rig.t > gone[0] + 0.7:
+            truth, chain = t.rig.cell.truth(), t.rig.robot.chain
+            way = np.asarray(truth["human_hand"]["position"]) - np.asarray(truth["robot_hand"]["position"])
+            velocity = chain.jacobian(truth["position"])[:3] @ truth["velocity"]
+            toward.append(float(velocity @ way / np.linalg.norm(way)))
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        if offered_before:
+            t.rig.human.command("give mug")
+            while t.rig.human.phase != "waiting":
+                t.clock.sleep(0.05)
+        before, end = len(t.ctx.journal.results), t.clock.now() + 60.0
+        t.ctx.requests.submit(RECEIVE, "mug")
+        t.begun.append(RECEIVE)
+        while len(t.ctx.journal.results) == before and t.clock.now() < end:
+            t.clock.sleep(0.05)
+
+    trial.beside = beside
+    result = trial.run(script=script)[0]
+    assert gone and result.outcome == "failed_empty" and result.reason, trial.ctx.journal.why()
+    assert result.code in {ReasonCode.GOAL_WITHDRAWN, ReasonCode.GOAL_LEFT_REGION, ReasonCode.GOAL_AHEAD_OUTSIDE}
+    assert max(toward) < 0.05
+
+
 def test_who_offers_and_withdraws_five_times_is_not_chased():
     """Each ends because the goal went back or left the region, and the sixth offer is taken. The palm goes toward the
     hand with at most 0.25 m/s from 0.2 s after that is 0.10 m back, and not much faster 0.2 s after it has turned."""

@@ -7,7 +7,8 @@ from coglab_smach.states.arm import SwitchController
 from coglab_smach.states.base import CoglabConcurrence, CoglabMachine, require_all
 from coglab_smach.states.give import WaitTaker
 from coglab_smach.states.hand import HandPreshape
-from coglab_smach.states.reach import ExecuteDmp, MonitorDmp, WaitStop
+from coglab_smach.states.monitor import MonitorDmp
+from coglab_smach.states.reach import ExecuteDmp, WaitStop
 
 KEYS = ["goal", "grasp", "object_entry", "object_id"]
 TAKER_KEYS = [*KEYS, "delivery"]

@@ -207,7 +207,8 @@ class GiveLoad(CoglabState):
     The grip loosens in proportion to their share of the weight, as people's does (Chan 2012, Endo 2012): where the hand
     feels its grip, the force of it falls as the load does, down to ``give.grip_safety`` times what friction needs for
     what the hand still carries, by ``give.ease`` counts at most; else it is ``give.loosen`` counts. When the load comes
-    back to the arm, or the object sinks in the hand by ``give.slip`` m, the grip closes again. Where the person's hand
+    back to the arm, or the object sinks in the hand by ``give.slip`` m, the grip closes again; what has sunk so once is
+    held closed to the end. Where the person's hand
     waits there, but not at the object, the arm brings it to where that hand takes it, ``give.bring_after`` s after its
     own arrival and later; a reach toward where a hand would be may have ended before that hesitated. Where nothing has
     happened for ``give.lower_after`` s the arm sinks by ``give.lower`` m, so that the weight comes to lie in the hand;

@@ -18,7 +18,7 @@ from coglab_smach.kinematics.grasp_choice import ranked
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState
 from coglab_smach.states.hand import closes_gently, firm_speed, gentle
-from coglab_smach.states.region import HandoverRegion, unless_withdrawn
+from coglab_smach.states.region import HandoverRegion, ends_outside, unless_withdrawn
 from coglab_smach.states.where import hand_name, palm_at, person_at
 
 Goals = Callable[[Mapping[str, Any]], list[dict[str, Any]]]
@@ -134,7 +134,7 @@ def await_offer(state: CoglabState, target: str, goals: Goals, margin: float = 0
         while True:
             located = locate(state, target)
             now, place = state.ctx.clock.now(), np.array(located["xyz"])
-            offered = region.offers(now, place)
+            offered = region.offers(now, place, moving=not ends_outside(state.ctx, region, located["frame"]))
             early = believed(state.ctx, target, located, person, region)
             candidates = goals(located)
             goal = first_reachable(state.ctx, located, candidates) if offered else None

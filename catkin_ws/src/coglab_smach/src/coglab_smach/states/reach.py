@@ -1,4 +1,4 @@
-"""States of a reach: starting a DMP, waiting for its end or for contact, another primitive on the way."""
+"""States of a reach: starting a DMP, and waiting for its end or for contact."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from coglab_msgs.msg import ReasonCode
 
-from coglab_smach.context.awaited import ARM, CONTACT, HAND, PERSON, SIGHT
+from coglab_smach.context.awaited import ARM, CONTACT, HAND, PERSON
 from coglab_smach.context.context import Context
 from coglab_smach.kinematics.motion_time import reach_time
 from coglab_smach.ports.interfaces import ContactEvent, DmpRequest
 from coglab_smach.ports.pending import PortError
-from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
-from coglab_smach.states.early_reach import OUTSIDE, EarlyReach, PersonsGrip, target_of
+from coglab_smach.states.base import CoglabState, TimeLimit
 from coglab_smach.states.motion import shift, shift_time
+from coglab_smach.states.reach_watch import LEFT, LOWERED, OUTSIDE, PersonsGrip, ReachWatch, target_of
 from coglab_smach.states.where import off_grasp, palm_axis
 
 BUMPS = 2
@@ -29,6 +29,8 @@ FIRM = 2.5
 """margin of a touch that is more than brushing past"""
 BETWEEN = 0.01
 """m off the last of the way, at most, for an object that is seen between the fingers"""
+NEWS = 0.02
+"""s after which the arm tells of a motion that has begun"""
 SLIDING = 0.6
 """s for which the hand goes on at most, at full speed scale"""
 
@@ -101,7 +103,7 @@ class WaitStop(CoglabState):
         self.trigger = trigger
         self._left = False
         """the compliant profile of the approach"""
-        self._early: EarlyReach | None = None
+        self._watched: ReachWatch | None = None
         self._grip: PersonsGrip | None = None
         self._arrived: float | None = None
         """s, when the hand was first at its place"""
@@ -113,7 +115,7 @@ class WaitStop(CoglabState):
         self.ctx.closing = self._arrived = None
         target = target_of(ud.goal) if self.trigger == "contact" else ""
         self._grip = PersonsGrip(self, target) if target else None
-        self._early = EarlyReach(self, ud.goal, self._grip) if self.trigger and "early" in ud.goal else None
+        self._watched = ReachWatch(self, ud.goal, self._grip) if self.trigger and "watch" in ud.goal else None
         if self.trigger == "contact":
             self.ctx.closing_firm = int(ud.grasp["hand"].get("firm", 0))
             return self._await_contact(ud)
@@ -171,20 +173,28 @@ class WaitStop(CoglabState):
                 except PortError as error:
                     self.reason = error.sentence  # as far as it goes
         self.await_pending(arm.switch_controller("dmp"), "switching to controller 'dmp'", 3.0)
-        # Where the object will be is not told any more once the person's reach is over.
-        self._begin_again(self._early.goal_now() if self._early is not None else ud.goal)
+        watch = self._watched
+        if watch is None:
+            self._begin_again(ud.goal)
+        elif watch.hopeful():
+            watch.forgive()
+            # Where the object will be is not told any more once the person's reach is over.
+            self._begin_again(watch.goal_now())
+        else:
+            self._pause(watch, *watch.doubt())
 
     def _begin_again(self, goal: dict[str, Any]) -> None:
         """Start a reach anew. What lies where no hand may go by now has fallen, or was taken there."""
         try:
             start(self, dmp_request(goal))
+            self.pause(NEWS)  # until then the arm tells how the motion before has ended
         except PortError as error:
             if error.code != ReasonCode.GOAL_OUTSIDE_WORKSPACE or self._grip is None:
                 raise
             code = self._grip.fell_or_withdrawn()
             raise TimeLimit("the reach was given up", (error.sentence,), code) from None
 
-    def _pause(self, early: EarlyReach, code: int, why: str) -> None:
+    def _pause(self, watch: ReachWatch, code: int, why: str) -> None:
         """Nobody seems to offer or ask within the region any more: the arm stands. Who goes on within
         ``handover.pause`` s is met; else the reach is given up, with this code and reason."""
         limit = float(self.ctx.config.get("handover.pause", 3.0))
@@ -193,13 +203,13 @@ class WaitStop(CoglabState):
         self.await_pending(resting, "rest of the arm", 3.0, code=ARM)
         self.ctx.journal.mark("paused")
         try:
-            self.wait_for(early.hopeful, "that the person goes on", limit, code=PERSON)
+            self.wait_for(watch.hopeful, "that the person goes on", limit, code=PERSON)
         except TimeLimit as error:
             if error.code != ReasonCode.TIME_LIMIT:
                 raise
             raise TimeLimit("the reach was given up", (why,), code) from None
-        early.forgive()
-        self._begin_again(early.goal_now())
+        watch.forgive()
+        self._begin_again(watch.goal_now())
 
     def _watch(self, ud: Any) -> None:
         """Arm the detector and wait for what it finds; where the arm has arrived and feels nothing, it goes on."""
@@ -249,7 +259,7 @@ class WaitStop(CoglabState):
     def _go_on(self, goal: dict[str, Any]) -> None:
         """A tracker's error or a light touch: the hand goes on along the grasp's axis, as slowly as it has come."""
         self._deeper = True
-        goal = self._early.goal_now() if self._early is not None else goal
+        goal = self._watched.goal_now() if self._watched is not None else goal
         axis = np.array(goal.get("approach", np.zeros(3)))
         length = float(np.linalg.norm(axis))
         if length > 0.0:
@@ -325,76 +335,23 @@ class WaitStop(CoglabState):
         return {**self._settings(ud), **ud.goal.get("object", {})}
 
     def _reached(self) -> bool:
-        progress = self.ctx.arm.dmp_progress()
+        progress, watch = self.ctx.arm.dmp_progress(), self._watched
         if self._grip is not None:
             self._grip.look()
-        if progress.state == "aborted" and progress.code == ReasonCode.GOAL_LEFT_REGION and self._early is not None:
-            # It may have been believed so for a moment only.
-            self._pause(self._early, *OUTSIDE)
+        left = progress.state == "aborted" and progress.code == ReasonCode.GOAL_LEFT_REGION
+        if left and watch is not None:
+            # It may have been believed so for a moment only, or is held still there.
+            self._pause(watch, *(OUTSIDE if watch.predicted else LEFT))
             return False
         if progress.state == "aborted":
             why, code = progress.reason or "the controller gave no reason", progress.code
             if code == ReasonCode.GOAL_FELL and self._grip is not None:
                 code = self._grip.fell_or_withdrawn()
-                why = why if code == ReasonCode.GOAL_FELL else "it was lowered with the hand that holds it"
+                why = why if code == ReasonCode.GOAL_FELL else LOWERED
             raise TimeLimit("the reach was aborted", (why,), code)
         if not (blocked := self.ctx.arm.motion_allowed()).ok:
             raise TimeLimit("the arm does not follow any more", (blocked.why,), blocked.code)
-        if self._early is not None and progress.state != "reached" and self._early.doubted():
-            self._pause(self._early, *self._early.doubt())
+        if watch is not None and progress.state != "reached" and watch.doubted():
+            self._pause(watch, *watch.doubt())
             return False
         return progress.state == "reached"
-
-
-class MonitorDmp(CoglabState):
-    """Beside the motion: if another reaching pattern is recognised, substitute its primitive (switch_dmp).
-
-    Only among the primitives of ``monitor.primitives``: a motion that runs with another one (giving, the board) is left
-    alone. A pattern counts from ``monitor.confidence`` on. Runs until preempted; where it fails, the reach goes on."""
-
-    default_time_limit = 600.0
-    essential = False
-
-    def __init__(self, ctx: Context) -> None:
-        super().__init__(ctx, input_keys=["goal"])
-
-    def run(self, ud: Any) -> str:
-        if not bool(self.ctx.config.get("monitor.enabled", True)):
-            self.wait_for(lambda: False, "the end of the motion", code=ARM)
-        running = ud.goal["primitive"]
-        family = dict(self.ctx.config.get("monitor.primitives", {}))
-        if running not in family.values():
-            family = {}
-        switches = 0
-        while True:
-            try:
-                self.wait_for(partial(self._other_pattern, family, running), "another reaching pattern", code=SIGHT)
-            except Interrupted as end:
-                if end.stop:
-                    raise
-                self.reason = f"motion over, {switches} switches"
-                return "preempted"
-            seen = self.ctx.perception.recognition()
-            target = family[seen.pattern]
-            self.await_pending(
-                self.ctx.arm.switch_dmp(dmp_request(ud.goal, primitive=target)), f"switch to primitive '{target}'", 1.0
-            )
-            self.ctx.journal.mark("switch_dmp")
-            self.ctx.journal.transition(
-                self.path(),
-                self.label,
-                "switched",
-                self.label,
-                f"pattern '{seen.pattern}' recognised with confidence {seen.confidence:.2f}: "
-                f"primitive '{running}' replaced by '{target}'",
-            )
-            running = target
-            switches += 1
-
-    def _other_pattern(self, family: dict[str, str], running: str) -> bool:
-        # Once the hand has arrived there is nothing left to substitute, and the arm has to stand still.
-        if self.ctx.arm.dmp_progress().state not in ("running", "holding"):
-            return False
-        seen = self.ctx.perception.recognition()
-        sure = seen.decided and seen.confidence >= float(self.ctx.config.get("monitor.confidence", 0.9))
-        return sure and seen.pattern in family and family[seen.pattern] != running

@@ -1,4 +1,4 @@
-"""What ends a reach that began on a belief: doubt, and what is seen of whom it is for."""
+"""What ends a reach for a person: doubt, and what is seen of whom it is for."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from coglab_msgs.msg import ReasonCode
 from coglab_smach.context.awaited import ARM
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState, TimeLimit
-from coglab_smach.states.region import HandoverRegion
+from coglab_smach.states.region import HandoverRegion, anything_believed, ends_outside
 from coglab_smach.states.where import hand_name, palm_at, sight_of, sight_or_refusal
 
 PERIOD = 0.03
@@ -36,7 +36,11 @@ def target_of(goal: Mapping[str, Any]) -> str:
 
 
 OUTSIDE = (int(ReasonCode.GOAL_AHEAD_OUTSIDE), "the person's reach seems to end outside the handover region")
-"""ReasonCode and sentence of a predicted place that is not followed"""
+LEFT = (int(ReasonCode.GOAL_LEFT_REGION), "it is outside the handover region")
+"""ReasonCode and sentence of a predicted place, and of one that is seen, that is not followed"""
+
+
+LOWERED = "it was lowered with the hand that holds it"
 
 
 class PersonsGrip:
@@ -74,15 +78,18 @@ class PersonsGrip:
         return int(ReasonCode.GOAL_WITHDRAWN)
 
 
-class EarlyReach:
-    """Watches a reach toward where something will be: the thing itself may not go back nor fall (cc.GoalWatch, the
-    rules of a reach toward a goal that is seen), where it will be has to lie in the handover region, and somebody has
-    to go on offering it."""
+class ReachWatch:
+    """Watches a reach for what a person offers, or for their hand: it may not go back nor fall (cc.GoalWatch, which the
+    controller asks of each motion, here from the first of several on), where it will be, or is, has to lie in the
+    handover region, and somebody has to go on offering it."""
 
     def __init__(self, state: CoglabState, goal: Mapping[str, Any], grip: PersonsGrip | None) -> None:
         """``grip``: of the person on the object that the reach is for."""
-        self.state, self.goal, self.limits, self.early = state, goal, goal["limits"], goal["early"]
+        self.state, self.goal, self.limits, self.may = state, goal, goal["limits"], goal["watch"]
         self.target, self._grip = target_of(goal), grip
+        self._frame = str(goal["frame"]).removesuffix("_ahead")
+        self.predicted = self._began_on_belief = self._frame != goal["frame"]
+        """whether the arm goes to where the target will be, and not to where it is seen"""
         self._watch: cc.GoalWatch | None = None
         self._sure = state.ctx.clock.now()
         """when it was last believed"""
@@ -93,16 +100,16 @@ class EarlyReach:
         """m, the palm when the reach began"""
         self._nearest, self._back = np.inf, 0.0
         """m from there to where the hand was nearest, and by which it has gone back since"""
-        self._region = HandoverRegion(state.ctx, self.early["margin"])
-        self._outside = False
-        """the person offers or asks, but not in the region"""
+        self._region = HandoverRegion(state.ctx, self.may["margin"])
+        self._outside: tuple[int, str] | None = None
+        """ReasonCode and sentence of who offers or asks, but not in the region"""
         self._untold: PortError | None = None
         """why perception cannot tell whose hand is at what the reach is for"""
 
     def doubt(self) -> tuple[int, str]:
         """ReasonCode and sentence of what is doubted."""
-        if self._outside:
-            return OUTSIDE
+        if self._outside is not None:
+            return self._outside
         if self._untold is not None:
             return int(ReasonCode.NOT_PERCEIVED), self._untold.sentence
         return int(ReasonCode.GOAL_WITHDRAWN), "the person does not offer or ask any more"
@@ -116,7 +123,7 @@ class EarlyReach:
         return now - self._sure > DOUBT_TIME or self._goes_back()
 
     def _goes_back(self) -> bool:
-        return self._back > BACKWARD * self.early["retreat"] > 0.0
+        return self._back > BACKWARD * self.may["retreat"] > 0.0
 
     def hopeful(self) -> bool:
         """Whether somebody offers or asks now, within the region: it is believed, or seen. TimeLimit as doubted()."""
@@ -128,26 +135,29 @@ class EarlyReach:
             self._follow(place, passed)
         if self._goes_back():
             return False
-        ahead = ctx.perception.ahead()
-        believed = max(ahead.offer, ahead.request) >= float(ctx.config.get("handover.doubt", 0.1))
-        predicted = believed and ahead.frame != ""
-        outside = predicted and not self._region.holds(ahead.place)
+        hope, outside = anything_believed(ctx), ends_outside(ctx, self._region, self._frame)
         # Who passes through the region on the way out of it offers nothing there.
         offered = place is not None and self._region.offers(now, place, moving=not outside)
-        if believed and not outside:
-            offered = offered or predicted or place is None
-        self._outside = believed and not offered
+        if not offered and not outside:
+            # What is hidden may have been taken back where nothing but a belief spoke for it.
+            hidden = place is None and (hope or not self._began_on_belief)
+            offered = hidden or (hope and ctx.perception.ahead().frame == f"{self._frame}_ahead")
+        self._outside = None
+        if not offered and place is not None:
+            self._outside = OUTSIDE if outside else None if self._region.holds(place) else LEFT
+        elif outside:
+            self._outside = OUTSIDE
         return offered
 
     def goal_now(self) -> dict[str, Any]:
         """What the reach is for: where it will be as long as that is believed, else where it is seen."""
         ahead = self.state.ctx.perception.ahead()
-        if ahead.frame == self.goal["frame"] and self._region.holds(ahead.place):
+        self.predicted = ahead.frame == self.goal["frame"] and self._region.holds(ahead.place)
+        if self.predicted:
             return dict(self.goal)
-        watched = {"goal_retreat": self.early["retreat"], "goal_drop": self.early["drop"]}
+        watched = {"goal_retreat": self.may["retreat"], "goal_drop": self.may["drop"]}
         limits = self.limits if self._last is None else self._region.limits(self._last[1])
-        seen = str(self.goal["frame"]).removesuffix("_ahead")
-        return {**self.goal, "frame": seen, "limits": {**limits, **watched}}
+        return {**self.goal, "frame": self._frame, "limits": {**limits, **watched}}
 
     def forgive(self) -> None:
         """The doubt is over."""
@@ -170,7 +180,7 @@ class EarlyReach:
             palm = self._from = palm_at(self.state.ctx)
             if palm is not None:
                 nowhere = np.zeros(3)
-                self._watch = cc.GoalWatch(nowhere, nowhere, self.early["retreat"], self.early["drop"], palm, place)
+                self._watch = cc.GoalWatch(nowhere, nowhere, self.may["retreat"], self.may["drop"], palm, place)
             return
         distance = float(np.linalg.norm(place - self._from))
         self._nearest = min(self._nearest, distance)
@@ -181,6 +191,7 @@ class EarlyReach:
             resting = self.state.ctx.arm.cancel_motion(sentence)
             self.state.await_pending(resting, "rest of the arm", 3.0, code=ARM)
             code = self._grip.fell_or_withdrawn()
+            sentence = sentence if code == ReasonCode.GOAL_FELL else LOWERED
         if code:
             raise TimeLimit(f"the reach was given up: {sentence}", (), code)
 

@@ -49,19 +49,30 @@ class HandoverRegion:
         }
 
 
+def anything_believed(ctx: Context) -> bool:
+    """Whether somebody seems to offer something, or to ask for it."""
+    ahead = ctx.perception.ahead()
+    return max(ahead.offer, ahead.request) >= float(ctx.config.get("handover.doubt", 0.1))
+
+
+def ends_outside(ctx: Context, region: HandoverRegion, frame: str) -> bool:
+    """Whether the reach that carries ``frame`` (of what is seen) is believed to end outside the region."""
+    ahead = ctx.perception.ahead()
+    return anything_believed(ctx) and ahead.frame == f"{frame}_ahead" and not region.holds(ahead.place)
+
+
 def unless_withdrawn(
     ctx: Context, goal: Mapping[str, Any], margin: float = 0.0, may_fall: bool = True
 ) -> dict[str, Any]:
     """The goal of a motion that ends by itself when what it follows leaves the region, goes back or, where it
     ``may_fall``, falls. The goal holds the place (m) of its frame, as it was offered."""
-    own = {
+    margins = {
         "goal_retreat": float(ctx.config.get("handover.retreat", 0.10)),
         "goal_drop": float(ctx.config.get("handover.drop", 0.08)) if may_fall else 0.0,
     }
     limits = HandoverRegion(ctx, margin).limits(goal["place"])
-    if not str(goal["frame"]).endswith("_ahead"):
-        return {**goal, "limits": {**limits, **own}}
+    watch = {"retreat": margins["goal_retreat"], "drop": margins["goal_drop"], "margin": margin}
     # A predicted place goes to and fro as the prediction is corrected: going back and falling are watched in what is
     # seen, by the state that waits for the reach.
-    early = {"retreat": own["goal_retreat"], "drop": own["goal_drop"], "margin": margin}
-    return {**goal, "limits": {**limits, "goal_retreat": 0.0, "goal_drop": 0.0}, "early": early}
+    predicted = str(goal["frame"]).endswith("_ahead")
+    return {**goal, "limits": {**limits, **(dict.fromkeys(margins, 0.0) if predicted else margins)}, "watch": watch}
