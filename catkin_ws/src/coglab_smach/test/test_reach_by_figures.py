@@ -293,8 +293,7 @@ def test_the_hand_slides_in_for_six_tenths_of_a_second_at_most(monkeypatch, off,
 
 def received(monkeypatch, off):
     """A reach of the whole machine with the object seen ``off(touches)`` m off its grasp."""
-    # In this cell the object hangs at the palm from the touch on, and goes with it.
-    trial, looks = Trial(**{"handover.close_within": 0.0, "handover.retreat": 1.0}), []
+    trial, looks = Trial(**{"handover.close_within": 0.0}), []
     monkeypatch.setattr(reach, "off_grasp", lambda state, goal: off(looks.append(1) or len(looks)))
     trial.cell.partner.touch_after = 0.3
 

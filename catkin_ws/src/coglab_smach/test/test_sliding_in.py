@@ -13,8 +13,7 @@ from conftest import Trial
 def receive(monkeypatch, away, **constants):
     """Receive where the palm is ``away(s since the first look)`` m off its grasp at a touch. Returns seconds from the
     first look to the closing, and the trial."""
-    # In this cell the object hangs at the palm from the touch on, and goes with it.
-    trial, looked = Trial(**{"handover.retreat": 1.0}), []
+    trial, looked = Trial(), []
 
     def off_grasp(state, goal):
         looked.append(trial.clock.now())

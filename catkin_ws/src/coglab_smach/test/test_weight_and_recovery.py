@@ -133,13 +133,22 @@ def test_without_a_sight_the_weight_and_the_whole_rise_are_enough(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("away", "keeps"),
-    [(None, True), (0.31, True), (0.29, False), (1.0, True)],
+    ("away", "seen_before", "loaded", "keeps"),
+    [
+        (None, True, False, True),
+        (0.31, False, False, True),
+        (0.29, False, True, False),
+        (0.4, True, False, False),
+        (0.4, True, True, True),
+        (1.0, True, True, True),
+    ],
 )
-def test_a_person_within_30_cm_gets_the_object_back(monkeypatch, away, keeps):
+def test_a_person_within_30_cm_gets_the_object_back(monkeypatch, away, seen_before, loaded, keeps):
+    """One whose hand is farther away, too, while the robot does not carry it: then somebody does."""
     lifted = Lifted(monkeypatch)
     lifted.away, lifted.ctx.holding = away, "mug"
-    error = lifted.state._not_released("mug", 5.0, TimeLimit("the wait"))
+    lifted.event = ContactEvent(True, "x", 1.0) if loaded else None
+    error = lifted.state._not_released("mug", 5.0, TimeLimit("the wait"), seen_before)
     assert error.sentence == "the person did not let go of 'mug' within 5 s" and error.code == ReasonCode.NOT_RELEASED
     assert (lifted.ctx.holding == "mug") == keeps and len(error.causes) == 1 + keeps
 

@@ -76,7 +76,7 @@ class TakeWeight(CoglabState):
                 lambda: self._has_let_go(farther), "the person's letting go", end - self.ctx.clock.now(), code=PERSON
             )
         except TimeLimit as error:
-            raise self._not_released(ud.object_id, limit, error) from None
+            raise self._not_released(ud.object_id, limit, error, farther is not None) from None
         finally:
             contact.disarm()
             self._way.stop()
@@ -143,13 +143,14 @@ class TakeWeight(CoglabState):
             self._rises += 1
             self._way.begin(rise(self.ctx, left, speed))
 
-    def _not_released(self, object_id: str, limit: float, error: TimeLimit) -> PortError:
+    def _not_released(self, object_id: str, limit: float, error: TimeLimit, seen_before: bool) -> PortError:
         """The failure, and who has the object then: the person, but where only the robot's hand may hold it."""
         causes: tuple[str, ...] = (error.sentence,)
-        away = hand_from_palm(self)
-        if away is None or away > AT_HAND:
+        away, loaded = hand_from_palm(self), self.ctx.contact.event() is not None
+        # What the robot does not carry somebody holds: whose hand was seen at it, and is seen still.
+        if away is None or (away > AT_HAND and (loaded or not seen_before)):
             # Nothing is opened: nobody may be there to hold it.
-            carried = "its weight is carried" if self.ctx.contact.event() is not None else "its weight has not come"
+            carried = "its weight is carried" if loaded else "its weight has not come"
             where = "not seen any more" if away is None else "seen elsewhere"
             causes += (f"{carried}, and the person's hand is {where}",)
         else:
