@@ -293,7 +293,14 @@ def test_the_hand_slides_in_for_six_tenths_of_a_second_at_most(monkeypatch, off,
 
 def received(monkeypatch, off):
     """A reach of the whole machine with the object seen ``off(touches)`` m off its grasp."""
-    trial, looks = Trial(**{"handover.close_within": 0.0}), []
+    # In this cell the object is at the palm from the touch on, wherever the palm is, and goes with it.
+    anywhere = {
+        "handover.region_low": [-2.0] * 3,
+        "handover.region_high": [2.0] * 3,
+        "handover.retreat": 2.0,
+        "handover.drop": 0.0,
+    }
+    trial, looks = Trial(**{"handover.close_within": 0.0}, **anywhere), []
     monkeypatch.setattr(reach, "off_grasp", lambda state, goal: off(looks.append(1) or len(looks)))
     trial.cell.partner.touch_after = 0.3
 

@@ -13,7 +13,8 @@ from conftest import Trial
 def receive(monkeypatch, away, **constants):
     """Receive where the palm is ``away(s since the first look)`` m off its grasp at a touch. Returns seconds from the
     first look to the closing, and the trial."""
-    trial, looked = Trial(), []
+    # In this cell the object is at the palm from the touch on, wherever the palm is, and goes with it.
+    trial, looked = Trial(**{"handover.retreat": 2.0}), []
 
     def off_grasp(state, goal):
         looked.append(trial.clock.now())

@@ -24,10 +24,6 @@ HAND_AT_WORK = np.array([0.86, 0.03, 0.43])
 """m, of the person's hand while something is handed over"""
 
 
-CLOSED = 100
-"""counts of 254 from which fingers hold something"""
-
-
 @dataclass
 class Faults:
     """What is broken. Sets of names are compared with the port method that is called."""
@@ -153,9 +149,8 @@ class SimulatedCell:
         self.lifted = force
 
     def pose(self, object_id: str) -> Pose:
-        """Where something is, in the base frame: what closed fingers hold goes with the hand."""
-        closed = self.fingers()[2] > CLOSED and not self.faults.empty_grasp
-        if not closed or self.at_palm is None or self.at_palm[0] != object_id:
+        """Where something is, in the base frame: what is in the hand goes with it."""
+        if self.at_palm is None or self.at_palm[0] != object_id:
             return self.objects[object_id]
         return Pose(*default_arm().fk(np.asarray(self.arm.position()))) * self.at_palm[1].inverse()
 

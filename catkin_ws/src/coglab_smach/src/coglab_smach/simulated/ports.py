@@ -19,7 +19,7 @@ from coglab_smach.clocks.clock import Clock
 from coglab_smach.ports.interfaces import Ahead, HandState, Located, Recognition
 from coglab_smach.ports.pending import Pending, Polled, PortError, Ready
 from coglab_smach.simulated.arm import SimulatedArm
-from coglab_smach.simulated.cell import CLOSED, SimulatedCell
+from coglab_smach.simulated.cell import SimulatedCell
 from coglab_smach.simulated.contact import SimulatedContact
 
 CALIBRATION = 1.7
@@ -108,7 +108,12 @@ class SimulatedHand:
                     f"preshape refused: no mode '{mode}'; there are: {', '.join(MODES)}", code=ReasonCode.UNKNOWN_NAME
                 )
             )
-        return self._move(f"preshape {mode}", 0.8, lambda: (200, 40, 40, 40, 40), True)
+
+        def positions() -> tuple[int, ...]:
+            self.cell.at_palm = None
+            return (200, 40, 40, 40, 40)
+
+        return self._move(f"preshape {mode}", 0.8, positions, True)
 
     def close_on_object(self) -> Pending:
         def positions() -> tuple[int, ...]:
@@ -147,7 +152,7 @@ class SimulatedHand:
         self.cell.advance()
         if "hand" in self.cell.faults.dead:
             return HandState(message="hand_status is silent", event=ReasonCode.NODE_SILENT)
-        closed = self._positions()[2] > CLOSED and not self.cell.faults.empty_grasp
+        closed = self._positions()[2] > 100 and not self.cell.faults.empty_grasp
         calibrating = self._calibrating()
         calibrated = self.cell.calibrated and not calibrating
         return HandState(True, calibrated, calibrating, closed, "", () if calibrating else self._positions())
