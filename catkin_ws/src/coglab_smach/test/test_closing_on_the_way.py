@@ -1,14 +1,23 @@
 """Fingers begin to close on the last of the way, where the object is seen between them; a hand that has touched
 something else opens before it comes again, toward where the object is seen."""
 
+import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_py.pose import Pose
+from coglab_smach.kinematics.reachability import default_arm
+from coglab_smach.machines import recovery
 from coglab_smach.ports.pending import Polled, PortError
 from coglab_smach.states import reach
 from conftest import Trial
 
 RECEIVE = "exchange_human_to_robot"
+
+
+def at_the_palm(trial):
+    """The person's hand is 0.1 m from the robot's."""
+    palm, _ = default_arm().fk(np.asarray(trial.cell.arm.position()))
+    trial.cell.objects["human_hand"] = Pose(palm + [0.1, 0.0, 0.0])
 
 
 def receive(monkeypatch, away, touch_after=1.5, **settings):
@@ -105,6 +114,7 @@ def test_with_fingers_that_do_not_open_again_the_arm_stays_with_what_the_person_
     """They have begun to close, the reach fails, and the hand is stuck: the person may hold what is in it."""
     trial = Trial()
     monkeypatch.setattr(reach, "off_grasp", lambda state, goal: 0.02)
+    monkeypatch.setattr(recovery, "hand_from_palm", lambda state: 0.1)
     trial.cell.partner.touch_after = None
 
     def script(t):
@@ -142,6 +152,8 @@ def test_what_fingers_have_caught_on_the_way_is_not_dropped_where_the_person_has
         while not t.ctx.journal.marked("closing_on_the_way"):
             t.clock.sleep(0.01)
         t.cell.at_palm = ("mug", Pose([-0.05, 0.0, 0.0]))
+        if person == "at it":
+            at_the_palm(t)
         if person == "away":
             t.cell.objects["human_hand"] = Pose([2.0, 0.0, 0.4])
         if person == "not seen":

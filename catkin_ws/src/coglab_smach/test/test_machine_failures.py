@@ -4,6 +4,7 @@ never by opening the hand."""
 import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_py.pose import Pose
+from coglab_smach.states import weight
 from conftest import Trial
 
 
@@ -104,7 +105,8 @@ def test_hand_closed_on_nothing():
     assert_recovered_empty(trial, "the hand closed on nothing")
 
 
-def test_a_person_who_does_not_let_go_gets_the_object_back():
+def test_a_person_who_does_not_let_go_gets_the_object_back(monkeypatch):
+    monkeypatch.setattr(weight, "hand_from_palm", lambda state: 0.1)
     trial = failed_exchange(lambda t: setattr(t.cell.partner, "let_go_after", None))
     assert_recovered_empty(trial, "the person did not let go of 'mug' within 5 s")
 

@@ -130,6 +130,59 @@ def test_a_reach_toward_what_is_seen_goes_on_without_a_belief_and_stops_for_one_
     assert seen.look(0.45, 0.08, 0.4), "another thing's place says nothing of this one"
 
 
+def test_a_belief_in_an_end_inside_does_not_lead_a_reach_toward_what_is_seen_outside(monkeypatch):
+    seen = Early(monkeypatch, frame="object_mug")
+    seen.ahead = Ahead(0.5, 0.0, "mug", "object_mug_ahead", (0.4, 0.0, 0.4))
+    assert seen.look(0.4, 0.9, 0.4) and not seen.look(0.4, 1.01, 0.4)
+    assert seen.reach.doubt()[0] == ReasonCode.GOAL_LEFT_REGION
+    early = Early(monkeypatch)
+    assert early.look(0.4, 1.01, 0.4), "one toward the predicted place goes there"
+
+
+def test_an_old_sight_that_is_told_again_and_again_is_not_held_still(monkeypatch):
+    early = Early(monkeypatch)
+    early.ahead, early.place = Ahead(1.0, 0.0, "mug", "object_mug_ahead", (0.4, 1.2, 0.4)), (0.4, 0.9, 0.4)
+    begin = early.t
+    early.seen = lambda: Located("mug", "world", early.place, IDENTITY, early.t - begin)
+    assert not any(early.look() for _ in range(14))
+
+
+def test_who_goes_back_a_little_and_holds_it_there_is_met(monkeypatch):
+    early = Early(monkeypatch)
+    early.look(0.6, 0.0, 0.0)
+    early.look(0.6, 0.0, 0.0)
+    assert not early.look(0.68, 0.0, 0.0)
+    looks = [early.look(0.68, 0.0, 0.0) for _ in range(12)]
+    assert not any(looks[:8]) and looks[-1]
+    with pytest.raises(TimeLimit) as end:  # 0.11 m from where it was nearest
+        early.look(0.71, 0.0, 0.0)
+    assert end.value.code == ReasonCode.GOAL_WITHDRAWN
+
+
+@pytest.mark.parametrize("closing", [False, True])
+def test_a_hand_that_takes_back_what_it_hides_has_withdrawn_it(monkeypatch, closing):
+    hand, grip = [0.5], SimpleNamespace()
+    early = Early(monkeypatch, grip=grip, frame="object_mug")
+    early.reach.state.ctx.closing = object() if closing else None
+    monkeypatch.setattr(
+        reach_watch, "sight_of", lambda state, name: Located(name, "world", (hand[0], 0.0, 0.4), IDENTITY, 0.0)
+    )
+    early.ahead = Ahead()
+    for _ in range(3):
+        early.look(0.4, 0.0, 0.4)
+    early.place, begin = None, hand[0]
+    for k in range(1, 5):
+        hand[0] = begin + 0.02 * k
+        assert early.look(), "hidden, and no farther away than a hand may go"
+    hand[0] = begin + 0.13
+    if closing:
+        assert early.look(), "who lets go goes away, too"
+        return
+    with pytest.raises(TimeLimit) as end:
+        early.look()
+    assert end.value.code == ReasonCode.GOAL_WITHDRAWN and "as the hand that hides it" in end.value.sentence
+
+
 @pytest.mark.parametrize(("back", "waits"), [(0.055, False), (0.065, True)])
 def test_the_arm_waits_for_a_hand_that_has_gone_back_by_six_tenths_of_what_it_may(monkeypatch, back, waits):
     early = Early(monkeypatch)

@@ -210,9 +210,27 @@ def test_a_partner_who_pushes_the_arm_away_while_it_receives(after, outcomes):
     assert trial.rig.robot.limit_violations == 0
 
 
+def receiving(there_before):
+    """A script: one exchange, of an object that is offered with it, or has been ``there_before``."""
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        if there_before:
+            t.rig.human.command("give mug")
+            while t.rig.human.phase != "waiting":
+                t.clock.sleep(0.05)
+        before, end = len(t.ctx.journal.results), t.clock.now() + 60.0
+        t.ctx.requests.submit(RECEIVE, "mug")
+        t.begun.append(RECEIVE)
+        while len(t.ctx.journal.results) == before and t.clock.now() < end:
+            t.clock.sleep(0.05)
+
+    return script
+
+
 @pytest.mark.parametrize("timing", ["calm", "natural"])
-@pytest.mark.parametrize("offered_before", [False, True])
-def test_who_pushes_the_arm_and_goes_is_not_chased(timing, offered_before):
+@pytest.mark.parametrize("there_before", [False, True])
+def test_who_pushes_the_arm_and_goes_is_not_chased(timing, there_before):
     """40 N for a second; as the arm draws back, the person takes the object away. What the arm then begins anew toward
     was in the region before, whether the reach had begun on a belief or on a sight."""
     trial = VirtualTrial(seed=4, profile="accustomed", perfect=True, timing=timing)
@@ -232,23 +250,45 @@ def test_who_pushes_the_arm_and_goes_is_not_chased(timing, offered_before):
             velocity = chain.jacobian(truth["position"])[:3] @ truth["velocity"]
             toward.append(float(velocity @ way / np.linalg.norm(way)))
 
-    def script(t):
-        t.wait_hub("wait_without_object")
-        if offered_before:
-            t.rig.human.command("give mug")
-            while t.rig.human.phase != "waiting":
-                t.clock.sleep(0.05)
-        before, end = len(t.ctx.journal.results), t.clock.now() + 60.0
-        t.ctx.requests.submit(RECEIVE, "mug")
-        t.begun.append(RECEIVE)
-        while len(t.ctx.journal.results) == before and t.clock.now() < end:
-            t.clock.sleep(0.05)
-
     trial.beside = beside
-    result = trial.run(script=script)[0]
+    result = trial.run(script=receiving(there_before))[0]
     assert gone and result.outcome == "failed_empty" and result.reason, trial.ctx.journal.why()
     assert result.code in {ReasonCode.GOAL_WITHDRAWN, ReasonCode.GOAL_LEFT_REGION, ReasonCode.GOAL_AHEAD_OUTSIDE}
     assert max(toward) < 0.05
+
+
+@pytest.mark.parametrize("when", ["closed", "loaded"])
+def test_a_hand_that_stays_and_does_not_hold_gets_nothing_back(when):
+    """Before or after the weight has come the person lets go, but leaves the hand at the object: it would fall."""
+    trial = VirtualTrial(seed=4, profile="accustomed", perfect=True, behaviour="never_release")
+    done = []
+
+    def beside(t):
+        if not done and t.begun and t.ctx.journal.marked(when):
+            done.append(t.rig.human.step)
+            t.rig.human.step = lambda now, view: replace(done[0](now, view), grip=0.0, grip_force=0.0)
+
+    trial.beside = beside
+    result = trial.run(RECEIVE)[0]
+    truth = trial.rig.cell.truth()
+    assert done and not truth["dropped"] and truth["held_by"] in ("robot", "both"), trial.ctx.journal.why()
+    assert result.outcome in ("stopped", "failed_holding") and result.code == ReasonCode.NOT_RELEASED
+
+
+def test_what_is_hidden_as_the_hand_takes_it_back_ends_the_reach():
+    trial = VirtualTrial(seed=4, profile="accustomed", perfect=True)
+    gone = []
+
+    def beside(t):
+        if not gone and t._reach is not None and t.rig.t > t._reach.begin + 0.15:
+            gone.append(t.rig.t)
+            t.rig.blind.add("object_mug")
+            t.rig.human.command("rest")
+
+    trial.beside = beside
+    result = trial.run(script=receiving(True))[0]
+    assert gone and result.outcome == "failed_empty" and result.reason, trial.ctx.journal.why()
+    assert result.code in {ReasonCode.GOAL_WITHDRAWN, ReasonCode.GOAL_LOST}, result.reason
 
 
 def test_who_offers_and_withdraws_five_times_is_not_chased():

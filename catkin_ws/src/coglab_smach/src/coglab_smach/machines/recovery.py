@@ -15,7 +15,7 @@ from coglab_smach.ports.interfaces import Verdict
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.arm import HomeRobot
 from coglab_smach.states.base import CoglabMachine, CoglabState
-from coglab_smach.states.hand import HandTighten
+from coglab_smach.states.hand import AT_HAND, HandTighten
 from coglab_smach.states.held import LOOK, HeldObject
 from coglab_smach.states.motion import end_motion
 from coglab_smach.states.where import AWAY, hand_from_palm
@@ -133,8 +133,8 @@ class SecureHand(CoglabState):
         while not (closing.done() and self.ctx.hand.state().holding) and self.ctx.clock.now() < end:
             self.pause(0.02)
         away = hand_from_palm(self)
-        if self.ctx.hand.state().holding and (away is None or away > AWAY):
-            self.ctx.holding, self.ctx.shared = self.ctx.closing_on, away is None
+        if self.ctx.hand.state().holding and (away is None or away > AT_HAND):
+            self.ctx.holding, self.ctx.shared = self.ctx.closing_on, away is None or away <= AWAY
             self.ctx.firm = self.ctx.closing_firm
 
     def _await_letting_go(self) -> None:

@@ -134,7 +134,8 @@ def await_offer(state: CoglabState, target: str, goals: Goals, margin: float = 0
         while True:
             located = locate(state, target)
             now, place = state.ctx.clock.now(), np.array(located["xyz"])
-            offered = region.offers(now, place, moving=not ends_outside(state.ctx, region, located["frame"]))
+            passes = ends_outside(state.ctx, region, located["frame"])
+            offered = region.offers(now - located["age"], place, moving=not passes)
             early = believed(state.ctx, target, located, person, region)
             candidates = goals(located)
             goal = first_reachable(state.ctx, located, candidates) if offered else None
@@ -145,9 +146,9 @@ def await_offer(state: CoglabState, target: str, goals: Goals, margin: float = 0
                 state.ctx.journal.mark("offered")
                 if now - since >= float(config.get("handover.start_after", 0.0)):
                     return goal
-            if now > end and offered:
+            if now > end and offered and goal is None:
                 raise PortError(*out_of_reach(target, located, candidates[0]), ReasonCode.GOAL_UNREACHABLE)
-            if now > end:
+            if now > end and goal is None:
                 where = ", ".join(f"{v:.2f}" for v in place)
                 raise PortError(
                     f"'{target}' was not offered within {limit:.0f} s: it stayed at ({where}) m, outside the "

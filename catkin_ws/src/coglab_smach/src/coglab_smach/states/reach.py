@@ -351,7 +351,8 @@ class WaitStop(CoglabState):
             raise TimeLimit("the reach was aborted", (why,), code)
         if not (blocked := self.ctx.arm.motion_allowed()).ok:
             raise TimeLimit("the arm does not follow any more", (blocked.why,), blocked.code)
-        if watch is not None and progress.state != "reached" and watch.doubted():
+        there = progress.state == "reached"
+        # What falls or is taken back ends the reach at its place, too, but for what the fingers close on.
+        if watch is not None and not (there and self.ctx.closing is not None) and watch.doubted() and not there:
             self._pause(watch, *watch.doubt())
-            return False
-        return progress.state == "reached"
+        return there

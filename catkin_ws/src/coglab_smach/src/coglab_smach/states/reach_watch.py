@@ -78,6 +78,17 @@ class PersonsGrip:
         return int(ReasonCode.GOAL_WITHDRAWN)
 
 
+Sight = tuple[float, np.ndarray]
+"""s, m"""
+
+
+def jumped_from(last: Sight | None, now: float, place: np.ndarray) -> tuple[bool, Sight | None]:
+    """Whether a sight is of something else than the last one that was no jump, and the one that is now."""
+    if last is not None and float(np.linalg.norm(place - last[1])) > JUMP and now - last[0] < SWAPPED:
+        return True, last
+    return False, (now, place)
+
+
 class ReachWatch:
     """Watches a reach for what a person offers, or for their hand: it may not go back nor fall (cc.GoalWatch, which the
     controller asks of each motion, here from the first of several on), where it will be, or is, has to lie in the
@@ -94,12 +105,18 @@ class ReachWatch:
         self._sure = state.ctx.clock.now()
         """when it was last believed"""
         self._looked = self._sure - PERIOD
-        self._last: tuple[float, np.ndarray] | None = None
+        self._last: Sight | None = None
         """s, m: the newest sight that was no jump"""
         self._from: np.ndarray | None = None
         """m, the palm when the reach began"""
         self._nearest, self._back = np.inf, 0.0
-        """m from there to where the hand was nearest, and by which it has gone back since"""
+        """m from there to where the target was nearest, and by which it has gone back since"""
+        self._hand: cc.GoalWatch | None = None
+        """of the person's hand, which is asked where the object is hidden"""
+        self._hand_last: Sight | None = None
+        """as of the target"""
+        self._seen_at = 0.0
+        """s, when the target was seen there"""
         self._region = HandoverRegion(state.ctx, self.may["margin"])
         self._outside: tuple[int, str] | None = None
         """ReasonCode and sentence of who offers or asks, but not in the region"""
@@ -133,15 +150,21 @@ class ReachWatch:
         place = self._look()
         if place is not None:
             self._follow(place, passed)
+        self._follow_hand(passed, hidden=place is None)
+        held = place is not None and self._region.offers(self._seen_at, place, moving=False)
+        if self._goes_back() and held:
+            # It is offered there: by as much less may it go back from now on.
+            self._nearest, self._back = self._nearest + self._back, 0.0
         if self._goes_back():
             return False
         hope, outside = anything_believed(ctx), ends_outside(ctx, self._region, self._frame)
         # Who passes through the region on the way out of it offers nothing there.
-        offered = place is not None and self._region.offers(now, place, moving=not outside)
+        offered = held or (place is not None and not outside and self._region.holds(place))
         if not offered and not outside:
             # What is hidden may have been taken back where nothing but a belief spoke for it.
             hidden = place is None and (hope or not self._began_on_belief)
-            offered = hidden or (hope and ctx.perception.ahead().frame == f"{self._frame}_ahead")
+            ahead = self._began_on_belief and hope and ctx.perception.ahead().frame == self.goal["frame"]
+            offered = hidden or ahead
         self._outside = None
         if not offered and place is not None:
             self._outside = OUTSIDE if outside else None if self._region.holds(place) else LEFT
@@ -171,10 +194,30 @@ class ReachWatch:
         if isinstance(seen, PortError):
             self._untold = seen if seen.code == ReasonCode.NOT_PERCEIVED else None
             return None
-        return None if seen is None else np.array(seen.xyz)
+        if seen is None:
+            return None
+        self._seen_at = self.state.ctx.clock.now() - seen.age
+        return np.array(seen.xyz)
+
+    def _follow_hand(self, passed: float, hidden: bool) -> None:
+        """A hand that takes an object back may hide it. One that leaves what the fingers close on has let go."""
+        seen = None if self._grip is None or self._from is None else sight_of(self.state, hand_name(self.state.ctx))
+        if seen is None or self._from is None:
+            return
+        place = np.array(seen.xyz)
+        jumped, self._hand_last = jumped_from(self._hand_last, self.state.ctx.clock.now(), place)
+        if jumped:
+            return
+        if self._hand is None:
+            nowhere = np.zeros(3)
+            self._hand = cc.GoalWatch(nowhere, nowhere, self.may["retreat"], 0.0, self._from, place)
+        code, sentence = self._hand.update(passed, place)
+        if code and hidden and self.state.ctx.closing is None:
+            raise TimeLimit(f"the reach was given up: {sentence}, as the hand that hides it", (), code)
 
     def _follow(self, place: np.ndarray, passed: float) -> None:
-        if self._jumped(place):
+        jumped, self._last = jumped_from(self._last, self.state.ctx.clock.now(), place)
+        if jumped:
             return
         if self._watch is None or self._from is None:
             palm = self._from = palm_at(self.state.ctx)
@@ -194,11 +237,3 @@ class ReachWatch:
             sentence = sentence if code == ReasonCode.GOAL_FELL else LOWERED
         if code:
             raise TimeLimit(f"the reach was given up: {sentence}", (), code)
-
-    def _jumped(self, place: np.ndarray) -> bool:
-        now = self.state.ctx.clock.now()
-        jumped = self._last is not None and float(np.linalg.norm(place - self._last[1])) > JUMP
-        if jumped and self._last is not None and now - self._last[0] < SWAPPED:
-            return True
-        self._last = (now, place)
-        return False

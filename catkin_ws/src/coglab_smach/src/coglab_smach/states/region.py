@@ -32,8 +32,8 @@ class HandoverRegion:
         return bool(np.all(place >= self.low - wider) and np.all(place <= self.high + wider))
 
     def offers(self, now: float, place: np.ndarray, moving: bool = True) -> bool:
-        """Whether what is seen at ``place`` (m) at ``now`` (s) is offered; asked at each sight. Without ``moving`` only
-        what is held still is."""
+        """Whether what was seen at ``place`` (m) at ``now`` (s, of the sight) is offered; asked at each sight. Without
+        ``moving`` only what is held still is."""
         self._seen = [(t, p) for t, p in self._seen if now - t <= LATELY] + [(now, place)]
         since, first = self._seen[0]
         still = now - since > STILL_TIME and float(np.linalg.norm(place - first)) < STILL

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 from coglab_msgs.msg import ReasonCode, Say
@@ -21,11 +22,13 @@ MOST_RISES = 8
 
 FOLLOWS = 0.25
 """s from one closing of the fingers to the next at least"""
+SINKING, SETTLES = 3.0, 0.3
+"""s in which it shows whether the person holds what the arm sinks with, and before that, for the torques at rest"""
 
 
 class TakeWeight(CoglabState):
     """Lift what the hand has closed on until the person's hand has left it, by ``hand.lift`` m at most and at
-    ``hand.lift_speed`` m/s. A person who does not let go gets the object back.
+    ``hand.lift_speed`` m/s. A person who does not let go gets the object back, where they hold it in truth.
 
     The weight that comes is measured (``hand.load_share`` of the object's), and the rise stands then: the person feels
     that it is carried, is told so, and an arm that went on would draw gentle fingers along what is still held. But the
@@ -76,7 +79,7 @@ class TakeWeight(CoglabState):
                 lambda: self._has_let_go(farther), "the person's letting go", end - self.ctx.clock.now(), code=PERSON
             )
         except TimeLimit as error:
-            raise self._not_released(ud.object_id, limit, error, farther is not None) from None
+            raise self._not_released(ud.object_id, limit, error, settings) from None
         finally:
             contact.disarm()
             self._way.stop()
@@ -143,18 +146,32 @@ class TakeWeight(CoglabState):
             self._rises += 1
             self._way.begin(rise(self.ctx, left, speed))
 
-    def _not_released(self, object_id: str, limit: float, error: TimeLimit, seen_before: bool) -> PortError:
-        """The failure, and who has the object then: the person, but where only the robot's hand may hold it."""
+    def _not_released(self, object_id: str, limit: float, error: TimeLimit, settings: Mapping[str, Any]) -> PortError:
+        """The failure, and who has the object then: the person who holds it, else the robot, which opens nothing."""
         causes: tuple[str, ...] = (error.sentence,)
-        away, loaded = hand_from_palm(self), self.ctx.contact.event() is not None
-        # What the robot does not carry somebody holds: whose hand was seen at it, and is seen still.
-        if away is None or (away > AT_HAND and (loaded or not seen_before)):
-            # Nothing is opened: nobody may be there to hold it.
-            carried = "its weight is carried" if loaded else "its weight has not come"
-            where = "not seen any more" if away is None else "seen elsewhere"
-            causes += (f"{carried}, and the person's hand is {where}",)
-        else:
+        loaded, away = self.ctx.contact.event() is not None, hand_from_palm(self)
+        self._way.stop()
+        if away is not None and away <= AT_HAND and self._holds(settings):
             self.ctx.holding = ""
+        else:
+            carried = "its weight is carried" if loaded else "its weight has not come"
+            where = "seen elsewhere" if away is not None and away > AT_HAND else "there, and does not hold it"
+            causes += (f"{carried}, and the person's hand is {'not seen any more' if away is None else where}",)
         return PortError(
             f"the person did not let go of '{object_id}' within {limit:.0f} s", causes, ReasonCode.NOT_RELEASED
         )
+
+    def _holds(self, settings: Mapping[str, Any]) -> bool:
+        """Whether the person does: their hand carries the object where the arm sinks with it, by as much as it rises at
+        most. A hand that merely is there takes no weight; who let go while the fingers closed gave none before."""
+        contact = self.ctx.contact
+        self.allow(SINKING + 8.0)
+        try:
+            self.await_pending(contact.arm("release", SINKING, settings), "arming of the contact detector", 2.0)
+            self.pause(SETTLES)
+            way, speed = (float(self.ctx.config.get(name, 0.03)) for name in ("hand.lift", "give.lower_speed"))
+            rise(self.ctx, -way, speed)
+            self.wait_for(lambda: contact.event() is not None, "the person's holding of it", SINKING, code=PERSON)
+        except PortError:
+            return False
+        return True
