@@ -11,6 +11,7 @@ from coglab_smach.context.journal import Journal
 from coglab_smach.kinematics.manager_limits import read_limits
 from coglab_smach.kinematics.motion_time import ptp_time, reach_time
 from coglab_smach.ports.pending import Polled, PortError, Ready
+from coglab_smach.states import weight
 from coglab_smach.states.motion import shift, shift_time
 from conftest import Trial
 from motion_watch import MotionWatch
@@ -255,8 +256,9 @@ def test_times_are_those_of_the_limits():
 
 
 @pytest.mark.parametrize("hub_after", ["stopped"])
-def test_a_person_who_holds_on_and_a_hand_that_does_not_open(hub_after):
+def test_a_person_who_holds_on_and_a_hand_that_does_not_open(hub_after, monkeypatch):
     """The arm must not go away with the person's object."""
+    monkeypatch.setattr(weight, "hand_from_palm", lambda state: 0.1)
 
     def script(t):
         t.wait_hub("wait_without_object")

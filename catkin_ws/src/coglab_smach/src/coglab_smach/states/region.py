@@ -39,7 +39,7 @@ class HandoverRegion:
         still = now - since > STILL_TIME and float(np.linalg.norm(place - first)) < STILL
         return (moving or still) and self.holds(place, self._still_margin if still else 0.0)
 
-    def limits(self, place: Sequence[float]) -> dict[str, Any]:
+    def limits(self, place: Sequence[float] | np.ndarray) -> dict[str, Any]:
         """What a reach may follow that begins toward ``place`` (m). What is offered outside was held still there, and
         may not go farther than that counts."""
         wider = 0.0 if self.holds(place) else self._still_margin

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 from coglab_msgs.msg import ReasonCode, Say
@@ -146,7 +145,7 @@ class TakeWeight(CoglabState):
             self._rises += 1
             self._way.begin(rise(self.ctx, left, speed))
 
-    def _not_released(self, object_id: str, limit: float, error: TimeLimit, settings: Mapping[str, Any]) -> PortError:
+    def _not_released(self, object_id: str, limit: float, error: TimeLimit, settings: dict[str, Any]) -> PortError:
         """The failure, and who has the object then: the person who holds it, else the robot, which opens nothing."""
         causes: tuple[str, ...] = (error.sentence,)
         loaded, away = self.ctx.contact.event() is not None, hand_from_palm(self)
@@ -161,7 +160,7 @@ class TakeWeight(CoglabState):
             f"the person did not let go of '{object_id}' within {limit:.0f} s", causes, ReasonCode.NOT_RELEASED
         )
 
-    def _holds(self, settings: Mapping[str, Any]) -> bool:
+    def _holds(self, settings: dict[str, Any]) -> bool:
         """Whether the person does: their hand carries the object where the arm sinks with it, by as much as it rises at
         most. A hand that merely is there takes no weight; who let go while the fingers closed gave none before."""
         contact = self.ctx.contact
