@@ -78,8 +78,8 @@ def test_beside_a_peer_the_rule_is_judged_where_no_joint_is_stopped():
     rows = bench_tracking.priority_rows(ours, {"peer": theirs})
     free = {row["figure"].rpartition(": ")[2]: row for row in rows if "the 2 of 300 reaches" in row["figure"]}
     largest = free["distance from the path, largest"]
-    assert (largest["value"], largest["peer_value"], largest["goal"], largest["ok"]) == (0.2, 4.0, "<= 1", True)
-    assert free["distance from the path, 95th percentile"]["goal"] == "<= 0.3"
+    assert (largest["value"], largest["peer_value"], largest["goal"], largest["ok"]) == (0.2, 4.0, "<= 1, < peer", True)
+    assert free["distance from the path, 95th percentile"]["goal"] == "<= 0.3, < peer"
     turned = free["more than 3 deg from the goal's orientation at the end"]
     assert (turned["value"], turned["peer_value"]) == (0.5, 0.0)
     (missed,) = [row for words, row in free.items() if words.startswith("misses")]
