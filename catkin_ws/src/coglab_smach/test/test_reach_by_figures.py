@@ -1,5 +1,5 @@
-"""A reach at the edges of its figures: what is doubted, what jumped, what fell; when fingers close on the way, when the
-hand slides in, goes on, comes again or gives up."""
+"""A reach at the edges of its figures: when fingers close on the way, when the hand slides in, goes on, comes again or
+gives up."""
 
 from types import SimpleNamespace
 
@@ -14,22 +14,7 @@ from coglab_smach.states.base import TimeLimit
 from coglab_smach.states.monitor import MonitorDmp
 from coglab_smach.states.reach import ExecuteDmp, WaitStop, dmp_request, start
 from conftest import Trial
-
-LOW, HIGH = [-1.0, -1.0, -1.0], [2.0, 1.0, 2.0]
-REGION = {"handover.region_low": LOW, "handover.region_high": HIGH}
-IDENTITY = (0.0, 0.0, 0.0, 1.0)
-GOAL = {
-    "frame": "object_mug_ahead",
-    "offset": [0.0, 0.0, 0.1],
-    "orientation": list(IDENTITY),
-    "primitive": "reach_human",
-    "dmp_ratio": 1.5,
-    "limits": {"goal_retreat": 0.0, "goal_drop": 0.0, "goal_region_low": LOW, "goal_region_high": HIGH},
-    "watch": {"retreat": 0.10, "drop": 0.08, "margin": 0.0},
-}
-
-
-# --- requests ---------------------------------------------------------------------------------------------------------
+from early_goal import GOAL, HIGH
 
 
 def test_a_request_has_what_its_goal_says_and_nothing_else():

@@ -10,23 +10,11 @@ from coglab_smach.ports.interfaces import Ahead, Located
 from coglab_smach.states import reach_watch
 from coglab_smach.states.base import TimeLimit
 from coglab_smach.states.reach_watch import PersonsGrip, ReachWatch, target_of
-
-LOW, HIGH = [-1.0, -1.0, -1.0], [2.0, 1.0, 2.0]
-REGION = {"handover.region_low": LOW, "handover.region_high": HIGH}
-IDENTITY = (0.0, 0.0, 0.0, 1.0)
-GOAL = {
-    "frame": "object_mug_ahead",
-    "offset": [0.0, 0.0, 0.1],
-    "orientation": list(IDENTITY),
-    "primitive": "reach_human",
-    "dmp_ratio": 1.5,
-    "limits": {"goal_retreat": 0.0, "goal_drop": 0.0, "goal_region_low": LOW, "goal_region_high": HIGH},
-    "watch": {"retreat": 0.10, "drop": 0.08, "margin": 0.0},
-}
+from early_goal import GOAL, HIGH, IDENTITY, LOW, REGION
 
 
 class Early:
-    """An ReachWatch of a palm at the origin; the test says what is seen and believed, and what time it is."""
+    """A ReachWatch of a palm at the origin; the test says what is seen and believed, and what time it is."""
 
     def __init__(self, monkeypatch, grip=None, frame="object_mug_ahead"):
         self.t, self.place, self.ahead = 0.0, (0.4, 0.0, 0.4), Ahead(1.0, 0.0, "mug", "object_mug_ahead", (0.4, 0, 0.4))
