@@ -32,6 +32,7 @@ return { place: [...document.querySelectorAll('*')].indexOf(at),
 
 def look(browser: Browser) -> tuple[list[str], int]:
     """Scroll bars, STOP hidden, controls without a name or too small, pale text; and how many texts were looked at."""
+    browser.painted()  # before that, nobody sees the page as it stands, and it has not judged its own room
     found = browser.js(_LOOK)
     return found["problems"], found["texts"]
 
