@@ -1,5 +1,6 @@
 """The robot gives: the grip follows the person's share of the load, and every end without a taker keeps the object."""
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -223,6 +224,27 @@ def test_who_lifts_before_the_arm_stands_is_felt():
     assert load.share == pytest.approx(0.8) and 0.8 * WEIGHT > SAME
     with pytest.raises(ValueError, match="mass"):
         LeavingLoad(0.0, 0.6, 1.0)
+
+
+def test_what_the_posture_may_explain_loosens_no_grip_and_opens_no_hand():
+    light = LeavingLoad(0.12, 0.5, 100.0, 0.12 * 9.81)
+    gone = lambda newton, start: [  # noqa: E731
+        light.feed(start + 0.005 * k, 0.12 * 9.81 - newton, True, False) for k in range(60)
+    ]
+    assert not any(gone(0.55, 0.0)), "seen so, of an arm that stands elsewhere and an object that nobody has touched"
+    assert light.share == pytest.approx(0.55 / (0.12 * 9.81)) and 0.0 <= light.sure < 0.1
+    assert not any(gone(0.6, 0.3)) and light.needed == pytest.approx(0.25 + SAME / (0.12 * 9.81))
+    assert any(gone(1.1, 0.6)) and light.margin == pytest.approx(light.share / light.needed)
+    light.feed(0.9, 0.12 * 9.81 + 0.4, True, False)
+    assert light.sure == 0.0 and math.copysign(1.0, light.sure) == -1.0, "pressed down, perhaps"
+    light.feed(0.91, 0.12 * 9.81 + 2.0, True, False)
+    assert light.sure == pytest.approx(-(2.0 - SAME) / (0.12 * 9.81))
+
+
+def test_a_load_counted_from_where_the_arm_stands_is_all_sure():
+    load = settled(carried=WEIGHT + 0.4)
+    load.feed(0.3, 0.7 * WEIGHT, True, False)
+    assert load.sure == pytest.approx(load.share) == pytest.approx(0.3) and load.needed == pytest.approx(0.6)
 
 
 class Carried:

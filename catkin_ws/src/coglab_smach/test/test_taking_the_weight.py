@@ -63,6 +63,21 @@ def test_the_rise_stands_when_the_weight_has_come_and_goes_on_in_steps_where_the
     assert trial.result().outcome == "succeeded"
 
 
+def test_fingers_that_follow_what_a_person_lets_go_of_stand_once_they_have():
+    ended = []
+
+    def script(t):
+        close = t.ctx.hand.close
+        t.ctx.hand.close = lambda *order: Polled(lambda: False, lambda: None, lambda: ended.append(order))
+        t.clock.sleep(1.0)
+        t.cell.push(-0.9 * WEIGHT)
+        t.clock.sleep(0.3)
+        assert not ended, "they go on around what the person still holds"
+        t.ctx.hand.close = close
+
+    assert receiving(script).result().outcome == "succeeded" and len(ended) == 1
+
+
 def test_without_a_sight_of_the_person_the_rise_is_whole():
     rises = []
 

@@ -271,8 +271,9 @@ class FusedDetector:
         return None
 
     def share_gone(self) -> float | None:
-        """Share of the weight that has left the hand since it was armed for RELEASE; None while it is not watched."""
-        return self._leaving.share if self._leaving is not None else None
+        """Share of the weight that has left the hand since it was armed for RELEASE, as far as that is sure
+        (LeavingLoad.sure); None while it is not watched."""
+        return self._leaving.sure if self._leaving is not None else None
 
     def force(self) -> np.ndarray | None:
         """N on the palm, base frame, beyond what acted before the reach in which contact was watched for last, less the

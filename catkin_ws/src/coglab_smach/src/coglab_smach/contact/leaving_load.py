@@ -7,6 +7,8 @@ its torques to tell, touch alone does.
 
 from __future__ import annotations
 
+import math
+
 from coglab_smach.contact.grip_and_load import Felt, together
 
 GRAVITY = 9.81
@@ -32,22 +34,37 @@ class LeavingLoad:
         mass."""
         if not mass > 0.0:
             raise ValueError(f"release needs the mass of the object in kg, got {mass}")
-        self.weight, self.needed, self.until = mass * GRAVITY, needed, until
+        self.weight, self._asked, self.until = mass * GRAVITY, needed, until
         self.share: float | None = None
         """1: all of it; None until enough was seen to count from"""
         self.told = False
         self._from = carried
         """N, that the share is counted from"""
-        self._settled = False
-        """it is final"""
+        self._doubt = SAME
+        """N of what is gone that the posture alone may explain"""
+        self._settled = self._here = False
+        """it is final, and of the posture that the arm has"""
         self._sum, self._count = 0.0, 0
         self._begun = 0.0
         self._since: float | None = None
 
     @property
+    def needed(self) -> float:
+        """Share that has to be gone: what was asked for, and half of that for sure."""
+        return max(self._asked, 0.5 * self._asked + self._doubt / self.weight)
+
+    @property
     def margin(self) -> float:
         """Share that is gone over the one that is needed."""
         return (self.share or 0.0) / self.needed
+
+    @property
+    def sure(self) -> float | None:
+        """The share less what is told by another posture alone, which no grip may follow: half of what a light object
+        weighs. None as above."""
+        if self.share is None:
+            return None
+        return math.copysign(max(0.0, abs(self.share) - self._doubt / self.weight), self.share)
 
     def feed(self, stamp: float, weight: float | None, still: bool, fresh: bool, felt: Felt | None = None) -> bool:
         """One sample: s, and N on the palm, None while the arm moves too fast to tell; ``still``: the arm stands;
@@ -56,6 +73,7 @@ class LeavingLoad:
         to be so anew."""
         if fresh:
             self._from, self._settled, self._count, self._since = None, False, 0, None
+            self._here = False
         if weight is not None and not self._settled and (still or self._from is None):
             self._settle(stamp, weight)
         torques = None if weight is None or self._from is None else (self._from - weight) / self.weight
@@ -64,6 +82,7 @@ class LeavingLoad:
             self._since = None
             return False
         self.share = share
+        self._doubt = 0.0 if self._here or felt is not None else SAME
         self._since = None if share < self.needed else stamp if self._since is None else self._since
         if self.told or self._since is None or stamp - self._since < CONFIRMED:
             return False
@@ -79,4 +98,4 @@ class LeavingLoad:
             return
         now, self._settled = self._sum / self._count, True
         if self._from is None or abs(now - self._from) < SAME:
-            self._from = now
+            self._from, self._here = now, True

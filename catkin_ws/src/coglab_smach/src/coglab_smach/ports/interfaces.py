@@ -259,8 +259,8 @@ class ContactPort(Protocol):
         """The first event since arm(), None until then."""
 
     def share_gone(self) -> float | None:
-        """Share of the object's weight that has left the hand since it was armed for 'release', also after its event:
-        0 none, 1 all, more where the hand is lifted. None while nobody watches."""
+        """Share of the object's weight that has left the hand since it was armed for 'release', as far as that is
+        sure, also after its event: 0 none, 1 all, more where the hand is lifted. None while nobody watches."""
 
     def force(self) -> tuple[float, float, float] | None:
         """N on the palm, base frame, beyond what acted before the last reach in which 'contact_in_motion' was watched

@@ -82,7 +82,7 @@ class TakeWeight(CoglabState):
         finally:
             contact.disarm()
             self._way.stop()
-            if self._closing is not None and self.ctx.stop.pressed():
+            if self._closing is not None:  # fingers that went on closing would press out what they hold
                 self._closing.cancel()
         event = contact.event()
         self.reason = event.message if event is not None else "the person's hand has left it"
