@@ -240,6 +240,19 @@ TEST_F(Table, AReachEndsWhereTheFrameSaysAndTellsItInBothFrames) {
   EXPECT_EQ(progress.stamp_ns, robot.now_ns);
 }
 
+TEST_F(Table, TheGoalThatIsToldIsTurnedAsItWillBeAndNotAsTheSetPointIs) {
+  const Quaternion turned =
+      robot.hand().orientation * Quaternion(Eigen::AngleAxisd(0.3, Vector3::UnitX()));
+  request.target_orientation = (base_from_table.orientation.conjugate() * turned).coeffs();
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(request)));
+  run(60, kGoal);
+  IkDebugRecord record;
+  while (robot.dmp().readIkDebug(record)) {
+  }
+  EXPECT_LT(record.goal_orientation.angularDistance(turned), 1e-6);
+  EXPECT_GT(record.set_point.orientation.angularDistance(turned), 0.05) << "on its way";
+}
+
 TEST_F(Table, AGivenStartAndAReplacedMotionAreInTheFrameToo) {
   request.initial_state = DmpRequest::kGiven;
   const Vector3 start = robot.hand().position + Vector3(0.0, 0.03, 0.0);

@@ -42,7 +42,8 @@ def figures(reach) -> dict[str, float]:
 
 def way(reach) -> dict[str, float]:
     """``sparc``; and, unless the reach is unfinished, ``late`` and ``reached_late`` (s after a person's arrival: there,
-    and told so) and ``reached`` (s). One that was met is there, and told so, when it was met."""
+    and told so) and ``reached`` (s). One that was met is there, and told so, when it was met; one that stood, but
+    farther than NEAR from its goal, is never there: it has no ``late``."""
     times = np.array([t for t, _, _ in reach.path])
     palm = np.array([p for _, p, _ in reach.path])
     goal = np.array([g for _, _, g in reach.path])
@@ -53,10 +54,10 @@ def way(reach) -> dict[str, float]:
     if told is None:
         return out
     far = np.flatnonzero(np.linalg.norm(palm[inside] - goal[inside], axis=1) > NEAR)
-    arrived = float(times[far[-1]]) if len(far) else reach.begin
-    human = human_time(float(np.linalg.norm(palm[-1] - palm[0])))
-    return out | {
-        "late": (arrived if reach.stood else told) - times[0] - human,
-        "reached_late": told - times[0] - human,
-        "reached": told - reach.begin,
-    }
+    human = human_time(float(np.linalg.norm(palm[inside][-1] - palm[0])))
+    out |= {"reached_late": told - times[0] - human, "reached": told - reach.begin}
+    if not reach.stood:
+        return out | {"late": out["reached_late"]}
+    if len(far) and far[-1] == np.count_nonzero(inside) - 1:
+        return out
+    return out | {"late": (float(times[far[-1]]) if len(far) else reach.begin) - times[0] - human}

@@ -30,10 +30,6 @@ def object_out_of_reach(t):
     t.cell.objects["mug"] = Pose([1.4, 0.2, 0.1])
 
 
-def no_person(t):
-    t.cell.faults.not_seen.add("mug")
-
-
 def hand_dead(t):
     t.cell.faults.dead.add("hand")
 
@@ -42,7 +38,6 @@ CASES = {
     missing_object: "object 'elephant' is not in the database; it has: ball, bottle, mug, screwdriver, tea_box",
     unreachable_object: "'mug' cannot be reached: the arm has no posture for the hand at (0.78, -0.01, 0.50) m",
     object_out_of_reach: "'mug' was not offered within 8 s: it stayed at (1.40, 0.20, 0.10) m, outside the handover",
-    no_person: "'mug' was not seen within 5.0 s",
     hand_dead: "preshape 'cylindrical' within 6.0 s expected",
 }
 

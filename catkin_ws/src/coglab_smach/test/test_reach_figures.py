@@ -38,8 +38,25 @@ def test_a_reach_that_stands_has_arrived_when_it_stays_within_five_millimetres()
     assert found["truth_mm"] == pytest.approx(0.0, abs=1e-6)
 
 
+@pytest.mark.parametrize("off", [0.006, 0.012, 0.1])
+def test_one_that_stands_beside_its_goal_is_never_there(off):
+    reach = record(stood=True, reached=DURATION, over=2.0, met=True)
+    reach.path = [(t, p, g + [0.0, off, 0.0]) for t, p, g in reach.path]
+    found = figures(reach)
+    assert "late" not in found and found["reached_late"] == pytest.approx(DURATION - human_time(WAY))
+    median = rows_of(reach)["arm there later than a person, median"]
+    assert median["value"] == bench_trials.NEVER and not median["ok"]
+
+
+def test_what_the_palm_does_after_its_arrival_is_no_part_of_the_way():
+    reach = record(stood=True, reached=DURATION, over=2.0, met=True)
+    expected = figures(reach)["late"]
+    reach.path += [(DURATION + 0.1 * k, np.array([0.1, 0.0, 0.0]), np.array([WAY, 0.0, 0.0])) for k in range(1, 5)]
+    assert figures(reach)["late"] == pytest.approx(expected, abs=1e-6)
+
+
 def test_one_that_is_met_is_there_when_it_is_met():
-    found = figures(record(0.6, met=True, over=0.6 * DURATION))
+    found = figures(record(0.6, met=True, over=0.6 * DURATION + 1e-9))
     way = WAY - found["truth_mm"] / 1000.0
     assert found["late"] == found["reached_late"] == pytest.approx(0.6 * DURATION - human_time(way))
     assert found["truth_mm"] > 50.0 and found["sparc"] < 0.0

@@ -214,7 +214,7 @@ class ReachRecord:
         """After each period of the rig."""
         robot, rig = self.rig.robot, self.rig
         for record in robot.look_at_motion():
-            self.path.append((record["time"], record["measured"][0], record["goal"]))
+            self.path.append((record["time"], record["measured"][0], record["goal"][0]))
         if self.reached is None and robot.progress["motion"] == "reached":
             self.reached = rig.t
         # Measured when the detector begins to watch an arm that stands still and nobody has touched yet.
@@ -240,7 +240,7 @@ class ReachRecord:
         palm = Pose(*rig.robot.chain.fk(rig.robot.report["position"]))
         goal = Pose(np.asarray(request.goal_offset, dtype=float), np.asarray(request.target_orientation))
         if debug is not None:
-            self.to_goal = palm.distance(Pose(np.asarray(debug["goal"]), np.asarray(debug["set_point"][1])))
+            self.to_goal = palm.distance(Pose(*map(np.asarray, debug["goal"])))
         frame = request.goal_frame.removesuffix("_ahead")
         seen, _ = rig.newest(frame)
         truth = pose_of_truth(rig.truth["human_hand" if frame == "human_hand" else "object"])

@@ -319,6 +319,7 @@ IkDebugRecord DmpCycle::debug(const CycleInput& input, const IkResult& ik) const
   now.stamp_ns = input.robot.stamp_ns;
   now.phase = motion_.dmp().state().phase;
   now.goal = base_from_dmp_.position + base_from_dmp_.orientation * motion_.goal();
+  now.goal_orientation = base_from_dmp_.orientation * motion_.goalOrientation();
   now.set_point = in_base_.pose;
   now.velocity = in_base_.velocity;
   now.angular_velocity = in_base_.angular_velocity;

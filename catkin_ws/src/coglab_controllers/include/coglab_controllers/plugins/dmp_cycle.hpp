@@ -29,6 +29,7 @@ struct IkDebugRecord {
   std::int64_t stamp_ns = 0;
   double phase = 0.0;
   Vector3 goal = Vector3::Zero();
+  Quaternion goal_orientation = Quaternion::Identity();
   Pose set_point, measured;
   Vector3 velocity = Vector3::Zero(), angular_velocity = Vector3::Zero();
   IkResult ik;
