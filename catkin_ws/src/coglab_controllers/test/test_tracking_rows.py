@@ -75,7 +75,7 @@ def outcomes(*ends):
 def test_beside_a_peer_the_rule_is_judged_where_no_joint_is_stopped():
     ours = outcomes((0.1, 0.0, False), (0.2, 9.0, False), (200.0, 9.0, True), (0.2, 0.0, False))
     theirs = outcomes((3.0, 0.0, False), (4.0, 0.0, False), (200.0, 0.0, True), (90.0, 0.0, True))
-    rows = bench_tracking.priority_rows(ours, {"peer": theirs})
+    rows = bench_tracking.priority_rows(ours, {"peer": {"": theirs}})
     free = {row["figure"].rpartition(": ")[2]: row for row in rows if "the 2 of 300 reaches" in row["figure"]}
     largest = free["distance from the path, largest"]
     assert (largest["value"], largest["peer_value"], largest["goal"], largest["ok"]) == (0.2, 4.0, "<= 1, < peer", True)
@@ -88,10 +88,36 @@ def test_beside_a_peer_the_rule_is_judged_where_no_joint_is_stopped():
     assert [(row["value"], row["ok"]) for row in whole] == [(200.0, False)]
 
 
+def test_each_row_has_the_peer_in_its_best_setting_by_the_rows_own_figure():
+    ours = outcomes(*[(0.2, 1.0, False)] * 100)
+    steady = outcomes(*[(0.25, 9.0, False)] * 100)
+    sharp = outcomes(*[(0.1, 1.0, False)] * 60, *[(0.1, 9.0, False)] * 39, (7.0, 9.0, False))
+    turned = outcomes(*[(30.0, 0.0, False)] * 99, (30.0, 0.0, True))
+    rows = bench_tracking.priority_rows(ours, {"KDL": {"steady": steady, "sharp": sharp, "turned": turned}})
+    best = {
+        "a joint came to its stop": ("steady", 0, True),
+        "misses (joint at its stop, 1 mm off the path, 3 deg at the end)": ("sharp", 40, True),
+        "distance from the path, 95th percentile": ("sharp", 0.1, False),
+        "distance from the path, largest": ("steady", 0.25, True),
+        "more than 3 deg from the goal's orientation at the end": ("turned", 0.0, True),
+    }
+    for words, (setting, value, ok) in best.items():
+        (row,) = [row for row in rows if row["figure"].endswith(f", 300 reaches: {words}")]
+        assert row["peer"] == f"KDL, best setting by this row: {setting}", words
+        assert row["peer_value"] == pytest.approx(value) and row["ok"] is ok, words
+
+
+def test_a_bad_setting_of_a_peer_takes_no_reach_out_of_those_without_a_stop():
+    ours = outcomes((0.1, 0.0, False), (0.2, 0.0, False))
+    peer = {"good": outcomes((3.0, 0.0, False), (4.0, 0.0, True)), "bad": outcomes((9.0, 0.0, True), (9.0, 0.0, True))}
+    rows = bench_tracking.priority_rows(ours, {"peer": peer})
+    assert any("the 1 of 300 reaches in which no method comes to a stop" in row["figure"] for row in rows)
+
+
 def test_a_peer_that_is_not_there_makes_its_rows_missed():
     rows = bench_tracking.priority_rows(outcomes((0.1, 0.0, False)), {"KDL wdls: PyKDL is not installed": None})
     assert len(rows) == 4 and all(row["value"] is None and not row["ok"] and row["goal"] for row in rows)
     stopped = outcomes((0.1, 0.0, True))
-    rows = bench_tracking.priority_rows(stopped, {"peer": stopped})
+    rows = bench_tracking.priority_rows(stopped, {"peer": {"": stopped}})
     judged = [row for row in rows if "the 0 of 300" in row["figure"] and row["goal"] != "reported"]
     assert len(judged) == 2 and not any(row["ok"] for row in judged)

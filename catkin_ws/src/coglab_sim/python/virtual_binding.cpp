@@ -108,8 +108,8 @@ py::dict feedbackOf(Robot& robot) {
 py::dict debugOf(const coglab_controllers::IkDebugRecord& record) {
   py::dict result;
   result["time"] = 1e-9 * static_cast<double>(record.stamp_ns);
-  result["goal"] = py::make_tuple(Vector3d(record.goal),
-                                  Eigen::Vector4d(record.goal_orientation.coeffs()));
+  result["goal"] =
+      py::make_tuple(Vector3d(record.goal), Eigen::Vector4d(record.goal_orientation.coeffs()));
   result["set_point"] = py::make_tuple(Vector3d(record.set_point.position),
                                        Eigen::Vector4d(record.set_point.orientation.coeffs()));
   result["measured"] = py::make_tuple(Vector3d(record.measured.position),

@@ -3,8 +3,12 @@
 
 Definitions. Update of one of 100 controllers: time of a cycle over 100, median of 150 blocks of 400 cycles, which
 alternate between all kinds; none left out. Each controller reads an IMU and changes a pose, with bounds on size and
-rate, judged in each cycle, timed and recorded for attribution. Free-running cycles: those of the real-time test, with
-plans, orders, gains and faults changed meanwhile; what could not be counted makes its row missed. Fuzzing: every
+rate, judged in each cycle, timed and recorded for attribution; beside it updates without bounds, timed and not. Their
+ratios to a bare loop keep the goals that were asked, 3.5 and with the time 12. 100 ns is a told figure: of a public
+implementation of 2017 without a guard, which is not measured here, and is no peer. Free-running cycles: those of the
+real-time test, with plans, orders, gains and faults changed meanwhile; what could not be counted makes its row missed.
+System calls are counted there by name; that there are no others the kernel says, in 20000 cycles of ten controllers
+without times and records, in which any call would kill. Without its word the row is missed. Fuzzing: every
 file is written, and loaded as list, gains or configuration in turn; half of them are a good one but for one word, the
 others are spoilt at random; whether it was taken or refused, it counts. Loading: 100 libraries, median of 7 runs of
 each kind in turn.
@@ -68,7 +72,7 @@ def guard_rows(binaries: Path) -> list[dict]:
     """100 controllers that read an IMU and change a pose, as they run on a robot: bounds on size, rate, angle and its
     rate, judged in each cycle, timed, and recorded for attribution; without each of it beside. Median of the blocks.
 
-    A cycle has 5 ms: 100 ns each is the goal, whatever the share of the guard in it.
+    A cycle has 5 ms: 100 ns each is the goal, whatever the share of the guard in it; and the goals of that share stand.
     """
     data = json.loads(run(binaries / "ctrl_more_bench_controllers"))
     if data["faults"]:
@@ -77,19 +81,52 @@ def guard_rows(binaries: Path) -> list[dict]:
         sys.exit(f"corrections of {data['attributed']} of {data['controllers']} controllers were recorded")
     floor = data["unguarded_ns"]
     bare = "the same controllers called in a bare loop [ns each]"
-    public = "public implementation of 2017, no guard, measured elsewhere [ns each]"
     whole = "bounded, judged, timed and attributed"
-    return [
-        row(f"{whole} update of one of 100", data["bounded_ns"], "ns", 100, public, 100),
-        row(f"{whole} / unguarded update of one of 100", data["bounded_ns"] / floor, "1", None, bare, floor),
-        row("the same without bounds", data["timed_ns"], "ns", None, bare, floor),
-        row("the same without bounds and time", data["guarded_ns"], "ns", None, bare, floor),
+    kinds = (  # name, key, goal of the ratio
+        (f"{whole} update", "bounded_ns", None),
+        ("guarded and timed update without bounds", "timed_ns", 12),
+        ("guarded update without bounds and time", "guarded_ns", 3.5),
+    )
+    return [row(f"{name} of one of 100; {TOLD}", data[key], "ns", 100) for name, key, _ in kinds] + [
+        row(f"{name} / unguarded update of one of 100", data[key] / floor, "1", goal, bare, floor)
+        for name, key, goal in kinds
     ]
 
 
+TOLD = "the goal was told for a public implementation of 2017 without guard, not measured here"
+
+
 def realtime_rows(binaries: Path) -> list[dict]:
-    """The counters of the real-time test, with services working meanwhile."""
-    text = run(binaries / "ctrl_more_test_realtime", "--gtest_filter=Realtime.Nothing*")
+    """The counters of the real-time test, with services working meanwhile, and the kernel's word on system calls.
+
+    The test fails where a counter is not 0: that is a missed row, and no end of the bench.
+    """
+    result = subprocess.run(
+        [str(binaries / "ctrl_more_test_realtime"), "--gtest_filter=Realtime.*"],
+        capture_output=True,
+        text=True,
+        timeout=600,
+    )
+    rows = counted_rows(result.stdout)
+    if result.returncode != 0 and all(each["ok"] for each in rows):
+        sys.exit(f"the real-time test failed ({result.returncode}): {result.stdout[-500:]}")
+    return rows
+
+
+def without_kernel(text: str) -> str:
+    """Why the run in which any system call kills proves nothing; empty where it does."""
+    found = re.search(r"^\[ +(OK|SKIPPED|FAILED) +\] Realtime\.CyclesRunWhereSystemCallsKill", text, re.MULTILINE)
+    reasons = {"OK": "", "SKIPPED": "was skipped: no seccomp here", "FAILED": "was killed by a call, or failed"}
+    return reasons[found.group(1)] if found else "did not run"
+
+
+def missed(figure: str) -> dict:
+    """A row of something of which there should be none, and of which nothing is known."""
+    return {**row(figure, 0.0, "1", 0.0), "value": None, "ok": False}
+
+
+def counted_rows(text: str) -> list[dict]:
+    """The rows of what the real-time test has printed."""
     names = (
         "cycles",
         "plans adopted",
@@ -103,10 +140,11 @@ def realtime_rows(binaries: Path) -> list[dict]:
     )
     found = re.search(", ".join(rf"{name} (\d+)" for name in names), text)
     if not found:
-        figure = "allocations, locks and system calls in free-running cycles; could not be counted here"
-        return [{**row(figure, 0.0, "1", 0.0), "value": None, "ok": False}]
+        return [missed("allocations, locks and system calls in free-running cycles; could not be counted here")]
     count = dict(zip(names, map(int, found.groups()), strict=True))
     what = f"in {count['cycles']} free-running cycles"
+    why = without_kernel(text)
+    calls = missed(f"{SYSTEM_CALLS} {what}: {count['syscalls']} of those by name; the run under seccomp {why}")
     return [
         row("free-running cycles", count["cycles"], "1", 1e5, at_least=True),
         row(f"plan changes adopted {what}", count["plans adopted"], "1", 1e4, at_least=True),
@@ -115,12 +153,12 @@ def realtime_rows(binaries: Path) -> list[dict]:
         row(f"faults {what}", count["faults"], "1", 1, at_least=True),
         row(f"allocations {what}", count["allocations"], "1", 0),
         row(f"locks {what}", count["locks"], "1", 0),
-        row(f"{SYSTEM_CALLS} {what}", count["syscalls"], "1", 0),
+        calls if why else row(f"{SYSTEM_CALLS} {what}", count["syscalls"], "1", 0),
         row(f"allocations of the C++ runtime at throws {what}", count["allocations of throws"], "1", None),
     ]
 
 
-SYSTEM_CALLS = "system calls (signals, reads, writes, sleeps, yields; by seccomp test_realtime forbids all)"
+SYSTEM_CALLS = "system calls (signals, reads, writes, sleeps, yields; any, by seccomp, in a run of its own)"
 
 
 def fuzz_rows(binaries: Path) -> list[dict]:

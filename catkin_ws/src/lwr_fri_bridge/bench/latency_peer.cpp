@@ -9,8 +9,14 @@
 ///                              blocks of the echo; the one whose block it is gets it first and is
 ///                              measured. Prints "ready" when the bridge is in command mode and
 ///                              moves; then per block one line: kind, then the latencies in us, -1
-///                              for a missing answer; at last the word moving and the share of the
-///                              bridge's answers that moved the arm.
+///                              for a missing answer. At last the word moving and the share of the
+///                              bridge's answers that moved the arm; and for each of bridge and
+///                              echo the word answers, its name, the packets that were sent to it
+///                              in all blocks and while the motion was waited for, those of them
+///                              that were not answered within 20 ms, the datagrams from it that
+///                              were not the answer that was waited for, because they came late,
+///                              and how many of the packets without an answer were sent before
+///                              "ready".
 ///   monitor ECHO BRIDGE QUADS  the same without waiting for a motion: monitor mode stays.
 #include <algorithm>
 #include <atomic>
@@ -24,6 +30,7 @@
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
+#include <poll.h>
 #include <sys/socket.h>
 #include <sys/time.h>
 #include <unistd.h>
@@ -34,13 +41,16 @@ namespace {
 
 using namespace lwr_fri_bridge;
 
-constexpr int kPriority = 80;                // of echo and FRI thread alike
-constexpr int kBlock = 500;                  // packets
-constexpr std::int64_t kPeriod = 1'000'000;  // ns
+constexpr int kPriority = 80;                   // of echo and FRI thread alike
+constexpr int kBlock = 500;                     // packets
+constexpr std::int64_t kPeriod = 1'000'000;     // ns
+constexpr std::int64_t kPatience = 20'000'000;  // ns, within which an answer has to come
 
 std::atomic<bool> ended{false};
+/// Ends the loops of both programs.
 void onSignal(int) { ended = true; }
 
+/// A UDP socket on a free local port, which is written into the address; it waits so long.
 int openSocket(sockaddr_in& address, int timeout_us) {
   const int fd = socket(AF_INET, SOCK_DGRAM, 0);
   address = {};
@@ -58,6 +68,7 @@ int openSocket(sockaddr_in& address, int timeout_us) {
   return fd;
 }
 
+/// Sends the head of each datagram back, as long as a command, until a signal ends it.
 int echo() {
   sockaddr_in local{}, from{};
   const int fd = openSocket(local, 100'000);
@@ -78,8 +89,8 @@ int echo() {
 /// A robot controller that does what it is told, in its resting posture.
 struct Controller {
   fri::MeasurementDatagram datagram{};
-  std::uint16_t counter = 0;
   std::uint64_t answers = 0, moved = 0;
+  /// At rest at home, in monitor mode.
   Controller() {
     datagram.measurement_period = datagram.command_period = 0.001F;
     datagram.state = 1;
@@ -93,6 +104,7 @@ struct Controller {
     std::copy(home, home + 7, datagram.commanded_position);
     std::copy(home, home + 7, datagram.measured_position);
   }
+  /// Follows an answer: goes where it says, and changes the mode if it asks for that.
   void take(const fri::CommandDatagram& answer) {
     datagram.header.reflected = answer.header.counter;
     if (answer.krl.ints[2] != 0 && answer.krl.ints[2] != datagram.krl.ints[0]) {
@@ -112,58 +124,112 @@ struct Controller {
   }
 };
 
+/// One of the two that are asked, and what became of its packets.
+struct Peer {
+  in_port_t port = 0;          // network order
+  std::uint16_t question = 0;  // counter of the packet that was sent last
+  std::uint64_t sent = 0, missing = 0, late = 0;
+};
+
 /// Sends packets by turns to the bridge and to the echo, on the beat.
 class Exchange {
  public:
-  Exchange(int echo_port, int bridge_port)
-      : fd_(openSocket(target_, 20'000)), echo_port_(echo_port), bridge_port_(bridge_port) {}
+  Exchange(int echo_port, int bridge_port) : fd_(openSocket(target_, kPatience / 1000)) {
+    echo_.port = htons(static_cast<std::uint16_t>(echo_port));
+    bridge_.port = htons(static_cast<std::uint16_t>(bridge_port));
+  }
 
-  /// So many packets to one of the two, timed into us(); the other one gets as many beside them.
+  /// So many packets to one of the two, timed into us(); the other one gets as many beside them,
+  /// whose answers are not timed, but counted like the others.
   void block(bool to_bridge, int packets) {
+    Peer& first = to_bridge ? bridge_ : echo_;
+    Peer& second = to_bridge ? echo_ : bridge_;
     for (int i = 0; i < packets; ++i, next_ += kPeriod) {
       // Late ourselves: not the peer's fault.
       if (steadyNow() > next_) next_ = steadyNow() + kPeriod;
       timespec wake{next_ / 1'000'000'000, next_ % 1'000'000'000};
       clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &wake, nullptr);
-      us_[static_cast<std::size_t>(i % kBlock)] = exchange(to_bridge);
-      exchange(!to_bridge);
+      us_[static_cast<std::size_t>(i % kBlock)] = exchange(first);
+      exchange(second);
     }
   }
 
   Controller& controller() { return controller_; }
   const std::vector<float>& us() const { return us_; }
+  const Peer& echoPeer() const { return echo_; }
+  const Peer& bridgePeer() const { return bridge_; }
 
  private:
-  /// Sends the packet of this millisecond to one of the two and waits for its answer; us.
-  float exchange(bool to_bridge) {
-    target_.sin_port = htons(static_cast<std::uint16_t>(to_bridge ? bridge_port_ : echo_port_));
+  /// Sends the packet of this millisecond to one of the two and waits for its answer; us, or -1 if
+  /// none came in time.
+  float exchange(Peer& peer) {
+    target_.sin_port = peer.port;
     fri::MeasurementDatagram& d = controller_.datagram;
-    d.header = fri::measurementHeader(to_bridge ? ++controller_.counter : controller_.counter,
-                                      d.header.reflected);
+    d.header = fri::measurementHeader(++peer.question, d.header.reflected);
+    ++peer.sent;
     const std::int64_t sent = steadyNow();
     sendto(fd_, &d, sizeof d, 0, reinterpret_cast<sockaddr*>(&target_), sizeof target_);
-    // A late answer of the other one is not mistaken for this one.
-    std::uint8_t reply[1024];
-    sockaddr_in from{};
-    ssize_t got = 0;
-    do {
-      socklen_t length = sizeof from;
-      got = recvfrom(fd_, reply, sizeof reply, 0, reinterpret_cast<sockaddr*>(&from), &length);
-    } while (got > 0 && from.sin_port != target_.sin_port);
-    const std::int64_t received = steadyNow();
-    if (got != static_cast<ssize_t>(fri::kCommandSize)) return -1.0F;
-    fri::CommandDatagram answer;
-    if (to_bridge && fri::decode(reply, fri::kCommandSize, answer)) controller_.take(answer);
-    return 1e-3F * static_cast<float>(received - sent);
+    std::int64_t took = 0;
+    for (bool came = receive(); came && took <= kPatience; came = receiveUntil(sent + kPatience)) {
+      took = steadyNow() - sent;
+      if (took <= kPatience && isAnswerOf(peer)) {
+        fri::CommandDatagram answer;
+        if (&peer == &bridge_ && fri::decode(reply_, fri::kCommandSize, answer))
+          controller_.take(answer);
+        return 1e-3F * static_cast<float>(took);
+      }
+      if (from_.sin_port == bridge_.port) ++bridge_.late;
+      if (from_.sin_port == echo_.port) ++echo_.late;
+    }
+    ++peer.missing;
+    return -1.0F;
+  }
+
+  /// The next datagram, whatever it is; false if none came within the socket's limit of time.
+  bool receive() {
+    socklen_t length = sizeof from_;
+    got_ = recvfrom(fd_, reply_, sizeof reply_, 0, reinterpret_cast<sockaddr*>(&from_), &length);
+    return got_ > 0;
+  }
+
+  /// The same after one that was not the answer: what is left of the patience is waited for.
+  bool receiveUntil(std::int64_t deadline) {
+    const std::int64_t left = std::max<std::int64_t>(deadline - steadyNow(), 0);
+    const timespec limit{left / 1'000'000'000, left % 1'000'000'000};
+    pollfd waited{fd_, POLLIN, 0};
+    return ppoll(&waited, 1, &limit, nullptr) > 0 && receive();
+  }
+
+  /// Whether the datagram that came last answers the last question to that peer: the bridge
+  /// reflects its counter, and the echo sends it back where it was.
+  bool isAnswerOf(const Peer& peer) const {
+    if (from_.sin_port != peer.port || got_ != static_cast<ssize_t>(fri::kCommandSize))
+      return false;
+    fri::Header header;
+    std::memcpy(&header, reply_, sizeof header);
+    return &peer == &bridge_ ? header.id == fri::kCommandId && header.reflected == peer.question
+                             : header.counter == peer.question;
   }
 
   sockaddr_in target_{};
-  const int fd_, echo_port_, bridge_port_;
+  const int fd_;
+  Peer echo_, bridge_;
   Controller controller_;
   std::vector<float> us_ = std::vector<float>(kBlock);
   std::int64_t next_ = steadyNow() + kPeriod;
+  std::uint8_t reply_[1024];
+  sockaddr_in from_{};
+  ssize_t got_ = 0;
 };
 
+/// The line of one of the two: its packets, those without an answer, late ones, missing before.
+void printAnswers(const char* name, const Peer& peer, std::uint64_t before) {
+  std::printf("answers %s %llu %llu %llu %llu\n", name, static_cast<unsigned long long>(peer.sent),
+              static_cast<unsigned long long>(peer.missing),
+              static_cast<unsigned long long>(peer.late), static_cast<unsigned long long>(before));
+}
+
+/// The blocks of both peers, printed; moving: after the bridge has begun to move the arm.
 int measure(bool moving, int echo_port, int bridge_port, int quads) {
   Exchange peers(echo_port, bridge_port);
   coglab_rt::enterRealTime(kPriority - 5);
@@ -180,6 +246,8 @@ int measure(bool moving, int echo_port, int bridge_port, int quads) {
   }
   std::puts("ready");
   std::fflush(stdout);
+  const std::uint64_t bridge_before = peers.bridgePeer().missing;
+  const std::uint64_t echo_before = peers.echoPeer().missing;
   controller.answers = controller.moved = 0;
   for (int quad = 0; quad < quads && !ended; ++quad) {
     for (const bool to_bridge : {false, true, true, false}) {
@@ -192,6 +260,8 @@ int measure(bool moving, int echo_port, int bridge_port, int quads) {
   std::printf("moving %.4f\n",
               static_cast<double>(controller.moved) /
                   static_cast<double>(std::max<std::uint64_t>(controller.answers, 1)));
+  printAnswers("bridge", peers.bridgePeer(), bridge_before);
+  printAnswers("echo", peers.echoPeer(), echo_before);
   return 0;
 }
 
