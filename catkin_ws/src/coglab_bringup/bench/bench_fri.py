@@ -11,7 +11,8 @@ packet whose number it reflects alone. One that does not come within 20 ms count
 is counted, also those beside the blocks of the echo and those sent while the motion was waited for, and one without an
 answer makes the row of missing answers missed. 40 rounds of four blocks were asked for; COGLAB_BENCH_QUADS takes fewer,
 which is a sample. The ratio of the 99th percentiles is shown beside the same ratio of echo against echo: on a machine
-that is not a real-time one it says more about the machine. Prints JSON. The rows of losses are in lwr_fri_bridge/bench/bench_fri.py.
+that is not a real-time one it says more about the machine. Prints JSON. The rows of losses are in
+lwr_fri_bridge/bench/bench_fri.py.
 """
 
 from __future__ import annotations

@@ -10,8 +10,11 @@ The new motion is that of coglab_controllers/test/test_new_motion.py: made by `c
 workspace of its own, and done when its rostest has seen the simulated arm move. A test that fails gives no value. What
 tests of combined conditions, and those that came with the simulated world, add to the whole test run: the programs
 named in COMBINED and in WORLD, whole, each with its part of the wall time (programs that run beside each other share it
-equally, at every moment); without a record of every one of them the row is missed. final_error_mm is what the demo of
-this bench leaves in its result.json for each direction: palm to the true grasp pose at the end of the last reach.
+equally, at every moment); without a record of every one of them the row is missed. Times that ./coglab demo and
+./coglab test have left are those of the sources that they say: of others, of sources that were not committed or changed
+meanwhile, and where git knows nothing, they are not measured on these, and their rows are missed. final_error_mm is
+what the demo of this bench leaves in its result.json for each direction: palm to the true grasp pose at the end of the
+last reach.
 """
 
 from __future__ import annotations
@@ -26,6 +29,7 @@ import time
 from pathlib import Path
 
 from coglab_bringup.demo import KINDS
+from coglab_bringup.sources import wall_sources
 
 COMBINED = {
     # losses with limits, leash and feedback; what ends command mode; stamps, sizes and numbers that nobody expects
@@ -134,6 +138,16 @@ def row(figure: str, value: float | None, limit: float) -> dict:
     )
 
 
+def of_sources(times: dict, now: str) -> dict:
+    """Of the recorded times those that were measured on the sources as they are now; none where these have no word."""
+    return {name: run for name, run in times.items() if now and run.get("sources") == now}
+
+
+def whole_test(times: dict) -> float | None:
+    """What the last run of all tests took."""
+    return times.get("last_test", {}).get("total_s")
+
+
 def first_demo(times: dict) -> tuple[str, float | None]:
     """What the one command took that installed, built and ran the first demo of this checkout, and in words its parts.
 
@@ -173,7 +187,7 @@ def final_errors(result: dict) -> list[dict]:
 def main() -> None:
     top = Path(os.environ["COGLAB_TOP"])
     recorded = top / ".coglab" / "times.json"
-    times = json.loads(recorded.read_text()) if recorded.is_file() else {}
+    times = of_sources(json.loads(recorded.read_text()) if recorded.is_file() else {}, wall_sources(top))
     figure, first = first_demo(times)
     with tempfile.TemporaryDirectory() as out:
         start = time.monotonic()
@@ -188,11 +202,7 @@ def main() -> None:
         row(figure, first and round(first, 1), 300),
         row("demo again, run by this bench", later, 60),
         row("from controller new --motion to a simulated arm that has moved", new_motion(made.stdout), 90),
-        row(
-            "./coglab test of all packages, as last run in this checkout",
-            times.get("last_test", {}).get("total_s"),
-            900,
-        ),
+        row("./coglab test of all packages, as last run in this checkout", whole_test(times), 900),
         row(*added(times, COMBINED, "combined conditions"), ADDED_LIMIT),
         row(*added(times, WORLD, "the simulated world"), ADDED_LIMIT),
         *final_errors(result),

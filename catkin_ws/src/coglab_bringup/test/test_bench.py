@@ -111,3 +111,20 @@ def test_the_final_error_of_the_demo_is_a_row_of_each_direction_and_missed_where
     assert all("final_error_mm" in row["figure"] and "seed 7" in row["figure"] for row in rows)
     assert truth in rows[0]["figure"] and "no reach began" in rows[1]["figure"]
     assert [row["ok"] for row in bench_wall.final_errors({"seed": 7, "handovers": []})] == [False, False]
+
+
+def test_a_time_of_other_sources_was_not_measured_on_these(bench_wall):
+    demo = {"install_s": 70.0, "build_s": 300.0, "run_s": 30.0}
+    names = [bench_wall.program_of(package, name) for package, all_of in bench_wall.WORLD.items() for name in all_of]
+    test = {"total_s": 600.0, "programs": dict.fromkeys(names, 1.0)}
+    for of, now, known in (("a", "a", True), ("b", "a", False), ("", "", False), ("", "a", False), (None, "a", False)):
+        word = {} if of is None else {"sources": of}
+        times = bench_wall.of_sources({"demo_from_nothing": demo | word, "last_test": test | word}, now)
+        assert (bench_wall.first_demo(times)[1] == 400.0) is known
+        assert (bench_wall.added(times, bench_wall.WORLD, "it")[1] is not None) is known
+        value = bench_wall.whole_test(times)
+        assert (value == 600.0) is known and bench_wall.row("tests", value, 900)["ok"] is known
+    half = bench_wall.of_sources(
+        {"demo_from_nothing": demo | {"sources": "b"}, "last_test": test | {"sources": "a"}}, "a"
+    )
+    assert bench_wall.first_demo(half)[1] is None and bench_wall.whole_test(half) == 600.0

@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 from coglab_bringup import bench, figures
 from coglab_bringup.commit import git
+from coglab_bringup.mutant import EQUIVALENT
+from coglab_bringup.sources import is_source, sources_of
 
 TOP = Path(__file__).resolve().parents[4]
 ROW = dict(zip(bench.COLUMNS, ("one", "time of a | step", 1.23456, "us", "<= 2", "KDL", 3.0, True), strict=True))
@@ -34,7 +36,7 @@ def checkout(tmp_path):
 
 def keep(top: Path, name: str, rows: list[dict], long: bool) -> None:
     """Rows of a run during which nothing has changed."""
-    assert figures.record(top, name, rows, long, figures.sources_of(top, name))
+    assert figures.record(top, name, rows, long, sources_of(top, name))
 
 
 def commit(top: Path, message: str) -> None:
@@ -161,7 +163,7 @@ def test_tests_and_equivalent_changes_make_the_figures_of_mutants_old(checkout):
     (checkout / "catkin_ws" / "src" / "p" / "README.md").write_text("words")
     commit(checkout, "a page")
     assert figures.measured(checkout, "mutants") is not None
-    (checkout / figures.EQUIVALENT).write_text("[]\n")
+    (checkout / EQUIVALENT).write_text("[]\n")
     commit(checkout, "the list")
     assert figures.measured(checkout, "mutants") is None
 
@@ -198,7 +200,7 @@ def test_what_changed_while_it_was_measured_is_not_kept(checkout, monkeypatch, c
     bench.main(["one"])
     assert figures.measured(checkout, "one") is None and not (checkout / ".coglab" / "figures" / "one.json").exists()
     assert "sources changed while it ran" in capsys.readouterr().err
-    before = figures.sources_of(checkout, "one")["commit"]
+    before = sources_of(checkout, "one")["commit"]
     bench.main(["one"])
     assert figures.measured(checkout, "one")["commit"] == before, "the commit that was measured, not the later one"
 
@@ -271,9 +273,9 @@ def test_a_test_that_a_bench_names_is_one_of_its_sources():
     """It runs it, so that what it measures is defined there."""
     words = 'find("p_test_cycle"), TEST / "fuzz.test", test_one_oracle'
     for path in ("p/test/test_cycle.cpp", "p/test/fuzz.test", "p/test/fuzz_rostest.py", "p/test/test_one_oracle.py"):
-        assert figures._is_source(path, words=words) and not figures._is_source(path)
+        assert is_source(path, words=words) and not is_source(path)
     for path in ("p/test/test_cycle_limits.cpp", "p/test/test_one.py", "p/test/test_fuzz_rules.py", "p/README.md"):
-        assert not figures._is_source(path, words=words)
+        assert not is_source(path, words=words)
 
 
 def test_the_page_knows_every_bench_and_the_readme_quotes_it():

@@ -48,6 +48,7 @@ def words(text: str, name: str) -> set[tuple[int, str, str]]:
 
 def test_cpp_is_changed_where_it_is_code():
     assert words(CPP, "limit.cpp") == {
+        (2, "3", "4"),
         (6, "<", "<="), (6, "0.5", "1.0"), (6, "return 0.5;", ";"),
         (8, "0", "1"), (8, "<", "<="), (8, "10", "11"), (8, "+=", "-="), (8, "(b, a)", "(a, b)"), (8, "*", "/"),
         (8, "2.0", "4.0"),
@@ -66,7 +67,7 @@ def test_python_is_changed_where_it_is_code():
 
 
 def test_lines_of_code_are_counted_without_comments_and_texts():
-    assert code_lines(CPP, "limit.cpp") == [5, 6, 7, 8, 9, 10, 11, 12]
+    assert code_lines(CPP, "limit.cpp") == [2, 5, 6, 7, 8, 9, 10, 11, 12]
     assert code_lines(PYTHON, "limit.py") == [2, 5, 7, 8, 9, 10]
 
 

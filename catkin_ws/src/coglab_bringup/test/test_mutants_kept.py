@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from coglab_bringup import figures, mutant_workspace, mutants, mutants_kept
 from coglab_bringup.commit import commit_seed, folder_seed, last_commit
+from coglab_bringup.mutant import EQUIVALENT
 from coglab_bringup.mutants_kept import further
 
 CODE = "int f(int a) {\n  if (a < 3) return 1;\n  return a + 4;\n}\nint g() { return 5 * 6; }\nint h() { return 7; }\n"
@@ -41,7 +42,7 @@ def checkout(tmp_path, monkeypatch):
     git(top, "init", "-q")
     (top / ".gitignore").write_text("/.coglab/\n")
     (top / "docs").mkdir()
-    (top / figures.EQUIVALENT).write_text("[]\n")
+    (top / EQUIVALENT).write_text("[]\n")
     (top / "README.md").write_text(f"{figures.BEGIN}\n{figures.END}\n")
     commit(top, "coglab", "")
     for name, uses in (("two", ""), ("one", "<depend>two</depend>")):
@@ -303,7 +304,7 @@ def test_the_page_lists_the_survivors_with_file_and_line(checkout, built, monkey
     run(checkout, monkeypatch, "--own")
     first = json.loads(next((checkout / ".coglab" / "mutants").glob("two.*.own.json")).read_text())["drawn"][0]
     named = {"file": first["file"], "line": first["text"], "change": first["changed"], "reason": "g is never called"}
-    (checkout / figures.EQUIVALENT).write_text(json.dumps([named]))
+    (checkout / EQUIVALENT).write_text(json.dumps([named]))
     text = section(checkout).partition(figures.TABLE)[2]
     lines = [line for line in text.splitlines() if line.startswith("- `catkin_ws/src/")]
     assert len(lines) == 6 and "one 3 of 3, two 3 of 3" in text and mutants_kept.KEPT in text

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from coglab_bringup.run_directory import record_times
+from coglab_bringup.sources import sources_of, wall_sources
 
 TOP = Path(__file__).resolve().parents[4]
 SET_UP = {
@@ -101,7 +102,7 @@ def recorded(tmp_path, monkeypatch):
                 monkeypatch.delenv(name, raising=False)
             for name, value in environment.items():
                 monkeypatch.setenv(name, value)
-            record_times(tmp_path, command, 30.0)
+            record_times(tmp_path, command, 30.0, "")
         return json.loads((tmp_path / ".coglab" / "times.json").read_text())
 
     return run_all
@@ -122,3 +123,54 @@ def test_parts_of_several_commands_make_no_first_demo(recorded, without):
 
 def test_a_test_that_did_the_set_up_is_no_demo(recorded):
     assert "demo_from_nothing" not in recorded(("test", SET_UP))
+
+
+@pytest.fixture
+def repository(tmp_path):
+    """A checkout with the bench of wall times, committed."""
+    folder = tmp_path / "catkin_ws" / "src" / "p" / "bench"
+    folder.mkdir(parents=True)
+    (folder.parent / "package.xml").write_text("<package><name>p</name></package>")
+    (folder / "bench_wall.py").write_text('"""Times."""\n')
+    (tmp_path / ".gitignore").write_text("/.coglab/\n")
+    (tmp_path / "coglab").write_text("")
+    commit_all(tmp_path)
+    return tmp_path
+
+
+def commit_all(top: Path) -> None:
+    for words in (["init", "-q"], ["add", "-A"], ["commit", "-q", "-m", "words"]):
+        git = ["git", "-c", "user.name=a", "-c", "user.email=a@b", "-C", str(top), *words]
+        subprocess.run(git, check=True, capture_output=True, timeout=30)
+
+
+def times_of(top: Path, before: str) -> dict:
+    record_times(top, "test", 30.0, before)
+    return json.loads((top / ".coglab" / "times.json").read_text())["last_test"]
+
+
+def test_a_time_says_the_sources_that_it_is_of(repository):
+    before = sources_of(repository, "wall")["sources"]
+    assert before and times_of(repository, before)["sources"] == before
+    source = repository / "catkin_ws" / "src" / "p" / "code.py"
+    source.write_text("x = 1\n")
+    assert times_of(repository, before)["sources"] == "", "they changed while it ran"
+    assert times_of(repository, sources_of(repository, "wall")["sources"])["sources"] == "", "not committed"
+    commit_all(repository)
+    assert times_of(repository, before)["sources"] == "", "others were committed while it ran"
+    after = sources_of(repository, "wall")["sources"]
+    assert times_of(repository, after)["sources"] == after != before
+
+
+def test_where_git_is_missing_or_knows_nothing_a_time_is_of_no_sources(repository, monkeypatch):
+    before = sources_of(repository, "wall")["sources"]
+    with monkeypatch.context() as without:
+        without.setenv("PATH", str(repository))
+        assert times_of(repository, before)["sources"] == "" and times_of(repository, "")["sources"] == ""
+    shutil.rmtree(repository / ".git")
+    assert times_of(repository, sources_of(repository, "wall")["sources"])["sources"] == ""
+
+
+def test_a_manifest_that_cannot_be_read_ends_no_demo(repository):
+    (repository / "catkin_ws" / "src" / "p" / "package.xml").write_text("<package><name>p</name>")
+    assert times_of(repository, wall_sources(repository))["sources"] == wall_sources(repository) == ""

@@ -18,6 +18,7 @@ from pathlib import Path
 
 from coglab_bringup import figures, process_tree
 from coglab_bringup.arguments import bench_options, find_benches
+from coglab_bringup.sources import sources_of
 from coglab_bringup.usage import Refused
 
 COLUMNS = ("bench", "figure", "value", "unit", "goal", "peer", "peer_value", "ok")
@@ -93,7 +94,7 @@ def main(arguments: list[str]) -> int:
     rows: list[dict] = []
     for name in options.names or ([] if options.report else benches):
         print(f"[coglab] bench {name} ...", file=sys.stderr, flush=True)
-        before = figures.sources_of(top, name)
+        before = sources_of(top, name)
         found = [row for path in benches[name] for row in run_bench(name, path, python, limit)]
         if not figures.record(top, name, found, options.long, before):
             print(f"[coglab] bench {name}: its sources changed while it ran; its rows are not kept", file=sys.stderr)

@@ -6,17 +6,13 @@ of its sources as they are now was not measured: it is shown as missed, whatever
 between the two marks are taken from that page: what `is_quoted` says of the benches QUOTED, and below them in one line
 what is missed besides.
 
-The sources of a bench are its package, the packages that its own files name, what all these depend on (package.xml),
-and `coglab`; documents and tests are none. Programs beside the tests, which benches share with them, are, and so are
-the tests that a bench names, because it runs them. Those of `mutants` are all packages with their tests, which are what
-it measures, and its list of equivalent changes; below its rows the page lists the survivors of docs/mutants.json, which
-the report keeps, too.
+What the sources of a bench are sources.py says. Below the rows of `mutants` the page lists the survivors of
+docs/mutants.json, which the report keeps, too.
 """
 
 from __future__ import annotations
 
 import ast
-import hashlib
 import json
 import os
 import platform
@@ -25,12 +21,10 @@ from collections import Counter
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 from coglab_bringup import mutants_kept
-from coglab_bringup.arguments import find_benches, package_folders
-from coglab_bringup.commit import git
-from coglab_bringup.mutant import EQUIVALENT
+from coglab_bringup.arguments import find_benches
+from coglab_bringup.sources import MUTANTS, sources_of
 
 NOT_MEASURED = "not measured on these sources"
 ALL_ROWS = "all of its rows"
@@ -41,7 +35,6 @@ GOAL = re.compile(r"[<>]=? ?(?:-?[\d.]|peer)|-?[\d.]")
 """how a goal begins that a value can meet: a comparison with a number or the peer, or a number"""
 BEGIN, END = "<!-- quoted from docs/figures.md -->", "<!-- end of the quotation -->"
 KEPT = "docs/figures.json"
-MUTANTS = "mutants"
 QUOTED = ("wall", "fri", "trials")
 """the benches of which README.md shows rows; of the others it says how many are missed"""
 HEAD = """# Figures
@@ -53,53 +46,6 @@ package and those that it uses, tests and documents apart) counts as missed.
 Definitions, goals and peers are fixed before anything is measured: they stand in the bench itself.
 """
 TABLE = "| figure | value | goal | | peer | its value |\n| --- | --- | --- | --- | --- | --- |"
-
-
-def _needed(packages: dict[str, Path], files: list[Path], words: str) -> list[Path]:
-    """Folders of the packages that a bench of these files, with these words, runs; all of them where the files are not
-    known."""
-    found = [
-        name for name, folder in packages.items() if name in words or any(folder in path.parents for path in files)
-    ]
-    for name in found:  # which grows meanwhile
-        manifest = ElementTree.parse(packages[name] / "package.xml").getroot()
-        uses = {element.text for element in manifest if element.tag.endswith("depend")}
-        found += [other for other in packages if other in uses and other not in found]
-    return [packages[name] for name in found or packages]
-
-
-def _is_source(path: str, tests: bool = False, words: str = "") -> bool:
-    """Whether a figure may depend on this file: documents measure nothing, nor do tests but where they are measured, or
-    run by the bench, whose files hold these words."""
-    folder, _, name = path.rpartition("/")
-    test = f"{folder}/".count("/test/") and (name.startswith("test_") or name.endswith((".test", "_rostest.py")))
-    stem = name.partition(".")[0]
-    # A rostest is named by its launch file, a program by the end of its name.
-    call = stem if name.startswith("test_") else f"{stem.removesuffix('_rostest')}.test"
-    run = re.search(rf"(?:\b|_){re.escape(call)}\b", words) is not None
-    return not (test and not tests and not run or name.endswith(".md"))
-
-
-def sources_of(top: Path, bench: str) -> dict[str, str]:
-    """Commit of a checkout, and one word for the sources of a bench: the same where only others change."""
-    source = top / "catkin_ws" / "src"
-    its_files = find_benches(source).get(bench, [])
-    words = " ".join(path.read_text(encoding="utf-8") for path in its_files)
-    folders = _needed(package_folders(source), its_files, words)
-    places = ["coglab", *sorted(str(folder.relative_to(top)) for folder in folders)]
-    tests = bench == MUTANTS
-    places += [EQUIVALENT] if tests else []
-
-    def kept(lines: str) -> list[str]:
-        return [line for line in lines.splitlines() if _is_source(line, tests, words)]
-
-    changed = bool(kept(git(top, "status", "--porcelain", "--", *places)))
-    files = kept(git(top, "ls-tree", "-r", "HEAD", "--", *places))
-    digest = hashlib.sha256("\n".join(files).encode()).hexdigest() if files else ""
-    return {
-        "commit": git(top, "rev-parse", "--short=7", "HEAD") + (" with changes" if changed else ""),
-        "sources": "" if changed else digest,
-    }
 
 
 def machine() -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import os
 import shutil
@@ -20,6 +21,11 @@ PAGES = ("test_pages.py", "test_figures.py", "test_measured_words.py", "test_arc
 NO_JUDGES = {*FORM, *PAGES, "test_feature_table.py"}
 """tests of the sources' form and of pages: a change that only the formatter or a page notices is one that no test of
 what the program does has noticed"""
+
+DRAWN_AND_JUDGED_BY = tuple(
+    Path(__file__).with_name(name) for name in ("mutants.py", "mutator.py", Path(__file__).name)
+)
+"""what decides which lines are changed, how, and which test has noticed: of others no result is one of these sources"""
 
 
 def update_copy(top: Path, copy: Path) -> str:
@@ -51,11 +57,22 @@ def update_copy(top: Path, copy: Path) -> str:
     return digest.hexdigest()
 
 
+def code_of(path: Path) -> str:
+    """The code of a Python file: without comments and docstrings, which decide nothing."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node) is not None:
+            node.body = node.body[1:]
+    return ast.unparse(tree)
+
+
 def digest_of(root: Path, package: str) -> str:
     """Of what judges a package by its own tests alone: its files, the sources of what it uses, and `coglab`; but for
-    pages and for the tests of what it uses."""
+    pages and for the tests of what it uses. And of what draws the changes and runs the tests, as it is here."""
     packages = package_folders(root / "catkin_ws" / "src")
     digest = hashlib.sha256((root / "coglab").read_bytes() if (root / "coglab").is_file() else b"")
+    for path in DRAWN_AND_JUDGED_BY:
+        digest.update(f"{path.name}\0{code_of(path)}\0".encode())
     for name in sorted({package, *used_by(package, packages)}):
         for path in sorted(packages[name].rglob("*")):
             inside = path.relative_to(packages[name])

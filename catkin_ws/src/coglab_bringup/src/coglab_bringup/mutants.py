@@ -1,11 +1,12 @@
 """./coglab bench mutants [PACKAGE ...] [--seed N]: would the tests notice a slip of the hand?
 
 Over how many: 12 changes or more in each of the seven packages with a core, drawn over all lines of code of the package
-that ship (mutator.py: comparison, sign, constant, condition, dropped exit, swapped arguments); fewer make the row
-missed. Each is made alone, what it touches is built, and the tests of the package and of what stands on it run until
-the first red one. What is left out, and counted in a row beside: a line that does not compile, which is drawn again,
-and a test that is red on the unchanged sources, too. Survivors with which the program does the same are named, with a
-reason, in docs/equivalent_mutants.json, shown, and subtracted as long as they are at most one in twenty of all.
+that ship, templates and programs without an ending among them (mutator.py: comparison, sign, constant, condition,
+dropped exit, swapped arguments; what is left alone there, and why, it says); fewer make the row missed. Each is made
+alone, what it touches is built, and the tests of the package and of what stands on it run until the first red one. What
+is left out, and counted in a row beside: a line that does not compile, which is drawn again, and a test that is red on
+the unchanged sources, too. Survivors with which the program does the same are named, with a reason, in
+docs/equivalent_mutants.json, shown, and subtracted as long as they are at most one in twenty of all.
 
 The seed of a package comes from the last commit that touched its folder, and changes with each one that does: a row
 says it, and nobody can choose among seeds. A seed given by hand is that of all packages, and is only printed. It was
@@ -16,7 +17,8 @@ seeds, of sources that were committed and stayed the same, and no others.
 All of it happens in a copy of the checkout below .coglab/mutants: the checkout itself is never changed, however this
 ends. A red test is run once more before it is believed, and one that was never seen green is run on the unchanged
 sources first. Tests of format, types, pages and figures do not judge (mutant_workspace.NO_JUDGES). What a run has found
-is kept: the same command goes on where it was ended, as long as the sources are the same. Hours; run only when named.
+is kept: the same command goes on where it was ended, as long as the sources are the same, those of the mutator and of
+what judges among them. Hours; run only when named.
 With --own the tests of the package alone judge, which is quicker and harder: what survives may be killed by what stands
 on it, so that the share is a lower bound, and its rows say so. What they have judged `./coglab bench --report` keeps in
 docs/mutants.json, from which another machine goes on (mutants_kept.py); it builds only what it has to judge. The
@@ -44,7 +46,8 @@ from coglab_bringup.mutant import Equivalent, Mutant, read_equivalent, sentence,
 from coglab_bringup.mutant_rows import rows_of
 from coglab_bringup.mutant_workspace import Workspace
 from coglab_bringup.mutants_kept import entry_of, further, mutants_of, own_seeds, read_state, rows_of_state, write_whole
-from coglab_bringup.mutator import ENDINGS, Change, changes, code_lines
+from coglab_bringup.mutator import Change, changes, code_lines, is_python, is_source
+from coglab_bringup.sources import MUTANTS, sources_of
 from coglab_bringup.usage import Refused
 
 NOT_SHIPPED = {"test", "bench"}
@@ -53,12 +56,14 @@ SLOWER = 4.0
 
 
 def shipped(folder: Path) -> list[Path]:
-    """The source files of a package that ship, in a fixed order: not its tests and benches."""
-    found = [path for path in folder.rglob("*") if path.suffix in ENDINGS and path.is_file()]
+    """The source files of a package that ship, in a fixed order: C++ and Python, templates of them and programs without
+    an ending, too; not its tests and benches, and not setup.py, which says where files lie."""
     return sorted(
         path
-        for path in found
-        if not (NOT_SHIPPED | {"__pycache__"}) & set(path.relative_to(folder).parts[:-1]) and path.name != "setup.py"
+        for path in folder.rglob("*")
+        if not (NOT_SHIPPED | {"__pycache__"}) & set(path.relative_to(folder).parts[:-1])
+        and path.name != "setup.py"
+        and is_source(path)
     )
 
 
@@ -242,7 +247,7 @@ class Edited:
 
     def __init__(self, workspace: Workspace, path: Path, texts: tuple[str, str], alone: Path | None) -> None:
         self._workspace, self._path, (self._before, self._after) = workspace, path, texts
-        self._compiled = path.suffix != ".py"
+        self._compiled = not is_python(self._before, path.name)
         self.alone = alone
         """The package that is built for it; None: all."""
 
@@ -266,7 +271,7 @@ def recorded(
     """Keeps the rows for docs/figures.md where nobody has chosen packages or seed, and the sources, which were
     committed, are as they were `before`, each package with its last commit."""
     chosen = bool(options.packages) or options.seed is not None or own_seeds(top, list(seeds)) != seeds
-    return not chosen and bool(before["sources"]) and figures.record(top, figures.MUTANTS, rows, False, before)
+    return not chosen and bool(before["sources"]) and figures.record(top, MUTANTS, rows, False, before)
 
 
 def judged(top: Path, options: argparse.Namespace, seeds: dict[str, int]) -> list[Campaign]:
@@ -312,7 +317,7 @@ def main(arguments: list[str]) -> int:
         folders, packages = package_folders(top / "catkin_ws" / "src"), options.packages or list(CORES)
         given = options.seed is not None
         seeds = {each: options.seed if given else folder_seed(top, folders[each]) for each in packages}
-        before = figures.sources_of(top, figures.MUTANTS)
+        before = sources_of(top, MUTANTS)
         campaigns = judged(top, options, seeds)
     except KeyboardInterrupt:
         say("ended; what was judged is kept, and the same command goes on from there")

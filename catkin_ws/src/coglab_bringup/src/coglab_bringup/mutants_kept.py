@@ -1,9 +1,10 @@
 """docs/mutants.json: what `./coglab bench mutants --own` has judged, kept with the checkout for later days.
 
 By package: its seed, which is that of the last commit that touched its folder, the digest of the sources and tests that
-were judged, date and machine, the changes as drawn, and the tests that told nothing. `./coglab bench --report` takes
-them from the state files below .coglab/mutants. An entry stands as long as seed and digest are those of the checkout,
-and is replaced only by one that goes on from it: who has less, or judges again what was judged, changes nothing.
+were judged and of what drew and judged, date and machine, the changes as drawn, and the tests that told nothing.
+`./coglab bench --report` takes them from the state files below .coglab/mutants. An entry stands as long as seed and
+digest are those of the checkout, and is replaced only by one that goes on from it: who has less, or judges again what
+was judged, changes nothing.
 """
 
 from __future__ import annotations

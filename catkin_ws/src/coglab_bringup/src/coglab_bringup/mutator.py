@@ -1,7 +1,16 @@
 """One-line changes of source, C++ and Python, as a slip of the hand would make them.
 
-Comparisons, signs, constants, conditions, exits that are dropped and arguments that are swapped. Comments, texts and
-what the preprocessor reads are left alone. What comes out need not compile; it is the same for the same source.
+Comparisons, signs (those of a number or a term, too, which are dropped), constants, conditions, exits that are dropped
+and arguments that are swapped. What comes out need not compile; it is the same for the same source. Left alone are
+
+- comments and texts, which do nothing, or are words to people;
+- what the preprocessor reads but macros: it says which code there is, not what that does;
+- static_assert and the 0 of a pure virtual function: the compiler alone reads them; what it refuses would be drawn
+  again, what it lets pass does the same;
+- import, global and nonlocal, which only give names;
+- the order of the parameters in a Python `def`, and of bases behind `class`: nearly any call notices at once, so that
+  they would only raise the share that is noticed. Defaults and annotations there are drawn as anything else;
+- declarations without an operator or a constant: they have nothing that these changes could change.
 """
 
 from __future__ import annotations
@@ -11,9 +20,13 @@ import re
 import tokenize
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path, PurePath
 
 CPP_ENDINGS = (".cpp", ".hpp", ".h")
 ENDINGS = (*CPP_ENDINGS, ".py")
+TEMPLATE = ".in"
+"""behind the ending of a file of which another is made: a controller of one's own, or a file of the build"""
+PYTHON_PROGRAM = re.compile(r"#!.*\bpython")
 
 
 @dataclass(frozen=True)
@@ -38,35 +51,56 @@ class Change:
 
 
 CPP_SKIPPED = re.compile(
-    r'//[^\n]*|/\*.*?\*/|R"(?P<mark>[^(\s]*)\(.*?\)(?P=mark)"|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])+\'', re.DOTALL
+    r'//[^\n]*|/\*.*?\*/|R"(?P<mark>[^(\s]*)\(.*?\)(?P=mark)"|"(?:\\.|[^"\\\n])*"|(?<![\da-fA-F])\'(?:\\.|[^\'\\\n])+\'',
+    re.DOTALL,
 )
 SWAPPED_WORDS = {
-    "comparison": {"<": "<=", "<=": "<", ">": ">=", ">=": ">", "==": "!=", "!=": "=="},
-    "sign": {"+": "-", "-": "+", "*": "/", "/": "*", "+=": "-=", "-=": "+="},
+    "comparison": {"<": "<=", "<=": "<", ">": ">=", ">=": ">", "==": "!=", "!=": "==", "is": "is not"},
+    "sign": {"+": "-", "-": "+", "*": "/", "/": "*", "+=": "-=", "-=": "+=", "*=": "/=", "/=": "*="},
     "condition": {"&&": "||", "||": "&&", "and": "or", "or": "and"},
     "constant": {"true": "false", "false": "true", "True": "False", "False": "True"},
 }
-# Binary operators have blanks around them, in C++ by the formatter; brackets of templates and pointers have not.
-WORDS = re.compile(r"(?<=\s)(<=|>=|==|!=|\+=|-=|&&|\|\||<|>|\+|-|\*|/|and|or)(?=\s)|\b(true|false|True|False)\b")
-PYTHON_WORDS, CPP_WORDS = ("and", "or", "True", "False"), ("true", "false", "&&", "||")
-NUMBER = re.compile(r"(?<![\w.])(\d+(?:\.\d*)?(?:[eE][-+]?\d+)?)([fFuUlL]*)(?![\w.])")
+# Binary operators have blanks around them, in C++ by the formatter, or end their line; brackets of templates and
+# pointers have not.
+WORDS = re.compile(
+    r"(?<!\S)(<=|>=|==|!=|\+=|-=|\*=|/=|&&|\|\||<|>|\+|-|\*|/|and|or|is(?! not\b))(?!\S)|\b(true|false|True|False)\b"
+)
+PYTHON_WORDS, CPP_WORDS = ("and", "or", "is", "True", "False"), ("true", "false", "&&", "||")
+# A sign stands before its number or term without a blank, and behind no other term.
+SIGN = re.compile(r"(?<![\w)\].-])-(?=[\w(.])")
+NUMBER = re.compile(r"(?<![\w.])(0[xX][\da-fA-F]+|\d(?:'?\d)*(?:\.\d*)?(?:[eE][-+]?\d+)?)([fFuUlL]*)(?![\w.])")
 NEGATION = re.compile(r"!(?=[\w(])|\bnot (?=[\w(])")
 TWO_ARGUMENTS = re.compile(r"(?<=[\w\]])\(([\w.\[\]]+), ([\w.\[\]]+)\)")
 CPP_EXIT = re.compile(r"^(\s*(?:\} )?(?:(?:else )?if \(.*\) )?)((?:return|break|continue|throw)\b[^;{}]*;)\s*$")
 PYTHON_EXIT = re.compile(r"^(\s*(?:(?:el)?if .*: )?)((?:return|break|continue|raise)\b.*)$")
-CPP_LEFT_OUT = re.compile(
-    r"^\s*(?:#|using |namespace |template|static_assert|friend |typedef |class |struct |enum |public:|private:)"
-    r"|^\s*virtual .*= 0;"
-)
-PYTHON_LEFT_OUT = re.compile(r"^\s*(?:import |from |def |class |@|global |nonlocal )")
+DEFINE = re.compile(r"\s*#\s*define\b")
+CPP_LEFT_OUT = re.compile(r"^\s*static_assert\b|^\s*virtual .*= 0;")
+PYTHON_LEFT_OUT = re.compile(r"^\s*(?:import |from |global |nonlocal )")
+PYTHON_HEADING = re.compile(r"^\s*(?:async )?(?:def|class) ")
+
+
+def is_python(text: str, name: str) -> bool:
+    """Whether a file is Python, by its ending, or without one by its first line; else it is read as C++."""
+    ending = PurePath(name.removesuffix(TEMPLATE)).suffix
+    return ending == ".py" or not ending and PYTHON_PROGRAM.match(text) is not None
+
+
+def is_source(path: Path) -> bool:
+    """Whether a file is C++ or Python: by its ending, that of what is made of a template, or by its first line."""
+    ending = PurePath(path.name.removesuffix(TEMPLATE)).suffix
+    if ending or not path.is_file():
+        return ending in ENDINGS and path.is_file()
+    with path.open(encoding="utf-8", errors="replace") as file:
+        return PYTHON_PROGRAM.match(file.readline(200)) is not None
 
 
 def masked_cpp(text: str) -> str:
-    """C++ with comments, texts and preprocessor lines turned into blanks; every place keeps its number."""
+    """C++ with comments, texts and preprocessor lines but those of macros turned into blanks; every place keeps its
+    number."""
     blank = CPP_SKIPPED.sub(lambda found: re.sub(r"[^\n]", " ", found.group()), text)
     lines, continued = [], False
     for line in blank.split("\n"):
-        directive = continued or line.lstrip().startswith("#")
+        directive = continued or line.lstrip().startswith("#") and DEFINE.match(line) is None
         lines.append(" " * len(line) if directive else line)
         continued = directive and line.rstrip().endswith("\\")
     return "\n".join(lines)
@@ -89,8 +123,11 @@ def masked_python(text: str) -> str:
 
 def another_number(word: str) -> str:
     """A number beside a number: a whole one and one more; another one doubled, 0.0 becomes 1.0."""
+    word = word.replace("'", "")  # between the digits of C++
     if word.isdigit():
         return str(int(word) + 1)
+    if word[:2].lower() == "0x":
+        return f"0x{int(word, 16) + 1:0{len(word) - 2}X}"
     return "1.0" if float(word) == 0.0 else repr(2.0 * float(word))
 
 
@@ -103,6 +140,8 @@ def _in_line(line: str, python: bool) -> Iterator[tuple[int, int, str, str]]:
         for kind, words in SWAPPED_WORDS.items():
             if word in words:
                 yield found.start(), found.end(), words[word], kind
+    for found in SIGN.finditer(line):
+        yield found.start(), found.end(), "", "sign"
     for found in NUMBER.finditer(line):
         yield found.start(1), found.end(1), another_number(found.group(1)), "constant"
     for found in NEGATION.finditer(line):
@@ -110,7 +149,7 @@ def _in_line(line: str, python: bool) -> Iterator[tuple[int, int, str, str]]:
             yield found.start(), found.end(), "", "condition"
     for found in TWO_ARGUMENTS.finditer(line):
         first, second = found.groups()
-        if first != second:
+        if first != second and not (python and PYTHON_HEADING.match(line)):
             yield found.start(), found.end(), f"({second}, {first})", "swapped arguments"
     left = (PYTHON_EXIT if python else CPP_EXIT).match(line)
     if left is None or any(line.count(pair[0]) != line.count(pair[1]) for pair in (("(", ")"), ("[", "]"), ("{", "}"))):
@@ -122,14 +161,14 @@ def _in_line(line: str, python: bool) -> Iterator[tuple[int, int, str, str]]:
 
 def code_lines(text: str, name: str) -> list[int]:
     """Numbers of the lines that hold code, from 1."""
-    python = name.endswith(".py")
+    python = is_python(text, name)
     masked = (masked_python if python else masked_cpp)(text)
     return [number for number, line in enumerate(masked.split("\n"), 1) if re.search(r"\w", line)]
 
 
 def changes(text: str, name: str) -> list[Change]:
     """Every change of a file, by line; `name` tells the language."""
-    python = name.endswith(".py")
+    python = is_python(text, name)
     masked = (masked_python if python else masked_cpp)(text)
     left_out = PYTHON_LEFT_OUT if python else CPP_LEFT_OUT
     result = []

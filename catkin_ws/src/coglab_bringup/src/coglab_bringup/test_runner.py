@@ -29,6 +29,7 @@ from pathlib import Path
 from coglab_bringup import process_tree
 from coglab_bringup.arguments import left_out, package_folders, test_options
 from coglab_bringup.run_directory import free_port, record_times, run_environment
+from coglab_bringup.sources import wall_sources
 from coglab_bringup.usage import Refused
 
 AT_A_TIME = 2
@@ -216,6 +217,8 @@ def main(arguments: list[str]) -> int:
     programs = find_programs(top, results, python, options.packages)
     if left_out(top):
         print(f"not tested, because this build uses those installed on this machine: {', '.join(left_out(top))}")
+    whole = not options.packages and not options.long
+    before = wall_sources(top) if whole else ""
     start = time.monotonic()
 
     def run_one(program: Program) -> None:
@@ -226,8 +229,8 @@ def main(arguments: list[str]) -> int:
             with ThreadPoolExecutor(max_workers=group[0].beside) as pool:
                 list(pool.map(run_one, group))
     print(f"all tests: {time.monotonic() - start:.0f} s; JUnit files and logs: {os.path.relpath(results)}")
-    if not options.packages and not options.long:
-        record_times(top, "test", time.monotonic() - start, programs=wall_times(programs))
+    if whole:
+        record_times(top, "test", time.monotonic() - start, before, programs=wall_times(programs))
     return report(programs, results)
 
 
