@@ -362,12 +362,11 @@ def test_grip_force_and_hand_of_the_person(cell):
     cell.cell.faults.dead.add("contact")
     assert cell.contact.grip() is None and cell.contact.force() is None
     cell.cell.let_go()
-    away = cell.cell.objects["human_hand"].position - HAND_AT_WORK
-    cell.sleep(0.98)
-    assert np.linalg.norm(away) == pytest.approx(0.3) and away[0] > 0.0
-    assert cell.cell.objects["human_hand"].position[0] > HAND_AT_WORK[0]
-    cell.sleep(0.03)
-    assert cell.cell.objects["human_hand"].position == pytest.approx(HAND_AT_WORK)
+    for after, away in ((0.1, 0.1), (0.19, 0.29), (0.02, 0.3), (0.67, 0.3), (0.12, 0.2), (0.21, 0.0)):
+        cell.sleep(after)
+        assert cell.cell.joints
+        place = cell.cell.objects["human_hand"].position
+        assert place == pytest.approx(HAND_AT_WORK + [away, 0.0, 0.0], abs=0.025), "1 m/s, for a second"
 
 
 def test_what_is_seen_believed_and_recognised_in_the_cell(cell):

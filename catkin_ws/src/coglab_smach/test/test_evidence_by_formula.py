@@ -216,11 +216,11 @@ def test_a_share_has_to_be_gone_for_50_ms_and_a_fresh_estimate_begins_anew():
     assert not load.feed(0.04, None, False, False), "nothing tells"
     assert not any(load.feed(0.05 + 0.01 * k, 4.9, False, False) for k in range(5))
     assert load.feed(0.101, 4.9, False, False)
-    load.feed(0.2, 3.0, True, True)
-    assert load.share == pytest.approx((9.81 - 4.9) / 9.81), "as it was until there is something to count from"
+    load.feed(0.2, None, False, True)
+    assert load.share is None, "nothing is known of the gap"
     for k in range(25):
         load.feed(0.21 + 0.005 * k, 3.0, True, False)
-    assert load.share == pytest.approx(0.0)
+    assert load.share == pytest.approx((9.81 - 3.0) / 9.81), "what somebody carried before it is theirs"
 
 
 # --- all together -----------------------------------------------------------------------------------------------------

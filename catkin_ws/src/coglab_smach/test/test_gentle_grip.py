@@ -1,5 +1,7 @@
 """Beside a person's hand the fingers close with the lowest force; firmly once it has let go."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from coglab_objects.database import objects_folder, read_object
@@ -42,6 +44,14 @@ def receive(trial):
 
     trial.run(script)
     return asked
+
+
+def track(monkeypatch, distance):
+    """The person's hand is so far (m, of the state that asks) from the palm."""
+    one = lambda state: SimpleNamespace(from_palm=lambda: distance(state), is_one=True)  # noqa: E731
+    for module in (hand_states, weight):
+        monkeypatch.setattr(module, "hand_from_palm", distance)
+        monkeypatch.setattr(module, "HandTrack", one)
 
 
 def test_it_closes_firmly_when_the_person_has_let_go():
@@ -102,8 +112,7 @@ def test_it_closes_firmly_only_where_the_persons_hand_was_seen_to_stay_away(monk
             return 0.1 + way(since[-1] - since[0])
         return 0.1 + (0.06 if state.label == "take_weight" and trial.ctx.contact.event() is not None else 0.0)
 
-    for module in (hand_states, weight):
-        monkeypatch.setattr(module, "hand_from_palm", distance)
+    track(monkeypatch, distance)
     asked = receive(trial)
     assert asked[-1] == trial.ctx.config.get("hand.tighten.medium")
     reasons = {t.from_state: t.reason for t in trial.ctx.journal.transitions if "tighten" in t.from_state}
@@ -113,7 +122,7 @@ def test_it_closes_firmly_only_where_the_persons_hand_was_seen_to_stay_away(monk
 
 def test_at_home_it_stays_held_gently_beside_a_persons_hand(monkeypatch):
     trial = Trial()
-    monkeypatch.setattr(hand_states, "hand_from_palm", lambda state: 0.1)
+    track(monkeypatch, lambda state: 0.1 if state.label != "take_weight" else 0.2)
     asked = receive(trial)
     assert set(asked) == {"low", LOWEST} and "tightened" not in trial.result().marks
     assert trial.ctx.holding == "mug" and trial.ctx.firm == trial.ctx.config.get("hand.tighten.medium")

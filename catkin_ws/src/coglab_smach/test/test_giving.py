@@ -247,6 +247,47 @@ def test_a_load_counted_from_where_the_arm_stands_is_all_sure():
     assert load.sure == pytest.approx(load.share) == pytest.approx(0.3) and load.needed == pytest.approx(0.6)
 
 
+HERE, THERE = np.zeros(7), np.array([0.0, 0.25, 0.0, -0.1, 0.0, 0.0, 0.0])
+
+
+def test_an_arm_that_brings_the_object_elsewhere_is_not_sure_of_its_load_until_it_has_asked_again():
+    light = LeavingLoad(0.12, 0.5, 100.0)
+    weight = 0.12 * 9.81
+    for k in range(40):
+        light.feed(0.005 * k, weight, True, False, posture=HERE)
+    assert light.sure == pytest.approx(0.0) and light.needed == 0.5
+    for k in range(20):  # on the way the model errs by 0.45 N, which nobody has taken
+        assert not light.feed(0.2 + 0.005 * k, weight - 0.45, False, False, posture=THERE)
+    assert light.share > 0.3 and light.sure == 0.0 and light.needed > 0.6
+    light.feed(0.3, weight - 0.45, False, False, posture=0.4 * THERE)
+    assert 0.0 < light.sure < 0.2, "half as far away it may err by half as much"
+    for k in range(40):
+        light.feed(0.4 + 0.005 * k, weight - 0.35, True, False, posture=THERE)
+    assert light.share == pytest.approx(0.0) and light.needed == 0.5, "it is counted from there now"
+    assert any(light.feed(0.6 + 0.005 * k, 0.0, True, False, posture=THERE) for k in range(20))
+
+
+def test_what_a_person_has_taken_before_a_gap_is_still_theirs_after_it():
+    load = settled()
+    load.feed(0.3, 0.55 * WEIGHT, True, False)
+    assert not load.feed(0.4, None, True, True) and load.share is None, "nothing is known of a grip's load"
+    said = [load.feed(0.45 + 0.005 * k, 0.3 * WEIGHT, True, False) for k in range(20)]
+    assert any(said) and load.share == pytest.approx(0.7)
+
+
+def test_a_clock_that_is_set_asks_anew_and_keeps_the_time_limit():
+    load = settled()
+    load.feed(0.3, 0.0, True, False)
+    load.clock_was_set(-60.0)
+    said = [load.feed(-59.7 + 0.005 * k, 0.0, True, False) for k in range(20)]
+    assert load.until == pytest.approx(40.0) and sum(said) == 1 and said.index(True) in (10, 11)
+
+
+def test_what_weighs_next_to_nothing_is_never_told_as_taken_by_torques_alone():
+    feather = LeavingLoad(0.04, 0.5, 100.0, 0.04 * 9.81)
+    assert not any(feather.feed(0.005 * k, 0.0, True, False, posture=HERE) for k in range(100))
+
+
 class Carried:
     """A hand at one posture with an object that is seen so far (m, up) from its palm at 30 Hz."""
 

@@ -209,6 +209,19 @@ def test_a_hand_presses_with_the_weight_or_2_newton_for_three_tenths_of_a_second
     assert not given.state._is_pressed(0.0, 0.4) and not given.state._is_pressed(-pressed / weight, 0.5)
 
 
+def test_the_arm_sinks_when_the_motion_before_has_ended(monkeypatch):
+    given, over = Given(monkeypatch), []
+    ended = []
+    given.state.ctx.arm.cancel_motion = lambda why: ended.append(why) or Polled(lambda: bool(over), lambda: None)
+    given.state._moving = Polled(lambda: False, lambda: None)
+    for now in range(3):
+        given.state._sink_with_them(float(now))
+    assert len(ended) == 1 and given.state._sinks == 0
+    over.append(1)
+    given.state._sink_with_them(3.0)
+    assert given.state._sinks == 1 and given.state._moving is None
+
+
 def test_the_arm_sinks_three_times_with_a_hand_that_presses(monkeypatch):
     given = Given(monkeypatch)
     for now in range(6):

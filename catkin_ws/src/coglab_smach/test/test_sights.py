@@ -10,6 +10,7 @@ from coglab_smach.ports.pending import PortError
 from coglab_smach.states import reach_watch
 from coglab_smach.states.base import TimeLimit
 from coglab_smach.states.reach import WaitStop
+from coglab_smach.states.where import SWAPPED
 
 WITHDRAWN = (int(ReasonCode.GOAL_WITHDRAWN), "the person does not offer or ask any more")
 LOW, HIGH = [-1.0, -1.0, -1.0], [2.0, 1.0, 2.0]
@@ -80,7 +81,7 @@ def test_a_hand_that_was_hidden_while_it_went_back_is_believed_after_a_moment(mo
     hand.see(0.4, 0.0, 0.4, frames=10)
     with pytest.raises(TimeLimit, match="went back"):
         hand.see(0.7, 0.0, 0.4, frames=12)
-    assert hand.t < 10 * FRAME + reach_watch.SWAPPED + 3 * FRAME
+    assert hand.t < 10 * FRAME + SWAPPED + 3 * FRAME
 
 
 @pytest.mark.parametrize("code, told", [(ReasonCode.NOT_PERCEIVED, True), (ReasonCode.OBJECT_NOT_SEEN, False)])

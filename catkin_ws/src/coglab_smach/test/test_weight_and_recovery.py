@@ -9,7 +9,7 @@ from coglab_py.pose import Pose
 from coglab_smach.clocks.virtual_clock import using
 from coglab_smach.machines import recovery
 from coglab_smach.machines.recovery import SecureHand, WhatIsHeld
-from coglab_smach.ports.interfaces import ContactEvent, HandState
+from coglab_smach.ports.interfaces import ContactEvent, HandState, Verdict
 from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states import arm, weight
 from coglab_smach.states.arm import HomeRobot
@@ -37,6 +37,10 @@ class Lifted:
         )
         state._way.halt = lambda why: self.rises.append(why)
         state._rises, state._on, state._told, state._seen_away = 0, None, False, False
+        state._hand = self.hand = SimpleNamespace(from_palm=lambda: self.away, is_one=True)
+        self.ctx.arm.motion_allowed = lambda: Verdict(True)
+        state._held = self.held = SimpleNamespace(check=lambda: None, stays=lambda since: self.kept, moved=False)
+        self.kept, self.held.there = True, lambda: True
         self.event = ContactEvent(True, "x", 1.0) if carried else None
         self.ctx.contact.event = lambda: self.event
         monkeypatch.setattr(weight, "palm_at", lambda ctx: np.array([0.0, 0.0, self.z]))
@@ -109,7 +113,8 @@ def test_the_whole_rise_is_3_cm_and_no_shorter_one_than_5_mm_is_begun(monkeypatc
 def test_a_person_has_let_go_who_is_farther_or_half_a_metre_away(monkeypatch, away, farther, gone):
     lifted = Lifted(monkeypatch)
     lifted.away = away
-    assert bool(lifted.state._has_let_go(farther)) == gone and lifted.state._seen_away == gone
+    lifted.state._farther = farther
+    assert bool(lifted.state._has_let_go()) == gone and lifted.state._seen_away == gone
 
 
 def test_a_rise_goes_on_by_a_centimetre_half_a_second_after_the_weight_has_come(monkeypatch):
@@ -119,7 +124,8 @@ def test_a_rise_goes_on_by_a_centimetre_half_a_second_after_the_weight_has_come(
     with using(lifted.trial.clock) as clock:
         for after, rises in ((0.0, 0), (0.49, 0), (0.02, 1), (0.6, 1), (0.1, 2)):
             clock.sleep(after)
-            assert not lifted.state._has_let_go(0.5)
+            lifted.state._farther = 0.5
+            assert not lifted.state._has_let_go()
             assert lifted.rises == ["the weight has come", *[(pytest.approx(0.01), 0.055)] * rises], after
     assert said == [Say.I_HAVE_IT]
 
@@ -127,11 +133,11 @@ def test_a_rise_goes_on_by_a_centimetre_half_a_second_after_the_weight_has_come(
 def test_without_a_sight_the_weight_and_the_whole_rise_are_enough(monkeypatch):
     lifted = Lifted(monkeypatch)
     lifted.away = None
-    assert not lifted.state._has_let_go(None) and len(lifted.rises) == 1
+    assert not lifted.state._has_let_go() and len(lifted.rises) == 1
     lifted.event, lifted.busy = ContactEvent(True, "x", 1.0), True
-    assert not lifted.state._has_let_go(None)
+    assert not lifted.state._has_let_go()
     lifted.busy = False
-    assert lifted.state._has_let_go(None)
+    assert lifted.state._has_let_go()
 
 
 @pytest.mark.parametrize("loaded", [False, True])

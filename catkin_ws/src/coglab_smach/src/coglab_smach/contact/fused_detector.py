@@ -222,7 +222,9 @@ class FusedDetector:
             if self._until is not None:
                 self._until += stamp - self._last_stamp
             if self._leaving is not None:
-                self._leaving.until += stamp - self._last_stamp
+                self._leaving.clock_was_set(stamp - self._last_stamp)
+            if self._lift is not None:
+                self._lift.since = None
             self._evidence.clear()
         self._last_stamp = stamp
 
@@ -235,7 +237,8 @@ class FusedDetector:
             return None
         if residual is None:
             return None
-        lift.begun = stamp if lift.begun is None or residual.fresh or stamp < lift.begun else lift.begun
+        if lift.begun is None or residual.fresh or stamp < lift.begun:
+            lift.begun, lift.sum, lift.count, lift.since = stamp, np.zeros(7), 0, None
         if lift.count == 0 or stamp - lift.begun < SETTLING:
             lift.sum, lift.count = lift.sum + residual.torque, lift.count + 1
             return None
@@ -259,9 +262,10 @@ class FusedDetector:
             return None
         felt = None if self._held is None else self._held.share_gone(stamp, leaving.weight)
         weight, fresh = None, False
+        posture: Joints = () if residual is None else residual.position
         if residual is not None and (self.moving.slow() or residual.fresh):
             weight, fresh = self.moving.weight(residual.torque, residual.position), residual.fresh
-        if leaving.feed(stamp, weight, self.moving.still(), fresh, felt):
+        if leaving.feed(stamp, weight, self.moving.still(), fresh, felt, posture):
             gone, needed = (share * leaving.weight for share in (leaving.share or 0.0, leaving.needed))
             message = f"{gone:.1f} N of the load are gone (needed {needed:.1f} N)"
             sure = probability(leaving.margin)

@@ -9,23 +9,29 @@ from __future__ import annotations
 
 import math
 
-from coglab_smach.contact.grip_and_load import Felt, together
+import numpy as np
+
+from coglab_smach.contact.grip_and_load import Felt, Joints, together
 
 GRAVITY = 9.81
 SETTLING = 0.10
 """s after arming over which the weight is averaged"""
 CONFIRMED = 0.05
 """s for which the load has to be gone"""
-SAME = 0.5
-"""N by which the weight that was carried before the motion may seem to differ from that after it, for the posture's
-sake: the model is that good"""
+SAME, FAR = 0.5, 0.2
+"""N by which the weight that is told in one posture may seem to differ from that in another, and by how much (rad) a
+joint has turned there, at most, where it may: the model is that good"""
+PART = 1.0 / 3.0
+"""of the weight that may seem to have gone or come by that, at most: who takes more has begun to take it"""
 
 
 class LeavingLoad:
     """The share that is gone, and the moment from which it has been enough for long enough.
 
     It is counted from what was carried before the last motion, and once the arm stands, from what hangs on the palm
-    then: unless that is more than SAME different, because somebody has been lifting or pulling already.
+    then: unless that is more different than another posture explains, because somebody has been lifting or pulling
+    already. An arm that turns its joints by half of FAR meanwhile, and stands, asks itself that again. What weighs less
+    than SAME the torques alone do not tell from nothing: such an object is given with touch.
     """
 
     def __init__(self, mass: float, needed: float, until: float, carried: float | None = None) -> None:
@@ -40,10 +46,14 @@ class LeavingLoad:
         self.told = False
         self._from = carried
         """N, that the share is counted from"""
+        self._posture: Joints = ()
+        """rad, of the newest sample"""
+        self._counted: Joints | None = None
+        """the posture in which that weight hung on the palm; None: another one"""
+        self._looked: Joints | None = None
+        """the posture in which it was last asked what hangs there"""
         self._doubt = SAME
         """N of what is gone that the posture alone may explain"""
-        self._settled = self._here = False
-        """it is final, and of the posture that the arm has"""
         self._sum, self._count = 0.0, 0
         self._begun = 0.0
         self._since: float | None = None
@@ -66,15 +76,23 @@ class LeavingLoad:
             return None
         return math.copysign(max(0.0, abs(self.share) - self._doubt / self.weight), self.share)
 
-    def feed(self, stamp: float, weight: float | None, still: bool, fresh: bool, felt: Felt | None = None) -> bool:
+    def feed(
+        self,
+        stamp: float,
+        weight: float | None,
+        still: bool,
+        fresh: bool,
+        felt: Felt | None = None,
+        posture: Joints = (),
+    ) -> bool:
         """One sample: s, and N on the palm, None while the arm moves too fast to tell; ``still``: the arm stands;
-        ``fresh``: the samples before it do not count; ``felt``: the share by touch, None where that does not tell.
-        Whether enough is gone now, said once. Where nothing tells, the share stays as it was, and what seemed gone has
-        to be so anew."""
+        ``fresh``: nothing is known of the time before; ``felt``: the share by touch, None where that does not tell;
+        ``posture``: rad, of all joints. Whether enough is gone now, said once. Where nothing tells, the share stays as
+        it was, but for a fresh one, and what seemed gone has to be so anew."""
+        self._posture = posture
         if fresh:
-            self._from, self._settled, self._count, self._since = None, False, 0, None
-            self._here = False
-        if weight is not None and not self._settled and (still or self._from is None):
+            self.share, self._count, self._since = None, 0, None
+        if weight is not None and (still or self._from is None) and self._turned(self._looked) > 0.5 * FAR:
             self._settle(stamp, weight)
         torques = None if weight is None or self._from is None else (self._from - weight) / self.weight
         share = together(torques, SAME / self.weight, felt)
@@ -82,12 +100,23 @@ class LeavingLoad:
             self._since = None
             return False
         self.share = share
-        self._doubt = 0.0 if self._here or felt is not None else SAME
+        self._doubt = 0.0 if felt is not None else SAME * min(1.0, self._turned(self._counted) / FAR)
         self._since = None if share < self.needed else stamp if self._since is None else self._since
         if self.told or self._since is None or stamp - self._since < CONFIRMED:
             return False
         self.told = True
         return True
+
+    def clock_was_set(self, step: float) -> None:
+        """By so many s: the watch keeps the time that it had, and what seemed gone has to be so anew."""
+        self.until += step
+        self._since, self._count = None, 0
+
+    def _turned(self, since: Joints | None) -> float:
+        """rad by which the joint that has turned most has turned since; inf where it is not known since when."""
+        if since is None:
+            return math.inf
+        return float(np.max(np.abs(np.subtract(self._posture, since)), initial=0.0))
 
     def _settle(self, stamp: float, weight: float) -> None:
         """Average what hangs on the palm, and then decide what is counted from."""
@@ -96,6 +125,6 @@ class LeavingLoad:
         self._sum, self._count = self._sum + weight, self._count + 1
         if stamp - self._begun < SETTLING:
             return
-        now, self._settled = self._sum / self._count, True
-        if self._from is None or abs(now - self._from) < SAME:
-            self._from, self._here = now, True
+        now, self._looked, self._count = self._sum / self._count, self._posture, 0
+        if self._from is None or abs(now - self._from) < min(SAME, PART * self.weight):
+            self._from, self._counted = now, self._posture

@@ -71,6 +71,8 @@ class Context:
     """the fingers have taken the preshape of this reach's grasp"""
     closing: Pending | None = None
     """of the fingers, begun on the last of a reach's way"""
+    tightening: Pending | None = None
+    """of the fingers around what the person has let go of, firmly"""
     closing_on: str = ""
     """id of the object that they close on there"""
     closing_firm: int = 0

@@ -46,8 +46,9 @@ class EndMotion(CoglabState):
 
     def run(self, ud: Any) -> str:
         if self.ctx.stop.pressed():
-            if self.ctx.closing is not None:
-                self.ctx.closing.cancel()
+            for closing in (self.ctx.closing, self.ctx.tightening):
+                if closing is not None:
+                    closing.cancel()
             self.reason = f"STOP: {self.ctx.stop.reason}; the hand keeps what it holds; to go on {command('reset')}"
             return "stopped"
         self.ctx.contact.disarm()

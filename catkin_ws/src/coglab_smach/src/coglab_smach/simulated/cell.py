@@ -22,6 +22,8 @@ from coglab_smach.simulated.arm_model import ArmModel
 
 HAND_AT_WORK = np.array([0.86, 0.03, 0.43])
 """m, of the person's hand while something is handed over"""
+HAND_SPEED = 1.0
+"""m/s with which it goes away and comes back"""
 
 
 @dataclass
@@ -133,12 +135,16 @@ class SimulatedCell:
             "board": Pose(np.array([0.45, -0.55, 0.05])),
             "human_hand": Pose(HAND_AT_WORK),
         }
+        self.touched: tuple[str, Pose] | None = None
+        """as at_palm, what the hand has touched last, until it is opened: fingers that close have it again"""
         self.at_palm: tuple[str, Pose] | None = None
         """what is in the hand, and the palm relative to it"""
         self._lock = threading.RLock()
         self._under_way: list[_Call] = []
         self._back: float | None = None
         """when the person's hand comes back"""
+        self._goes: tuple[float, np.ndarray] | None = None
+        """s, when it was where it is, and m, to where it goes"""
 
     def note(self, what: str) -> None:
         """Remember a call with its time."""
@@ -161,7 +167,7 @@ class SimulatedCell:
 
     def let_go(self) -> None:
         """The person's hand leaves what it has given, and comes back later."""
-        self.objects["human_hand"] = Pose(HAND_AT_WORK + [0.3, 0.0, 0.0])
+        self._goes = self.clock.now(), HAND_AT_WORK + [0.3, 0.0, 0.0]
         self._back = self.clock.now() + self.partner.away
 
     def called(self, prefix: str = "") -> list[str]:
@@ -193,7 +199,19 @@ class SimulatedCell:
             self._under_way = [call for call in self._under_way if not call.over]
             self.arm.follow()
             if self._back is not None and now >= self._back:
-                self.objects["human_hand"], self._back = Pose(HAND_AT_WORK), None
+                self._goes, self._back = (now, np.array(HAND_AT_WORK)), None
+            self._move_hand(now)
+
+    def _move_hand(self, now: float) -> None:
+        """No hand is elsewhere from one moment to the next."""
+        if self._goes is None:
+            return
+        since, there = self._goes
+        here, step = np.asarray(self.objects["human_hand"].position), HAND_SPEED * (now - since)
+        way = there - here
+        left = float(np.linalg.norm(way))
+        self.objects["human_hand"] = Pose(there if left <= step else here + step / left * way)
+        self._goes = None if left <= step else (now, there)
 
     @property
     def joints(self) -> tuple[float, ...]:

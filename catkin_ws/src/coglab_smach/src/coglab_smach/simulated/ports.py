@@ -115,23 +115,30 @@ class SimulatedHand:
 
         return self._move(f"preshape {mode}", 0.8, positions, True)
 
+    def _closed(self) -> tuple[int, ...]:
+        """Around what was touched, which goes with them from then on, or past it."""
+        if self.cell.faults.empty_grasp:
+            return (200, 254, 254, 254, 254)
+        self.cell.at_palm = self.cell.at_palm or self.cell.touched
+        return (200, 150, 160, 155, 170)
+
     def close_on_object(self) -> Pending:
         def positions() -> tuple[int, ...]:
             if not self.cell.preshaped:
                 raise PortError("hand_preshape_close without a preshape", code=ReasonCode.HAND_REFUSED)
-            return (200, 254, 254, 254, 254) if self.cell.faults.empty_grasp else (200, 150, 160, 155, 170)
+            return self._closed()
 
         return self._move("close", 1.0, positions, True)
 
     def close(self, speed: int) -> Pending:
         def positions() -> tuple[int, ...]:
-            return (200, 254, 254, 254, 254) if self.cell.faults.empty_grasp else (200, 150, 160, 155, 170)
+            return self._closed()
 
         return self._at_speed("close", speed, positions)
 
     def open(self, speed: int) -> Pending:
         def positions() -> tuple[int, ...]:
-            self.cell.at_palm = None
+            self.cell.at_palm = self.cell.touched = None
             return (0, 0, 0, 0, 0)
 
         return self._at_speed("open", speed, positions)

@@ -228,6 +228,8 @@ class GiveLoad(CoglabState):
         """the way (m) from the object to where the person's hand takes it"""
         self._lowering: Pending | None = None
         self._moving: Pending | None = None
+        self._ending: Pending | None = None
+        """of what moves"""
         self._lower_at = self._look_at = 0.0
         self._brings = self._sinks = 0
         self._pressed_since: float | None = None
@@ -259,7 +261,7 @@ class GiveLoad(CoglabState):
             contact.grip,
         )
         self._firm = firm_speed(self.ctx, entry, ud.grasp_name)
-        self._lowering = self._moving = self._back_since = self._pressed_since = None
+        self._lowering = self._moving = self._ending = self._back_since = self._pressed_since = None
         self._brings, self._sinks, self._way = 0, 0, None
         self._offer = partial(way_to_hand, self, ud.object_id, ud.delivery)
         self._held = HeldObject(self.ctx, ud.object_id)
@@ -311,9 +313,13 @@ class GiveLoad(CoglabState):
 
     def _sink_with_them(self, now: float) -> None:
         """Rather than bring it anywhere."""
-        if self._moving is not None:
-            self._moving.cancel()
-            self._moving = None
+        if self._moving is not None and not self._moving.done():
+            # The next motion begins when this one has ended, or its end would be the next one's.
+            if self._ending is None:
+                self._ending = self.ctx.arm.cancel_motion("the object is pressed down")
+            if not self._ending.done():
+                return
+        self._moving = self._ending = None
         if self._sinks < SINKS and (self._lowering is None or self._lowering.done()):
             self._lower(now)
 

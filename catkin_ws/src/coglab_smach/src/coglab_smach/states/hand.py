@@ -13,7 +13,7 @@ from coglab_smach.context.context import Context
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
 from coglab_smach.states.motion import shift, shift_time
-from coglab_smach.states.where import AWAY, hand_from_palm, palm_axis
+from coglab_smach.states.where import AWAY, HandTrack, hand_from_palm, palm_axis
 from coglab_smach.states.yielding import GivesWay
 
 LOOSE = 40
@@ -205,6 +205,8 @@ class HandTighten(CoglabState):
             self.reason = "the person's hand was not seen to go: at home"
             return "succeeded"
         closing, end = self.ctx.hand.close(speed), float(self.ctx.config.get("hand.settle_after_close", 0.3))
+        # It goes on while the arm does: a STOP ends it then as well (EndMotion).
+        self.ctx.tightening = closing
         end += self.ctx.clock.now()
         while not closing.done() and self.ctx.clock.now() < end:
             self.pause(0.02)
@@ -218,9 +220,9 @@ class HandTighten(CoglabState):
     def _is_free(self, before: float | None) -> bool:
         """Whether the person's hand, which was ``before`` m from the palm, is seen away from the object."""
         free, since = AWAY if before is None else before + FREE, None
-        end = self.ctx.clock.now() + GOES
-        while self.ctx.clock.now() < end:
-            if (hand_from_palm(self) or 0.0) <= free:
+        end, hand = self.ctx.clock.now() + GOES, HandTrack(self)
+        while self.ctx.clock.now() < end and hand.is_one:
+            if (hand.from_palm() or 0.0) <= free:
                 since = None
             else:
                 since = self.ctx.clock.now() if since is None else since

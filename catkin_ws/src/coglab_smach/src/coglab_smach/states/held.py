@@ -42,6 +42,8 @@ class HeldObject:
         self._height = self._before = self._taken = 0.0
         self.sunk = 0.0
         """m by which the object is lower against the palm than it was at first, in both of its last two sights"""
+        self.moved = False
+        """whether the newest sight has shown it farther from the palm, or nearer, than at first"""
         self._away_since: float | None = None
         self._kept_at = -math.inf
         """s, when the newest sight was taken that has shown it as far from the palm as the first one"""
@@ -60,7 +62,8 @@ class HeldObject:
             self._carried = distance if distance < NEAR else None
             self._height = self._before = self._above
         self.sunk, self._before = self._height - max(self._above, self._before), self._above
-        if self._carried is not None and abs(distance - self._carried) < KEPT:
+        self.moved = self._carried is not None and abs(distance - self._carried) >= KEPT
+        if self._carried is not None and not self.moved:
             self._kept_at = self._taken
         # What is far away at the first sight already was lost before anybody asked.
         if distance < (NEAR if self._carried is None else self._carried) + FARTHER:

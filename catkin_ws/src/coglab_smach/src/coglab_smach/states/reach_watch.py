@@ -13,15 +13,12 @@ from coglab_smach.context.awaited import ARM
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState, TimeLimit
 from coglab_smach.states.region import HandoverRegion, anything_believed, ends_outside
-from coglab_smach.states.where import hand_name, palm_at, sight_of, sight_or_refusal
+from coglab_smach.states.where import Sight, hand_name, jumped_from, palm_at, sight_of, sight_or_refusal
 
 PERIOD = 0.03
 """s between two looks"""
 DOUBT_TIME = 0.2
 """s for which nothing is believed before a reach ends; a belief that a gap in what is seen broke off is back by then"""
-JUMP, SWAPPED = 0.12, 0.2
-"""m between two sights that no person's hand goes, nor anything that falls: the tracker has taken something else for
-it, unless it stays there for so long (s)"""
 BACKWARD = 0.6
 """share of the way that a hand may go back from which on the arm waits to see whether it does"""
 SLIPPED = 0.06
@@ -76,17 +73,6 @@ class PersonsGrip:
         if self._at_first is None or not found or float(np.median(found)) > self._at_first + SLIPPED:
             return int(ReasonCode.GOAL_FELL)
         return int(ReasonCode.GOAL_WITHDRAWN)
-
-
-Sight = tuple[float, np.ndarray]
-"""s, m"""
-
-
-def jumped_from(last: Sight | None, now: float, place: np.ndarray) -> tuple[bool, Sight | None]:
-    """Whether a sight is of something else than the last one that was no jump, and the one that is now."""
-    if last is not None and float(np.linalg.norm(place - last[1])) > JUMP and now - last[0] < SWAPPED:
-        return True, last
-    return False, (now, place)
 
 
 class ReachWatch:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
 from coglab_msgs.msg import ReasonCode, Say
 
 from coglab_smach.context.awaited import PERSON
@@ -12,8 +13,9 @@ from coglab_smach.context.context import Context
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.base import CoglabState, TimeLimit
 from coglab_smach.states.hand import AT_HAND
+from coglab_smach.states.held import HeldObject
 from coglab_smach.states.motion import rise
-from coglab_smach.states.where import AWAY, hand_from_palm, palm_at
+from coglab_smach.states.where import AWAY, HandTrack, hand_from_palm, palm_at, person_at, seen_at
 from coglab_smach.states.yielding import LEAST_WAY, GivesWay
 
 MOST_RISES = 8
@@ -21,6 +23,10 @@ MOST_RISES = 8
 
 FOLLOWS = 0.25
 """s from one closing of the fingers to the next at least"""
+UNSEEN = 0.4
+"""s from the going of the person's hand on after which an object that nobody sees has stayed in the fingers"""
+WITH_HAND = 0.2
+"""m between the person's hand and an object that they have taken along, at most"""
 SINKING, SETTLES = 3.0, 0.3
 """s in which it shows whether the person holds what the arm sinks with, and before that, for the torques at rest"""
 
@@ -34,8 +40,11 @@ class TakeWeight(CoglabState):
     weight is counted from the closing of the fingers, when a person often still presses the object up or down: where
     they hold on for ``hand.lift_pause`` s all the same, the arm rises on by ``hand.lift_step`` m, again and again.
     ``hand_distance``: m, of the person's hand from the palm before the fingers closed; None where no tracker saw it,
-    and then the weight has to have come by the end of the whole rise, or the hand to be seen AWAY. Where the
-    tracker has lost the hand since, the person may have gone: nothing is opened, the arm stays and says so.
+    and then it counts from where the hand is seen at the object first. While it is seen nowhere the weight has to have
+    come by the end of the whole rise, or the hand to be seen AWAY. A hand that goes has let go where the object stays:
+    who pulls it out of gentle fingers has taken it back. Where the tracker takes another hand for it, its going tells
+    nothing before the weight has come, and nothing is held firmly. Where the tracker has lost the hand, the person may
+    have gone: nothing is opened, the arm stays and says so.
 
     The palm goes along with who pulls (GivesWay), and the rise goes on afterwards. The fingers close again and again
     (``give.close_speed``, the lowest force).
@@ -51,6 +60,12 @@ class TakeWeight(CoglabState):
         """m, height to which the palm rises"""
         self._rises = 0
         self._told = self._seen_away = False
+        self._hand: HandTrack
+        self._held: HeldObject
+        self._farther: float | None = None
+        """m from the palm from which on the person's hand has left the object"""
+        self._gone: float | None = None
+        """s, since when it has"""
         self._on: float | None = None
         """s, when it rises on with the weight; None: the weight has not come"""
         self._closing: Pending | None = None
@@ -60,9 +75,14 @@ class TakeWeight(CoglabState):
 
     def run(self, ud: Any) -> str:
         limit, contact = float(self.ctx.config.get("hand.load_timeout", 5.0)), self.ctx.contact
-        end, farther = self.ctx.clock.now() + limit, None
-        if ud.hand_distance is not None:
-            farther = ud.hand_distance + float(self.ctx.config.get("hand.let_go", 0.04))
+        end = self.ctx.clock.now() + limit
+        self._hand, self._held, self._farther, self._gone = (
+            HandTrack(self),
+            HeldObject(self.ctx, ud.object_id),
+            None,
+            None,
+        )
+        self._count_from(ud.hand_distance)
         settings = {
             "mass": float(ud.object_entry.get("mass", 0.0)),
             "load_share": float(self.ctx.config.get("hand.load_share", 0.5)),
@@ -74,11 +94,13 @@ class TakeWeight(CoglabState):
         try:
             self.pause(float(self.ctx.config.get("hand.lift_after", 0.1)))
             self._rise()
-            self.wait_for(
-                lambda: self._has_let_go(farther), "the person's letting go", end - self.ctx.clock.now(), code=PERSON
-            )
+            self.wait_for(self._has_let_go, "the person's letting go", end - self.ctx.clock.now(), code=PERSON)
         except TimeLimit as error:
+            if error.code != ReasonCode.TIME_LIMIT:
+                raise
             raise self._not_released(ud.object_id, limit, error, settings) from None
+        except PortError as error:
+            raise self._taken_back(ud.object_id, error) from None
         finally:
             contact.disarm()
             self._way.stop()
@@ -91,23 +113,53 @@ class TakeWeight(CoglabState):
         self.ctx.journal.mark("released")
         return "succeeded"
 
-    def _has_let_go(self, farther: float | None) -> bool:
+    def _count_from(self, distance: float | None) -> None:
+        """The person's hand was seen so far from the palm (m) at the object."""
+        if distance is not None:
+            self._farther = distance + float(self.ctx.config.get("hand.let_go", 0.04))
+
+    def _has_let_go(self) -> bool:
         """Whether the person has; meanwhile rise until the weight has come, or give way."""
         carried = self.ctx.contact.event() is not None
+        if not (blocked := self.ctx.arm.motion_allowed()).ok:
+            raise TimeLimit("the arm does not follow any more", (blocked.why,), blocked.code)
+        self._held.check()
         self._follow()
         if carried:
             self.ctx.journal.mark("loaded")
             self._tell()
         # Before and after the look, which waits for a sight.
         self._way.follow()
-        if (hand_from_palm(self) or 0.0) > (AWAY if farther is None else farther):
-            self._seen_away = True
+        away = self._hand.from_palm()
+        if self._farther is None and away is not None and away <= AT_HAND:
+            self._count_from(away)
+        if self._has_gone(away, carried):
+            self._seen_away = self._hand.is_one
             return True
         self._way.follow()
-        if farther is None or not carried:
+        if self._farther is None or not carried:
             if not carried and self._way.idle():
                 self._rise()
             return carried and self._way.idle()
+        self._rise_on()
+        return False
+
+    def _has_gone(self, away: float | None, carried: bool) -> bool:
+        """Whether the person's hand, ``away`` m from the palm, has left the object, and the object has stayed."""
+        if away is None or away <= (AWAY if self._farther is None else self._farther):
+            self._gone = None
+            return False
+        if not (self._hand.is_one or carried):
+            return False
+        now = self.ctx.clock.now()
+        self._gone = now if self._gone is None else self._gone
+        if self._held.stays(self._gone):
+            return True
+        hidden = now - self._gone >= UNSEEN and not self._held.moved
+        return self._held.there() and (away > AT_HAND or hidden)
+
+    def _rise_on(self) -> None:
+        """With the weight, in steps, while the person holds on."""
         now = self.ctx.clock.now()
         if self._on is None:
             self._way.halt("the weight has come")
@@ -116,7 +168,6 @@ class TakeWeight(CoglabState):
             step, speed = (float(self.ctx.config.get(f"hand.{name}", 0.01)) for name in ("lift_step", "lift_speed"))
             self._on = now + step / speed + float(self.ctx.config.get("hand.lift_pause", 0.5))
             self._rise(step)
-        return False
 
     def _follow(self) -> None:
         """Again and again, with the lowest force: what the person holds less and less shifts between the fingers, and
@@ -144,6 +195,15 @@ class TakeWeight(CoglabState):
         if left > LEAST_WAY:
             self._rises += 1
             self._way.begin(rise(self.ctx, left, speed))
+
+    def _taken_back(self, object_id: str, error: PortError) -> PortError:
+        """The failure, where the object has left the hand with the person's."""
+        if error.code == ReasonCode.OBJECT_NOT_SEEN and not self.ctx.holding:
+            hand, thing = person_at(self), seen_at(self, object_id)
+            if hand is not None and thing is not None and float(np.linalg.norm(hand - thing)) < WITH_HAND:
+                causes = (error.sentence, *error.causes)
+                return PortError(f"the person took '{object_id}' back", causes, ReasonCode.GOAL_WITHDRAWN)
+        return error
 
     def _not_released(self, object_id: str, limit: float, error: TimeLimit, settings: dict[str, Any]) -> PortError:
         """The failure, and who has the object then: the person who holds it, else the robot, which opens nothing."""

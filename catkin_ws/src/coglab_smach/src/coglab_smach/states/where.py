@@ -22,6 +22,9 @@ AWAY = 0.5
 """m from the palm: a person's hand that is seen there holds nothing that is in the robot's"""
 OLDEST = 0.5
 """s, an older sight does not tell where the hand is"""
+JUMP, SWAPPED = 0.12, 0.2
+"""m between two sights that no person's hand goes, nor anything that falls: the tracker has taken something else for
+it, unless it stays there for so long (s)"""
 
 
 def palm_at(ctx: Context) -> np.ndarray | None:
@@ -96,6 +99,40 @@ def hand_from_palm(state: CoglabState) -> float | None:
     """m from the person's hand to the palm."""
     person, palm = person_at(state), palm_at(state.ctx)
     return None if person is None or palm is None else float(np.linalg.norm(person - palm))
+
+
+Sight = tuple[float, np.ndarray]
+"""s, m"""
+
+
+def jumped_from(last: Sight | None, now: float, place: np.ndarray) -> tuple[bool, Sight | None]:
+    """Whether a sight is of something else than the last one that was no jump, and the one that is now."""
+    if last is not None and float(np.linalg.norm(place - last[1])) > JUMP and now - last[0] < SWAPPED:
+        return True, last
+    return False, (now, place)
+
+
+class HandTrack:
+    """The person's hand from sight to sight, for states in which it matters that it is one and the same."""
+
+    def __init__(self, state: CoglabState) -> None:
+        self._state = state
+        self.is_one = True
+        """False once the tracker has taken another hand for it, and stayed with that"""
+        self._last: Sight | None = None
+        self._jumps = False
+
+    def from_palm(self) -> float | None:
+        """m to the palm; None where that is not known, or where a sight may be another hand's."""
+        person, palm = person_at(self._state), palm_at(self._state.ctx)
+        if person is None or palm is None:
+            return None
+        before = self._last
+        jumped, self._last = jumped_from(before, self._state.ctx.clock.now(), person)
+        if self._jumps and not jumped and before is not None and float(np.linalg.norm(person - before[1])) > JUMP:
+            self.is_one = False
+        self._jumps = jumped
+        return None if jumped else float(np.linalg.norm(person - palm))
 
 
 def way_to_hand(state: CoglabState, object_id: str, delivery: Mapping[str, Any]) -> np.ndarray | None:
