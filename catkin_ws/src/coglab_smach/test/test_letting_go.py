@@ -63,10 +63,16 @@ def test_who_pulls_it_out_has_not_let_go(monkeypatch):
         assert lifted.state._has_let_go(), "it has slipped a little, and stays where the hand is not"
 
 
-def test_another_hand_that_goes_tells_nothing_before_the_weight_has_come(monkeypatch):
+def test_another_hand_that_goes_tells_it_late_unless_the_weight_has_come(monkeypatch):
     lifted = Lifted(monkeypatch)
     lifted.state._farther, lifted.away, lifted.hand.is_one = 0.14, 0.6, False
-    assert not lifted.state._has_let_go()
+    with using(lifted.trial.clock) as clock:
+        assert not lifted.state._has_let_go()
+        clock.sleep(0.95)
+        assert not lifted.state._has_let_go()
+        clock.sleep(0.1)
+        assert lifted.state._has_let_go() and not lifted.state._seen_away
+    lifted.state._gone = None
     lifted.event = ContactEvent(True, "x", 1.0)
     assert lifted.state._has_let_go() and not lifted.state._seen_away, "and nothing is held firmly for it"
 
@@ -102,11 +108,16 @@ def test_a_hand_that_is_elsewhere_from_one_sight_to_the_next_is_another_one(monk
         place[0] -= 0.3
         clock.sleep(0.05)
         assert hand.from_palm() == pytest.approx(0.1) and hand.is_one
-        for _ in range(6):  # who goes is followed
-            place[0] += 0.1
-            clock.sleep(0.05)
+        for way, after in (
+            (0.1, 0.05),
+            (0.3, 0.1),
+            (0.2, 0.05),
+            (0.4, 0.15),
+        ):  # who goes, hidden now and then, is followed
+            place[0] += way
+            clock.sleep(after)
             assert hand.from_palm() is not None and hand.is_one
-        place[0] -= 0.3
+        place[0] -= 0.9
         for _ in range(6):
             clock.sleep(0.05)
             hand.from_palm()

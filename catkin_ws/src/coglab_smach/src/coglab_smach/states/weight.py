@@ -25,6 +25,8 @@ FOLLOWS = 0.25
 """s from one closing of the fingers to the next at least"""
 UNSEEN = 0.4
 """s from the going of the person's hand on after which an object that nobody sees has stayed in the fingers"""
+ANOTHER = 1.0
+"""s from then on after which a hand that may be another's, but stays away, is taken for the person's"""
 WITH_HAND = 0.2
 """m between the person's hand and an object that they have taken along, at most"""
 SINKING, SETTLES = 3.0, 0.3
@@ -42,8 +44,8 @@ class TakeWeight(CoglabState):
     ``hand_distance``: m, of the person's hand from the palm before the fingers closed; None where no tracker saw it,
     and then it counts from where the hand is seen at the object first. While it is seen nowhere the weight has to have
     come by the end of the whole rise, or the hand to be seen AWAY. A hand that goes has let go where the object stays:
-    who pulls it out of gentle fingers has taken it back. Where the tracker takes another hand for it, its going tells
-    nothing before the weight has come, and nothing is held firmly. Where the tracker has lost the hand, the person may
+    who pulls it out of gentle fingers has taken it back. Where the tracker may have taken another hand for it, its
+    going tells that late, unless the weight has come, and nothing is held firmly. Where the tracker has lost the hand, the person may
     have gone: nothing is opened, the arm stays and says so.
 
     The palm goes along with who pulls (GivesWay), and the rise goes on afterwards. The fingers close again and again
@@ -149,10 +151,10 @@ class TakeWeight(CoglabState):
         if away is None or away <= (AWAY if self._farther is None else self._farther):
             self._gone = None
             return False
-        if not (self._hand.is_one or carried):
-            return False
         now = self.ctx.clock.now()
         self._gone = now if self._gone is None else self._gone
+        if not (self._hand.is_one or carried) and now - self._gone < ANOTHER:
+            return False
         if self._held.stays(self._gone):
             return True
         hidden = now - self._gone >= UNSEEN and not self._held.moved

@@ -101,6 +101,9 @@ def hand_from_palm(state: CoglabState) -> float | None:
     return None if person is None or palm is None else float(np.linalg.norm(person - palm))
 
 
+FASTEST = 2.0
+"""m/s of a hand that has let go and goes"""
+
 Sight = tuple[float, np.ndarray]
 """s, m"""
 
@@ -127,12 +130,16 @@ class HandTrack:
         person, palm = person_at(self._state), palm_at(self._state.ctx)
         if person is None or palm is None:
             return None
-        before = self._last
-        jumped, self._last = jumped_from(before, self._state.ctx.clock.now(), person)
-        if self._jumps and not jumped and before is not None and float(np.linalg.norm(person - before[1])) > JUMP:
+        now, before = self._state.ctx.clock.now(), self._last
+        if before is not None and now - before[0] < SWAPPED:
+            # A hand that goes may be hidden for a few sights, and is somewhere else after them.
+            if float(np.linalg.norm(person - before[1])) > JUMP + FASTEST * (now - before[0]):
+                self._jumps = True
+                return None
+        elif self._jumps:
             self.is_one = False
-        self._jumps = jumped
-        return None if jumped else float(np.linalg.norm(person - palm))
+        self._last, self._jumps = (now, person), False
+        return float(np.linalg.norm(person - palm))
 
 
 def way_to_hand(state: CoglabState, object_id: str, delivery: Mapping[str, Any]) -> np.ndarray | None:
