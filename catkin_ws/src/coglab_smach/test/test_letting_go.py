@@ -108,12 +108,8 @@ def test_a_hand_that_is_elsewhere_from_one_sight_to_the_next_is_another_one(monk
         place[0] -= 0.3
         clock.sleep(0.05)
         assert hand.from_palm() == pytest.approx(0.1) and hand.is_one
-        for way, after in (
-            (0.1, 0.05),
-            (0.3, 0.1),
-            (0.2, 0.05),
-            (0.4, 0.15),
-        ):  # who goes, hidden now and then, is followed
+        # Who goes, and is hidden now and then, is followed.
+        for way, after in ((0.1, 0.05), (0.3, 0.1), (0.2, 0.05), (0.4, 0.15)):
             place[0] += way
             clock.sleep(after)
             assert hand.from_palm() is not None and hand.is_one

@@ -45,8 +45,8 @@ class TakeWeight(CoglabState):
     and then it counts from where the hand is seen at the object first. While it is seen nowhere the weight has to have
     come by the end of the whole rise, or the hand to be seen AWAY. A hand that goes has let go where the object stays:
     who pulls it out of gentle fingers has taken it back. Where the tracker may have taken another hand for it, its
-    going tells that late, unless the weight has come, and nothing is held firmly. Where the tracker has lost the hand, the person may
-    have gone: nothing is opened, the arm stays and says so.
+    going tells that late, unless the weight has come, and nothing is held firmly. Where the tracker has lost the hand,
+    the person may have gone: nothing is opened, the arm stays and says so.
 
     The palm goes along with who pulls (GivesWay), and the rise goes on afterwards. The fingers close again and again
     (``give.close_speed``, the lowest force).
