@@ -277,7 +277,7 @@ def tightened(monkeypatch, away, at_home=False, before=0.1, **ud):
     """(closed at which speed, s that it took) with the person's hand ``away(s)`` m from the palm."""
     seen, closed, clock = (it := Seen()), [], it.trial.clock
     monkeypatch.setattr(hands, "hand_from_palm", lambda state: away(clock.now()))
-    monkeypatch.setattr(hands, "HandTrack", lambda s: SimpleNamespace(from_palm=lambda: away(clock.now()), is_one=True))
+    monkeypatch.setattr(hands, "from_palm", lambda state, track: away(clock.now()))
     seen.ctx.holding, seen.ctx.firm = "mug", 140
     seen.ctx.hand.close = lambda speed: closed.append(speed) or Polled(lambda: False, lambda: None)
     fields = {} if at_home else {"hand_distance": before, "hand_seen_away": True, **ud}

@@ -115,6 +115,7 @@ def test_with_fingers_that_do_not_open_again_the_arm_stays_with_what_the_person_
     trial = Trial()
     monkeypatch.setattr(reach, "off_grasp", lambda state, goal: 0.02)
     monkeypatch.setattr(recovery, "hand_from_palm", lambda state: 0.1)
+    monkeypatch.setattr(recovery, "person_holds", lambda state, settings: True)
     trial.cell.partner.touch_after = None
 
     def script(t):
@@ -214,3 +215,49 @@ def test_stop_ends_a_closing_on_the_way(monkeypatch):
         assert cancelled
 
     trial.run(script)
+
+
+def test_fingers_that_have_begun_to_close_open_before_a_reach_that_paused_goes_on(monkeypatch):
+    """With a fist it would push away what the person offers again."""
+    trial, waits = Trial(), []
+    monkeypatch.setattr(reach, "off_grasp", lambda state, goal: 0.02)
+    trial.cell.partner.touch_after = 3.0
+    doubted = reach.ReachWatch.doubted
+    monkeypatch.setattr(
+        reach.ReachWatch,
+        "doubted",
+        lambda watch: not waits and trial.ctx.closing is not None and not waits.append(1) or doubted(watch),
+    )
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.start(RECEIVE)
+        while t.ctx.requests.hub() == "":
+            t.clock.sleep(0.05)
+
+    trial.run(script)
+    calls = trial.cell.called()
+    again = [i for i, name in enumerate(calls) if name == "execute_dmp"][1]
+    between = calls[calls.index("close") : again]
+    assert "paused" in trial.result().marks and any(name.startswith("preshape") for name in between), calls
+
+
+def test_a_stop_ends_fingers_that_have_begun_to_close_at_once(monkeypatch):
+    trial, cancelled = Trial(), []
+    monkeypatch.setattr(reach, "off_grasp", lambda state, goal: 0.02)
+    trial.cell.partner.touch_after = None
+    trial.ctx.hand.close_on_object = lambda: Polled(
+        lambda: False, lambda: None, lambda: cancelled.append(trial.clock.now())
+    )
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.start(RECEIVE)
+        t.until(lambda: t.ctx.journal.marked("closing_on_the_way"))
+        pressed.append(t.clock.now())
+        t.ctx.stop.press("a finger is in it")
+        t.wait_hub("stopped")
+
+    pressed: list[float] = []
+    trial.run(script)
+    assert cancelled and cancelled[0] - pressed[0] < 0.05

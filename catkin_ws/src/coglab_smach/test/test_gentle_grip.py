@@ -1,7 +1,5 @@
 """Beside a person's hand the fingers close with the lowest force; firmly once it has let go."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from coglab_objects.database import objects_folder, read_object
@@ -48,10 +46,9 @@ def receive(trial):
 
 def track(monkeypatch, distance):
     """The person's hand is so far (m, of the state that asks) from the palm."""
-    one = lambda state: SimpleNamespace(from_palm=lambda: distance(state), is_one=True)  # noqa: E731
     for module in (hand_states, weight):
-        monkeypatch.setattr(module, "hand_from_palm", distance)
-        monkeypatch.setattr(module, "HandTrack", one)
+        monkeypatch.setattr(module, "from_palm", lambda state, track: distance(state))
+    monkeypatch.setattr(hand_states, "hand_from_palm", distance)
 
 
 def test_it_closes_firmly_when_the_person_has_let_go():

@@ -1,14 +1,13 @@
 """When a person has let go, and when not: who it was, and what became of the object."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_smach.clocks.virtual_clock import using
-from coglab_smach.ports.interfaces import ContactEvent, Verdict
+from coglab_smach.context.hand_track import HandTrack
+from coglab_smach.ports.interfaces import Verdict
 from coglab_smach.ports.pending import Polled, PortError
-from coglab_smach.states import weight, where
+from coglab_smach.states import weight
 from coglab_smach.states.base import TimeLimit
 from conftest import Trial
 from test_weight_and_recovery import RECEIVE, Lifted
@@ -63,20 +62,6 @@ def test_who_pulls_it_out_has_not_let_go(monkeypatch):
         assert lifted.state._has_let_go(), "it has slipped a little, and stays where the hand is not"
 
 
-def test_another_hand_that_goes_tells_it_late_unless_the_weight_has_come(monkeypatch):
-    lifted = Lifted(monkeypatch)
-    lifted.state._farther, lifted.away, lifted.hand.is_one = 0.14, 0.6, False
-    with using(lifted.trial.clock) as clock:
-        assert not lifted.state._has_let_go()
-        clock.sleep(0.95)
-        assert not lifted.state._has_let_go()
-        clock.sleep(0.1)
-        assert lifted.state._has_let_go() and not lifted.state._seen_away
-    lifted.state._gone = None
-    lifted.event = ContactEvent(True, "x", 1.0)
-    assert lifted.state._has_let_go() and not lifted.state._seen_away, "and nothing is held firmly for it"
-
-
 def test_an_arm_that_may_not_move_says_so_and_not_that_the_person_holds_on(monkeypatch):
     lifted = Lifted(monkeypatch)
     lifted.ctx.arm.motion_allowed = lambda: Verdict(False, "the operator holds it", int(ReasonCode.HELD))
@@ -95,26 +80,60 @@ def test_what_has_gone_with_the_persons_hand_was_taken_back(monkeypatch):
     assert lifted.state._taken_back("mug", lost) is lost
 
 
-def test_a_hand_that_is_elsewhere_from_one_sight_to_the_next_is_another_one(monkeypatch):
-    trial, place = Trial(), [0.9, 0.0, 0.4]
-    monkeypatch.setattr(where, "person_at", lambda s: np.array(place))
-    monkeypatch.setattr(where, "palm_at", lambda ctx: np.array([0.8, 0.0, 0.4]))
-    hand = where.HandTrack(SimpleNamespace(ctx=trial.ctx))
-    with using(trial.clock) as clock:
-        assert hand.from_palm() == pytest.approx(0.1)
-        place[0] += 0.3
-        clock.sleep(0.05)
-        assert hand.from_palm() is None and hand.is_one, "for a moment"
-        place[0] -= 0.3
-        clock.sleep(0.05)
-        assert hand.from_palm() == pytest.approx(0.1) and hand.is_one
-        # Who goes, and is hidden now and then, is followed.
-        for way, after in ((0.1, 0.05), (0.3, 0.1), (0.2, 0.05), (0.4, 0.15)):
-            place[0] += way
-            clock.sleep(after)
-            assert hand.from_palm() is not None and hand.is_one
-        place[0] -= 0.9
-        for _ in range(6):
-            clock.sleep(0.05)
-            hand.from_palm()
-        assert not hand.is_one and hand.from_palm() is not None
+def seen(track, way, frames=5, frame=0.033, since=0.0, jitter=0.0):
+    """Sights of a hand on its way (m by s); s of the last one."""
+    for k in range(1, frames + 1):
+        track.follow(since + k * frame, np.array([way(k * frame) + jitter * (-1) ** k, 0.0, 0.4]))
+    return since + frames * frame
+
+
+@pytest.mark.parametrize("shift", [0.25, 0.4, 0.6, -0.3])
+def test_a_hand_that_is_elsewhere_from_one_sight_to_the_next_is_another_one(shift):
+    track = HandTrack()
+    t = seen(track, lambda s: 0.9, jitter=0.01)
+    assert track.is_one
+    t = seen(track, lambda s: 0.9 + shift, frames=60, since=t, jitter=0.01)
+    assert not track.is_one, "however long it is taken for it"
+    track.follow(t - 5.0, np.array([0.9 + shift, 0.0, 0.4]))
+    assert not track.is_one, "an old sight told again says nothing"
+    t = seen(track, lambda s: 0.9, since=t)
+    assert track.is_one, "back where it was"
+
+
+@pytest.mark.parametrize("hidden", [0.033, 0.1, 0.3])
+@pytest.mark.parametrize("speed", [0.3, 1.0, 1.9])
+def test_a_hand_that_goes_and_is_hidden_now_and_then_is_one(speed, hidden):
+    track, t = HandTrack(), 0.0
+    for _ in range(5):
+        t = seen(track, lambda s, t=t: speed * (t + s), since=t)
+        t += hidden
+    assert track.is_one
+
+
+def test_a_person_whose_hand_the_tracker_took_another_for_keeps_what_they_hold(monkeypatch):
+    lifted = Lifted(monkeypatch, carried=True)
+    lifted.state._farther, lifted.away = 0.14, None
+    with using(lifted.trial.clock) as clock:
+        for _ in range(100):
+            assert not lifted.state._has_let_go()
+            clock.sleep(0.02)
+
+
+def test_what_the_brain_waits_for_is_told_all_the_while_and_no_look_beside_it():
+    trial, told = Trial(), []
+    trial.cell.partner.let_go_after = None
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.start(RECEIVE)
+        while "arm lift" not in t.cell.called():
+            t.clock.sleep(0.01)
+        t.clock.sleep(0.3)
+        for _ in range(100):
+            told.append(t.ctx.journal.wait().what)
+            t.clock.sleep(0.011)
+        t.ctx.stop.press("enough")
+        t.wait_hub("stopped")
+
+    trial.run(script)
+    assert set(told) == {"the person's letting go"}, set(told)

@@ -18,7 +18,7 @@ class Early:
 
     def __init__(self, monkeypatch, grip=None, frame="object_mug_ahead"):
         self.t, self.place, self.ahead = 0.0, (0.4, 0.0, 0.4), Ahead(1.0, 0.0, "mug", "object_mug_ahead", (0.4, 0, 0.4))
-        monkeypatch.setattr(reach_watch, "sight_or_refusal", lambda state, target: self.seen())
+        monkeypatch.setattr(reach_watch, "sight_or_refusal", lambda state, target, limit: self.seen())
         monkeypatch.setattr(reach_watch, "palm_at", lambda ctx: np.zeros(3))
         ctx = SimpleNamespace(
             clock=SimpleNamespace(now=lambda: self.t),
@@ -148,7 +148,9 @@ def test_a_hand_that_takes_back_what_it_hides_has_withdrawn_it(monkeypatch, clos
     early = Early(monkeypatch, grip=grip, frame="object_mug")
     early.reach.state.ctx.closing = object() if closing else None
     monkeypatch.setattr(
-        reach_watch, "sight_of", lambda state, name: Located(name, "world", (hand[0], 0.0, 0.4), IDENTITY, 0.0)
+        reach_watch,
+        "sight_of",
+        lambda state, name, limit=0.3: Located(name, "world", (hand[0], 0.0, 0.4), IDENTITY, 0.0),
     )
     early.ahead = Ahead()
     for _ in range(3):
@@ -209,7 +211,7 @@ class Grip:
         assert duration == 0.03
         self.t += duration
 
-    def sight(self, state, name):
+    def sight(self, state, name, limit=0.3):
         self.asked += 1
         if self.above is None:
             return None

@@ -23,7 +23,7 @@ class Watched:
     def __init__(self, monkeypatch):
         self.t, self.place, self.refusal = 0.0, np.array([0.4, 0.0, 0.4]), None
         self.ahead = Ahead(0.0, 1.0, "", "human_hand_ahead", (0.4, 0.0, 0.4))
-        monkeypatch.setattr(reach_watch, "sight_or_refusal", lambda state, target: self.refusal or self.sight())
+        monkeypatch.setattr(reach_watch, "sight_or_refusal", lambda state, target, limit: self.refusal or self.sight())
         monkeypatch.setattr(reach_watch, "palm_at", lambda ctx: np.zeros(3))
         ctx = SimpleNamespace(
             clock=SimpleNamespace(now=lambda: self.t),
@@ -124,7 +124,9 @@ def test_a_reach_that_will_end_outside_the_region_is_not_followed(monkeypatch, b
 def test_a_hand_that_is_hidden_while_it_goes_down_has_not_lost_what_it_holds(monkeypatch):
     """Its last sight is older than that of the object, which seems to have left it, until it is seen again."""
     t, sights = [0.0], {"human_hand": ((0.8, 0.0, 0.45), 0.05), "mug": ((0.75, 0.0, 0.42), 0.05)}
-    monkeypatch.setattr(reach_watch, "sight_of", lambda state, name: Located(name, "world", *sight(*sights[name])))
+    monkeypatch.setattr(
+        reach_watch, "sight_of", lambda state, name, limit=0.3: Located(name, "world", *sight(*sights[name]))
+    )
 
     def sight(place, age):
         return place, (0.0, 0.0, 0.0, 1.0), age

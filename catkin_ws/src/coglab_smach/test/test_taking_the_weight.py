@@ -285,7 +285,7 @@ def test_the_person_is_told_that_the_robot_has_it_once_its_weight_is_carried():
 
 
 def test_a_person_who_does_not_let_go_is_never_told_that_the_robot_has_it(monkeypatch):
-    monkeypatch.setattr(weight, "hand_from_palm", lambda state: 0.1)
+    monkeypatch.setattr(weight, "from_palm", lambda state, track: 0.1)
     told, trial = [], Trial()
     trial.ctx.say = lambda code, text: told.append(code)
 

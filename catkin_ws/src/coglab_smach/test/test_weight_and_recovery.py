@@ -7,6 +7,7 @@ import pytest
 from coglab_msgs.msg import ReasonCode, Say
 from coglab_py.pose import Pose
 from coglab_smach.clocks.virtual_clock import using
+from coglab_smach.context.hand_track import HandTrack
 from coglab_smach.machines import recovery
 from coglab_smach.machines.recovery import SecureHand, WhatIsHeld
 from coglab_smach.ports.interfaces import ContactEvent, HandState, Verdict
@@ -37,14 +38,14 @@ class Lifted:
         )
         state._way.halt = lambda why: self.rises.append(why)
         state._rises, state._on, state._told, state._seen_away = 0, None, False, False
-        state._hand = self.hand = SimpleNamespace(from_palm=lambda: self.away, is_one=True)
+        monkeypatch.setattr(weight, "from_palm", lambda state, track: self.away)
+        state._hand = self.hand = HandTrack()
         self.ctx.arm.motion_allowed = lambda: Verdict(True)
         state._held = self.held = SimpleNamespace(check=lambda: None, stays=lambda since: self.kept, moved=False)
         self.kept, self.held.there = True, lambda: True
         self.event = ContactEvent(True, "x", 1.0) if carried else None
         self.ctx.contact.event = lambda: self.event
         monkeypatch.setattr(weight, "palm_at", lambda ctx: np.array([0.0, 0.0, self.z]))
-        monkeypatch.setattr(weight, "hand_from_palm", lambda s: self.away)
         monkeypatch.setattr(weight, "rise", lambda ctx, by, speed: self.rises.append((by, speed)) or Ready())
 
 
@@ -151,7 +152,7 @@ def test_a_person_gets_the_object_back_whose_hand_is_within_30_cm_and_carries_it
     lifted = Lifted(monkeypatch)
     lifted.away, lifted.ctx.holding = away, "mug"
     lifted.event = ContactEvent(True, "x", 1.0) if loaded else None
-    monkeypatch.setattr(lifted.state, "_holds", lambda settings: holds)
+    monkeypatch.setattr(weight, "person_holds", lambda state, settings: holds)
     error = lifted.state._not_released("mug", 5.0, TimeLimit("the wait"), {"mass": 0.31})
     assert error.sentence == "the person did not let go of 'mug' within 5 s" and error.code == ReasonCode.NOT_RELEASED
     assert (lifted.ctx.holding == "mug") == keeps and len(error.causes) == 1 + keeps
@@ -163,8 +164,8 @@ def test_who_holds_it_carries_it_when_the_arm_sinks(monkeypatch, comes):
     lifted.state._deadline = 1e9
     lifted.ctx.contact.event = lambda: ContactEvent(False, "x", 1.0) if comes and lifted.rises else None
     with using(lifted.trial.clock):
-        assert lifted.state._holds({"mass": 0.31, "load_share": 0.5}) == comes
-    assert lifted.trial.cell.called()[-1] == "arm release" and lifted.rises == [(-0.03, 0.03)]
+        assert weight.person_holds(lifted.state, {"mass": 0.31, "load_share": 0.5}) == comes
+    assert lifted.trial.cell.called()[-2:] == ["arm release", "disarm"] and lifted.rises == [(-0.03, 0.03)]
 
 
 # --- recovery ---------------------------------------------------------------------------------------------------------
@@ -276,16 +277,22 @@ def test_fingers_that_begin_to_close_on_the_way_have_a_second_to_stand(monkeypat
     assert trial.ctx.firm == (0 if opens else 140) and trial.ctx.closing is None
 
 
-@pytest.mark.parametrize(("away", "held"), [(0.29, ""), (0.31, "mug"), (0.51, "mug"), (None, "mug")])
-def test_who_is_at_what_fingers_have_caught_gets_it_back(monkeypatch, away, held):
-    trial = Trial()
+@pytest.mark.parametrize(
+    ("away", "holds", "held"),
+    [(0.29, True, ""), (0.29, False, "mug"), (0.31, True, "mug"), (0.51, True, "mug"), (None, True, "mug")],
+)
+def test_who_holds_what_fingers_have_caught_gets_it_back(monkeypatch, away, holds, held):
+    trial, asked = Trial(), []
     state = SecureHand(trial.ctx)
+    monkeypatch.setattr(recovery, "person_holds", lambda s, settings: asked.append(settings) or holds)
+    trial.ctx.closing_mass = 0.31
     monkeypatch.setattr(recovery, "hand_from_palm", lambda s: away)
     trial.ctx.closing, trial.ctx.closing_on, trial.ctx.shared = Ready(), "mug", True
     trial.ctx.hand.state = lambda: HandState(True, holding=True)
     with using(trial.clock):
         state._closed_on_the_way()
     assert trial.ctx.holding == held and trial.ctx.shared == (away is None or away < 0.5)
+    assert asked == ([{"mass": 0.31, "load_share": 0.5}] if away == 0.29 else [])
 
 
 @pytest.mark.parametrize(("empty_after", "hub", "took"), [(1.5, "empty", 1.6), (2.5, "holding", 2.0)])

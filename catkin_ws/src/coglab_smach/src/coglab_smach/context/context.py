@@ -10,6 +10,7 @@ from coglab_py.pose import Pose
 
 from coglab_smach.clocks.clock import Clock
 from coglab_smach.context.config import Config
+from coglab_smach.context.hand_track import HandTrack
 from coglab_smach.context.holding import HoldingMemory
 from coglab_smach.context.journal import Journal
 from coglab_smach.context.requests import Requests
@@ -77,6 +78,10 @@ class Context:
     """id of the object that they close on there"""
     closing_firm: int = 0
     """``firm`` of that object"""
+    closing_mass: float = 0.0
+    """kg, of it"""
+    giver: HandTrack | None = None
+    """the hand of the person from whom an object is taken, as long as they may hold it"""
     _holding: str = ""
 
     def __post_init__(self) -> None:

@@ -18,7 +18,8 @@ from coglab_smach.states.base import CoglabMachine, CoglabState
 from coglab_smach.states.hand import AT_HAND, HandTighten
 from coglab_smach.states.held import LOOK, HeldObject
 from coglab_smach.states.motion import end_motion
-from coglab_smach.states.where import AWAY, hand_from_palm
+from coglab_smach.states.weight import person_holds
+from coglab_smach.states.where import AWAY, from_palm, hand_from_palm
 
 CAUGHT = 1.0
 """s in which fingers that have begun to close on the way stand"""
@@ -125,16 +126,19 @@ class SecureHand(CoglabState):
         return "succeeded"
 
     def _closed_on_the_way(self) -> None:
-        """What the fingers have caught on the last of a reach that has failed then. A person whose hand is at it gets
-        it back; one who let go at the first touch has left it to the robot."""
+        """What the fingers have caught on the last of a reach that has failed then. A person who holds it gets it back;
+        one who let go at the first touch has left it to the robot, wherever their hand is."""
         closing, self.ctx.closing = self.ctx.closing, None
         if closing is None or not self.ctx.shared or self.ctx.holding:
             return
         end = self.ctx.clock.now() + CAUGHT
         while not (closing.done() and self.ctx.hand.state().holding) and self.ctx.clock.now() < end:
             self.pause(0.02)
+        if not self.ctx.hand.state().holding:
+            return
         away = hand_from_palm(self)
-        if self.ctx.hand.state().holding and (away is None or away > AT_HAND):
+        settings = {"mass": self.ctx.closing_mass, "load_share": float(self.ctx.config.get("hand.load_share", 0.5))}
+        if away is None or away > AT_HAND or not person_holds(self, settings):
             self.ctx.holding, self.ctx.shared = self.ctx.closing_on, away is None or away <= AWAY
             self.ctx.firm = self.ctx.closing_firm
 
@@ -144,7 +148,7 @@ class SecureHand(CoglabState):
         self.allow(LETS_GO + 10.0)
         end = self.ctx.clock.now() + LETS_GO
         while self.ctx.clock.now() < end:
-            away = hand_from_palm(self)
+            away = hand_from_palm(self) if self.ctx.giver is None else from_palm(self, self.ctx.giver)
             if away is not None and away > AWAY:
                 self.ctx.shared = False
                 self._look_for_it()

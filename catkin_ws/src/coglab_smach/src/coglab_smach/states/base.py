@@ -78,6 +78,8 @@ class CoglabState(smach.State):
         self.targets: Mapping[str, str] = {}
         self.reason = ""
         self._deadline = 0.0
+        self._waits = False
+        """a wait is under way"""
 
     def run(self, ud: Any) -> str:
         """Do the work; returns an outcome. ``self.reason`` may hold a sentence for it."""
@@ -188,6 +190,8 @@ class CoglabState(smach.State):
         allowed = self.left() if limit is None else min(limit, self.left())
         left, before, told = allowed, self.ctx.clock.now(), -math.inf
         path = f"{self.path()}/{self.label}"
+        # What a condition waits for itself, such as a sight, belongs to the wait that is told.
+        within, self._waits = self._waits, True
         try:
             while True:
                 self.check()
@@ -200,11 +204,12 @@ class CoglabState(smach.State):
                 before = now
                 if left <= 0.0:
                     raise TimeLimit(f"{what} within {max(0.0, allowed):.1f} s expected, it did not happen")
-                if now + left > told + RETOLD:
+                if not within and now + left > told + RETOLD:
                     told = now + left
                     self.ctx.journal.waits(path, Wait(what, told, code, aside=not self.essential))
                 self.ctx.clock.sleep(POLL_PERIOD)
         finally:
+            self._waits = within
             if told > -math.inf:
                 self.ctx.journal.waits(path, None)
 

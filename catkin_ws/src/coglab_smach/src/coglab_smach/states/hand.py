@@ -10,10 +10,11 @@ from ih2_hand.grasps import CLOSING_MOTORS, LEVELS, levels_of
 
 from coglab_smach.context.awaited import ARM, HAND
 from coglab_smach.context.context import Context
+from coglab_smach.context.hand_track import HandTrack
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
 from coglab_smach.states.motion import shift, shift_time
-from coglab_smach.states.where import AWAY, HandTrack, hand_from_palm, palm_axis
+from coglab_smach.states.where import AWAY, from_palm, hand_from_palm, palm_axis
 from coglab_smach.states.yielding import GivesWay
 
 LOOSE = 40
@@ -126,7 +127,8 @@ class HandClose(CoglabState):
         closing = self.ctx.closing or self.ctx.hand.close_on_object()
         self.ctx.closing = None
         if self.from_person:
-            ud.hand_distance = self._before = hand_from_palm(self)
+            self.ctx.giver = HandTrack()
+            ud.hand_distance = self._before = from_palm(self, self.ctx.giver)
             self._give_way(closing)
         self.await_pending(closing, "closing of the hand", code=HAND)
         self.ctx.journal.mark("closed")
@@ -165,6 +167,8 @@ class HandClose(CoglabState):
 
         def closed() -> bool:
             way.follow()
+            if self.ctx.giver is not None:
+                from_palm(self, self.ctx.giver)
             return closing.done()
 
         try:
@@ -220,9 +224,9 @@ class HandTighten(CoglabState):
     def _is_free(self, before: float | None) -> bool:
         """Whether the person's hand, which was ``before`` m from the palm, is seen away from the object."""
         free, since = AWAY if before is None else before + FREE, None
-        end, hand = self.ctx.clock.now() + GOES, HandTrack(self)
-        while self.ctx.clock.now() < end and hand.is_one:
-            if (hand.from_palm() or 0.0) <= free:
+        end, hand = self.ctx.clock.now() + GOES, self.ctx.giver or HandTrack()
+        while self.ctx.clock.now() < end:
+            if (from_palm(self, hand) or 0.0) <= free:
                 since = None
             else:
                 since = self.ctx.clock.now() if since is None else since

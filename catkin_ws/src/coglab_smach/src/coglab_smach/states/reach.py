@@ -14,7 +14,7 @@ from coglab_smach.context.context import Context
 from coglab_smach.kinematics.motion_time import reach_time
 from coglab_smach.ports.interfaces import ContactEvent, DmpRequest
 from coglab_smach.ports.pending import PortError
-from coglab_smach.states.base import CoglabState, TimeLimit
+from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
 from coglab_smach.states.motion import shift, shift_time
 from coglab_smach.states.reach_watch import LEFT, LOWERED, OUTSIDE, PersonsGrip, ReachWatch, target_of
 from coglab_smach.states.where import off_grasp, palm_axis
@@ -109,16 +109,26 @@ class WaitStop(CoglabState):
         """s, when the hand was first at its place"""
         self._deeper = False
         """it has gone on from there"""
+        self._hand: dict[str, Any] = {}
+        """of the grasp, as the object's entry has it"""
 
     def run(self, ud: Any) -> str:
         self._left = self._deeper = False
-        self.ctx.closing = self._arrived = None
+        self.ctx.closing = self.ctx.giver = self._arrived = None
         target = target_of(ud.goal) if self.trigger == "contact" else ""
         self._grip = PersonsGrip(self, target) if target else None
         self._watched = ReachWatch(self, ud.goal, self._grip) if self.trigger and "watch" in ud.goal else None
         if self.trigger == "contact":
             self.ctx.closing_firm = int(ud.grasp["hand"].get("firm", 0))
-            return self._await_contact(ud)
+            self.ctx.closing_mass = float(ud.object_entry.get("mass", 0.0))
+            self._hand = ud.grasp["hand"]
+            try:
+                return self._await_contact(ud)
+            except Interrupted:
+                # STOP, or an action that is ended: what closes on a person's object stops at once.
+                if self.ctx.closing is not None:
+                    self.ctx.closing.cancel()
+                raise
         return self._await_end(ud)
 
     def _await_end(self, ud: Any) -> str:
@@ -151,17 +161,12 @@ class WaitStop(CoglabState):
 
     def _come_again(self, ud: Any) -> None:
         """Draw back against the palm's outward axis with the hand open, and begin the reach anew."""
-        arm, hand = self.ctx.arm, ud.grasp["hand"]
+        arm = self.ctx.arm
         self.allow(20.0)
         # What begins while the arm moves takes its speed along, and brakes less than an arm that is stopped.
         self.await_pending(arm.cancel_motion("something touches the hand"), "rest of the arm", 3.0, code=ARM)
         self.await_pending(arm.switch_controller("ptp"), "switching to 'ptp'", 3.0)
-        if self.ctx.closing is not None:
-            self.ctx.closing = None
-            self.await_pending(
-                self.ctx.hand.preshape(hand["mode"], hand["level"]), "the hand's opening", 5.0, code=HAND
-            )
-            self.ctx.shared = False
+        self._open_again()
         back = palm_axis(self.ctx)
         if back is not None:
             way = (self.ctx, -DRAWN_BACK * back, 0.1)
@@ -182,6 +187,16 @@ class WaitStop(CoglabState):
             self._begin_again(watch.goal_now())
         else:
             self._pause(watch, *watch.doubt())
+
+    def _open_again(self) -> None:
+        """Fingers that have begun to close: with them the arm would come as a fist."""
+        if self.ctx.closing is None:
+            return
+        self.ctx.closing.cancel()
+        self.ctx.closing = None
+        opening = self.ctx.hand.preshape(self._hand["mode"], self._hand["level"])
+        self.await_pending(opening, "the hand's opening", 5.0, code=HAND)
+        self.ctx.shared = False
 
     def _begin_again(self, goal: dict[str, Any]) -> None:
         """Start a reach anew. What lies where no hand may go by now has fallen, or was taken there."""
@@ -208,6 +223,7 @@ class WaitStop(CoglabState):
             if error.code != ReasonCode.TIME_LIMIT:
                 raise
             raise TimeLimit("the reach was given up", (why,), code) from None
+        self._open_again()
         watch.forgive()
         self._begin_again(watch.goal_now())
 

@@ -10,10 +10,11 @@ import numpy as np
 from coglab_msgs.msg import ReasonCode
 
 from coglab_smach.context.awaited import ARM
+from coglab_smach.context.hand_track import Sight
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState, TimeLimit
 from coglab_smach.states.region import HandoverRegion, anything_believed, ends_outside
-from coglab_smach.states.where import Sight, hand_name, jumped_from, palm_at, sight_of, sight_or_refusal
+from coglab_smach.states.where import GLANCE, hand_name, jumped_from, palm_at, sight_of, sight_or_refusal
 
 PERIOD = 0.03
 """s between two looks"""
@@ -175,7 +176,7 @@ class ReachWatch:
     def _look(self) -> np.ndarray | None:
         """m, where the target is seen. Of one that is merely hidden nothing is said: a hand that goes back hides it
         too."""
-        seen = sight_or_refusal(self.state, self.target)
+        seen = sight_or_refusal(self.state, self.target, GLANCE)
         self._untold = None
         if isinstance(seen, PortError):
             self._untold = seen if seen.code == ReasonCode.NOT_PERCEIVED else None
@@ -187,8 +188,10 @@ class ReachWatch:
 
     def _follow_hand(self, passed: float, hidden: bool) -> None:
         """A hand that takes an object back may hide it. One that leaves what the fingers close on has let go."""
-        seen = None if self._grip is None or self._from is None else sight_of(self.state, hand_name(self.state.ctx))
-        if seen is None or self._from is None:
+        if self._grip is None or self._from is None:
+            return
+        seen = sight_of(self.state, hand_name(self.state.ctx), GLANCE)
+        if seen is None:
             return
         place = np.array(seen.xyz)
         jumped, self._hand_last = jumped_from(self._hand_last, self.state.ctx.clock.now(), place)

@@ -10,12 +10,13 @@ from coglab_msgs.msg import ReasonCode, Say
 
 from coglab_smach.context.awaited import PERSON
 from coglab_smach.context.context import Context
+from coglab_smach.context.hand_track import HandTrack
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.base import CoglabState, TimeLimit
 from coglab_smach.states.hand import AT_HAND
 from coglab_smach.states.held import HeldObject
 from coglab_smach.states.motion import rise
-from coglab_smach.states.where import AWAY, HandTrack, hand_from_palm, palm_at, person_at, seen_at
+from coglab_smach.states.where import AWAY, from_palm, palm_at, person_at, seen_at
 from coglab_smach.states.yielding import LEAST_WAY, GivesWay
 
 MOST_RISES = 8
@@ -25,12 +26,31 @@ FOLLOWS = 0.25
 """s from one closing of the fingers to the next at least"""
 UNSEEN = 0.4
 """s from the going of the person's hand on after which an object that nobody sees has stayed in the fingers"""
-ANOTHER = 1.0
-"""s from then on after which a hand that may be another's, but stays away, is taken for the person's"""
 WITH_HAND = 0.2
 """m between the person's hand and an object that they have taken along, at most"""
 SINKING, SETTLES = 3.0, 0.3
 """s in which it shows whether the person holds what the arm sinks with, and before that, for the torques at rest"""
+
+
+def person_holds(state: CoglabState, settings: dict[str, Any]) -> bool:
+    """Whether the person does: their hand carries the object where the arm sinks with it, by as much as it rises at
+    most. A hand that merely is there takes no weight; who let go while the fingers closed gave none before.
+    ``settings``: mass (kg) and load_share of the object. Only with controller 'ptp', and an arm that stands."""
+    contact, config = state.ctx.contact, state.ctx.config
+    state.allow(SINKING + 8.0)
+    sinking: Pending | None = None
+    try:
+        state.await_pending(contact.arm("release", SINKING, settings), "arming of the contact detector", 2.0)
+        state.pause(SETTLES)
+        sinking = rise(state.ctx, -float(config.get("hand.lift", 0.03)), float(config.get("give.lower_speed", 0.03)))
+        state.wait_for(lambda: contact.event() is not None, "the person's holding of it", SINKING, code=PERSON)
+    except PortError:
+        return False
+    finally:
+        contact.disarm()
+        if sinking is not None:
+            sinking.cancel()
+    return True
 
 
 class TakeWeight(CoglabState):
@@ -44,9 +64,8 @@ class TakeWeight(CoglabState):
     ``hand_distance``: m, of the person's hand from the palm before the fingers closed; None where no tracker saw it,
     and then it counts from where the hand is seen at the object first. While it is seen nowhere the weight has to have
     come by the end of the whole rise, or the hand to be seen AWAY. A hand that goes has let go where the object stays:
-    who pulls it out of gentle fingers has taken it back. Where the tracker may have taken another hand for it, its
-    going tells that late, unless the weight has come, and nothing is held firmly. Where the tracker has lost the hand,
-    the person may have gone: nothing is opened, the arm stays and says so.
+    who pulls it out of gentle fingers has taken it back. Where the tracker has lost the hand, or taken
+    another one for it (HandTrack), the person may have gone: nothing is opened, the arm stays and says so.
 
     The palm goes along with who pulls (GivesWay), and the rise goes on afterwards. The fingers close again and again
     (``give.close_speed``, the lowest force).
@@ -78,12 +97,8 @@ class TakeWeight(CoglabState):
     def run(self, ud: Any) -> str:
         limit, contact = float(self.ctx.config.get("hand.load_timeout", 5.0)), self.ctx.contact
         end = self.ctx.clock.now() + limit
-        self._hand, self._held, self._farther, self._gone = (
-            HandTrack(self),
-            HeldObject(self.ctx, ud.object_id),
-            None,
-            None,
-        )
+        self._hand, self._held = self.ctx.giver or HandTrack(), HeldObject(self.ctx, ud.object_id)
+        self._farther = self._gone = None
         self._count_from(ud.hand_distance)
         settings = {
             "mass": float(ud.object_entry.get("mass", 0.0)),
@@ -132,11 +147,11 @@ class TakeWeight(CoglabState):
             self._tell()
         # Before and after the look, which waits for a sight.
         self._way.follow()
-        away = self._hand.from_palm()
+        away = from_palm(self, self._hand)
         if self._farther is None and away is not None and away <= AT_HAND:
             self._count_from(away)
-        if self._has_gone(away, carried):
-            self._seen_away = self._hand.is_one
+        if self._has_gone(away):
+            self._seen_away = True
             return True
         self._way.follow()
         if self._farther is None or not carried:
@@ -146,15 +161,13 @@ class TakeWeight(CoglabState):
         self._rise_on()
         return False
 
-    def _has_gone(self, away: float | None, carried: bool) -> bool:
+    def _has_gone(self, away: float | None) -> bool:
         """Whether the person's hand, ``away`` m from the palm, has left the object, and the object has stayed."""
         if away is None or away <= (AWAY if self._farther is None else self._farther):
             self._gone = None
             return False
         now = self.ctx.clock.now()
         self._gone = now if self._gone is None else self._gone
-        if not (self._hand.is_one or carried) and now - self._gone < ANOTHER:
-            return False
         if self._held.stays(self._gone):
             return True
         hidden = now - self._gone >= UNSEEN and not self._held.moved
@@ -210,9 +223,9 @@ class TakeWeight(CoglabState):
     def _not_released(self, object_id: str, limit: float, error: TimeLimit, settings: dict[str, Any]) -> PortError:
         """The failure, and who has the object then: the person who holds it, else the robot, which opens nothing."""
         causes: tuple[str, ...] = (error.sentence,)
-        loaded, away = self.ctx.contact.event() is not None, hand_from_palm(self)
+        loaded, away = self.ctx.contact.event() is not None, from_palm(self, self._hand)
         self._way.stop()
-        if away is not None and away <= AT_HAND and self._holds(settings):
+        if away is not None and away <= AT_HAND and person_holds(self, settings):
             self.ctx.holding = ""
         else:
             carried = "its weight is carried" if loaded else "its weight has not come"
@@ -221,18 +234,3 @@ class TakeWeight(CoglabState):
         return PortError(
             f"the person did not let go of '{object_id}' within {limit:.0f} s", causes, ReasonCode.NOT_RELEASED
         )
-
-    def _holds(self, settings: dict[str, Any]) -> bool:
-        """Whether the person does: their hand carries the object where the arm sinks with it, by as much as it rises at
-        most. A hand that merely is there takes no weight; who let go while the fingers closed gave none before."""
-        contact = self.ctx.contact
-        self.allow(SINKING + 8.0)
-        try:
-            self.await_pending(contact.arm("release", SINKING, settings), "arming of the contact detector", 2.0)
-            self.pause(SETTLES)
-            way, speed = (float(self.ctx.config.get(name, 0.03)) for name in ("hand.lift", "give.lower_speed"))
-            rise(self.ctx, -way, speed)
-            self.wait_for(lambda: contact.event() is not None, "the person's holding of it", SINKING, code=PERSON)
-        except PortError:
-            return False
-        return True

@@ -11,6 +11,7 @@ from coglab_py.pose import Pose
 
 from coglab_smach.context.awaited import SIGHT
 from coglab_smach.context.context import Context
+from coglab_smach.context.hand_track import JUMP, HandTrack, Sight
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.interfaces import Located
 from coglab_smach.ports.pending import PortError
@@ -20,11 +21,12 @@ NEARER = 0.02
 """m by which what a person has missed is brought nearer than it was offered"""
 AWAY = 0.5
 """m from the palm: a person's hand that is seen there holds nothing that is in the robot's"""
+GLANCE = 0.05
+"""s that a look may take beside which something else is waited for"""
 OLDEST = 0.5
 """s, an older sight does not tell where the hand is"""
-JUMP, SWAPPED = 0.12, 0.2
-"""m between two sights that no person's hand goes, nor anything that falls: the tracker has taken something else for
-it, unless it stays there for so long (s)"""
+SWAPPED = 0.2
+"""s for which sights stay where nothing goes from one to the next (JUMP), until they are believed"""
 
 
 def palm_at(ctx: Context) -> np.ndarray | None:
@@ -51,11 +53,8 @@ def way_to_grasp(state: CoglabState, goal: Mapping[str, Any]) -> np.ndarray | No
     if not thing or here is None:
         return None
     name = str(thing["frame"]).removeprefix("object_")
-    try:
-        seen = state.await_pending(state.ctx.perception.locate_object(name, 0.3), f"sight of '{name}'", 0.5, code=SIGHT)
-    except PortError:
-        return None
-    if seen.age > OLDEST:
+    seen = sight_of(state, name, GLANCE)
+    if seen is None:
         return None
     grasp = Pose(np.array(seen.xyz), np.array(seen.quaternion)) * Pose.from_dict(thing["grasp"])
     return np.asarray(grasp.position - default_arm().fk(np.asarray(here))[0])
@@ -71,21 +70,21 @@ def hand_name(ctx: Context) -> str:
     return str(ctx.config.get("perception.human_hand", "human_hand"))
 
 
-def sight_or_refusal(state: CoglabState, target: str) -> Located | PortError | None:
+def sight_or_refusal(state: CoglabState, target: str, limit: float = 0.3) -> Located | PortError | None:
     """Of an object or of the person's hand as perception names it, OLDEST s old at most; perception's own words where
-    it has none."""
+    it has none within ``limit`` s."""
     try:
         seen: Located = state.await_pending(
-            state.ctx.perception.locate_object(target, 0.3), f"sight of '{target}'", 0.5, code=SIGHT
+            state.ctx.perception.locate_object(target, limit), f"sight of '{target}'", limit + 0.2, code=SIGHT
         )
     except PortError as error:
         return error
     return seen if seen.age <= OLDEST else None
 
 
-def sight_of(state: CoglabState, target: str) -> Located | None:
+def sight_of(state: CoglabState, target: str, limit: float = 0.3) -> Located | None:
     """The same, None for a refusal."""
-    seen = sight_or_refusal(state, target)
+    seen = sight_or_refusal(state, target, limit)
     return None if isinstance(seen, PortError) else seen
 
 
@@ -101,13 +100,6 @@ def hand_from_palm(state: CoglabState) -> float | None:
     return None if person is None or palm is None else float(np.linalg.norm(person - palm))
 
 
-FASTEST = 2.0
-"""m/s of a hand that has let go and goes"""
-
-Sight = tuple[float, np.ndarray]
-"""s, m"""
-
-
 def jumped_from(last: Sight | None, now: float, place: np.ndarray) -> tuple[bool, Sight | None]:
     """Whether a sight is of something else than the last one that was no jump, and the one that is now."""
     if last is not None and float(np.linalg.norm(place - last[1])) > JUMP and now - last[0] < SWAPPED:
@@ -115,31 +107,15 @@ def jumped_from(last: Sight | None, now: float, place: np.ndarray) -> tuple[bool
     return False, (now, place)
 
 
-class HandTrack:
-    """The person's hand from sight to sight, for states in which it matters that it is one and the same."""
-
-    def __init__(self, state: CoglabState) -> None:
-        self._state = state
-        self.is_one = True
-        """False once the tracker has taken another hand for it, and stayed with that"""
-        self._last: Sight | None = None
-        self._jumps = False
-
-    def from_palm(self) -> float | None:
-        """m to the palm; None where that is not known, or where a sight may be another hand's."""
-        person, palm = person_at(self._state), palm_at(self._state.ctx)
-        if person is None or palm is None:
-            return None
-        now, before = self._state.ctx.clock.now(), self._last
-        if before is not None and now - before[0] < SWAPPED:
-            # A hand that goes may be hidden for a few sights, and is somewhere else after them.
-            if float(np.linalg.norm(person - before[1])) > JUMP + FASTEST * (now - before[0]):
-                self._jumps = True
-                return None
-        elif self._jumps:
-            self.is_one = False
-        self._last, self._jumps = (now, person), False
-        return float(np.linalg.norm(person - palm))
+def from_palm(state: CoglabState, track: HandTrack) -> float | None:
+    """m from the hand that is followed to the palm, by one more sight; None where that is not known, or where the sight
+    is another hand's."""
+    seen, palm = sight_of(state, hand_name(state.ctx), GLANCE), palm_at(state.ctx)
+    if seen is None or palm is None:
+        return None
+    place = np.array(seen.xyz)
+    track.follow(state.ctx.clock.now() - seen.age, place)
+    return float(np.linalg.norm(place - palm)) if track.is_one else None
 
 
 def way_to_hand(state: CoglabState, object_id: str, delivery: Mapping[str, Any]) -> np.ndarray | None:
