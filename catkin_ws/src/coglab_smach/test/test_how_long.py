@@ -34,7 +34,7 @@ WAITS = {
     "opening of the hand": {(WHOLE, HAND)},
     "preshape": {(WHOLE, HAND)},
     "rest of the arm": {(3.0, ARM)},
-    "sight of": {(6.0, SIGHT), (0.5, SIGHT)},
+    "sight of": {(6.0, SIGHT), (0.5, SIGHT), (0.25, SIGHT)},
     "start of perception": {(WHOLE, SIGHT)},
     "start of primitive": {(3.0, ANSWER)},
     "switch to primitive": {(1.0, ANSWER)},
@@ -122,7 +122,7 @@ def test_who_waits_for_what(waited):
     assert found["Stopped", "LWR command"] in (5.0, 20.0) and found["Fault", "LWR command"] == 5.0
     assert found["ConfigureLwr", "command mode of the LWR"] is WHOLE
     assert found["Stopped", "command mode of the LWR"] == 10.0 and found["EndMotion", "switching to"] is WHOLE
-    assert {s for state, what, s, _, _ in waited[0] if (state, what) == ("WaitStop", "sight of")} == {0.5}
+    assert {s for state, what, s, _, _ in waited[0] if (state, what) == ("WaitStop", "sight of")} == {0.5, 0.25}
     assert {s for state, what, s, _, _ in waited[0] if (state, what) == ("SetTakeGoal", "sight of")} == {6.0}
     # 6 cm at 0.25 m/s, its start and end, and two seconds more.
     assert 2.24 < found["LetGo", "drawing back"] < 2.6 and 5.6 < found["WaitStop", "drawing back"] < 6.0
