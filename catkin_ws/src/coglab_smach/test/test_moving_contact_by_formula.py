@@ -294,8 +294,8 @@ def test_thresholds_are_written_with_the_figures_that_count(tmp_path):
 class Moved:
     """A MovingContact on an arm without inertia, fed with positions (rad) and what acts on its first joints (N)."""
 
-    def __init__(self):
-        self.arm, self.k = Plain(), 0
+    def __init__(self, period=DT):
+        self.arm, self.k, self.period = Plain(), 0, period
         self.contact = MovingContact(thresholds(lag=0.002), self.arm, lambda q: PALM)
 
     def feed(self, force=(0.0, 0.0, 0.0), samples=1, by=0.0):
@@ -303,7 +303,7 @@ class Moved:
         for _ in range(samples):
             self.k += 1
             self.q = getattr(self, "q", 0.0) + by
-            self.contact.feed(self.k * DT, seven(self.q), -np.array([*force, 0.0, 0.0, 0.0, 0.0]))
+            self.contact.feed(self.k * self.period, seven(self.q), -np.array([*force, 0.0, 0.0, 0.0, 0.0]))
         return self.contact
 
 
@@ -316,13 +316,22 @@ def test_a_residual_is_of_a_free_arm_after_a_quarter_of_a_second_of_rest():
     assert moved.feed((0.0, 0.0, -3.0)).still() and contact.before_motion()[2] == pytest.approx(-3.0)
     moved.feed((0.0, 0.0, -4.0))
     felt = -3.0 - 0.5 * (1.0 - KEEP)
-    assert contact.before_motion()[2] == pytest.approx(-3.0 + 0.02 * (felt + 3.0)), "a fiftieth of each sample"
+    assert contact.before_motion()[2] == pytest.approx(-3.0 + DT / 0.25 * (felt + 3.0)), "as much as its time"
     assert contact.weight_before_motion() is None, "it has not moved"
     moved.feed((0.0, 0.0, -4.0), 200)
     moved.feed((0.0, 0.0, -9.0), 1, by=0.021 * DT)
     assert not contact.still() and contact.weight_before_motion() == pytest.approx(4.0, abs=0.1)
     assert contact.before_motion()[2] == pytest.approx(-4.0, abs=0.1)
     assert contact.weight_since(np.zeros(7)) == pytest.approx(-contact.residual.torque[2])
+
+
+@pytest.mark.parametrize("period", [0.002, 0.005, 0.010])
+def test_a_push_at_rest_is_forgotten_as_fast_at_every_period(period):
+    moved = Moved(period)
+    contact = moved.feed((0.0, 0.0, 0.0), int(1.0 / period))
+    moved.feed((0.0, 0.0, -8.0), int(1.0 / period))
+    moved.feed((0.0, 0.0, 0.0), int(0.5 / period))
+    assert -contact.before_motion()[2] == pytest.approx(8.0 * np.exp(-0.5 / 0.25), abs=0.25)
 
 
 @pytest.mark.parametrize(("speed", "still"), [(0.019, True), (0.021, False)])

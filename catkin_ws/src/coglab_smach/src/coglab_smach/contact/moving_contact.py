@@ -20,6 +20,8 @@ SLOW, GENTLE = 0.15, 1.0
 """rad/s and rad/s^2 of the fastest joint"""
 SETTLED = 0.25
 """s of stillness before the residual is taken as that of a free arm"""
+REMEMBERED = 0.25
+"""s over which that residual is averaged, whatever the period: so long a push on the resting arm is not forgotten"""
 LEAD, GROWTH = 0.03, 0.02
 """s by which a force is told ahead, about the observer's own delay, and s over which it is seen to grow"""
 
@@ -50,7 +52,7 @@ class MovingContact:
         self._rest: np.ndarray | None = None
         self._free: np.ndarray | None = None
         """mean residual of the rest before the motion, or of this one while the arm has not moved"""
-        self._rest_position = np.zeros(7)
+        self._rest_position, self._rest_stamp = np.zeros(7), 0.0
         self._free_weight: float | None = None
         """N on the palm then"""
         self._growing: deque[tuple[float, np.ndarray]] = deque()
@@ -146,8 +148,9 @@ class MovingContact:
             self._still_since = residual.stamp
         elif residual.stamp - self._still_since >= SETTLED:
             rest = residual.torque if self._rest is None else self._rest
-            self._rest = rest + 0.02 * (residual.torque - rest)
-            self._rest_position = residual.position
+            share = min(1.0, (residual.stamp - self._rest_stamp) / REMEMBERED)
+            self._rest = rest + share * (residual.torque - rest)
+            self._rest_position, self._rest_stamp = residual.position, residual.stamp
 
     def feed(self, stamp: float, position: Joints, torque: Joints) -> None:
         """One sample: s, rad, Nm as measured."""
