@@ -263,17 +263,18 @@ def test_the_largest_number_of_an_arm_is_taken_and_no_larger_one():
         assert (rest.detector._last_stamp != before) == taken
 
 
-def test_at_rest_a_fiftieth_of_each_sample_is_remembered_and_a_jolt_is_no_motion():
+def test_at_rest_a_sample_counts_as_much_as_its_time_and_a_jolt_is_no_motion():
     rest = RestTorque()
-    rest.learn(np.zeros(7))
-    rest.learn(np.ones(7))
+    rest.learn(np.zeros(7), 0.005)
+    rest.learn(np.ones(7), 0.005)
     rest.move(0.125, np.full(7, 0.16))  # 20 mrad
     assert not rest.travels and rest.before_motion is None
     rest.move(0.125, np.full(7, 1e-3))
     assert rest.travels and rest.before_motion == pytest.approx([0.02] * 7)
     rest.stand()
     assert not rest.travels
-    rest.learn(np.full(7, 3.0))
+    rest.learn(np.full(7, 3.0), 0.010)
+    rest.learn(np.full(7, 3.0), 1.0)
     rest.move(0.125, np.full(7, 0.1))
     rest.move(0.125, np.full(7, -0.1))
     assert not rest.travels, "to and fro"

@@ -140,7 +140,7 @@ class ContactDetector:
         self._odd_stamp: float | None = None
         """of the last sample that did not follow the one before it"""
         self._still_since: float | None = None
-        self._rest = RestTorque()
+        self._rest, self._gap = RestTorque(), 0.0  # the latter in s, between the last two samples
         self._unloaded: np.ndarray | None = None
         self.margin = 0.0
         self._largest = np.zeros(7)
@@ -279,7 +279,7 @@ class ContactDetector:
     def _filter(self, stamp: float, tau: np.ndarray) -> np.ndarray | None:
         """Low-pass, remember, and return the difference over the window (None until the window is full)."""
         dt = stamp - self._last_stamp if self._last_stamp is not None else 0.005
-        self._last_stamp = stamp
+        self._last_stamp, self._gap = stamp, dt
         if self._filtered is None or dt > 0.1:
             self._filtered = tau.copy()
             self._history.clear()
@@ -297,7 +297,7 @@ class ContactDetector:
     def _learn(self, difference: np.ndarray) -> None:
         assert self._filtered is not None
         self._rest_differences.append(difference)
-        self._rest.learn(self._filtered)
+        self._rest.learn(self._filtered, self._gap)
 
     def sigma(self) -> np.ndarray:
         """Robust standard deviation (Nm) of the difference at rest, per joint; the floor where too little was seen."""

@@ -11,6 +11,7 @@ from coglab_py.pose import length
 from coglab_smach.contact.evidence import MOMENTUM, Evidence
 from coglab_smach.contact.momentum_observer import Dynamics, Joints, MomentumObserver, Residual
 from coglab_smach.contact.motion_thresholds import CONFIRM, Change, ChangeOfResidual, Offset, Thresholds
+from coglab_smach.contact.rest import REMEMBERED
 
 HOLD = 0.03
 """s for which one sample counts"""
@@ -20,8 +21,6 @@ SLOW, GENTLE = 0.15, 1.0
 """rad/s and rad/s^2 of the fastest joint"""
 SETTLED = 0.25
 """s of stillness before the residual is taken as that of a free arm"""
-REMEMBERED = 0.25
-"""s over which that residual is averaged, whatever the period: so long a push on the resting arm is not forgotten"""
 LEAD, GROWTH = 0.03, 0.02
 """s by which a force is told ahead, about the observer's own delay, and s over which it is seen to grow"""
 

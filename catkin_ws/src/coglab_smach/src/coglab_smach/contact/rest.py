@@ -8,8 +8,9 @@ import numpy as np
 
 JOLT = 0.02
 """rad that a joint moves at most when somebody pushes an arm that rests, or lets go of it"""
-SHARE = 0.02
-"""of each new sample in what is felt at rest"""
+REMEMBERED = 0.25
+"""s over which what is felt at rest is averaged, whatever the period: so long a push on the resting arm is not
+forgotten"""
 
 
 class RestTorque:
@@ -41,6 +42,7 @@ class RestTorque:
         """It has just come to a stop."""
         self._here = self._travelled = None
 
-    def learn(self, torque: np.ndarray) -> None:
-        """What it feels now, having stood for a while."""
-        self._here = torque if self._here is None else self._here + SHARE * (torque - self._here)
+    def learn(self, torque: np.ndarray, gap: float) -> None:
+        """What it feels now, having stood for a while, ``gap`` s after the sample before."""
+        share = min(1.0, gap / REMEMBERED)
+        self._here = torque if self._here is None else self._here + share * (torque - self._here)
