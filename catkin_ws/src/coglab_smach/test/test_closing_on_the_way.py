@@ -114,7 +114,7 @@ def test_with_fingers_that_do_not_open_again_the_arm_stays_with_what_the_person_
     """They have begun to close, the reach fails, and the hand is stuck: the person may hold what is in it."""
     trial = Trial()
     monkeypatch.setattr(reach, "off_grasp", lambda state, goal: 0.02)
-    monkeypatch.setattr(recovery, "hand_from_palm", lambda state: 0.1)
+    monkeypatch.setattr(recovery, "from_palm", lambda state, track, *_: 0.1)
     monkeypatch.setattr(recovery, "person_holds", lambda state, settings: True)
     trial.cell.partner.touch_after = None
 
@@ -146,6 +146,7 @@ def test_what_fingers_have_caught_on_the_way_is_not_dropped_where_the_person_has
     trial = Trial()
     monkeypatch.setattr(reach, "off_grasp", lambda state, goal: 0.02)
     trial.cell.partner.touch_after = None
+    trial.cell.partner.take_after = 1.0 if person == "at it" else None
 
     def script(t):
         t.wait_hub("wait_without_object")
@@ -156,7 +157,7 @@ def test_what_fingers_have_caught_on_the_way_is_not_dropped_where_the_person_has
         if person == "at it":
             at_the_palm(t)
         if person == "away":
-            t.cell.objects["human_hand"] = Pose([2.0, 0.0, 0.4])
+            t.cell._goes = t.clock.now(), np.array([2.0, 0.0, 0.4])
         if person == "not seen":
             t.cell.faults.not_seen.add("human_hand")
         t.cell.arm.end("goal lost", ReasonCode.GOAL_LOST)
@@ -221,7 +222,7 @@ def test_fingers_that_have_begun_to_close_open_before_a_reach_that_paused_goes_o
     """With a fist it would push away what the person offers again."""
     trial, waits = Trial(), []
     monkeypatch.setattr(reach, "off_grasp", lambda state, goal: 0.02)
-    trial.cell.partner.touch_after = 3.0
+    trial.cell.partner.touch_after, trial.cell.faults.empty_grasp = 3.0, True
     doubted = reach.ReachWatch.doubted
     monkeypatch.setattr(
         reach.ReachWatch,

@@ -7,7 +7,7 @@ from coglab_py.pose import Pose
 from coglab_smach.ports.pending import PortError, Ready
 from coglab_smach.states import hand as hand_states
 from coglab_smach.states import knowledge, weight
-from coglab_smach.states.hand import closes_gently, gentle
+from coglab_smach.states.hand import closes_gently, gentle, stopped_by_object
 from conftest import Trial
 from ih2_hand.grasps import levels_of
 
@@ -47,7 +47,7 @@ def receive(trial):
 def track(monkeypatch, distance):
     """The person's hand is so far (m, of the state that asks) from the palm."""
     for module in (hand_states, weight):
-        monkeypatch.setattr(module, "from_palm", lambda state, track: distance(state))
+        monkeypatch.setattr(module, "from_palm", lambda state, track, *_: distance(state))
     monkeypatch.setattr(hand_states, "hand_from_palm", distance)
 
 
@@ -123,3 +123,9 @@ def test_at_home_it_stays_held_gently_beside_a_persons_hand(monkeypatch):
     asked = receive(trial)
     assert set(asked) == {"low", LOWEST} and "tightened" not in trial.result().marks
     assert trial.ctx.holding == "mug" and trial.ctx.firm == trial.ctx.config.get("hand.tighten.medium")
+
+
+@pytest.mark.parametrize(("thumb", "index", "around"), [(249, 249, True), (250, 249, False), (249, 250, False)])
+def test_a_finger_has_closed_past_the_object_from_250_counts_on(thumb, index, around):
+    assert stopped_by_object("cylindrical", (0, thumb, index, 254, 254)) == around
+    assert stopped_by_object("cylindrical", (0, 100)) is True, "nothing is told of the others"

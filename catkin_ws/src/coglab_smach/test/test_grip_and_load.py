@@ -10,7 +10,7 @@ from coglab_smach.contact.evidence import FUSED, MOMENTUM
 from coglab_smach.contact.fused_detector import IN_MOTION, LIFT, RELEASE, FusedDetector
 from coglab_smach.contact.grip_and_load import COVERED, OLDEST, Felt, GripAndLoad, together
 from coglab_smach.ports.interfaces import HandState
-from coglab_smach.states.give import FIRMER, WEAKER, LooseningGrip
+from coglab_smach.states.loosening_grip import FIRMER, WEAKER, LooseningGrip
 from test_giving import WEIGHT, giving
 
 MASS = WEIGHT / 9.81

@@ -5,7 +5,7 @@ import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_smach.clocks.virtual_clock import using
 from coglab_smach.context.hand_track import HandTrack
-from coglab_smach.ports.interfaces import Verdict
+from coglab_smach.ports.interfaces import Located, Verdict
 from coglab_smach.ports.pending import Polled, PortError
 from coglab_smach.states import weight
 from coglab_smach.states.base import TimeLimit
@@ -72,12 +72,16 @@ def test_an_arm_that_may_not_move_says_so_and_not_that_the_person_holds_on(monke
 
 def test_what_has_gone_with_the_persons_hand_was_taken_back(monkeypatch):
     lifted, lost = Lifted(monkeypatch), PortError("'mug' has left the hand", ("open",), ReasonCode.OBJECT_NOT_SEEN)
-    monkeypatch.setattr(weight, "person_at", lambda s: np.array([0.8, 0.0, 0.4]))
-    for thing, code in (([0.8, 0.1, 0.4], ReasonCode.GOAL_WITHDRAWN), ([0.8, 0.3, 0.4], ReasonCode.OBJECT_NOT_SEEN)):
-        monkeypatch.setattr(weight, "seen_at", lambda s, name, at=thing: np.array(at))
-        assert lifted.state._taken_back("mug", lost).code == code
-    monkeypatch.setattr(weight, "seen_at", lambda s, name: None)
-    assert lifted.state._taken_back("mug", lost) is lost
+    taken, fell = ReasonCode.GOAL_WITHDRAWN, ReasonCode.OBJECT_NOT_SEEN
+    sights, lifted.state._deadline = {}, 1e9
+    monkeypatch.setattr(weight, "sight_of", lambda s, name: sights.get(name))
+    with using(lifted.trial.clock) as clock:
+        for thing, age, code in ((0.1, 0.1, taken), (0.3, 0.1, fell), (0.1, 0.2, fell), (None, 0.0, fell)):
+            sights["human_hand"] = Located("human_hand", "", (0.8, 0.0, 0.4), (0.0, 0.0, 0.0, 1.0), 0.1)
+            sights["mug"] = thing and Located("object_mug", "", (0.8, thing, 0.4), (0.0, 0.0, 0.0, 1.0), age)
+            begun = clock.now()
+            assert lifted.state._taken_back("mug", lost).code == code
+            assert clock.now() - begun == pytest.approx(0.4, abs=0.01), "what falls has to have fallen by then"
 
 
 def seen(track, way, frames=5, frame=0.033, since=0.0, jitter=0.0):

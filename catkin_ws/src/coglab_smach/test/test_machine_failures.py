@@ -107,7 +107,7 @@ def test_hand_closed_on_nothing():
 
 
 def test_a_person_who_does_not_let_go_gets_the_object_back(monkeypatch):
-    monkeypatch.setattr(weight, "from_palm", lambda state, track: 0.1)
+    monkeypatch.setattr(weight, "from_palm", lambda state, track, *_: 0.1)
     trial = failed_exchange(lambda t: setattr(t.cell.partner, "let_go_after", None))
     assert_recovered_empty(trial, "the person did not let go of 'mug' within 5 s")
 

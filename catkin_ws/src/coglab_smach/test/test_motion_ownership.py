@@ -258,7 +258,7 @@ def test_times_are_those_of_the_limits():
 @pytest.mark.parametrize("hub_after", ["stopped"])
 def test_a_person_who_holds_on_and_a_hand_that_does_not_open(hub_after, monkeypatch):
     """The arm must not go away with the person's object."""
-    monkeypatch.setattr(weight, "from_palm", lambda state, track: 0.1)
+    monkeypatch.setattr(weight, "from_palm", lambda state, track, *_: 0.1)
 
     def script(t):
         t.wait_hub("wait_without_object")

@@ -327,8 +327,7 @@ def test_a_residual_is_of_a_free_arm_after_a_quarter_of_a_second_of_rest():
 
 @pytest.mark.parametrize("period", [0.002, 0.005, 0.010])
 def test_a_push_at_rest_is_forgotten_as_fast_at_every_period(period):
-    moved = Moved(period)
-    contact = moved.feed((0.0, 0.0, 0.0), int(1.0 / period))
+    contact = (moved := Moved(period)).feed((0.0, 0.0, 0.0), int(1.0 / period))
     moved.feed((0.0, 0.0, -8.0), int(1.0 / period))
     moved.feed((0.0, 0.0, 0.0), int(0.5 / period))
     assert -contact.before_motion()[2] == pytest.approx(8.0 * np.exp(-0.5 / 0.25), abs=0.25)

@@ -243,12 +243,12 @@ def test_fingers_that_close_past_it_on_the_way_hold_nothing():
 
 
 def test_an_object_whose_giver_was_hidden_while_the_fingers_closed_and_is_gone_is_not_dropped():
-    """Its weight was not felt either. The person is seen again, far away: nobody but the robot can hold it."""
+    """Its weight was not felt either. A hand is seen again, far away: it is felt that nobody but the robot holds it."""
     trial = Trial()
 
     def script(t):
         t.wait_hub("wait_without_object")
-        t.cell.partner.let_go_after = None
+        t.cell.partner.let_go_after = t.cell.partner.take_after = None
         t.start("exchange_human_to_robot")
         while not t.ctx.journal.marked("contact"):
             t.clock.sleep(0.01)
@@ -285,7 +285,7 @@ def test_the_person_is_told_that_the_robot_has_it_once_its_weight_is_carried():
 
 
 def test_a_person_who_does_not_let_go_is_never_told_that_the_robot_has_it(monkeypatch):
-    monkeypatch.setattr(weight, "from_palm", lambda state, track: 0.1)
+    monkeypatch.setattr(weight, "from_palm", lambda state, track, *_: 0.1)
     told, trial = [], Trial()
     trial.ctx.say = lambda code, text: told.append(code)
 

@@ -25,6 +25,12 @@ WEIGHT = 0.31 * 9.81
 # --- taking the weight ------------------------------------------------------------------------------------------------
 
 
+def seen_all_the_way():
+    track = HandTrack()
+    track.is_sure = True
+    return track
+
+
 class Lifted:
     """A TakeWeight whose parts the test calls; ``rises``: m and m/s."""
 
@@ -38,8 +44,8 @@ class Lifted:
         )
         state._way.halt = lambda why: self.rises.append(why)
         state._rises, state._on, state._told, state._seen_away = 0, None, False, False
-        monkeypatch.setattr(weight, "from_palm", lambda state, track: self.away)
-        state._hand = self.hand = HandTrack()
+        monkeypatch.setattr(weight, "from_palm", lambda state, track, *_: self.away)
+        state._hand = self.hand = seen_all_the_way()
         self.ctx.arm.motion_allowed = lambda: Verdict(True)
         state._held = self.held = SimpleNamespace(check=lambda: None, stays=lambda since: self.kept, moved=False)
         self.kept, self.held.there = True, lambda: True
@@ -144,7 +150,14 @@ def test_without_a_sight_the_weight_and_the_whole_rise_are_enough(monkeypatch):
 @pytest.mark.parametrize("loaded", [False, True])
 @pytest.mark.parametrize(
     ("away", "holds", "keeps"),
-    [(None, True, True), (0.31, True, True), (1.0, True, True), (0.29, True, False), (0.29, False, True)],
+    [
+        (None, True, True),
+        (0.31, True, True),
+        (1.0, True, True),
+        (0.29, True, False),
+        (0.29, False, True),
+        (0.1, None, True),
+    ],
 )
 def test_a_person_gets_the_object_back_whose_hand_is_within_30_cm_and_carries_it(
     monkeypatch, away, holds, loaded, keeps
@@ -192,15 +205,18 @@ def test_a_hand_half_a_metre_from_the_palm_holds_nothing_any_more(away, goes):
         end = t.clock.now() + 60.0
         while not t.ctx.requests.hub():
             assert t.clock.now() < end
-            t.cell.objects["human_hand"] = Pose(t.cell.pose("mug").position + [0.0, away, 0.0])
-            if any(r.from_state == "give_load" for r in t.ctx.journal.transitions):
+            given_up = any(r.from_state == "give_load" for r in t.ctx.journal.transitions)
+            there = t.cell.pose("mug").position + [0.0, away if given_up else 0.1, 0.0]
+            t.cell._goes = t.cell._goes or (t.clock.now(), there)
+            if given_up:
                 t.cell.push(0.0)
             t.clock.sleep(0.05)
 
     trial = giving(script, **{"give.near": 2.0, "give.bring_after": 99.0})
     secured = next(r.stamp for r in trial.ctx.journal.transitions if r.from_state == "secure_hand")
     given_up = next(r.stamp for r in trial.ctx.journal.transitions if r.from_state == "give_load")
-    assert (secured - given_up < 2.0) == goes, "who has gone is not waited for"
+    # A hand that was not looked at while the arm came to rest may be another one: it is felt whether they hold it.
+    assert (secured - given_up < 4.5) == goes, "who has gone is not waited for"
     assert trial.result().outcome == ("failed_holding" if goes else "stopped")
 
 
@@ -266,7 +282,8 @@ def test_fingers_that_begin_to_close_on_the_way_have_a_second_to_stand(monkeypat
     trial = Trial()
     state, opened, clock = SecureHand(trial.ctx), [], trial.clock
     state._deadline = 1e9
-    monkeypatch.setattr(recovery, "hand_from_palm", lambda s: 0.51)
+    monkeypatch.setattr(recovery, "from_palm", lambda s, track, *_: 0.51)
+    trial.ctx.hand_track = seen_all_the_way()
     trial.ctx.closing, trial.ctx.closing_on, trial.ctx.closing_firm, trial.ctx.shared = Ready(), "mug", 140, True
     trial.ctx.hand.state = lambda: HandState(True, holding=clock.now() >= caught)
     trial.ctx.hand.open = lambda speed: opened.append(speed) or Ready()
@@ -279,14 +296,21 @@ def test_fingers_that_begin_to_close_on_the_way_have_a_second_to_stand(monkeypat
 
 @pytest.mark.parametrize(
     ("away", "holds", "held"),
-    [(0.29, True, ""), (0.29, False, "mug"), (0.31, True, "mug"), (0.51, True, "mug"), (None, True, "mug")],
+    [
+        (0.29, True, ""),
+        (0.29, False, "mug"),
+        (0.29, None, "mug"),
+        (0.31, True, "mug"),
+        (0.51, True, "mug"),
+        (None, True, "mug"),
+    ],
 )
 def test_who_holds_what_fingers_have_caught_gets_it_back(monkeypatch, away, holds, held):
     trial, asked = Trial(), []
     state = SecureHand(trial.ctx)
     monkeypatch.setattr(recovery, "person_holds", lambda s, settings: asked.append(settings) or holds)
-    trial.ctx.closing_mass = 0.31
-    monkeypatch.setattr(recovery, "hand_from_palm", lambda s: away)
+    trial.ctx.shared_mass, trial.ctx.hand_track = 0.31, seen_all_the_way()
+    monkeypatch.setattr(recovery, "from_palm", lambda s, track, *_: away)
     trial.ctx.closing, trial.ctx.closing_on, trial.ctx.shared = Ready(), "mug", True
     trial.ctx.hand.state = lambda: HandState(True, holding=True)
     with using(trial.clock):

@@ -78,10 +78,10 @@ class Context:
     """id of the object that they close on there"""
     closing_firm: int = 0
     """``firm`` of that object"""
-    closing_mass: float = 0.0
-    """kg, of it"""
-    giver: HandTrack | None = None
-    """the hand of the person from whom an object is taken, as long as they may hold it"""
+    shared_mass: float = 0.0
+    """kg, of what the robot and the person may both hold"""
+    hand_track: HandTrack | None = None
+    """the hand of the person who gives an object, or takes it, as long as they may hold it, too"""
     _holding: str = ""
 
     def __post_init__(self) -> None:

@@ -9,20 +9,20 @@ from coglab_msgs.msg import ReasonCode, Say
 
 from coglab_smach.context.awaited import HAND
 from coglab_smach.context.context import Context
+from coglab_smach.context.hand_track import HandTrack
 from coglab_smach.context.holding import UNKNOWN
 from coglab_smach.context.requests import command
 from coglab_smach.ports.interfaces import Verdict
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.arm import HomeRobot
 from coglab_smach.states.base import CoglabMachine, CoglabState
-from coglab_smach.states.hand import AT_HAND, HandTighten
+from coglab_smach.states.hand import HandTighten
 from coglab_smach.states.held import LOOK, HeldObject
 from coglab_smach.states.motion import end_motion
+from coglab_smach.states.reach import CAUGHT
 from coglab_smach.states.weight import person_holds
-from coglab_smach.states.where import AWAY, from_palm, hand_from_palm
+from coglab_smach.states.where import AT_HAND, AWAY, from_palm
 
-CAUGHT = 1.0
-"""s in which fingers that have begun to close on the way stand"""
 LETS_GO = 5.0
 """s in which a person who is told that it is over lets go of what the robot's fingers hold, too, and goes"""
 
@@ -136,23 +136,39 @@ class SecureHand(CoglabState):
             self.pause(0.02)
         if not self.ctx.hand.state().holding:
             return
-        away = hand_from_palm(self)
-        settings = {"mass": self.ctx.closing_mass, "load_share": float(self.ctx.config.get("hand.load_share", 0.5))}
-        if away is None or away > AT_HAND or not person_holds(self, settings):
-            self.ctx.holding, self.ctx.shared = self.ctx.closing_on, away is None or away <= AWAY
+        away = from_palm(self, self._track(), 0.3)
+        holds = None if away is None or away > AT_HAND else self._person_holds()
+        if not holds:
+            self.ctx.holding, self.ctx.shared = self.ctx.closing_on, not self._is_away(away)
             self.ctx.firm = self.ctx.closing_firm
 
+    def _track(self) -> HandTrack:
+        """Of the person's hand, followed from where it may have held the object."""
+        self.ctx.hand_track = self.ctx.hand_track or HandTrack()
+        return self.ctx.hand_track
+
+    def _is_away(self, away: float | None) -> bool:
+        """Whether the person's hand, ``away`` m from the palm, was seen to go so far that it holds nothing there."""
+        return away is not None and away > AWAY and self._track().is_sure
+
+    def _person_holds(self) -> bool | None:
+        share = float(self.ctx.config.get("hand.load_share", 0.5))
+        return person_holds(self, {"mass": self.ctx.shared_mass, "load_share": share})
+
     def _await_letting_go(self) -> None:
-        """Nobody else holds the object, or has taken it along, once the person's hand is seen away from it."""
+        """Nobody else holds the object, or has taken it along, once the person's hand is seen away from it. Where it
+        was not seen to go another one may be seen there: then it is felt whether they hold it."""
         self._tell()
         self.allow(LETS_GO + 10.0)
-        end = self.ctx.clock.now() + LETS_GO
+        end, felt = self.ctx.clock.now() + LETS_GO, False
         while self.ctx.clock.now() < end:
-            away = hand_from_palm(self) if self.ctx.giver is None else from_palm(self, self.ctx.giver)
-            if away is not None and away > AWAY:
+            away = from_palm(self, self._track())
+            asks = away is not None and away > AWAY and not felt
+            if self._is_away(away) or (asks and self._person_holds() is False):
                 self.ctx.shared = False
                 self._look_for_it()
                 return
+            felt = felt or asks
             self.pause(0.05)
 
     def _look_for_it(self) -> None:

@@ -22,6 +22,8 @@ from coglab_smach.simulated.arm_model import ArmModel
 
 HAND_AT_WORK = np.array([0.86, 0.03, 0.43])
 """m, of the person's hand while something is handed over"""
+HAND_AT_OBJECT = np.array([0.08, 0.0, 0.0])
+"""m, of it from what it holds"""
 HAND_SPEED = 1.0
 """m/s with which it goes away and comes back"""
 
@@ -164,6 +166,11 @@ class SimulatedCell:
         """All frames that a goal may be given in, in the base frame."""
         seen = {n if n in ("board", "human_hand") else f"object_{n}": self.pose(n) for n in self.objects}
         return {"world": Pose(), "lwr_base_link": Pose(), **seen}
+
+    def bring(self, object_id: str, palm: Pose) -> None:
+        """The person's object has come into the robot's hand, and theirs comes with it. ``palm``: relative to it."""
+        self.at_palm = self.touched = object_id, palm
+        self._goes = self.clock.now(), self.pose(object_id).position + HAND_AT_OBJECT
 
     def let_go(self) -> None:
         """The person's hand leaves what it has given, and comes back later."""

@@ -101,7 +101,7 @@ class SimulatedContact:
             code = ReasonCode.CONTACT_CAME_EARLY if early else EVENTS[self._mode]
             self._event = ContactEvent(self._mode != "release", "simulated", 2.0, why, code=code)
             if self._touches is not None and happens and not self._pushed():
-                self.cell.at_palm = self.cell.touched = self._touches
+                self.cell.bring(*self._touches)
             if self._mode == "lift":
                 self.cell.let_go()
         return self._event

@@ -12,22 +12,17 @@ from coglab_msgs.msg import ReasonCode
 
 from coglab_smach.context.awaited import PERSON, SIGHT
 from coglab_smach.context.context import Context
-from coglab_smach.ports.interfaces import HandPort
+from coglab_smach.context.hand_track import HandTrack
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
 from coglab_smach.states.hand import firm_speed
 from coglab_smach.states.held import HeldObject
+from coglab_smach.states.loosening_grip import LooseningGrip
 from coglab_smach.states.motion import await_rest, rise, shift
 from coglab_smach.states.reach import WaitStop
-from coglab_smach.states.where import hand_from_palm, way_to_hand
+from coglab_smach.states.weight import person_holds
+from coglab_smach.states.where import AT_HAND, HandLook, from_palm, hand_from_palm, way_to_hand
 
-FINGERS = slice(1, 5)
-"""motors that bend fingers"""
-FIRMER, WEAKER = 0.15, 0.3
-"""share of the wanted grip force by which it may be more or less without a finger's moving"""
-AHEAD, SEEN_AFTER = 0.04, 0.1
-"""s for which the grip goes on as it does after an order to stand, and after which it is seen what that order has left:
-sensors, nodes and the hand's line take some hundredths of a second"""
 GRAVITY = 9.81
 ASTRAY = 0.02
 """m that the object is from where it is offered, from which on it is brought there"""
@@ -38,100 +33,6 @@ PRESSES, LASTS, SINKS = 2.0, 0.3, 3
 with it, and times at most that it does"""
 BRINGS, LOOKS = 3, 0.3
 """times at most that it is; s between two looks, between which a hand that waits moves by less than ASTRAY"""
-
-
-class LooseningGrip:
-    """The fingers around an object: opened by counts of a motor's position (0 open .. 254 closed), or until the grip
-    that is felt has come down, and closed again."""
-
-    def __init__(
-        self,
-        hand: HandPort,
-        speed: int,
-        closing_speed: int,
-        easing_speed: int = 1,
-        force: Callable[[], float | None] = lambda: None,
-    ) -> None:
-        """``speed``, ``closing_speed``: 1..511, wire speeds at which they loosen and close; the second one stands for
-        the force with which they hold then. ``force``: N of grip that are felt, None where nothing tells; where it
-        tells, they loosen at ``easing_speed``."""
-        self._hand, self._speed, self._closing_speed = hand, speed, closing_speed
-        self._easing_speed, self._force = easing_speed, force
-        self._closed, self._firm = hand.state().positions, force()
-        self._seen: tuple[float, float] | None = None
-        self._rate, self._stood = 0.0, -math.inf
-        """N/s of the grip, and when (s) fingers that followed it stood last"""
-        self._opening: Pending | None = None
-        self._closing: Pending | None = None
-
-    def loosened(self) -> int | None:
-        """Counts by which the finger that has moved most is more open than in the grip; None where the hand does not
-        tell."""
-        now = self._hand.state().positions
-        if not now or not self._closed:
-            return None
-        return max(c - n for c, n in zip(self._closed[FINGERS], now[FINGERS], strict=True))
-
-    def loosen_to(self, counts: float) -> None:
-        """Open on until they are so loose; call it again and again."""
-        if not self._has_closed():
-            return
-        loosened = self.loosened()
-        if self._opening is None:
-            if loosened is not None and loosened + 1 <= counts:
-                self._opening = self._hand.open(self._speed)
-        elif loosened is None or loosened >= counts or self._opening.done():
-            self.stand()
-
-    def ease_to(self, part: float, least: float, counts: float, now: float) -> bool:
-        """Grip with so much of the force of the closed grip, with ``least`` N at least, and looser by ``counts`` at
-        most; call it again and again. False, and nothing done, where no force is felt."""
-        force, loosened = self._force(), self.loosened()
-        if force is None or loosened is None:
-            return False
-        if self._firm is None:
-            self._firm = force
-        before, self._seen = self._seen, (now, force)
-        if before is not None and now > before[0]:
-            self._rate += 0.5 * ((force - before[1]) / (now - before[0]) - self._rate)
-        ahead = force + AHEAD * self._rate
-        wanted = max(least, part * self._firm)
-        if not self._has_closed():
-            if ahead >= wanted and self._closing is not None:
-                self._closing.cancel()
-                self._closing, self._stood = None, now
-        elif self._opening is not None:
-            if ahead <= wanted or loosened >= counts or self._opening.done():
-                self.stand()
-                self._stood = now
-        elif now < self._stood + SEEN_AFTER:
-            pass
-        elif force < (1.0 - WEAKER) * wanted and loosened > 0:
-            self.tighten()
-        elif force > (1.0 + FIRMER) * wanted and loosened + 1 <= counts:
-            self._opening = self._hand.open(self._easing_speed)
-        return True
-
-    def _has_closed(self) -> bool:
-        """Whether no closing is under way any more. What they hold with then is the closed grip."""
-        if self._closing is None:
-            return True
-        if not self._closing.done():
-            return False
-        self._closed, self._firm, self._closing = self._hand.state().positions, self._force(), None
-        return True
-
-    def stand(self) -> None:
-        """No looser."""
-        if self._opening is not None:
-            self._opening.cancel()
-            self._opening = None
-
-    def tighten(self) -> None:
-        """Close again, unless they do."""
-        self.stand()
-        if self._closing is None:
-            self._closing = self._hand.close(self._closing_speed)
 
 
 class WaitTaker(WaitStop):
@@ -224,6 +125,7 @@ class GiveLoad(CoglabState):
         super().__init__(ctx, input_keys=["object_id", "object_entry", "grasp_name", "delivery"])
         self._grip: LooseningGrip
         self._held: HeldObject
+        self._hand: HandLook
         self._offer: Callable[[], np.ndarray | None] = lambda: None
         """the way (m) from the object to where the person's hand takes it"""
         self._lowering: Pending | None = None
@@ -250,7 +152,10 @@ class GiveLoad(CoglabState):
         self._needed = float(release.get("threshold", 0.5))
         self.allow(limit + 10.0)
         entry = ud.object_entry
-        self._weight = GRAVITY * float(entry.get("mass", 0.0))
+        self.ctx.shared_mass = float(entry.get("mass", 0.0))
+        self.ctx.hand_track = HandTrack()
+        self._hand = HandLook(self.ctx, self.ctx.hand_track)
+        self._weight = GRAVITY * self.ctx.shared_mass
         # Two sides press: the object slips where friction on both does not carry it.
         self._slips_at = self._weight / (2.0 * float(entry.get("friction", 0.5)))
         self._grip = LooseningGrip(
@@ -272,6 +177,8 @@ class GiveLoad(CoglabState):
         except TimeLimit as error:
             self._keep()
             error.code = error.code if error.code != ReasonCode.TIME_LIMIT else ReasonCode.NOT_RELEASED
+            if not self.ctx.shared and error.code == ReasonCode.NOT_RELEASED:
+                self.ctx.shared = self._may_hold(ud)
             raise
         except (Interrupted, PortError):
             self._keep()
@@ -292,6 +199,7 @@ class GiveLoad(CoglabState):
         """Look at the person's share, and do what it asks for; whether it is enough."""
         if self._held.there() and self.ctx.contact.event() is not None:
             return True
+        self._hand.look()
         share, now = self.ctx.contact.share_gone(), self.ctx.clock.now()
         begins = self._number("begins", 0.2)
         self._follow(0.0 if share is None else share, begins, now)
@@ -299,7 +207,9 @@ class GiveLoad(CoglabState):
         if share is not None and share < begins and now >= self._look_at:
             if pressed:
                 self._sink_with_them(now)
-            elif self._lowering is None and (self._moving is None or self._moving.done()):
+                return False
+            self._ending = None
+            if self._lowering is None and (self._moving is None or self._moving.done()):
                 self._bring_or_lower(now)
         return False
 
@@ -371,6 +281,17 @@ class GiveLoad(CoglabState):
         """The arm sinks."""
         self._look_at, self._sinks = now + LOOKS, self._sinks + 1
         self._lowering = rise(self.ctx, -self._number("lower", 0.03), self._number("lower_speed", 0.03))
+
+    def _may_hold(self, ud: Any) -> bool:
+        """Whether the person does: what they carry of a light object is not sure to be felt while the arm stands."""
+        away = from_palm(self, self.ctx.hand_track or HandTrack(), 0.3)
+        if away is None or away > AT_HAND:
+            return False
+        for motion in (self._moving, self._lowering):
+            if motion is not None:
+                motion.cancel()
+        await_rest(self.ctx, self.check)
+        return person_holds(self, {"mass": self.ctx.shared_mass, "load_share": self._needed}) is not False
 
     def _keep(self) -> None:
         """The object stays in the hand: closed again, where it was loosened."""

@@ -14,7 +14,7 @@ from coglab_smach.context.hand_track import HandTrack
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
 from coglab_smach.states.motion import shift, shift_time
-from coglab_smach.states.where import AWAY, from_palm, hand_from_palm, palm_axis
+from coglab_smach.states.where import AT_HAND, AWAY, HandLook, from_palm, hand_from_palm, palm_axis
 from coglab_smach.states.yielding import GivesWay
 
 LOOSE = 40
@@ -24,8 +24,6 @@ AT_END = 250
 FREE, FREE_FOR, GOES = 0.10, 0.2, 1.0
 """m that the person's hand is farther than it was, and s for which it is, when none of its fingers is at the object; s
 in which it has to go so far"""
-AT_HAND = 0.3
-"""m from the palm in which a person's hand may reach what is in it"""
 DRAWING_BACK = 2.0
 """s that drawing back may take beyond what limits and speed scale ask for"""
 
@@ -124,12 +122,15 @@ class HandClose(CoglabState):
         # From here on the hand may hold: a failure in the middle must not make the recovery drop the object.
         self.ctx.holding, self.ctx.shared = ud.object_id, self.from_person
         self.ctx.firm = int(ud.grasp["hand"].get("firm", 0)) if self.from_person else 0
-        closing = self.ctx.closing or self.ctx.hand.close_on_object()
-        self.ctx.closing = None
+        closing, self.ctx.closing = self.ctx.closing or self.ctx.hand.close_on_object(), None
         if self.from_person:
-            self.ctx.giver = HandTrack()
-            ud.hand_distance = self._before = from_palm(self, self.ctx.giver)
-            self._give_way(closing)
+            track = self.ctx.hand_track = self.ctx.hand_track or HandTrack()
+            try:
+                ud.hand_distance = self._before = from_palm(self, track)
+                self._give_way(closing, HandLook(self.ctx, track))
+            except (Interrupted, TimeLimit):
+                closing.cancel()
+                raise
         self.await_pending(closing, "closing of the hand", code=HAND)
         self.ctx.journal.mark("closed")
         end = self.ctx.clock.now() + float(self.ctx.config.get("hand.settle_after_close", 0.3))
@@ -156,26 +157,23 @@ class HandClose(CoglabState):
         """Whether the fingers stand around the object; or the person has gone, so that opening would let it fall."""
         if stopped_by_object(mode, positions):
             return True
-        gone = AWAY if self._before is None else self._before + float(self.ctx.config.get("hand.let_go", 0.04))
-        away = hand_from_palm(self)
-        # A hand that nobody sees may have gone, too.
+        let_go = float(self.ctx.config.get("hand.let_go", 0.04))
+        gone = AT_HAND if self._before is None else min(AT_HAND, self._before + let_go)
+        away = from_palm(self, self.ctx.hand_track or HandTrack(), 0.3)
+        # A hand that nobody sees may have gone, too, and so may one for which another one is seen.
         return away is None or away > gone
 
-    def _give_way(self, closing: Pending) -> None:
+    def _give_way(self, closing: Pending, hand: HandLook) -> None:
         """Until the fingers have closed."""
         way = GivesWay(self.ctx)
 
         def closed() -> bool:
             way.follow()
-            if self.ctx.giver is not None:
-                from_palm(self, self.ctx.giver)
+            hand.look()
             return closing.done()
 
         try:
             self.wait_for(closed, "closing of the hand", code=HAND)
-        except (Interrupted, TimeLimit):
-            closing.cancel()
-            raise
         finally:
             way.stop()
 
@@ -185,9 +183,9 @@ class HandTighten(CoglabState):
     at the wire speed, and with it the force, of ``hand.tighten`` for the grasp's level (Context.firm).
 
     The arm need not wait until the hand is sure that they stand: they press within ``hand.settle_after_close`` s.
-    Nobody's fingers may be there: the person's hand has to be seen FREE m farther than it was for FREE_FOR s, which no
-    hand that was taken for another is. Where it was not seen to go it is held firmly ``at_home``, if no hand is seen
-    near the palm there."""
+    Nobody's fingers may be there: the person's hand has to be seen all the way until it is FREE m farther than it was,
+    and so for FREE_FOR s, which no hand that was taken for another is. Where it was not seen to go it is held firmly
+    ``at_home``, if no hand is seen near the palm there."""
 
     default_time_limit = 5.0
 
@@ -224,9 +222,9 @@ class HandTighten(CoglabState):
     def _is_free(self, before: float | None) -> bool:
         """Whether the person's hand, which was ``before`` m from the palm, is seen away from the object."""
         free, since = AWAY if before is None else before + FREE, None
-        end, hand = self.ctx.clock.now() + GOES, self.ctx.giver or HandTrack()
+        end, hand = self.ctx.clock.now() + GOES, self.ctx.hand_track or HandTrack()
         while self.ctx.clock.now() < end:
-            if (from_palm(self, hand) or 0.0) <= free:
+            if (from_palm(self, hand) or 0.0) <= free or not hand.is_sure:
                 since = None
             else:
                 since = self.ctx.clock.now() if since is None else since

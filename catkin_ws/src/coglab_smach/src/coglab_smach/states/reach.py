@@ -11,13 +11,14 @@ from coglab_msgs.msg import ReasonCode
 
 from coglab_smach.context.awaited import ARM, CONTACT, HAND, PERSON
 from coglab_smach.context.context import Context
+from coglab_smach.context.hand_track import HandTrack
 from coglab_smach.kinematics.motion_time import reach_time
 from coglab_smach.ports.interfaces import ContactEvent, DmpRequest
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
 from coglab_smach.states.motion import shift, shift_time
 from coglab_smach.states.reach_watch import LEFT, LOWERED, OUTSIDE, PersonsGrip, ReachWatch, target_of
-from coglab_smach.states.where import off_grasp, palm_axis
+from coglab_smach.states.where import HandLook, off_grasp, palm_axis
 
 BUMPS = 2
 """touches of something else after which the arm still comes again"""
@@ -31,8 +32,9 @@ BETWEEN = 0.01
 """m off the last of the way, at most, for an object that is seen between the fingers"""
 NEWS = 0.02
 """s after which the arm tells of a motion that has begun"""
-SLIDING = 0.6
-"""s for which the hand goes on at most, at full speed scale"""
+CAUGHT = 1.0
+"""s in which fingers that have begun to close on the way stand"""
+SLIDING = 0.6  # s for which the hand goes on at most, at full speed scale
 
 
 def dmp_request(goal: dict[str, Any], primitive: str | None = None, ratio: float | None = None) -> DmpRequest:
@@ -109,18 +111,22 @@ class WaitStop(CoglabState):
         """s, when the hand was first at its place"""
         self._deeper = False
         """it has gone on from there"""
+        self._watches = self._caught = False
+        """for a contact; and the fingers have closed around something while the arm paused"""
+        self._looks: HandLook | None = None
+        """at the person's hand, once the fingers have begun to close"""
         self._hand: dict[str, Any] = {}
         """of the grasp, as the object's entry has it"""
 
     def run(self, ud: Any) -> str:
-        self._left = self._deeper = False
-        self.ctx.closing = self.ctx.giver = self._arrived = None
+        self._left = self._deeper = self._watches = self._caught = False
+        self.ctx.closing = self.ctx.hand_track = self._looks = self._arrived = None
         target = target_of(ud.goal) if self.trigger == "contact" else ""
         self._grip = PersonsGrip(self, target) if target else None
         self._watched = ReachWatch(self, ud.goal, self._grip) if self.trigger and "watch" in ud.goal else None
         if self.trigger == "contact":
             self.ctx.closing_firm = int(ud.grasp["hand"].get("firm", 0))
-            self.ctx.closing_mass = float(ud.object_entry.get("mass", 0.0))
+            self.ctx.shared_mass = float(ud.object_entry.get("mass", 0.0))
             self._hand = ud.grasp["hand"]
             try:
                 return self._await_contact(ud)
@@ -143,11 +149,9 @@ class WaitStop(CoglabState):
         for left in reversed(range(BUMPS + 1)):
             self._await_reach(lambda: self._reached() or 0.0 < arm.dmp_progress().remaining_distance < within)
             self._watch(ud)
-            away = off_grasp(self, ud.goal)
+            away, event = off_grasp(self, ud.goal), self.ctx.contact.event()
             if away is None or away < float(self.ctx.config.get("contact_near", 0.09)):
-                event = self.ctx.contact.event()
-                assert event is not None
-                if away is not None and away > SEATED and event.margin < FIRM:
+                if event is not None and away is not None and away > SEATED and event.margin < FIRM:
                     self._slide_in(ud)
                 return self._found(event)
             self.ctx.journal.mark("bumped")
@@ -190,10 +194,11 @@ class WaitStop(CoglabState):
 
     def _open_again(self) -> None:
         """Fingers that have begun to close: with them the arm would come as a fist."""
+        self._caught = False
         if self.ctx.closing is None:
             return
         self.ctx.closing.cancel()
-        self.ctx.closing = None
+        self.ctx.closing = self.ctx.hand_track = self._looks = None
         opening = self.ctx.hand.preshape(self._hand["mode"], self._hand["level"])
         self.await_pending(opening, "the hand's opening", 5.0, code=HAND)
         self.ctx.shared = False
@@ -223,9 +228,23 @@ class WaitStop(CoglabState):
             if error.code != ReasonCode.TIME_LIMIT:
                 raise
             raise TimeLimit("the reach was given up", (why,), code) from None
+        if self._watches and self.ctx.contact.event() is not None:
+            return  # an object has come into the hand that stands
+        self._caught = self._has_caught()
+        if self._caught:
+            return
         self._open_again()
         watch.forgive()
         self._begin_again(watch.goal_now())
+
+    def _has_caught(self) -> bool:
+        """Whether fingers that have begun to close hold something: they open for nobody who is merely seen."""
+        if self.ctx.closing is None:
+            return False
+        end = self.ctx.clock.now() + CAUGHT
+        while not self.ctx.closing.done() and self.ctx.clock.now() < end:
+            self.pause(NEWS)
+        return self.ctx.hand.state().holding
 
     def _watch(self, ud: Any) -> None:
         """Arm the detector and wait for what it finds; where the arm has arrived and feels nothing, it goes on."""
@@ -234,18 +253,22 @@ class WaitStop(CoglabState):
         self.allow(limit + 5.0)
         arming = self.ctx.contact.arm("contact_in_motion", limit, settings)
         self.await_pending(arming, "arming of the contact detector", 2.0)
+        self._watches = True
         try:
             self.wait_for(partial(self._happened, ud.goal), "contact of an object with the hand", limit, code=CONTACT)
         except TimeLimit as error:
             error.code = error.code if error.code != ReasonCode.TIME_LIMIT else ReasonCode.NO_CONTACT
             raise
         finally:
+            self._watches = False
             self.ctx.contact.disarm()
 
     def _happened(self, goal: dict[str, Any]) -> bool:
-        if self.ctx.contact.event() is not None:
+        if self.ctx.contact.event() is not None or self._caught:
             return True
         self._close_on_the_way(goal)
+        if self._looks is not None:
+            self._looks.look()
         if self._reached():
             now = self.ctx.clock.now()
             self._arrived = now if self._arrived is None else self._arrived
@@ -270,6 +293,8 @@ class WaitStop(CoglabState):
             # From here on the person's object may be in the fingers, whatever becomes of the reach.
             self.ctx.shared, self.ctx.closing_on = True, target_of(goal)
             self.ctx.closing = self.ctx.hand.close_on_object()
+            self.ctx.hand_track = HandTrack()
+            self._looks = HandLook(self.ctx, self.ctx.hand_track)
             self.ctx.journal.mark("closing_on_the_way")
 
     def _go_on(self, goal: dict[str, Any]) -> None:
@@ -305,9 +330,10 @@ class WaitStop(CoglabState):
         finally:
             contact.disarm()
 
-    def _found(self, event: ContactEvent) -> str:
+    def _found(self, event: ContactEvent | None) -> str:
         self.ctx.journal.mark("contact")
-        self.reason = event.message or f"contact by {event.source}, margin {event.margin:.1f}"
+        felt = "the fingers hold it" if event is None else f"contact by {event.source}, margin {event.margin:.1f}"
+        self.reason = (event.message if event is not None else "") or felt
         return "succeeded"
 
     def _await_reach(self, near: Callable[[], bool]) -> None:

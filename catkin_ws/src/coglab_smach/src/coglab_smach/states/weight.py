@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
 from coglab_msgs.msg import ReasonCode, Say
 
 from coglab_smach.context.awaited import PERSON
@@ -13,10 +12,9 @@ from coglab_smach.context.context import Context
 from coglab_smach.context.hand_track import HandTrack
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.base import CoglabState, TimeLimit
-from coglab_smach.states.hand import AT_HAND
 from coglab_smach.states.held import HeldObject
 from coglab_smach.states.motion import rise
-from coglab_smach.states.where import AWAY, from_palm, palm_at, person_at, seen_at
+from coglab_smach.states.where import AT_HAND, AWAY, from_palm, hand_name, palm_at, sight_of
 from coglab_smach.states.yielding import LEAST_WAY, GivesWay
 
 MOST_RISES = 8
@@ -28,24 +26,28 @@ UNSEEN = 0.4
 """s from the going of the person's hand on after which an object that nobody sees has stayed in the fingers"""
 WITH_HAND = 0.2
 """m between the person's hand and an object that they have taken along, at most"""
+FALLS, RECENT = 0.4, 0.15
+"""s after which what falls is far below where it was lost, and how old (s) a sight may be that tells so"""
 SINKING, SETTLES = 3.0, 0.3
 """s in which it shows whether the person holds what the arm sinks with, and before that, for the torques at rest"""
 
 
-def person_holds(state: CoglabState, settings: dict[str, Any]) -> bool:
+def person_holds(state: CoglabState, settings: dict[str, Any]) -> bool | None:
     """Whether the person does: their hand carries the object where the arm sinks with it, by as much as it rises at
-    most. A hand that merely is there takes no weight; who let go while the fingers closed gave none before.
-    ``settings``: mass (kg) and load_share of the object. Only with controller 'ptp', and an arm that stands."""
+    most. A hand that merely is there takes no weight; who let go while the fingers closed gave none before. None where
+    it cannot be felt. ``settings``: mass (kg) and load_share of the object. Only with controller 'ptp', and an arm that
+    stands."""
     contact, config = state.ctx.contact, state.ctx.config
     state.allow(SINKING + 8.0)
     sinking: Pending | None = None
     try:
-        state.await_pending(contact.arm("release", SINKING, settings), "arming of the contact detector", 2.0)
+        state.await_pending(contact.arm("release", SINKING + 2.0, settings), "arming of the contact detector", 2.0)
         state.pause(SETTLES)
         sinking = rise(state.ctx, -float(config.get("hand.lift", 0.03)), float(config.get("give.lower_speed", 0.03)))
         state.wait_for(lambda: contact.event() is not None, "the person's holding of it", SINKING, code=PERSON)
     except PortError:
-        return False
+        # A detector that is dead, or that nobody tells anything, finds nobody either.
+        return None if sinking is None or contact.share_gone() is None else False
     finally:
         contact.disarm()
         if sinking is not None:
@@ -61,11 +63,12 @@ class TakeWeight(CoglabState):
     that it is carried, is told so, and an arm that went on would draw gentle fingers along what is still held. But the
     weight is counted from the closing of the fingers, when a person often still presses the object up or down: where
     they hold on for ``hand.lift_pause`` s all the same, the arm rises on by ``hand.lift_step`` m, again and again.
-    ``hand_distance``: m, of the person's hand from the palm before the fingers closed; None where no tracker saw it,
-    and then it counts from where the hand is seen at the object first. While it is seen nowhere the weight has to have
-    come by the end of the whole rise, or the hand to be seen AWAY. A hand that goes has let go where the object stays:
-    who pulls it out of gentle fingers has taken it back. Where the tracker has lost the hand, or taken
-    another one for it (HandTrack), the person may have gone: nothing is opened, the arm stays and says so.
+    ``hand_distance``: m, of the person's hand from the palm before the fingers closed; None where no tracker saw it.
+    Where it was not at the object, the hand counts from where it is seen there first. While it is seen nowhere the
+    weight has to have come by the end of the whole rise; and it has to have come, too, where the hand was hidden on its
+    way, since another one may be seen now. A hand that goes has let go where the object stays: who pulls it out of
+    gentle fingers has taken it back. Where the tracker has lost the hand, or taken another one for it (HandTrack), the
+    person may have gone: nothing is opened, the arm stays and says so.
 
     The palm goes along with who pulls (GivesWay), and the rise goes on afterwards. The fingers close again and again
     (``give.close_speed``, the lowest force).
@@ -97,7 +100,7 @@ class TakeWeight(CoglabState):
     def run(self, ud: Any) -> str:
         limit, contact = float(self.ctx.config.get("hand.load_timeout", 5.0)), self.ctx.contact
         end = self.ctx.clock.now() + limit
-        self._hand, self._held = self.ctx.giver or HandTrack(), HeldObject(self.ctx, ud.object_id)
+        self._hand, self._held = self.ctx.hand_track or HandTrack(), HeldObject(self.ctx, ud.object_id)
         self._farther = self._gone = None
         self._count_from(ud.hand_distance)
         settings = {
@@ -115,7 +118,8 @@ class TakeWeight(CoglabState):
         except TimeLimit as error:
             if error.code != ReasonCode.TIME_LIMIT:
                 raise
-            raise self._not_released(ud.object_id, limit, error, settings) from None
+            if not self._is_left(settings):
+                raise self._not_released(ud.object_id, limit, error, settings) from None
         except PortError as error:
             raise self._taken_back(ud.object_id, error) from None
         finally:
@@ -131,8 +135,9 @@ class TakeWeight(CoglabState):
         return "succeeded"
 
     def _count_from(self, distance: float | None) -> None:
-        """The person's hand was seen so far from the palm (m) at the object."""
-        if distance is not None:
+        """The person's hand was seen so far from the palm (m). One that is not at the object has left it already, or is
+        another one: it says nothing."""
+        if distance is not None and distance <= AT_HAND:
             self._farther = distance + float(self.ctx.config.get("hand.let_go", 0.04))
 
     def _has_let_go(self) -> bool:
@@ -148,10 +153,10 @@ class TakeWeight(CoglabState):
         # Before and after the look, which waits for a sight.
         self._way.follow()
         away = from_palm(self, self._hand)
-        if self._farther is None and away is not None and away <= AT_HAND:
+        if self._farther is None:
             self._count_from(away)
-        if self._has_gone(away):
-            self._seen_away = True
+        if self._has_gone(away, carried):
+            self._seen_away = self._hand.is_sure
             return True
         self._way.follow()
         if self._farther is None or not carried:
@@ -161,9 +166,11 @@ class TakeWeight(CoglabState):
         self._rise_on()
         return False
 
-    def _has_gone(self, away: float | None) -> bool:
-        """Whether the person's hand, ``away`` m from the palm, has left the object, and the object has stayed."""
-        if away is None or away <= (AWAY if self._farther is None else self._farther):
+    def _has_gone(self, away: float | None, carried: bool) -> bool:
+        """Whether the person's hand, ``away`` m from the palm, has left the object, and the object has stayed. A hand
+        that was not seen all the way may be another one: then its weight has to be ``carried``, too."""
+        gone = away is not None and away > (AWAY if self._farther is None else self._farther)
+        if away is None or not gone or not (carried or self._hand.is_sure):
             self._gone = None
             return False
         now = self.ctx.clock.now()
@@ -214,17 +221,26 @@ class TakeWeight(CoglabState):
     def _taken_back(self, object_id: str, error: PortError) -> PortError:
         """The failure, where the object has left the hand with the person's."""
         if error.code == ReasonCode.OBJECT_NOT_SEEN and not self.ctx.holding:
-            hand, thing = person_at(self), seen_at(self, object_id)
-            if hand is not None and thing is not None and float(np.linalg.norm(hand - thing)) < WITH_HAND:
+            self._way.stop()
+            self.pause(FALLS)
+            hand, thing = sight_of(self, hand_name(self.ctx)), sight_of(self, object_id)
+            if hand is None or thing is None or max(hand.age, thing.age) > RECENT:
+                return error
+            if math.dist(hand.xyz, thing.xyz) < WITH_HAND:
                 causes = (error.sentence, *error.causes)
                 return PortError(f"the person took '{object_id}' back", causes, ReasonCode.GOAL_WITHDRAWN)
         return error
 
+    def _is_left(self, settings: dict[str, Any]) -> bool:
+        """Whether a hand is seen elsewhere that may be the person's, and nobody holds the object."""
+        self._way.stop()
+        away = from_palm(self, self._hand)
+        return away is not None and away > AWAY and person_holds(self, settings) is False
+
     def _not_released(self, object_id: str, limit: float, error: TimeLimit, settings: dict[str, Any]) -> PortError:
         """The failure, and who has the object then: the person who holds it, else the robot, which opens nothing."""
         causes: tuple[str, ...] = (error.sentence,)
-        loaded, away = self.ctx.contact.event() is not None, from_palm(self, self._hand)
-        self._way.stop()
+        loaded, away = self.ctx.journal.marked("loaded"), from_palm(self, self._hand)
         if away is not None and away <= AT_HAND and person_holds(self, settings):
             self.ctx.holding = ""
         else:

@@ -14,11 +14,13 @@ from coglab_smach.context.context import Context
 from coglab_smach.context.hand_track import JUMP, HandTrack, Sight
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.interfaces import Located
-from coglab_smach.ports.pending import PortError
+from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.base import CoglabState
 
 NEARER = 0.02
 """m by which what a person has missed is brought nearer than it was offered"""
+AT_HAND = 0.3
+"""m from the palm in which a person's hand may reach what is in it"""
 AWAY = 0.5
 """m from the palm: a person's hand that is seen there holds nothing that is in the robot's"""
 GLANCE = 0.05
@@ -107,15 +109,45 @@ def jumped_from(last: Sight | None, now: float, place: np.ndarray) -> tuple[bool
     return False, (now, place)
 
 
-def from_palm(state: CoglabState, track: HandTrack) -> float | None:
-    """m from the hand that is followed to the palm, by one more sight; None where that is not known, or where the sight
-    is another hand's."""
-    seen, palm = sight_of(state, hand_name(state.ctx), GLANCE), palm_at(state.ctx)
+class HandLook:
+    """Follows the person's hand from sight to sight, without waiting for one."""
+
+    def __init__(self, ctx: Context, track: HandTrack) -> None:
+        self._ctx, self._track = ctx, track
+        self._sight: Pending | None = None
+
+    def look(self) -> None:
+        """Call it again and again."""
+        if self._sight is None:
+            self._sight = self._ctx.perception.locate_object(hand_name(self._ctx), GLANCE)
+        if not self._sight.done():
+            return
+        sight, self._sight = self._sight, None
+        try:
+            seen: Located = sight.result()
+        except PortError:
+            return
+        palm = palm_at(self._ctx)
+        if seen.age <= OLDEST and palm is not None:
+            _follow(self._ctx, self._track, seen, palm)
+
+
+def _follow(ctx: Context, track: HandTrack, seen: Located, palm: np.ndarray) -> float:
+    """m from the hand to the palm."""
+    place = np.array(seen.xyz)
+    away = float(np.linalg.norm(place - palm))
+    track.follow(ctx.clock.now() - seen.age, place, away <= AT_HAND)
+    return away
+
+
+def from_palm(state: CoglabState, track: HandTrack, limit: float = GLANCE) -> float | None:
+    """m from the hand that is followed to the palm, by one more sight within ``limit`` s; None where that is not known,
+    or where the sight is another hand's."""
+    seen, palm = sight_of(state, hand_name(state.ctx), limit), palm_at(state.ctx)
     if seen is None or palm is None:
         return None
-    place = np.array(seen.xyz)
-    track.follow(state.ctx.clock.now() - seen.age, place)
-    return float(np.linalg.norm(place - palm)) if track.is_one else None
+    away = _follow(state.ctx, track, seen, palm)
+    return away if track.is_one else None
 
 
 def way_to_hand(state: CoglabState, object_id: str, delivery: Mapping[str, Any]) -> np.ndarray | None:

@@ -1,0 +1,290 @@
+"""Two hands in reach: which one counts, and that another one frees nothing and makes no finger close firmly."""
+
+import numpy as np
+import pytest
+from coglab_msgs.msg import ReasonCode
+from coglab_py.pose import Pose
+from coglab_smach.clocks.virtual_clock import using
+from coglab_smach.context.hand_track import HandTrack
+from coglab_smach.kinematics.reachability import default_arm
+from coglab_smach.ports.pending import Polled, PortError, Ready
+from coglab_smach.states import reach, reach_watch
+from coglab_smach.states.weight import person_holds
+from conftest import Trial
+from test_giving import WEIGHT, giving
+from test_weight_and_recovery import Lifted
+
+RECEIVE = "exchange_human_to_robot"
+FRAME = 1.0 / 30.0
+HERE, THERE = np.array([0.9, 0.0, 0.4]), np.array([0.9, 0.45, 0.4])
+
+
+def palm_of(trial):
+    """m."""
+    return default_arm().fk(np.asarray(trial.cell.arm.position()))[0]
+
+
+def follow(track, frames, place, near=True):
+    for k in frames:
+        track.follow(k * FRAME, place, near)
+
+
+def receive(trial, moment, then, limit=60.0):
+    """Ask for the mug and call ``then`` once ``moment`` has come; the action's record."""
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        before = len(t.ctx.journal.results)
+        t.start(RECEIVE)
+        t.until(lambda: moment(t))
+        then(t)
+        t.until(lambda: len(t.ctx.journal.results) > before, limit)
+
+    trial.run(script)
+    return trial.result()
+
+
+def test_a_hand_that_comes_out_elsewhere_may_be_another_one():
+    track = HandTrack()
+    follow(track, range(10), HERE)
+    assert track.is_one and track.is_sure
+    follow(track, range(17, 40), THERE, near=False)
+    assert track.is_one and not track.is_sure, "no hand is too slow for that, and nobody saw it go"
+    follow(track, range(40, 60), THERE + [0.0, 0.1, 0.0])
+    assert not track.is_sure, "it stays unsure wherever it goes"
+    follow(track, range(70, 72), HERE + [0.0, 0.05, 0.0])
+    assert track.is_sure, "back where it was"
+
+
+def test_a_hand_that_is_seen_all_the_way_is_sure_however_far_it_goes():
+    track = HandTrack()
+    for k in range(60):
+        track.follow(k * FRAME, HERE + [1.2 * k * FRAME, 0.0, 0.0], k < 5)
+        assert track.is_sure
+
+
+def test_a_hand_that_was_never_seen_at_the_object_is_not_sure():
+    track = HandTrack()
+    follow(track, range(10), THERE, near=False)
+    assert track.is_one and not track.is_sure
+    follow(track, range(10, 12), HERE)
+    assert not track.is_one, "another one"
+    follow(track, range(20, 22), THERE, near=True)
+    assert track.is_one and track.is_sure
+
+
+@pytest.mark.parametrize("swap", [0.13, 0.22, 0.25, 0.4])
+def test_a_hand_counts_again_where_it_was_though_a_sight_was_lost_between(swap):
+    track = HandTrack()
+    follow(track, range(10), HERE)
+    follow(track, range(10, 14), HERE + [0.0, swap, 0.0])
+    assert not track.is_sure or not track.is_one
+    follow(track, range(15, 17), HERE)
+    assert track.is_one and track.is_sure
+
+
+def test_a_hand_counts_again_where_it_was_though_another_one_came_out_first():
+    track = HandTrack()
+    follow(track, range(10), HERE)
+    follow(track, range(20, 24), HERE + [0.0, 0.13, 0.0])
+    assert track.is_one and not track.is_sure, "it was hidden, and may have gone there"
+    follow(track, range(24, 26), HERE)
+    assert track.is_one and track.is_sure
+
+
+def test_nothing_is_closed_firmly_where_another_hand_comes_into_view_while_the_person_holds_on():
+    trial, firm = Trial(), []
+    close = trial.ctx.hand.close
+    trial.ctx.hand.close = lambda speed: (firm.append(speed) if speed > 60 else None) or close(speed)
+    trial.cell.partner.let_go_after = trial.cell.partner.take_after = None
+
+    def other_hand(t):
+        t.clock.sleep(0.2)
+        t.cell.faults.not_seen.add("human_hand")
+        t.clock.sleep(0.3)
+        t.cell.objects["human_hand"] = Pose(np.asarray(t.cell.objects["human_hand"].position) + [0.1, 0.5, 0.0])
+        t.cell.faults.not_seen.discard("human_hand")
+        t.clock.sleep(4.0)
+        assert not firm and not t.ctx.journal.marked("released")
+        t.cell.partner.take_after = 0.5  # the arm sinks, and they hold it
+
+    result = receive(trial, lambda t: "arm lift" in t.cell.called(), other_hand)
+    assert (result.outcome, result.code) == ("stopped", ReasonCode.NOT_RELEASED) and not firm
+
+
+@pytest.mark.parametrize("weight", [True, False])
+def test_a_hand_that_was_hidden_as_it_went_has_let_go_where_the_weight_has_come(weight):
+    trial = Trial()
+    trial.cell.partner.let_go_after = trial.cell.partner.take_after = None
+
+    def goes_hidden(t):
+        t.cell.faults.not_seen.add("human_hand")
+        t.clock.sleep(0.5)
+        t.cell.objects["human_hand"] = Pose(palm_of(t) + [0.45, 0.0, 0.0])
+        t.cell.faults.not_seen.discard("human_hand")
+        t.clock.sleep(0.3)
+        if weight:
+            t.cell.push(-WEIGHT)
+
+    result = receive(trial, lambda t: "arm lift" in t.cell.called(), goes_hidden)
+    assert result.outcome == ("succeeded" if weight else "stopped"), result
+
+
+@pytest.mark.parametrize("away", [0.35, 0.45, 0.55])
+def test_who_has_let_go_before_the_fingers_close_is_not_waited_for(monkeypatch, away):
+    trial = Trial()
+    trial.cell.partner.let_go_after, trial.cell.let_go = None, lambda: None
+    monkeypatch.setattr(reach, "off_grasp", lambda state, goal: 0.02)
+
+    def goes(t):
+        t.cell._goes = t.clock.now(), palm_of(t) + [away, 0.0, 0.0]
+        t.cell.bring = lambda object_id, palm: setattr(t.cell, "at_palm", (object_id, palm))
+        t.until(lambda: "arm lift" in t.cell.called())
+        t.clock.sleep(0.15)
+        t.cell.push(-WEIGHT)
+
+    result = receive(trial, lambda t: t.ctx.journal.marked("closing_on_the_way"), goes)
+    assert result.outcome == "succeeded", result
+
+
+@pytest.mark.parametrize("at", [0.0, 0.02, 0.04])
+def test_stop_ends_the_closing_while_the_person_is_first_looked_at(at):
+    trial, begun, cancelled = Trial(), [], []
+    trial.ctx.hand.close_on_object = lambda: (
+        begun.append(1) or Polled(lambda: False, lambda: None, lambda: cancelled.append(1))
+    )
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.start(RECEIVE)
+        t.until(lambda: begun)
+        t.clock.sleep(at)
+        t.ctx.stop.press("a finger is in it")
+        t.wait_hub("stopped")
+
+    trial.run(script)
+    assert begun and cancelled
+
+
+@pytest.mark.parametrize("touched", [False, True])
+def test_fingers_that_have_caught_something_open_for_no_glimpse_of_it(monkeypatch, touched):
+    """The person has let go at the first touch, and what is in the robot's fingers is seen again after a pause."""
+    trial, opened = Trial(), []
+    monkeypatch.setattr(reach, "off_grasp", lambda state, goal: 0.02)
+    init = reach_watch.ReachWatch.__init__
+
+    def believed(self, *given):
+        init(self, *given)
+        self._began_on_belief = True
+
+    monkeypatch.setattr(reach_watch.ReachWatch, "__init__", believed)
+    trial.cell.partner.touch_after, trial.cell.partner.take_after = (1.2 if touched else None), None
+    preshape = trial.ctx.hand.preshape
+
+    def watched(mode, level):
+        opened.extend([mode] if trial.cell.at_palm is not None else [])
+        return preshape(mode, level)
+
+    trial.ctx.hand.preshape = watched
+
+    def lets_go(t):
+        # It stays where it was offered, within the region.
+        t.cell.at_palm = ("mug", t.cell.objects["mug"].inverse() * Pose(*default_arm().fk(t.cell.arm.position())))
+        t.cell._goes = t.clock.now(), np.array([1.6, 0.0, 0.4])
+        t.cell.faults.not_seen.add("mug")
+        t.clock.sleep(1.5)
+        t.cell.faults.not_seen.discard("mug")
+
+    result = receive(trial, lambda t: t.ctx.journal.marked("closing_on_the_way"), lets_go)
+    assert "paused" in result.marks and not opened, result
+    assert "contact" in result.marks, "what the fingers hold has come into the hand, felt or not"
+
+
+def test_another_hand_does_not_free_what_was_caught_on_the_way(monkeypatch):
+    trial = Trial()
+    monkeypatch.setattr(reach, "off_grasp", lambda state, goal: 0.02)
+    trial.cell.partner.touch_after = None
+
+    def jumps(t):
+        t.cell.bring("mug", Pose([-0.05, 0.0, 0.0]))
+        t.clock.sleep(0.5)
+        t.cell.objects["human_hand"] = Pose(palm_of(t) + [0.2, 0.62, 0.0])
+        t.cell.arm.end("goal lost", ReasonCode.GOAL_LOST)
+
+    result = receive(trial, lambda t: t.ctx.journal.marked("closing_on_the_way"), jumps)
+    assert result.outcome == "stopped" and trial.ctx.shared and not trial.cell.called("open")
+
+
+def test_another_hand_does_not_send_the_arm_away_with_what_the_taker_holds():
+    def script(t):
+        t.cell._goes = t.clock.now(), palm_of(t) + [0.1, 0.0, 0.0]
+        t.clock.sleep(0.5)
+        t.cell.push(0.45 * WEIGHT)
+        t.clock.sleep(1.0)
+        assert t.ctx.shared
+        t.cell.objects["human_hand"] = Pose(palm_of(t) + [0.2, 0.62, 0.0])
+        t.wait_hub("stopped")
+
+    assert giving(script).result().outcome == "stopped"
+
+
+@pytest.mark.parametrize(("near", "holds"), [(True, True), (True, False), (False, True)])
+def test_who_may_hold_a_light_object_is_felt_before_the_arm_goes(near, holds):
+    """Their share is not sure to be felt while the arm stands."""
+
+    def script(t):
+        t.cell.partner.take_after = None
+        t.cell._goes = t.clock.now(), palm_of(t) + [0.1 if near else 0.9, 0.0, 0.0]
+        t.clock.sleep(6.0)
+        t.cell.partner.take_after = 0.5 if holds else None
+        t.until(lambda: t.ctx.requests.hub() in ("stopped", "wait_with_object"), 60.0)
+
+    result = giving(script, **{"give.near": 0.01}).result()
+    assert result.outcome == ("stopped" if near and holds else "failed_holding")
+
+
+@pytest.mark.parametrize("trouble", ["refuses", "silent", ""])
+def test_what_cannot_be_felt_is_not_taken_for_nobodys(monkeypatch, trouble):
+    lifted = Lifted(monkeypatch)
+    lifted.state._deadline, contact = 1e9, lifted.ctx.contact
+    contact.share_gone = lambda: None if trouble == "silent" else 0.0
+    if trouble == "refuses":
+        contact.arm = lambda *_: Ready(error=PortError("no torques come"))
+    with using(lifted.trial.clock):
+        assert person_holds(lifted.state, {"mass": 0.31, "load_share": 0.5}) is (None if trouble else False)
+
+
+@pytest.mark.parametrize("perception", ["seen", "silent"])
+def test_a_pull_while_the_fingers_close_waits_for_no_sight(perception):
+    trial, took = Trial(), []
+    trial.cell.partner.let_go_after = None
+
+    def pulls(t):
+        t.clock.sleep(0.3)
+        if perception == "silent":
+            t.cell.faults.dead.add("perception")
+        t.clock.sleep(0.1)
+        t.cell.pulled, begun = (12.0, 0.0, 0.0), t.clock.now()
+        t.until(lambda: t.ctx.journal.marked("gave_way"))
+        took.append(t.clock.now() - begun)
+        t.ctx.stop.press("enough")
+
+    receive(trial, lambda t: t.ctx.journal.marked("closing"), pulls)
+    assert took[0] < 0.1
+
+
+def test_what_falls_out_beside_the_persons_hand_was_not_taken_back():
+    trial = Trial()
+    trial.cell.partner.let_go_after = None
+
+    def falls(t):
+        t.clock.sleep(0.3)
+        start, begun = np.asarray(t.cell.pose("mug").position), t.clock.now()
+        t.cell.at_palm, t.cell.hand_positions = None, (200, 254, 254, 254, 254)
+        while t.ctx.requests.hub() == "" and t.clock.now() < begun + 5.0:
+            drop = 4.9 * (t.clock.now() - begun) ** 2
+            t.cell.objects["mug"] = Pose([start[0], start[1], max(-0.4, start[2] - drop)])
+            t.clock.sleep(0.01)
+
+    result = receive(trial, lambda t: "arm lift" in t.cell.called(), falls)
+    assert (result.outcome, result.code) == ("failed_empty", ReasonCode.OBJECT_NOT_SEEN), result
