@@ -92,6 +92,15 @@ def test_a_hand_counts_again_where_it_was_though_another_one_came_out_first():
     assert track.is_one and track.is_sure
 
 
+def test_a_hand_that_goes_counts_again_though_another_one_was_taken_for_it_on_the_way():
+    track = HandTrack()
+    follow(track, range(10), HERE)
+    follow(track, range(13, 16), HERE - [0.15, 0.0, 0.0], near=True)
+    assert track.is_one and not track.is_sure
+    follow(track, range(16, 20), HERE + [0.25, 0.0, 0.0], near=False)
+    assert track.is_one and not track.is_sure, "from where it was sure last it may have come there"
+
+
 def test_nothing_is_closed_firmly_where_another_hand_comes_into_view_while_the_person_holds_on():
     trial, firm = Trial(), []
     close = trial.ctx.hand.close

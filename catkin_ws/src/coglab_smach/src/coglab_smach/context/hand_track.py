@@ -27,28 +27,29 @@ class HandTrack:
         self._newest: Sight | None = None
         self._last: Sight | None = None
         """the newest one of that hand"""
-        self._sure: np.ndarray | None = None
-        """m, where it was seen last as long as that was sure"""
+        self._sure: Sight | None = None
+        """the newest one as long as that was sure"""
 
     def follow(self, at: float, place: np.ndarray, at_object: bool = True) -> None:
         """A sight that was taken at ``at`` (s), at ``place`` (m), where it may reach the object."""
-        before, last = self._newest, self._last
+        before, sure = self._newest, self._sure
         at = at if before is None else max(at, before[0])
         self._newest = at, place
         jumped = before is not None and _too_far(before, at, place)
-        if self.is_one:
-            self.is_one = not jumped
-        elif last is not None:
-            self.is_one = _far(place, last[1]) <= PLACE or (jumped and not _too_far(last, at, place))
-        # Where it was sure last it is itself again, whatever was taken for it between.
-        self.is_one = self.is_one or (self._sure is not None and _far(place, self._sure) <= PLACE)
+        if jumped or not self.is_one:
+            # It may go on from where it was sure last, whatever was taken for it between.
+            self.is_one = any(
+                _far(place, each[1]) <= PLACE or (jumped and not _too_far(each, at, place))
+                for each in (self._last, sure)
+                if each is not None
+            )
         if self.is_one:
             self._last = at, place
-            if self._sure is None:
+            if sure is None:
                 self.is_sure = at_object
             else:
-                self.is_sure = _far(place, self._sure) <= (JUMP if self.is_sure else PLACE)
-            self._sure = place if self.is_sure else self._sure
+                self.is_sure = _far(place, sure[1]) <= (JUMP if self.is_sure else PLACE)
+            self._sure = self._last if self.is_sure else sure
 
 
 def _far(place: np.ndarray, other: np.ndarray) -> float:
