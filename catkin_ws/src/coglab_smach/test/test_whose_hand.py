@@ -1,5 +1,7 @@
 """Two hands in reach: which one counts, and that another one frees nothing and makes no finger close firmly."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
@@ -8,7 +10,7 @@ from coglab_smach.clocks.virtual_clock import using
 from coglab_smach.context.hand_track import HandTrack
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.pending import Polled, PortError, Ready
-from coglab_smach.states import reach, reach_watch
+from coglab_smach.states import reach, reach_watch, weight
 from coglab_smach.states.weight import person_holds
 from conftest import Trial
 from test_giving import WEIGHT, giving
@@ -175,10 +177,24 @@ def test_stop_ends_the_closing_while_the_person_is_first_looked_at(at):
     assert begun and cancelled
 
 
-@pytest.mark.parametrize("touched", [False, True])
-def test_fingers_that_have_caught_something_open_for_no_glimpse_of_it(monkeypatch, touched):
+def tells_late(hand, clock, late):
+    """The hand tells so late (s) after the order that it holds something."""
+    close, state, ended = hand.close_on_object, hand.state, []
+
+    def closing():
+        order = close()
+        done = lambda: order.done() and (ended or ended.append(clock.now()) or True)  # noqa: E731
+        return Polled(lambda: bool(done()), order.result, order.cancel)
+
+    hand.close_on_object = closing
+    hand.state = lambda: replace(state(), holding=bool(ended) and clock.now() >= ended[0] + late and state().holding)
+
+
+@pytest.mark.parametrize(("touched", "seen_after"), [(False, 1.5), (True, 1.5), (False, 0.6)])
+def test_fingers_that_have_caught_something_open_for_no_glimpse_of_it(monkeypatch, touched, seen_after):
     """The person has let go at the first touch, and what is in the robot's fingers is seen again after a pause."""
     trial, opened = Trial(), []
+    tells_late(trial.ctx.hand, trial.clock, 0.1)
     monkeypatch.setattr(reach, "off_grasp", lambda state, goal: 0.02)
     init = reach_watch.ReachWatch.__init__
 
@@ -201,7 +217,7 @@ def test_fingers_that_have_caught_something_open_for_no_glimpse_of_it(monkeypatc
         t.cell.at_palm = ("mug", t.cell.objects["mug"].inverse() * Pose(*default_arm().fk(t.cell.arm.position())))
         t.cell._goes = t.clock.now(), np.array([1.6, 0.0, 0.4])
         t.cell.faults.not_seen.add("mug")
-        t.clock.sleep(1.5)
+        t.clock.sleep(seen_after)
         t.cell.faults.not_seen.discard("mug")
 
     result = receive(trial, lambda t: t.ctx.journal.marked("closing_on_the_way"), lets_go)
@@ -237,30 +253,60 @@ def test_another_hand_does_not_send_the_arm_away_with_what_the_taker_holds():
     assert giving(script).result().outcome == "stopped"
 
 
-@pytest.mark.parametrize(("near", "holds"), [(True, True), (True, False), (False, True)])
-def test_who_may_hold_a_light_object_is_felt_before_the_arm_goes(near, holds):
+@pytest.mark.parametrize("holds", [True, False])
+@pytest.mark.parametrize("hand", ["near", "hidden", "gone"])
+def test_who_may_hold_a_light_object_is_felt_before_the_arm_goes(hand, holds):
     """Their share is not sure to be felt while the arm stands."""
 
     def script(t):
         t.cell.partner.take_after = None
-        t.cell._goes = t.clock.now(), palm_of(t) + [0.1 if near else 0.9, 0.0, 0.0]
-        t.clock.sleep(6.0)
+        t.cell._goes = t.clock.now(), palm_of(t) + [0.1, 0.0, 0.0]
+        t.clock.sleep(3.0)
+        if hand == "hidden":
+            t.cell.faults.not_seen.add("human_hand")
+        if hand == "gone":
+            t.cell._goes = t.clock.now(), palm_of(t) + [0.9, 0.0, 0.0]
+        t.clock.sleep(3.0)
         t.cell.partner.take_after = 0.5 if holds else None
         t.until(lambda: t.ctx.requests.hub() in ("stopped", "wait_with_object"), 60.0)
 
     result = giving(script, **{"give.near": 0.01}).result()
-    assert result.outcome == ("stopped" if near and holds else "failed_holding")
+    # Who has gone in full view is not felt for, whatever the script says.
+    assert result.outcome == ("stopped" if hand != "gone" and holds else "failed_holding")
 
 
-@pytest.mark.parametrize("trouble", ["refuses", "silent", ""])
+@pytest.mark.parametrize("trouble", ["refuses", "silent", "the arm stands", "the arm is slow", ""])
 def test_what_cannot_be_felt_is_not_taken_for_nobodys(monkeypatch, trouble):
     lifted = Lifted(monkeypatch)
     lifted.state._deadline, contact = 1e9, lifted.ctx.contact
     contact.share_gone = lambda: None if trouble == "silent" else 0.0
     if trouble == "refuses":
         contact.arm = lambda *_: Ready(error=PortError("no torques come"))
+    if trouble.startswith("the arm"):
+        ended = PortError("refused") if trouble == "the arm stands" else None
+        motion = Ready(error=ended) if ended else Polled(lambda: False, lambda: None)
+        monkeypatch.setattr(weight, "rise", lambda *_: motion)
     with using(lifted.trial.clock):
         assert person_holds(lifted.state, {"mass": 0.31, "load_share": 0.5}) is (None if trouble else False)
+
+
+def test_the_sinking_has_as_much_longer_as_the_arm_is_slower(monkeypatch):
+    lifted = Lifted(monkeypatch)
+    lifted.state._deadline, lifted.ctx.contact.share_gone = 1e9, lambda: 0.0
+    lifted.ctx.arm.speed_scale = lambda: 0.2
+    began = lifted.trial.clock.now()
+    monkeypatch.setattr(
+        weight, "rise", lambda *_: Polled(lambda: lifted.trial.clock.now() > began + 10.0, lambda: None)
+    )
+    with using(lifted.trial.clock):
+        assert person_holds(lifted.state, {"mass": 0.31, "load_share": 0.5}) is False
+
+
+@pytest.mark.parametrize("carried", [True, False])
+def test_a_hand_that_goes_in_full_view_while_no_weight_has_come_may_have_left_another_one_there(monkeypatch, carried):
+    lifted = Lifted(monkeypatch, carried=carried)
+    lifted.state._farther, lifted.away = 0.14, 0.31
+    assert lifted.state._has_let_go() and lifted.state._seen_away == carried, "no finger closes firmly before home"
 
 
 @pytest.mark.parametrize("perception", ["seen", "silent"])

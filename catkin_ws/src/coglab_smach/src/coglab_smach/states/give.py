@@ -21,7 +21,7 @@ from coglab_smach.states.loosening_grip import LooseningGrip
 from coglab_smach.states.motion import await_rest, rise, shift
 from coglab_smach.states.reach import WaitStop
 from coglab_smach.states.weight import person_holds
-from coglab_smach.states.where import AT_HAND, HandLook, from_palm, hand_from_palm, way_to_hand
+from coglab_smach.states.where import AWAY, HandLook, from_palm, hand_from_palm, way_to_hand
 
 GRAVITY = 9.81
 ASTRAY = 0.02
@@ -283,9 +283,11 @@ class GiveLoad(CoglabState):
         self._lowering = rise(self.ctx, -self._number("lower", 0.03), self._number("lower_speed", 0.03))
 
     def _may_hold(self, ud: Any) -> bool:
-        """Whether the person does: what they carry of a light object is not sure to be felt while the arm stands."""
-        away = from_palm(self, self.ctx.hand_track or HandTrack(), 0.3)
-        if away is None or away > AT_HAND:
+        """Whether the person does: what they carry of a light object is not sure to be felt while the arm stands. Only
+        a hand that was seen to go away from it holds nothing; one that nobody sees may be at it."""
+        track = self.ctx.hand_track or HandTrack()
+        away = from_palm(self, track, 0.3)
+        if away is not None and away > AWAY and track.is_sure:
             return False
         for motion in (self._moving, self._lowering):
             if motion is not None:

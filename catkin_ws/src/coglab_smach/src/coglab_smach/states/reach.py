@@ -30,8 +30,7 @@ FIRM = 2.5
 """margin of a touch that is more than brushing past"""
 BETWEEN = 0.01
 """m off the last of the way, at most, for an object that is seen between the fingers"""
-NEWS = 0.02
-"""s after which the arm tells of a motion that has begun"""
+NEWS = 0.02  # s after which the arm tells of a motion that has begun
 CAUGHT = 1.0
 """s in which fingers that have begun to close on the way stand"""
 SLIDING = 0.6  # s for which the hand goes on at most, at full speed scale
@@ -242,7 +241,8 @@ class WaitStop(CoglabState):
         if self.ctx.closing is None:
             return False
         end = self.ctx.clock.now() + CAUGHT
-        while not self.ctx.closing.done() and self.ctx.clock.now() < end:
+        # The hand tells that it holds something a moment after its order has ended.
+        while not (self.ctx.closing.done() and self.ctx.hand.state().holding) and self.ctx.clock.now() < end:
             self.pause(NEWS)
         return self.ctx.hand.state().holding
 

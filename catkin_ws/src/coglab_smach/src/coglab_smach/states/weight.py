@@ -27,7 +27,8 @@ UNSEEN = 0.4
 WITH_HAND = 0.2
 """m between the person's hand and an object that they have taken along, at most"""
 FALLS, RECENT = 0.4, 0.15
-"""s after which what falls is far below where it was lost, and how old (s) a sight may be that tells so"""
+"""s after which what falls is far below where it was lost, and for which it is looked for then; and how old (s) a
+sight may be that tells so"""
 SINKING, SETTLES = 3.0, 0.3
 """s in which it shows whether the person holds what the arm sinks with, and before that, for the torques at rest"""
 
@@ -37,21 +38,33 @@ def person_holds(state: CoglabState, settings: dict[str, Any]) -> bool | None:
     most. A hand that merely is there takes no weight; who let go while the fingers closed gave none before. None where
     it cannot be felt. ``settings``: mass (kg) and load_share of the object. Only with controller 'ptp', and an arm that
     stands."""
-    contact, config = state.ctx.contact, state.ctx.config
+    contact, config, pace = state.ctx.contact, state.ctx.config, state.ctx.arm.speed_scale
     state.allow(SINKING + 8.0)
     sinking: Pending | None = None
     try:
-        state.await_pending(contact.arm("release", SINKING + 2.0, settings), "arming of the contact detector", 2.0)
+        watch = SINKING / max(0.1, pace()) + 2.0
+        state.await_pending(contact.arm("release", watch, settings), "arming of the contact detector", 2.0)
         state.pause(SETTLES)
         sinking = rise(state.ctx, -float(config.get("hand.lift", 0.03)), float(config.get("give.lower_speed", 0.03)))
-        state.wait_for(lambda: contact.event() is not None, "the person's holding of it", SINKING, code=PERSON)
+        state.wait_for(lambda: contact.event() is not None, "the person's holding of it", SINKING, pace, PERSON)
     except PortError:
-        # A detector that is dead, or that nobody tells anything, finds nobody either.
-        return None if sinking is None or contact.share_gone() is None else False
+        # A detector that is dead, or that nobody tells anything, finds nobody either, nor does an arm that stands.
+        return False if _has_sunk(sinking) and contact.share_gone() is not None else None
     finally:
         contact.disarm()
         if sinking is not None:
             sinking.cancel()
+    return True
+
+
+def _has_sunk(sinking: Pending | None) -> bool:
+    """Whether that motion has come to its end."""
+    if sinking is None or not sinking.done():
+        return False
+    try:
+        sinking.result()
+    except PortError:
+        return False
     return True
 
 
@@ -156,7 +169,8 @@ class TakeWeight(CoglabState):
         if self._farther is None:
             self._count_from(away)
         if self._has_gone(away, carried):
-            self._seen_away = self._hand.is_sure
+            # The other one of two hands may hold on where the first is seen to go.
+            self._seen_away = self._hand.is_sure and carried
             return True
         self._way.follow()
         if self._farther is None or not carried:
@@ -223,12 +237,15 @@ class TakeWeight(CoglabState):
         if error.code == ReasonCode.OBJECT_NOT_SEEN and not self.ctx.holding:
             self._way.stop()
             self.pause(FALLS)
-            hand, thing = sight_of(self, hand_name(self.ctx)), sight_of(self, object_id)
-            if hand is None or thing is None or max(hand.age, thing.age) > RECENT:
-                return error
-            if math.dist(hand.xyz, thing.xyz) < WITH_HAND:
-                causes = (error.sentence, *error.causes)
-                return PortError(f"the person took '{object_id}' back", causes, ReasonCode.GOAL_WITHDRAWN)
+            end = self.ctx.clock.now() + FALLS
+            while self.ctx.clock.now() < end:
+                hand, thing = sight_of(self, hand_name(self.ctx)), sight_of(self, object_id)
+                if hand is not None and thing is not None and max(hand.age, thing.age) <= RECENT:
+                    if math.dist(hand.xyz, thing.xyz) >= WITH_HAND:
+                        break
+                    causes = (error.sentence, *error.causes)
+                    return PortError(f"the person took '{object_id}' back", causes, ReasonCode.GOAL_WITHDRAWN)
+                self.pause(RECENT / 3)
         return error
 
     def _is_left(self, settings: dict[str, Any]) -> bool:
