@@ -144,6 +144,6 @@ def test_what_states_may_take_from_some_moment_on(waited):
     found = {}
     for state, seconds in waited[1]:
         found.setdefault(state, set()).add(seconds)
-    assert found["GiveLoad"] == {18.0, 11.0}, "ten seconds beyond the person's eight, and to feel whether they hold it"
+    assert found["GiveLoad"] == {18.0, 13.0}, "ten seconds beyond the person's eight, and to feel whether they hold it"
     assert {1.5, 1.6} <= found["HomeRobot"] and 1.5 in found["PtpMotion"]
     assert {11.0, 20.0} <= found["WaitStop"], "five beyond the contact's six; and to come again"

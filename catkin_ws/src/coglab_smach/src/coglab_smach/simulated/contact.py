@@ -90,8 +90,7 @@ class SimulatedContact:
     def event(self) -> ContactEvent | None:
         self.cell.advance()
         now = self.cell.clock.now()
-        happens = self._due is not None and self._due <= min(now, self._until)
-        happens = happens or (now <= self._until and self._pushed())
+        happens = self._is_due() or (now <= self._until and self._pushed())
         if self._mode in AT_REST and not self.cell.arm.standing():
             self._early = happens
             return self._event
@@ -109,7 +108,8 @@ class SimulatedContact:
     def share_gone(self) -> float | None:
         if self._mode != "release" or "contact" in self.cell.faults.dead:
             return None
-        return 1.0 if self.event() is not None else (self.cell.lifted - self._lifted_before) / self._weight
+        taken = 1.0 if self.event() is not None and self._is_due() else 0.0
+        return taken + (self.cell.lifted - self._lifted_before) / self._weight
 
     def force(self) -> tuple[float, float, float] | None:
         """What the script pulls and lifts with."""
@@ -122,6 +122,10 @@ class SimulatedContact:
         if self.cell.touch is None or "contact" in self.cell.faults.dead:
             return None
         return self.cell.touch * max(0, self.cell.fingers()[2] - AROUND)
+
+    def _is_due(self) -> bool:
+        """Whether the script's moment has come, while somebody watches."""
+        return self._due is not None and self._due <= min(self.cell.clock.now(), self._until)
 
     def _pushed(self) -> bool:
         lifted = self.cell.lifted - self._lifted_before

@@ -292,7 +292,6 @@ class GiveLoad(CoglabState):
         for motion in (self._moving, self._lowering):
             if motion is not None:
                 motion.cancel()
-        await_rest(self.ctx, self.check)
         return person_holds(self, {"mass": self.ctx.shared_mass, "load_share": self._needed}) is not False
 
     def _keep(self) -> None:

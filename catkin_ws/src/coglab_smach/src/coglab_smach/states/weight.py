@@ -13,7 +13,7 @@ from coglab_smach.context.hand_track import HandTrack
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.base import CoglabState, TimeLimit
 from coglab_smach.states.held import HeldObject
-from coglab_smach.states.motion import rise
+from coglab_smach.states.motion import await_rest, rise
 from coglab_smach.states.where import AT_HAND, AWAY, from_palm, hand_name, palm_at, sight_of
 from coglab_smach.states.yielding import LEAST_WAY, GivesWay
 
@@ -35,24 +35,29 @@ SINKING, SETTLES = 3.0, 0.3
 
 def person_holds(state: CoglabState, settings: dict[str, Any]) -> bool | None:
     """Whether the person does: their hand carries the object where the arm sinks with it, by as much as it rises at
-    most. A hand that merely is there takes no weight; who let go while the fingers closed gave none before. None where
-    it cannot be felt. ``settings``: mass (kg) and load_share of the object. Only with controller 'ptp', and an arm that
-    stands."""
+    most. A hand that merely is there takes no weight, and what has gone before the arm sinks may have been their pull.
+    None where it cannot be felt. ``settings``: mass (kg) and load_share of the object. Only with controller 'ptp', and
+    an arm that comes to rest."""
     contact, config, pace = state.ctx.contact, state.ctx.config, state.ctx.arm.speed_scale
-    state.allow(SINKING + 8.0)
+    state.allow(SINKING + 10.0)
+    await_rest(state.ctx, state.check)
     sinking: Pending | None = None
     try:
         watch = SINKING / max(0.1, pace()) + 2.0
         state.await_pending(contact.arm("release", watch, settings), "arming of the contact detector", 2.0)
         state.pause(SETTLES)
+        before = contact.share_gone()
         sinking = rise(state.ctx, -float(config.get("hand.lift", 0.03)), float(config.get("give.lower_speed", 0.03)))
-        state.wait_for(lambda: contact.event() is not None, "the person's holding of it", SINKING, pace, PERSON)
+        # A detector that tells no share has counted from the arm that stood.
+        least = -math.inf if before is None else before + float(settings["load_share"])
+        felt = lambda: contact.event() is not None and (contact.share_gone() or 0.0) >= least  # noqa: E731
+        state.wait_for(felt, "the person's holding of it", SINKING, pace, PERSON)
     except PortError:
         # A detector that is dead, or that nobody tells anything, finds nobody either, nor does an arm that stands.
         return False if _has_sunk(sinking) and contact.share_gone() is not None else None
     finally:
         contact.disarm()
-        if sinking is not None:
+        if sinking is not None and not sinking.done():
             sinking.cancel()
     return True
 
