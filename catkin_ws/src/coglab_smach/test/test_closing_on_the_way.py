@@ -114,8 +114,7 @@ def test_with_fingers_that_do_not_open_again_the_arm_stays_with_what_the_person_
     """They have begun to close, the reach fails, and the hand is stuck: the person may hold what is in it."""
     trial = Trial()
     monkeypatch.setattr(reach, "off_grasp", lambda state, goal: 0.02)
-    monkeypatch.setattr(recovery, "from_palm", lambda state, track, *_: 0.1)
-    monkeypatch.setattr(recovery, "person_holds", lambda state, settings: True)
+    monkeypatch.setattr(recovery, "person_has_it", lambda *_: True)
     trial.cell.partner.touch_after = None
 
     def script(t):

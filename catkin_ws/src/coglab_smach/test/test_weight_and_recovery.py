@@ -309,7 +309,8 @@ def test_fingers_that_begin_to_close_on_the_way_have_a_second_to_stand(monkeypat
 def test_who_holds_what_fingers_have_caught_gets_it_back(monkeypatch, away, holds, held):
     trial, asked = Trial(), []
     state = SecureHand(trial.ctx)
-    monkeypatch.setattr(recovery, "person_holds", lambda s, settings: asked.append(settings) or holds)
+    monkeypatch.setattr(weight, "person_holds", lambda s, settings: asked.append(settings) or holds)
+    monkeypatch.setattr(weight, "from_palm", lambda s, track, *_: away)
     trial.ctx.shared_mass, trial.ctx.hand_track = 0.31, seen_all_the_way()
     monkeypatch.setattr(recovery, "from_palm", lambda s, track, *_: away)
     trial.ctx.closing, trial.ctx.closing_on, trial.ctx.shared = Ready(), "mug", True

@@ -275,29 +275,6 @@ def test_who_may_hold_a_light_object_is_felt_before_the_arm_goes(hand, holds):
     assert result.outcome == ("stopped" if hand != "gone" and holds else "failed_holding")
 
 
-@pytest.mark.parametrize("before", [0.0, WEIGHT])
-@pytest.mark.parametrize("carries", [True, False])
-def test_a_pull_that_ends_before_the_arm_sinks_is_not_their_holding(monkeypatch, before, carries):
-    """The weight that it takes along is gone from the palm, and the object is still the robot's alone."""
-    lifted = Lifted(monkeypatch)
-    lifted.state._deadline, cell, pause = 1e9, lifted.trial.cell, lifted.state.pause
-    cell.partner.take_after = None
-    del lifted.ctx.contact.event
-
-    def pulls_no_more(seconds):
-        cell.push(before)
-        pause(seconds)
-
-    def sinks(*_):
-        cell.push(before + (WEIGHT if carries else 0.0))
-        return Ready()
-
-    monkeypatch.setattr(lifted.state, "pause", pulls_no_more)
-    monkeypatch.setattr(weight, "rise", sinks)
-    with using(lifted.trial.clock):
-        assert person_holds(lifted.state, {"mass": 0.31, "load_share": 0.5}) is carries
-
-
 @pytest.mark.parametrize("trouble", ["refuses", "silent", "the arm stands", "the arm is slow", ""])
 def test_what_cannot_be_felt_is_not_taken_for_nobodys(monkeypatch, trouble):
     lifted = Lifted(monkeypatch)

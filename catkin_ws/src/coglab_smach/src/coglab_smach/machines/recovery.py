@@ -20,8 +20,8 @@ from coglab_smach.states.hand import HandTighten
 from coglab_smach.states.held import LOOK, HeldObject
 from coglab_smach.states.motion import end_motion
 from coglab_smach.states.reach import CAUGHT
-from coglab_smach.states.weight import person_holds
-from coglab_smach.states.where import AT_HAND, AWAY, from_palm
+from coglab_smach.states.weight import person_has_it, person_holds
+from coglab_smach.states.where import AWAY, from_palm
 
 LETS_GO = 5.0
 """s in which a person who is told that it is over lets go of what the robot's fingers hold, too, and goes"""
@@ -136,9 +136,8 @@ class SecureHand(CoglabState):
             self.pause(0.02)
         if not self.ctx.hand.state().holding:
             return
-        away = from_palm(self, self._track(), 0.3)
-        holds = None if away is None or away > AT_HAND else self._person_holds()
-        if not holds:
+        if not person_has_it(self, self._track(), self._weighed()):
+            away = from_palm(self, self._track(), 0.3)
             self.ctx.holding, self.ctx.shared = self.ctx.closing_on, not self._is_away(away)
             self.ctx.firm = self.ctx.closing_firm
 
@@ -151,9 +150,9 @@ class SecureHand(CoglabState):
         """Whether the person's hand, ``away`` m from the palm, was seen to go so far that it holds nothing there."""
         return away is not None and away > AWAY and self._track().is_sure
 
-    def _person_holds(self) -> bool | None:
-        share = float(self.ctx.config.get("hand.load_share", 0.5))
-        return person_holds(self, {"mass": self.ctx.shared_mass, "load_share": share})
+    def _weighed(self) -> dict[str, float]:
+        """What to feel for."""
+        return {"mass": self.ctx.shared_mass, "load_share": float(self.ctx.config.get("hand.load_share", 0.5))}
 
     def _await_letting_go(self) -> None:
         """Nobody else holds the object, or has taken it along, once the person's hand is seen away from it. Where it
@@ -164,7 +163,7 @@ class SecureHand(CoglabState):
         while self.ctx.clock.now() < end:
             away = from_palm(self, self._track())
             asks = away is not None and away > AWAY and not felt
-            if self._is_away(away) or (asks and self._person_holds() is False):
+            if self._is_away(away) or (asks and person_holds(self, self._weighed()) is False):
                 self.ctx.shared = False
                 self._look_for_it()
                 return

@@ -17,6 +17,7 @@ from coglab_smach.states.motion import await_rest, rise
 from coglab_smach.states.where import AT_HAND, AWAY, from_palm, hand_name, palm_at, sight_of
 from coglab_smach.states.yielding import LEAST_WAY, GivesWay
 
+GRAVITY = 9.81
 MOST_RISES = 8
 """the first one, and those that go on where the weight or somebody's pull has ended one"""
 
@@ -30,41 +31,77 @@ FALLS, RECENT = 0.4, 0.15
 """s after which what falls is far below where it was lost, and for which it is looked for then; and how old (s) a
 sight may be that tells so"""
 SINKING, SETTLES = 3.0, 0.3
-"""s in which it shows whether the person holds what the arm sinks with, and before that, for the torques at rest"""
+"""s in which the arm has sunk with what the person may hold, and before and after that, for the torques at rest"""
+TELLS = 1.0
+"""s in which the contact detector tells the share of the weight, once it is armed"""
+LIFTS = 1.0
+"""N that a soft hand (35 N/m) lifts more by, where what it holds sinks by 3 cm"""
 
 
 def person_holds(state: CoglabState, settings: dict[str, Any]) -> bool | None:
-    """Whether the person does: their hand carries the object where the arm sinks with it, by as much as it rises at
-    most. A hand that merely is there takes no weight, and what has gone before the arm sinks may have been their pull.
-    None where it cannot be felt. ``settings``: mass (kg) and load_share of the object. Only with controller 'ptp', and
-    an arm that comes to rest."""
+    """Whether the person does: the palm carries less where the arm has sunk with the object, by as much as it rises at
+    most, and rests. A hand that merely is there takes no weight, and what had gone before may have been the end of
+    their pull: then, and where it cannot be felt, None. ``settings``: mass (kg) and load_share of the object. Only with
+    controller 'ptp', and an arm that comes to rest."""
     contact, config, pace = state.ctx.contact, state.ctx.config, state.ctx.arm.speed_scale
-    state.allow(SINKING + 10.0)
+    watch = SINKING / max(0.1, pace()) + 6.0
+    state.allow(SINKING + 12.0)
     await_rest(state.ctx, state.check)
     sinking: Pending | None = None
     try:
-        watch = SINKING / max(0.1, pace()) + 2.0
         state.await_pending(contact.arm("release", watch, settings), "arming of the contact detector", 2.0)
-        state.pause(SETTLES)
-        before = contact.share_gone()
+        least = min(float(settings["load_share"]), LIFTS / (GRAVITY * float(settings["mass"])))
+        before = _share_at_rest(state)
         sinking = rise(state.ctx, -float(config.get("hand.lift", 0.03)), float(config.get("give.lower_speed", 0.03)))
-        # A detector that tells no share has counted from the arm that stood.
-        least = -math.inf if before is None else before + float(settings["load_share"])
-        felt = lambda: contact.event() is not None and (contact.share_gone() or 0.0) >= least  # noqa: E731
-        state.wait_for(felt, "the person's holding of it", SINKING, pace, PERSON)
+        if sinking is None:
+            return None
+        # Nobody is pressed down for longer than it takes to feel them.
+        enough, lowered = before + 1.5 * least, sinking.done
+        state.wait_for(lambda: lowered() or (contact.share_gone() or 0.0) >= enough, "the sinking", SINKING, pace)
+        sunk = _has_sunk(sinking)
+        if not sunk:
+            sinking.cancel()
+        await_rest(state.ctx, state.check)
+        if _share_at_rest(state) - before >= least:
+            return True
+        return False if sunk and before < least else None
     except PortError:
-        # A detector that is dead, or that nobody tells anything, finds nobody either, nor does an arm that stands.
-        return False if _has_sunk(sinking) and contact.share_gone() is not None else None
+        # A detector that is dead, or that nobody tells anything, finds nobody either.
+        return None
     finally:
         contact.disarm()
         if sinking is not None and not sinking.done():
             sinking.cancel()
-    return True
 
 
-def _has_sunk(sinking: Pending | None) -> bool:
+def person_has_it(state: CoglabState, track: HandTrack, settings: dict[str, Any]) -> bool:
+    """Whether the person holds the object (person_holds), and their hand is there before and after. Whose pull ends
+    while the arm sinks seem to hold it, and go."""
+
+    def at_hand() -> bool:
+        away = from_palm(state, track, 0.3)
+        return away is not None and away <= AT_HAND
+
+    return at_hand() and person_holds(state, settings) is True and at_hand()
+
+
+def _share_at_rest(state: CoglabState) -> float:
+    """Share of the weight that has gone from a palm that rests. TimeLimit where the detector does not tell it."""
+    told: list[float] = []
+
+    def tells() -> bool:
+        share = state.ctx.contact.share_gone()
+        told.extend([] if share is None else [share])
+        return bool(told)
+
+    state.pause(SETTLES)
+    state.wait_for(tells, "the share of the weight that the contact detector tells", TELLS)
+    return told[0]
+
+
+def _has_sunk(sinking: Pending) -> bool:
     """Whether that motion has come to its end."""
-    if sinking is None or not sinking.done():
+    if not sinking.done():
         return False
     try:
         sinking.result()
@@ -263,7 +300,7 @@ class TakeWeight(CoglabState):
         """The failure, and who has the object then: the person who holds it, else the robot, which opens nothing."""
         causes: tuple[str, ...] = (error.sentence,)
         loaded, away = self.ctx.journal.marked("loaded"), from_palm(self, self._hand)
-        if away is not None and away <= AT_HAND and person_holds(self, settings):
+        if person_has_it(self, self._hand, settings):
             self.ctx.holding = ""
         else:
             carried = "its weight is carried" if loaded else "its weight has not come"
