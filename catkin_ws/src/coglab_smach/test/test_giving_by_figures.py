@@ -292,7 +292,7 @@ def test_what_a_delivery_asks_for_is_what_is_waited_for():
 
     trial.run(script)
     # Then it is felt whether the person holds it all the same.
-    assert armed[-2:] == [("release", limit, {"mass": 0.31, "load_share": 0.7}) for limit in (10.0, 9.0)]
+    assert armed[-2:] == [("release", limit, {"mass": 0.31, "load_share": 0.7}) for limit in (10.0, 16.0)]
     assert "the person's taking of the load within 5.0 s" in trial.ctx.journal.why()
     assert ("lift", 5.0, {"mass": 0.31, "load_share": 0.5}) in armed
 

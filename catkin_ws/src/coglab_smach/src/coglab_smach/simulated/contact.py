@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from coglab_msgs.msg import ReasonCode
 from coglab_py.pose import Pose
 
+from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.interfaces import ContactEvent
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.simulated.cell import SimulatedCell
@@ -15,6 +17,8 @@ TOUCH = 1.0
 """N, a contact"""
 AROUND = 150
 """counts at which the middle finger of the closed hand begins to squeeze what it holds"""
+STIFFNESS = 200.0
+"""N/m, of the hand of who takes the object"""
 EVENTS = {
     "contact": ReasonCode.CONTACT_FOUND,
     "contact_in_motion": ReasonCode.CONTACT_FOUND,
@@ -42,13 +46,15 @@ class SimulatedContact:
         self._touches: tuple[str, Pose] | None = None
         """what the person brings to the palm, and the palm relative to it"""
         self._lifted_before = self._needed = self._weight = 0.0
+        self._taken_at: float | None = None
+        """m, height of the palm where the script's person began to carry what it holds"""
         self.armed_while_moving = False
         self.armed_with_profile: list[str] = []
         """profile in force at each arming, with ' fading' while another one's correction was not gone"""
 
     def arm(self, mode: str, time_limit: float, settings: dict[str, Any]) -> Pending:
         cell = self.cell
-        self._event, self._mode, self._early = None, "", False
+        self._event, self._mode, self._early, self._taken_at = None, "", False, None
 
         def apply() -> None:
             partner = cell.partner
@@ -108,8 +114,12 @@ class SimulatedContact:
     def share_gone(self) -> float | None:
         if self._mode != "release" or "contact" in self.cell.faults.dead:
             return None
-        taken = 1.0 if self.event() is not None and self._is_due() else 0.0
-        return taken + (self.cell.lifted - self._lifted_before) / self._weight
+        lifts = self.cell.lifted - self._lifted_before
+        if self.event() is not None and self._is_due():
+            # Who takes it holds it where it is: a hand that sinks is lifted more.
+            self._taken_at = self._height() if self._taken_at is None else self._taken_at
+            lifts += self._weight + STIFFNESS * (self._taken_at - self._height())
+        return lifts / self._weight
 
     def force(self) -> tuple[float, float, float] | None:
         """What the script pulls and lifts with."""
@@ -122,6 +132,10 @@ class SimulatedContact:
         if self.cell.touch is None or "contact" in self.cell.faults.dead:
             return None
         return self.cell.touch * max(0, self.cell.fingers()[2] - AROUND)
+
+    def _height(self) -> float:
+        """m, of the palm, base frame."""
+        return float(default_arm().fk(np.asarray(self.cell.arm.position()))[0][2])
 
     def _is_due(self) -> bool:
         """Whether the script's moment has come, while somebody watches."""

@@ -31,7 +31,7 @@ FALLS, RECENT = 0.4, 0.15
 """s after which what falls is far below where it was lost, and for which it is looked for then; and how old (s) a
 sight may be that tells so"""
 SINKING, SETTLES = 3.0, 0.3
-"""s in which the arm has sunk with what the person may hold, and before and after that, for the torques at rest"""
+"""s in which the arm has sunk with what the person may hold, or is back; and before and after, for torques at rest"""
 TELLS = 1.0
 """s in which the contact detector tells the share of the weight, once it is armed"""
 LIFTS = 1.0
@@ -40,43 +40,58 @@ LIFTS = 1.0
 
 def person_holds(state: CoglabState, settings: dict[str, Any]) -> bool | None:
     """Whether the person does: the palm carries less where the arm has sunk with the object, by as much as it rises at
-    most, and rests. A hand that merely is there takes no weight, and what had gone before may have been the end of
-    their pull: then, and where it cannot be felt, None. ``settings``: mass (kg) and load_share of the object. Only with
-    controller 'ptp', and an arm that comes to rest."""
-    contact, config, pace = state.ctx.contact, state.ctx.config, state.ctx.arm.speed_scale
-    watch = SINKING / max(0.1, pace()) + 6.0
-    state.allow(SINKING + 12.0)
+    most, and carries it again where the arm is back. A hand that merely is there takes no weight, and a pull that has
+    ended gives none back; what had gone before may have been such a pull, or a hand that goes along. None where it is
+    not sure, or cannot be felt. ``settings``: mass (kg) and load_share of the object. Only with controller 'ptp', and
+    an arm that comes to rest."""
+    contact, lift = state.ctx.contact, float(state.ctx.config.get("hand.lift", 0.03))
+    state.allow(2.0 * SINKING + 16.0)
     await_rest(state.ctx, state.check)
-    sinking: Pending | None = None
     try:
+        watch = 2.0 * SINKING / max(0.1, state.ctx.arm.speed_scale()) + 10.0
         state.await_pending(contact.arm("release", watch, settings), "arming of the contact detector", 2.0)
         least = min(float(settings["load_share"]), LIFTS / (GRAVITY * float(settings["mass"])))
-        before = _share_at_rest(state)
-        sinking = rise(state.ctx, -float(config.get("hand.lift", 0.03)), float(config.get("give.lower_speed", 0.03)))
-        if sinking is None:
-            return None
+        before, top = _share_at_rest(state), palm_at(state.ctx)
         # Nobody is pressed down for longer than it takes to feel them.
-        enough, lowered = before + 1.5 * least, sinking.done
-        state.wait_for(lambda: lowered() or (contact.share_gone() or 0.0) >= enough, "the sinking", SINKING, pace)
-        sunk = _has_sunk(sinking)
-        if not sunk:
-            sinking.cancel()
-        await_rest(state.ctx, state.check)
-        if _share_at_rest(state) - before >= least:
-            return True
-        return False if sunk and before < least else None
+        whole = _shifts(state, -lift, before + 1.5 * least)
+        sunk, bottom = _share_at_rest(state), palm_at(state.ctx)
+        if sunk - before < least:
+            return False if whole and before < least else None
+        _shifts(state, lift if top is None or bottom is None else max(LEAST_WAY, float(top[2] - bottom[2])))
+        return True if sunk - _share_at_rest(state) >= 0.5 * least else None
     except PortError:
         # A detector that is dead, or that nobody tells anything, finds nobody either.
         return None
     finally:
         contact.disarm()
-        if sinking is not None and not sinking.done():
-            sinking.cancel()
+
+
+def _shifts(state: CoglabState, up: float, enough: float = math.inf) -> bool:
+    """Rise by ``up`` m, sink if negative, until ``enough`` of the weight has gone, and come to rest. Whether the arm
+    has gone the whole way. PortError where it does not."""
+    ctx = state.ctx
+    motion = rise(ctx, up, float(ctx.config.get("give.lower_speed", 0.03)))
+    if motion is None:
+        raise PortError("the posture of the arm is not known")
+    done = motion.done
+
+    def over() -> bool:
+        share = ctx.contact.share_gone()
+        return done() or (share is not None and share >= enough)
+
+    try:
+        state.wait_for(over, "the motion with the object", SINKING, ctx.arm.speed_scale)
+        if whole := done():
+            motion.result()
+    finally:
+        if not done():
+            motion.cancel()
+    await_rest(ctx, state.check)
+    return whole
 
 
 def person_has_it(state: CoglabState, track: HandTrack, settings: dict[str, Any]) -> bool:
-    """Whether the person holds the object (person_holds), and their hand is there before and after. Whose pull ends
-    while the arm sinks seem to hold it, and go."""
+    """Whether the person holds the object (person_holds), and their hand is there before and after."""
 
     def at_hand() -> bool:
         away = from_palm(state, track, 0.3)
@@ -99,17 +114,6 @@ def _share_at_rest(state: CoglabState) -> float:
     return told[0]
 
 
-def _has_sunk(sinking: Pending) -> bool:
-    """Whether that motion has come to its end."""
-    if not sinking.done():
-        return False
-    try:
-        sinking.result()
-    except PortError:
-        return False
-    return True
-
-
 class TakeWeight(CoglabState):
     """Lift what the hand has closed on until the person's hand has left it, by ``hand.lift`` m at most and at
     ``hand.lift_speed`` m/s. A person who does not let go gets the object back, where they hold it in truth.
@@ -123,7 +127,7 @@ class TakeWeight(CoglabState):
     weight has to have come by the end of the whole rise; and it has to have come, too, where the hand was hidden on its
     way, since another one may be seen now. A hand that goes has let go where the object stays: who pulls it out of
     gentle fingers has taken it back. Where the tracker has lost the hand, or taken another one for it (HandTrack), the
-    person may have gone: nothing is opened, the arm stays and says so.
+    person may have gone: it is felt whether they hold it. Where that is not sure nothing is opened, and the arm stays.
 
     The palm goes along with who pulls (GivesWay), and the rise goes on afterwards. The fingers close again and again
     (``give.close_speed``, the lowest force).
@@ -291,10 +295,11 @@ class TakeWeight(CoglabState):
         return error
 
     def _is_left(self, settings: dict[str, Any]) -> bool:
-        """Whether a hand is seen elsewhere that may be the person's, and nobody holds the object."""
+        """Whether a hand is seen far from the object, or none at it while the weight has come, and nobody holds it."""
         self._way.stop()
-        away = from_palm(self, self._hand)
-        return away is not None and away > AWAY and person_holds(self, settings) is False
+        away, loaded = from_palm(self, self._hand, 0.3), self.ctx.contact.event() is not None
+        gone = loaded if away is None else away > (AT_HAND if loaded else AWAY)
+        return gone and person_holds(self, settings) is False
 
     def _not_released(self, object_id: str, limit: float, error: TimeLimit, settings: dict[str, Any]) -> PortError:
         """The failure, and who has the object then: the person who holds it, else the robot, which opens nothing."""
