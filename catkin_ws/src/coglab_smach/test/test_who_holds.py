@@ -78,7 +78,7 @@ def spring(before, stiffness):
 @pytest.mark.parametrize(
     ("mass", "before", "stiffness"),
     [
-        *[(mass, 0.0, 100) for mass in (0.06, 0.31, 0.53, 1.0)],
+        *[(mass, 0.0, stiffness) for mass in (0.06, 0.31, 0.53, 1.0) for stiffness in (35, 100)],
         *[(0.06, before, 100) for before in (0.59, -0.5, -2.0)],
         *[(0.31, before, 100) for before in (1.0, -2.0)],
         (0.31, 3.04, 40),

@@ -34,8 +34,8 @@ SINKING, SETTLES = 3.0, 0.3
 """s in which the arm has sunk with what the person may hold, or is back; and before and after, for torques at rest"""
 TELLS = 1.0
 """s in which the contact detector tells the share of the weight, once it is armed"""
-LIFTS = 1.0
-"""N that a soft hand (35 N/m) lifts more by, where what it holds sinks by 3 cm"""
+LIFTS = 0.8
+"""N that a soft hand (35 N/m) lifts more by, where what it holds sinks by 3 cm, less what another posture explains"""
 
 
 def person_holds(state: CoglabState, settings: dict[str, Any]) -> bool | None:
