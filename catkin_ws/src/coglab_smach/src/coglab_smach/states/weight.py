@@ -36,6 +36,8 @@ TELLS = 1.0
 """s in which the contact detector tells the share of the weight, once it is armed"""
 LIFTS = 0.8
 """N that a soft hand (35 N/m) lifts more by, where what it holds sinks by 3 cm, less what another posture explains"""
+IN_MOTION = 1.6
+"""N by which the weight that a slow arm tells differs from what it tells at rest, at most"""
 
 
 def person_holds(state: CoglabState, settings: dict[str, Any]) -> bool | None:
@@ -53,7 +55,7 @@ def person_holds(state: CoglabState, settings: dict[str, Any]) -> bool | None:
         least = min(float(settings["load_share"]), LIFTS / (GRAVITY * float(settings["mass"])))
         before, top = _share_at_rest(state), palm_at(state.ctx)
         # Nobody is pressed down for longer than it takes to feel them.
-        whole = _shifts(state, -lift, before + 1.5 * least)
+        whole = _shifts(state, -lift, before + least + IN_MOTION / (GRAVITY * float(settings["mass"])))
         sunk, bottom = _share_at_rest(state), palm_at(state.ctx)
         if sunk - before < least:
             return False if whole and before < least else None
