@@ -354,16 +354,22 @@ class Console(unittest.TestCase):
             time.sleep(0.05)
 
     def test_09_a_second_console_of_this_master_is_refused_and_says_so(self):
-        command = ["rosrun", "coglab_console", "console_node.py", "__name:=another_console"]
-        ended = subprocess.run(command, capture_output=True, text=True, timeout=90)
-        self.assertEqual(ended.returncode, 1)
-        self.assertIn("another console of this ROS master runs", ended.stderr)
-        # Of the same name and with a ROS_HOME of its own, as from a second terminal: it would end the first one.
+        command = ["rosrun", "coglab_console", "console_node.py"]
         with tempfile.TemporaryDirectory() as home:
-            command, environment = command[:-1], {**os.environ, "ROS_HOME": home}
-            ended = subprocess.run(command, capture_output=True, text=True, timeout=90, env=environment)
-        self.assertEqual(ended.returncode, 1)
-        self.assertIn("another console of this ROS master runs at http", ended.stderr)
+            # Beside each other. The other one has this one's name and a ROS_HOME of its own, as from a second terminal:
+            # it would end the first one.
+            begun = [
+                subprocess.Popen([*command, *name], stderr=subprocess.PIPE, text=True, env={**os.environ, **changed})
+                for name, changed in ((["__name:=another_console"], {}), ([], {"ROS_HOME": home}))
+            ]
+            try:
+                said = [one.communicate(timeout=90)[1] for one in begun]
+            finally:
+                for one in begun:
+                    one.kill()
+        self.assertEqual([one.returncode for one in begun], [1, 1], said)
+        self.assertIn("another console of this ROS master runs", said[0])
+        self.assertIn("another console of this ROS master runs at http", said[1])
         self.browser.until("return !document.body.classList.contains('lost')", 20.0)
 
     def test_10_the_page_had_nothing_to_complain_about(self):
