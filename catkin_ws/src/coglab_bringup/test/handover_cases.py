@@ -1,8 +1,7 @@
-#!/usr/bin/python3
-"""A whole handover through the plain launch file: names, outcome, error, limits at every tick, bytes of the hand."""
+"""Cases of a whole handover from person to robot through the plain launch file: names, outcome, error, limits at every
+tick, bytes of the hand. session_rostest.py runs them."""
 
 import re
-import sys
 import unittest
 import xmlrpc.client
 from pathlib import Path
@@ -11,7 +10,6 @@ import numpy as np
 import rosgraph
 import rospkg
 import rospy
-import rostest
 import tf2_ros
 import yaml
 from coglab_bringup.handover import run_handover
@@ -30,8 +28,8 @@ class Handover(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        rospy.init_node("handover_test")
-        cls.log = rospy.get_param("/handover_test/log")
+        rospy.init_node("session_test")
+        cls.log = rospy.get_param("/session_test/log")
         cls.goal_owners = set()
         cls.frames = tf2_ros.Buffer()
         cls.listener = tf2_ros.TransformListener(cls.frames)
@@ -47,7 +45,7 @@ class Handover(unittest.TestCase):
             cls.goal_owners.add(message._connection_header["callerid"])
 
     def test_every_name_of_the_interface(self):
-        master = rosgraph.Master("/handover_test")
+        master = rosgraph.Master("/session_test")
         publishers, subscribers, services = master.getSystemState()
         nodes = {node for _, names in publishers + subscribers + services for node in names}
         problems = missing_names(dict(master.getTopicTypes()), {name for name, _ in services}, nodes)
@@ -58,8 +56,8 @@ class Handover(unittest.TestCase):
         table = PAGE.read_text(encoding="utf-8").split("Threads of `/robot`")[1].split("\n\nWith `arm:=ideal`")[0]
         columns = [line.split("|")[2] for line in table.splitlines() if line.startswith("| ")]
         documented = {name for column in columns for name in re.findall(r"`(\w+)`", column)}
-        node = xmlrpc.client.ServerProxy(rosgraph.Master("/handover_test").lookupNode("/robot"))
-        pid = node.getPid("/handover_test")[2]
+        node = xmlrpc.client.ServerProxy(rosgraph.Master("/session_test").lookupNode("/robot"))
+        pid = node.getPid("/session_test")[2]
         running = {path.read_text().strip() for path in Path(f"/proc/{pid}/task").glob("*/comm")}
         self.assertIn("fri", documented)
         self.assertEqual(running - {"robot_node"}, documented)
@@ -124,7 +122,3 @@ class Handover(unittest.TestCase):
         closed = positions[times > self.end - 0.5].mean(axis=0)
         preshaped = positions.min(axis=0)
         self.assertGreater(np.max(closed - preshaped), 20)
-
-
-if __name__ == "__main__":
-    rostest.rosrun("coglab_bringup", "handover", Handover, sys.argv)
