@@ -13,7 +13,7 @@ import rostest
 from coglab_bringup.handover import READY_LIMIT, ask_for, run_handover
 from coglab_bringup.trial_recorder import TrialRecorder
 from coglab_msgs.srv import Start
-from handover_cases import Handover
+from handover_rostest import Handover
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 
