@@ -194,3 +194,11 @@ def test_a_motion_beside_it_reaches_its_end_within_the_limits(system):
     asked = [v for message in arm.heard[heard:] for v in message.velocity]
     assert all(math.isfinite(v) and abs(v) <= 1.05 * SPEED for v in asked), max(map(abs, asked))
     assert max(abs(a - b) for a, b in zip(arm.position, target, strict=True)) < 0.01
+
+
+def test_a_start_that_fails_says_why_and_ends_with_1(system):
+    """As every program here whose settings cannot be used; roslaunch shows the number."""
+    command = [manager_binary(), "__name:=another_manager", "_arm_namespace:=7"]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert ended.returncode == 1, ended.stderr
+    assert "another_manager/arm_namespace" in ended.stderr and "expected a name" in ended.stderr

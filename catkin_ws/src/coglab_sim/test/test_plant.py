@@ -216,6 +216,11 @@ def test_divergence_stops_with_seed_and_time():
         run(plant, 1.0, torque=np.full(7, 1e5))
 
 
+def test_a_plant_without_a_seed_has_the_seed_1():
+    with pytest.raises(RuntimeError, match="with seed 1:"):
+        run(_plant.Plant(URDF, HOME, BOX), 1.0, torque=np.full(7, 1e5))
+
+
 @pytest.mark.parametrize("speed, diverged", [(6.0, False), (14.0, True)])
 def test_no_body_is_faster_than_10_m_per_s(speed, diverged):
     """The arm stretched out, its first joint turning: far below any limit of a joint, but the hand is 1 m away."""

@@ -249,3 +249,24 @@ def test_a_person_who_takes_carries_what_they_lift():
         assert plant.state()["held_by"] == "both"
         shares.append(plant.state()["person_share"])
     assert shares[0] < 0.15 and shares[1] > 0.6
+
+
+def test_what_a_person_holds_turns_with_the_hand():
+    """The grip acts at the object's center of mass, here 10 cm from its own origin, and knows how fast that moves."""
+    plant, here, center = _plant.Plant(URDF, HOME, {**BOX, "center": [0, 0, 0.1]}), np.array([1.0, 0.3, 0.9]), 0.1
+
+    def in_hand():
+        state = plant.state()
+        (hand, turn), (thing, _) = state["person_hand"], state["object"]
+        return rotated(np.append(-np.array(turn[:3]), turn[3]), np.array(thing) - np.array(hand))
+
+    plant.set_person(here, grip=1.0, grip_force=200.0)
+    plant.place("human_hand", [-0.08, 0.0, -center])
+    run(plant, 0.2)
+    before, moved = in_hand(), 0.0
+    for step in range(500):
+        half = 1e-3 * (step + 1)  # rad, at 2 rad/s
+        plant.set_person(here, [0.0, np.sin(half), 0.0, np.cos(half)], grip=1.0, grip_force=200.0)
+        run(plant, STEP)
+        moved = max(moved, np.linalg.norm(in_hand() - before))
+    assert plant.state()["held_by"] == "human" and moved < 0.002, moved

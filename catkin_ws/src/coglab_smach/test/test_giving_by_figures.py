@@ -103,6 +103,14 @@ def test_a_grip_that_falls_is_stopped_four_hundredths_of_a_second_ahead_and_look
         assert len(hand.orders) == orders
 
 
+def test_a_second_look_in_the_same_moment_tells_nothing_about_the_rate():
+    hand, felt = Hand(), [20.0]
+    grip = LooseningGrip(hand, 40, 60, 140, lambda: felt[0])
+    grip.ease_to(0.5, 1.0, 12.0, 3.0)
+    felt[0] = 11.0
+    assert grip.ease_to(0.5, 1.0, 12.0, 3.0) and hand.orders == [("open", 140)]
+
+
 def test_no_looser_than_so_many_counts_and_no_weaker_than_what_friction_needs():
     for index, least, opens in ((149, 1.0, True), (148, 1.0, False), (155, 25.9, True), (155, 26.2, False)):
         hand, felt = Hand(), [30.0]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -219,6 +222,25 @@ def test_an_unforeseen_error_costs_the_connection_but_not_the_thread(connected, 
     assert len(connected._ended.waited) == (0 if is_ending else 3)
     assert (connected.driver is None) is not is_ending
     assert ("connection lost: internal error: 'slip'" in last().message) is not is_ending
+
+
+STUCK = """
+import threading
+import pytest, rospy
+from ih2_hand.ros import hand_node
+from node_parts import node_without_master
+hand_node.HandNode._poll = lambda self: threading.Event().wait()
+rospy.spin = lambda: None
+node_without_master(pytest.MonkeyPatch(), None).run()
+print("has ended", flush=True)
+"""
+
+
+def test_a_port_that_blocks_for_ever_does_not_keep_the_process():
+    """As a driver of the kernel may whose device has gone; the polling thread is left behind."""
+    here = str(Path(__file__).parent)
+    ended = subprocess.run([sys.executable, "-c", STUCK], cwd=here, capture_output=True, text=True, timeout=60)
+    assert ended.returncode == 0 and ended.stdout == "has ended\n", ended.stderr
 
 
 def test_the_end_of_a_goal_is_told_with_the_grip(connected):
