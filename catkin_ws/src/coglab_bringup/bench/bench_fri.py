@@ -1,18 +1,24 @@
 #!/usr/bin/python3
-"""Answer latency of the robot node against a bare echo, at 1 kHz: in monitor mode, while a motion runs, and with the
-console and one browser beside that.
+"""Answer latency of the robot node against a bare echo, at 1 kHz: in monitor mode, while a motion and feedback run,
+and with the console and one browser beside that.
 
-The node is /robot as launched by default: FRI thread and controller manager in one process, with the shipped feedback
-list; for the second and third row a point-to-point motion runs to and fro. Blocks of 500 packets go to echo, bridge,
-bridge, echo; both are served in every millisecond, the one whose block it is first. The ratio of the medians of
-neighbouring blocks is judged by its median over all pairs and by the upper end of the distribution-free 95 % interval
-of that median, whose ranks come from the exact binomial, so that it covers at least that. An answer counts for the
-packet whose number it reflects alone. One that does not come within 20 ms counts as 20 ms; every packet that was sent
-is counted, also those beside the blocks of the echo and those sent while the motion was waited for, and one without an
-answer makes the row of missing answers missed. 40 rounds of four blocks were asked for; COGLAB_BENCH_QUADS takes fewer,
-which is a sample. The ratio of the 99th percentiles is shown beside the same ratio of echo against echo: on a machine
-that is not a real-time one it says more about the machine. Prints JSON. The rows of losses are in
-lwr_fri_bridge/bench/bench_fri.py.
+The node is /robot as launched by default: FRI thread and controller manager in one process, with the shipped list of
+feedback controllers, which are loaded and, as shipped, disabled: so they are in monitor mode. In the other two ways a
+point-to-point motion runs to and fro, and the service feedback/enable has enabled all of them, in the list's order,
+once the motion controller was active. No force acts on the hand. feedback/status and feedback/state are listened to
+meanwhile, at 5 Hz: a controller ran if, at every look while the blocks were measured, it was `running` and had been
+updated in the cycle looked at. How many ran stands in the names of the rows. Fewer than are loaded miss a row of their
+own; with none, or fewer looks than rounds, every row of that way is missed.
+
+Blocks of 500 packets go to echo, bridge, bridge, echo; both are served in every millisecond, the one whose block it is
+first. The ratio of the medians of neighbouring blocks is judged by its median over all pairs and by the upper end of
+the distribution-free 95 % interval of that median, whose ranks come from the exact binomial, so that it covers at least
+that. An answer counts for the packet whose number it reflects alone. One that does not come within 20 ms counts as
+20 ms; every packet that was sent is counted, also those beside the blocks of the echo and those sent while the motion
+was waited for, and one without an answer makes the row of missing answers missed. 40 rounds of four blocks were asked
+for; COGLAB_BENCH_QUADS takes fewer, which is a sample. The ratio of the 99th percentiles is shown beside the same ratio
+of echo against echo: on a machine that is not a real-time one it says more about the machine. Prints JSON. The rows of
+losses are in lwr_fri_bridge/bench/bench_fri.py.
 """
 
 from __future__ import annotations
@@ -43,6 +49,7 @@ PATIENCE = 60.0  # s, for each step of the start
 
 Blocks = list[tuple[str, list[float]]]  # kind, and latencies in us, -1 missing
 Counts = dict[str, list[int]]  # by kind: packets sent, without an answer, late datagrams, without before the blocks
+Looks = list[list[str]]  # of each look while the blocks were measured, the feedback controllers that ran in its cycle
 
 
 def find_binary(name: str) -> str:
@@ -65,8 +72,42 @@ def end(process: subprocess.Popen, limit: float = 20.0) -> None:
         process.wait()
 
 
+class Feedback:
+    """Watches over ROS which feedback controllers run."""
+
+    def __init__(self) -> None:
+        self.activity: dict[str, str] = {}  # of each that is loaded, in execution order
+        self.looks: Looks = []
+        self._cycle = 0  # of the newest look
+
+    def listen(self) -> None:
+        """Subscribes to both topics; the node publishes what happened in a cycle only while somebody does."""
+        import rospy
+        from coglab_msgs.msg import FeedbackState, FeedbackStatus
+
+        rospy.Subscriber("controller_manager/feedback/status", FeedbackStatus, self.take_status)
+        rospy.Subscriber("controller_manager/feedback/state", FeedbackState, self.take_state)
+
+    def take_status(self, message: object) -> None:
+        """Which are loaded, and what each does."""
+        self.activity = {controller.name: controller.activity for controller in message.controllers}
+
+    def take_state(self, message: object) -> None:
+        """One look. A cycle that was looked at before means that no update has come since: then none runs."""
+        shown = [state.controller for state in message.states] if message.cycle > self._cycle else []
+        self._cycle = message.cycle
+        self.looks.append([name for name in shown if self.activity.get(name) == "running"])
+
+
+def active(looks: Looks) -> list[str]:
+    """The controllers that ran at every look. With fewer looks than rounds nothing is known, and none counts."""
+    if len(looks) < QUADS or not looks:
+        return []
+    return [name for name in looks[0] if all(name in look for look in looks)]
+
+
 class Motion:
-    """Asks the node for command mode and for point-to-point motions to and fro, in a thread of its own."""
+    """Asks the node for command mode, feedback, and point-to-point motions to and fro, in a thread of its own."""
 
     def __init__(self) -> None:
         self.error = ""
@@ -89,7 +130,7 @@ class Motion:
     def _move(self) -> None:
         import rospy
         from coglab_msgs.msg import FinishedPtp
-        from coglab_msgs.srv import AddPtp, LoadController, LwrCommand, SwitchController
+        from coglab_msgs.srv import AddPtp, FeedbackSelect, LoadController, LwrCommand, SwitchController
 
         def call(name: str, kind: type, *arguments: object) -> object:
             rospy.wait_for_service(name, PATIENCE)
@@ -102,6 +143,8 @@ class Motion:
             ("controller_manager/load_controller", LoadController, ("ptp", "coglab/PtpController")),
             ("lwr/command", LwrCommand, ("start",)),
             ("controller_manager/switch_controller", SwitchController, ("ptp",)),
+            # After the switch, which applies the profile of ptp: none. No name: all that are loaded.
+            ("controller_manager/feedback/enable", FeedbackSelect, ([], "")),
         ]
         for name, kind, arguments in steps:
             while True:  # the measuring peer comes a moment later
@@ -173,8 +216,9 @@ def open_console(stack: ExitStack, home: Path) -> None:
     browser.open(fresh_link(home, limit=PATIENCE), PATIENCE)
 
 
-def measure(way: str) -> tuple[Blocks, float, Counts]:
-    """Blocks, the share of answers that moved the arm, which is 0 in monitor mode, and what became of all packets.
+def measure(way: str) -> tuple[Blocks, float, Counts, list[str], Looks]:
+    """Blocks, the share of answers that moved the arm, which is 0 in monitor mode, what became of all packets, the
+    feedback controllers that are loaded, and the looks at them, of which there are none in monitor mode.
 
     The way is `monitor`, `moving`, or `console` (moving, with the console and one browser).
     """
@@ -202,20 +246,33 @@ def measure(way: str) -> tuple[Blocks, float, Counts]:
         port = bound_port()
         if way == "console":
             open_console(stack, Path(home))
-        motion = Motion()
+        motion, feedback = Motion(), Feedback()
         if moving:
+            feedback.listen()
             motion.start()
             stack.callback(motion.stop)
-        run = subprocess.run(
-            [binary, "measure" if moving else "monitor", str(echo_port), str(port), str(QUADS)],
-            stdout=subprocess.PIPE,
-            text=True,
-            check=False,
-            timeout=2 * PATIENCE + 10 * QUADS,
-        )
-        if run.returncode != 0:
-            sys.exit(f"nothing measured: {motion.error or run.returncode}")
-    return read(run.stdout)
+        command = [binary, "measure" if moving else "monitor", str(echo_port), str(port), str(QUADS)]
+        status, text, looks = follow(command, feedback)
+        if status != 0:
+            sys.exit(f"nothing measured: {motion.error or status}")
+    return *read(text), list(feedback.activity), looks
+
+
+def follow(command: list[str], feedback: Feedback) -> tuple[int, str, Looks]:
+    """Runs the measuring peer: its exit status, what it has printed, and the looks from its word "ready", with which
+    the blocks begin, to its end."""
+    run = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    limit = threading.Timer(2 * PATIENCE + 10 * QUADS, run.kill)
+    limit.start()
+    try:
+        assert run.stdout is not None
+        text = run.stdout.readline()
+        begin = len(feedback.looks)
+        text += run.stdout.read()
+        return run.wait(), text, feedback.looks[begin:]
+    finally:
+        limit.cancel()
+        end(run)
 
 
 def read(text: str) -> tuple[Blocks, float, Counts]:
@@ -261,7 +318,7 @@ def row(
 def missing_row(where: str, counts: Counts) -> dict[str, object]:
     """Answers that did not come, of all packets that the bridge was sent."""
     sent, missing, late, before = counts["bridge"]
-    what = f"answers {where} that did not come within 20 ms, of all {sent} packets to the bridge"
+    what = f"answers that did not come within 20 ms {where}, of all {sent} packets to the bridge"
     figure = f"{what} ({before} of them before the blocks; {late} came late)"
     return row(figure, missing, "packets", "0", "bare echo", counts["echo"][1], missing == 0)
 
@@ -283,6 +340,7 @@ def figures(where: str, blocks: Blocks, counts: Counts) -> list[dict[str, object
         p99_ratios += [p99s[first + 1] / p99s[first], p99s[first + 2] / p99s[first + 3]]
         echo_p99_ratios.append(p99s[first + 3] / p99s[first])
     ratio, (low, high) = statistics.median(ratios), median_interval(ratios)
+    echo_p99 = statistics.median(echo_p99_ratios)
     of = {
         kind: statistics.median(m for (k, _), m in zip(served, medians, strict=True) if k == kind)
         for kind in ("echo", "bridge")
@@ -292,21 +350,33 @@ def figures(where: str, blocks: Blocks, counts: Counts) -> list[dict[str, object
     return [
         row(f"{what}, median of {len(ratios)} block ratios", ratio, unit, goal, "bare echo", 1.0, ratio <= LIMIT),
         row(f"{what}, upper end of the median's 95 % interval", high, unit, goal, "bare echo", 1.0, high <= LIMIT),
-        row(f"{what}, lower end of it", low, unit),
+        row(f"{what}, lower end of the median's 95 % interval", low, unit),
         row(f"{what}, median", of["bridge"], "us", "reported", "bare echo", of["echo"]),
-        row(
-            f"{what}, ratio of p99",
-            statistics.median(p99_ratios),
-            unit,
-            "reported",
-            "echo/echo",
-            statistics.median(echo_p99_ratios),
-        ),
+        row(f"{what}, ratio of p99", statistics.median(p99_ratios), unit, peer="echo/echo", peer_value=echo_p99),
         missing_row(where, counts),
     ]
 
 
-def measured(way: str) -> tuple[Blocks, float, Counts]:
+def feedback_row(where: str, loaded: list[str], looks: Looks) -> dict[str, object]:
+    """How many of the feedback controllers of the shipped list ran."""
+    names = ", ".join(loaded) or "none"
+    figure = f"feedback controllers that ran at each of {len(looks)} looks, of {len(loaded)} loaded ({names}), {where}"
+    count = len(active(looks))
+    return row(figure, count, "1", f">= {max(1, len(loaded))}", ok=0 < count >= len(loaded))
+
+
+def moving_rows(
+    beside: str, blocks: Blocks, share: float, counts: Counts, loaded: list[str], looks: Looks
+) -> list[dict[str, object]]:
+    """The rows of a way in which a motion runs. Without any feedback controller that runs, all of them are missed:
+    they would be figures of something else than their names say."""
+    count = len(active(looks))
+    where = f"while a motion runs, with {count} feedback controller{'' if count == 1 else 's'}{beside}"
+    rows = [*figures(where, blocks, counts), share_row(where, share), feedback_row(where, loaded, looks)]
+    return [{**each, "ok": bool(each["ok"]) and (count > 0 or each["goal"] == "reported")} for each in rows]
+
+
+def measured(way: str) -> tuple[Blocks, float, Counts, list[str], Looks]:
     """measure() in a process of its own: a process can be a node of one master alone."""
     run = subprocess.run([sys.executable, __file__, way], stdout=subprocess.PIPE, text=True, check=False, timeout=600)
     if run.returncode != 0:
@@ -319,14 +389,10 @@ def main() -> None:
     if sys.argv[1:]:
         print(json.dumps(measure(sys.argv[1])))
         return
-    blocks, _, counts = measured("monitor")
+    blocks, _, counts, *_ = measured("monitor")
     rows = figures("in monitor mode", blocks, counts)
-    for way, where in (
-        ("moving", "while a motion runs, with the shipped feedback"),
-        ("console", "while a motion runs, with the shipped feedback, the console and one browser"),
-    ):
-        blocks, share, counts = measured(way)
-        rows += [*figures(where, blocks, counts), share_row(where, share)]
+    for way, beside in (("moving", ""), ("console", ", the console and one browser")):
+        rows += moving_rows(beside, *measured(way))
     print(json.dumps(rows, indent=1))
 
 

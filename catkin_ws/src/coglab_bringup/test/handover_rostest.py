@@ -15,11 +15,13 @@ import yaml
 from coglab_bringup.handover import run_handover
 from coglab_bringup.interface import FRAMES, missing_names
 from coglab_bringup.trial_recorder import TrialRecorder
-from coglab_smach.states.reach import SEATED
 from tf2_msgs.msg import TFMessage
 
 PAGE = Path(__file__).resolve().parents[4] / "docs" / "architecture.md"
 CMD = 2  # FRI state in which the arm follows our commands
+FARTHEST, TURNED = 30.0, 5.0
+"""mm and deg off its grasp, within which the fingers close on an object as it is meant to be held; written out here, so
+that no change of the code under test moves the bound"""
 FLOAT32 = 5e-4  # rad/s, what rounding to float32 on the wire adds to a velocity (at 10 ms)
 
 
@@ -71,16 +73,16 @@ class Handover(unittest.TestCase):
         self.assertEqual(self.row["outcome"], "success", self.trial.transitions[-8:])
 
     def test_final_error(self):
-        """By the cell's truth, at the end of every reach, however it ended. Further than SEATED off its grasp the
-        fingers do not close on the object at a light touch; nobody turns it meanwhile."""
+        """By the cell's truth, at the end of every reach, however it ended. Farther off its grasp the fingers do not
+        close on the object at a light touch; nobody turns it meanwhile."""
         self.assertEqual(self.row["final_error_by"], "truth of the simulated cell")
         self.assertTrue(self.row["reaches"])
         for reach in self.row["reaches"]:
             self.assertIsNotNone(reach["error_mm"], self.row["reaches"])
             self.assertIsNotNone(reach["error_deg"], self.row["reaches"])
         self.assertIn(self.row["reaches"][-1]["ended"], ("reached", "met"))
-        self.assertLessEqual(self.row["final_error_mm"], 1000.0 * SEATED)
-        self.assertLessEqual(self.row["final_error_deg"], 5.0)
+        self.assertLessEqual(self.row["final_error_mm"], FARTHEST)
+        self.assertLessEqual(self.row["final_error_deg"], TURNED)
 
     def test_contact_was_found_after_the_touch(self):
         self.assertIsNotNone(self.row["contact_delay_ms"], "no contact, or no touch in the truth")

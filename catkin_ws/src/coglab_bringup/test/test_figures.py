@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import ast
+import os
 import re
+import shlex
 import subprocess
+from collections import Counter
 from pathlib import Path
 
 import pytest
-from coglab_bringup import bench, figures
+from coglab_bringup import arguments, bench, figures
 from coglab_bringup.commit import git
 from coglab_bringup.mutant import EQUIVALENT
+from coglab_bringup.mutant_rows import rows_of
 from coglab_bringup.sources import is_source, sources_of
 
 TOP = Path(__file__).resolve().parents[4]
+ELSEWHERE = re.compile(r"(?:^|: )\.\.\.|\b(?:of|among|beside|after) these\b|\bbeside it\b|\b(?:of|after) it$")
+"""words in the name of a row for what another row says"""
 ROW = dict(zip(bench.COLUMNS, ("one", "time of a | step", 1.23456, "us", "<= 2", "KDL", 3.0, True), strict=True))
 
 
@@ -48,7 +55,7 @@ def commit(top: Path, message: str) -> None:
 def test_the_page_has_definition_goal_value_peer_machine_date_and_commit(checkout):
     keep(checkout, "one", [ROW, ROW | {"figure": "other", "ok": False}], False)
     text = figures.write_report(checkout).read_text()
-    assert "Ten steps, none left out." in text and "./coglab bench one" in text
+    assert "Ten steps, none left out." in text and "Printed by `./coglab bench one`, on " in text
     assert r"| one: time of a \| step | 1.235 us | <= 2 | met | KDL | 3 |" in text
     assert "| one: other | 1.235 us | <= 2 | **missed** | KDL | 3 |" in text
     assert re.search(r"on \d{4}-\d\d-\d\d, commit [0-9a-f]{7}, on \d+ cores of ", text)
@@ -220,6 +227,61 @@ def test_a_sample_can_miss_a_goal_and_not_meet_it(checkout, capsys):
     assert ["[sample of 12 of 100 asked]" in line for line in printed] == [True, True, True, False]
 
 
+@pytest.mark.parametrize(
+    "typed",
+    ["./coglab bench one", "./coglab bench --long one", "COGLAB_BENCH_QUADS=4 ./coglab bench one",
+     "CONSOLE_BENCH_PARTS='page load' ./coglab bench --long one"],
+)  # fmt: skip
+def test_the_command_on_the_page_typed_as_it_stands_prints_its_rows(checkout, monkeypatch, typed):
+    """Also where the environment that it was typed in had settings of its own."""
+    names = ("COGLAB_LONG", *figures.SETTINGS)
+
+    def type_in(command: str, **beside: str) -> list[dict]:
+        for name in names:
+            monkeypatch.delenv(name, raising=False)
+        words = shlex.split(command)
+        before = [word.partition("=") for word in words[: words.index("./coglab")]]
+        for name, value in (*((name, value) for name, _, value in before), *beside.items()):
+            monkeypatch.setenv(name, value)
+        assert bench.main(words[words.index("bench") + 1 :]) == 0
+        return figures.measured(checkout, "one")["rows"]
+
+    def run_bench(name, path, python, limit):
+        seen = [f"{name} {os.environ.get(name)}" for name in names]
+        return [ROW | {"figure": f"steps, {', '.join(seen)}, at most {limit:g} s"}]
+
+    monkeypatch.setenv("COGLAB_TOP", str(checkout))
+    monkeypatch.setattr(bench, "run_bench", run_bench)
+    rows = type_in(typed)
+    (command,) = re.findall(r"^Printed by `([^`]*)`", figures.page(checkout), flags=re.M)
+    assert command == typed and type_in(command) == rows
+    type_in("./coglab bench one", COGLAB_LONG="1")
+    assert "Printed by `./coglab bench --long one`" in figures.page(checkout), "no sample says that it is none"
+    assert type_in("./coglab bench one", COGLAB_LONG="0") == type_in("./coglab bench one"), "and none is a campaign"
+
+
+def test_trials_that_came_from_a_file_are_said_to_come_from_one(checkout, monkeypatch):
+    monkeypatch.setenv("COGLAB_TRIALS", "/home/me/trials.json")
+    keep(checkout, "one", [ROW], True)
+    assert "Printed by `COGLAB_TRIALS=FILE ./coglab bench --long one`, on " in figures.page(checkout)
+
+
+def test_rows_of_the_own_tests_name_the_command_that_has_them(checkout):
+    for own in (False, True):
+        rows = rows_of({"one": []}, {"one": 7}, [], [], own)
+        keep(checkout, "mutants", rows, False)
+        command = "./coglab bench mutants --own" if own else "./coglab bench mutants"
+        assert f"Printed by `{command}`, on " in figures.page(checkout)
+        arguments.judge(TOP, "bench", command.split()[2:])
+
+
+def test_every_setting_that_changes_rows_stands_before_the_command():
+    known = {*figures.SETTINGS, "COGLAB_LONG", "COGLAB_TOP", "CONSOLE_BENCH_PART"}  # the last is a part's own process
+    texts = [path.read_text(encoding="utf-8") for path in (TOP / "catkin_ws" / "src").rglob("bench/*.py")]
+    read = {name for text in texts for name in re.findall(r"environ(?:\.get\(|\[)\"(CO[A-Z_]+)\"", text)}
+    assert set(figures.SETTINGS) <= read <= known
+
+
 def test_report_runs_only_what_is_named(checkout, monkeypatch):
     monkeypatch.setenv("COGLAB_TOP", str(checkout))
     ran: list[str] = []
@@ -230,9 +292,49 @@ def test_report_runs_only_what_is_named(checkout, monkeypatch):
     assert (checkout / ".coglab" / "figures" / "two.json").is_file()
 
 
-def test_every_bench_says_what_it_measures():
-    for name, paths in figures.find_benches(TOP / "catkin_ws" / "src").items():
-        assert len(figures.definition(paths)) > 60, f"{name}: what, over how many, what is left out?"
+def test_every_bench_says_what_it_measures_over_how_many_and_what_is_left_out():
+    number = r"\b(?:\d[\d.e]*|one|two|three|four|five|six|seven|eight|nine|ten|twelve|hundred|thousand)\b"
+    left_out = r"\bleft out\b|\binfinitely (?:late|far)\b|\bmissed\b|\b(?:replaced|drawn again|every \w+ counts)\b"
+    wrong = []
+    for paths in figures.find_benches(TOP / "catkin_ws" / "src").values():
+        for path, text in ((path, " ".join(figures.definition([path]).split())) for path in paths):
+            if len(text) <= 60 or not re.search(number, text, re.I):
+                wrong.append(f"{path.relative_to(TOP)}: what, over how many?")
+            if not re.search(left_out, text, re.I):
+                wrong.append(f"{path.relative_to(TOP)}: what is left out (or none), and as what does it count?")
+    assert not wrong, "\n".join(wrong)
+
+
+def strings(path: Path) -> list[str]:
+    """Those of a program but its docstrings, each value in them as {}."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    told = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    joined = [node for node in ast.walk(tree) if isinstance(node, ast.JoinedStr)]
+    told |= {id(part) for node in joined for part in node.values}
+    whole = [node.value for node in ast.walk(tree)
+             if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in told]  # fmt: skip
+    return whole + ["".join(getattr(part, "value", "") if isinstance(part, ast.Constant) else "{}"
+                            for part in node.values) for node in joined]  # fmt: skip
+
+
+def test_no_bench_names_a_row_by_another_one():
+    """What a peer is may say "the same cycle on KDL": it stands in the row that it is the peer of."""
+    beginning = re.compile(r"(?:^|: )the same(?:[,:]| (?:with|without|from|of|for)\b)")
+    wrong = [f"{path.name}: {text}" for path in sorted((TOP / "catkin_ws" / "src").rglob("bench/*.py"))
+             for text in strings(path) if ELSEWHERE.search(text) or beginning.search(text)]  # fmt: skip
+    assert not wrong, "\n".join(wrong)
+
+
+def test_every_row_of_the_page_can_be_read_alone():
+    """It names what is measured itself, in three words or more, and no other row of the bench has its name, unit and
+    peer."""
+    wrong = []
+    for name, run in figures.kept(TOP).items():
+        known = Counter((row["figure"], row["unit"], row["peer"]) for row in run["rows"])
+        for figure, _, _ in (key for key in known if known[key] > 1 or ELSEWHERE.search(key[0])
+                             or re.search(r"(?:^|: )the same\b", key[0]) or len(key[0].split()) < 3):  # fmt: skip
+            wrong.append(f"{name}: {figure}")
+    assert not wrong, "\n".join(wrong)
 
 
 def test_every_goal_is_a_comparison_or_a_number_or_none():
@@ -256,6 +358,7 @@ def test_every_row_that_was_kept_stands_on_the_page():
     runs = figures.kept(TOP)
     missing = [figures.line_of(name, row) for name, run in runs.items() for row in run["rows"]
                if figures.line_of(name, row) not in lines]  # fmt: skip
+    missing += [line for name, run in runs.items() if (line := figures.printed_by(name, run)) not in lines]
     assert runs and not missing, "run ./coglab bench --report\n" + "\n".join(missing)
 
 

@@ -86,7 +86,7 @@ def test_every_change_of_what_ships_fits_its_line(package):
         if path.suffix == ".py":
             for change in random.Random(1).sample(changes(text, path.name), min(3, len(changes(text, path.name)))):
                 compile(change.apply(text), path.name, "exec")
-    assert total > 200
+    assert total > 100
 
 
 def test_who_stands_on_a_package_is_found_by_the_manifests():

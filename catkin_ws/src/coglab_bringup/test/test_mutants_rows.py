@@ -63,18 +63,44 @@ def test_the_goals_are_shares_of_what_was_judged():
     assert [row["ok"] for row in rows_of(both, SEEDS, [], [])[:3]] == [True, True, False], "82.5 of 85 % over all"
 
 
-def test_one_in_twenty_may_be_named_equivalent_and_is_shown():
-    (first, named, _) = rows_of({"one": package(20, 2)}, SEEDS, [equivalent(1)], [])
-    assert first["value"] == round(100 * 18 / 19, 1) and "of 20, 1 equivalent left out" in first["figure"]
-    assert (named["value"], named["goal"], named["ok"]) == (1, "<= 1", True)
-    assert "a is never that large" in named["figure"] and "a.py:1: comparison: '<' -> '<='" in named["figure"]
+def test_one_in_twenty_of_all_may_be_named_equivalent_and_is_shown():
+    of = {"one": package(20, 2), "two": package(20, name="two")}
+    rows = rows_of(of, SEEDS, [equivalent(1)], [])
+    assert rows[2]["value"] == round(100 * 38 / 39, 1) and "of 40, 1 equivalent left out" in rows[2]["figure"]
+    assert (rows[3]["value"], rows[3]["goal"], rows[3]["ok"]) == (1, "<= 2", True)
+    assert "a is never that large" in rows[3]["figure"] and "a.py:1: comparison: '<' -> '<='" in rows[3]["figure"]
+
+
+def test_the_row_of_a_package_subtracts_nothing_and_names_its_equivalent_survivors():
+    """One in twenty of twelve is none: a package's own goal is met without any."""
+    of = {"one": package(12, 4), "two": package(40, name="two")}
+    rows = rows_of(of, SEEDS, [equivalent(1), equivalent(2)], [])
+    assert rows[0]["value"] == round(100 * 8 / 12, 1) and not rows[0]["ok"], "66.7 %, not 80 % of ten"
+    assert "left out" not in rows[0]["figure"] and "2 named equivalent counted as survivors (" in rows[0]["figure"]
+    for number in (1, 2):
+        assert f"catkin_ws/src/one/a.py:{number}: comparison: '<' -> '<='" in rows[0]["figure"]
+    assert "equivalent" not in rows[1]["figure"]
+    assert rows[2]["value"] == round(100 * 48 / 50, 1) and "of 52, 2 equivalent left out" in rows[2]["figure"]
+
+
+def test_alone_a_package_of_any_size_subtracts_nothing_either():
+    (first, named, _) = rows_of({"one": package(40, 10)}, SEEDS, [equivalent(1)], [])
+    assert (first["value"], first["ok"]) == (75.0, True) and "1 named equivalent counted as survivors" in first[
+        "figure"
+    ]
+    assert (named["value"], named["goal"], named["ok"]) == (1, "<= 2", True)
+    (first, named, _) = rows_of({"one": package(40, 11)}, SEEDS, [equivalent(1), equivalent(2)], [])
+    assert (first["value"], first["ok"]) == (72.5, False), "not 29 of 38, which would do"
+    assert named["ok"], "so few may be named"
 
 
 def test_where_more_are_named_none_is_subtracted():
-    for count, names in ((20, (0, 1)), (19, (1,))):
-        (first, named, _) = rows_of({"one": package(count, 2)}, SEEDS, [equivalent(n) for n in names], [])
-        assert first["value"] == round(100 * (count - 2) / count, 1) and "left out" not in first["figure"]
-        assert not named["ok"] and named["value"] == len(names)
+    for count, names in ((20, (0, 1, 2)), (9, (1,))):
+        of = {"one": package(count, 3), "two": package(count, name="two")}
+        rows = rows_of(of, SEEDS, [equivalent(n) for n in names], [])
+        assert rows[2]["value"] == round(100 * (2 * count - 3) / (2 * count), 1)
+        assert "left out" not in rows[2]["figure"] and "too many, so that none is left out" in rows[3]["figure"]
+        assert not rows[3]["ok"] and rows[3]["value"] == len(names)
 
 
 def test_what_a_test_notices_is_not_equivalent_and_an_entry_names_one():

@@ -80,7 +80,7 @@ def imitation_rows() -> list[Row]:
         ),
         row(
             "dmp",
-            "imitation RMSE, 95th percentile",
+            f"imitation RMSE, 95th percentile of {len(wanted)} curves, N=20",
             np.percentile(errors, 95),
             "% of path",
             "",
@@ -88,14 +88,20 @@ def imitation_rows() -> list[Row]:
             None if peer is None else np.percentile(peer, 95),
             below_peer=True,
         ),
-        row("dmp", "imitation RMSE, median, stepped at 100 Hz", np.median(at_cycle), "% of path", "<= 0.10"),
+        row(
+            "dmp",
+            f"imitation RMSE, stepped at 100 Hz, median of {len(wanted)} curves, N=20",
+            np.median(at_cycle),
+            "% of path",
+            "<= 0.10",
+        ),
     ]
     for kind in dict.fromkeys(kind for kind, _ in wanted):
         chosen = np.array([k == kind for k, _ in wanted])
         rows.append(
             row(
                 "dmp",
-                f"imitation RMSE, median, {kind}",
+                f"imitation RMSE, median of {int(chosen.sum())} {kind} curves, N=20",
                 np.median(errors[chosen]),
                 "% of path",
                 "",
@@ -110,7 +116,8 @@ def main() -> None:
     """Prints the rows as JSON."""
     rows = imitation_rows()
     peer = peer_step_time() if DMP else None
-    rows.append(row("dmp", "step, three axes, N=20, 200 Hz", core_times()["dmp_step_20"], "us", "<= 0.5", PEER, peer))
+    words = "one step of a DMP, three axes, N=20, 200 Hz, median of all calls"
+    rows.append(row("dmp", words, core_times()["dmp_step_20"], "us", "<= 0.5", PEER, peer))
     json.dump(rows, sys.stdout, indent=1)
     print()
 

@@ -105,29 +105,17 @@ def step_rows() -> list[Row]:
     positions, _, accelerations, _ = run(goal_at, 400)
     peer_change, peer_settling = peer_step(moved) if DMP else (None, None)
     plain_positions, _, plain, _ = run(goal_at, 400, estimator=0.0)
+    what = "one motion, goal step of 100 mm at 0.3 T"
+    change = f"largest change of acceleration from one cycle of {1000.0 * CYCLE:g} ms to the next"
+    within = "time until it is within 10 mm of its goal for good"
+    without = f"{what}, without the goal estimator"
     return [
-        row(
-            "goal_change",
-            "goal step of 100 mm at 0.3 T: change of acceleration per 5 ms",
-            largest_change(accelerations),
-            "m/s^2",
-            "< 1",
-            PEER,
-            peer_change,
-            below_peer=True,
-        ),
-        row("goal_change", "the same without the goal estimator", largest_change(plain), "m/s^2", ""),
-        row(
-            "goal_change",
-            "goal step of 100 mm at 0.3 T: within 10 mm",
-            settling(positions, moved),
-            "T",
-            "<= 0.95",
-            PEER,
-            peer_settling,
-        ),
-        row("goal_change", "the same without the goal estimator (settling)", settling(plain_positions, moved), "T", ""),
-    ]
+        row("goal_change", f"{what}: {change}", largest_change(accelerations), "m/s^2", "< 1", PEER, peer_change,
+            below_peer=True),
+        row("goal_change", f"{without}: {change}", largest_change(plain), "m/s^2", ""),
+        row("goal_change", f"{what}: {within}", settling(positions, moved), "T", "<= 0.95", PEER, peer_settling),
+        row("goal_change", f"{without}: {within}", settling(plain_positions, moved), "T", ""),
+    ]  # fmt: skip
 
 
 def moving_rows() -> list[Row]:
@@ -143,19 +131,13 @@ def moving_rows() -> list[Row]:
     plain_lag = 1000.0 * np.linalg.norm(plain - goals, axis=1)
     end = round(DURATION / CYCLE)
     peer = peer_lag() if DMP else None
+    what = "one motion, goal moving at 0.1 m/s, known exactly in every cycle"
+    without = f"{what}, without the goal estimator and so without the goal's velocity"
     return [
-        row(
-            "goal_change",
-            "goal moving at 0.1 m/s: lag from T on, largest",
-            lag[end:].max(),
-            "mm",
-            "<= 2",
-            PEER,
-            peer,
-            below_peer=True,
-        ),
-        row("goal_change", "the same, without goal velocity", plain_lag[end:].max(), "mm", ""),
-    ]
+        row("goal_change", f"{what}: lag from T on, largest", lag[end:].max(), "mm", "<= 2", PEER, peer,
+            below_peer=True),
+        row("goal_change", f"{without}: lag from T on, largest", plain_lag[end:].max(), "mm", ""),
+    ]  # fmt: skip
 
 
 def noisy_lag_rows() -> list[Row]:
@@ -169,19 +151,22 @@ def noisy_lag_rows() -> list[Row]:
         return (GOAL + way - run(seen, len(way))[0])[begin:]
 
     exact = 1000.0 * np.linalg.norm(off(np.tile(GOAL, (400, 1))), axis=1)
-    what = "goal moving at 0.1 m/s, seen at 30 Hz without noise: lag from T on, largest"
+    what = "one motion, goal moving at 0.1 m/s, seen at 30 Hz without noise: lag from T on, largest"
     rows = [row("goal_change", what, exact.max(), "mm", "")]
     for name, correlation in NOISES:
         every = 1000.0 * np.array([off(noisy_frames(seed, correlation)) for seed in range(SEEDS)])
         behind = every.mean(axis=1) @ VELOCITY / np.linalg.norm(VELOCITY)
         mean, largest = np.linalg.norm(every.mean(axis=0), axis=1), np.linalg.norm(every, axis=2).max()
-        what = f"goal moving at 0.1 m/s, 4 mm of noise at 30 Hz, {name}, {SEEDS} seeds"
+        what = f"{SEEDS} motions, one per seed, goal moving at 0.1 m/s, 4 mm of noise at 30 Hz, {name}"
+        one = f"{what}: mean lag of one motion from T on, along the goal's way"
         rows += [
-            row("goal_change", f"{what}: lag from T on, mean of all seeds, largest", mean.max(), "mm", "<= 2"),
-            row("goal_change", f"{what}: mean lag of one seed, median", float(np.median(behind)), "mm", "<= 2"),
-            row("goal_change", f"{what}: mean lag of one seed, largest", behind.max(), "mm", ""),
-            row("goal_change", f"{what}: distance, noise and all, largest", largest, "mm", ""),
-        ]
+            row("goal_change", f"{what}: lag from T on, mean of all motions in each cycle, largest of the cycles",
+                mean.max(), "mm", "<= 2"),
+            row("goal_change", f"{one}, median of the motions", float(np.median(behind)), "mm", "<= 2"),
+            row("goal_change", f"{one}, largest of the motions", behind.max(), "mm", ""),
+            row("goal_change", f"{what}: distance to the goal from T on, noise and all, largest of all motions and "
+                "cycles", largest, "mm", ""),
+        ]  # fmt: skip
     return rows
 
 
@@ -258,34 +243,37 @@ def noise_rows() -> list[Row]:
     still_goal = run(lambda t: GOAL, WATCHED)[0]
     exact = noisy(None, None)
     assert exact.reached is not None
-    rows = [row("goal_change", "still goal seen exactly: reached", exact.reached / DURATION, "T", "")]
+    what = "one motion, still goal seen exactly: time until it is reached"
+    rows = [row("goal_change", what, exact.reached / DURATION, "T", "")]
     for name, correlation in NOISES:
         motions = [noisy(noisy_frames(seed, correlation), still_goal) for seed in range(SEEDS)]
         late = [value - exact.reached for value in missed_is_worst([m.reached for m in motions])]
         rest = missed_is_worst([m.still for m in motions])
         added = 1000.0 * np.array([np.sqrt(np.mean(m.added**2)) for m in motions])
-        what = f"still goal, 4 mm of noise at 30 Hz, {name}, {SEEDS} seeds"
+        what = f"{SEEDS} motions, one per seed, still goal, 4 mm of noise at 30 Hz, {name}"
+        rest_words = f"{what}: time from the end until the set-point's speed is zero for good"
+        extra = f"{what}: speed that the noise adds to the set-point during the motion, RMS"
         rows += [
-            row("goal_change", f"{what}: reached later than if seen exactly, median", late[SEEDS // 2], "s", "<= 0.25"),
-            row("goal_change", f"{what}: reached, the latest", (late[-1] + exact.reached) / DURATION, "T", "<= 2"),
-            row("goal_change", f"{what}: said ended faster than 0.02 m/s or more than 5 mm from the goal as estimated",
-                sum(m.hasty for m in motions), "1", "<= 0"),
-            row("goal_change", f"{what}: never reached", sum(m.reached is None for m in motions), "1", "<= 0"),
-            row("goal_change", f"{what}: from the end until the set-point's speed is zero, median", rest[SEEDS // 2],
-                "s", "<= 0"),
-            row("goal_change", f"{what}: from the end until the set-point's speed is zero, longest", rest[-1], "s",
-                "<= 0"),
-            row("goal_change", f"{what}: speed from 1 s after the end on, largest",
+            row("goal_change", f"{what}: time until it is reached, beyond that of a goal seen exactly, median",
+                late[SEEDS // 2], "s", "<= 0.25"),
+            row("goal_change", f"{what}: time until it is reached, the latest", (late[-1] + exact.reached) / DURATION,
+                "T", "<= 2"),
+            row("goal_change", f"{what}: motions that said ended faster than 0.02 m/s or more than 5 mm from the goal "
+                "as estimated", sum(m.hasty for m in motions), "1", "<= 0"),
+            row("goal_change", f"{what}: motions that did not reach it within {WATCHED * CYCLE:g} s",
+                sum(m.reached is None for m in motions), "1", "<= 0"),
+            row("goal_change", f"{rest_words}, median", rest[SEEDS // 2], "s", "<= 0"),
+            row("goal_change", f"{rest_words}, longest", rest[-1], "s", "<= 0"),
+            row("goal_change", f"{what}: speed of the set-point from 1 s after the end on, largest of all motions",
                 1000.0 * max(m.after for m in motions), "mm/s", "<= 0"),
-            row("goal_change", f"{what}: times it was followed again", sum(m.again for m in motions), "1", "<= 0"),
-            row("goal_change", f"{what}: speed that the noise adds during the motion, RMS, all seeds together",
+            row("goal_change", f"{what}: times that the goal was followed again after an end, of all motions",
+                sum(m.again for m in motions), "1", "<= 0"),
+            row("goal_change", f"{extra}, the cycles of all motions together",
                 1000.0 * float(np.sqrt(np.mean(np.concatenate([m.added for m in motions]) ** 2))), "mm/s", "<= 15"),
-            row("goal_change", f"{what}: speed that the noise adds during the motion, RMS, median seed",
-                float(np.median(added)), "mm/s", ""),
-            row("goal_change", f"{what}: speed that the noise adds during the motion, RMS, 95th percentile of seeds",
+            row("goal_change", f"{extra}, median motion", float(np.median(added)), "mm/s", ""),
+            row("goal_change", f"{extra}, 95th percentile of the motions",
                 float(np.percentile(added, 95, method="higher")), "mm/s", ""),
-            row("goal_change", f"{what}: speed that the noise adds during the motion, RMS, worst seed", added.max(),
-                "mm/s", "<= 15"),
+            row("goal_change", f"{extra}, worst motion", added.max(), "mm/s", "<= 15"),
         ]  # fmt: skip
     return rows
 
@@ -297,7 +285,8 @@ def switch_rows() -> list[Row]:
     )
     worst = 0.0
     rng = np.random.default_rng(4)
-    for _ in range(500):
+    switches = 500
+    for _ in range(switches):
         dmp = cc.Dmp(PRIMITIVE, np.zeros(3), GOAL)
         for _ in range(rng.integers(1, 200)):
             dmp.step(CYCLE, GOAL)
@@ -306,7 +295,9 @@ def switch_rows() -> list[Row]:
         worst = max(
             worst, np.abs(dmp.position - position).max(), np.abs(dmp.velocity - velocity).max(), abs(dmp.phase - phase)
         )
-    return [row("goal_change", "switch_dmp: step in position, velocity and phase", worst, "m, m/s, 1", "<= 1e-9")]
+    what = f"{switches} motions, other primitive and ratio by switch_dmp at a random moment"
+    words = f"{what}: largest step in position, velocity or phase"
+    return [row("goal_change", words, worst, "m, m/s, 1", "<= 1e-9")]
 
 
 def main() -> None:

@@ -1,11 +1,13 @@
 #!/usr/bin/python3
 """Tracking of 300 random reaches at 200 Hz, none left out.
 
-First the whole robot as it ships, in lockstep with the simulated one: acceleration and jerk limits, the shipped list
-of feedback controllers, the guard. A reach that is refused, aborted or does not end at its goal is a miss. The arm as
-measured is the true joint state behind its servos at the end of every period of every reach that began, until 1.5 s
-after its end, or until it was given up. Its range, speed and acceleration (change of speed over one period) are judged
-against the limits, with no allowance for what the servos add. Then the rule of priority alone, on an ideal robot: ours
+First the whole robot as it ships, in lockstep with the simulated one: acceleration and jerk limits, the guard, and the
+shipped list of feedback controllers, whose profile for reaches is empty: as shipped none of them runs, and a row says
+how many did. A reach that is refused, aborted or does not end at its goal is a miss. The arm as measured is the true
+joint state behind its servos at the end of every period of every reach that began, until 1.5 s after it was reached,
+aborted or given up. Its range, speed and acceleration (change of speed over one period) are judged against the limits,
+with no allowance for what the servos add. Then the same reaches and figures, reported, with a list in which the profile
+has all of the shipped controllers. Then the rule of priority alone, on an ideal robot: ours
 beside plain scaling of the whole vector and KDL's solvers, all slowed by the same clock and with the Jacobian of the
 same time. Each row has the peer in the one of its settings that is best by that row's own figure, and names it: no
 single setting is as good in all of them. These rows are over all reaches, and once more over those in which no method's
@@ -16,7 +18,9 @@ makes its rows missed.
 
 import json
 import sys
+import tempfile
 from collections.abc import Callable
+from pathlib import Path
 
 import coglab_controllers as cc
 import lockstep
@@ -30,13 +34,22 @@ RULE, DISTANCE = "rotation shrunk first, ideal arm", "distance from the path"
 SETTINGS = {"wdls": (0.005, 0.01, 0.02, 0.05, 0.1), "pinv": (1e-5, 1e-3, 1e-2, 0.05, 0.1)}
 
 
-def shipped_rows(limits: cc.JointLimits, reaches: list[Reach]) -> list[Row]:
-    """The reaches through the whole robot in virtual time. Without it the figures are missed."""
-    what = f"as shipped, {len(reaches)} reaches in lockstep with the simulated arm"
+def lockstep_outcomes(limits: cc.JointLimits, reaches: list[Reach], feedback: bool) -> list[lockstep.LockstepReach]:
+    """The reaches through the whole robot in virtual time; `feedback`: with all of the shipped feedback controllers."""
+    with tempfile.TemporaryDirectory() as folder:
+        manager = lockstep.with_feedback(Path(folder)) if feedback else lockstep.as_shipped()
+        return [lockstep.reach(r.posture, r.goal, r.target, limits, manager) for r in reaches]
+
+
+def shipped_rows(limits: cc.JointLimits, reaches: list[Reach], feedback: bool = False) -> list[Row]:
+    """Rows of the whole robot; `feedback`: all of the shipped feedback controllers run, and the figures are reported.
+    Without coglab_sim they are missed."""
+    how = "with all shipped feedback controllers enabled" if feedback else "as shipped"
+    what = f"{how}, {len(reaches)} reaches in lockstep with the simulated arm"
     if lockstep._virtual is None:
         missing = row("tracking", f"{what}: not measured, coglab_sim is not built", 0.0, "1", "<= 0")
         return [{**missing, "value": None, "ok": False}]
-    outcomes = [lockstep.reach(r.posture, r.goal, r.target, limits) for r in reaches]
+    outcomes = lockstep_outcomes(limits, reaches, feedback)
     for outcome in outcomes:
         if outcome.why:
             print(outcome.why, file=sys.stderr)
@@ -48,9 +61,10 @@ def shipped_rows(limits: cc.JointLimits, reaches: list[Reach]) -> list[Row]:
     missed = f"misses: {refused} refused, {sum(bool(o.why) for o in begun)} aborted, the rest beyond 1 mm or 3 deg"
 
     def figure(words: str, value: float, unit: str, goal: str = "") -> Row:
-        return row("tracking", f"{what}: {words}", value, unit, goal)
+        return row("tracking", f"{what}: {words}", value, unit, "" if feedback else goal)
 
     return [
+        ran_row(what, begun, feedback),
         figure(missed, len(outcomes) - len(hits), "1", "<= 0"),
         figure("hand from its goal at the end, 95th percentile; misses as far as they are", np.percentile(ends, 95),
                "mm", "<= 1"),
@@ -67,6 +81,15 @@ def shipped_rows(limits: cc.JointLimits, reaches: list[Reach]) -> list[Row]:
         figure("joint acceleration of the arm as measured, largest over its limit",
                max(o.arm_acceleration for o in begun), "1", "<= 1.0001"),
     ]  # fmt: skip
+
+
+def ran_row(what: str, begun: list[lockstep.LockstepReach], feedback: bool) -> Row:
+    """How many feedback controllers ran: the most at any time of any reach, and where they are to run the fewest."""
+    if feedback:
+        words = f"{what}: feedback controllers that ran, the fewest at any time of the {len(begun)} begun"
+        return row("tracking", words, min(o.feedback[0] for o in begun), "1", f">= {lockstep.listed()}")
+    words = f"{what}: feedback controllers that ran, the most at any time of the {len(begun)} begun"
+    return row("tracking", words, max(o.feedback[1] for o in begun), "1")
 
 
 Settings = dict[str, list[Outcome]]
@@ -194,7 +217,7 @@ def main() -> None:
         peers[f"KDL {kind}"] = {
             f"{setting:g}": all_of(kdl_solver(chain, limits, kind, setting)) for setting in settings
         }
-    rows = shipped_rows(limits, reaches) + priority_rows(ours, peers)
+    rows = shipped_rows(limits, reaches) + shipped_rows(limits, reaches, feedback=True) + priority_rows(ours, peers)
     tried = [ours, *(outcomes for peer in peers.values() for outcomes in (peer or {}).values())]
     over = max(o.over for outcomes in tried for o in outcomes)
     words = "ideal arm, every method in every setting: largest joint speed over its limit"

@@ -1,6 +1,7 @@
 """What the benches of the cores share: rows, files of the workspace, minimum-jerk reaches."""
 
 import json
+import operator
 import os
 import subprocess
 from pathlib import Path
@@ -25,12 +26,12 @@ def row(
     peer_value: float | None = None,
     below_peer: bool = False,
 ) -> Row:
-    """One row; `goal` is "" (reported only), "<= number" or "< number"; `below_peer` also asks to beat the peer, which
-    nobody does where the peer is not there."""
+    """One row; `goal` is "" (reported only), "<= number", "< number" or ">= number"; `below_peer` also asks to beat the
+    peer, which nobody does where the peer is not there."""
     ok = True
     if goal:
         sign, number = goal.split()
-        ok = value <= float(number) if sign == "<=" else value < float(number)
+        ok = {"<=": operator.le, "<": operator.lt, ">=": operator.ge}[sign](value, float(number))
     if below_peer:
         ok = ok and peer_value is not None and value < peer_value
         goal = f"{goal}, < peer" if goal else "< peer"

@@ -5,9 +5,11 @@ Needs the robot in virtual time of coglab_sim; without it the figures are missed
 
 import re
 from dataclasses import dataclass
+from pathlib import Path
 
 import coglab_controllers as cc
 import numpy as np
+import yaml
 from core_bench import LIMITS, PACKAGE, PRIMITIVES, URDF
 
 try:
@@ -15,6 +17,7 @@ try:
 except ImportError:  # optional: the simulated cell is a package of its own
     _virtual = None
 
+FEEDBACK = PACKAGE.parent / "ctrl_more" / "config" / "feedback.yaml"
 PERIOD, FRAME_PERIOD = 0.005, 0.03
 START_LIMIT, REACH_LIMIT, WATCHED = 10.0, 6.0, 1.5  # s of simulated time
 
@@ -24,8 +27,9 @@ class LockstepReach:
     """One reach. Distance of the hand from its goal at the end as the simulated arm has it (m, deg), largest distance
     from the reference as measured (m), time until it stood (s). Largest of the joints over their limits: speed and
     acceleration of the set-point that the bridge sends, and of the arm behind its servos (its true joint state at the
-    end of every period, also while it comes to rest); rad by which a joint of the arm was beyond its range, negative
-    inside. `why`: it was refused or given up."""
+    end of every period, also while it comes to rest, and for as long after it was aborted or given up as after it was
+    reached); rad by which a joint of the arm was beyond its range, negative inside. `why`: it was refused or given up.
+    `feedback`: how many feedback controllers ran, the fewest and the most at any sight of its goal."""
 
     begun: bool
     why: str
@@ -38,6 +42,7 @@ class LockstepReach:
     arm_over: float = 0.0
     arm_acceleration: float = 0.0
     arm_beyond: float = -np.inf
+    feedback: tuple[int, int] = (0, 0)
 
 
 def wait(robot, condition, limit: float) -> None:
@@ -74,9 +79,28 @@ def ready(posture: np.ndarray, manager: str = ""):
 
 
 def as_shipped() -> str:
-    """The controller manager's shipped parameters, with the shipped list of feedback controllers."""
+    """The controller manager's shipped parameters, with the shipped list of feedback controllers, whose profile for
+    reaches enables none."""
     text = (PACKAGE / "config" / "controllers.yaml").read_text()
     return re.sub(r"package://(\w+)", lambda found: str(PACKAGE.parent / found.group(1)), text)
+
+
+def listed() -> int:
+    """How many feedback controllers the shipped list has."""
+    return len(yaml.safe_load(FEEDBACK.read_text())["loadControllers"])
+
+
+def with_feedback(folder: Path) -> str:
+    """The same, but that reaches have all controllers of the shipped list, in its order: a list file of one's own, as
+    an experimenter would write it, in that folder."""
+    text = as_shipped()
+    if str(FEEDBACK) not in text:
+        raise ValueError(f"the shipped parameters were expected to name {FEEDBACK}")
+    shipped = yaml.safe_load(FEEDBACK.read_text())
+    shipped |= {"searchPath": [str(FEEDBACK.parent)], "profiles": {"dmp": shipped["loadControllers"]}}
+    file = folder / "feedback.yaml"
+    file.write_text(yaml.safe_dump(shipped))
+    return text.replace(str(FEEDBACK), str(file))
 
 
 class Watch:
@@ -119,9 +143,12 @@ class Watch:
         return speed
 
 
-def reach(posture: np.ndarray, goal: np.ndarray, target: np.ndarray, limits: cc.JointLimits) -> LockstepReach:
-    """One DMP motion from rest in a posture to a goal frame that stays, with the robot as it ships."""
-    robot = ready(posture, as_shipped())
+def reach(
+    posture: np.ndarray, goal: np.ndarray, target: np.ndarray, limits: cc.JointLimits, manager: str
+) -> LockstepReach:
+    """One DMP motion from rest in a posture to a goal frame that stays. `manager`: parameters of the controller manager
+    as YAML text, as_shipped() or with_feedback()."""
+    robot = ready(posture, manager)
     robot.set_frame("goal", goal, target)
     answer = robot.execute_dmp(
         "reach_human", orientation_control=True, target_orientation=[0.0, 0.0, 0.0, 1.0], goal_frame="goal"
@@ -137,19 +164,20 @@ def reach(posture: np.ndarray, goal: np.ndarray, target: np.ndarray, limits: cc.
 
 
 def follow(robot, goal: np.ndarray, target: np.ndarray, limits: cc.JointLimits, outcome: LockstepReach) -> None:
-    """Runs a reach until it has been over for WATCHED s, or is given up."""
-    begin, reached, watch = robot.now, None, Watch(robot, limits, outcome)
-    while reached is None or robot.now - reached < WATCHED:
+    """Runs a reach until it has been over for WATCHED s, however it ended: the arm brakes after an abort, too."""
+    begin, ended, watch = robot.now, None, Watch(robot, limits, outcome)
+    running: list[int] = []
+    while ended is None or robot.now - ended < WATCHED:
         robot.set_frame("goal", goal, target)
         for _ in range(round(FRAME_PERIOD / PERIOD)):
             robot.tick()
             report = watch.look()
-        if report["motion"] == "aborted":
-            outcome.why = report["reason"]
-            return
-        if report["motion"] == "reached" and reached is None:
-            reached = robot.now
-        if reached is None and robot.now - begin > REACH_LIMIT:
-            outcome.why = report["reason"] or "the motion waits at a border of the workspace"
-            return
+        running.append(sum(c["activity"] == "running" for c in robot.feedback_status()["controllers"]))
+        if report["motion"] == "aborted" and not outcome.why:
+            outcome.why, ended = report["reason"], robot.now
+        elif report["motion"] == "reached" and ended is None:
+            ended = robot.now
+        elif ended is None and robot.now - begin > REACH_LIMIT:
+            outcome.why, ended = report["reason"] or "the motion waits at a border of the workspace", robot.now
+    outcome.feedback = min(running), max(running)
     outcome.duration = (watch.stood or robot.now) - begin

@@ -88,16 +88,18 @@ INSTANTIATE_TEST_SUITE_P(Faults, Fault,
                                            std::make_pair("throw_int", "threw"),
                                            std::make_pair("nan", "not finite")));
 
-TEST(Faults, OverrunsInARowFaultTheControllerAndSinglesDoNot) {
+/// Runs a controller that spins for 20 ms, where 15 are allowed, in each cycle but the fifth and
+/// the tenth, and compares what is told of it. False if the machine itself delayed one of these
+/// two: the row of slow cycles is longer then, and the rest cannot be judged.
+bool overrunsWereJudged() {
   const coglab_rt::JointLimits limits =
       coglab_rt::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
   ctrl_more::Logger logger;
-  // `slow` spins for 20 ms in each cycle but every fifth; the sixth time it does not stop any more.
   ManagerSettings settings = readManagerSettings(
       YAML::Load("{odd: {fault: slow, after: 0, rest_every: 5, rests: 2}, overrun_time: 0.015, " +
                  kTypes + "}"),
       readText(std::string(DESCRIPTION_DIR) + "/urdf/lwr_ih2.urdf"), limits, false);
-  ASSERT_EQ(settings.cycle.overruns_to_fault, 5);
+  EXPECT_EQ(settings.cycle.overruns_to_fault, 5);
   settings.logger = &logger;
   std::atomic<bool> stop{false};
   ControllerManager manager(std::move(settings));
@@ -120,14 +122,10 @@ TEST(Faults, OverrunsInARowFaultTheControllerAndSinglesDoNot) {
     manager.cycle().run(sample, 0.005, command);
     return manager.report();
   };
-  // Four slow cycles and a quick one, twice. Where the machine itself delays the quick one, the row
-  // is longer: then there is nothing to be seen.
   std::uint64_t overruns = 0;
   for (int i = 1; i <= 10; ++i) {
     const CycleReport report = run();
-    if (i % 5 == 0 && report.overruns != overruns) {
-      GTEST_SKIP() << "the machine delayed a cycle";
-    }
+    if (i % 5 == 0 && report.overruns != overruns) return false;
     overruns = report.overruns;
     EXPECT_EQ(overruns, static_cast<std::uint64_t>(i - i / 5));
     EXPECT_FALSE(report.fault) << report.reason.c_str();
@@ -143,6 +141,15 @@ TEST(Faults, OverrunsInARowFaultTheControllerAndSinglesDoNot) {
   EXPECT_NE(report.reason.str().find("too slow 5 times in a row"), std::string::npos)
       << report.reason.c_str();
   EXPECT_EQ(command.velocity, JointVector::Zero().eval());
+  return true;
+}
+
+TEST(Faults, OverrunsInARowFaultTheControllerAndSinglesDoNot) {
+  constexpr int kAttempts = 20;
+  for (int attempt = 0; attempt < kAttempts && !HasFailure(); ++attempt) {
+    if (overrunsWereJudged()) return;
+  }
+  FAIL() << "in each of " << kAttempts << " attempts a quick cycle counted as an overrun";
 }
 
 /// Takes 20 ms.

@@ -1,4 +1,5 @@
-"""The rows of ./coglab bench tracking about the arm as measured: judged by range, speed and acceleration."""
+"""The rows of ./coglab bench tracking: the arm as measured is judged by range, speed and acceleration, also after its
+reach was aborted; and rows as shipped say that no feedback controller runs in them."""
 
 from __future__ import annotations
 
@@ -8,6 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import yaml
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))
 import bench_tracking
@@ -43,6 +45,87 @@ def test_the_true_state_is_measured_against_range_speed_and_acceleration():
     assert outcome.arm_acceleration == pytest.approx(0.1 / lockstep.PERIOD / 10.0), "the largest stays"
 
 
+class Arm:
+    """A robot whose motion ends in one tick as told, and whose arm is as fast as told in another one."""
+
+    def __init__(self, ended: str, at: int, fast: int) -> None:
+        self.ended, self.at, self.fast, self.ticks = ended, at, fast, 0
+        self.cell = self
+
+    now = property(lambda self: self.ticks * lockstep.PERIOD)
+    position = property(lambda self: REST)
+    velocity = property(lambda self: np.full(7, 3.0 if self.ticks == self.fast else 0.0))
+
+    def tick(self) -> None:
+        self.ticks += 1
+
+    def set_frame(self, *_) -> None:
+        """Perception, which sees the goal where it stays."""
+
+    def ik_debug(self) -> list:
+        return []
+
+    def feedback_status(self) -> dict:
+        return {"controllers": []}
+
+    def report(self) -> dict:
+        motion = self.ended if self.ticks >= self.at else "running"
+        return {"commanded_position": REST, "motion": motion, "reason": "at its stop" if motion == "aborted" else ""}
+
+
+def followed(arm: Arm) -> lockstep.LockstepReach:
+    """What has been seen of its reach."""
+    outcome = lockstep.LockstepReach(True, "", 0.0, 0.0)
+    lockstep.follow(arm, REST[:3], REST[:4], LIMITS, outcome)
+    return outcome
+
+
+@pytest.mark.parametrize("ended", ["reached", "aborted", "running"])
+def test_the_arm_is_watched_for_as_long_after_an_abort_as_after_a_reach(ended):
+    end = 60 if ended != "running" else round(lockstep.REACH_LIMIT / lockstep.PERIOD)
+    after = round(lockstep.WATCHED / lockstep.PERIOD)
+    arm = Arm(ended, 60, end + after - 6)
+    outcome = followed(arm)
+    assert arm.ticks == pytest.approx(end + after, abs=12)
+    assert outcome.arm_over == pytest.approx(1.5) and outcome.arm_acceleration > 1.0
+    why = {"reached": "", "aborted": "at its stop", "running": "the motion waits at a border of the workspace"}
+    assert outcome.why == why[ended]
+
+
+def test_a_reach_that_is_given_up_after_its_end_is_watched_from_then_on():
+    arm = Arm("aborted", 60, 0)
+    ended = arm.report
+    arm.report = lambda: ended() | ({"motion": "reached"} if 30 <= arm.ticks < 60 else {})
+    outcome = followed(arm)
+    assert outcome.why == "at its stop"
+    assert arm.ticks == pytest.approx(60 + round(lockstep.WATCHED / lockstep.PERIOD), abs=12)
+
+
+def shipped(monkeypatch, running: int, enabled: bool) -> list[dict]:
+    """The rows of two reaches in which so many feedback controllers ran, in the second at least."""
+    left = iter([lockstep.LockstepReach(True, "", 0.0, 0.0, feedback=count) for count in ((2, 2), (running, running))])
+    monkeypatch.setattr(lockstep, "_virtual", object())
+    monkeypatch.setattr(lockstep, "reach", lambda *_, **__: next(left))
+    reaches = [SimpleNamespace(posture=REST, goal=REST, target=REST)] * 2
+    return bench_tracking.shipped_rows(LIMITS, reaches, enabled)
+
+
+def test_rows_as_shipped_say_how_many_feedback_controllers_ran_in_them(monkeypatch):
+    rows = shipped(monkeypatch, 0, False)
+    (row,) = [row for row in rows if "feedback controllers that ran" in row["figure"]]
+    assert (row["value"], row["goal"]) == (2, "reported"), "the most of any reach"
+    assert all("as shipped" in row["figure"] for row in rows)
+
+
+def test_rows_with_feedback_enabled_are_reported_and_missed_where_it_did_not_run(monkeypatch):
+    rows = shipped(monkeypatch, 2, True)
+    (row,) = [row for row in rows if "feedback controllers that ran" in row["figure"]]
+    assert (row["value"], row["goal"], row["ok"]) == (2, ">= 2", True)
+    assert {row["goal"] for row in rows} == {"reported", ">= 2"}
+    (row,) = [row for row in shipped(monkeypatch, 1, True) if "feedback controllers that ran" in row["figure"]]
+    assert (row["value"], row["ok"]) == (1, False), "the fewest of any reach"
+
+
 @pytest.mark.parametrize(
     "words, field, fine, beyond",
     [
@@ -59,7 +142,7 @@ def test_the_worst_of_all_reaches_that_began_is_judged(monkeypatch, words, field
             setattr(outcome, field, value)
         left = iter(outcomes)
         monkeypatch.setattr(lockstep, "_virtual", object())
-        monkeypatch.setattr(lockstep, "reach", lambda *_: next(left))
+        monkeypatch.setattr(lockstep, "reach", lambda *_, **__: next(left))
         reaches = [SimpleNamespace(posture=REST, goal=REST, target=REST)] * len(outcomes)
         (row,) = [row for row in bench_tracking.shipped_rows(LIMITS, reaches) if words in row["figure"]]
         return row["ok"]
@@ -121,3 +204,15 @@ def test_a_peer_that_is_not_there_makes_its_rows_missed():
     rows = bench_tracking.priority_rows(stopped, {"peer": {"": stopped}})
     judged = [row for row in rows if "the 0 of 300" in row["figure"] and row["goal"] != "reported"]
     assert len(judged) == 2 and not any(row["ok"] for row in judged)
+
+
+def test_the_list_with_feedback_is_the_shipped_one_but_for_the_profile_of_reaches(tmp_path):
+    ours = yaml.safe_load(Path(yaml.safe_load(lockstep.with_feedback(tmp_path))["feedback_file"]).read_text())
+    shipped = yaml.safe_load(Path(yaml.safe_load(lockstep.as_shipped())["feedback_file"]).read_text())
+    assert shipped["profiles"]["dmp"] == [], "the docstring of the bench says so"
+    assert (
+        ours["profiles"]["dmp"] == shipped["loadControllers"] and len(shipped["loadControllers"]) == lockstep.listed()
+    )
+    for table in (ours, shipped):
+        del table["profiles"]
+    assert ours.pop("searchPath") and ours == shipped

@@ -101,14 +101,15 @@ def onset_rows(runs: list[Run], level: float) -> list[dict]:
     }
     every = list(delays.values())
     rows.append(at_most(f"onset of the reach to the decision, median, {of}", quantile(every, 0.5), "s", 0.25))
-    rows.append(row("... 95th percentile", quantile(every, 0.95), "s"))
+    rows.append(row(f"onset of the reach to the decision, 95th percentile, {of}", quantile(every, 0.95), "s"))
     for name, holds in groups.items():
         part = [delays[id(r)] for r in runs if r.recording.robot_holds == holds]
-        rows.append(row(f"... {name}, median", quantile(part, 0.5), "s"))
-        rows.append(row(f"... {name}, 95th percentile", quantile(part, 0.95), "s"))
+        figure = f"onset of the reach to the decision, {len(part)} {name}"
+        rows.append(row(f"{figure}, median", quantile(part, 0.5), "s"))
+        rows.append(row(f"{figure}, 95th percentile", quantile(part, 0.95), "s"))
     early = np.mean([any(b.either >= level for t, b in r.beliefs if t < r.recording.onset) for r in runs])
-    rows.append(row("decided before the onset", early, "share"))
-    rows.append(row("never decided", np.mean(np.isinf(every)), "share"))
+    rows.append(row(f"decided before the onset, {of}", early, "share"))
+    rows.append(row(f"never decided, {of}", np.mean(np.isinf(every)), "share"))
     return rows
 
 
@@ -132,10 +133,9 @@ def place_rows(runs: list[Run], level: float) -> list[dict]:
     errors = [place_errors(run, level) for run in runs]
     for name in errors[0]:
         values = [e[name] for e in errors]
-        rows.append(
-            row(f"error of the predicted place at {name}, median, {len(runs)} reaches", quantile(values, 0.5), "m")
-        )
-        rows.append(row("... 95th percentile", quantile(values, 0.95), "m"))
+        figure, of = f"error of the predicted place at {name}", f"{len(runs)} reaches"
+        rows.append(row(f"{figure}, median, {of}", quantile(values, 0.5), "m"))
+        rows.append(row(f"{figure}, 95th percentile, {of}", quantile(values, 0.95), "m"))
     steps, lapses = [], []
     for run in runs:
         first = run.first(level, run.recording.onset)
@@ -153,7 +153,13 @@ def place_rows(runs: list[Run], level: float) -> list[dict]:
             "m",
         )
     )
-    rows.append(row("belief below 0.5 again before the hand goes back, or no decision", np.mean(lapses), "share"))
+    rows.append(
+        row(
+            f"belief below 0.5 again before the hand goes back, or no decision, {len(runs)} reaches",
+            np.mean(lapses),
+            "share",
+        )
+    )
     return rows
 
 
@@ -186,12 +192,13 @@ def main() -> int:
     rows = onset_rows(runs, level) + place_rows(runs, level)
     crossed = {id(r): r.first(level, 0.0) is not None for r in others}
     share = float(np.mean(list(crossed.values())))
-    rows.append(at_most(f"decided in one of {OTHERS} motions that are neither offer nor request", share, "share", 0.05))
+    neither_of = "motions that are neither offer nor request"
+    rows.append(at_most(f"decided in one of {OTHERS} {neither_of}", share, "share", 0.05))
     for kind in KINDS:
         part = [crossed[id(r)] for r in others if r.recording.kind == kind]
-        rows.append(row(f"... {kind}, of {len(part)}", np.mean(part), "share"))
+        rows.append(row(f"decided in one of {len(part)} {neither_of}: {kind}", np.mean(part), "share"))
     long = np.mean([sum(b.either >= level for _, b in r.beliefs) >= 6 for r in others])
-    rows.append(row("... for 6 sights (0.2 s) and more", long, "share"))
+    rows.append(row(f"decided for 6 sights (0.2 s) and more in one of {OTHERS} {neither_of}", long, "share"))
     rows += calibration_rows(runs + others)
     back = [r.gone_after(r.recording.back, HAND) for r in runs]
     rows.append(

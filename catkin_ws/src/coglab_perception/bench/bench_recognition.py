@@ -185,8 +185,14 @@ def main() -> int:
     wrong = np.mean([judged.wrong for _, judged in every])
     mixed = f"of {len(every)} motions, {len(others)} of them of no pattern"
     rows.append(row(f"a wrong pattern decided at any time, {mixed}", wrong, "share", "<= 0.01", wrong <= 0.01))
-    rows.append(row(f"... {of}", np.mean([j.wrong for j in reaches]), "share"))
-    rows.append(row(f"... of the {len(others)} motions of no pattern", np.mean([j.wrong for j in others]), "share"))
+    rows.append(row(f"a wrong pattern decided at any time, {of}", np.mean([j.wrong for j in reaches]), "share"))
+    rows.append(
+        row(
+            f"a wrong pattern decided at any time, of the {len(others)} motions of no pattern",
+            np.mean([j.wrong for j in others]),
+            "share",
+        )
+    )
     rows.append(row(f"a pattern decided, {of}", np.mean([j.decided for j in reaches]), "share"))
     delays = [np.inf if j.delay is None else j.delay for j in reaches]
     rows.append(row(f"decided after, median, {of}; undecided: never", np.median(delays), "share of the time"))

@@ -1,9 +1,8 @@
 #!/usr/bin/python3
 """Bench of contact detection: sensitivity, delay, false alarms; the peer is an absolute threshold on the same signals.
 
-Pushes: 60 of each kind on synthetic torques; the median delay is that of the pushes that were found at all, the share
-beside it says how many were. False alarms: 200 still and 50 moving runs. People: 12 drawn ones who give the mug in
-whole trials, 200 with --long.
+Pushes: 60 of each kind on synthetic torques; one that is not found is infinitely late. False alarms: 200 still and 50
+moving runs. People: 12 drawn ones who give the mug in whole trials, 200 with --long.
 """
 
 import json
@@ -59,15 +58,18 @@ def main() -> int:
     rows = []
     peer = absolute_alarms(posture[1], 60, 12, push((0, 1, 0), 3.0))
     share, delay = found_within(posture, (0, 1, 0), 3.0)
-    rows.append(row("lateral 3 N found within 60 ms", share, "share", ">= 0.95", share >= 0.95, "absolute 1 Nm", peer))
-    rows.append(row("lateral 3 N, median delay", delay * 1000, "ms", "<= 60", delay <= 0.06))
+    of = "of 60 pushes"
+    rows.append(
+        row(f"lateral 3 N found within 60 ms, {of}", share, "share", ">= 0.95", share >= 0.95, "absolute 1 Nm", peer)
+    )
+    rows.append(row(f"lateral 3 N, median delay, {of}", delay * 1000, "ms", "<= 60", delay <= 0.06))
     for name, direction, newton, sigma in (
         ("down 3 N", (0, 0, -1), 3.0, 0.05),
         ("toward robot 3 N", (-1, 0, 0), 3.0, 0.05),
         ("lateral 3 N, noisy sensors 0.15 Nm", (0, 1, 0), 3.0, 0.15),
     ):
         share, _ = found_within(posture, direction, newton, sigma=sigma)
-        rows.append(row(f"{name} found within 60 ms", share, "share"))
+        rows.append(row(f"{name} found within 60 ms, {of}", share, "share"))
     false = 0
     started, samples = time.perf_counter(), 0
     for seed in range(200):
@@ -85,8 +87,12 @@ def main() -> int:
             v = np.full(7, 0.4 * np.sin(np.pi * (k + 1) / 201) + 0.03)
             event, _ = trial.feed(0.005, push((0, 1, 0), 8.0), lambda t, v=v: v)
             moving += event is not None or trial.detector.state() == "watching"
-    rows.append(row("watching while the arm moves", moving, "samples", "<= 0", moving == 0))
-    rows.append(row("time per sample, signal included", per_sample, "us", "<= 1000", per_sample <= 1000))
+    rows.append(
+        row("watching in 50 runs of 200 samples in which the arm moves", moving, "samples", "<= 0", moving == 0)
+    )
+    rows.append(
+        row("time per sample, signal included, mean of 200 runs", per_sample, "us", "<= 1000", per_sample <= 1000)
+    )
     rows += of_asked(contact_rows(row, run_default(PEOPLE)), PEOPLE, ASKED)
     print(json.dumps(rows))
     return 0

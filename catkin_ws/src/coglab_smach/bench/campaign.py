@@ -165,6 +165,8 @@ class Campaign:
         """of each action: outcome, and who held the object in truth when the trial was over"""
         self.reasons: dict[str, Counter] = {action: Counter() for action in EXCHANGES}
         self.reaches: dict[str, list[dict[str, float]]] = {action: [] for action in EXCHANGES}
+        self.without_reach: Counter = Counter()
+        """trials in which no reach of this action began"""
         self.touches: list[dict[str, Any]] = []
         self.outside_commanded = self.outside_measured = self.over_command = self.moving = self.stuck = self.trials = (
             self.fell
@@ -231,6 +233,8 @@ class Campaign:
                 self.reasons.setdefault(kind, Counter())[code] += 1
                 if code not in (STUCK, NOT_BEGUN):
                     print(f"{name}, {kind}, seed {trial['seed']}: {outcome}: {reason}", file=sys.stderr)
+        reached = {action for action, _ in trial["reaches"]}
+        self.without_reach.update(action for action in actions if action in self.reaches and action not in reached)
         for (action, found), touch in zip(trial["reaches"], trial["touches"], strict=True):
             if action in self.reaches:
                 self.reaches[action].append(found)

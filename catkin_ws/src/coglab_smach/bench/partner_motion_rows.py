@@ -23,19 +23,24 @@ def reach_rows(group: Group) -> list[dict]:
     wrong = [reach["wrong_mm"] for reach in reaches if reach["code"] not in GIVEN_UP]
     detours, smooth = [reach["detour"] for reach in moved], [reach["sparc"] for reach in moved]
     low = [float(np.percentile(smooth, p, method="lower")) if smooth else -np.inf for p in (50, 5)]
+    of = f" of {len(moved)} reaches"
     single = share([reach["peaks"] == 1 for reach in moved])
     return [
-        group.row("reaches", len(reaches), "reaches"),
+        group.row("reaches of the palm, all", len(reaches), "reaches"),
         group.row("reaches in which the palm did not move", len(reaches) - len(moved), "reaches"),
         group.row(f"wrong-way motion, 99th percentile of {len(wrong)} reaches", late(wrong, 99), "mm", "<= 5"),
         group.row("wrong-way motion, worst", late(wrong, 100), "mm"),
         group.row("reaches given up on the way", len(given_up), f"of {len(reaches)}"),
-        group.row("wrong-way motion of these, worst", max((r["wrong_mm"] for r in given_up), default=0.0), "mm"),
-        group.row("path over the straight line, median", late(detours, 50), "share", "<= 1.08"),
-        group.row("path over the straight line, 95th percentile", late(detours, 95), "share"),
-        group.row("reaches with one speed peak", single, "share", ">= 0.9"),
-        group.row("SPARC, median", low[0], "1", ">= -1.5"),
-        group.row("SPARC, 5th percentile", low[1], "1", ">= -1.65"),
+        group.row(
+            "wrong-way motion of reaches given up on the way, worst",
+            max((r["wrong_mm"] for r in given_up), default=0.0),
+            "mm",
+        ),
+        group.row(f"path over the straight line, median{of}", late(detours, 50), "share", "<= 1.08"),
+        group.row(f"path over the straight line, 95th percentile{of}", late(detours, 95), "share"),
+        group.row(f"reaches with one speed peak{of}", single, "share", ">= 0.9"),
+        group.row(f"SPARC, median{of}", low[0], "1", ">= -1.5"),
+        group.row(f"SPARC, 5th percentile{of}", low[1], "1", ">= -1.65"),
     ]
 
 
@@ -132,5 +137,7 @@ def pull_rows(group: Group) -> list[dict]:
     what = f"force on a person who pulls against the closing hand, largest of {len(every)}"
     rows = [group.row(what, late(every, 100), "N", "<= 15")]
     for name, values in pulls.items():
-        rows.append(group.row(f"... '{name}', 95th percentile of {len(values)}", late(values, 95), "N"))
+        rows.append(
+            group.row(f"force on a person with '{name}', 95th percentile of {len(values)}", late(values, 95), "N")
+        )
     return rows

@@ -214,7 +214,7 @@ def success_rows(group: Group) -> list[dict]:
         group.row("the object fell", fell / max(1, len(group.trials)), "share of trials", "<= 0.01"),
         group.row("success claimed that was none", claimed, "directions"),
         group.row("failures without one documented outcome", vague, "directions", "<= 0"),
-        group.row("stuck", stuck, "trials", "<= 0"),
+        group.row("the machine is stuck", stuck, "trials", "<= 0"),
     ]
 
 
@@ -245,5 +245,5 @@ def interrupted_rows(group: Group, what: str, documented: set[int]) -> list[dict
         group.row(f"{what}: end in their outcome, of {len(found)} (others: {named})", good, "share", ">= 1"),
         group.row(f"{what} that came about", len(happened), f"of {len(found)}"),
         group.row(f"{what}: palm toward hand or object from 0.2 s after on, largest", chase, "m/s", "<= 0.25"),
-        group.row(f"{what}: the same from 0.2 s after its first moment on", at_once, "m/s"),
+        group.row(f"{what}: palm toward hand or object from 0.2 s after its first moment on, largest", at_once, "m/s"),
     ]

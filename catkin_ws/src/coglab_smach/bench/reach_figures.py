@@ -42,8 +42,9 @@ def figures(reach) -> dict[str, float]:
 
 def way(reach) -> dict[str, float]:
     """``sparc``; and, unless the reach is unfinished, ``late`` and ``reached_late`` (s after a person's arrival: there,
-    and told so) and ``reached`` (s). One that was met is there, and told so, when it was met; one that stood, but
-    farther than NEAR from its goal, is never there: it has no ``late``."""
+    and told so) and ``reached`` (s). One that was met is told so when it was met. One whose palm was farther than NEAR
+    from its goal then, or as it stood, is never there: it has no ``late``. ``met_late``: ``late`` of those that stood,
+    and of those that were met, wherever that was, when it was."""
     times = np.array([t for t, _, _ in reach.path])
     palm = np.array([p for _, p, _ in reach.path])
     goal = np.array([g for _, _, g in reach.path])
@@ -57,7 +58,8 @@ def way(reach) -> dict[str, float]:
     human = human_time(float(np.linalg.norm(palm[inside][-1] - palm[0])))
     out |= {"reached_late": told - times[0] - human, "reached": told - reach.begin}
     if not reach.stood:
-        return out | {"late": out["reached_late"]}
+        out["met_late"] = out["reached_late"]
     if len(far) and far[-1] == np.count_nonzero(inside) - 1:
         return out
-    return out | {"late": (float(times[far[-1]]) if len(far) else reach.begin) - times[0] - human}
+    late = (float(times[far[-1]]) if len(far) else reach.begin) - times[0] - human
+    return {"met_late": late} | out | {"late": late}

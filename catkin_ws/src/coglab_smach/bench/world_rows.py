@@ -150,7 +150,7 @@ def together(campaigns: list[Campaign]) -> tuple[Campaign, float]:
 def accustomed_rows(row: Row) -> list[dict]:
     """Beside what is judged: the same trials with people who have habits; no goal."""
     everything, share = together([accustomed_plan(name).run() for name in OBJECTS])
-    what = f"beside it: {ACCUSTOMED} accustomed people (patient, with habits) x {len(OBJECTS)} objects x 2 directions"
+    what = f"{ACCUSTOMED} accustomed people (patient, with habits) x {len(OBJECTS)} objects x 2 directions"
     row = everything.marked(row)
     return [
         row(f"{what}: succeeded", share, "share"),
@@ -228,7 +228,7 @@ def contact_rows(row: Row, campaign: Campaign) -> list[dict]:
         found = [each["found"] - each["touched"] for each in real]
         name = f"drawn people, {what} at first touch"
         rows.append(row(f"{name}: touches", len(touched), f"of {waits} waits"))
-        rows.append(row(f"{name}: found", len(found) / max(1, len(touched)), "share"))
+        rows.append(row(f"{name}: found, of {len(touched)} touches", len(found) / max(1, len(touched)), "share"))
         if found:
             rows.append(row(f"{name}: delay from 0.3 N to contact, median", 1000 * np.median(found), "ms"))
             rows.append(row(f"{name}: delay from 0.3 N to contact, p95", 1000 * np.percentile(found, 95), "ms"))

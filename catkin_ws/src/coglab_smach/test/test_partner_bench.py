@@ -334,7 +334,7 @@ def test_a_sample_is_true_and_makes_all_rows(monkeypatch):
     names = [row["figure"] for row in rows]
     assert len(set(names)) == len(names)
     shown = {row["figure"].partition(" [sample of")[0]: row for row in rows}
-    assert shown["withdrawals that came about"]["value"] == 1.0 and shown["reaches"]["value"] >= 4.0
+    assert shown["withdrawals that came about"]["value"] == 1.0 and shown["reaches of the palm, all"]["value"] >= 4.0
     assert rows[0]["figure"] == "settings of home, region and timing that were changed (none)"
     assert rows[0]["ok"] and rows[1]["ok"] and rows[1]["figure"].startswith("a reach follows what is outside")
     assert not [row["figure"] for row in rows[2:] if row["goal"] and row["ok"]]

@@ -1,5 +1,6 @@
-// Whatever a list file or a gain file contains, it is taken or refused with a sentence, and the
-// controller that runs keeps running.
+// Whatever a file contains, it is taken wholly or refused with a sentence, as a list, as gains and
+// as a configuration, and the controller that runs keeps running.
+#include <array>
 #include <cctype>
 #include <cstdio>
 #include <cstdlib>
@@ -86,81 +87,172 @@ const std::string kList =
 
 enum Way { kAsList, kAsGains, kAsConfiguration, kWays };
 
-/// Loads a file; empty if it was taken, else the sentence.
-std::string load(Rig& rig, Way way, const std::string& file) {
-  if (way == kAsList) {
-    const LoadReport report = rig.manager->load(file);
-    for (const std::string& error : report.errors) EXPECT_FALSE(error.empty());
-    return report.ok() ? "" : report.errors.front();
-  }
-  Status status;
-  if (way == kAsGains) {
-    status = rig.manager->loadGains("running", file);
-  } else {
-    ControllerEntry entry;
-    entry.config_file = file;
-    status = rig.manager->addController(configurable(), "configured", entry);
-  }
-  EXPECT_TRUE(status.ok() || !status.message().empty());
-  return status ? "" : status.message();
-}
+/// What a load that is refused must leave as it was.
+struct Snapshot {
+  std::vector<std::string> names, order, profiles;
+  GainValues gains;
+  bool enabled, paused;
 
-/// What was taken goes again, so that the next file finds everything as this one did.
-void unloadTheRest(Rig& rig) {
-  for (const std::string& name : rig.manager->getControllersNames()) {
-    if (name == "running") continue;
-    ASSERT_TRUE(rig.manager->setProfile("dmp", {"running"}));
-    rig.manager->disable(name, true);
-    Status gone = Status::failure("not tried");
-    for (int cycle = 0; cycle < 1000 && !gone; ++cycle) {  // until its correction has faded
-      rig.step();
-      gone = rig.manager->unload(name);
-    }
-    ASSERT_TRUE(gone) << gone.message();
+  explicit Snapshot(const FeedbackControllersManager& manager)
+      : names(manager.getControllersNames()),
+        order(manager.getExecutionOrder()),
+        profiles(manager.getProfiles()),
+        gains(manager.getGains("running")),
+        enabled(manager.isEnabled("running")),
+        paused(manager.isPaused("running")) {}
+  bool operator==(const Snapshot& other) const {
+    return names == other.names && order == other.order && profiles == other.profiles &&
+           gains.sameAs(other.gains) && enabled == other.enabled && paused == other.paused;
   }
-}
+};
 
-/// Every file is written and loaded, as list, as gains of a controller that runs, and as the
-/// configuration of a new one; half of them differ from a good one by one word.
-TEST(ConfigFuzz, ListAndGainAndConfigurationFilesNeverBreakWhatRuns) {
-  constexpr long kRuns = 102000;
-  Rig rig(0.0, false, false);
-  rig.logger.setLevel(LogLevel::Error);
-  rig.add(configurable(), "running");
-  // In memory where that can be written: a hundred thousand files are hard on a disk.
-  std::string folder = access("/dev/shm", W_OK) == 0 ? "/dev/shm" : ::testing::TempDir();
-  folder += "/ctrl_more_fuzz_XXXXXX";
-  ASSERT_NE(mkdtemp(&folder[0]), nullptr) << folder;
-  const std::string file = folder + "/fuzz.yaml";
-  std::ofstream(folder + "/good.yaml") << "type: Good\n";
-  long taken[kWays] = {}, refused[kWays] = {};
-  std::mt19937 random(20180521);
-  for (long i = 0; i < kRuns; ++i) {
-    const Way way = static_cast<Way>(i % kWays);
-    const std::string& good = way == kAsList ? kList : kGains;
-    const std::string text = (i / kWays) % 2 == 0 ? mutate(good, random) : mistype(good, random);
-    SCOPED_TRACE(text);
+/// One controller that runs, and files that are loaded beside it in every way.
+class ConfigFuzz : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    rig_.logger.setLevel(LogLevel::Error);
+    running_ = rig_.add(configurable(), "running");
+    // In memory where that can be written: a hundred thousand files are hard on a disk.
+    folder_ = access("/dev/shm", W_OK) == 0 ? "/dev/shm" : ::testing::TempDir();
+    folder_ += "/ctrl_more_fuzz_XXXXXX";
+    ASSERT_NE(mkdtemp(&folder_[0]), nullptr) << folder_;
+    file_ = folder_ + "/fuzz.yaml";
+    std::ofstream(folder_ + "/good.yaml") << "type: Good\n";
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  /// Writes a file and loads it in each way, first in the one that it is meant for.
+  void loadInEveryWay(const std::string& text, Way own) {
     {
-      std::ofstream out(file, std::ios::binary);
+      std::ofstream out(file_, std::ios::binary);
       out << text;
       ASSERT_TRUE(out.flush().good());
     }
-    ++(load(rig, way, file).empty() ? taken : refused)[way];
-    ASSERT_NO_FATAL_FAILURE(unloadTheRest(rig));
-    if (i % 50 != 0) continue;
-    rig.step();
-    ASSERT_EQ(rig.pose()[0], 1.0);
-    ASSERT_EQ(rig.manager->getControllersNames().size(), 1u);
+    bool taken[kWays] = {};
+    std::string refusal[kWays];
+    GainValues as_gains, as_configuration;
+    for (int turn = 0; turn < kWays; ++turn) {
+      const Way way = static_cast<Way>((own + turn) % kWays);
+      const Snapshot before(*rig_.manager);
+      refusal[way] = load(way);
+      taken[way] = refusal[way].empty();
+      ++(taken[way] ? taken_ : refused_)[way];
+      if (turn == 0) ++(taken[way] ? own_taken_ : own_refused_)[way];
+      if (!taken[way]) {
+        ASSERT_TRUE(before == Snapshot(*rig_.manager)) << way << ": half of it stayed";
+      }
+      if (taken[way] && way == kAsGains) as_gains = rig_.manager->getGains("running");
+      if (taken[way] && way == kAsConfiguration) {
+        ASSERT_TRUE(rig_.manager->has("configured"));
+        as_configuration = rig_.manager->getGains("configured");
+      }
+      ASSERT_NO_FATAL_FAILURE(look(way));
+      ASSERT_NO_FATAL_FAILURE(unloadTheRest());
+    }
+    // Gains and configuration are the same file: both have the same numbers of it, and what only
+    // a new controller takes has another setting.
+    if (taken[kAsGains]) {
+      ASSERT_TRUE(taken[kAsConfiguration]) << refusal[kAsConfiguration];
+      ASSERT_TRUE(as_gains.sameAs(as_configuration));
+    } else if (taken[kAsConfiguration]) {
+      ASSERT_TRUE(contains(refusal[kAsGains], "setting 'mode'")) << refusal[kAsGains];
+    }
+  }
+
+  std::array<long, kWays> taken_{}, refused_{}, own_taken_{}, own_refused_{};
+  long looks_ = 0;
+
+ private:
+  /// Loads the file; empty if it was taken, else the sentence.
+  std::string load(Way way) {
+    if (way == kAsList) {
+      const LoadReport report = rig_.manager->load(file_);
+      for (const std::string& error : report.errors) EXPECT_FALSE(error.empty());
+      EXPECT_TRUE(report.ok() || report.loaded.empty()) << "nothing of a list that is refused";
+      for (const std::string& name : report.loaded) EXPECT_TRUE(rig_.manager->has(name)) << name;
+      EXPECT_EQ(rig_.manager->getControllersNames().size(), 1 + report.loaded.size());
+      return report.ok() ? "" : report.errors.front();
+    }
+    Status status;
+    if (way == kAsGains) {
+      status = rig_.manager->loadGains("running", file_);
+    } else {
+      ControllerEntry entry;
+      entry.config_file = file_;
+      status = rig_.manager->addController(configurable(), "configured", entry);
+    }
+    EXPECT_TRUE(status.ok() || !status.message().empty());
+    return status ? "" : status.message();
+  }
+
+  /// What ran before goes on: one update more, and its correction.
+  void look(Way way) {
+    const int updates = running_->updates;
+    rig_.step();
+    ASSERT_EQ(running_->updates, updates + 1) << way;
+    ASSERT_EQ(rig_.pose()[0], 1.0) << way;
+    ++looks_;
+  }
+
+  /// What was taken goes again, so that the next file finds everything as this one did.
+  void unloadTheRest() {
+    const std::vector<std::string> names = rig_.manager->getControllersNames();
+    if (names.size() == 1) return;
+    for (const std::string& profile : rig_.manager->getProfiles()) {
+      ASSERT_TRUE(rig_.manager->setProfile(profile, {"running"}));
+    }
+    for (const std::string& name : names) {
+      if (name == "running") continue;
+      rig_.manager->disable(name, true);
+      Status gone = Status::failure("not tried");
+      for (int cycle = 0; cycle < 1000 && !gone; ++cycle) {  // until its correction has faded
+        rig_.step();
+        gone = rig_.manager->unload(name);
+      }
+      ASSERT_TRUE(gone) << gone.message();
+    }
+  }
+
+  Rig rig_{0.0, false, false};
+  TestController* running_ = nullptr;
+  std::string folder_, file_;
+};
+
+/// As many as the environment asks for; the bench asks for more than the tests take.
+long filesAskedFor() {
+  const char* const asked = std::getenv("CTRL_MORE_FUZZ_FILES");
+  return asked == nullptr ? 12000 : std::atol(asked);
+}
+
+/// Every file is written, and loaded as list, as gains of a controller that runs, and as the
+/// configuration of a new one; a third of them is meant for each, and half of them differ from a
+/// good one by one word. What runs is looked at after each load.
+TEST_F(ConfigFuzz, ListAndGainAndConfigurationFilesNeverBreakWhatRuns) {
+  const long files = filesAskedFor();
+  ASSERT_GE(files, 1200) << "CTRL_MORE_FUZZ_FILES";
+  long mistyped = 0;
+  std::mt19937 random(20180521);
+  for (long i = 0; i < files; ++i) {
+    const Way own = static_cast<Way>(i % kWays);
+    const std::string& good = own == kAsList ? kList : kGains;
+    const bool near = (i / kWays) % 2 != 0;
+    const std::string text = near ? mistype(good, random) : mutate(good, random);
+    if (near) ++mistyped;
+    SCOPED_TRACE(text);
+    ASSERT_NO_FATAL_FAILURE(loadInEveryWay(text, own));
+    ASSERT_FALSE(HasFailure());
   }
   for (const Way way : {kAsList, kAsGains, kAsConfiguration}) {
-    EXPECT_EQ(taken[way] + refused[way], kRuns / kWays);
-    EXPECT_GT(taken[way], kRuns / kWays / 20) << way;
-    EXPECT_GT(refused[way], kRuns / kWays / 4) << way;
+    EXPECT_EQ(taken_[way] + refused_[way], files);
+    EXPECT_GT(own_taken_[way], files / kWays / 20) << way;
+    EXPECT_GT(own_refused_[way], files / kWays / 4) << way;
   }
+  EXPECT_EQ(looks_, kWays * files);
   std::printf(
-      "files written and loaded %ld, of these taken as list %ld, gains %ld, configuration %ld\n",
-      kRuns, taken[kAsList], taken[kAsGains], taken[kAsConfiguration]);
-  std::filesystem::remove_all(folder);
+      "files written %ld, near-valid %ld, each loaded in %d ways, looks at what runs %ld, "
+      "taken as list %ld, gains %ld, configuration %ld\n",
+      files, mistyped, static_cast<int>(kWays), looks_, taken_[kAsList], taken_[kAsGains],
+      taken_[kAsConfiguration]);
 }
 
 }  // namespace

@@ -12,7 +12,7 @@
 namespace ctrl_more {
 namespace {
 
-const std::string kTool = CTRL_MORE_PLUGIN_DIR "/ctrl_more/ctrl_more_describe";
+const std::string kTool = CTRL_MORE_DESCRIBE;
 const std::string kLimits = CTRL_MORE_PLUGIN_DIR "/libctrl_more_joint_limits.so";
 const std::string kGood = CTRL_MORE_TEST_PLUGIN_DIR "/libgood.so";  // has no texts
 
@@ -45,7 +45,7 @@ std::string contentOf(const std::string& path) {
 
 struct DescribeTool : ::testing::Test {
   void SetUp() override {
-    if (access(kTool.c_str(), X_OK) != 0) GTEST_SKIP() << "the tool is not where catkin puts it";
+    ASSERT_EQ(access(kTool.c_str(), X_OK), 0) << "build " << kTool << ", which is tested";
   }
 };
 

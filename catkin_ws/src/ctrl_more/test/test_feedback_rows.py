@@ -1,5 +1,6 @@
 """The rows of ./coglab bench feedback: ratios keep the goals that were asked, what was told elsewhere is no measured
-peer, and system calls are judged only where the kernel has watched."""
+peer, system calls are judged only where the kernel has watched, and fuzzing says in which ways it loads, and is missed
+where what runs was not looked at after each load."""
 
 from __future__ import annotations
 
@@ -97,3 +98,28 @@ def test_the_run_under_seccomp_is_among_what_is_run(monkeypatch):
 def test_what_could_not_be_counted_makes_its_row_missed(monkeypatch):
     row = system_calls(monkeypatch, PASSED)
     assert row["value"] is None and not row["ok"]
+
+
+def fuzz_row(monkeypatch, files: int, looks: int) -> tuple[dict, dict[str, str]]:
+    """The row of a fuzzing test that printed this, and what it was given in its environment."""
+    asked: dict[str, str] = {}
+    text = (
+        f"files written {files}, near-valid {files // 2}, each loaded in 3 ways, looks at what runs {looks}, "
+        "taken as list 3, gains 4, configuration 5\n"
+    )
+    monkeypatch.setattr(bench_feedback, "run", lambda *_, **more: asked.update(more) or text)
+    (row,) = bench_feedback.fuzz_rows(Path())
+    return row, asked
+
+
+def test_fuzzing_is_asked_for_as_many_files_as_its_row_needs_and_says_how_each_was_loaded(monkeypatch):
+    row, asked = fuzz_row(monkeypatch, 102000, 306000)
+    assert row["ok"] and row["value"] == 102000 and int(asked["CTRL_MORE_FUZZ_FILES"]) >= 1e5
+    for words in ("51000 of them near-valid", "as list, as gains and as configuration", "each of 306000 loads",
+                  "taken as list 3, as gains 4, as configuration 5"):  # fmt: skip
+        assert words in row["figure"]
+
+
+@pytest.mark.parametrize("files, looks", [(12000, 36000), (102000, 102000)], ids=["few files", "a look at each third"])
+def test_fuzzing_of_fewer_files_or_with_fewer_looks_is_missed(monkeypatch, files, looks):
+    assert not fuzz_row(monkeypatch, files, looks)[0]["ok"]

@@ -64,8 +64,16 @@ foreach(name plugins search_path describe_tool documentation central_module atti
     add_dependencies(ctrl_more_test_${name} ${CTRL_MORE_PLUGINS})
   endif()
 endforeach()
+# Programs that a test runs, wherever catkin or plain CMake puts them: a missing one makes it red.
 if(TARGET ctrl_more_test_describe_tool)
   add_dependencies(ctrl_more_test_describe_tool ctrl_more_describe)
+  target_compile_definitions(ctrl_more_test_describe_tool PRIVATE
+    CTRL_MORE_DESCRIBE="$<TARGET_FILE:ctrl_more_describe>")
+endif()
+if(TARGET ctrl_more_test_central_module)
+  add_dependencies(ctrl_more_test_central_module ctrl_more_attitude_example)
+  target_compile_definitions(ctrl_more_test_central_module PRIVATE
+    CTRL_MORE_EXAMPLE="$<TARGET_FILE:ctrl_more_attitude_example>")
 endif()
 if(TARGET ctrl_more_test_realtime)
   target_link_libraries(ctrl_more_test_realtime ${CMAKE_DL_LIBS})

@@ -20,8 +20,13 @@ from coglab_bringup.launch_arguments import judge_launch
 from coglab_bringup.usage import Parser, Refused, master_port, seed, writable_file, writable_folder
 
 HELP_GIVEN = 10
-CORES = ("lwr_fri_bridge", "coglab_controllers", "ctrl_more", "ih2_hand", "smach", "coglab_smach", "coglab_sim")
-"""the packages with a core: bridge, controllers, ctrl_more, hand, engine, brain, cell"""
+CORES = (
+    *("lwr_fri_bridge", "coglab_controllers", "ctrl_more", "ih2_hand", "smach", "coglab_smach", "coglab_sim"),
+    *("coglab_rt", "coglab_objects", "coglab_py"),
+)
+"""the packages with a core: bridge, controllers, ctrl_more, hand, engine, brain, cell; and those to which code of these
+has moved: interpolator, braking, limits, samples and exchanges of bridge and controllers (coglab_rt), the brain's
+objects (coglab_objects), its checked files and poses (coglab_py)"""
 BUILD_OPTIONS = ("--upstream-smach",)
 BUILD_TARGETS = ("tests",)
 

@@ -86,9 +86,11 @@ def main(arguments: list[str]) -> int:
     except Refused as error:
         print(f"[coglab] error: {error}", file=sys.stderr)
         return 2
-    if options.long:
+    # One word for all benches, and for the record: some ask whether it is set, others whether it is 1.
+    long = options.long or os.environ.pop("COGLAB_LONG", "") == "1"
+    if long:
         os.environ["COGLAB_LONG"] = "1"
-    limit = LONG_TIME_LIMIT if options.long else TIME_LIMIT
+    limit = LONG_TIME_LIMIT if long else TIME_LIMIT
     benches = find_benches(sources)
     python = os.environ.get("COGLAB_TEST_PYTHON", "/usr/bin/python3")
     rows: list[dict] = []
@@ -96,7 +98,7 @@ def main(arguments: list[str]) -> int:
         print(f"[coglab] bench {name} ...", file=sys.stderr, flush=True)
         before = sources_of(top, name)
         found = [row for path in benches[name] for row in run_bench(name, path, python, limit)]
-        if not figures.record(top, name, found, options.long, before):
+        if not figures.record(top, name, found, long, before):
             print(f"[coglab] bench {name}: its sources changed while it ran; its rows are not kept", file=sys.stderr)
         rows += found
     if rows:

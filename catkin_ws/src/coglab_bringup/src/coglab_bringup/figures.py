@@ -17,6 +17,7 @@ import json
 import os
 import platform
 import re
+import shlex
 from collections import Counter
 from datetime import UTC, datetime
 from pathlib import Path
@@ -24,6 +25,7 @@ from typing import Any
 
 from coglab_bringup import mutants_kept
 from coglab_bringup.arguments import find_benches
+from coglab_bringup.mutant import ALONE
 from coglab_bringup.sources import MUTANTS, sources_of
 
 NOT_MEASURED = "not measured on these sources"
@@ -37,6 +39,10 @@ BEGIN, END = "<!-- quoted from docs/figures.md -->", "<!-- end of the quotation 
 KEPT = "docs/figures.json"
 QUOTED = ("wall", "fri", "trials")
 """the benches of which README.md shows rows; of the others it says how many are missed"""
+TRIALS = "COGLAB_TRIALS"
+SETTINGS = (TRIALS, "COGLAB_BENCH_QUADS", "CONSOLE_BENCH_PARTS")
+"""what a bench reads from the environment, beside what --long sets: which rows there are, of how many, and from which
+file of trials"""
 HEAD = """# Figures
 
 Written by `./coglab bench --report`, from what `./coglab bench NAME ...` has measured on these sources; edit nothing
@@ -55,6 +61,12 @@ def machine() -> str:
     return f"{os.cpu_count()} cores of {model}, Linux {platform.release()}"
 
 
+def settings_here() -> dict[str, str]:
+    """Those of SETTINGS that are made, as they are told: a file lies elsewhere for whoever types the command."""
+    made = {name: os.environ[name] for name in SETTINGS if os.environ.get(name)}
+    return made | {name: "FILE" for name in made if name == TRIALS}
+
+
 def record(top: Path, name: str, rows: list[dict], long: bool, before: dict[str, str]) -> bool:
     """Keeps the rows of one bench as just measured; the load tells how far the machine was alone.
 
@@ -71,6 +83,7 @@ def record(top: Path, name: str, rows: list[dict], long: bool, before: dict[str,
         "load": round(os.getloadavg()[1], 1),
         "date": datetime.now(UTC).strftime("%Y-%m-%d"),
         "long": long,
+        "settings": {} if name == MUTANTS else settings_here(),
     }
     new = folder / f"{name}.new"
     new.write_text(json.dumps(run | before, indent=1) + "\n")
@@ -139,6 +152,21 @@ def line_of(bench: str, row: dict) -> str:
     return f"| {bench}: {figure} | {value} | {_cell(row['goal'])} | {judged} | {peer} | {peer_value} |"
 
 
+def command_of(name: str, run: dict[str, Any]) -> str:
+    """What prints the rows of a run, whoever types it."""
+    settings = [f"{key}={shlex.quote(value)}" for key, value in run.get("settings", {}).items()]
+    own = name == MUTANTS and any(ALONE in row["figure"] for row in run["rows"])
+    return " ".join([*settings, "./coglab bench", *["--long"] * run["long"], name, *["--own"] * own])
+
+
+def printed_by(name: str, run: dict[str, Any]) -> str:
+    """The line above the table of a run."""
+    return (
+        f"Printed by `{command_of(name, run)}`, on {run['date']}, commit {run['commit']}, "
+        f"on {run['machine']}, five-minute load {run['load']}."
+    )
+
+
 def lines_of(top: Path, name: str) -> list[str]:
     """The rows of a bench; a single one where it was not measured."""
     run = measured(top, name)
@@ -156,11 +184,7 @@ def page(top: Path) -> str:
         run = measured(top, name)
         parts.append(f"## {name}\n\n{definition(paths)}\n")
         if run is not None:
-            kind = "with --long" if run["long"] else "as sampled by default"
-            parts.append(
-                f"Printed by `./coglab bench {name}`, {kind}, on {run['date']}, commit {run['commit']}, "
-                f"on {run['machine']}, five-minute load {run['load']}.\n"
-            )
+            parts.append(printed_by(name, run) + "\n")
         parts.append("\n".join([TABLE, *lines_of(top, name)]) + "\n")
         if name == MUTANTS and (survivors := mutants_kept.survivors(top)):
             parts.append(survivors + "\n")

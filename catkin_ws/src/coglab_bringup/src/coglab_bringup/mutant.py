@@ -9,6 +9,8 @@ from pathlib import Path
 from coglab_bringup.usage import Refused
 
 EQUIVALENT = "docs/equivalent_mutants.json"
+ALONE = ", by the package's own tests alone"
+"""what a row says, and no other, whose lines nothing but these tests has judged: --own"""
 
 
 @dataclass

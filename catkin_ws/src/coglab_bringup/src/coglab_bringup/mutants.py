@@ -1,12 +1,14 @@
 """./coglab bench mutants [PACKAGE ...] [--seed N]: would the tests notice a slip of the hand?
 
-Over how many: 12 changes or more in each of the seven packages with a core, drawn over all lines of code of the package
-that ship, templates and programs without an ending among them (mutator.py: comparison, sign, constant, condition,
-dropped exit, swapped arguments; what is left alone there, and why, it says); fewer make the row missed. Each is made
-alone, what it touches is built, and the tests of the package and of what stands on it run until the first red one. What
-is left out, and counted in a row beside: a line that does not compile, which is drawn again, and a test that is red on
-the unchanged sources, too. Survivors with which the program does the same are named, with a reason, in
-docs/equivalent_mutants.json, shown, and subtracted as long as they are at most one in twenty of all.
+Over how many: 12 changes or more in each of ten packages, the seven with a core (bridge, controllers, ctrl_more, hand,
+engine, brain, cell), and coglab_rt, coglab_objects and coglab_py, to which code of these has moved since 5828bb3, drawn
+over all lines of code of the package that ship, templates and programs without an ending among them (mutator.py:
+comparison, sign, constant, condition, dropped exit, swapped arguments; what is left alone there, and why, it says);
+fewer make the row missed. Each is made alone, what it touches is built, and the tests of the package and of what stands
+on it run until the first red one. What is left out, and counted in a row beside: a line that does not compile, which is
+drawn again, and a test that is red on the unchanged sources, too. Survivors with which the program does the same are
+named, with a reason, in docs/equivalent_mutants.json, shown, and subtracted from the row over all packages alone, as
+long as they are at most one in twenty of all; in the row of its package each counts as a survivor.
 
 The seed of a package comes from the last commit that touched its folder, and changes with each one that does: a row
 says it, and nobody can choose among seeds. A seed given by hand is that of all packages, and is only printed. It was

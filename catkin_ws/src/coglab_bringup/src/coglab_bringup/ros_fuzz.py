@@ -204,7 +204,9 @@ class Fuzz:
         kinds = dict(self.master.getTopicTypes())
         heard = {name for name, nodes in subscribers if ours & set(nodes)} | {"/tf", "/tf_static"}
         self.topics = {name: roslib.message.get_message_class(kinds[name]) for name in sorted(heard) if name in kinds}
-        names = sorted(name for name, nodes in services if ours & set(nodes) and name not in LEFT_OUT)
+        names = sorted(name for name, nodes in services if ours & set(nodes))
+        self.left_out = [name for name in names if name in LEFT_OUT]
+        names = [name for name in names if name not in LEFT_OUT]
         self.services = {name: rosservice.get_service_class_by_name(name) for name in names}
         self.published = sorted(name for name, nodes in publishers if ours & set(nodes))
         self.pids = {node: self.pid(node) for node in self.nodes}
@@ -311,6 +313,12 @@ class Fuzz:
         """s for which the request that a service has now is under way; 0 if it has none."""
         started = self._asked.get(name)
         return 0.0 if started is None else time.monotonic() - started
+
+
+def explained(silent: Collection[str], said: dict[str, tuple[float, str]], now: float, within: float) -> dict[str, str]:
+    """Silent topics whose node says why, with its words. `said`: of each, when it said so last, and the words; they
+    count for `within` s, in which a node that still has that reason says so again."""
+    return {name: said[name][1] for name in sorted(silent) if name in said and now - said[name][0] <= within}
 
 
 def hash_of(name: str) -> int:
