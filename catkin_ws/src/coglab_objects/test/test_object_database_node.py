@@ -58,15 +58,17 @@ def make(tmp_path, monkeypatch):
     master, warnings = Master(tmp_path), []
     for name in ("get_param", "has_param", "set_param", "delete_param"):
         monkeypatch.setattr(rospy, name, getattr(master, name))
+    begun = []
     for name in ("Service", "Timer"):
-        monkeypatch.setattr(rospy, name, lambda *_: None)
+        monkeypatch.setattr(rospy, name, lambda *args: begun.append(args))
     for name in ("logwarn", "logerr_throttle"):
         monkeypatch.setattr(rospy, name, lambda *args: warnings.append(args))
     monkeypatch.setattr(rospy, "resolve_name", lambda name: name)
     spec = importlib.util.spec_from_file_location("node", SHARE / "scripts" / "object_database_node.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    return lambda: SimpleNamespace(node=module.ObjectDatabaseNode(), master=master, folder=tmp_path, warnings=warnings)
+    there = {"module": module, "master": master, "folder": tmp_path, "warnings": warnings, "begun": begun}
+    return lambda node=True: SimpleNamespace(node=module.ObjectDatabaseNode() if node else None, **there)
 
 
 def hostile(folder):
@@ -140,3 +142,98 @@ def test_reading_again_says_by_a_code_whether_all_files_fit(make, tmp_path):
     (tmp_path / "mug.yaml").write_text("id: mug\nmass: heavy\n")
     read = started.node.on_reload(None)
     assert (read.success, read.reason_code) == (False, ReasonCode.BAD_FILE) and "mug.yaml" in read.message
+
+
+def test_three_services_and_a_timer_of_a_second(make):
+    started = make()
+    *services, (period, on_timer) = started.begun
+    assert [(name, served) for name, _, served in services] == [
+        ("~get_object", started.node.on_get),
+        ("~list_objects", started.node.on_list),
+        ("~reload", started.node.on_reload),
+    ]
+    assert period.to_sec() == 1.0 and on_timer == started.node.on_timer
+
+
+def test_an_entry_is_answered_as_its_file_has_it(make, tmp_path):
+    got = make().node.on_get(SimpleNamespace(object_id="mug"))
+    assert (got.success, got.reason_code, got.message) == (True, ReasonCode.NONE, "")
+    assert got.yaml == (tmp_path / "mug.yaml").read_text()
+
+
+def test_an_object_that_is_unknown_is_a_code_and_a_sentence(make):
+    got = make().node.on_get(SimpleNamespace(object_id="elephant"))
+    assert (got.success, got.reason_code, got.yaml) == (False, ReasonCode.OBJECT_UNKNOWN, "")
+    assert got.message == "object 'elephant' is not in the database; it has: ball, mug"
+
+
+def test_a_file_that_is_written_is_read_at_the_next_tick_and_mirrored_once(make):
+    started = make()
+    assert started.master.values["~objects/mug"]["mass"] == 0.31 and started.master.calls == 2
+    path = started.folder / "mug.yaml"
+    path.write_text(path.read_text().replace("mass: 0.31", "mass: 0.3333"))
+    for _ in range(3):
+        started.node.on_timer(None)
+    assert started.master.values["~objects/mug"]["mass"] == 0.3333 and started.master.calls == 3
+    assert started.warnings == []
+
+
+def test_the_timer_reads_only_what_has_changed_and_the_service_all(make, monkeypatch):
+    started = make()
+    asked, reload = [], started.node.database.reload
+    monkeypatch.setattr(started.node.database, "reload", lambda only: asked.append(only) or reload(only))
+    started.node.on_timer(None)
+    assert asked == []
+    (started.folder / "mug.yaml").unlink()
+    started.node.on_timer(None)
+    assert asked == [True]
+    started.node.on_reload(None)
+    assert asked == [True, False]
+
+
+def test_a_problem_that_comes_back_is_told_again(make):
+    started = make()
+    path = started.folder / "mug.yaml"
+    good = path.read_text()
+    for text, told in (("id: mug\n", 1), (good, 1), ("id: mug\n", 2), ("id: mug\n# x\n", 2)):
+        path.write_text(text)
+        started.node.on_reload(None)
+        assert len(started.warnings) == told
+    assert started.warnings[0][0] == "object database: %s" and "mug.yaml" in started.warnings[0][1]
+
+
+def test_a_master_that_is_away_at_the_start_and_later_again_is_told_each_time(make):
+    started = make(node=False)
+    started.master.down = True
+    node = started.module.ObjectDatabaseNode()
+    node.on_timer(None)
+    assert node.behind and len(started.warnings) == 1 and node.database.ids() == ["ball", "mug"]
+    assert started.warnings[0][0] == "object database: %s is not up to date: %s"
+    assert started.warnings[0][1] == "~objects"
+    started.master.down = False
+    node.on_timer(None)
+    calls = started.master.calls
+    node.on_timer(None)
+    assert not node.behind and started.master.objects() == ["ball", "mug"] and started.master.calls == calls
+    started.master.down = True
+    (started.folder / "mug.yaml").unlink()
+    node.on_timer(None)
+    assert node.behind and len(started.warnings) == 2
+
+
+def test_errors_of_the_timer_are_told_at_most_every_ten_seconds(make, monkeypatch):
+    started = make()
+    monkeypatch.setattr(started.node.database, "changed", lambda: 1 / 0)
+    started.node.on_timer(None)
+    assert started.warnings[-1][0] == 10.0
+
+
+def test_the_program_ends_with_1_without_a_folder_and_else_when_ros_ends(make, monkeypatch):
+    started, said = make(node=False), []
+    monkeypatch.setattr(rospy, "init_node", lambda name: said.append(name))
+    monkeypatch.setattr(rospy, "spin", lambda: said.append("spun"))
+    monkeypatch.setattr(rospy, "logfatal", lambda *args: said.append(str(args[1])))
+    assert started.module.main() == 0 and said == ["object_database", "spun"]
+    del started.master.values["~folder"]
+    assert started.module.main() == 1
+    assert said[2:] == ["object_database", "parameter ~folder is missing; expected a text"]

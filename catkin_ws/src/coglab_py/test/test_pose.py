@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from coglab_py.pose import Pose, about_z, mean_pose, rotation
+from coglab_py.pose import IDENTITY, Pose, about_z, length, mean_pose, rotation
 
 RNG = np.random.default_rng(5)
 
@@ -40,7 +40,39 @@ def test_distance_is_that_of_position_and_of_the_smallest_turn():
     assert (far, angle) == pytest.approx((5.0, 0.3))
 
 
+def test_a_pose_of_which_nothing_is_said_is_its_parent():
+    for pose in (Pose(), Pose.from_dict({})):
+        assert pose.position.tolist() == [0.0, 0.0, 0.0] and pose.orientation.tolist() == [0.0, 0.0, 0.0, 1.0]
+    assert IDENTITY == (0.0, 0.0, 0.0, 1.0)
+    with pytest.raises(AttributeError):
+        Pose().position = np.ones(3)
+
+
+def test_a_turn_about_the_vertical_axis_and_a_length():
+    assert about_z(0.6) == pytest.approx([0.0, 0.0, np.sin(0.3), np.cos(0.3)], abs=1e-15)
+    assert length(np.array([2.0, -3.0, 6.0])) == 7.0
+
+
+def test_only_a_quaternion_of_nearly_nothing_has_no_direction():
+    assert rotation([0, 0, 0, 1.5e-9]).as_quat() == pytest.approx(IDENTITY)
+    assert rotation([0, 0, -20, 0]).magnitude() == pytest.approx(np.pi)
+
+
+def test_a_pose_as_plain_lists():
+    pose = Pose(np.array([1, 2, 3]), np.array([0, 0, 1, 0]))
+    assert pose.to_dict() == {"xyz": [1.0, 2.0, 3.0], "quaternion": [0.0, 0.0, 1.0, 0.0]}
+    assert {type(number) for numbers in pose.to_dict().values() for number in numbers} == {float}
+
+
+def test_the_mean_of_two_poses_lies_half_way():
+    one, other = Pose(np.array([1.0, 2.0, 3.0]), about_z(0.2)), Pose(np.array([3.0, 6.0, -3.0]), about_z(0.6))
+    mean = mean_pose([one, other])
+    assert mean.position == pytest.approx([2.0, 4.0, 0.0])
+    assert mean.distance(Pose(mean.position, about_z(0.4))) == pytest.approx((0.0, 0.0), abs=1e-7)
+
+
 def test_reading():
+    assert Pose.from_dict({"xyz": [1, 2, 3], "quaternion": [0, 0, 2, 0]}).orientation == pytest.approx([0, 0, 1, 0])
     assert Pose.from_dict({"xyz": [1, 2, 3]}).orientation == pytest.approx([0, 0, 0, 1])
     assert Pose.from_dict({"xyz": [0, 0, 0], "rpy_deg": [0, 0, 90]}).axis(0) == pytest.approx([0, 1, 0], abs=1e-12)
     # Fixed axes: the roll comes first, so a yaw after it carries the rolled y axis.
@@ -56,6 +88,12 @@ def test_reading():
         ({"rpy_deg": [0, float("nan"), 0]}, "rpy_deg has three"),
         ({"quaternion": [0, 0, 0, 0]}, "no direction"),
         ({"quaternion": [0, 0, 1]}, "four finite numbers"),
+        ({"quaternion": [0, 0, float("inf"), 1]}, "four finite numbers"),
+        ({"quaternion": [[0, 0, 0, 1]]}, "four finite numbers"),
+        ({"quaternion": [0, 0, 0.6e-9, 0.6e-9]}, "no direction"),
+        ({"xyz": [0, float("inf"), 0]}, r"xyz has three finite numbers in m, got \[0, inf, 0\]"),
+        ({"xyz": [0, 0, 0, 0]}, "xyz has three finite numbers"),
+        ({"rpy_deg": [0, 0]}, r"rpy_deg has three finite numbers in degrees, got \[0, 0\]"),
     ],
 )
 def test_malformed_poses_are_refused(data, sentence):

@@ -1,9 +1,14 @@
 /// A thread of the real-time side.
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cstdint>
+#include <string>
+#include <system_error>
+#include <utility>
 
 #include <sys/mman.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include "coglab_rt/real_time.hpp"
@@ -40,6 +45,130 @@ TEST(BoundedThread, TheStackBelowTheBodyIsTouchedBeforeItRuns) {
   thread.join();
   EXPECT_GT(looked_at, 300U);
   EXPECT_EQ(present, looked_at);
+}
+
+/// Size of the calling thread's stack as the C library tells it, and its name.
+std::size_t stackSize() {
+  pthread_attr_t attributes;
+  pthread_getattr_np(pthread_self(), &attributes);
+  std::size_t size = 0;
+  pthread_attr_getstacksize(&attributes, &size);
+  pthread_attr_destroy(&attributes);
+  return size;
+}
+
+std::string threadName() {
+  char name[16] = "";
+  pthread_getname_np(pthread_self(), name, sizeof(name));
+  return name;
+}
+
+TEST(BoundedThread, HasTheStackThatIsAskedForAndAtLeast128KiB) {
+  std::size_t size = 0;
+  BoundedThread thread;
+  // Sizes that are no quarter of another test's: the C library would give that one's stack again.
+  for (const auto& [asked, given] : {std::pair<std::size_t, std::size_t>{1, 128 * 1024},
+                                     {128 * 1024, 128 * 1024},
+                                     {132 * 1024, 132 * 1024}}) {
+    thread.start("size", asked, [&size] { size = stackSize(); });
+    thread.join();
+    EXPECT_EQ(size, given) << asked;
+  }
+}
+
+TEST(BoundedThread, IsNamedByTheFirst15Characters) {
+  std::string name;
+  BoundedThread thread;
+  for (const char* asked : {"123456789012345", "1234567890123456789"}) {
+    name.clear();
+    thread.start(asked, 0, [&name] { name = threadName(); });
+    thread.join();
+    EXPECT_EQ(name, "123456789012345");
+  }
+}
+
+TEST(BoundedThread, RunsUntilItIsJoinedAndAnotherStartWaitsForIt) {
+  std::atomic<int> ran{0};
+  BoundedThread thread;
+  EXPECT_FALSE(thread.running());
+  thread.join();  // of none
+  thread.start("first", 0, [&ran] {
+    usleep(20'000);
+    ++ran;
+  });
+  EXPECT_TRUE(thread.running());
+  thread.start("second", 0, [&ran] { ran = ran == 1 ? 2 : -1; });
+  thread.join();
+  EXPECT_FALSE(thread.running());
+  EXPECT_EQ(ran, 2);
+}
+
+TEST(BoundedThread, OneThatCannotBeStartedIsNamedAndDoesNotRun) {
+  BoundedThread thread;
+  try {
+    thread.start("vast", std::size_t{1} << 60, [] {});
+    FAIL();
+  } catch (const std::system_error& error) {
+    EXPECT_EQ(std::string(error.what()).find("cannot start thread vast"), 0U) << error.what();
+    EXPECT_NE(error.code().value(), 0);
+  }
+  EXPECT_FALSE(thread.running());
+}
+
+/// Half of what is left is touched; what lies deeper is not, so that locked memory stays small.
+TEST(BoundedThread, TheLowerHalfOfTheStackIsNotTouched) {
+  constexpr std::size_t kStack = 16'384 * 1024;  // no stack that the C library keeps from before
+  std::size_t present = 0;
+  BoundedThread thread;
+  thread.start("untouched", kStack, [&] {
+    const auto page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+    const auto here = reinterpret_cast<std::uintptr_t>(__builtin_frame_address(0)) / page * page;
+    for (std::size_t depth = kStack * 6 / 10; depth < kStack * 9 / 10; depth += page) {
+      unsigned char resident = 0;
+      if (mincore(reinterpret_cast<void*>(here - depth), page, &resident) == 0 && (resident & 1))
+        ++present;
+    }
+  });
+  thread.join();
+  EXPECT_EQ(present, 0U);
+}
+
+TEST(RealTime, APriorityThatThereIsNotIsRefusedInWords) {
+  EXPECT_EQ(enterRealTime(100),
+            "SCHED_FIFO priority 100 not granted (Invalid argument): answers may come late under "
+            "load; give the binary cap_sys_nice");
+}
+
+/// In a thread of its own, which takes the priority with it: granted or not, what it says is so.
+TEST(RealTime, ThePriorityThatIsGrantedIsTheOneAskedFor) {
+  BoundedThread thread;
+  thread.start("priority", 0, [] {
+    const std::string refused = enterRealTime(7);
+    int policy = -1;
+    sched_param parameters{};
+    ASSERT_EQ(pthread_getschedparam(pthread_self(), &policy, &parameters), 0);
+    EXPECT_EQ(policy == SCHED_FIFO, refused.empty()) << refused;
+    EXPECT_EQ(parameters.sched_priority, refused.empty() ? 7 : 0);
+  });
+  thread.join();
+}
+
+/// In a process of its own, which alone is locked: granted or not, what it says is so.
+TEST(RealTime, MemoryIsLockedOrItIsSaidThatItIsNot) {
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    const std::string refused = lockMemory();
+    const bool granted = mlockall(MCL_CURRENT) == 0;
+    const bool told = refused.find("mlockall not granted (") == 0 &&
+                      refused.find("give the binary cap_ipc_lock or raise the memlock limit") !=
+                          std::string::npos;
+    _exit(granted ? (refused.empty() ? 0 : 1) : (told ? 0 : 2));
+  }
+  int status = -1;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  EXPECT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
 }  // namespace

@@ -49,5 +49,36 @@ TEST(FixedText, EqualityIsThatOfTheText) {
   EXPECT_EQ(one, other);
 }
 
+TEST(FixedText, NumbersAtTheEdges) {
+  const auto written = [](auto value) { return (FixedText<64>() << value).str(); };
+  EXPECT_EQ(written(0.0), "0.000");
+  EXPECT_EQ(written(0.0004), "0.000");
+  EXPECT_EQ(written(0.0006), "0.001");
+  EXPECT_EQ(written(-0.0996), "-0.100");
+  EXPECT_EQ(written(12.3456), "12.346");
+  EXPECT_EQ(written(0.9996), "1.000");
+  EXPECT_EQ(written(1e15), "1000000000000000.000");
+  EXPECT_EQ(written(1.1e15), ">1e15");
+  EXPECT_EQ(written(-1.1e15), "->1e15");
+  EXPECT_EQ(written(std::uint64_t{0}), "0");
+  EXPECT_EQ(written(std::uint64_t{10}), "10");
+}
+
+TEST(FixedText, EqualityLooksAtEveryCharacterAndAtTheEnd) {
+  const FixedText<8> text("abc");
+  for (const char* other : {"xbc", "axc", "abx", "ab", "abcd", ""}) {
+    EXPECT_NE(text, FixedText<8>(other));
+    EXPECT_NE(FixedText<8>(other), text);
+  }
+  EXPECT_EQ(FixedText<8>(), FixedText<8>(""));
+  EXPECT_TRUE(FixedText<8>().empty());
+  EXPECT_FALSE(text.empty());
+}
+
+TEST(FixedText, AnIdHasAtMost63Characters) {
+  EXPECT_EQ(Name(std::string(63, 'n').c_str()).str(), std::string(63, 'n'));
+  EXPECT_EQ(Name(std::string(64, 'n').c_str()).str(), std::string(63, 'n'));
+}
+
 }  // namespace
 }  // namespace coglab_rt

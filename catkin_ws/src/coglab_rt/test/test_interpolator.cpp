@@ -108,5 +108,32 @@ TEST(Interpolator, MatchesNumericIntegrationOfItsJerk) {
   EXPECT_NEAR(s.acceleration, a, 1e-3);
 }
 
+/// After its phases the velocity is kept: exactly the target's, whatever the phases came to.
+TEST(Interpolator, AtTheEndOfAProfileTheVelocityIsTheTarget) {
+  const AxisProfile profile{{0.25, 0.25, 0.25}, {1.0, 0.0, -1.0}, 5.0};
+  const AxisState end = advance({0.0, 0.0, 0.0}, profile, 0.75);
+  EXPECT_EQ(end.velocity, 5.0);
+  EXPECT_EQ(end.acceleration, 0.0);
+  const AxisState later = advance({0.0, 0.0, 0.0}, profile, 1.75);
+  EXPECT_DOUBLE_EQ(later.position - end.position, 5.0);
+  EXPECT_DOUBLE_EQ(profile.totalTime(), 0.75);
+}
+
+TEST(Interpolator, StandsOnlyWithoutVelocityAndWithoutAccelerationOfAnyJoint) {
+  Interpolator interpolator(loadJointLimits(LIMITS_FILE));
+  EXPECT_TRUE(interpolator.standsStill());
+  for (int joint = 0; joint < 7; ++joint) {
+    const Vector7 one = Vector7::Unit(joint), none = Vector7::Zero();
+    interpolator.resume(one, 1e-9 * one, none);
+    EXPECT_FALSE(interpolator.standsStill());
+    interpolator.resume(one, none, -1e-9 * one);
+    EXPECT_FALSE(interpolator.standsStill());
+    EXPECT_EQ(interpolator.axis(joint).position, 1.0);
+    EXPECT_EQ(interpolator.axis(joint).acceleration, -1e-9);
+    interpolator.reset(one);
+    EXPECT_TRUE(interpolator.standsStill());
+  }
+}
+
 }  // namespace
 }  // namespace coglab_rt

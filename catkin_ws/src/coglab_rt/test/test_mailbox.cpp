@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <functional>
 #include <thread>
 
 #include "coglab_rt/arm_port.hpp"
@@ -69,6 +70,64 @@ TEST(Mailbox, AQueueKeepsEverythingInOrder) {
     }
   }
   writer.join();
+}
+
+/// A value that does something while it is copied to the reader: there the writer may be at work.
+struct Watched {
+  int value = 0;
+  const std::function<void()>* during_copy = nullptr;
+
+  Watched() = default;
+  Watched(int value) : value(value) {}  // NOLINT: converts like a number on purpose
+  Watched(const Watched&) = default;
+  Watched& operator=(const Watched& other) {
+    value = other.value;
+    if (during_copy != nullptr) {
+      (*during_copy)();
+      EXPECT_EQ(other.value, value) << "the writer wrote to what the reader reads";
+    }
+    return *this;
+  }
+};
+
+TEST(Mailbox, TheWriterNeverTouchesWhatTheReaderReads) {
+  TripleBuffer<Watched> buffer;
+  int last = 0;
+  const std::function<void()> write_thrice = [&] {
+    for (int i = 0; i < 3; ++i) buffer.write(++last);
+  };
+  Watched read;
+  EXPECT_FALSE(buffer.read(read));  // nothing was written
+  EXPECT_EQ(read.value, 0);
+  read.during_copy = &write_thrice;
+  for (int turn = 0; turn < 5; ++turn) {
+    EXPECT_EQ(buffer.read(read), turn > 0);  // three more are written with each
+    EXPECT_EQ(read.value, 3 * turn);
+  }
+  read.during_copy = nullptr;
+  EXPECT_TRUE(buffer.read(read));
+  EXPECT_EQ(read.value, 15);
+  EXPECT_FALSE(buffer.read(read));  // the newest again, and it is said that it is not new
+  EXPECT_EQ(read.value, 15);
+}
+
+TEST(Mailbox, AFullQueueRefusesTheNewestAndCountsIt) {
+  EventRing<int, 4> queue;
+  int value = -1;
+  EXPECT_FALSE(queue.pop(value));
+  EXPECT_EQ(value, -1);
+  for (int round = 0; round < 3; ++round) {
+    for (int i = 0; i < 4; ++i) EXPECT_TRUE(queue.push(10 * round + i));
+    EXPECT_EQ(queue.dropped(), 2U * static_cast<unsigned>(round));
+    EXPECT_FALSE(queue.push(98));
+    EXPECT_FALSE(queue.push(99));
+    EXPECT_EQ(queue.dropped(), 2U * static_cast<unsigned>(round) + 2U);
+    for (int i = 0; i < 4; ++i) {
+      EXPECT_TRUE(queue.pop(value));
+      EXPECT_EQ(value, 10 * round + i);
+    }
+    EXPECT_FALSE(queue.pop(value));
+  }
 }
 
 }  // namespace

@@ -81,5 +81,28 @@ TEST(PlanExchange, WithAThreadThatTakesThemEachComesOnceAndInOrder) {
   EXPECT_EQ(alive, 0);
 }
 
+TEST(PlanExchange, AnAcknowledgementWithoutAPlanIsOfNone) {
+  PlanExchange<Plan> plans;
+  plans.acknowledge();
+  EXPECT_EQ(plans.generation(), 0U);
+}
+
+TEST(PlanExchange, APlanThatWasTakenLateIsFreedByTheNextOneThatIsAdopted) {
+  {
+    PlanExchange<Plan> plans;
+    bool late = true;
+    plans.setWait([&] {
+      if (plans.take() != nullptr && !late) plans.acknowledge();
+    });
+    EXPECT_EQ(plans.offer(std::make_unique<Plan>(1), 0.01), PlanOutcome::Taken);
+    EXPECT_EQ(alive, 1);
+    late = false;
+    EXPECT_EQ(plans.offer(std::make_unique<Plan>(2), 10.0), PlanOutcome::Adopted);
+    EXPECT_EQ(plans.generation(), 2U);
+    EXPECT_EQ(alive, 1);
+  }
+  EXPECT_EQ(alive, 0);
+}
+
 }  // namespace
 }  // namespace coglab_rt

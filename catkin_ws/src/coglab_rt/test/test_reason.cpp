@@ -38,5 +38,10 @@ TEST(Reason, IsEmptyOnlyWithoutACode) {
   EXPECT_TRUE(reason.empty());
 }
 
+TEST(Reason, ASentenceHasAtMost199Characters) {
+  const std::string longest(199, 'x');
+  EXPECT_EQ(Reason(ReasonCode::Busy, (longest + "y").c_str()).str(), longest);
+}
+
 }  // namespace
 }  // namespace coglab_rt

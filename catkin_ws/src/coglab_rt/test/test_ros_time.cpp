@@ -48,5 +48,15 @@ TEST_F(RosTime, ZeroMeansNoStampAndIsNeverMade) {
   EXPECT_NEAR(toRos(steadyNow() - 1'000'000'000).toSec(), 2.0, 0.5);
 }
 
+TEST(RosTimeValues, SecondsAndNanosecondsAreOneNumber) {
+  EXPECT_EQ(nanoseconds(ros::Time(3, 5)), 3'000'000'005);
+  EXPECT_EQ(nanoseconds(ros::Time(4294967295U, 999'999'999)), 4'294'967'295'999'999'999);
+  ros::Time::setNow(ros::Time(7, 250));
+  EXPECT_EQ(ageOf(ros::Time(5, 200)), 2'000'000'050);
+  EXPECT_EQ(ageOf(ros::Time(9, 250)), -2'000'000'000);
+  EXPECT_EQ(toSteady(ros::Time(5, 200), 10'000'000'000), 7'999'999'950);
+  EXPECT_EQ(toSteady(ros::Time(9, 250), 10'000'000'000), 12'000'000'000);
+}
+
 }  // namespace
 }  // namespace coglab_rt

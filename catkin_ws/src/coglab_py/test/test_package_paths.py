@@ -1,0 +1,57 @@
+"""Where files of packages are looked for, in which order, and what is said where they are in none of these places."""
+
+import pytest
+import rospkg
+from coglab_py import packages
+from coglab_py.packages import package_path
+
+
+@pytest.fixture
+def rospack(monkeypatch):
+    """What rospack knows, by package; nothing at first."""
+    known = {}
+
+    class RosPack:
+        def get_path(self, package):
+            if package not in known:
+                raise rospkg.ResourceNotFound(package)
+            return known[package]
+
+    monkeypatch.setattr(rospkg, "RosPack", RosPack)
+    return known
+
+
+def placed(folder):
+    (folder / "config").mkdir(parents=True)
+    (folder / "config" / "f.yaml").write_text("")
+    return folder / "config" / "f.yaml"
+
+
+def test_beside_this_package(rospack):
+    found = package_path("coglab_py", "package.xml")
+    assert found.is_file() and found.parent.name == "coglab_py"
+
+
+def test_in_the_share_folder_of_an_install_space(rospack, monkeypatch, tmp_path):
+    monkeypatch.setattr(packages, "__file__", str(tmp_path / "lib" / "python3" / "coglab_py" / "packages.py"))
+    file = placed(tmp_path / "share" / "ours")
+    assert package_path("ours", "config", "f.yaml") == file
+    assert package_path("ours") == tmp_path / "share" / "ours"
+
+
+def test_through_rospack_where_it_is_nowhere_near(rospack, tmp_path):
+    file = placed(tmp_path / "elsewhere")
+    rospack["far_away"] = str(tmp_path / "elsewhere")
+    assert package_path("far_away", "config", "f.yaml") == file
+
+
+def test_a_file_or_package_that_is_nowhere_is_named_with_what_to_do(rospack, tmp_path):
+    placed(tmp_path / "elsewhere")
+    rospack["far_away"] = str(tmp_path / "elsewhere")
+    todo = "is not there: build the workspace, or install the package"
+    with pytest.raises(FileNotFoundError) as error:
+        package_path("far_away", "config", "g.yaml")
+    assert str(error.value) == f"{tmp_path}/elsewhere/config/g.yaml {todo} far_away again"
+    with pytest.raises(FileNotFoundError) as error:
+        package_path("no_such_package", "config", "f.yaml")
+    assert str(error.value) == f"no_such_package/config/f.yaml {todo} no_such_package again"

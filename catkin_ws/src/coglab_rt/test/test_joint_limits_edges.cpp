@@ -1,0 +1,157 @@
+/// The table of joint limits at the edges of what it may say: values just allowed and just not, and
+/// the line and the whole sentence of what is refused.
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <fstream>
+#include <stdexcept>
+#include <string>
+
+#include <unistd.h>
+
+#include "coglab_rt/joint_limits_table.hpp"
+
+namespace coglab_rt {
+namespace {
+
+const std::string kNames = "joints: [j1, j2, j3, j4, j5, j6, j7]\n";  // line 1
+const std::string kMargin = "position_margin: 0.02\n";                // line 2
+const std::string kDefault =                                          // lines 3 to 9
+    "default:\n"
+    "  lower_position: [-1, -2, -3, -4, -5, -6, -7]\n"
+    "  upper_position: [1, 2, 3, 4, 5, 6, 7]\n"
+    "  velocity: [1, 2, 3, 4, 5, 6, 7]\n"
+    "  acceleration: [11, 12, 13, 14, 15, 16, 17]\n"
+    "  jerk: [21, 22, 23, 24, 25, 26, 27]\n"
+    "  torque: [31, 32, 33, 34, 35, 36, 37]\n";
+const std::string kTable = kNames + kMargin + kDefault;
+
+std::string with(const std::string& from, const std::string& to) {
+  std::string text = kTable;
+  EXPECT_NE(text.find(from), std::string::npos) << from;
+  return text.replace(text.find(from), from.size(), to);
+}
+
+/// A table in a file that lasts as long as the test.
+class Edges : public ::testing::Test {
+ protected:
+  void TearDown() override { std::remove(path_.c_str()); }
+
+  JointLimits load(const std::string& text, const std::string& profile = "default") const {
+    std::ofstream(path_) << text;
+    return loadJointLimits(path_, profile);
+  }
+  /// What is said, behind the name of the file; empty if it is read.
+  std::string error(const std::string& text, const std::string& profile = "default") const {
+    try {
+      load(text, profile);
+    } catch (const std::runtime_error& caught) {
+      const std::string begin = "joint limits " + path_, what = caught.what();
+      return what.compare(0, begin.size(), begin) == 0 ? what.substr(begin.size()) : "?" + what;
+    }
+    return "";
+  }
+
+  const std::string path_ = "/tmp/coglab_rt_edges_" + std::to_string(getpid()) + ".yaml";
+};
+
+TEST_F(Edges, EveryValueComesToItsPlace) {
+  const JointLimits limits = load(kTable);
+  for (int i = 0; i < 7; ++i) {
+    EXPECT_EQ(limits.names[static_cast<std::size_t>(i)], "j" + std::to_string(i + 1));
+    EXPECT_EQ(limits.lower_position[i], -1.0 - i);
+    EXPECT_EQ(limits.upper_position[i], 1.0 + i);
+    EXPECT_EQ(limits.velocity[i], 1.0 + i);
+    EXPECT_EQ(limits.acceleration[i], 11.0 + i);
+    EXPECT_EQ(limits.jerk[i], 21.0 + i);
+    EXPECT_EQ(limits.torque[i], 31.0 + i);
+  }
+  EXPECT_EQ(limits.position_margin, 0.02);
+}
+
+TEST_F(Edges, SpeedAccelerationJerkAndTorqueArePositive) {
+  const std::pair<const char*, const char*> fields[] = {
+      {"velocity: [1,", ":6: default.velocity"},
+      {"acceleration: [11,", ":7: default.acceleration"},
+      {"jerk: [21,", ":8: default.jerk"},
+      {"torque: [31,", ":9: default.torque"}};
+  for (const auto& [field, place] : fields) {
+    const std::string name(field, std::string(field).find('[') + 1);
+    EXPECT_EQ(error(with(field, name + "0,")),
+              std::string(place) + "[0] = 0.000000: expected a positive finite number");
+    EXPECT_EQ(error(with(field, name + "1e-9,")), "");
+  }
+}
+
+TEST_F(Edges, APositionIsAnyFiniteNumberButBelowTheOtherEnd) {
+  EXPECT_EQ(load(with("upper_position: [1,", "upper_position: [-0.5,")).upper_position[0], -0.5);
+  EXPECT_EQ(load(with("upper_position: [1,", "upper_position: [0,")).upper_position[0], 0.0);
+  EXPECT_EQ(load(with("lower_position: [-1,", "lower_position: [0,")).lower_position[0], 0.0);
+  EXPECT_EQ(error(with("lower_position: [-1,", "lower_position: [.inf,")),
+            ":4: default.lower_position[0] = inf: expected a finite number");
+  const std::string order = ": lower_position must be below upper_position";
+  EXPECT_EQ(error(with("lower_position: [-1,", "lower_position: [1,")), ":1: j1" + order);
+  EXPECT_EQ(error(with("-6, -7]", "-6, 7]")), ":1: j7" + order);
+}
+
+TEST_F(Edges, ListsHaveSevenNumbers) {
+  EXPECT_EQ(error(with("26, 27]", "26, 27, 28]")),
+            ":8: default.jerk: expected a list of 7 numbers, got 8 entries");
+  EXPECT_EQ(error(with("[21, 22, 23, 24, 25, 26, 27]", "21")),
+            ":8: default.jerk: expected a list of 7 numbers, got no list");
+  EXPECT_EQ(error(with("26, 27]", "26, fast]")), ":8: default.jerk[6]: expected a number");
+  for (const char* names : {"joints: [j1, j2, j3, j4, j5, j6, j7, j8]\n", "joints: j1\n", ""})
+    EXPECT_EQ(error(names + kMargin + kDefault),
+              ":1: joints: expected the 7 names in the order of the arm");
+  EXPECT_EQ(error(with("j7", "''")), ":1: joints[6] = '': expected a name that no other joint has");
+}
+
+TEST_F(Edges, MarginAndOvershootGoFromZeroToAHalf) {
+  for (const char* good : {"0", "0.5"}) {
+    const double value = std::stod(good);
+    EXPECT_EQ(load(with("margin: 0.02", std::string("margin: ") + good)).position_margin, value);
+    const JointLimits limits = load(kTable + "servo_overshoot: " + good);
+    EXPECT_DOUBLE_EQ(limits.velocity[6], 7.0 / (1.0 + value));
+  }
+  for (const char* bad : {"-0.001", "0.501", "[0.02]", ".nan", "wide"}) {
+    EXPECT_EQ(error(with("margin: 0.02", std::string("margin: ") + bad)),
+              ":2: position_margin: expected a number from 0 to 0.5 (rad)")
+        << bad;
+    EXPECT_EQ(error(kTable + "servo_overshoot: " + bad),
+              ":10: servo_overshoot: expected a number in 0..0.5")
+        << bad;
+  }
+}
+
+TEST_F(Edges, AProfileOverridesWhatItNamesAndNoMore) {
+  const std::string slow = kTable + "slow:\n  velocity: [0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.2]\n";
+  const JointLimits limits = load(slow, "slow");
+  EXPECT_EQ(limits.velocity[0], 0.1);
+  EXPECT_EQ(limits.velocity[6], 0.2);
+  EXPECT_EQ(limits.acceleration, load(kTable).acceleration);
+  EXPECT_EQ(load(slow).velocity[0], 1.0);
+  EXPECT_EQ(error(slow + "  speed: 1\n", "slow"), ":12: slow.speed: unknown field");
+  EXPECT_EQ(error(slow + "  speed: 1\n"), "");  // nobody asked for it
+  EXPECT_EQ(error(kTable + "slow: 5\n", "slow"), ":1: profile 'slow' is missing");
+}
+
+TEST_F(Edges, WhatIsMissingIsNamed) {
+  EXPECT_EQ(error(with("  torque: [31, 32, 33, 34, 35, 36, 37]\n", "")),
+            ":4: default.torque is missing");
+  EXPECT_EQ(error(kNames + kMargin), ":1: profile 'default' is missing");
+  EXPECT_EQ(error(kNames + kDefault), ":1: position_margin: expected a number from 0 to 0.5 (rad)");
+  EXPECT_EQ(error("- 1\n- 2\n"), ":1: expected a map with 'joints', 'default' and profiles");
+  EXPECT_EQ(error(kNames + "default: [1\n").substr(0, 3), ":3:");
+  std::remove(path_.c_str());
+  try {
+    loadJointLimits(path_);
+    FAIL();
+  } catch (const std::runtime_error& caught) {
+    EXPECT_EQ(caught.what(), "joint limits " + path_ +
+                                 ": cannot be opened; expected config/joint_limits.yaml of the "
+                                 "arm's description");
+  }
+}
+
+}  // namespace
+}  // namespace coglab_rt
