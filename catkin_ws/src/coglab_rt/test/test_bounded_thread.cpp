@@ -89,14 +89,17 @@ TEST(BoundedThread, IsNamedByTheFirst15Characters) {
 
 TEST(BoundedThread, RunsUntilItIsJoinedAndAnotherStartWaitsForIt) {
   std::atomic<int> ran{0};
+  std::atomic<bool> seen{false};
   BoundedThread thread;
   EXPECT_FALSE(thread.running());
   thread.join();  // of none
-  thread.start("first", 0, [&ran] {
-    usleep(20'000);
+  thread.start("first", 0, [&ran, &seen] {
+    while (!seen) usleep(100);
+    usleep(20'000);  // a second one that did not wait would begin before this has run
     ++ran;
   });
   EXPECT_TRUE(thread.running());
+  seen = true;
   thread.start("second", 0, [&ran] { ran = ran == 1 ? 2 : -1; });
   thread.join();
   EXPECT_FALSE(thread.running());
