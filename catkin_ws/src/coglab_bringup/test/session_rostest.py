@@ -3,11 +3,15 @@
 person. Then the robot's node is killed while the machine waits: it says so, and can go on."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
+import tempfile
 import time
+from pathlib import Path
 
+import rospkg
 import rospy
 import rostest
 from coglab_bringup.handover import READY_LIMIT, ask_for, run_handover
@@ -18,6 +22,42 @@ from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 
 ORDER = ("put", "take", "exchange_robot_to_human")
+WORKSPACE = Path(rospkg.RosPack().get_path("coglab_bringup")).parents[1]
+
+
+def built_for_the_first_demo() -> set[str]:
+    """Names of the programs and libraries that the target coglab_system builds, with all that these depend on."""
+    needs: dict[str, set[str]] = {}
+    for target, needed in re.findall(
+        r"^(\S+\.dir)/all: (\S+\.dir)/all$", (WORKSPACE / "build/CMakeFiles/Makefile2").read_text(), re.MULTILINE
+    ):
+        needs.setdefault(target, set()).add(needed)
+    found, waiting = set(), {"coglab_bringup/CMakeFiles/coglab_system.dir"}
+    while waiting:
+        target = waiting.pop()
+        found.add(target)
+        waiting |= needs.get(target, set()) - found
+    links = [WORKSPACE / "build" / target / "link.txt" for target in found]
+    return {re.search(r" -o (\S+)", link.read_text()).group(1).rsplit("/", 1)[-1] for link in links if link.is_file()}
+
+
+def loaded_by_this_session() -> set[str]:
+    """Names of the programs and libraries of this workspace that its running processes have in memory, and of those
+    that programs of the launch file load before there are any."""
+    ours = f"ROS_MASTER_URI={os.environ['ROS_MASTER_URI']}\0".encode()
+    text = ""
+    for process in Path("/proc").glob("[0-9]*"):
+        try:
+            text += (process / "maps").read_text() if ours in (process / "environ").read_bytes() else ""
+        except OSError:  # it has ended, or is somebody else's
+            continue
+    with tempfile.TemporaryDirectory() as out:
+        told = {"LD_DEBUG": "files", "LD_DEBUG_OUTPUT": f"{out}/loaded"}
+        dump = ["roslaunch", "--dump-params", "coglab_bringup", "coglab.launch"]
+        subprocess.run(dump, env={**os.environ, **told}, stdout=subprocess.DEVNULL, timeout=60, check=True)
+        text += "".join(file.read_text(errors="replace") for file in Path(out).iterdir())
+    paths = re.findall(rf"{re.escape(str(WORKSPACE / 'devel'))}/[^\s;\]]+", text)
+    return {path.rsplit("/", 1)[-1] for path in paths}
 
 
 class Session(Handover):
@@ -66,6 +106,12 @@ class Session(Handover):
         ends = [m.points[-1] for array in self.scenes for m in array.markers if m.ns == "path" and m.points]
         goals = [m.pose.position for array in self.scenes for m in array.markers if m.ns == "goal" and m.color.a > 0]
         self.assertLess(abs(ends[-1].x - goals[-1].x), 0.02, "the path does not lead to the goal")
+
+    def test_6_all_that_runs_is_what_the_first_demo_builds(self):
+        """Whoever types ./coglab demo first has nothing else of this workspace."""
+        loaded = loaded_by_this_session()
+        self.assertLessEqual({"robot_node", "cell_node", "_plant"}, {name.split(".")[0] for name in loaded})
+        self.assertEqual(loaded - built_for_the_first_demo(), set())
 
     def test_z_a_killed_robot_node_shows_in_the_hub_and_is_initialised_again(self):
         found = subprocess.run(["rosnode", "info", "/robot"], capture_output=True, text=True, timeout=20, check=True)
