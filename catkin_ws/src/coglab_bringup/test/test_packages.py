@@ -151,7 +151,8 @@ def test_the_target_of_the_first_demo_holds_what_a_launched_system_runs():
         f"{p.parent.name}_generate_messages" for p in SOURCES.rglob("package.xml") if (p.parent / "msg").is_dir()
     }
     assert plugins and nodes == {"robot_node", "cell_node"} and len(messages) == 2
-    assert listed == plugins | nodes | messages | {"coglab_controllers_python"}
+    # What the launch and its Python programs load besides: session.test asserts that nothing is missing.
+    assert listed == plugins | nodes | messages | {"coglab_controllers_python", "coglab_sim_plant_python"}
     # The plug-ins of the manager, which nobody links, come with its node.
     controllers = (SOURCES / "coglab_controllers" / "CMakeLists.txt").read_text(encoding="utf-8")
     assert "add_dependencies(robot_node coglab_dmp_controller coglab_ptp_controller)" in controllers
