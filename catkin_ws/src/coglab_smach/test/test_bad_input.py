@@ -128,9 +128,13 @@ def test_what_a_node_says_reaches_the_person_word_for_word_with_its_code(prepare
 
 
 @pytest.mark.parametrize(
-    "moment, hub, sentence", [(0.3, "wait_without_object", "hand"), (2.6, "stopped", "closing of the hand")]
+    "moment, hub, sentence, code",
+    [
+        (0.3, "wait_without_object", "hand_preshape: preshape 'cylindrical' within 6.0 s", ReasonCode.TIME_LIMIT),
+        (2.6, "stopped", "hand_close: closing of the hand within 11.9 s", ReasonCode.NOT_RELEASED),
+    ],
 )
-def test_hand_node_dies_during_the_exchange(moment, hub, sentence):
+def test_hand_node_dies_during_the_exchange(moment, hub, sentence, code):
     trial = Trial()
 
     def script(t):
@@ -141,9 +145,30 @@ def test_hand_node_dies_during_the_exchange(moment, hub, sentence):
         t.wait_hub(hub)
 
     trial.run(script)
-    assert trial.result().outcome == ("failed_empty" if hub == "wait_without_object" else "stopped")
-    assert sentence in trial.result().reason + " ".join(trial.result().causes)
+    result = trial.result()
+    assert (result.outcome, result.code) == ("failed_empty" if hub == "wait_without_object" else "stopped", code)
+    assert [result.reason, *result.causes][-1] == f"{sentence} expected, it did not happen"
     assert "open" not in [c for c in trial.cell.called() if c == "open"][1:]
+
+
+@pytest.mark.parametrize("action", [EXCHANGE, "take"])
+def test_a_hand_node_that_dies_once_the_fingers_have_closed_has_not_said_that_they_closed_on_nothing(action):
+    trial = Trial()
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        # Until it dies the hand says that it holds nothing, so that the brain gives it time to say otherwise.
+        t.cell.faults.empty_grasp = True
+        t.start(action)
+        t.until(lambda: t.ctx.journal.marked("closed"))
+        t.cell.calls.clear()
+        t.clock.sleep(0.1)
+        t.cell.faults.dead.add("hand")
+        t.wait_hub("wait_with_object")
+
+    trial.run(script)
+    assert trial.ctx.holding == "mug" and "missed" not in trial.result().marks
+    assert not trial.cell.called("open") and not trial.cell.called("preshape"), "what it may hold would fall"
 
 
 def stale(frame, age):

@@ -4,9 +4,13 @@ import json
 
 import numpy as np
 import pytest
+from coglab_msgs.msg import ReasonCode
 from coglab_py.pose import Pose
 from coglab_smach.context.holding import HoldingMemory
+from coglab_smach.ports.pending import PortError
 from conftest import Trial
+
+WORDS = "words of the perception node that are made up here 4714"
 
 
 def receive(t):
@@ -126,11 +130,15 @@ def test_a_hold_while_the_person_gives_does_not_move_the_hand():
 
 
 def test_why_names_the_block_and_not_only_what_failed_before_it():
-    trial = Trial()
+    trial, asked = Trial(), []
+    locate = trial.ctx.perception.locate_object
+    trial.ctx.perception.locate_object = lambda name, limit: asked.append((name, limit)) or locate(name, limit)
 
     def script(t):
         t.wait_hub("wait_without_object")
+        # Not seen, so that the answer comes when the time that the brain gives is over; the words of it are any.
         t.cell.faults.not_seen.add("mug")
+        t.cell.faults.refuse["locate mug"] = PortError(WORDS, code=ReasonCode.OBJECT_NOT_SEEN)
         t.start("exchange_human_to_robot")
         t.cell.arm.held = True
         t.wait_hub("stopped", limit=15.0)
@@ -138,9 +146,9 @@ def test_why_names_the_block_and_not_only_what_failed_before_it():
     trial.run(script)
     assert trial.ctx.journal.why() == (
         "the arm is blocked: hold is latched; reset first; the hand keeps what it holds; when its cause is "
-        "away, type: ./coglab start reset, because set_dmp_goal: 'mug' "
-        "was not seen within 5.0 s"
+        f"away, type: ./coglab start reset, because set_dmp_goal: {WORDS}"
     )
+    assert asked == [("mug", 5.0)]
     assert trial.result().reason.startswith("the arm is blocked: hold is latched")
 
 

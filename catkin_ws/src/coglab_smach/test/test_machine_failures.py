@@ -4,8 +4,11 @@ never by opening the hand."""
 import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_py.pose import Pose
+from coglab_smach.ports.pending import PortError
 from coglab_smach.states import weight
 from conftest import Trial
+
+WORDS, CAUSE = "words of a node that are made up here 4712", "a cause that is made up here 4713"
 
 
 def failed_exchange(prepare, hub="wait_without_object", action="exchange_human_to_robot", object_id="mug", **overrides):
@@ -79,16 +82,29 @@ def test_no_person_means_no_contact_within_the_limit():
 
 
 def test_goal_lost_half_way():
-    trial = failed_exchange(lambda t: setattr(t.cell.faults, "abort_dmp_after", 0.6))
-    assert_recovered_empty(trial, "goal lost for 1.0 s")
-    assert trial.ctx.journal.why() == ("wait_stop: the reach was aborted, because goal lost for 1.0 s")
+    def prepare(t):
+        t.cell.faults.abort_dmp_after, t.cell.faults.abort_reason = 0.6, WORDS
+
+    trial = failed_exchange(prepare)
+    assert_recovered_empty(trial, WORDS)
+    assert trial.ctx.journal.why() == f"wait_stop: the reach was aborted, because {WORDS}"
+    assert trial.result().code == ReasonCode.GOAL_LOST
 
 
 def test_primitive_that_does_not_exist():
-    trial = failed_exchange(lambda t: t.cell.primitives.discard("reach_human"))
-    assert_recovered_empty(
-        trial, "primitive 'reach_human' is unknown; loaded are: give_human, put_board, reach_human_high, take_board"
-    )
+    asked = []
+
+    def prepare(t):
+        execute = t.ctx.arm.execute_dmp
+        t.ctx.arm.execute_dmp = lambda request: asked.append(request.primitive_id) or execute(request)
+        t.cell.faults.refuse["execute_dmp"] = PortError(WORDS, (CAUSE,), ReasonCode.UNKNOWN_NAME)
+
+    trial = failed_exchange(prepare)
+    assert_recovered_empty(trial, WORDS)
+    assert asked == ["reach_human"], "the primitive of the object's entry, and once"
+    result = trial.result()
+    assert (result.reason, result.causes) == (f"execute_dmp: {WORDS}", (CAUSE,))
+    assert result.code == ReasonCode.UNKNOWN_NAME
 
 
 def test_contact_detector_dead():

@@ -103,6 +103,24 @@ def test_contact_is_armed_only_after_the_motion_has_ended(trial):
     assert marks["motion_reached"] <= marks["contact"]
 
 
+def test_a_contact_that_is_armed_while_the_arm_moves_is_noted_for_good(trial):
+    """So that what is asserted not to have happened would be seen."""
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        contact, home = t.ctx.contact, t.ctx.config.get("postures.home")
+        t.ctx.arm.move_ptp([home[0] + 0.1, *home[1:]], [0.2] * 7)
+        t.clock.sleep(0.1)
+        assert not t.ctx.arm.standing().ok and not contact.armed_while_moving
+        for _ in range(2):
+            contact.arm("contact", 1.0, {})
+            t.until(lambda: t.ctx.arm.standing().ok)
+            t.clock.sleep(0.05)
+            assert contact.armed_while_moving
+
+    trial.run(script)
+
+
 def test_monitor_switches_the_primitive_once():
     trial = Trial(**{"monitor.primitives": {"mid": "reach_human", "high": "reach_human_high"}})
     trial.cell.partner.pattern, trial.cell.partner.pattern_at = "high", 0.4
