@@ -331,6 +331,15 @@ TEST(DmpController, AfterTheEndTheRemainingDistanceIsThatToTheGoalThatWasLatched
   }
   EXPECT_NEAR(progress.remaining_distance, (progress.goal.position - robot.hand().position).norm(),
               1e-3);
+  // A hand that is pushed away while the motion stands is told as away by as much: the first joint,
+  // whose axis is vertical through the base, turned, moves it along a chord.
+  constexpr double kTurn = 0.1;
+  const double chord = 2.0 * kGoal.head<2>().norm() * std::sin(kTurn / 2.0);
+  robot.sample.position[0] += kTurn;
+  robot.tick();
+  ASSERT_TRUE(robot.dmp().readProgress(progress));
+  EXPECT_EQ(progress.state, MotionState::Reached);
+  EXPECT_NEAR(progress.remaining_distance, chord, 2e-3);
 }
 
 TEST(DmpController, IkDebugSaysWhatTheCycleDid) {

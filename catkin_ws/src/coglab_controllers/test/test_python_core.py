@@ -94,6 +94,16 @@ def test_learning_accepts_lists_and_several_demonstrations() -> None:
     assert primitive.duration == pytest.approx(0.75)
 
 
+def test_the_start_velocity_is_the_mean_over_the_demonstrations(reach: cc.Primitive) -> None:
+    # One shape, so that the demonstrations differ in their start velocity alone and each can be learnt exactly.
+    velocities = np.array([[0.3, 0.0, 0.0], [0.0, 0.2, -0.1], [-0.05, 0.0, 0.4]])
+    demonstrations = [cc.Dmp(reach, reach.start, reach.goal, v).roll_out(reach.goal, 1.2)[:2] for v in velocities]
+    for (times, path), velocity in zip(demonstrations, velocities, strict=True):
+        np.testing.assert_allclose((path[1] - path[0]) / (times[1] - times[0]), velocity, atol=0.03)
+    several = cc.learn("several", demonstrations).start_velocity
+    np.testing.assert_allclose(several, velocities.mean(axis=0), atol=1e-3)
+
+
 @pytest.mark.parametrize(
     ("call", "words"),
     [
