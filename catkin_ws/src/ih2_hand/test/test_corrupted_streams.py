@@ -145,6 +145,7 @@ class Campaign:
         self.read += 1
         if right:
             return
+        # Told apart to see where a wrong value comes from; a resynchronisation on the way excuses none.
         if counters.resynchronisations > resyncs:
             self.wrong_but_counted += 1
         else:
@@ -198,19 +199,19 @@ def run(seed: int, streams: int, events: tuple[int, ...], burst: bool = False) -
 def test_corrupted_streams(part):
     campaign = run(1000 + part, STREAMS // PARTS, (1, 1, 2))
     assert campaign.corrupter.done > STREAMS // PARTS
-    assert campaign.wrong == []
+    assert campaign.wrong == [] and campaign.wrong_but_counted == 0
     assert campaign.read >= 0.98 * campaign.asked, "the line is good enough for nearly all of them"
 
 
 def test_two_corruptions():
     campaign = run(2000, STREAMS // 10, (2,))
-    assert campaign.wrong == []
+    assert campaign.wrong == [] and campaign.wrong_but_counted == 0
     assert campaign.read >= 0.96 * campaign.asked
 
 
 def test_bursts_of_two():
     campaign = run(2500, STREAMS // 10, (2,), burst=True)
-    assert campaign.wrong == []
+    assert campaign.wrong == [] and campaign.wrong_but_counted == 0
     assert campaign.read >= 0.96 * campaign.asked
 
 
@@ -220,7 +221,7 @@ def test_worse_bursts():
     """
     campaign = run(3000, STREAMS // 10, (3, 4, 6))
     assert campaign.corrupter.done > STREAMS // 10 * 3
-    assert len(campaign.wrong) * 2_000 <= campaign.read
+    assert (len(campaign.wrong) + campaign.wrong_but_counted) * 2_000 <= campaign.read
     assert campaign.read >= 0.85 * campaign.asked
 
 
@@ -228,7 +229,7 @@ def test_longer_bursts_anywhere():
     """Neighbours in a row, from a few bytes to whole requests with their answers: counted, too."""
     campaign = run(4000, STREAMS // 10, (3, 4, 8, 12, 20), burst=True)
     assert campaign.corrupter.done > STREAMS // 10 * 5
-    assert len(campaign.wrong) * 2_000 <= campaign.read
+    assert (len(campaign.wrong) + campaign.wrong_but_counted) * 2_000 <= campaign.read
     assert campaign.read >= 0.80 * campaign.asked
 
 

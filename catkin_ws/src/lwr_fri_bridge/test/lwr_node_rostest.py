@@ -221,6 +221,18 @@ class LwrNode(unittest.TestCase):
         for joint, degrees in zip(("a1", "a2", "e1", "a3", "a4", "a5", "a6"), range(30, 37), strict=True):
             self.assertEqual(float(found["arm"][f"temperature lwr_{joint} (degC)"]), degrees)
 
+    def test_the_mean_answer_time_is_not_the_longest(self) -> None:
+        told = Diagnostics("lwr: FRI connection")
+
+        def times_differ(status: DiagnosticStatus) -> bool:
+            values = {v.key: v.value for v in status.values}
+            return 0 < float(values["mean answer time (s)"]) < float(values["longest answer time (s)"])
+
+        # The mean goes over the last thousand answers, the longest over those since the status before. So after a stall
+        # the mean may be above it for a while.
+        told.next(times_differ, "a mean below the longest")
+        told.close()
+
     def test_refusals_are_counted_by_their_reason_and_warned_of_once(self) -> None:
         self.ask("start")
         wait_for(lambda: self.states[-1].motion_allowed, "permission")

@@ -7,7 +7,10 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
+
+#include <yaml-cpp/yaml.h>
 
 #include "lwr_fri_bridge/bridge/diagnosis.hpp"
 #include "lwr_fri_bridge/requests/target_command.hpp"
@@ -39,6 +42,34 @@ TEST(Defaults, ParametersAreThoseOfTheReadme) {
   EXPECT_EQ(thread.controller_address, "");
   EXPECT_EQ(thread.priority, 80);
   EXPECT_EQ(thread.stack_bytes, 262144U);
+}
+
+/// What config/lwr.yaml sets is the default: a node started without the file does the same.
+TEST(Defaults, TheShippedFileChangesNothing) {
+  const std::string here = LIMITS_FILE;  // beside this package
+  const std::string packages = here.substr(0, here.rfind("/lwr_description/"));
+  const YAML::Node shipped = YAML::LoadFile(packages + "/lwr_fri_bridge/config/lwr.yaml");
+  const BridgeConfig config;
+  const FriThreadOptions thread;
+  const std::vector<std::pair<const char*, double>> numbers = {
+      {"fri_port", thread.port},
+      {"velocity_filter_time", config.velocity_filter_time},
+      {"command_timeout", config.command_timeout},
+      {"topic_timeout", config.topic_timeout},
+      {"receive_timeout", config.receive_timeout},
+      {"start_timeout", config.requests.start_timeout},
+      {"stop_timeout", config.requests.stop_timeout},
+      {"silent_stop_timeout", config.requests.silent_stop_timeout},
+      {"rt_priority", thread.priority}};
+  for (const auto& [name, value] : numbers) EXPECT_EQ(shipped[name].as<double>(), value) << name;
+  const YAML::Node leash = shipped["set_point_leash"];
+  EXPECT_EQ(leash["position"].as<double>(), config.leash.position);
+  EXPECT_EQ(leash["impedance"].as<double>(), config.leash.impedance);
+  EXPECT_EQ(leash["load"].as<double>(), config.leash.load);
+  EXPECT_EQ(shipped["fri_address"].as<std::string>(), thread.address);
+  EXPECT_EQ(shipped["krl_convention"].as<std::string>(), "coglab");
+  EXPECT_EQ(shipped["control_mode"].as<std::string>(), "position");
+  EXPECT_EQ(shipped["wrench_axes"].as<std::string>(), "base");
 }
 
 TEST(Defaults, StiffnessAndDampingAreThoseOfExistingClients) {
