@@ -83,24 +83,31 @@ TEST(TorqueSensor, TheEstimateKeepsTheSideOfTheLastMovement) {
   EXPECT_EQ(sensor.measured(ideal), measured);  // the joint torque itself has none
 }
 
+/// A UDP socket on the loopback, which the caller closes, and its port.
+std::pair<int, std::uint16_t> loopbackSocket() {
+  const int fd = socket(AF_INET, SOCK_DGRAM, 0);
+  sockaddr_in own{};
+  own.sin_family = AF_INET;
+  own.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t length = sizeof own;
+  EXPECT_EQ(bind(fd, reinterpret_cast<sockaddr*>(&own), length), 0);
+  EXPECT_EQ(getsockname(fd, reinterpret_cast<sockaddr*>(&own), &length), 0);
+  return {fd, ntohs(own.sin_port)};
+}
+
 /// Real time times any factor; nobody has to answer, and a flood of datagrams stops nothing. A
 /// busy machine may lose periods: of five runs the one that lost least tells the factor.
 TEST(RealTimeCell, TheFactorScalesTimeAndAFloodDoesNotStopIt) {
   const auto share_of = [](double factor) {  // simulated time over factor x real time
-    const int fd = socket(AF_INET, SOCK_DGRAM, 0);
-    sockaddr_in own{}, peer{};
-    own.sin_family = AF_INET;
-    own.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    socklen_t length = sizeof own;
-    EXPECT_EQ(bind(fd, reinterpret_cast<sockaddr*>(&own), length), 0);
-    EXPECT_EQ(getsockname(fd, reinterpret_cast<sockaddr*>(&own), &length), 0);
+    const auto [fd, port] = loopbackSocket();
+    sockaddr_in peer{};
+    socklen_t length = sizeof peer;
     CellConfig config;
     config.urdf = URDF;
     config.krc.period = 0.02;
-    RealTimeCell cell(config, "127.0.0.1", ntohs(own.sin_port), factor);
+    RealTimeCell cell(config, "127.0.0.1", port, factor);
     cell.start();
     std::array<char, 1024> bytes{};
-    length = sizeof peer;
     EXPECT_EQ(
         recvfrom(fd, bytes.data(), bytes.size(), 0, reinterpret_cast<sockaddr*>(&peer), &length),
         916);
@@ -135,26 +142,22 @@ TEST(RealTimeCell, TheFactorScalesTimeAndAFloodDoesNotStopIt) {
 TEST(RealTimeCell, TheLatencyOfAnswersIsToldInTimeOfTheCell) {
   constexpr double kPeriod = 0.1;
   const auto told_at = [](double factor, double held) {
-    const int fd = socket(AF_INET, SOCK_DGRAM, 0);
-    sockaddr_in own{}, peer{};
-    own.sin_family = AF_INET;
-    own.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    socklen_t length = sizeof own;
-    EXPECT_EQ(bind(fd, reinterpret_cast<sockaddr*>(&own), length), 0);
-    EXPECT_EQ(getsockname(fd, reinterpret_cast<sockaddr*>(&own), &length), 0);
+    const auto [fd, port] = loopbackSocket();
+    sockaddr_in peer{};
+    socklen_t length = sizeof peer;
     const timeval limit{5, 0};
     setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
     CellConfig config;
     config.urdf = URDF;
     config.krc.period = kPeriod;
-    RealTimeCell cell(config, "127.0.0.1", ntohs(own.sin_port), factor);
+    RealTimeCell cell(config, "127.0.0.1", port, factor);
     cell.start();
     fri::MeasurementDatagram measurement{};
     std::array<std::uint8_t, fri::kMeasurementSize> bytes{};
     // Until three of its last hundred measurements were answered: on a busy machine some answers
     // come too late to be taken.
     for (std::uint16_t counter = 1; counter <= 200 && measurement.answer_rate < 0.025F; ++counter) {
-      const auto receive = [&](int flags) {
+      const auto receive = [&, fd = fd](int flags) {
         length = sizeof peer;
         return recvfrom(fd, bytes.data(), bytes.size(), flags, reinterpret_cast<sockaddr*>(&peer),
                         &length);
