@@ -17,6 +17,7 @@
 #include <unistd.h>
 
 #include "coglab_sim/cell.hpp"
+#include "coglab_sim/fri_socket.hpp"
 #include "coglab_sim/random.hpp"
 #include "coglab_sim/real_time_cell.hpp"
 
@@ -93,6 +94,37 @@ std::pair<int, std::uint16_t> loopbackSocket() {
   EXPECT_EQ(bind(fd, reinterpret_cast<sockaddr*>(&own), length), 0);
   EXPECT_EQ(getsockname(fd, reinterpret_cast<sockaddr*>(&own), &length), 0);
   return {fd, ntohs(own.sin_port)};
+}
+
+TEST(FriSocket, SendsReceivesAndSaysWhatIsTooLong) {
+  const auto soon = [] { return std::chrono::steady_clock::now() + std::chrono::seconds(5); };
+  const auto [taken, port] = loopbackSocket();
+  close(taken);
+  FriSocket one("127.0.0.1", port), two("127.0.0.1");
+  const std::array<std::uint8_t, 5> sent{1, 2, 3, 4, 5};
+  ASSERT_TRUE(two.send(sent.data(), sent.size(), port));
+  std::array<std::uint8_t, 5> bytes{};
+  EXPECT_EQ(one.receive(bytes.data(), bytes.size(), soon()), 5);
+  EXPECT_EQ(bytes, sent);
+  ASSERT_TRUE(two.send(sent.data(), sent.size(), port));
+  EXPECT_EQ(one.receive(bytes.data(), 4, soon()), 5);
+  ASSERT_TRUE(two.send(sent.data(), sent.size(), port));
+  EXPECT_EQ(one.receive(bytes.data(), 3, soon()), 4) << "cut off";
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_EQ(one.receive(bytes.data(), 5, begin + std::chrono::milliseconds(30)), -1);
+  EXPECT_GE(std::chrono::steady_clock::now() - begin, std::chrono::milliseconds(30));
+  EXPECT_EQ(one.receive(bytes.data(), 5, begin), -1);
+  EXPECT_FALSE(two.send(sent.data(), 70000, port)) << "the system refuses";
+  for (const char* host : {"localhost", "", "300.0.0.1"})
+    EXPECT_THROW(FriSocket(host, 0), std::runtime_error) << host;
+  try {
+    FriSocket("127.0.0.1", port);
+    FAIL() << "bound twice";
+  } catch (const std::runtime_error& error) {
+    const std::string words = "cannot open a UDP socket for FRI toward 127.0.0.1 from port ";
+    EXPECT_EQ(std::string(error.what()).find(words + std::to_string(port) + ": "), 0U)
+        << error.what();
+  }
 }
 
 /// Real time times any factor; nobody has to answer, and a flood of datagrams stops nothing. A
@@ -250,29 +282,22 @@ TEST(RealTimeCell, ItsThreadIsRealTimeWhereThatIsGrantedAndTheFactorAllowsIt) {
 
 /// Clients with a hard-wired port of the controller can be used.
 TEST(RealTimeCell, SendsFromTheSourcePortAsked) {
-  const int fd = socket(AF_INET, SOCK_DGRAM, 0), free_port = socket(AF_INET, SOCK_DGRAM, 0);
-  sockaddr_in own{}, source{};
-  own.sin_family = source.sin_family = AF_INET;
-  own.sin_addr.s_addr = source.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t length = sizeof own;
-  for (auto [socket, address] : {std::pair{fd, &own}, std::pair{free_port, &source}}) {
-    ASSERT_EQ(bind(socket, reinterpret_cast<sockaddr*>(address), length), 0);
-    ASSERT_EQ(getsockname(socket, reinterpret_cast<sockaddr*>(address), &length), 0);
-  }
+  const auto [fd, client_port] = loopbackSocket();
+  const auto [free_port, port] = loopbackSocket();
   CellConfig config;
   config.urdf = URDF;
-  const std::uint16_t port = ntohs(source.sin_port);
   try {
-    RealTimeCell(config, "127.0.0.1", ntohs(own.sin_port), 1.0, port);
+    RealTimeCell(config, "127.0.0.1", client_port, 1.0, port);
     FAIL() << "bound twice";
   } catch (const std::runtime_error& error) {
     EXPECT_NE(std::string(error.what()).find(std::to_string(port)), std::string::npos);
   }
   close(free_port);
-  RealTimeCell cell(config, "127.0.0.1", ntohs(own.sin_port), 1.0, port);
+  RealTimeCell cell(config, "127.0.0.1", client_port, 1.0, port);
   cell.start();
   std::array<char, 1024> bytes{};
   sockaddr_in peer{};
+  socklen_t length = sizeof peer;
   const timeval limit{5, 0};
   setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
   EXPECT_EQ(

@@ -1,19 +1,13 @@
 /// The small parts of the cell by themselves: what its structures begin with, random numbers,
-/// geometry, statistics, ranges, sensors, the socket.
+/// geometry, statistics, ranges, sensors.
 #include <gtest/gtest.h>
 
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <string>
 
-#include <netinet/in.h>
-#include <sys/socket.h>
-#include <unistd.h>
-
 #include "coglab_sim/cell.hpp"
-#include "coglab_sim/fri_socket.hpp"
 #include "coglab_sim/random.hpp"
 #include "coglab_sim/ranges.hpp"
 #include "coglab_sim/real_time_cell.hpp"
@@ -24,19 +18,6 @@ namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
-
-/// A UDP port that nobody has now.
-std::uint16_t freePort() {
-  const int fd = socket(AF_INET, SOCK_DGRAM, 0);
-  sockaddr_in own{};
-  own.sin_family = AF_INET;
-  own.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t length = sizeof own;
-  EXPECT_EQ(bind(fd, reinterpret_cast<sockaddr*>(&own), length), 0);
-  EXPECT_EQ(getsockname(fd, reinterpret_cast<sockaddr*>(&own), &length), 0);
-  close(fd);
-  return ntohs(own.sin_port);
-}
 
 }  // namespace
 
@@ -334,37 +315,4 @@ TEST(TorqueSensor, OffsetsAreAddedToTheSensorAndTakenFromTheEstimate) {
   EXPECT_LT((sensor.external(ideal, posture) - ideal + offset).norm(), 1e-12);
   EXPECT_LT(offset.minCoeff(), 0.0);
   EXPECT_GT(offset.maxCoeff(), 0.0);
-}
-
-// -- wire
-// ------------------------------------------------------------------------------------------
-
-TEST(FriSocket, SendsReceivesAndSaysWhatIsTooLong) {
-  const auto soon = [] { return std::chrono::steady_clock::now() + std::chrono::seconds(5); };
-  const std::uint16_t port = freePort();
-  FriSocket one("127.0.0.1", port), two("127.0.0.1");
-  const std::array<std::uint8_t, 5> sent{1, 2, 3, 4, 5};
-  ASSERT_TRUE(two.send(sent.data(), sent.size(), port));
-  std::array<std::uint8_t, 5> bytes{};
-  EXPECT_EQ(one.receive(bytes.data(), bytes.size(), soon()), 5);
-  EXPECT_EQ(bytes, sent);
-  ASSERT_TRUE(two.send(sent.data(), sent.size(), port));
-  EXPECT_EQ(one.receive(bytes.data(), 4, soon()), 5);
-  ASSERT_TRUE(two.send(sent.data(), sent.size(), port));
-  EXPECT_EQ(one.receive(bytes.data(), 3, soon()), 4) << "cut off";
-  const auto begin = std::chrono::steady_clock::now();
-  EXPECT_EQ(one.receive(bytes.data(), 5, begin + std::chrono::milliseconds(30)), -1);
-  EXPECT_GE(std::chrono::steady_clock::now() - begin, std::chrono::milliseconds(30));
-  EXPECT_EQ(one.receive(bytes.data(), 5, begin), -1);
-  EXPECT_FALSE(two.send(sent.data(), 70000, port)) << "the system refuses";
-  for (const char* host : {"localhost", "", "300.0.0.1"})
-    EXPECT_THROW(FriSocket(host, 0), std::runtime_error) << host;
-  try {
-    FriSocket("127.0.0.1", port);
-    FAIL() << "bound twice";
-  } catch (const std::runtime_error& error) {
-    const std::string words = "cannot open a UDP socket for FRI toward 127.0.0.1 from port ";
-    EXPECT_EQ(std::string(error.what()).find(words + std::to_string(port) + ": "), 0U)
-        << error.what();
-  }
 }
