@@ -308,10 +308,28 @@ class LwrNode(unittest.TestCase):
         self.ask("stop")
 
     def test_a_second_publisher_is_refused_while_one_moves_the_arm(self) -> None:
+        # A stalled machine ends command mode, and then both publishers are refused for that. The motion_epoch has grown
+        # by it, and such a try says nothing.
+        for _ in range(3):
+            self.ask("start")
+            epoch = wait_for(lambda: self.states[-1].motion_allowed and self.states[-1].motion_epoch, "permission")
+            try:
+                self.second_publisher_is_refused()
+                break
+            except AssertionError:
+                if self.states[-1].motion_epoch == epoch:
+                    raise
+                self.setUp()
+        else:
+            self.fail("command mode was lost in each of three tries")
+        self.ask("stop")
+
+    def second_publisher_is_refused(self) -> None:
+        """In command mode: a second publisher moves the arm only after the first one has ended."""
         binary = [sys.executable, str(pathlib.Path(__file__).resolve().parent / "foreign_target.py")]
         told: list[str] = []
-        rospy.Subscriber("/rosout", Log, lambda m: told.append(m.msg))
-        self.ask("start")
+        log = rospy.Subscriber("/rosout", Log, lambda m: told.append(m.msg))
+        refused = refusals("another publisher")
         twist = Twist(self.target, [0.0] * 7)
         foreign = subprocess.Popen([*binary, "__name:=foreign_target"], env=os.environ)
         try:
@@ -322,14 +340,14 @@ class LwrNode(unittest.TestCase):
             )
             rospy.sleep(1.0)
             self.assertEqual(self.robot.position[6], before)
-            self.assertGreater(refusals("another publisher"), 0)
+            self.assertGreater(refusals("another publisher"), refused)
             twist.stop()  # a pause longer than topic_timeout: now the other one may
             wait_for(lambda: self.robot.position[6] > before + 0.05, "the other one's motion")
         finally:
             twist.stop()
             foreign.kill()
             foreign.wait(timeout=LIMIT)
-        self.ask("stop")
+            log.unregister()
 
 
 if __name__ == "__main__":
