@@ -54,6 +54,7 @@ class OwnMotion(unittest.TestCase):
         self.assertEqual(first.status, StartMotionRequest.STARTED)
         second = self.start(queue=True, duration=2.0)
         self.assertEqual(second.status, StartMotionRequest.QUEUED)
+        self.assertEqual(second.motion_id, first.motion_id + 1)
         wait_until(
             lambda: max(abs(a - b) for a, b in zip(robot.arm(), home, strict=True)) > 0.05, 10.0, "the arm moves"
         )
@@ -70,7 +71,9 @@ class OwnMotion(unittest.TestCase):
         done = self.robot.cancel("circle", "test")
         self.assertTrue(done.success and done.was_running, done.message)
         wait_until(lambda: bool(self.ended(answer.motion_id)), 5.0, "the end of the motion")
-        self.assertEqual(self.ended(answer.motion_id)[0].reason_code, ReasonCode.CANCELLED)
+        end = self.ended(answer.motion_id)[0]
+        self.assertEqual((end.state, end.reason_code), ("aborted", ReasonCode.CANCELLED))
+        self.assertIn("test", end.reason)
 
     def test_3_no_controller_then_unload_with_all_services(self) -> None:
         robot = self.robot

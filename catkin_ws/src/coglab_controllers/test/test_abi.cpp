@@ -65,6 +65,16 @@ TEST(AbiOfMotions, AControllerOfAnotherBuildIsRefused) {
   }
 }
 
+TEST(AbiOfMotions, TwoMakersAreTheSameIfBothOfTheirFunctionsAre) {
+  const MotionMaker maker{[]() -> MotionController* { return nullptr; },
+                          []() -> MotionControllerRos* { return nullptr; }};
+  EXPECT_EQ(MotionMaker().controller, nullptr);
+  EXPECT_EQ(MotionMaker().ros, nullptr);
+  EXPECT_TRUE(maker == maker);
+  EXPECT_FALSE(maker == (MotionMaker{maker.controller, nullptr}));
+  EXPECT_FALSE(maker == (MotionMaker{nullptr, maker.ros}));
+}
+
 /// A class derived from Motion<> touches more than a controller does.
 TEST(AbiOfMotions, AMotionOfAnotherBuildIsRefused) {
   std::unique_ptr<MotionController> own(AuthoredController::make(std::make_unique<Nothing>()));

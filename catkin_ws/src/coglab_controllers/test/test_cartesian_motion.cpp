@@ -51,6 +51,26 @@ TEST(MotionEnd, LatchesAndFollowsAgainOutsideTheBall) {
   EXPECT_FALSE(end.latched());
 }
 
+TEST(MotionEnd, WhatIsExactlyAtAThreshold) {
+  using Event = MotionEnd::Event;
+  MotionEndParameters p;  // numbers that a computer has exactly
+  p.phase = p.speed = p.turning = p.distance = 0.25;
+  p.follow_distance = p.follow_time = 0.5;
+  const Vector3 zero = Vector3::Zero(), x = Vector3::UnitX();
+  MotionEnd end(p);
+  for (const int at : {0, 1, 2, 3, 4}) {  // is not below it: the motion goes on
+    const auto value = [at](int which) { return at == which ? 0.25 : 0.2499; };
+    const double raw = at == 4 ? 0.5 : 0.4999;
+    EXPECT_EQ(end.update(0.125, value(0), value(1), value(2), value(3) * x, zero, raw * x),
+              Event::None);
+  }
+  EXPECT_EQ(end.update(0.125, 0.2499, 0.2499, 0.2499, 0.2499 * x, zero, 0.4999 * x), Event::Ended);
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(end.update(0.125, 0, 0, 0, zero, zero, x), Event::None);
+  EXPECT_EQ(end.update(0.125, 0, 0, 0, zero, zero, 0.5 * x), Event::None) << "within the ball";
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(end.update(0.125, 0, 0, 0, zero, zero, x), Event::None);
+  EXPECT_EQ(end.update(0.125, 0, 0, 0, zero, zero, x), Event::FollowsAgain);
+}
+
 /// Frames at 30 Hz, 7 cycles apart: `goal(time)` plus noise of 4 mm per axis that wanders with a
 /// correlation time of 0.5 s, or is white with 0.
 class Sights {

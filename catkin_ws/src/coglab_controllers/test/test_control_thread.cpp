@@ -1,9 +1,13 @@
-// The control thread's time: it goes on with the controller's counter while measurements are lost.
+// The control thread's time, which goes on with the controller's counter while measurements are
+// lost; and what its cycle makes of a controller that goes on pushing.
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <initializer_list>
 #include <memory>
+#include <sstream>
 #include <thread>
+#include <tuple>
 
 #include "coglab_controllers/manager/control_thread.hpp"
 #include "coglab_rt/joint_limits_table.hpp"
@@ -216,5 +220,175 @@ TEST_F(ControlThreadTest, WithoutAPriorityThereIsNothingToWarnOfAndItStopsAtOnce
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(30));
 }
 
+TEST_F(ControlThreadTest, AMeasurementWakesItAndTheFirstCountsAsOneCycle) {
+  options.idle_period = 60.0;
+  thread = std::make_unique<ControlThread>(manager->cycle(), mailboxes, options);
+  thread->start();
+  ASSERT_TRUE(robot.measure(*manager, *thread, 1000)) << "woken, and not by its own time";
+  EXPECT_EQ(manager->report().dt, 0.005);
+  ASSERT_TRUE(robot.measure(*manager, *thread, 3));
+  EXPECT_NEAR(manager->report().dt, 0.015, 1e-12);
+  VelocityCommand command;
+  mailboxes.takeVelocity(command);
+  EXPECT_EQ(command.stamp_ns, manager->report().robot.stamp_ns);
+}
+
+/// A controller that asks for one velocity, whatever the arm does.
+class Pushing : public MotionController {
+ public:
+  void configure(const MotionSetup&) override {}
+  void adopt(const CycleInput& input) override { allowed = input.motion_allowed; }
+  void start(const CycleInput&) override {}
+  void stop() override {}
+  void abort(const Reason& reason) override {
+    why = reason;
+    doing = MotionState::Aborted;
+  }
+  void computeReference(const CycleInput&, References&) override { ++computed; }
+  void resolve(const CycleInput&, References& references) override {
+    references.states.view<kMaxJoints>(references.joint_velocity) = velocity;
+  }
+  double limitScale() const override { return limit; }
+  bool waitsAtBorder() const override { return waits; }
+  MotionState state() const override { return doing; }
+  const Reason& reason() const override { return why; }
+
+  JointVector velocity = JointVector::Zero();
+  MotionState doing = MotionState::Running;
+  Reason why;
+  double limit = 1.0;
+  bool waits = false, allowed = false;
+  int computed = 0;
+};
+
+/// A robot with one of them in charge.
+struct PushedRobot : VirtualRobot {
+  explicit PushedRobot(const std::string& parameters = "") : VirtualRobot(parameters) {
+    EXPECT_TRUE(ok(manager->load("push", "test/Pushing")));
+    push = dynamic_cast<Pushing*>(manager->motion("push"));
+    switchTo("push");
+  }
+  CycleReport run(const RobotSample& from, double dt = 0.005) {
+    manager->cycle().run(from, dt, command);
+    return manager->report();
+  }
+  /// Cycles of 1/256 s, which add up without rounding, on one joint state until the motion is given
+  /// up; 400 if it is not.
+  int cyclesToTheEnd(const RobotSample& from) {
+    for (int i = 1; i < 400; ++i) {
+      if (run(from, 1.0 / 256.0).motion == MotionState::Aborted) return i;
+    }
+    return 400;
+  }
+  Pushing* push = nullptr;
+};
+
+TEST(ControlCycle, AJointIsSlowedBeforeItsStopWhereTheArmOrItsSetPointIsFurther) {
+  PushedRobot robot;
+  const RobotSetup& setup = *robot.manager->settings().robot;
+  Guard guard(setup.guard, setup.chain);
+  guard.setInterfaceReserve(0.02, 0.003);
+  const double speed = guard.speedToStop(0, 0.03), stop = setup.guard.upper_position[0];
+  ASSERT_GT(speed, 0.1);
+  ASSERT_LT(speed, 0.3);
+  for (const double side : {1.0, -1.0}) {
+    for (JointVector RobotSample::*further :
+         {&RobotSample::position, &RobotSample::commanded_position}) {
+      RobotSample sample = robot.sample;
+      sample.stop_delay = 0.02;
+      sample.stop_rounding = 0.003;
+      (sample.*further)[0] = side * (stop - 0.03);
+      robot.push->velocity[0] = side;
+      robot.run(sample);
+      EXPECT_NEAR(robot.command.velocity[0], side * speed, 1e-9);
+    }
+  }
+}
+
+TEST(ControlCycle, TheFirstJointThatBlocksAMotionIsNamedToo) {
+  PushedRobot robot;
+  RobotSample sample = robot.sample;
+  const double stop = robot.limits.upper_position[0] - 0.0099;
+  sample.position[0] = sample.commanded_position[0] = stop;
+  robot.push->velocity[0] = 1.0;
+  EXPECT_EQ(robot.cyclesToTheEnd(sample), 128) << "half a second";
+  EXPECT_EQ(robot.push->why.str(), "joint lwr_a1 is at its stop and blocks the motion");
+  EXPECT_EQ(robot.push->why.code(), ReasonCode::JointBlocked);
+}
+
+TEST(ControlCycle, ABorderThatLeavesNextToNothingOfAMotionForMoreThanASecondEndsIt) {
+  const VirtualRobot plain;
+  const ChainState home = plain.manager->settings().robot->chain.evaluate(kHome);
+  const JointVector outward = 0.2 * home.jacobian.row(0).transpose().normalized();
+  const double speed = home.jacobian.row(0).dot(outward);
+  // The border is where the guard leaves this share of the speed: v^2 / (2 a) + v * lag before it.
+  const auto box = [&](double share) {
+    const double left = share * speed;
+    std::ostringstream text;
+    text.precision(17);
+    text << "workspace: {box_max: [" << home.tool.position.x() + left * left / 4.0 + 0.015 * left
+         << ", 1.2, 1.6]}";
+    return text.str();
+  };
+  PushedRobot slowed(box(0.021)), stopped(box(0.019)), waiting(box(0.019));
+  for (PushedRobot* robot : {&slowed, &stopped, &waiting}) robot->push->velocity = outward;
+  waiting.push->waits = true;
+  EXPECT_EQ(slowed.cyclesToTheEnd(slowed.sample), 400);
+  EXPECT_NEAR(slowed.manager->report().guard.scale, 0.021, 1e-6);
+  EXPECT_EQ(waiting.cyclesToTheEnd(waiting.sample), 400);
+  for (int i = 0; i < 200; ++i) stopped.run(stopped.sample, 1.0 / 256.0);
+  stopped.push->velocity.setZero();
+  stopped.run(stopped.sample, 1.0 / 256.0);  // the time counts anew
+  stopped.push->velocity = outward;
+  EXPECT_EQ(stopped.cyclesToTheEnd(stopped.sample), 257);
+  EXPECT_EQ(stopped.push->why.str(),
+            "a border of the workspace blocks the motion: upper side of the workspace box");
+}
+
+TEST(ControlCycle, TheClockIsSlowedByTheLimitsOfAMotionUnderWayAlone) {
+  PushedRobot robot;
+  const auto expect = [&robot](std::initializer_list<double> scales) {
+    for (const double scale : scales) {
+      robot.tick();
+      EXPECT_NEAR(robot.manager->report().time_scale, scale, 1e-12);
+    }
+  };
+  EXPECT_EQ(robot.manager->report().time_scale, 1.0);
+  robot.push->limit = 0.5;
+  expect({1.0, 0.5, 0.25});
+  robot.push->limit = 3.0;  // no more than nothing is limited
+  expect({0.125, 0.135});
+  robot.push->limit = 0.5;
+  robot.push->doing = MotionState::Idle;
+  expect({0.145, 0.155});
+  robot.push->limit = -1.0;
+  robot.push->doing = MotionState::Running;
+  expect({0.165, 0.0});
+}
+
+TEST(ControlCycle, AMotionIsAllowedWithAJointStateOfAnArmThatFollowsAndElseOnlyAdopted) {
+  PushedRobot robot;
+  robot.push->doing = MotionState::Idle;
+  RobotSample held = robot.sample, broken = robot.sample;
+  held.block = MotionBlock::Held;
+  broken.torque[6] = std::nan("");
+  int computed = 0;
+  for (const auto& [sample, allowed, computes] :
+       {std::tuple(robot.sample, true, 1), {held, false, 1}, {broken, false, 0}}) {
+    robot.push->allowed = !allowed;
+    robot.run(sample);
+    EXPECT_EQ(robot.push->allowed, allowed);
+    EXPECT_EQ(robot.push->computed, computed += computes);
+  }
+  robot.push->velocity[6] = 1e-9;  // the arm stands by its set-point, and is asked to go on
+  EXPECT_FALSE(robot.run(robot.sample).standing);
+  EXPECT_EQ(robot.command.velocity[6], 1e-9);
+  robot.push->velocity.setZero();
+  EXPECT_FALSE(robot.run(robot.sample).standing) << "that may not have reached the set-point yet";
+  EXPECT_TRUE(robot.run(robot.sample).standing);
+}
+
 }  // namespace
 }  // namespace coglab_controllers
+
+COGLAB_REGISTER_MOTION_CONTROLLER("test/Pushing", coglab_controllers::Pushing)

@@ -16,6 +16,20 @@
 using namespace coglab_controllers;
 using namespace coglab_controllers::test;
 
+namespace {
+
+/// A second task as told.
+class ToldTask : public SecondTask {
+ public:
+  void evaluate(const ChainState&, const JointVector&, const CartesianReference&,
+                TaskConstraint& constraint) const noexcept override {
+    constraint = told;
+  }
+  TaskConstraint told;
+};
+
+}  // namespace
+
 TEST(Chain, ElbowAndWristAreTheMiddleAndTheEndOfTheArm) {
   std::string urdf = robotUrdf();
   const std::string third = "<joint name=\"lwr_e1\" type=\"revolute\"";
@@ -266,4 +280,102 @@ TEST(ShapeMap, LinesShorterThanAMillimetreHaveNoDirection) {
     const Matrix3 other = shapeMap(ShapeMapping::Similarity, z + 0.5 * y, z + level * x);
     EXPECT_EQ((back - other).norm() < 1e-9, level < 1e-3) << level;
   }
+}
+
+TEST(TwoTaskIk, ATranslationAtTheLimitOfAJointLeavesTheSecondTaskExactlyWhatIsFree) {
+  JointVector q;
+  q << 0.3, 0.6, 0.2, -1.3, 0.4, 0.9, 0.1;
+  const ChainState state = robot().evaluate(q);
+  CartesianReference reference;
+  reference.pose = state.tool;
+  reference.velocity = Vector3(0.1, 0.05, -0.02);
+  reference.orientation_control = false;
+  IkParameters parameters;
+  parameters.velocity_limit.setConstant(99.0);
+  IkResult free, bound;
+  TwoTaskIk(parameters).solve(state, q, reference, free);
+  int fastest = 0;
+  const double speed = free.velocity.cwiseAbs().maxCoeff(&fastest);
+  parameters.velocity_limit[fastest] = speed;
+  TwoTaskIk(parameters).solve(state, q, reference, bound);
+  EXPECT_EQ(bound.second_task_scale, 1.0) << "nothing is too fast";
+  EXPECT_EQ(bound.scale, 1.0);
+  ToldTask outward;
+  outward.told.rows = kMaxJoints;
+  outward.told.jacobian.setIdentity();
+  outward.told.velocity[fastest] = std::copysign(1.0, free.velocity[fastest]);
+  outward.told.reject_whole = false;
+  TwoTaskIk(parameters).solve(state, q, reference, outward, bound);
+  EXPECT_EQ(bound.second_task_scale, 0.0);
+  EXPECT_EQ(bound.velocity, free.velocity);
+  parameters.velocity_limit[fastest] = 0.5 * speed;
+  TwoTaskIk(parameters).solve(state, q, reference, bound);
+  EXPECT_LT(bound.second_task_scale, 1e-6);
+  EXPECT_NEAR(bound.scale, 0.5, 1e-12);
+}
+
+TEST(SecondTask, FillsAConstraintThatWasUsedBefore) {
+  const JointVector q = Random(4).posture(0.4), wanted = Random(5).posture(0.4);
+  const ChainState state = robot().evaluate(q);
+  CartesianReference reference;
+  reference.pose.orientation = expRotation(Vector3(0.1, 0.2, -0.3)) * state.tool.orientation;
+  reference.angular_velocity = Vector3(0.3, -0.2, 0.1);
+  TaskConstraint used;
+  used.rows = 5;
+  used.jacobian.setConstant(9.0);
+  used.velocity = used.error = JointVector::Constant(9.0);
+  used.gain = 9.0;
+  used.reject_whole = false;
+  OrientationTask(3.0).evaluate(state, q, reference, used);
+  EXPECT_EQ(used.rows, 3);
+  EXPECT_TRUE(used.reject_whole);
+  EXPECT_TRUE(used.jacobian.topRows<3>() == state.jacobian.bottomRows<3>());
+  EXPECT_TRUE(used.velocity.head<3>() == reference.angular_velocity);
+  EXPECT_LT((used.error.head<3>() - Vector3(0.1, 0.2, -0.3)).norm(), 1e-9);
+  EXPECT_EQ(used.gain, 3.0);
+  PostureTask(wanted, 2.0).evaluate(state, q, reference, used);
+  EXPECT_EQ(used.rows, kMaxJoints);
+  EXPECT_FALSE(used.reject_whole);
+  EXPECT_TRUE(used.jacobian.isIdentity(0.0));
+  EXPECT_TRUE(used.velocity.isZero(0.0));
+  EXPECT_TRUE(used.error == wanted - q);
+  EXPECT_EQ(used.gain, 2.0);
+}
+
+TEST(TwoTaskIk, SaysWhichParameterIsOutOfWhichRange) {
+  const auto refusal = [](auto&& change) -> std::string {
+    IkParameters parameters;
+    change(parameters);
+    try {
+      TwoTaskIk{parameters};
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(refusal([](IkParameters& p) { p.pos_clik_gain = 501.0; }),
+            "pos_clik_gain: expected a number from 0.000000 to 500.000000, got 501.000000");
+  EXPECT_EQ(refusal([](IkParameters& p) { p.velocity_limit[6] = 0.0; }),
+            "velocity_limit[6]: expected a number from 0.001000 to 100.000000, got 0.000000");
+  EXPECT_EQ(refusal([](IkParameters& p) { p.rot_clik_gain = -1.0; }),
+            "rot_clik_gain: expected a gain of at least 0 1/s, got -1.000000");
+}
+
+TEST(Workspace, ASphereThatReachesTheCornersLeavesNoRoomAndItsCentreHasNoWayOut) {
+  WorkspaceParameters parameters;
+  parameters.box_max = Vector3(1.0, 2.0, 2.0);
+  parameters.box_min = -parameters.box_max;
+  parameters.base_centre.setZero();
+  parameters.base_radius = 3.0;
+  EXPECT_THROW(Workspace{parameters}, std::invalid_argument);
+  parameters.base_radius = 2.9999;
+  EXPECT_NO_THROW(Workspace{parameters});
+  const JointVector q = Random(3).posture(0.4);
+  const ChainState state = robot().evaluate(q);
+  parameters.base_centre = state.tool.position;
+  parameters.base_radius = 0.25;
+  std::array<Workspace::Margin, Workspace::kBorders> margins;
+  Workspace(parameters).margins(robot(), state, JointVector::Constant(0.5), margins);
+  EXPECT_EQ(margins[6].distance, -0.25);
+  EXPECT_EQ(margins[6].rate, 0.0);
 }

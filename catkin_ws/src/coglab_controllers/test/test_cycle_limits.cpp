@@ -130,7 +130,8 @@ TEST_F(Cycle, ARobotThatStopsOrLeavesCommandModeForAMomentEndsTheMotion) {
   robot->tick();
   EXPECT_EQ(report().motion, MotionState::Aborted);
   EXPECT_EQ(report().reason.code(), ReasonCode::Held);
-  EXPECT_NE(report().reason.str().find("the robot stopped the motion: "), std::string::npos);
+  EXPECT_EQ(report().reason.str().find("the robot stopped the motion: hold is latched; send reset"),
+            0u);
   robot->sample.block = MotionBlock::None;
   robot->tick();
   move();
@@ -243,12 +244,40 @@ TEST_F(Cycle, ACancelOfAControllerThatIsNotActiveEndsNothingLater) {
   EXPECT_FALSE(robot->manager->cancelEnded(order, answer)) << "a cycle may have been under way";
   robot->tick();
   EXPECT_TRUE(robot->manager->cancelEnded(order, answer));
-  robot->manager->askCancel("dmp", "");
+  const CancelOrder before = robot->manager->askCancel("dmp", "");
   robot->switchTo("dmp");
+  EXPECT_FALSE(before.cancel->endedMotion(before.number));
   robot->see("human_hand", Vector3(0.8, 0.0, 0.45));
   ASSERT_TRUE(VirtualRobot::ok(robot->dmp().execute(robot->reach())));
   robot->tick();
   EXPECT_EQ(report().motion, MotionState::Running);
+}
+
+TEST(FirstJointState, IsNoStopOfTheRobotAndTheSecondMayBe) {
+  const VirtualRobot plain;
+  ctrl_more::Logger logger;
+  ManagerSettings settings =
+      readManagerSettings(YAML::Load("{" + kTypes + "}"),
+                          readText(DESCRIPTION_DIR "/urdf/lwr_ih2.urdf"), plain.limits, true);
+  EXPECT_EQ(settings.cycle.overrun_time, 0.0) << "nothing is timed in lockstep";
+  settings.clock = [] { return 5000 * kMs; };
+  settings.logger = &logger;
+  ControllerManager manager(std::move(settings));
+  std::string type;
+  ASSERT_TRUE(VirtualRobot::ok(manager.load("odd", "test/Misbehaving")));
+  ASSERT_TRUE(VirtualRobot::ok(manager.switchTo("odd", type)));
+  manager.cycle().idle(9000 * kMs);
+  EXPECT_EQ(manager.report().reason.str(), "no joint state from the robot yet");
+  RobotSample sample = plain.sample;
+  VelocityCommand command;
+  sample.motion_epoch = 5;
+  manager.cycle().run(sample, 0.005, command);
+  EXPECT_EQ(manager.report().motion, MotionState::Running);
+  EXPECT_EQ(command.motion_epoch, 5u);
+  sample.motion_epoch = 6;
+  manager.cycle().run(sample, 0.005, command);
+  EXPECT_EQ(manager.report().reason.str(),
+            "the robot stopped the motion: it left command mode for a moment");
 }
 
 TEST(VoidReason, ARequestIsVoidAfterACancelOrAStopOfTheRobot) {

@@ -7,6 +7,7 @@
 #include "coglab_controllers/plugins/dmp_controller.hpp"
 #include "coglab_controllers/plugins/ptp_controller.hpp"
 #include "coglab_controllers/ros/manager_ros.hpp"
+#include "coglab_controllers/testing/virtual_arm.hpp"
 
 namespace coglab_controllers {
 namespace {
@@ -129,6 +130,51 @@ TEST(Defaults, TheControlThreadIsBelowTheArmsAndIdlesEveryTwentyMilliseconds) {
   EXPECT_FALSE(IdealArmView().hold_latched);
   EXPECT_EQ(kPathPoints, 40);
   EXPECT_EQ(kSlowestClock, 0.1);
+}
+
+/// A row of a store as `key: size, unit, frame`.
+std::vector<std::string> rows(const std::vector<ctrl_more::SignalInfo>& signals) {
+  std::vector<std::string> texts;
+  for (const ctrl_more::SignalInfo& row : signals) {
+    texts.push_back(row.key + ": " + std::to_string(row.size) + ", " + row.unit + ", " + row.frame);
+  }
+  return texts;
+}
+
+TEST(Defaults, WhatControllersShareHasItsUnitsAndFramesAndBeginsAtTheBase) {
+  using ctrl_more::ControlContainer;
+  using ctrl_more::RobotSource;
+  using Rows = std::vector<std::string>;
+  const std::string description = DESCRIPTION_DIR, wire = ", joints in wire order";
+  const auto robot =
+      makeRobotSetup(readText(description + "/urdf/lwr_ih2.urdf"),
+                     coglab_rt::loadJointLimits(description + "/config/joint_limits.yaml"),
+                     Parameters(YAML::Load("{tactile: true}"), "controller_manager"));
+  ctrl_more::Logger logger;
+  FeedbackStage stage(*robot, 0.004, true, &logger), timed(*robot, 0.004, false, &logger);
+  EXPECT_EQ(rows(stage.robot().signals(RobotSource::Measured)),
+            (Rows{"joint_position: 7, rad" + wire, "joint_velocity: 7, rad/s" + wire,
+                  "joint_torque: 7, Nm" + wire, "external_torque: 7, Nm" + wire,
+                  "wrench: 6, N, Nm, base", "touch: 18, N, tool"}));
+  EXPECT_EQ(rows(stage.robot().signals(RobotSource::Estimated)),
+            (Rows{"ee: 7, m, quaternion x y z w, base"}));
+  References& references = stage.references();
+  ctrl_more::ControlStates& states = references.states;
+  EXPECT_EQ(rows(states.signals(ControlContainer::TaskSpaceReferencePose)),
+            (Rows{"ee: 7, m, quaternion x y z w, base"}));
+  EXPECT_EQ(rows(states.signals(ControlContainer::TaskSpaceReferenceVel)),
+            (Rows{"ee: 6, m/s, rad/s, base"}));
+  EXPECT_EQ(rows(states.signals(ControlContainer::JointSpaceReference)),
+            (Rows{"Position: 7, rad" + wire, "Velocity: 7, rad/s" + wire}));
+  Eigen::Matrix<double, 7, 1> base;
+  base << 0, 0, 0, 0, 0, 0, 1;
+  EXPECT_TRUE(states.view(references.pose) == base);
+  EXPECT_TRUE(states.view(references.twist).isZero(0.0));
+  EXPECT_TRUE(states.view(references.joint_velocity).isZero(0.0));
+  EXPECT_EQ(states.joints(), 7);
+  EXPECT_EQ(states.controlPeriod(), 0.004);
+  EXPECT_TRUE(stage.manager().options().lockstep && !stage.manager().options().timed);
+  EXPECT_TRUE(timed.manager().options().timed && !timed.manager().options().lockstep);
 }
 
 }  // namespace

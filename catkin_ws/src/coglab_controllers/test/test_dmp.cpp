@@ -11,10 +11,12 @@ namespace {
 
 // Hoffmann et al. 2009: tau v' = K (g - x) - D v - K (g - x0) s + K f(s), with f(s) = s sum(w psi)
 // / sum(psi), integrated by its own Runge-Kutta code with the same steps.
+// A goal that moves adds its velocity with a weight of its own (docs/deviations.md).
 struct Hoffmann {
   const Primitive& p;
   Vector3 x0, x, v;
   double s = 1.0, tau;
+  Vector3 goal_velocity = Vector3::Zero();
 
   Vector3 slope(double phase, const Vector3& xx, const Vector3& vv, const Vector3& g) const {
     Vector3 sum = Vector3::Zero();
@@ -25,19 +27,21 @@ struct Hoffmann {
       norm += psi;
     }
     const Vector3 f = phase * sum / norm;
+    const double w = 1.0 - phase, lead = w * w * (3.0 - 2.0 * w) * tau;
     return (p.stiffness * (g - xx) - p.damping * vv - p.stiffness * (g - x0) * phase +
-            p.stiffness * f) /
+            p.stiffness * f + p.damping * lead * goal_velocity) /
            tau;
   }
 
   void step(double h, const Vector3& g) {
     const double s1 = s * std::exp(-p.alpha * 0.5 * h / tau), s2 = s * std::exp(-p.alpha * h / tau);
+    const Vector3 half = g + 0.5 * h * goal_velocity, end = g + h * goal_velocity;
     const Vector3 a1 = v / tau, b1 = slope(s, x, v, g);
     const Vector3 a2 = (v + 0.5 * h * b1) / tau,
-                  b2 = slope(s1, x + 0.5 * h * a1, v + 0.5 * h * b1, g);
+                  b2 = slope(s1, x + 0.5 * h * a1, v + 0.5 * h * b1, half);
     const Vector3 a3 = (v + 0.5 * h * b2) / tau,
-                  b3 = slope(s1, x + 0.5 * h * a2, v + 0.5 * h * b2, g);
-    const Vector3 a4 = (v + h * b3) / tau, b4 = slope(s2, x + h * a3, v + h * b3, g);
+                  b3 = slope(s1, x + 0.5 * h * a2, v + 0.5 * h * b2, half);
+    const Vector3 a4 = (v + h * b3) / tau, b4 = slope(s2, x + h * a3, v + h * b3, end);
     x += h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4);
     v += h / 6.0 * (b1 + 2.0 * b2 + 2.0 * b3 + b4);
     s = s2;
@@ -303,4 +307,94 @@ TEST(Dmp, RefusesAnImpossibleRatio) {
   for (const double ratio : {0.0, -1.0, 1e9, std::nan("")})
     EXPECT_THROW(requireRatio(ratio), std::invalid_argument);
   EXPECT_NO_THROW(requireRatio(1.0));
+}
+
+TEST(Dmp, ALongCycleIsDividedByTheFastestPoleAndByTheBasis) {
+  // A tenth of the time constant of the linear part, half of the distance of two basis functions.
+  const struct {
+    double stiffness, damping, longest;  // the last in s, at a time constant of one second
+    int basis;
+  } cases[] = {
+      {256.0, 16.0, 0.1 / 16.0, 4}, {64.0, 64.0, 0.1 / 32.0, 4}, {4.0, 4.0, 0.5 / 64.0, 64}};
+  Random random(13);
+  for (const auto& c : cases) {
+    Primitive p = randomPrimitive(random);
+    p.duration = 1.0;
+    p.stiffness = c.stiffness, p.damping = c.damping;
+    placeBasis(c.basis, p.alpha, p.centres, p.widths);
+    p.weights.resize(3, c.basis);
+    for (int i = 0; i < c.basis; ++i) p.weights.col(i) = random.point(0.5);
+    const Vector3 goal = random.point(1.0), moving = random.point(0.3);
+    for (const int steps : {1, 2, 20}) {
+      const double time = steps * c.longest;
+      Dmp dmp;
+      dmp.start(TransformationSystem(p), p.start, p.start_velocity, goal, 1.0);
+      dmp.step(time, goal, moving);
+      const auto after = [&](int count) {
+        Hoffmann reference{p, p.start, p.start, p.start_velocity, 1.0, 1.0, moving};
+        const double h = time / count;
+        for (int i = 0; i < count; ++i) reference.step(h, goal + i * h * moving);
+        return reference.x;
+      };
+      EXPECT_LT((dmp.state().position - after(steps)).norm(), 1e-12) << c.basis << " " << steps;
+      EXPECT_GT((dmp.state().position - after(2 * steps)).norm(), 1e-11) << "or it shows nothing";
+    }
+  }
+}
+
+TEST(Dmp, AStepOfNoTimeOrOfAClockThatStandsChangesNothing) {
+  Random random(14);
+  const Primitive p = randomPrimitive(random);
+  Dmp dmp;
+  dmp.start(TransformationSystem(p), p.start, p.start_velocity, p.goal, 1.0);
+  dmp.step(0.1, p.goal);
+  const DmpState before = dmp.state();
+  for (const auto& [dt, rate] : {std::pair(0.0, 1.0), {0.1, 0.0}, {-0.1, 1.0}}) {
+    const DmpState& after = dmp.step(dt, Vector3(9, 9, 9), Vector3(1, 1, 1), rate);
+    EXPECT_EQ(after.position, before.position) << dt;
+    EXPECT_EQ(after.velocity, before.velocity) << dt;
+    EXPECT_EQ(after.acceleration, before.acceleration) << dt;
+    EXPECT_EQ(after.phase, before.phase) << dt;
+  }
+  EXPECT_LT((dmp.step(1e-15, p.goal).position - before.position).norm(), 1e-12);
+}
+
+TEST(Dmp, ASwitchToWhatRunsChangesNothing) {
+  Random random(15);
+  for (const ShapeMapping mapping : {ShapeMapping::Similarity, ShapeMapping::Upright}) {
+    Primitive p = randomPrimitive(random);
+    p.mapping = mapping;
+    const Vector3 start = random.point(0.5), goal = start + random.point(0.5);
+    Dmp through, switched;
+    for (Dmp* dmp : {&through, &switched})
+      dmp->start(TransformationSystem(p), start, Vector3::Zero(), goal, 1.3);
+    for (int i = 0; i < 120; ++i) {
+      if (i == 40) switched.switchTo(TransformationSystem(p), goal, 1.3);
+      ASSERT_EQ(through.step(0.005, goal).position, switched.step(0.005, goal).position) << i;
+    }
+    EXPECT_EQ(switched.startPosition(), start);
+    EXPECT_NEAR(switched.ratio(), 1.3, 1e-12);
+    switched.switchTo(TransformationSystem(p), goal, 0.7);
+    EXPECT_NEAR(switched.tau(), 0.7 * p.duration, 1e-12);
+  }
+}
+
+TEST(ShapeMap, UprightTurnsWhatIsLevelAndScalesHeights) {
+  Random random(16);
+  const Vector3 x = Vector3::UnitX(), y = Vector3::UnitY(), up = Vector3::UnitZ();
+  for (int k = 0; k < 2000; ++k) {
+    const Vector3 from = random.point(1), to = random.point(1);
+    if (std::min(from.head<2>().norm(), to.head<2>().norm()) < 0.05) continue;
+    const Matrix3 map = shapeMap(ShapeMapping::Upright, from, to);
+    ASSERT_LT((map * up.cross(from) - up.cross(to)).norm(), 1e-9) << "aside stays aside";
+    ASSERT_LT((map * up - to.norm() / from.norm() * up).norm(), 1e-9);
+  }
+  // What has exactly the least length is not shorter than it.
+  EXPECT_FALSE(shapeMap(ShapeMapping::Similarity, 1e-3 * x, y).isIdentity());
+  EXPECT_FALSE(shapeMap(ShapeMapping::Similarity, x, 1e-9 * y).isZero(0.0));
+  const Vector3 steep = up + 1e-3 * x, flat = up + 0.5 * y;
+  for (const auto& [from, to] : {std::pair(steep, flat), {flat, steep}}) {
+    const Matrix3 similar = shapeMap(ShapeMapping::Similarity, from, to);
+    EXPECT_GT((shapeMap(ShapeMapping::Upright, from, to) - similar).norm(), 1e-3);
+  }
 }

@@ -63,6 +63,8 @@ TEST(DmpController, APredictedGoalIsNotLed) {
   const double seen = wentBack("human_hand"), predicted = wentBack("human_hand_ahead");
   EXPECT_GT(seen, predicted + 0.001);
   EXPECT_LT(predicted, 0.002);
+  EXPECT_LT(wentBack("_ahead"), 0.002) << "the end may be all of the name";
+  EXPECT_GT(wentBack("hand_ahead_of_us"), predicted + 0.001) << "but has to be its end";
 }
 
 /// A reach toward a goal that goes `way(t)` from kGoal, 0.5 s after the start; how it ended, and
@@ -155,7 +157,8 @@ TEST(DmpController, JumpIsBelievedAfterThreeFrames) {
     robot.see("human_hand", far);
     robot.tick();
     EXPECT_EQ(robot.state(), MotionState::Holding);
-    EXPECT_NE(robot.reason().find("jumped"), std::string::npos);
+    EXPECT_EQ(robot.reason(),
+              "the goal jumped by 0.200 m: the last one is held until frames agree");
   }
   robot.see("human_hand", far);
   robot.tick();
@@ -216,6 +219,128 @@ TEST(DmpController, FollowsATurningObject) {
   }
   EXPECT_EQ(robot.state(), MotionState::Reached) << robot.reason();
   EXPECT_LT(robot.hand().orientation.angularDistance(object * start), 0.02);
+}
+
+/// A reach of an arm that stands, as its clock does, toward a goal that was seen when it began, and
+/// after that not at all or stamped 0.2 s ahead of the clock.
+struct Unseen : VirtualRobot {
+  explicit Unseen(const std::string& parameters = "") : VirtualRobot(parameters) {
+    loadBoth();
+    EXPECT_TRUE(manager->setSpeedScale(0.0).success);
+    for (int i = 0; i < 100; ++i) tick();
+  }
+  void begin(const Vector3& goal) {
+    see("human_hand", goal);
+    ASSERT_TRUE(ok(dmp().execute(reach())));
+  }
+  void wait(int cycles, bool ahead = false) {
+    for (int i = 0; i < cycles; ++i) {
+      if (ahead) {
+        see("human_hand", kGoal);
+        frames.frames["human_hand"].stamp_ns += 205'000'000;  // the next cycle is 5 ms later
+        frames.frames["human_hand"].frame_ns += 205'000'000;
+      }
+      tick();
+    }
+  }
+};
+
+TEST(DmpController, AnOldGoalAndALostOneSpeakOfTheClockOnlyIfItIsTheCause) {
+  for (const bool ahead : {false, true}) {
+    Unseen robot;
+    robot.begin(kGoal);
+    robot.wait(39, ahead);
+    EXPECT_EQ(robot.reason(), "");
+    robot.wait(2, ahead);
+    EXPECT_EQ(robot.reason(),
+              std::string("the newest goal is 0.205 s old: the last one is held") +
+                  (ahead ? "; newer ones are refused: stamped 0.200 s ahead of the clock" : ""));
+    EXPECT_EQ(robot.state(), MotionState::Holding);
+    EXPECT_EQ(robot.manager->report().reason.code(), ReasonCode::GoalStale);
+    robot.wait(158, ahead);
+    EXPECT_EQ(robot.state(), MotionState::Holding);
+    robot.wait(2, ahead);
+    Reason lost(ReasonCode::GoalLost, "the goal is lost for ");
+    lost << 1.005 << " s with " << (kGoal - robot.hand().position).norm() << " m to go; "
+         << (ahead ? "newer ones are stamped ahead of the clock: synchronise the clocks"
+                   : "check what publishes it");
+    EXPECT_EQ(robot.reason(), lost.str());
+    EXPECT_EQ(robot.state(), MotionState::Aborted);
+  }
+}
+
+TEST(DmpController, AMotionIsFinishedWithoutItsGoalFromTwelveCentimetresOnOrAsItIsTold) {
+  const auto lostAt = [](double distance, const std::string& parameters) {
+    Unseen robot(parameters);
+    robot.begin(robot.hand().position + Vector3(distance, 0.0, 0.0));
+    robot.wait(201);
+    return robot.reason();
+  };
+  EXPECT_EQ(lostAt(0.1199, ""), "the goal is lost: finishing on the held one");
+  EXPECT_EQ(lostAt(0.1201, ""),
+            "the goal is lost for 1.005 s with 0.120 m to go; check what publishes it");
+  EXPECT_EQ(lostAt(0.0, "dmp: {goal_finish_distance: 0}"),
+            "the goal is lost for 1.005 s with 0.000 m to go; check what publishes it");
+}
+
+TEST(DmpController, AGoalIsOutsideTheWorkspaceFromAMicrometreOn) {
+  for (const auto& [away, outside] : {std::pair(0.9e-6, false), {1.2e-6, true}}) {
+    VirtualRobot robot("workspace: {box_max: [0.75, 1.2, 1.6]}");
+    robot.loadBoth();
+    robot.see("human_hand", Vector3(0.75 + away, 0.0, 0.45));
+    ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
+    robot.tick();
+    EXPECT_EQ(robot.reason(), outside ? "the goal is outside the workspace (upper side of the "
+                                        "workspace box): the motion goes to the border"
+                                      : "");
+  }
+}
+
+TEST(DmpController, TellsPathsAndDebugRecordsOfAMotionUnderWayAlone) {
+  VirtualRobot robot;
+  robot.loadBoth();
+  PredictedPath path;
+  IkDebugRecord record;
+  robot.see("human_hand", kGoal);
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
+  robot.tick();
+  robot.tick();
+  EXPECT_FALSE(robot.dmp().readPath(path)) << "nobody asked";
+  EXPECT_FALSE(robot.dmp().readIkDebug(record)) << "nobody asked";
+  robot.dmp().askPath();
+  robot.dmp().setIkDebug(true);
+  robot.tick();
+  EXPECT_TRUE(robot.dmp().readPath(path));
+  EXPECT_TRUE(robot.dmp().readIkDebug(record));
+  EXPECT_EQ(record.stamp_ns, robot.now_ns);
+  robot.manager->askCancel("dmp", "");
+  robot.tick();
+  robot.dmp().askPath();
+  robot.tick();
+  EXPECT_FALSE(robot.dmp().readPath(path)) << "no motion";
+  EXPECT_FALSE(robot.dmp().readIkDebug(record)) << "no motion";
+}
+
+TEST(HandGoal, TurnsWithAFrameAndNotWithATopic) {
+  GoalObservation goal;
+  goal.position = Vector3(1, 2, 3);
+  goal.orientation = Quaternion(Eigen::AngleAxisd(M_PI / 2, Vector3::UnitZ()));
+  HandGoal hand;
+  hand.offset = Vector3(0.1, 0.2, 0.3);
+  hand.approach = Vector3(0.4, 0.5, 0.6);
+  hand.orientation = Quaternion(Eigen::AngleAxisd(0.3, Vector3::UnitX()));
+  for (const bool keeps : {true, false}) {
+    hand.keep_orientation = keeps;
+    hand.in_goal_frame = true;
+    EXPECT_LT((hand.at(goal).position - Vector3(0.8, 2.1, 3.3)).norm(), 1e-12);
+    EXPECT_LT((hand.approachAt(goal) - Vector3(-0.5, 0.4, 0.6)).norm(), 1e-12);
+    const Quaternion turned = keeps ? hand.orientation : goal.orientation * hand.orientation;
+    EXPECT_LT(hand.at(goal).orientation.angularDistance(turned), 1e-7);
+    hand.in_goal_frame = false;
+    EXPECT_LT((hand.at(goal).position - Vector3(1.1, 2.2, 3.3)).norm(), 1e-12);
+    EXPECT_EQ(hand.approachAt(goal), hand.approach);
+    EXPECT_LT(hand.at(goal).orientation.angularDistance(hand.orientation), 1e-7);
+  }
 }
 
 }  // namespace

@@ -1,4 +1,9 @@
 // Requests of the DMP plug-in that are refused: why, and that the running motion does not notice.
+#include <cmath>
+#include <functional>
+#include <sstream>
+#include <utility>
+
 #include "virtual_robot.hpp"
 
 namespace coglab_controllers {
@@ -195,6 +200,119 @@ TEST(DmpRequests, BadSwitchesLeaveTheRunningMotionAsItIs) {
     }
     ASSERT_EQ(robot.command.velocity, twin.command.velocity);
   }
+}
+
+TEST(DmpRequests, ASwitchLooksNeitherAtAStartNorAtAFrame) {
+  VirtualRobot robot;
+  robot.loadBoth();
+  robot.see("human_hand", kGoal);
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
+  robot.tick();
+  DmpRequest request = robot.reach("give_human");
+  request.initial_state = 7;
+  request.initial_position = Vector3(9, 9, 9);
+  request.goal_frame = "nowhere";
+  EXPECT_TRUE(VirtualRobot::ok(robot.dmp().switchDmp(request)));
+}
+
+/// What predict_dmp says, which checks as execute_dmp does and begins nothing.
+std::string says(VirtualRobot& robot, const std::function<void(DmpRequest&)>& change) {
+  robot.see("human_hand", kGoal);
+  robot.see("far", Vector3(1.9, 0.1, 0.5));
+  DmpRequest request = robot.reach();
+  change(request);
+  PredictedPath path;
+  const Answer answer = robot.dmp().predict(request, path);
+  EXPECT_EQ(answer.success, path.motion == "reach_human");
+  if (answer.success) {
+    EXPECT_EQ(path.stamp_ns, robot.now_ns);
+  }
+  return answer.message;
+}
+
+TEST(DmpRequests, AreRefusedInWholeSentences) {
+  VirtualRobot robot;
+  robot.loadBoth();
+  using R = DmpRequest;
+  const Vector3 hand = robot.hand().position;
+  std::ostringstream where;
+  where << "(" << hand.x() << ", " << hand.y() << ", " << hand.z() << ") m";
+  const std::pair<std::function<void(R&)>, std::string> refusals[] = {
+      {[](R& r) { r.arrival_speed = 0.01; },
+       "arrival_speed is 0.010000 m/s; expected 0 (as the primitive has it) or 0.02 to 0.45 m/s"},
+      {[](R& r) { r.goal_approach = Vector3(0.4, -0.1, 0.2); },
+       "goal_approach (0.4, -0.1, 0.2) m is not finite or longer than 0.3 m"},
+      {[](R& r) { r.goal_offset.y() = std::nan(""); },
+       "goal_offset holds a number that is not finite"},
+      {[](R& r) {
+         r.orientation_control = true;
+         r.target_orientation << 0, 0, 0, 2;
+       },
+       "target_orientation has norm 2; expected a unit quaternion x y z w, or all zero to keep the "
+       "present orientation"},
+      {[](R& r) {
+         r.orientation_control = true;
+         r.target_orientation << std::nan(""), 0, 0, 1;
+       },
+       "target_orientation holds a number that is not finite"},
+      {[](R& r) { r.initial_state = 7; },
+       "initial_state 7 is unknown; expected CURRENT=0 or GIVEN=1"},
+      {[](R& r) {
+         r.initial_state = R::kGiven;
+         r.initial_velocity.z() = std::nan("");
+       },
+       "initial_position or initial_velocity holds a number that is not finite"},
+      {[](R& r) { r.goal_frame = "far"; },
+       "the hand's goal (1.9, 0.1, 0.5) m is 0.700000 m outside the workspace (upper side of the "
+       "workspace box); box from (-1.2, -1.2, 0) m to (1.2, 1.2, 1.6) m, 0.250000 m from the base"},
+      {[&](R& r) {
+         r.initial_state = R::kGiven;
+         r.initial_position = hand + Vector3(0.0, 0.3, 0.0);
+       },
+       "initial_position is 0.300000 m from the hand at " + where.str() +
+           "; allowed: 0.100000 m (max_initial_distance); use initial_state CURRENT"},
+      {[&](R& r) {
+         r.initial_state = R::kGiven;
+         r.initial_position = hand;
+         r.initial_velocity = Vector3(0, 3, 4);
+       },
+       "initial_velocity is 5.000000 m/s; expected at most 2 m/s"}};
+  for (const auto& [change, words] : refusals) EXPECT_EQ(says(robot, change), words);
+}
+
+TEST(DmpRequests, AreTakenExactlyUpToTheirLimits) {
+  VirtualRobot robot("dmp: {max_initial_distance: 0}");
+  robot.loadBoth();
+  EXPECT_EQ(says(robot, [](DmpRequest& r) { r.goal_approach = Vector3(0.3, 0, 0); }), "");
+  EXPECT_EQ(says(robot,
+                 [&](DmpRequest& r) {
+                   r.initial_state = DmpRequest::kGiven;
+                   r.initial_position = robot.hand().position;
+                   r.initial_velocity = Vector3(0, 2, 0);
+                 }),
+            "");
+}
+
+TEST(DmpRequests, NothingIsPredictedBeforeTheFirstJointState) {
+  const VirtualRobot plain;
+  ctrl_more::Logger logger;
+  FrameTable frames;
+  ManagerSettings settings = readManagerSettings(
+      YAML::Load("{}"), readText(DESCRIPTION_DIR "/urdf/lwr_ih2.urdf"), plain.limits, true);
+  settings.clock = [] { return std::int64_t{5'000'000'000}; };
+  settings.logger = &logger;
+  ControllerManager manager(std::move(settings));
+  ASSERT_TRUE(VirtualRobot::ok(manager.load("dmp", "coglab/DmpController")));
+  auto& dmp = dynamic_cast<DmpController&>(*manager.motion("dmp"));
+  frames.frames["human_hand"].position = kGoal;
+  frames.frames["human_hand"].stamp_ns = manager.now_ns();
+  dmp.setGoalSource(&frames);
+  int loaded = 0;
+  ASSERT_TRUE(VirtualRobot::ok(dmp.loadDmps(PACKAGE_DIR "/config/primitives.xml", loaded)));
+  PredictedPath path;
+  const Answer answer = dmp.predict(plain.reach(), path);
+  EXPECT_EQ(answer.code, ReasonCode::RobotDisconnected);
+  EXPECT_EQ(answer.message, "no joint state has come yet; is the arm there?");
 }
 
 }  // namespace

@@ -1,7 +1,11 @@
 // Plug-ins that throw, give no numbers or take too long: told, and nobody else suffers.
+#include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
+#include <stdexcept>
 #include <thread>
+#include <tuple>
 
 #include "coglab_rt/joint_limits_table.hpp"
 #include "virtual_robot.hpp"
@@ -137,9 +141,11 @@ bool overrunsWereJudged() {
   }
   const CycleReport report = manager.report();
   EXPECT_TRUE(report.fault);
+  EXPECT_EQ(report.faults, 1u);
   EXPECT_EQ(report.overruns, 13u);
-  EXPECT_NE(report.reason.str().find("too slow 5 times in a row"), std::string::npos)
+  EXPECT_NE(report.reason.str().find("too slow 5 times in a row: "), std::string::npos)
       << report.reason.c_str();
+  EXPECT_NE(report.reason.str().find(" ms, allowed 15.000 ms"), std::string::npos);
   EXPECT_EQ(command.velocity, JointVector::Zero().eval());
   return true;
 }
@@ -211,5 +217,176 @@ TEST(Faults, TheTimeOfASlowFeedbackControllerIsNotChargedToTheMotionController) 
   EXPECT_GT(command.velocity.norm(), 0.0);
 }
 
+/// Does what a test tells it to, and writes down what the cycle calls.
+class Scripted : public MotionController {
+ public:
+  void configure(const MotionSetup&) override {}
+  void adopt(const CycleInput&) override { call("adopt"); }
+  void start(const CycleInput&) override { call("start"); }
+  void stop() override { call("stop"); }
+  void abort(const Reason& reason) override {
+    why = reason;
+    doing = MotionState::Aborted;
+    call("abort");
+  }
+  void computeReference(const CycleInput&, References&) override { call("computeReference"); }
+  void resolve(const CycleInput&, References& references) override {
+    references.states.view<kMaxJoints>(references.joint_velocity) = velocity;
+    call("resolve");
+  }
+  MotionState state() const override { return doing; }
+  const Reason& reason() const override { return why; }
+
+  JointVector velocity = JointVector::Zero();
+  MotionState doing = MotionState::Running;
+  Reason why;
+  bool marked = true;  // as running a plug-in's code, in each call
+  const ControlCycle* cycle = nullptr;
+  std::string throws, throws_number;
+  std::vector<std::string> calls;
+
+ private:
+  void call(const std::string& what) {
+    calls.push_back(what);
+    marked = marked && (cycle == nullptr || cycle->inPlugin());
+    if (what == throws) throw std::runtime_error("told to");
+    if (what == throws_number) throw 7;
+  }
+};
+
+/// A robot with one of them, which is not the active controller yet.
+struct ScriptedRobot : VirtualRobot {
+  explicit ScriptedRobot(const std::string& parameters = "") : VirtualRobot(parameters) {
+    EXPECT_TRUE(ok(manager->load("script", "test/Scripted")));
+    script = dynamic_cast<Scripted*>(manager->motion("script"));
+  }
+  Scripted* script = nullptr;
+};
+
+using Calls = std::vector<std::string>;
+
+/// Counts the cycles in which it runs.
+class Counting : public ctrl_more::FeedbackController {
+ public:
+  Counting(ctrl_more::Stage stage, int& ran) : stage_(stage), ran_(ran) {}
+  ctrl_more::Description describe() const override {
+    using ctrl_more::ControlContainer;
+    const bool task = stage_ == ctrl_more::Stage::Task;
+    ctrl_more::Description description;
+    description.type = "Counting";
+    description.stage = stage_;
+    description
+        .modifies(
+            task ? ControlContainer::TaskSpaceReferenceVel : ControlContainer::JointSpaceReference,
+            task ? "ee" : "Velocity")
+        .in(task ? "m/s, rad/s" : "rad/s")
+        .frameOf(task ? "base" : "joints in wire order")
+        .about("left as it is");
+    return description;
+  }
+  void initialize(ctrl_more::Setup&) override {}
+  void update(const ctrl_more::Cycle&, const ctrl_more::RobotStates&,
+              const ctrl_more::ControlStates&, ctrl_more::ModifiedControlStates&) override {
+    ++ran_;
+  }
+
+ private:
+  ctrl_more::Stage stage_;
+  int& ran_;
+};
+
+TEST(Faults, NoStepOfTheCycleRunsAfterTheOneThatFailed) {
+  const std::string id = "controller 'script' ";
+  for (const auto& [where, tasks, words] :
+       {std::tuple("computeReference", 1, "threw in computeReference: told to"),
+        std::tuple("resolve", 2, "threw in resolve: told to"),
+        std::tuple("", 2, "gave a velocity that is not finite")}) {
+    ScriptedRobot robot;
+    int task = 0, joint = 0;
+    ctrl_more::ControllerEntry entry;
+    entry.blend_s = 0.0;
+    auto& feedback = robot.manager->feedback();
+    using ctrl_more::Stage;
+    ASSERT_TRUE(
+        feedback.addController(std::make_unique<Counting>(Stage::Task, task), "tasks", entry).ok());
+    ASSERT_TRUE(
+        feedback.addController(std::make_unique<Counting>(Stage::Joint, joint), "joints", entry)
+            .ok());
+    ASSERT_TRUE(feedback.setProfile("script", {"tasks", "joints"}).ok());
+    robot.switchTo("script");
+    robot.script->velocity.setConstant(0.01);
+    robot.tick();
+    ASSERT_EQ(task, 1);
+    ASSERT_EQ(joint, 1);
+    robot.script->throws = where;
+    if (robot.script->throws.empty()) robot.script->velocity[6] = std::nan("");
+    for (int i = 0; i < 2; ++i) {
+      robot.tick();
+      EXPECT_EQ(task, tasks) << words;
+      EXPECT_EQ(joint, 1) << words;
+      EXPECT_TRUE(robot.command.velocity.isZero(0.0));
+      EXPECT_EQ(robot.reason(), id + words);
+    }
+    EXPECT_EQ(robot.manager->report().faults, 1u);
+  }
+}
+
+TEST(Faults, WhatThrowsIsToldWithItsPlaceAndIsCalledNoMore) {
+  for (const std::string where : {"start", "adopt", "computeReference", "resolve"}) {
+    for (const bool number : {false, true}) {
+      ScriptedRobot robot;
+      Scripted& script = *robot.script;
+      script.cycle = &robot.manager->cycle();
+      (number ? script.throws_number : script.throws) = where;
+      robot.switchTo("script");
+      robot.tick();
+      const CycleReport told = robot.manager->report();
+      EXPECT_TRUE(told.fault);
+      EXPECT_EQ(told.faults, 1u);
+      EXPECT_EQ(told.motion, MotionState::Idle);
+      EXPECT_EQ(told.reason.str(),
+                "controller 'script' threw in " + where + (number ? "" : ": told to"));
+      EXPECT_EQ(script.why.str(), told.reason.str());
+      EXPECT_EQ(script.calls.back(), "abort");
+      const Calls before = script.calls;
+      const CancelOrder order = robot.manager->askCancel("script", "");
+      robot.sample.velocity[2] = std::nan("");
+      robot.tick();
+      robot.manager->cycle().idle(robot.now_ns + 900'000'000);
+      EXPECT_EQ(script.calls, before) << where;
+      EXPECT_EQ(robot.reason(), told.reason.str()) << "the fault is what counts";
+      EXPECT_FALSE(order.cancel->endedMotion(order.number));
+      EXPECT_TRUE(script.marked);
+      EXPECT_FALSE(script.cycle->inPlugin());
+      robot.switchTo("");
+      EXPECT_EQ(script.calls.back(), "stop");
+      EXPECT_FALSE(robot.manager->report().fault);
+      EXPECT_EQ(robot.manager->report().faults, 1u);
+    }
+  }
+}
+
+TEST(Faults, AControllerThatThrowsWhereItIsEndedIsEndedAllTheSame) {
+  ScriptedRobot robot;
+  robot.script->throws = "abort";
+  robot.switchTo("script");
+  robot.sample.block = MotionBlock::Held;
+  robot.tick();
+  EXPECT_EQ(robot.reason(), "controller 'script' threw in abort: told to");
+  EXPECT_EQ(robot.manager->report().faults, 1u);
+  EXPECT_EQ(std::count(robot.script->calls.begin(), robot.script->calls.end(), "abort"), 2);
+  robot.script->throws = "stop";
+  robot.sample.block = MotionBlock::None;
+  robot.switchTo("script");  // at fault: afresh
+  EXPECT_FALSE(robot.manager->report().fault) << robot.reason();
+  EXPECT_EQ(robot.script->calls.back(), "adopt");
+  robot.switchTo("");
+  robot.tick();  // with the robot's new state
+  EXPECT_EQ(robot.manager->report().state, ManagerState::Idle);
+  EXPECT_EQ(robot.manager->report().reason.str(), "");
+}
+
 }  // namespace
 }  // namespace coglab_controllers
+
+COGLAB_REGISTER_MOTION_CONTROLLER("test/Scripted", coglab_controllers::Scripted)

@@ -129,6 +129,22 @@ TEST(FeedbackRequests, WhoIsPausedForWhatIsNamedWhereNothingCanBeWithdrawn) {
   EXPECT_TRUE(judgeResume({}, {}, "lunch").ok()) << "nobody is there to be paused";
 }
 
+TEST(FeedbackRequests, AreRefusedInWholeSentences) {
+  const std::string rest = "; expected printable text of at most 200 bytes, or none for 'user'";
+  EXPECT_EQ(judgeReason(std::string(201, 'x')).message(), "reason has 201 bytes" + rest);
+  EXPECT_EQ(judgeReason("  ").message(), "reason has only spaces" + rest);
+  EXPECT_EQ(judgeReason("ab\xff").message(), "reason is no UTF-8 at byte 2" + rest);
+  EXPECT_EQ(judgeReason("\u00e9\n").message(),
+            "reason has the unprintable character U+000A at byte 2" + rest);
+  EXPECT_EQ(judgeNames({"a", "b", ""}).message(),
+            "names[2] is empty; expected names of loaded controllers, or a list without any name "
+            "for all of them");
+  const std::vector<ControllerStatus> loaded = {controller("a", {"lunch"}), controller("b", {})};
+  EXPECT_EQ(judgeResume(loaded, {"a", "b"}, "lunch").message(),
+            "reason 'lunch' is none that can be withdrawn; expected one of those in "
+            "feedback/status, where is paused: b for no reason, it is not paused");
+}
+
 TEST(FeedbackRequests, AnEmptyNameIsNotAllOfThem) {
   EXPECT_TRUE(judgeNames({}).ok());
   EXPECT_TRUE(judgeNames({"a", "a", "b"}).ok()) << "a name given twice counts once";

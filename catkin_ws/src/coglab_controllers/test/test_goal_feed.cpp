@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "coglab_controllers/goal/goal_relay.hpp"
+#include "coglab_controllers/goal/goal_watch.hpp"
 #include "virtual_robot.hpp"
 
 namespace coglab_controllers {
@@ -55,6 +56,71 @@ TEST(GoalRelay, AStaticFrameIsToldAtOnceAndThenOnceASecond) {
     EXPECT_EQ(relay.goal().position, kGoal);
   }
   EXPECT_EQ(told, 4);
+}
+
+TEST(GoalRelay, AStaticFrameIsToldFromTheFirstMillisecondAndAfterExactlyASecond) {
+  GoalRelay relay;
+  const std::int64_t first = 1'000'000;  // the clock of a computer that has just started
+  EXPECT_TRUE(relay.see(first, sight(kGoal, 0, first)));
+  for (const std::int64_t later : {first, first + kSecond - 1}) {
+    EXPECT_FALSE(relay.see(later, sight(kGoal, 0, later))) << later;
+  }
+  EXPECT_TRUE(relay.see(first + kSecond, sight(kGoal, 0, first + kSecond)));
+  EXPECT_FALSE(relay.see(first + 2 * kSecond - 1, sight(kGoal, 0, first + 2 * kSecond - 1)));
+}
+
+TEST(GoalGate, IsLostAfterExactlyItsTimeAndKnowsNoJumpBeforeAGoal) {
+  GoalGateParameters exact;
+  exact.max_age = 0.25;
+  exact.lost_time = 0.5;
+  GoalGate gate(exact);
+  for (int frame = 1; frame <= 3; ++frame) {
+    EXPECT_EQ(gate.jump(), 0.0) << "no goal that it could have left";
+    gate.update(frame, sight(kGoal + Vector3(0.01 * frame, 0.0, 0.0), frame, frame));
+  }
+  EXPECT_EQ(gate.jump(), 0.0);
+  EXPECT_EQ(gate.state(), GoalGate::State::Fresh);
+  const GoalObservation last = sight(kGoal, 4, 4);
+  const std::int64_t half = kSecond / 2 + 4;
+  EXPECT_EQ(gate.update(4, last), GoalGate::State::Fresh);
+  EXPECT_NEAR(gate.jump(), 0.03, 1e-12);
+  EXPECT_EQ(gate.update(half, last), GoalGate::State::Old);
+  EXPECT_EQ(gate.update(half + 1, last), GoalGate::State::Lost);
+  gate.reset(sight(kOutlier, 5, half));  // a motion begins, whatever came before
+  EXPECT_EQ(gate.state(), GoalGate::State::Fresh);
+  EXPECT_EQ(gate.age(), 0.0);
+  EXPECT_EQ(gate.jump(), 0.0);
+  EXPECT_EQ(gate.goal().position, kOutlier);
+  EXPECT_EQ(gate.update(half, sight(kOutlier, 5, half)), GoalGate::State::Fresh);
+}
+
+TEST(GoalWatch, WhatIsExactlyAtALimitIsWithinIt) {
+  const Vector3 x = Vector3::UnitX(), z = Vector3::UnitZ();
+  GoalLimits limits;  // numbers that a computer has exactly
+  limits.retreat = 0.25;
+  GoalWatch watch;
+  watch.begin(limits, Vector3::Zero(), x);
+  EXPECT_EQ(watch.update(0.005, 1.25 * x).code(), ReasonCode::None);
+  EXPECT_EQ(watch.update(0.005, 1.2501 * x).code(), ReasonCode::GoalWithdrawn);
+  limits = {};
+  limits.drop = 0.25;
+  watch.begin(limits, Vector3::Zero(), x);
+  EXPECT_EQ(watch.update(0.005, x - 0.25 * z).code(), ReasonCode::None);
+  watch.begin(limits, Vector3::Zero(), x);
+  EXPECT_EQ(watch.update(0.005, x - 0.2501 * z).code(), ReasonCode::GoalFell);
+  limits = {};
+  limits.region_high = Vector3(1.0, 0.0, 1.0);  // a region may be flat
+  EXPECT_STREQ(limits.wrong(), "");
+  watch.begin(limits, Vector3::Zero(), x);
+  EXPECT_EQ(watch.update(0.005, x).code(), ReasonCode::None);
+  EXPECT_EQ(watch.update(0.005, x - 0.001 * z).code(), ReasonCode::GoalLeftRegion);
+  watch.begin(limits, Vector3::Zero(), x);  // what was inside before does not count
+  EXPECT_EQ(watch.update(0.005, x - 0.001 * z).code(), ReasonCode::None);
+}
+
+TEST(GoalSource, KnowsNothingOfFramesAheadOfTheClockUnlessItSaysSo) {
+  FrameTable frames;
+  EXPECT_EQ(frames.ahead("human_hand"), 0.0);
 }
 
 TEST(GoalRelay, AfterAStepBackOfTheClockItGoesOn) {

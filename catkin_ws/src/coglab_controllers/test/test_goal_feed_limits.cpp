@@ -26,9 +26,15 @@ class Clock : public MotionHost {
 /// Frames that say how far their newest transform was ahead, too.
 class Frames : public FrameTable {
  public:
+  bool lookup(const std::string& reference, const std::string& frame, GoalObservation& observation,
+              std::string& why) override {
+    ++lookups;
+    return FrameTable::lookup(reference, frame, observation, why);
+  }
   double ahead(const std::string& frame) override { return frame == late_frame ? late : 0.0; }
   std::string late_frame;
   double late = 0.0;
+  int lookups = 0;
 };
 
 struct Feed : ::testing::Test {
@@ -187,6 +193,54 @@ TEST_F(Feed, OneOwnerAtATimeIsFollowed) {
   see("cup", kNow, 200, 0.1);
   feed.poll();
   EXPECT_EQ(newest().position.x(), 0.9) << "the topic owns the goal now";
+}
+
+TEST_F(Feed, APollAsksForTheFrameOfTheMotionAndForNothingElse) {
+  frames.late = 7.0;  // of the frame without a name
+  feed.poll();
+  EXPECT_EQ(frames.lookups, 0) << "no frame owns the goal";
+  EXPECT_EQ(feed.ahead(), 0.0);
+  see("cup", kNow, 100);
+  ASSERT_TRUE(first("cup").success);
+  feed.follow("cup", goal);
+  EXPECT_EQ(feed.ahead(), 0.0);
+  frames.late_frame = "cup";
+  frames.frames.erase("cup");
+  feed.poll();
+  EXPECT_EQ(frames.lookups, 2);
+  EXPECT_EQ(feed.ahead(), 7.0) << "why there is none";
+  EXPECT_EQ(newest().position.x(), 0.5);
+  EXPECT_EQ(newest().frame_ns, 100);
+  feed.setSource(nullptr);
+  feed.poll();
+  EXPECT_EQ(newest().position.x(), 0.5);
+  feed.follow("cup", goal);
+  EXPECT_EQ(feed.ahead(), 0.0) << "of the motion before";
+}
+
+TEST_F(Feed, ARefusalIsAWholeSentence) {
+  const std::string clocks =
+      " s ahead of this computer's clock and was refused: "
+      "synchronise the clocks";
+  EXPECT_EQ(first("cup").message, "goal frame 'cup' is not known in 'base': no such frame");
+  EXPECT_EQ(first("").message,
+            "no goal has come on dmp_goal yet; name the tf2 frame to follow in goal_frame, or "
+            "publish a goal in frame 'base' first (goal_helper.launch does)");
+  see("cup", kNow - 300 * kMs, 77);
+  const std::string old =
+      "goal frame 'cup' is 0.300000 s old, allowed: 0.200000 s "
+      "(goal_max_age); check what publishes it";
+  EXPECT_EQ(first("cup").message, old);
+  frames.late_frame = "cup";
+  frames.late = 3.5;
+  EXPECT_EQ(first("cup").message, old + "; its newest frame is stamped 3.500000" + clocks);
+  see("cup", kNow + 80 * kMs, 77);
+  EXPECT_EQ(first("cup").message,
+            "goal frame 'cup' is not followed; its newest frame is stamped 0.080000" + clocks);
+  EXPECT_EQ(feed.offer("base", Vector3::Zero(), kNow + 80 * kMs, 0).message,
+            "dmp_goal refused; its newest frame is stamped 0.080000" + clocks);
+  feed.setSource(nullptr);
+  EXPECT_EQ(first("cup").message, "nothing provides frames");
 }
 
 /// The robot with a frame of its own for goals and primitives, turned and away from its base.

@@ -7,6 +7,7 @@
 #include "coglab_controllers/manager/feedback_stage.hpp"
 #include "coglab_controllers/manager/robot_setup.hpp"
 #include "coglab_controllers/motion/hold.hpp"
+#include "coglab_controllers/motion/reference_loop.hpp"
 #include "coglab_rt/joint_limits_table.hpp"
 #include "virtual_robot.hpp"
 
@@ -163,6 +164,141 @@ TEST(StartBlend, ADifferenceFadesByItsTimeConstantOrAtOnce) {
   blend.advance(0.001);
   EXPECT_TRUE(blend.position().isZero(0.0) && blend.rotation().isZero(0.0));
   EXPECT_TRUE(blend.joints().isZero(0.0));
+  blend.begin(Vector3(1, 2, 3), Vector3(4, 5, 6), joints(7, 8));
+  blend.advance(0.0);
+  EXPECT_TRUE(blend.position().isZero(0.0)) << "at once, even before time passes";
+}
+
+TEST_F(HoldTest, OneThatNobodyBeganBrakesToo) {
+  expectAsked(joints(0, 0.2), joints(0.4, 0.2));
+  EXPECT_EQ(held(), JointVector(kHome));
+}
+
+TEST_F(HoldTest, ItsThresholdsThemselvesStillCountAsMotion) {
+  hold.begin();
+  expectAsked(joints(0, 0.005), joints(0.02, 0.005));
+  hold.begin();
+  expectAsked(joints(0, -0.1), joints(0.4, -0.1), joints(0.04, 0));  // 0.02 of its limit, not more
+  hold.begin();
+  asked(joints(0, 0.001));
+  input.robot.commanded_position = kHome + joints(0.1, 0);
+  asked(joints(0, 0.0));
+  EXPECT_EQ(held(), JointVector(kHome + joints(0.1, 0))) << "it did not stand before";
+}
+
+TEST_F(HoldTest, TheOthersNeverGetFasterThanTheyWere) {
+  const JointVector from = joints(0.4, 0.2), others = joints(0.0, 0.2);
+  hold.begin();
+  expectAsked(others, from);
+  expectAsked(0.0 * others, 0.31 * from);
+  expectAsked(others, 0.9 * from);
+  expectAsked(0.0 * others, -0.1 * from);
+}
+
+/// The control law around a motion's reference, cycle by cycle.
+class LoopTest : public HoldTest {
+ protected:
+  void SetUp() override {
+    HoldTest::SetUp();
+    MotionSetup motion;
+    motion.id = "loop";
+    motion.parameters =
+        YAML::Load("{Kp: 4, hold_blend: 0.3, tolerance: 0.004, arrive_distance: 0.02}");
+    motion.robot = std::make_shared<RobotSetup>(setup);
+    loop.configure(motion);
+    input.chain = setup.chain.evaluate(input.robot.position);
+  }
+  JointVector run(const MotionReference& reference) {
+    loop.write(input, reference, stage.references());
+    loop.resolve(input, stage.references());
+    return stage.references().states.view(stage.references().joint_velocity);
+  }
+  const double gone = 1.0 - std::exp(-0.005 / 0.3);  // share of a difference that became an error
+  ReferenceLoop loop;
+};
+
+TEST_F(LoopTest, JointsBeginWithoutAnErrorThatThenBlendsIn) {
+  const JointVector away = joints(0.01, -0.02), speed = joints(0.1, 0);
+  input.robot.position = kHome - away;
+  MotionReference reference(0.005);
+  reference.joints(kHome, kHome + 0.005 * speed);
+  EXPECT_LT((run(reference) - speed).norm(), 1e-9);
+  EXPECT_LT((run(reference) - speed - 4.0 * gone * away).norm(), 1e-9);
+  reference.jumps = true;
+  EXPECT_LT((run(reference) - speed).norm(), 1e-9);
+  EXPECT_EQ(loop.ik().scale, 1.0);
+  References& references = stage.references();
+  EXPECT_TRUE(references.states.view(references.twist).isZero(0.0));
+  EXPECT_EQ(references.states.view(references.pose).head<3>(), input.chain.tool.position);
+  EXPECT_NEAR(loop.error(input), 0.02, 1e-12);
+  EXPECT_EQ(loop.allowedError(), 0.004);
+  EXPECT_EQ(loop.stuck(input).code(), ReasonCode::TargetNotReached);
+  EXPECT_EQ(loop.stuck(input).str(), "the arm does not reach the target: is it blocked?");
+  for (const auto& [scale, rate] : {std::pair(0.5, 0.5), {0.1, 0.1}, {0.02, 0.1}, {1.0, 1.0}}) {
+    input.time_scale = scale;
+    const SetPoint from = loop.setPoint(input, false), end = loop.setPoint(input, true);
+    EXPECT_EQ(from.joints, reference.joint_next);
+    EXPECT_LT((from.joint_velocity - speed / rate).norm(), 1e-9);
+    const ChainState there = setup.chain.evaluate(from.joints);
+    EXPECT_EQ(from.pose.position, there.tool.position);
+    EXPECT_LT((from.velocity - there.jacobian.topRows<3>() * speed / rate).norm(), 1e-9);
+    EXPECT_LT((from.angular_velocity - there.jacobian.bottomRows<3>() * speed / rate).norm(), 1e-9);
+    EXPECT_EQ(end.joints, from.joints);
+    EXPECT_TRUE(end.joint_velocity.isZero(0.0));
+    EXPECT_TRUE(end.velocity.isZero(0.0) && end.angular_velocity.isZero(0.0));
+  }
+}
+
+TEST_F(LoopTest, APoseBeginsWithoutAnErrorThatThenBlendsIn) {
+  const Vector3 away(0.002, 0.0, -0.001), turned(0.0, 0.01, 0.02);
+  const Pose& tool = input.chain.tool;
+  CartesianReference to;
+  to.pose = {tool.position + away, expRotation(turned) * tool.orientation};
+  to.velocity = Vector3(0.02, 0.0, 0.01);
+  to.angular_velocity = Vector3(0.0, 0.05, 0.0);
+  MotionReference reference(0.005);
+  reference.cartesian(to);
+  run(reference);
+  EXPECT_LT(loop.ik().position_error.norm() + loop.ik().rotation_error.norm(), 1e-9);
+  reference.share = 0.5;
+  const JointVector half = run(reference);
+  EXPECT_EQ(half, (0.5 * loop.ik().velocity).eval());
+  EXPECT_GT(half.norm(), 1e-3);
+  EXPECT_LT((loop.ik().position_error - gone * away).norm(), 1e-9);
+  EXPECT_LT((loop.ik().rotation_error - gone * turned).norm(), 1e-6);
+  EXPECT_EQ(loop.error(input), loop.ik().position_error.norm());
+  EXPECT_EQ(loop.allowedError(), 0.02);
+  EXPECT_EQ(loop.stuck(input).str(), Arrival::handStuck(loop.error(input)).str());
+  input.time_scale = 0.5;
+  const SetPoint from = loop.setPoint(input, false), end = loop.setPoint(input, true);
+  EXPECT_EQ(from.joints, input.robot.commanded_position);
+  EXPECT_LT((from.pose.position - (to.pose.position + 0.005 * to.velocity)).norm(), 1e-12);
+  EXPECT_LT((from.velocity - 2.0 * to.velocity).norm(), 1e-12);
+  EXPECT_LT((from.angular_velocity - 2.0 * to.angular_velocity).norm(), 1e-12);
+  EXPECT_TRUE(end.velocity.isZero(0.0) && end.angular_velocity.isZero(0.0));
+  reference.jumps = true;
+  run(reference);
+  EXPECT_LT(loop.ik().position_error.norm() + loop.ik().rotation_error.norm(), 1e-9);
+}
+
+TEST_F(LoopTest, AtRestAMotionBeginsOnTheCommandedStateAndNothingIsAmiss) {
+  EXPECT_TRUE(run(MotionReference(0.005)).isZero(0.0));
+  EXPECT_EQ(loop.ik().scale, 1.0);
+  EXPECT_EQ(loop.error(input), 0.0);
+  input.robot.commanded_velocity = joints(0.2, -0.1);
+  input.time_scale = 0.5;
+  for (const bool at_rest : {false, true}) {
+    const SetPoint from = loop.setPoint(input, at_rest);
+    EXPECT_EQ(from.joints, JointVector(kHome));
+    EXPECT_LT((from.joint_velocity - joints(0.4, -0.2)).norm(), 1e-12) << at_rest;
+    EXPECT_GT(from.velocity.norm(), 1e-3);
+  }
+  MotionReference reference(0.005);
+  reference.joints(kHome, kHome);
+  run(reference);
+  loop.open();  // the motion has ended: the next one begins where the arm was told to be
+  EXPECT_EQ(loop.error(input), 0.0);
+  EXPECT_LT((loop.setPoint(input, true).joint_velocity - joints(0.4, -0.2)).norm(), 1e-12);
 }
 
 }  // namespace

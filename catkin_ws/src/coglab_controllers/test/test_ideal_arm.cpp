@@ -117,12 +117,25 @@ TEST(IdealArm, HoldBrakesLatchesAndNeedsReset) {
   const coglab_rt::Answer refused = arm.arm.request("start");
   EXPECT_FALSE(refused.success);
   EXPECT_EQ(refused.code, coglab_rt::ReasonCode::Held);
+  EXPECT_EQ(refused.message, "start: hold is latched; send reset first");
   const Vector7 held = arm.sample.position;
   arm.drive(50, Vector7::Constant(0.3));
   EXPECT_EQ(arm.sample.position, held);
   arm.ask("reset");
   arm.drive(50, Vector7::Constant(0.3));
   EXPECT_GT(arm.sample.position[0], held[0]);
+}
+
+TEST(IdealArm, AHoldThatIsResetBeforeAStandingArmSawItChangesNothing) {
+  Arm arm;
+  arm.ask("start");
+  const std::uint32_t epoch = arm.sample.motion_epoch;
+  ASSERT_TRUE(arm.arm.request("hold").success);
+  ASSERT_TRUE(arm.arm.request("reset").success);
+  arm.drive(50, Vector7::Constant(0.3));
+  EXPECT_EQ(arm.sample.block, MotionBlock::None);
+  EXPECT_EQ(arm.sample.motion_epoch, epoch);
+  EXPECT_TRUE(arm.sample.velocity.isApprox(Vector7::Constant(0.3)));
 }
 
 TEST(IdealArm, StopBrakesAndNeedsStart) {
@@ -346,6 +359,11 @@ TEST(IdealArm, RefusesWhatItCannotDoAndParametersOutOfRange) {
   EXPECT_EQ(arm.arm.request("joint_impedance stiffness 500").code,
             coglab_rt::ReasonCode::NotSupported);
   EXPECT_TRUE(arm.arm.request("position").success);
+  EXPECT_EQ(arm.arm.request("jump").message,
+            "unknown event 'jump'; expected one of: start, stop, hold, reset, position");
+  EXPECT_EQ(arm.arm.request("cartesian_impedance 1").message,
+            "'cartesian_impedance 1': an ideal arm knows no forces; use position, or an arm with "
+            "physics (arm:=fri)");
   const auto refusal = [](auto&& change) {
     IdealArmConfig bad = config();
     change(bad);
@@ -356,8 +374,8 @@ TEST(IdealArm, RefusesWhatItCannotDoAndParametersOutOfRange) {
     }
     return std::string();
   };
-  EXPECT_NE(refusal([](IdealArmConfig& c) { c.period = 0.5; }).find("period = 0.5 is outside"),
-            std::string::npos);
+  EXPECT_EQ(refusal([](IdealArmConfig& c) { c.period = 0.5; }),
+            "parameter period = 0.5 is outside its range 0.001..0.1");
   EXPECT_NE(
       refusal([](IdealArmConfig& c) { c.command_timeout = std::nan(""); }).find("command_timeout"),
       std::string::npos);

@@ -27,6 +27,17 @@ CartesianReference randomReference(Random& random, const ChainState& state, doub
   return reference;
 }
 
+IkResult usedBefore() {
+  IkResult result;
+  result.velocity.setConstant(7.0);
+  result.position_velocity = result.rotation_velocity = result.velocity;
+  result.position_error = result.rotation_error = Vector3(7.0, 7.0, 7.0);
+  result.smallest_singular_value_position = result.smallest_singular_value_rotation = 7.0;
+  result.second_task_scale = result.scale = 0.25;
+  result.rotation_rejected = true;
+  return result;
+}
+
 }  // namespace
 
 TEST(SmallSvd, EqualsEigen) {
@@ -302,4 +313,79 @@ TEST(TwoTaskIk, RefusesBadParameters) {
   parameters.correction_speed = 0.0;
   EXPECT_THROW(TwoTaskIk{parameters}, std::invalid_argument);
   EXPECT_THROW(OrientationTask(-1.0), std::invalid_argument);
+}
+
+TEST(TwoTaskIk, AResultThatIsUsedAgainTellsNothingOfTheCycleBefore) {
+  Random random(10);
+  IkParameters together;
+  together.rotation_first_scaling = false;
+  const TwoTaskIk rotation_first, both(together);
+  for (int k = 0; k < 400; ++k) {
+    const JointVector q = random.posture(0.1);
+    const ChainState state = robot().evaluate(q);
+    CartesianReference reference = randomReference(random, state, k % 3 == 0 ? 2.0 : 0.02);
+    reference.orientation_control = k % 4 != 0;
+    for (const TwoTaskIk* ik : {&rotation_first, &both}) {
+      IkResult fresh, used = usedBefore();
+      ik->solve(state, q, reference, fresh);
+      ik->solve(state, q, reference, used);
+      EXPECT_EQ(used.velocity, fresh.velocity);
+      EXPECT_EQ(used.position_velocity, fresh.position_velocity);
+      EXPECT_EQ(used.rotation_velocity, fresh.rotation_velocity);
+      EXPECT_EQ(used.smallest_singular_value_position, fresh.smallest_singular_value_position);
+      EXPECT_EQ(used.smallest_singular_value_rotation, fresh.smallest_singular_value_rotation);
+      EXPECT_EQ(used.second_task_scale, fresh.second_task_scale);
+      EXPECT_EQ(used.scale, fresh.scale);
+      EXPECT_EQ(used.rotation_rejected, fresh.rotation_rejected);
+      const Quaternion& wanted = reference.pose.orientation;
+      EXPECT_EQ(used.position_error, (reference.pose.position - state.tool.position).eval());
+      EXPECT_EQ(used.rotation_error, rotationBetween(state.tool.orientation, wanted));
+      if (reference.orientation_control) continue;
+      EXPECT_EQ(used.smallest_singular_value_rotation, 0.0);
+      EXPECT_FALSE(used.rotation_rejected);
+    }
+  }
+}
+
+TEST(TwoTaskIk, ASecondTaskIsRejectedBelowItsThresholdAndNotAtIt) {
+  JointVector q;
+  q << 0.3, 0.6, 0.2, -1.3, 0.4, 0.9, 0.1;
+  const ChainState state = robot().evaluate(q);
+  CartesianReference reference;
+  reference.pose = state.tool;
+  reference.angular_velocity = Vector3(0.1, -0.2, 0.3);
+  IkParameters parameters = unlimited();
+  const auto solved = [&](double threshold) {
+    parameters.singularity_threshold = threshold;
+    IkResult result;
+    TwoTaskIk(parameters).solve(state, q, reference, result);
+    return result;
+  };
+  const IkResult plain = solved(1e-6);
+  const double smallest = plain.smallest_singular_value_rotation;
+  ASSERT_TRUE(smallest > 1e-3 && smallest < 1.0) << smallest;
+  const IkResult at = solved(smallest), below = solved(std::nextafter(smallest, 2.0));
+  EXPECT_FALSE(at.rotation_rejected);
+  EXPECT_EQ(at.velocity, plain.velocity);
+  EXPECT_TRUE(below.rotation_rejected);
+  EXPECT_TRUE(below.rotation_velocity.isZero(0.0));
+  EXPECT_EQ(below.smallest_singular_value_rotation, smallest);
+}
+
+TEST(TwoTaskIk, APostureDrawsByItsGainInsideTheNullSpaceAlsoWithoutADirectionOfTheHand) {
+  JointVector q, wanted;
+  q << 0.3, 0.6, 0.2, -1.3, 0.4, 0.9, 0.1;
+  wanted << 0.0, 0.5, 0.8, -1.2, 0.0, 0.8, 0.5;
+  for (const bool lost : {false, true}) {
+    ChainState state = robot().evaluate(q);
+    if (lost) state.jacobian.row(2).setZero();
+    CartesianReference reference;
+    reference.pose = state.tool;
+    IkResult result;
+    TwoTaskIk(unlimited()).solve(state, q, reference, PostureTask(wanted, 2.0), result);
+    const Eigen::MatrixXd j = state.jacobian.topRows<3>();
+    const Eigen::MatrixXd pinv = j.completeOrthogonalDecomposition().pseudoInverse();
+    const JointVector away = wanted - q, inside = away - pinv * (j * away);
+    EXPECT_LT((result.velocity - 2.0 * inside).norm(), 1e-9) << lost;
+  }
 }

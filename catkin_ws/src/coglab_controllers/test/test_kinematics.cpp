@@ -188,3 +188,61 @@ TEST(Rotation, DifferenceEqualsKdl) {
     ASSERT_LT((got - Vector3(expected.x(), expected.y(), expected.z())).norm(), 1e-6);
   }
 }
+
+TEST(Rotation, TheSeriesNearZeroIsAsExactAsTheFormulaBesideIt) {
+  for (const double angle : {1e-9, 0.5e-4, 0.99e-4, 1.01e-4, 0.01}) {
+    const Quaternion turn = expRotation(Vector3(0.0, -angle, 0.0));
+    EXPECT_NEAR(turn.y() / -std::sin(0.5 * angle), 1.0, 1e-14) << angle;
+    EXPECT_NEAR(turn.w(), std::cos(0.5 * angle), 2e-16) << angle;
+    const double sine = angle;
+    const Quaternion small(std::sqrt(1.0 - sine * sine), 0.0, sine, 0.0);
+    EXPECT_NEAR(logRotation(small).y() / (2.0 * std::asin(sine)), 1.0, 1e-14) << angle;
+  }
+  EXPECT_NEAR(logRotation(Quaternion(0.0, 0.0, 1.0, 0.0)).y(), M_PI, 1e-15) << "half a turn";
+}
+
+TEST(Chain, AStateThatIsUsedAgainKeepsNothingOfAnotherArm) {
+  Random random(8);
+  std::string urdf = robotUrdf();
+  const std::string third = "<joint name=\"lwr_e1\" type=\"revolute\"";
+  ASSERT_NE(urdf.find(third), std::string::npos);
+  urdf.replace(urdf.find(third), third.size(), "<joint name=\"lwr_e1\" type=\"fixed\"");
+  const Chain six(urdf, "lwr_base_link", "ih2_palm");
+  const JointVector q = random.joints(2.0);
+  ChainState used = robot().evaluate(q);
+  six.evaluate(q, used);
+  const ChainState fresh = six.evaluate(q);
+  EXPECT_TRUE(used.jacobian == fresh.jacobian && used.axes == fresh.axes);
+  EXPECT_TRUE(used.origins == fresh.origins && used.tool.position == fresh.tool.position);
+  EXPECT_TRUE(used.jacobian.col(6).isZero(0.0) && used.axes.col(6).isZero(0.0));
+  EXPECT_TRUE(used.origins.col(6).isZero(0.0));
+}
+
+TEST(Chain, NamesWhatItExpectedOfAUrdfAndWhatItFound) {
+  const auto refusal = [](const std::string& urdf, const std::string& tip) -> std::string {
+    try {
+      Chain(urdf, "lwr_base_link", tip);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "";
+  };
+  const std::string urdf = robotUrdf(), found = "expected 6 or 7 movable joints between ";
+  EXPECT_EQ(refusal("not xml", "b"),
+            "expected a URDF with one tree of links, got text of 7 characters that does not "
+            "parse; see the messages above");
+  EXPECT_EQ(refusal(urdf, "nowhere"),
+            "expected a chain from link 'lwr_base_link' to link 'nowhere' in the URDF, found "
+            "none; check both names");
+  Random random(4);
+  for (const int joints : {5, 8}) {
+    std::string arm = randomArm(random, joints);
+    std::string tip = "l1";
+    for (int i = 1; arm.find("\"l" + std::to_string(i) + "\"") != std::string::npos; ++i)
+      tip = "l" + std::to_string(i);
+    arm.replace(arm.find("\"l0\""), 4, "\"lwr_base_link\"");
+    arm.replace(arm.find("\"l0\""), 4, "\"lwr_base_link\"");
+    EXPECT_EQ(refusal(arm, tip),
+              found + "'lwr_base_link' and '" + tip + "', found " + std::to_string(joints));
+  }
+}

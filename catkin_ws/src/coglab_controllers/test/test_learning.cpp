@@ -37,6 +37,27 @@ double relativeError(const Primitive& primitive, const Trajectory& path) {
   return std::sqrt(error.squaredNorm() / static_cast<double>(error.cols())) / length;
 }
 
+// Once around, and in the end `away` from where it began.
+Trajectory loop(const Vector3& start, const Vector3& away) {
+  Trajectory path = minimumJerkReach(start, start + away, 1.2, 61);
+  for (Eigen::Index i = 1; i < 60; ++i) {
+    const double turn = 2.0 * M_PI * minimumJerk(static_cast<double>(i) / 60.0);
+    path.positions.col(i) += 0.1 * Vector3(std::sin(turn), 1.0 - std::cos(turn), 0.0);
+  }
+  return path;
+}
+
+// Places on the x axis, a second apart.
+Trajectory everySecond(const std::vector<double>& places) {
+  Trajectory path;
+  path.positions.setZero(3, static_cast<Eigen::Index>(places.size()));
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    path.times.push_back(static_cast<double>(i));
+    path.positions(0, static_cast<Eigen::Index>(i)) = places[i];
+  }
+  return path;
+}
+
 }  // namespace
 
 TEST(Learning, ReproducesItsDemonstration) {
@@ -145,4 +166,62 @@ TEST(Learning, RefusesWhatCannotBeLearnt) {
   options = {};
   options.stiffness = -1.0;
   EXPECT_THROW(learn("stiffness", {good}, options), std::invalid_argument);
+}
+
+TEST(Learning, ADemonstrationThatComesBackToItsStartIsNotMappedToAnother) {
+  // Less than a millimetre is no line that could be turned to the one of another demonstration.
+  LearningOptions options;
+  options.mapping = ShapeMapping::Similarity;
+  const Vector3 here = Vector3::Zero(), there(0.0, 2.0, 0.0), way(0.5, 0.0, 0.0);
+  const Vector3 less(0.9e-3, 0.0, 0.0), least(1e-3, 0.0, 0.0);
+  const Trajectory reach = minimumJerkReach(here, way, 1.2);
+  const std::vector<Trajectory> apart[] = {
+      {loop(here, less), loop(there, less)},
+      {reach, loop(there, less)},
+      {loop(here, less), minimumJerkReach(there, there + way, 1.2)}};
+  for (const auto& both : apart) {
+    EXPECT_LT((learn("apart", both, options).start - 0.5 * there).norm(), 1e-12);
+  }
+  const Primitive mapped = learn("mapped", {loop(here, least), loop(there, least)}, options);
+  EXPECT_LT(mapped.start.norm(), 1e-12);
+  EXPECT_LT((mapped.goal - least).norm(), 1e-12);
+}
+
+TEST(Learning, AStartIsAtRestOnlyBelowATenthOfTheMeanSpeed) {
+  LearningOptions options;
+  options.basis_count = 5;
+  const auto startOf = [&](double second) {
+    return learn("a", {everySecond({0.0, second, 1.0, 2.0, 3.0, 4.0, 5.0, 7.0, 8.0})}, options)
+        .start_velocity.norm();
+  };
+  EXPECT_GT(startOf(0.1), 0.0) << "the mean is 1 m/s";
+  EXPECT_EQ(startOf(0.0999), 0.0);
+}
+
+TEST(Learning, AnEndInMotionIsNotHeldBack) {
+  Trajectory cut = minimumJerkReach(Vector3::Zero(), Vector3(0.5, 0.0, 0.0), 1.2);
+  cut.times.resize(145);
+  cut.positions.conservativeResize(3, 145);
+  const Primitive p = learn("cut", {cut});
+  EXPECT_LT(relativeError(p, cut), 0.001);
+  const Eigen::Matrix3Xd end = reproduce(p, {0.0, cut.times[140], cut.times[144]});
+  const double expected = (cut.positions.col(144) - cut.positions.col(140)).norm();
+  EXPECT_NEAR((end.col(2) - end.col(1)).norm(), expected, 0.1 * expected);
+}
+
+TEST(Learning, ASecondDemonstrationIsNamedWhereItCannotBeUsed) {
+  const Trajectory good = everySecond({0.0, 0.1, 0.3, 0.5, 0.6});
+  const auto refusal = [&](const Trajectory& second) -> std::string {
+    try {
+      learn("a", {good, second});
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(refusal(good), "");
+  EXPECT_EQ(refusal(everySecond({0.0, 0.1, 0.3, 0.5})),
+            "demonstration 2: trajectory: expected at least 5 samples, got 4");
+  EXPECT_EQ(refusal(everySecond({0.0, 0.0, 0.0, 0.0, 0.0})),
+            "demonstration 2: expected a path of at least 0.1 mm, got one of 0.000000 m");
 }

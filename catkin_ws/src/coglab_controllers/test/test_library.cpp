@@ -222,6 +222,46 @@ TEST(Library, RefusesWithFileAndLine) {
   }
 }
 
+TEST(Library, TheRootHasItsNameWhateverElseIsRight) {
+  const std::string expected = ": expected <dmp_library> as the root element";
+  EXPECT_EQ(errorOf("<!-- nothing -->"), "file.xml:1" + expected);
+  EXPECT_EQ(errorOf("\n<library version=\"1\"></library>"), "file.xml:2" + expected);
+  const std::string renamed = replaced(kMinimal, "<dmp_library", "<library");
+  EXPECT_EQ(errorOf(replaced(renamed, "</dmp_library", "</library")), "file.xml:2" + expected);
+}
+
+TEST(Library, WhatIsQuotedKeepsItsBeginning) {
+  const auto word = [](std::size_t length) { return "a" + std::string(length - 1, 'y'); };
+  const struct {
+    std::string what, by, expected;
+  } cases[] = {
+      {"\"1.2\"", "\"" + word(61) + "\"",
+       "file.xml:4: <system>: duration: expected one finite number, got '" + word(57) + "...'"},
+      {"\"1.2\"", "\"" + word(60) + "\"",
+       "file.xml:4: <system>: duration: expected one finite number, got '" + word(60) + "'"},
+      {"=\"none\"", "=\"" + word(70) + "\"",
+       "file.xml:6: <shape>: mapping: expected none, similarity or upright, got '" + word(60) +
+           "'"},
+      {"id=\"p\"", "id=\"" + word(100) + "\"",
+       "file.xml:3: <primitive>: id: expected 1 to 64 letters, digits, '_', '-' or '.', got '" +
+           word(80) + "'"},
+      {"<goal pos", "<" + word(70) + "/><goal pos",
+       "file.xml:8: unexpected <" + word(60) + "> in <primitive>"},
+      {"duration=", word(61) + "=\"\" duration=",
+       "file.xml:4: <system>: unknown attribute '" + word(57) +
+           "...', expected alpha, damping, duration, stiffness"},
+  };
+  for (const auto& c : cases) EXPECT_EQ(errorOf(replaced(kMinimal, c.what, c.by)), c.expected);
+  Library library;
+  try {
+    library.at(word(70));
+    FAIL();
+  } catch (const std::invalid_argument& error) {
+    EXPECT_EQ(error.what(),
+              "primitive '" + word(64) + "' is unknown; loaded are: none, call load_dmps first");
+  }
+}
+
 TEST(Library, RefusesDuplicatesWithinAFileAndReplacesAcrossFiles) {
   const std::string good = kMinimal;
   const auto begin = good.find("  <primitive"), end = good.find("</dmp_library>");

@@ -293,3 +293,104 @@ TEST(PhaseGovernor, WaitsForAnArmThatIsLimited) {
   }
   EXPECT_NEAR(governor.rate(), 0.4, 0.02);
 }
+
+TEST(Guard, OfAVelocityThatIsNoNumberNothingElseIsSaid) {
+  Guard guard(armLimits(), robot());
+  const ChainState state = robot().evaluate(JointVector::Zero());
+  for (const bool position : {false, true}) {
+    JointVector q = JointVector::Zero(), request = JointVector::Zero();
+    (position ? q : request)[1] = std::nan("");
+    GuardResult result;
+    result.velocity.setConstant(3.0);
+    result.joint = result.blocked_joint = 4;
+    result.border = WorkspaceBorder::Stretch;
+    guard.limit(state, q, request, kCycle, result);
+    EXPECT_EQ(result.reason, GuardReason::NotFinite);
+    EXPECT_EQ(result.scale, 0.0);
+    EXPECT_EQ(result.joint, -1);
+    EXPECT_EQ(result.blocked_joint, -1);
+    EXPECT_EQ(result.border, WorkspaceBorder::None);
+    EXPECT_TRUE(result.velocity.isZero(0.0));
+  }
+}
+
+namespace {
+
+GuardParameters jointLimitsOnly() {
+  GuardParameters p = armLimits();
+  p.workspace = everywhere();
+  p.hand_speed = p.elbow_speed = 0.0;
+  return p;
+}
+
+}  // namespace
+
+TEST(Guard, OfJointsThatAreEquallyTooFastTheFirstIsNamedAndAtTheLimitNone) {
+  GuardParameters p = jointLimitsOnly();
+  p.velocity.setConstant(1.5);
+  Guard guard(p, robot());
+  const JointVector q = JointVector::Zero();
+  const ChainState state = robot().evaluate(q);
+  const auto limited = [&](double third, double fifth) {
+    JointVector request = JointVector::Zero();
+    request[2] = third;
+    request[4] = fifth;
+    GuardResult result;
+    guard.limit(state, q, request, kCycle, result);
+    return result;
+  };
+  EXPECT_EQ(limited(3.0, -3.0).scale, 0.5);
+  EXPECT_EQ(limited(3.0, -3.0).joint, 2);
+  EXPECT_EQ(limited(3.0, -3.5).joint, 4);
+  EXPECT_EQ(limited(1.5, -1.5).scale, 1.0);
+  EXPECT_EQ(limited(1.5, -1.5).reason, GuardReason::None);
+}
+
+TEST(Guard, AJointAtItsStopMayAskForNothingAndForAThousandthButNoMore) {
+  const GuardParameters p = jointLimitsOnly();
+  Guard guard(p, robot());
+  JointVector q = JointVector::Zero(), request = JointVector::Zero();
+  GuardResult result;
+  const auto scale = [&](double fastest, double outward) {
+    request[0] = fastest;
+    request[3] = outward;
+    guard.limit(robot().evaluate(q), q, request, kCycle, result);
+    return result.scale;
+  };
+  for (const double side : {1.0, -1.0}) {
+    q[3] = side > 0.0 ? p.upper_position[3] : p.lower_position[3];
+    EXPECT_EQ(scale(0.3, 0.0), 1.0);
+    EXPECT_EQ(result.reason, GuardReason::None);
+    EXPECT_EQ(result.velocity, request);
+    EXPECT_EQ(scale(0.0, 0.0), 1.0);
+    EXPECT_EQ(scale(1.0, side * 1e-3), 1.0);
+    EXPECT_EQ(result.velocity[3], 0.0);
+    EXPECT_EQ(scale(1.0, side * std::nextafter(1e-3, 1.0)), 0.0);
+    EXPECT_EQ(scale(1e-4, side * 1e-5), 1.0);
+    EXPECT_EQ(scale(1e-4, side * std::nextafter(1e-5, 1.0)), 0.0);
+    q[3] -= side * (p.position_margin + 2e-5);  // there is room for a little
+    const double room = side > 0.0 ? p.upper_position[3] - q[3] : q[3] - p.lower_position[3];
+    EXPECT_EQ(scale(1.0, side * 0.9e-3), 1.0);
+    EXPECT_EQ(result.velocity[3], side * guard.speedToStop(3, room));
+  }
+}
+
+TEST(Guard, AJointBlocksOnlyByItselfAndWithoutAPause) {
+  const GuardParameters p = jointLimitsOnly();
+  Guard guard(p, robot());
+  const auto blocked = [&](int joint, double room) {
+    JointVector q = JointVector::Zero();
+    q[joint] = p.upper_position[joint] - room;
+    GuardResult result;
+    guard.limit(robot().evaluate(q), q, JointVector::Unit(joint), 0.125, result);
+    EXPECT_EQ(result.joint, joint);
+    return result.blocked_joint;
+  };
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(blocked(3, 0.0), -1);
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(blocked(5, 0.0), -1) << "another joint's time is its own";
+  EXPECT_EQ(blocked(5, 0.0), 5);
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(blocked(3, 0.0), -1);
+  EXPECT_EQ(blocked(3, 0.05), -1) << "it moves on, slowly";
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(blocked(3, 0.0), -1);
+  EXPECT_EQ(blocked(3, 0.0), 3);
+}

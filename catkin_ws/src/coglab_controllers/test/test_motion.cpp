@@ -1,6 +1,7 @@
 // The shipped example of a motion of one's own, as an author would test it.
 #include <gtest/gtest.h>
 
+#include "coglab_controllers/motion/predicted_path.hpp"
 #include "coglab_controllers/testing/virtual_arm.hpp"
 
 namespace coglab_controllers {
@@ -90,6 +91,70 @@ TEST_F(Circle, ABadParameterRefusesTheController) {
   const Answer answer = other.manager->load("circle", "coglab_example_motions/Circle");
   EXPECT_FALSE(answer.success);
   EXPECT_NE(answer.message.find("circle/radius"), std::string::npos) << answer.message;
+}
+
+TEST_F(Circle, ARefusalSaysWhatWasExpectedAndLeavesNoTrace) {
+  EXPECT_EQ(motion.startMotion({{"radius"}, {0.5}}).message, "radius is 0.5 m; expected 0 to 0.15");
+  EXPECT_EQ(motion.startMotion({{"radius"}, {}}).message,
+            "start_motion has 1 names and 0 values; expected one value for each name");
+  EXPECT_EQ(motion.startMotion({{"height"}, {0.1}}).message,
+            "'height' is no argument of this motion; there are:\n" + motion.describeArguments());
+  arm.run(0.05);
+  EXPECT_EQ(arm.state(), MotionState::Idle);
+  EndedMotion end;
+  EXPECT_FALSE(motion.readEnd(end));
+  EXPECT_EQ(motion.startMotion({}).id, 0);
+}
+
+TEST(VirtualArm, FollowsAtOnceAndStandsWhereItMayNotMove) {
+  VirtualArm arm(DESCRIPTION_DIR, "{plugin_paths: [" PLUGIN_DIR "]}");
+  EXPECT_THROW(arm.load("nothing", "nowhere/Nothing"), std::runtime_error);
+  AuthoredController& motion = arm.load("circle", "coglab_example_motions/Circle");
+  const std::int64_t begin = arm.now_ns;
+  const auto sequence = arm.sample.sequence;
+  arm.run(0.05);
+  EXPECT_EQ(arm.now_ns - begin, 50'000'000);
+  EXPECT_EQ(arm.sample.sequence, sequence + 10);
+  EXPECT_EQ(arm.sample.stamp_ns, arm.now_ns);
+  EXPECT_EQ(arm.sample.position, JointVector(kHome));
+  EXPECT_EQ(arm.sample.cycle_time, 0.005);
+  EXPECT_EQ(arm.sample.stop_delay, coglab_rt::lostTime(0.005));
+  EXPECT_EQ(arm.sample.stop_rounding, 2.0 * coglab_rt::kWireRounding);
+  ASSERT_TRUE(motion.startMotion({}).success);
+  arm.run(1.0);
+  const RobotSample before = arm.sample;
+  const Vector3 hand = arm.hand().position;
+  const JointVector velocity = arm.tick().velocity;
+  EXPECT_GT(velocity.norm(), 1e-3);
+  EXPECT_LT((arm.sample.position - before.position - 0.005 * velocity).norm(), 1e-15);
+  EXPECT_EQ(arm.sample.commanded_position, arm.sample.position);
+  EXPECT_EQ(arm.sample.velocity, velocity);
+  EXPECT_EQ(arm.sample.commanded_velocity, velocity);
+  const JointVector acceleration = (velocity - before.commanded_velocity) / 0.005;
+  EXPECT_LT((arm.sample.commanded_acceleration - acceleration).norm(), 1e-9);
+  EXPECT_LT((arm.handVelocity() - (arm.hand().position - hand) / 0.005).norm(), 1e-3);
+  arm.sample.block = MotionBlock::Held;
+  ++arm.sample.motion_epoch;
+  const JointVector held = arm.sample.position;
+  EXPECT_TRUE(arm.tick().velocity.isZero(0.0));
+  EXPECT_EQ(arm.sample.position, held);
+}
+
+TEST(CopyOnRequest, IsMadeOncePerRequestAndReadOnce) {
+  CopyOnRequest<int> copies;
+  int made = 0, read = -1;
+  const auto give = [&] { copies.give([&made] { return ++made; }); };
+  give();
+  EXPECT_EQ(made, 0);
+  EXPECT_FALSE(copies.read(read));
+  copies.ask();
+  copies.ask();
+  give();
+  give();
+  EXPECT_EQ(made, 1);
+  EXPECT_TRUE(copies.read(read));
+  EXPECT_EQ(read, 1);
+  EXPECT_FALSE(copies.read(read));
 }
 
 }  // namespace

@@ -38,6 +38,8 @@ class Turn : public Motion<> {
   }
   const Reason& reason() const override {
     static const Reason none, why(ReasonCode::GoalUnreachable, "told to give up");
+    static const Reason wait(ReasonCode::GoalUnreachable, "told to wait");
+    if (request_[fault_] == 5.0 && time_ > 0.3 && time_ < 0.6) return wait;
     return request_[fault_] == 4.0 && time_ > 0.5 ? why : none;
   }
   void stop() noexcept override { ++stops; }
@@ -118,6 +120,9 @@ TEST_F(Runner, AQueueRunsInOrderFromEachEndAndRefusesWhenFull) {
   const MotionAnswer full = ask(0.1, 1.0, true);
   EXPECT_EQ(full.status, MotionAnswer::kRejected);
   EXPECT_EQ(full.code, ReasonCode::QueueFull);
+  EXPECT_EQ(full.id, -1);
+  EXPECT_EQ(full.message,
+            "the queue is full: 2 motions wait (max_queue 2); wait for the end of one");
   arm.run(1.0);
   EXPECT_NEAR(joint() - home, 0.2, 0.01);
   arm.run(1.0);
@@ -128,6 +133,7 @@ TEST_F(Runner, AQueueRunsInOrderFromEachEndAndRefusesWhenFull) {
   const std::vector<EndedMotion> all = ends();
   ASSERT_EQ(all.size(), 3u);
   for (int i = 0; i < 3; ++i) EXPECT_TRUE(all[i].executed && all[i].id == i);
+  EXPECT_EQ(ask(0.1, 1.0, true).id, 3) << "what was refused has no id";
 }
 
 TEST_F(Runner, ANewMotionTakesThePlaceOfTheOneUnderWayWithoutAStepOfTheSetPoint) {
@@ -341,6 +347,27 @@ TEST_F(Runner, ProgressTellsIdStateTimeAndQueue) {
   EXPECT_EQ(progress.state, MotionState::Running);
   EXPECT_NEAR(progress.time, 1.0, 0.02);
   EXPECT_EQ(progress.queued, 1);
+  EXPECT_EQ(progress.stamp_ns, arm.now_ns);
+  EXPECT_TRUE(progress.reason.empty());
+}
+
+TEST_F(Runner, AReasonOfTheMotionIsTakenOverWhileItLasts) {
+  ask(0.2, 1.0, false, 5.0);
+  for (const char* words : {"", "told to wait", ""}) {
+    arm.run(words[0] == '\0' ? 0.2 : 0.3);
+    EXPECT_EQ(turn.reason().str(), words);
+    if (words[0] != '\0') arm.run(0.2);
+  }
+}
+
+TEST_F(Runner, AMotionThatWasToReplaceAnotherAndIsReplacedItselfIsToldOnce) {
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(ask(0.2, 2.0, false).id, i);
+    if (i == 0) arm.run(0.2);
+  }
+  const std::vector<EndedMotion> all = ends();
+  ASSERT_EQ(all.size(), 2u);
+  for (int i = 0; i < 2; ++i) EXPECT_EQ(all[i].id, i);
 }
 
 }  // namespace

@@ -90,6 +90,7 @@ TEST(ParameterRanges, OfDmp) {
       return loading("dmp", "{dmp: {" + std::string(range.name) + ": " + value + "}}");
     });
   }
+  EXPECT_EQ(loading("dmp", "{dmp: {max_queue: 99}}"), "") << "it has no queue";
   for (const std::string flag : {"enable_ik_debug", "rotation_first_scaling"}) {
     EXPECT_NE(loading("dmp", "{dmp: {" + flag + ": 7}}").find("expected true or false, got 7"),
               std::string::npos);

@@ -1,4 +1,6 @@
-// The path ahead: a roll-out is the motion that is driven, before it begins and while it runs.
+// The path ahead: a roll-out is the motion that is driven, before it begins and while it runs; and
+// where that motion ends, rests and is switched.
+#include "coglab_controllers/dmp/roll_out.hpp"
 #include "virtual_robot.hpp"
 
 namespace coglab_controllers {
@@ -117,6 +119,131 @@ TEST(RollOut, OfALongMotionIsAsLongAndAsExact) {
   for (const double share : {0.2, 0.4, 0.6, 0.8}) {
     const double t = share * library.at("reach_human").duration;
     EXPECT_LT((placeAt(quick, t) - placeAt(slow, 100.0 * t)).norm(), 5e-3) << share;
+  }
+}
+
+CartesianMotionPlan reachPlan(double ratio = 1.0) {
+  Library library;
+  library.load(std::string(PACKAGE_DIR) + "/config/primitives.xml");
+  return {TransformationSystem(library.at("reach_human")), ratio, true};
+}
+
+const Pose kStart{Vector3(0.4, 0.1, 0.3), Quaternion::Identity()};
+const Pose kThere{kGoal, Quaternion::Identity()};
+
+TEST(RollOut, GoesOnToAMillimetreFromTheGoalAndNotBeyond) {
+  CartesianMotion motion;  // so slow that it counts as ended some millimetres away
+  motion.start(reachPlan(3.0), kStart, Vector3::Zero(), Vector3::Zero(), kThere);
+  while (motion.dmp().progress() < 0.9) motion.step(0.01, kThere);
+  const Pose moved{kGoal + Vector3(0.0, 0.05, 0.0), Quaternion::Identity()};
+  const TimedPath path = rollOut(motion, moved);
+  ASSERT_TRUE(wellFormed(path));
+  const double away = (path.poses.back().position - moved.position).norm();
+  EXPECT_GT(away, 0.95e-3);
+  EXPECT_LT(away, 1.3e-3);
+  CartesianMotion still;  // one that begins at its goal takes its time all the same
+  still.start(reachPlan(), kThere, Vector3::Zero(), Vector3::Zero(), kThere);
+  EXPECT_GT(rollOut(still, kThere).times.back(), 0.9 * reachPlan().system.duration());
+}
+
+TEST(CartesianMotion, ASlowedClockDoesNotMakeAnEnd) {
+  MotionEndParameters end;  // the speed alone decides, from the middle of the motion on
+  end.phase = 0.5;
+  end.turning = end.distance = end.follow_distance = 100.0;
+  int cycle[3] = {};
+  const double rates[] = {1.0, 0.01, 0.001};
+  for (int k = 0; k < 3; ++k) {
+    CartesianMotion motion({}, end);
+    motion.start(reachPlan(), kStart, Vector3::Zero(), Vector3::Zero(), kThere);
+    while (motion.phase() == CartesianMotion::Phase::Running) {
+      motion.step(0.005 / rates[k], kThere, rates[k]);
+      ASSERT_LT(++cycle[k], 1000);
+      EXPECT_EQ(motion.rate(), rates[k]);
+    }
+    EXPECT_LT(motion.dmp().state().velocity.norm(), 0.025);
+    EXPECT_EQ(cycle[k], cycle[0]) << rates[k];
+  }
+  EXPECT_GT(cycle[0], 100);
+}
+
+TEST(CartesianMotion, RestsFromATenthOfAMillimetreAndOfAMillimetrePerSecondOn) {
+  for (const double ratio : {1.0, 20.0}) {  // of a fast motion the speed is what is awaited
+    const double dt = 0.005 * ratio;
+    CartesianMotion motion;
+    motion.start(reachPlan(ratio), kStart, Vector3::Zero(), Vector3::Zero(), kThere);
+    Pose goal = kThere;
+    bool rests = false;
+    for (int i = 0; i < 1000; ++i) {
+      if (motion.dmp().progress() > 0.8) goal.position.y() = kGoal.y() + 0.02;
+      const bool stands = motion.step(dt, goal).velocity.isZero(0.0);
+      ASSERT_EQ(stands, rests) << ratio << ", cycle " << i;
+      const DmpState& state = motion.dmp().state();
+      rests = rests ||
+              (motion.phase() == CartesianMotion::Phase::Ended && motion.dmp().progress() >= 1.0 &&
+               state.velocity.norm() < 1e-4 && (state.position - motion.goal()).norm() < 1e-4);
+    }
+    EXPECT_TRUE(rests) << ratio;
+    // From rest a switch lets it run again, with what the new plan asks for.
+    CartesianMotionPlan next = reachPlan(ratio);
+    next.orientation_control = false;
+    goal.position.y() -= 0.1;
+    motion.switchTo(next, goal);
+    EXPECT_EQ(motion.phase(), CartesianMotion::Phase::Running);
+    EXPECT_FALSE(motion.reference().orientation_control);
+    for (int i = 0; i < 1000; ++i) {
+      const CartesianReference& reference = motion.step(dt, goal);
+      ASSERT_TRUE(reference.velocity.allFinite() && reference.angular_velocity.allFinite());
+      ASSERT_TRUE(reference.pose.orientation.coeffs().allFinite());
+    }
+    EXPECT_EQ(motion.phase(), CartesianMotion::Phase::Ended);
+    EXPECT_LT((motion.dmp().state().position - goal.position).norm(), 5e-3);
+  }
+}
+
+TEST(CartesianMotion, TurnsOnAsFastAsItDidWhenItBeginsAndWhenItIsSwitched) {
+  const Vector3 turning(0.2, -0.3, 0.4);
+  const Pose goal{kGoal, Quaternion(Eigen::AngleAxisd(1.1, Vector3(0.6, 0.0, 0.8)))};
+  for (const double rate : {1.0, 0.15}) {
+    CartesianMotion motion;
+    motion.start(reachPlan(2.0), kStart, Vector3::Zero(), turning, goal);
+    EXPECT_LT((motion.step(0.005, goal).angular_velocity - turning).norm(), 3e-3);
+    for (int i = 0; i < 120; ++i) motion.step(0.005, goal, i < 100 ? 1.0 : rate);
+    const Vector3 before = motion.reference().angular_velocity;
+    ASSERT_GT(before.norm(), 0.02);
+    motion.switchTo(reachPlan(1.5), goal);
+    EXPECT_LT((motion.step(0.005, goal, rate).angular_velocity - before).norm(),
+              0.02 * before.norm());
+  }
+}
+
+TEST(CartesianMotion, AsksForNothingWhereNoTimePassesAndWhereItIsNotUnderWay) {
+  CartesianMotion motion;
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_TRUE(motion.step(0.005, kThere).velocity.isZero(0.0));
+    EXPECT_TRUE(motion.reference().pose.position.isZero(0.0));
+    EXPECT_EQ(motion.phase(), CartesianMotion::Phase::Idle);
+  }
+  const Quaternion turned(Eigen::AngleAxisd(0.5, Vector3::UnitX()));
+  motion.start(reachPlan(), kStart, Vector3::Zero(), Vector3::Zero(), {kGoal, turned});
+  for (int i = 0; i < 100; ++i) motion.step(0.005, {kGoal, turned});
+  const CartesianReference before = motion.reference();
+  const Vector3 place = motion.dmp().state().position;
+  EXPECT_NEAR(motion.remainingDistance(), (kGoal - place).norm(), 1e-12);
+  for (const double no_time : {0.0, -0.005}) {
+    const CartesianReference& same = motion.step(no_time, kThere);
+    EXPECT_EQ(same.velocity, before.velocity) << no_time;
+    EXPECT_EQ(same.angular_velocity, before.angular_velocity) << no_time;
+    EXPECT_EQ(motion.dmp().state().position, place) << no_time;
+  }
+  ASSERT_GT(before.velocity.norm(), 0.1);
+  ASSERT_GT(before.angular_velocity.norm(), 0.1);
+  motion.stop();
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_EQ(motion.reference().pose.position, place) << "where the next cycle would have been";
+    EXPECT_TRUE(motion.reference().velocity.isZero(0.0));
+    EXPECT_TRUE(motion.reference().angular_velocity.isZero(0.0));
+    EXPECT_EQ(motion.remainingTime(), 0.0);
+    motion.step(0.005, kThere);
   }
 }
 

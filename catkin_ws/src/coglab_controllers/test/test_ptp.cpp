@@ -151,3 +151,59 @@ TEST(PtpTrajectory, SaysWhichJointIsWrong) {
   EXPECT_NE(message(zero, bad, one, one, one).find("velocity[4]"), std::string::npos);
   EXPECT_NE(message(zero, zero, one, one, one, 9).find("joints"), std::string::npos);
 }
+
+TEST(PtpTrajectory, SaysWhatItExpectedAndWhatItGot) {
+  const JointVector zero = JointVector::Zero(), one = JointVector::Ones();
+  JointVector bad = one;
+  bad[4] = 1e9;
+  const auto message = [](auto&&... arguments) -> std::string {
+    try {
+      PtpTrajectory(arguments...);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "";
+  };
+  const std::string got = ", got 1000000000.000000";
+  EXPECT_EQ(message(bad, zero, one, one, one), "position[4]: expected a finite angle in rad" + got);
+  EXPECT_EQ(message(zero, bad, one, one, one),
+            "velocity[4]: expected a finite velocity in rad/s" + got);
+  EXPECT_EQ(message(zero, zero, bad, one, one), "target[4]: expected a finite angle in rad" + got);
+  EXPECT_EQ(message(zero, zero, one, bad, one),
+            "max_vel[4]: expected a positive velocity in rad/s" + got);
+  EXPECT_EQ(message(zero, zero, one, one, bad),
+            "max_acc[4]: expected a positive acceleration in rad/s^2" + got);
+  EXPECT_EQ(message(zero, zero, one, one, one, 8), "joints: expected 1 to 7, got 8");
+}
+
+TEST(PtpTrajectory, EachPartBeginsWithItsOwnAcceleration) {
+  const JointVector zero = JointVector::Zero(), way = JointVector::Unit(2);
+  const PtpTrajectory trajectory(zero, zero, way, JointVector::Constant(0.5), JointVector::Ones());
+  ASSERT_EQ(trajectory.duration(), 2.5);
+  const struct {
+    double time, position, velocity, acceleration;
+  } expected[] = {{-1.0, 0.0, 0.0, 1.0},       {0.0, 0.0, 0.0, 1.0},  {0.25, 0.03125, 0.25, 1.0},
+                  {0.5, 0.125, 0.5, 0.0},      {1.25, 0.5, 0.5, 0.0}, {2.0, 0.875, 0.5, -1.0},
+                  {2.25, 0.96875, 0.25, -1.0}, {2.5, 1.0, 0.0, 0.0},  {9.0, 1.0, 0.0, 0.0}};
+  for (const auto& at : expected) {
+    PtpPoint point;
+    point.position = point.velocity = point.acceleration = JointVector::Constant(7.0);
+    trajectory.at(at.time, point);
+    EXPECT_EQ(point.position[2], at.position) << at.time;
+    EXPECT_EQ(point.velocity[2], at.velocity) << at.time;
+    EXPECT_EQ(point.acceleration[2], at.acceleration) << at.time;
+    EXPECT_LT(std::abs(point.position[3]), 1e-200) << at.time;
+    EXPECT_LT(std::abs(point.velocity[3]), 1e-200) << at.time;
+  }
+}
+
+TEST(PtpTrajectory, AWayThatIsOnlyRoundingTakesNoTime) {
+  const JointVector q = Random(6).joints(0.5), zero = JointVector::Zero(),
+                    one = JointVector::Ones();
+  const JointVector target = q + JointVector::Constant(1e-13);
+  const PtpTrajectory trajectory(q, zero, target, one, one);
+  EXPECT_EQ(trajectory.duration(), 0.0);
+  PtpPoint point;
+  trajectory.at(0.0, point);
+  EXPECT_EQ(point.position, target);
+}

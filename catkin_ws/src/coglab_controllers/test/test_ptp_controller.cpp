@@ -3,6 +3,7 @@
 #include <atomic>
 #include <chrono>
 #include <random>
+#include <sstream>
 #include <thread>
 
 #include "coglab_controllers/limits/workspace.hpp"
@@ -250,6 +251,77 @@ TEST(PtpController, RandomMotionsEndExactly) {
   EXPECT_GE(reached, clear);
   EXPECT_GT(leaving, 0);
   EXPECT_GE(aborted, leaving);
+}
+
+TEST(PtpController, SaysWhatIsWrongInWholeSentences) {
+  VirtualRobot robot;
+  robot.loadBoth("ptp");
+  const auto says = [&robot](const PtpRequest& request) {
+    return robot.ptp().add(request).message;
+  };
+  const auto range = [](const std::string& words, double least, double most) {
+    std::ostringstream text;
+    text << words << least << " to " << most;
+    return text.str();
+  };
+  const std::string order =
+      " numbers; expected 7, in the order lwr_a1 lwr_a2 lwr_e1 lwr_a3 lwr_a4 lwr_a5 lwr_a6";
+  EXPECT_EQ(says({{1, 2, 3}, {}, {}}), "position has 3" + order);
+  EXPECT_EQ(says({kThere, {0.1, 0.1}, {}}), "max_vel has 2" + order);
+  EXPECT_EQ(says({kThere, {}, {0.1}}), "max_acc has 1" + order);
+  std::vector<double> far = kThere, fast(7, 0.5), hard(7, 0.5);
+  far[1] = 2.1;
+  fast[3] = 99.0;
+  hard[5] = -1.0;
+  const coglab_rt::JointLimits& limits = robot.limits;
+  const double kept = limits.position_margin + 0.002;
+  EXPECT_EQ(says({far, {}, {}}),
+            range("position of lwr_a2 is 2.1 rad; expected ", limits.lower_position[1] + kept,
+                  limits.upper_position[1] - kept));
+  EXPECT_EQ(says({kThere, fast, {}}),
+            range("max_vel of lwr_a3 is 99 rad/s; expected ", 1e-4, limits.velocity[3]));
+  EXPECT_EQ(says({kThere, {}, hard}),
+            range("max_acc of lwr_a5 is -1 rad/s^2; expected ", 1e-4, limits.acceleration[5]));
+  std::ostringstream box;
+  box << "workspace: {box_max: [" << robot.hand().position.x() - 0.01 << ", 1.2, 1.6]}";
+  VirtualRobot narrow(box.str());
+  narrow.loadBoth("ptp");
+  EXPECT_EQ(narrow.ptp().add({{kHome.data(), kHome.data() + 7}, {}, {}}).message,
+            "position puts the hand outside the workspace: upper side of the workspace box");
+}
+
+TEST(PtpController, NeedsAllSevenJoints) {
+  VirtualRobot robot("tool_link: lwr_link_6");
+  EXPECT_TRUE(refused(robot.manager->load("ptp", "coglab/PtpController"),
+                      {"the chain has not seven joints; point-to-point motions need all"}));
+}
+
+TEST(PtpController, ThePathAheadTakesTheTimeThatIsLeftAndAtTheEndIsOnePoint) {
+  for (const double scale : {1.0, 0.5}) {
+    VirtualRobot robot;
+    robot.loadBoth("ptp");
+    ASSERT_TRUE(robot.manager->setSpeedScale(scale).success);
+    for (int i = 0; i < 100; ++i) robot.tick();
+    ASSERT_EQ(robot.ptp().add({kThere, {}, {}}).status, MotionAnswer::kStarted);
+    for (int i = 0; i < 50; ++i) robot.tick();
+    PredictedPath path;
+    robot.ptp().askPath();
+    robot.tick();
+    ASSERT_TRUE(robot.ptp().readPath(path));
+    ASSERT_EQ(path.path.times.size(), 41u);
+    const double ahead = path.path.times.back();
+    int cycles = 0;
+    for (; cycles < 5000 && robot.state() == MotionState::Running; ++cycles) {
+      robot.ptp().askPath();
+      robot.tick();
+      robot.ptp().readPath(path);
+    }
+    EXPECT_EQ(robot.state(), MotionState::Reached) << robot.reason();
+    EXPECT_GE(cycles * robot.period, ahead) << scale;
+    EXPECT_LE(cycles * robot.period, ahead + 2.5 * robot.period) << "it is told in the next cycle";
+    EXPECT_EQ(path.path.times, std::vector<double>{0.0});
+    EXPECT_EQ(path.path.poses.size(), 1u);
+  }
 }
 
 }  // namespace

@@ -227,17 +227,27 @@ TEST_F(Requests, AreWelcomeByTheNewestJointState) {
   EXPECT_EQ(code(now), ReasonCode::None);
   now.robot.stamp_ns = robot.now_ns - 101 * kMs;
   EXPECT_EQ(code(now), ReasonCode::StaleJointState);
-  EXPECT_NE(manager.motionWelcome("dmp", now).message.find("is 0.101000 s old; allowed: 0.1"),
-            std::string::npos);
+  const auto words = [&](const std::string& id) { return manager.motionWelcome(id, now).message; };
+  EXPECT_EQ(words("dmp"), "the newest joint state is 0.101000 s old; allowed: 0.100000 s");
   now = manager.report();
   now.robot.block = MotionBlock::DriveError;
   EXPECT_EQ(code(now), ReasonCode::DriveError);
-  EXPECT_NE(manager.motionWelcome("dmp", now).message.find("lwr/command"), std::string::npos);
+  EXPECT_EQ(words("dmp"), std::string("the robot follows no motion now: ") +
+                              coglab_rt::describe(MotionBlock::DriveError) +
+                              "; see lwr/state, then use lwr/command (reset, start)");
   now.samples = 0;
   EXPECT_EQ(code(now), ReasonCode::StaleJointState);
+  EXPECT_EQ(words("dmp"), "no joint state from the robot yet; start the robot's interface first");
   now.fault = true;
+  now.reason = Reason(ReasonCode::ControllerFault, "it broke");
   EXPECT_EQ(code(now), ReasonCode::ControllerFault);
+  EXPECT_EQ(words("dmp"),
+            "controller 'dmp' is at fault: it broke; call switch_controller with 'dmp' to start it "
+            "afresh");
   EXPECT_EQ(manager.motionWelcome("ptp", now).code, ReasonCode::NotActive);
+  EXPECT_EQ(words("ptp"),
+            "controller 'ptp' is not active; active is 'dmp'; call switch_controller with 'ptp' "
+            "first");
 }
 
 TEST_F(Requests, OfTheManagerHaveNamesOfLettersAndAScaleFromZeroToOne) {
@@ -282,6 +292,7 @@ TEST_F(Requests, OfACancelThatComesToNoEndSayWhy) {
   robot.tick();
   answer = robot.manager->cancelUnfinished(order, 0.25);
   EXPECT_EQ(answer.code, ReasonCode::TimeLimit);
+  EXPECT_TRUE(answer.was_running);
   EXPECT_NE(answer.message.find("its largest joint speed is 0."), std::string::npos);
   const std::string reason = robot.reason();
   EXPECT_NE(reason.find("cancelled: " + std::string(120, 'x')), std::string::npos);
@@ -291,6 +302,27 @@ TEST_F(Requests, OfACancelThatComesToNoEndSayWhy) {
   EXPECT_EQ(answer.code, ReasonCode::StaleJointState);
   EXPECT_NE(answer.message.find("did not come to rest within 0.250000 s: no joint state"),
             std::string::npos);
+}
+
+TEST_F(Requests, OfACancelNameTheControllerThatHoldsTheArmOnItsWay) {
+  robot.see("human_hand", kGoal);
+  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
+  for (int i = 0; i < 60; ++i) robot.tick();
+  ASSERT_EQ(robot.state(), MotionState::Holding);
+  const CancelOrder order = robot.manager->askCancel("ptp", "");
+  robot.tick();
+  robot.tick();
+  CancelAnswer answer;
+  answer.was_running = true;  // of one before
+  EXPECT_TRUE(robot.manager->cancelEnded(order, answer));
+  EXPECT_EQ(answer.code, ReasonCode::NotActive);
+  EXPECT_FALSE(answer.was_running);
+  EXPECT_EQ(answer.message,
+            "no motion of 'ptp' was running; 'dmp' moves the arm: cancel its motion");
+  answer.was_running = true;
+  EXPECT_TRUE(robot.manager->cancelEnded(robot.manager->askCancel("nobody", ""), answer));
+  EXPECT_EQ(answer.message, "controller_id 'nobody' is not loaded");
+  EXPECT_FALSE(answer.was_running);
 }
 
 TEST(RequestsWithoutACycle, AreWithdrawnAndLeaveNothing) {
@@ -329,6 +361,10 @@ TEST(RequestsWithoutACycle, AreWithdrawnAndLeaveNothing) {
   const CancelAnswer unheard = robot.manager->cancel("ptp", 0.0, "");
   EXPECT_EQ(unheard.code, ReasonCode::NotAdopted);
   EXPECT_TRUE(refused(unheard, {"not taken the cancel over within 2."}));
+  const Answer later = robot.manager->applyProfile("dmp");
+  EXPECT_TRUE(VirtualRobot::ok(later));
+  EXPECT_EQ(later.message,
+            "the control cycle has not taken the change yet; it will with its next cycle");
 }
 
 }  // namespace

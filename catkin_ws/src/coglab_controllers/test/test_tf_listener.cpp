@@ -63,6 +63,8 @@ TEST_F(Listener, ATransformMayBeFiftyMillisecondsAheadOfTheClock) {
   EXPECT_EQ(listener.refused(), 1u);
   EXPECT_NEAR(listener.ahead("cup"), 0.051, 1e-9);
   EXPECT_NEAR(source.ahead("/cup"), 0.051, 1e-9) << "with and without a slash";
+  ASSERT_TRUE(known("cup"));
+  EXPECT_EQ(goal.frame_ns, now_ns + 50 * kMs) << "what is refused does not come into the buffer";
   EXPECT_EQ(listener.ahead("plate"), 0.0);
   set(now_ns + 20 * kMs);
   receive(seen("cup", 0));
@@ -136,9 +138,58 @@ TEST_F(Listener, AGoalHasThePoseTheStampAndTheAgeOfItsTransform) {
   EXPECT_FALSE(known("nowhere"));
 }
 
+TEST_F(Listener, GoodTransformsBesideARefusedOneOfTheSameMessageAreTaken) {
+  tf2_msgs::TFMessage message;
+  for (const char* frame : {"cup", "plate", "spoon"}) message.transforms.push_back(seen(frame, 0));
+  message.transforms[1].transform.translation.z = std::nan("");
+  listener.receive(message, "/tracker", false);
+  EXPECT_EQ(listener.refused(), 1u);
+  EXPECT_TRUE(known("cup"));
+  EXPECT_FALSE(known("plate"));
+  EXPECT_TRUE(known("spoon"));
+}
+
+TEST_F(Listener, AFrameWithoutANameIsAheadOfNothing) {
+  receive(seen("cup", 60 * kMs));
+  EXPECT_EQ(listener.ahead(""), 0.0);
+  EXPECT_EQ(listener.ahead("/"), 0.0);
+  EXPECT_EQ(listener.ahead("up"), 0.0);
+}
+
+// What the log says of a transform; the log is not throttled that long after all others.
+struct Said : Listener {
+  std::string of(const geometry_msgs::TransformStamped& transform, bool is_static) {
+    ::testing::internal::CaptureStderr();
+    receive(transform, is_static);
+    return ::testing::internal::GetCapturedStderr();
+  }
+  void expect(const std::string& said, const std::string& words) {
+    EXPECT_NE(said.find(words), std::string::npos) << said;
+  }
+};
+
+TEST_F(Said, ARefusedTransformIsNamedWithItsPublisherAndWhatIsWrong) {
+  set(5000 * kSecond);
+  EXPECT_EQ(of(seen("cup", 0), false), "");
+  expect(of(seen("cup", 1500 * kMs), false),
+         "tf of 'cup' from /tracker refused: stamped 1.500 s ahead of this computer's clock "
+         "(allowed: 0.050 s); synchronise the clocks. 1 refused so far");
+  geometry_msgs::TransformStamped bad = seen("cup", 0);
+  bad.transform.rotation.x = std::nan("");
+  expect(of(bad, false), "tf of 'cup' from /tracker refused: it holds a number that is not finite");
+  expect(of(seen("cup", 0), true),
+         "static tf of 'cup' from /tracker refused: expected a frame that does not move, or names "
+         "and a rotation that are valid");
+  set(now_ns - 250 * kMs);
+  expect(of(seen("cup", 0), false),
+         "this computer's clock went back by 0.250 s: transforms are forgotten");
+  EXPECT_EQ(listener.refused(), 3u);
+}
+
 TEST_F(Listener, APathIsToldPoseByPose) {
   PredictedPath path;
   path.motion = "reach";
+  path.stamp_ns = steadyNow() - 2 * kSecond;
   for (int i = 0; i < 3; ++i) {
     path.path.times.push_back(0.1 * i);
     path.path.poses.push_back({Vector3(i, 10 + i, 20 + i), Quaternion(0.1, 0.2, 0.3, 0.4 + i)});
@@ -146,6 +197,7 @@ TEST_F(Listener, APathIsToldPoseByPose) {
   const coglab_msgs::PredictedPath message = toMessage(path, "base");
   EXPECT_EQ(message.header.frame_id, "base");
   EXPECT_EQ(message.motion, "reach");
+  EXPECT_NEAR(message.header.stamp.toSec(), 1e-9 * static_cast<double>(now_ns) - 2.0, 0.5);
   EXPECT_EQ(message.times, path.path.times);
   ASSERT_EQ(message.poses.size(), 3u);
   for (int i = 0; i < 3; ++i) {

@@ -1,5 +1,6 @@
 // Controllers are unloaded, and none is active: nothing is left, and nothing moves.
 #include <atomic>
+#include <chrono>
 #include <memory>
 #include <thread>
 
@@ -153,5 +154,107 @@ TEST(Deactivate, ClearsAFault) {
   EXPECT_TRUE(VirtualRobot::ok(robot.manager->unload("odd")));
 }
 
+/// Stays in start() for as long as it is told to.
+class Lingering : public MotionController {
+ public:
+  static inline std::atomic<bool> lingers{false};
+
+  void configure(const MotionSetup&) override {}
+  void adopt(const CycleInput&) override {}
+  void start(const CycleInput&) override {
+    while (lingers) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  void stop() override {}
+  void abort(const Reason&) override {}
+  void computeReference(const CycleInput&, References&) override {}
+  void resolve(const CycleInput&, References&) override {}
+  MotionState state() const override { return MotionState::Idle; }
+  const Reason& reason() const override { return none_; }
+
+ private:
+  Reason none_;
+};
+
+TEST(Unload, NeitherTheControllerThatStillRunsNorTheOneThatIsOrderedGoes) {
+  VirtualRobot robot("", 0.005, false);
+  ControllerManager& manager = *robot.manager;
+  std::atomic<bool> stop{false};
+  std::thread control([&] {
+    while (!stop) {
+      robot.tick();
+      std::this_thread::sleep_for(std::chrono::microseconds(100));
+    }
+  });
+  robot.loadBoth("ptp");
+  EXPECT_TRUE(VirtualRobot::ok(manager.load("slow", "test/Lingering")));
+  Lingering::lingers = true;
+  std::string type, id;
+  const Answer taken = manager.switchTo("slow", type);
+  EXPECT_TRUE(VirtualRobot::ok(taken));
+  for (const std::string words : {"took the request but did not confirm it within 0.300000 s: ",
+                                  "has not returned from its code"}) {
+    EXPECT_NE(taken.message.find(words), std::string::npos) << taken.message;
+  }
+  manager.active(id, type);
+  EXPECT_EQ(id, "slow");
+  EXPECT_EQ(manager.report().active.str(), "ptp");
+  EXPECT_EQ(manager.unload("ptp").code, ReasonCode::Busy);
+  EXPECT_EQ(manager.unload("slow").code, ReasonCode::Busy);
+  Lingering::lingers = false;
+  for (int i = 0; i < 5000 && manager.report().active.str() != "slow"; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  EXPECT_TRUE(VirtualRobot::ok(manager.unload("ptp")));
+  EXPECT_EQ(manager.unload("slow").message,
+            "'slow' is the active controller; switch_controller to another one, or to '' for none, "
+            "first");
+  stop = true;
+  control.join();
+}
+
+TEST(Controllers, WaitAtBordersAndSlowTheClockOnlyIfTheySaySo) {
+  VirtualRobot robot;
+  robot.loadBoth();
+  EXPECT_TRUE(robot.dmp().waitsAtBorder()) << "its goal may come closer";
+  EXPECT_FALSE(robot.ptp().waitsAtBorder());
+  EXPECT_FALSE(Lingering().waitsAtBorder());
+  EXPECT_EQ(Lingering().limitScale(), 1.0);
+}
+
+TEST(Controllers, AreListedAndMissedByTheirNames) {
+  VirtualRobot robot("{" + kTypes + "}");
+  ControllerManager& manager = *robot.manager;
+  std::string type = "?";
+  EXPECT_EQ(manager.unload("nobody").message, "controller_id 'nobody' is not loaded; loaded: none");
+  robot.loadBoth("ptp");
+  EXPECT_EQ(manager.unload("nobody").message,
+            "controller_id 'nobody' is not loaded; loaded: dmp, ptp");
+  EXPECT_EQ(manager.switchTo("nobody", type).message,
+            "controller_id 'nobody' is not loaded; loaded: dmp, ptp; use load_controller first");
+  EXPECT_EQ(type, "");
+  EXPECT_EQ(manager.switchTo("dmp", type).message, "") << "no profile is missed without feedback";
+  ASSERT_TRUE(VirtualRobot::ok(manager.load("limits", "JointLimits")));
+  EXPECT_EQ(manager.switchTo("limits", type).message,
+            "'limits' is a feedback controller: use feedback/enable; motion controllers: dmp, ptp");
+  EXPECT_EQ(manager.switchTo("ptp", type).message,
+            "no feedback profile of this name: feedback controllers stay as they are");
+  std::vector<std::string> ids = {"old"}, types = {"older", "oldest"};
+  manager.list(ids, types);
+  EXPECT_EQ(ids, (std::vector<std::string>{"dmp", "ptp", "limits"}));
+  EXPECT_EQ(types, (std::vector<std::string>{"coglab/DmpController", "coglab/PtpController",
+                                             "JointLimits"}));
+  const Answer other = manager.load("a", "test/Other");
+  EXPECT_EQ(other.code, ReasonCode::UnknownName);
+  EXPECT_TRUE(refused(other, {"controller 'a' of type 'test/Other' was not loaded: library '",
+                              "' has no type 'test/Other'; it has: test/Misbehaving"}));
+  const Answer unknown = VirtualRobot().manager->load("a", "my_lab/Unknown");
+  EXPECT_EQ(unknown.code, ReasonCode::UnknownName);
+  EXPECT_EQ(unknown.message.find("controller_type 'my_lab/Unknown' is unknown; motion controllers: "
+                                 "coglab/DmpController, coglab/PtpController; as a feedback "
+                                 "controller: "),
+            0u);
+}
+
 }  // namespace
 }  // namespace coglab_controllers
+
+COGLAB_REGISTER_MOTION_CONTROLLER("test/Lingering", coglab_controllers::Lingering)

@@ -24,7 +24,7 @@ from std_msgs.msg import Float64
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from feedback_on_ros import FeedbackOnRos
-from robot_fixture import HOME, Robot, end_within, frozen_master, robot_processes, wait_until
+from robot_fixture import HOME, JOINTS, Robot, end_within, frozen_master, robot_processes, wait_until
 
 GOAL = (0.80, 0.0, 0.45)
 ASIDE = (0.65, -0.15, 0.60)
@@ -71,6 +71,8 @@ class TopicGoal(FeedbackOnRos):
         self.assertLess(20 / max(1e-3, (stamps[19] - stamps[0]).to_sec()), 45.0)  # 30 Hz, not 100
         goal = self.goals[-1]
         self.assertEqual(goal.header.frame_id, "lwr_base_link")
+        self.assertAlmostEqual(goal.goal.x, GOAL[0], places=6)
+        self.assertAlmostEqual(goal.goal.y, GOAL[1], places=6)
         self.assertAlmostEqual(goal.goal.z, GOAL[2] + 0.02, places=6)
 
     def test_3_reaches_the_goal_of_the_topic(self) -> None:
@@ -86,7 +88,12 @@ class TopicGoal(FeedbackOnRos):
         self.assertGreater(record.smallest_singular_value_position, 0.0)
         q = record.measured.orientation
         self.assertAlmostEqual(q.x**2 + q.y**2 + q.z**2 + q.w**2, 1.0, places=6)
+        # The reference of the cycle less where the arm is: what the inverse kinematics takes away.
+        for axis in "xyz":
+            ahead = getattr(record.set_point.position, axis) - getattr(record.measured.position, axis)
+            self.assertAlmostEqual(getattr(record.position_error, axis), ahead, delta=2e-3)
         self.assertTrue(self.targets and len(self.targets[-1].velocity) == 7)
+        self.assertEqual(list(self.targets[-1].name), JOINTS)
 
     def test_3b_switch_dmp_goes_on_in_the_phase_of_the_motion(self) -> None:
         robot = self.robot
