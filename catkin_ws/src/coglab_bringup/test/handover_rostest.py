@@ -13,7 +13,7 @@ import rospy
 import tf2_ros
 import yaml
 from coglab_bringup.handover import run_handover
-from coglab_bringup.interface import FRAMES, missing_names
+from interface import FRAMES, missing_names
 from coglab_bringup.trial_recorder import TrialRecorder
 from tf2_msgs.msg import TFMessage
 

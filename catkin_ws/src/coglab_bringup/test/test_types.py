@@ -23,9 +23,3 @@ def test_the_python_that_ships_is_typed(capfd):
     status = type_check.main()
     said = capfd.readouterr()
     assert status == 0, said.out[-6000:] + said.err
-
-
-def test_before_a_commit_the_same_tools_run_as_in_the_tests():
-    hooks = (TOP / ".pre-commit-config.yaml").read_text(encoding="utf-8")
-    for tool in ("clang-format", "ruff check", "ruff format", "coglab_bringup.type_check"):
-        assert tool in hooks, tool

@@ -20,13 +20,6 @@ from coglab_bringup.launch_arguments import judge_launch
 from coglab_bringup.usage import Parser, Refused, master_port, seed, writable_file, writable_folder
 
 HELP_GIVEN = 10
-CORES = (
-    *("lwr_fri_bridge", "coglab_controllers", "ctrl_more", "ih2_hand", "smach", "coglab_smach", "coglab_sim"),
-    *("coglab_rt", "coglab_objects", "coglab_py"),
-)
-"""the packages with a core: bridge, controllers, ctrl_more, hand, engine, brain, cell; and those to which code of these
-has moved: interpolator, braking, limits, samples and exchanges of bridge and controllers (coglab_rt), the brain's
-objects (coglab_objects), its checked files and poses (coglab_py)"""
 BUILD_OPTIONS = ("--upstream-smach",)
 BUILD_TARGETS = ("tests",)
 
@@ -137,29 +130,8 @@ def bench_options(top: Path, words: list[str]) -> argparse.Namespace:
     parser.add_argument("names", nargs="*", metavar="NAME", help="default: all")
     parser.add_argument("--json", type=writable_file, metavar="FILE", help="write the rows as a JSON list")
     parser.add_argument("--long", action="store_true", help="the campaigns too (hours)")
-    parser.add_argument("--report", action="store_true", help="write docs/figures.md; runs only the benches named")
     options = parser.parse_args(words)
     _named(options.names, find_benches(top / "catkin_ws" / "src"), "bench")
-    return options
-
-
-def mutants_options(top: Path, words: list[str]) -> argparse.Namespace:
-    """./coglab bench mutants"""
-    parser = Parser(
-        prog="coglab bench mutants",
-        description="Changes one line at a time, in a copy: do the tests notice? Goes on where it was ended.",
-    )
-    parser.add_argument("packages", nargs="*", metavar="PACKAGE", help=f"default: {', '.join(CORES)}")
-    parser.add_argument(
-        "--seed", type=seed, metavar="N", help="of the lines drawn (default: each package's last commit)"
-    )
-    parser.add_argument("--count", type=int, default=12, metavar="N", help="mutants per package (default 12)")
-    parser.add_argument("--own", action="store_true", help="judged by the tests of the package alone")
-    parser.add_argument("--json", type=writable_file, metavar="FILE", help="write rows and mutants as JSON")
-    options = parser.parse_args(words)
-    _named(options.packages, package_folders(top / "catkin_ws" / "src"), "package")
-    if not 1 <= options.count <= 10000:
-        raise Refused(f"--count: expected 1 to 10000, got {options.count}")
     return options
 
 
@@ -240,8 +212,6 @@ def judge(top: Path, command: str, words: list[str]) -> None:
         demo_parser(top).parse_args(words)
     elif command == "test":
         test_options(top, words)
-    elif command == "bench" and words[:1] == ["mutants"]:
-        mutants_options(top, words[1:])
     elif command == "bench":
         bench_options(top, words)
     elif command in ("start", "status", "hold", "stop"):

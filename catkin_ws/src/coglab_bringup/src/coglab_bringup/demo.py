@@ -14,8 +14,7 @@ from pathlib import Path
 from coglab_bringup import process_tree
 from coglab_bringup.arguments import demo_parser
 from coglab_bringup.commit import commit_of
-from coglab_bringup.run_directory import free_port, record_run, record_times, run_environment
-from coglab_bringup.sources import wall_sources
+from coglab_bringup.run_directory import free_port, record_run, run_environment
 from coglab_bringup.usage import Refused
 
 OBJECT = "mug"  # what the simulated person offers (coglab_sim/config/cell.yaml)
@@ -108,7 +107,6 @@ def main(arguments: list[str]) -> int:
         print(f"[coglab] error: {error}", file=sys.stderr)
         return 2
     signal.signal(signal.SIGTERM, _interrupt)  # what happened until then is still written down
-    before, began = wall_sources(top), time.monotonic()
     out: Path = options.out.absolute()
     out.mkdir(parents=True, exist_ok=True)
     person, words = PEOPLE[options.person]
@@ -151,12 +149,11 @@ def main(arguments: list[str]) -> int:
     finally:
         (out / "result.json").write_text(json.dumps(result, indent=1) + "\n")
         system.stop()
-    return summarise(top, out, result["handovers"], time.monotonic() - began, before)
+    return summarise(out, result["handovers"])
 
 
-def summarise(top: Path, out: Path, handovers: list[dict], took: float, before: str) -> int:
-    """Prints how each handover ended; exit status 0 if all did well, and what they took (s) is remembered then, of the
-    sources that were there `before`."""
+def summarise(out: Path, handovers: list[dict]) -> int:
+    """Prints how each handover ended; returns exit status 0 if all succeeded."""
     good = sum(row["outcome"] == "success" for row in handovers)
     for row in handovers:
         print(f"{row['kind']}: {row['outcome']}" + (f" in {row['duration_s']:.1f} s" if "duration_s" in row else ""))
@@ -164,8 +161,6 @@ def summarise(top: Path, out: Path, handovers: list[dict], took: float, before: 
         f"{good} of {len(KINDS)} handovers succeeded; {out}/result.json and trial.png, log: {out}/roslaunch.log",
         flush=True,
     )
-    if good == len(KINDS):  # what was interrupted says nothing about how long it takes
-        record_times(top, "demo", took, before)
     return 0 if good == len(KINDS) else 1
 
 

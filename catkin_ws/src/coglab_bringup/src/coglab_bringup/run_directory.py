@@ -9,8 +9,6 @@ import socket
 import tempfile
 from pathlib import Path
 
-from coglab_bringup.sources import wall_sources
-
 
 def free_port() -> int:
     """A TCP port on loopback that nobody holds at the moment."""
@@ -99,34 +97,3 @@ def running_systems(top: Path) -> dict[int, str]:
         else:
             path.unlink(missing_ok=True)
     return found
-
-
-def record_times(top: Path, command: str, seconds: float, before: str, **parts: object) -> None:
-    """Keeps wall times (s) of the last ./coglab demo or test of this checkout, for ./coglab bench wall.
-
-    `seconds` is the run itself; what installing and building took before it comes from the environment, where ./coglab
-    did them in the same command. `parts` of the run are kept beside it. A first demo is one alone: that of the command
-    which installed packages, built a checkout where nothing was built, and ran the first demo of it.
-
-    `before`: what wall_sources() said when the run began. It is kept with the times, by which the bench tells those of
-    other sources; empty where the sources are others now, because nobody could say which of them the times are of.
-    """
-    folder = top / ".coglab"
-    folder.mkdir(exist_ok=True)
-    path = folder / "times.json"
-    times = json.loads(path.read_text()) if path.is_file() else {}
-    install = float(os.environ.get("COGLAB_INSTALL_SECONDS", "0"))
-    build = float(os.environ.get("COGLAB_BUILD_SECONDS", "0"))
-    row: dict[str, object] = {
-        "install_s": install,
-        "build_s": build,
-        "run_s": round(seconds, 1),
-        "total_s": round(install + build + seconds, 1),
-        "sources": before if before and before == wall_sources(top) else "",
-        **parts,
-    }
-    from_nothing = install > 0.0 and build > 0.0 and os.environ.get("COGLAB_FIRST_BUILD") == "yes"
-    if command == "demo" and from_nothing and "last_demo" not in times:
-        times["demo_from_nothing"] = row | {"installed": os.environ.get("COGLAB_INSTALLED", "")}
-    times[f"last_{command}"] = row
-    path.write_text(json.dumps(times, indent=1) + "\n")

@@ -15,7 +15,6 @@ rostests, alone, because they measure real time.
 
 from __future__ import annotations
 
-import itertools
 import os
 import shutil
 import subprocess
@@ -28,8 +27,7 @@ from pathlib import Path
 
 from coglab_bringup import process_tree
 from coglab_bringup.arguments import left_out, package_folders, test_options
-from coglab_bringup.run_directory import free_port, record_times, run_environment
-from coglab_bringup.sources import wall_sources
+from coglab_bringup.run_directory import free_port, run_environment
 from coglab_bringup.usage import Refused
 
 AT_A_TIME = 2
@@ -59,7 +57,6 @@ class Program:
     command: list[str]
     junit: Path  # file it writes, or (rostest) folder
     beside: int = AT_A_TIME  # how many of its kind run at a time
-    began: float = 0.0  # s, monotonic
     seconds: float = 0.0
     passed: int = 0
     failed: int = 0
@@ -138,7 +135,7 @@ def run(program: Program, log: Path, limit: float) -> None:
     environment = dict(os.environ)
     if program.kind == "rostest":
         environment = run_environment(free_port(), program.junit)
-    program.began = time.monotonic()
+    began = time.monotonic()
     if not Path(shutil.which(program.command[0]) or "").is_file():
         program.failed += 1
         program.failures.append(f"{program.command[0]} does not exist: it was not built; see .coglab/build.log")
@@ -150,7 +147,7 @@ def run(program: Program, log: Path, limit: float) -> None:
         status = process_tree.run(
             command, limit, stdout=output, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, env=environment
         )
-    program.seconds = time.monotonic() - program.began
+    program.seconds = time.monotonic() - began
     count(program, status)
     verdict = "ok" if not program.failed else f"{program.failed} FAILED"
     print(
@@ -158,17 +155,6 @@ def run(program: Program, log: Path, limit: float) -> None:
         f"{program.skipped:3d} skipped {program.seconds:7.1f} s  {verdict}",
         flush=True,
     )
-
-
-def wall_times(programs: list[Program]) -> dict[str, float]:
-    """s that each program adds to a run of all: at every moment, those that run share the time equally."""
-    added = {f"{one.package}/{one.name}": 0.0 for one in programs}
-    edges = sorted({moment for one in programs for moment in (one.began, one.began + one.seconds)})
-    for begin, end in itertools.pairwise(edges):
-        running = [one for one in programs if one.began <= begin and end <= one.began + one.seconds]
-        for one in running:
-            added[f"{one.package}/{one.name}"] += (end - begin) / len(running)
-    return {name: round(seconds, 2) for name, seconds in added.items()}
 
 
 def in_groups(programs: list[Program]) -> list[list[Program]]:
@@ -217,8 +203,6 @@ def main(arguments: list[str]) -> int:
     programs = find_programs(top, results, python, options.packages)
     if left_out(top):
         print(f"not tested, because this build uses those installed on this machine: {', '.join(left_out(top))}")
-    whole = not options.packages and not options.long
-    before = wall_sources(top) if whole else ""
     start = time.monotonic()
 
     def run_one(program: Program) -> None:
@@ -229,8 +213,6 @@ def main(arguments: list[str]) -> int:
             with ThreadPoolExecutor(max_workers=group[0].beside) as pool:
                 list(pool.map(run_one, group))
     print(f"all tests: {time.monotonic() - start:.0f} s; JUnit files and logs: {os.path.relpath(results)}")
-    if whole:
-        record_times(top, "test", time.monotonic() - start, before, programs=wall_times(programs))
     return report(programs, results)
 
 
