@@ -64,7 +64,7 @@ install(FILES src/coglab_controllers/_core.pyi src/coglab_controllers/py.typed
 install(FILES config/primitives.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/config)
 
 if(CATKIN_ENABLE_TESTING)
-  foreach(thing allocation cartesian_motion core_values dmp goal_estimator goals_and_ends ik kinematics learning library
+  foreach(thing allocation cartesian_motion dmp goal_estimator goals_and_ends ik kinematics learning library
       limits ptp slow_arrival)
     catkin_add_gtest(coglab_controllers_test_${thing} test/test_${thing}.cpp)
     if(TARGET coglab_controllers_test_${thing})

@@ -47,8 +47,8 @@ target_link_options(ctrl_more_test_plugin_resident PRIVATE -Wl,-z,nodelete)
 # One program per file, named after it: the test runner looks for them.
 foreach(name robot_states control_states feedback_controller manager by_signal gains cascade
     all_or_nothing isolation limits letting_go overruns attribution blending corrections exchanges
-    plugins list_file search_path describe_tool documentation description settings defaults config
-    config_fuzz words logger central_module attitude compliant_stabiliser zmp_dcm ee_admittance
+    plugins list_file search_path describe_tool documentation description settings config
+    config_fuzz logger central_module attitude compliant_stabiliser zmp_dcm ee_admittance
     joint_limits three_robots abi controller_logs)
   ctrl_more_add_test(${name} test/test_${name}.cpp)
 endforeach()
