@@ -177,7 +177,8 @@ class Desk:
                 "reasons": reasons(now, self.guard, self.experiment.refusals()),
                 "guard": {
                     "stop": self.guard.stops,
-                    "cause": self.guard.cause,
+                    "cause": self.guard.told(),
+                    "lifted": self.guard.lifted,
                     "unacknowledged": self.guard.unacknowledged,
                     "hold": self.guard.needs_hold,
                 },
