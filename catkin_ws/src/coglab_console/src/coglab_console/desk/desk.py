@@ -196,7 +196,7 @@ class Desk:
         except BadCommand as error:
             return str(error)
         if command.operator and who != self.roles.operator:
-            return f"{who} watches; {self.roles.operator or 'nobody'} is the operator: take over first"
+            return f"{who} watches; {self.roles.operator or 'nobody'} is the operator: press Take over first"
         found = reasons(self.backend.standing(), self.guard, self.experiment.refusals())
         reason = found.get(control(name, arguments), "")
         return f"{words_of(name, arguments)}: {reason}" if reason else ""
