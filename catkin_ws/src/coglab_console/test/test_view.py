@@ -11,11 +11,14 @@ from coglab_console.scene.urdf_model import RobotModel
 from coglab_msgs.msg import (
     ContactSignal,
     ControllerStatus,
+    DmpFeedback,
     HandStatus,
     LwrState,
     MasterState,
     PredictedPath,
+    ReasonCode,
     Transition,
+    UnfinishedPtp,
 )
 from geometry_msgs.msg import Point, Pose, TransformStamped
 from rospy import Time
@@ -136,6 +139,23 @@ def test_a_transition_belongs_to_the_phase_that_has_ended(seen):
     view._on_transition(told)
     words = "the arm is blocked, because hold is latched (reaches: failed; now: recovers)"
     assert events[1:] == [("machine", words, "warning", "reaches")]
+
+
+@pytest.mark.parametrize(
+    "code, level",
+    [
+        (ReasonCode.CANCELLED, "info"),
+        (ReasonCode.SUPERSEDED, "info"),
+        (ReasonCode.WORKSPACE_BORDER, "warning"),
+        (ReasonCode.HELD, "warning"),
+    ],
+)
+def test_a_motion_that_was_to_end_is_no_warning(seen, code, level):
+    """The brain cancels the reach when something touches the hand: that is how an exchange succeeds."""
+    view, _, events = seen
+    view._on_dmp(DmpFeedback(state="aborted", reason_code=code, reason="something touches the hand"))
+    view._on_unfinished(UnfinishedPtp(ptp_id=1, reason_code=code, reason="the weight has come"))
+    assert [event[2] for event in events] == [level, level]
 
 
 def tf_of(*children, stamp=100.0):

@@ -18,6 +18,7 @@ from coglab_msgs.msg import (
     LwrState,
     MasterState,
     PredictedPath,
+    ReasonCode,
     Transition,
     UnfinishedPtp,
 )
@@ -36,6 +37,8 @@ PALM = "ih2_palm"
 FRAME_PARENTS = ("world", "lwr_base_link")
 OLD = 1.0  # s without a message after which a motion's path or progress is over
 GOAL_FRAME = "dmp_goal"
+ASKED_FOR = (ReasonCode.CANCELLED, ReasonCode.SWITCHED, ReasonCode.SUPERSEDED)
+"""a motion that ends for one of these ends because the brain or a person asked for it: no failure"""
 MOST_POSES = 200
 MOST_STATIC = 1000  # frames of /tf_static that are kept by name, as the object they belong to may be chosen later
 
@@ -320,7 +323,7 @@ class RosView:
     def _on_dmp(self, message: DmpFeedback) -> None:
         before, self.dmp, self._dmp_at = self.dmp, message, time.monotonic()
         if message.state == "aborted" and before.state != "aborted":
-            self._say("controller", f"motion aborted: {message.reason}", "warning")
+            self._ended("reach", message)
 
     def _on_path(self, message: PredictedPath, controller: str) -> None:
         if message.poses:
@@ -331,4 +334,9 @@ class RosView:
             self._put("path", None)
 
     def _on_unfinished(self, message: UnfinishedPtp) -> None:
-        self._say("controller", f"motion {message.ptp_id} ended before its target: {message.reason}", "warning")
+        self._ended(f"motion {message.ptp_id}", message)
+
+    def _ended(self, what: str, message: DmpFeedback | UnfinishedPtp) -> None:
+        """A motion that ended before its goal."""
+        level = "info" if message.reason_code in ASKED_FOR else "warning"
+        self._say("controller", f"{what} ended before its goal: {message.reason}", level)
