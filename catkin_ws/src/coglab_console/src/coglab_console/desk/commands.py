@@ -68,7 +68,7 @@ _ALL = (
     }, ("participant", "conditions", "repetitions", "order")),
     Command("session_end", "closes the session's file", {}),
     Command("trial_begin", "the next trial of the order", {}),
-    Command("trial_end", "the trial is over", {"outcome": {"enum": ["done", "repeat", "skipped"]}}, ("outcome",)),
+    Command("trial_end", "the trial is over", {"outcome": {"enum": ["done", "failed", "repeat", "skipped"]}}, ("outcome",)),
     Command("contact_learn", "noise of the torques from 5 s at rest", {}),
     Command("contact_arm", "the contact detector, to try it", {
         "mode": {"enum": ["contact", "off"]},

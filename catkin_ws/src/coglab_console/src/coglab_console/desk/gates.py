@@ -59,7 +59,9 @@ class MotionGuard:
         """What the page says of the newest stop."""
         if not self.lifted:
             return self.cause
-        return f"This stop is over, it was lifted without this page: {without_advice(self.cause) or 'no reason was told'}"
+        return (
+            f"This stop is over, it was lifted without this page: {without_advice(self.cause) or 'no reason was told'}"
+        )
 
     def observe(self, stopped: bool, cause: str, standstills: int = 0) -> bool:
         """How the robot stands, several times a second, and how often it has come to stand (Standstills); True where a
@@ -229,7 +231,7 @@ def reasons(now: Standing, guard: MotionGuard, session: Mapping[str, str] | None
         if name in SECOND_THOUGHT and (now.under_way or trial):
             found[name] = "not while an action or a trial is under way"
     found["acknowledge"] = "" if guard.unacknowledged else "no stop waits to be acknowledged"
-    return {**found, **given}
+    return {**found, **{name: found.get(name) or reason for name, reason in given.items()}}
 
 
 def control(name: str, arguments: Mapping[str, Any]) -> str:
@@ -240,4 +242,4 @@ def control(name: str, arguments: Mapping[str, Any]) -> str:
         return "calibrate_forced"
     if name == "calibrate" and arguments.get("mode") == "complete":
         return "calibrate_complete"
-    return name
+    return "trial_done" if name == "trial_end" and arguments["outcome"] == "done" else name
