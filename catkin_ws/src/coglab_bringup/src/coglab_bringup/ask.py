@@ -11,7 +11,7 @@ import socket
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import urlparse
 
@@ -90,13 +90,13 @@ def find_master(top: Path, port: int, users_own: str) -> str:
 
 @dataclass
 class State:
-    """coglab_msgs/MasterState, as far as it is shown or used here."""
+    """coglab_msgs/MasterState, as far as it is shown or used here; `state` is empty as long as none has come."""
 
-    state: str
-    in_hub: bool
-    actions: list[str]
-    object_id: str
-    why: str
+    state: str = ""
+    in_hub: bool = False
+    actions: list[str] = field(default_factory=list)
+    object_id: str = ""
+    why: str = ""
 
     @classmethod
     def of(cls, data: bytes) -> State:
@@ -111,7 +111,7 @@ class Brain:
 
     def __init__(self, master: str) -> None:
         self.master = master
-        self.state: State | None = None
+        self.state = State()
         self._topic: Connection | None = None
 
     def _look(self, limit: float) -> None:
@@ -128,7 +128,7 @@ class Brain:
         """Waits until a state has come for which the condition holds; whether it did within `limit` s."""
         end = time.monotonic() + limit
         self._look(0.0)
-        while self.state is None or not condition(self.state):
+        while not (self.state.state and condition(self.state)):
             left = end - time.monotonic()
             if left <= 0.0:
                 return False
@@ -173,7 +173,6 @@ def status(brain: Brain, _options: argparse.Namespace) -> int:
             "/coglab/state says nothing: the brain is starting, or it has ended; its words are in the terminal "
             "of ./coglab launch"
         )
-    assert brain.state is not None
     print(sentence_of(brain.state))
     factor = brain.factor()
     if factor != 1.0:
@@ -208,7 +207,7 @@ def start(brain: Brain, options: argparse.Namespace) -> int:
     """Waits for the hub, then asks for the action; a refusal that the next hub may not repeat is waited for."""
     deadline, wanted = time.monotonic() + options.wait, options.action
     if not brain.wait_for_state(lambda state: state.in_hub, min(1.0, options.wait)):
-        now = brain.state.state.rpartition("/")[2] if brain.state else "the brain is starting"
+        now = brain.state.state.rpartition("/")[2] if brain.state.state else "the brain is starting"
         print(f"[coglab] waiting for the hub, {options.wait:.0f} s at most; now: {now}", file=sys.stderr, flush=True)
     while (left := deadline - time.monotonic()) > 0:
         if not brain.wait_for_state(lambda state: state.in_hub, left):
@@ -227,7 +226,7 @@ def start(brain: Brain, options: argparse.Namespace) -> int:
         if brain.wait_for_state(lambda state: not state.in_hub, 0.5):
             continue  # the hub was left in that moment
         raise Refused(message)
-    state = brain.state.state if brain.state else "/coglab/state never came"
+    state = brain.state.state or "/coglab/state never came"
     raise Refused(f"no hub within {options.wait:.0f} s; the machine is in {state}; more: ./coglab status")
 
 

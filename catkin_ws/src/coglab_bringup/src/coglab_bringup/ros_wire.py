@@ -24,7 +24,7 @@ class NoAnswer(Exception):
 def master_call(master: str, method: str, *words: object) -> Any:
     """A call of the master's XML-RPC API, or of a node's: its value. NoAnswer where there is none."""
     try:
-        code, sentence, value = getattr(xmlrpc.client.ServerProxy(master), method)(CALLER, *words)  # type: ignore[misc]
+        code, sentence, value = getattr(xmlrpc.client.ServerProxy(master), method)(CALLER, *words)
     except (OSError, xmlrpc.client.Error, ValueError, TypeError) as error:
         raise NoAnswer(f"{master} does not answer ({error})") from error
     if code != 1:
