@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 import traceback
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -92,6 +93,10 @@ class ActionServerWrapper:
         )
         self._action_server.register_preempt_callback(self._on_cancel)
         self._action_server.start()
+        server = self._action_server.action_server
+        if server.status_timer is not None:
+            server.status_timer.shutdown()
+            threading.Thread(target=_publish_status, args=(server,), name="action_status", daemon=True).start()
 
     def _on_cancel(self) -> None:
         with self._lock:
@@ -165,3 +170,13 @@ class ActionServerWrapper:
         for slot, key in keys.items():
             setattr(feedback, slot, userdata[key])
         self._action_server.publish_feedback(feedback)
+
+
+def _publish_status(server: Any) -> None:
+    """In place of actionlib's timer: a step of `/clock` backwards ends that one for good."""
+    while not rospy.is_shutdown():
+        time.sleep(1.0 / server.status_frequency)
+        try:
+            server.publish_status_async(None)
+        except rospy.ROSException:  # shutdown has closed the topic
+            return
