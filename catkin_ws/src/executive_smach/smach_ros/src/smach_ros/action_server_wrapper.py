@@ -10,6 +10,7 @@ from typing import Any
 
 import rospy
 import smach
+from actionlib.action_server import ActionServer
 from actionlib.simple_action_server import SimpleActionServer
 
 
@@ -92,11 +93,14 @@ class ActionServerWrapper:
             self._server_name, self._action_spec, execute_cb=self._execute, auto_start=False
         )
         self._action_server.register_preempt_callback(self._on_cancel)
+        self._action_server.action_server = _SteadyActionServer(
+            self._server_name,
+            self._action_spec,
+            self._action_server.internal_goal_callback,
+            self._action_server.internal_preempt_callback,
+            auto_start=False,
+        )
         self._action_server.start()
-        server = self._action_server.action_server
-        if server.status_timer is not None:
-            server.status_timer.shutdown()
-            threading.Thread(target=_publish_status, args=(server,), name="action_status", daemon=True).start()
 
     def _on_cancel(self) -> None:
         with self._lock:
@@ -172,11 +176,27 @@ class ActionServerWrapper:
         self._action_server.publish_feedback(feedback)
 
 
-def _publish_status(server: Any) -> None:
-    """In place of actionlib's timer: a step of `/clock` backwards ends that one for good."""
-    while not rospy.is_shutdown():
-        time.sleep(1.0 / server.status_frequency)
-        try:
-            server.publish_status_async(None)
-        except rospy.ROSException:  # shutdown has closed the topic
-            return
+class _SteadyActionServer(ActionServer):
+    """Publishes its status by the steady clock: a step of `/clock` backwards ends actionlib's timer."""
+
+    @property
+    def status_frequency(self) -> float:
+        """0, for which actionlib makes no timer."""
+        return 0.0
+
+    @status_frequency.setter
+    def status_frequency(self, frequency: float) -> None:
+        self._frequency = frequency
+
+    def initialize(self) -> None:
+        super().initialize()
+        if self._frequency > 0.0:
+            threading.Thread(target=self._publish, name="action_status", daemon=True).start()
+
+    def _publish(self) -> None:
+        while not rospy.is_shutdown():
+            time.sleep(1.0 / self._frequency)
+            try:
+                self.publish_status_async(None)
+            except rospy.ROSException:  # shutdown has closed the topic
+                return
