@@ -69,12 +69,17 @@ def test_a_failing_call_costs_no_timer_but_failing_for_good_ends_the_node(ros, m
 
 
 def test_stamps_are_told_on_the_steady_clock_across_a_step(monkeypatch):
-    before = steady.steady_of(rospy.Time.from_sec(rospy.get_time() - 0.2))
-    now = time.time()
-    monkeypatch.setattr(time, "time", lambda: now - 30.0)
-    after = steady.steady_of(rospy.Time.from_sec(now - 30.0))
-    assert 0.1 < after - before < 5.0
-    assert steady.stamp_of(time.monotonic() - 0.2).to_sec() == pytest.approx(now - 30.2, abs=0.01)
+    now = [50.0, 1000.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(time, "time", lambda: now[1])
+    stamps = steady.Stamps()
+    assert stamps.steady(rospy.Time.from_sec(999.8)) == pytest.approx(49.8)
+    for late in (0.03, -0.03):  # as /clock is, which comes now and then
+        now[1] += late
+        assert stamps.steady(rospy.Time.from_sec(999.8)) == pytest.approx(49.8, abs=0.001)
+    now[1] -= 30.0
+    assert stamps.steady(rospy.Time.from_sec(969.9)) == pytest.approx(49.9, abs=0.001)
+    assert stamps.stamp(49.9).to_sec() == pytest.approx(969.9, abs=0.001)
 
 
 def test_a_service_is_given_up_by_the_steady_clock(monkeypatch):

@@ -22,6 +22,12 @@ SILENCE = 1.0
 """s without a message on /clock, after which that is a fault"""
 STEP = 0.5
 """s by which ROS time moves beside the steady clock where it was set"""
+SET = 0.04
+"""s beside the steady clock, beyond which ROS time counts as set where stamps are told on the other clock"""
+QUICK = 0.005
+"""s within which both clocks have to be read to be compared"""
+FOLLOWED = 0.01
+"""share of a small difference by which stamps follow at each look"""
 POLL = 0.1
 """s between two looks of a wait"""
 
@@ -33,10 +39,15 @@ def ending() -> bool:
     return bool(rospy.core.is_shutdown_requested() or rospy.is_shutdown())
 
 
-def spin() -> int:
-    """Wait for the node's end; its exit status: 1 where a worker has ended it."""
-    rospy.spin()
+def exit_status() -> int:
+    """Of the node: 1 where a worker has ended it."""
     return int(_failed.is_set())
+
+
+def spin() -> int:
+    """Wait for the node's end; its exit status."""
+    rospy.spin()
+    return exit_status()
 
 
 def worker(function: Callable[[], object], name: str) -> threading.Thread:
@@ -91,14 +102,31 @@ class SteadyTimer:
                     raise
 
 
-def steady_of(stamp: rospy.Time) -> float:
-    """The steady time, s, of a stamp of ROS time, by what both clocks show now."""
-    return time.monotonic() - (rospy.get_time() - stamp.to_sec())
+class Stamps:
+    """Stamps of ROS time on the steady clock and back. Where ROS time was set, what comes afterwards is told by the new
+    time; else the two clocks are followed slowly, so that a busy computer does not make stamps jitter."""
 
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._offset: float | None = None
 
-def stamp_of(steady: float) -> rospy.Time:
-    """The other way round."""
-    return rospy.Time.from_sec(max(0.0, rospy.get_time() - (time.monotonic() - steady)))
+    def steady(self, stamp: rospy.Time) -> float:
+        """The steady time of a stamp, s."""
+        return stamp.to_sec() + self._follow()
+
+    def stamp(self, steady: float) -> rospy.Time:
+        """The stamp of a steady time (s)."""
+        return rospy.Time.from_sec(max(0.0, steady - self._follow()))
+
+    def _follow(self) -> float:
+        before, ros, after = time.monotonic(), rospy.get_time(), time.monotonic()
+        with self._lock:
+            beside = before - ros - (self._offset or 0.0)
+            if self._offset is None or (abs(beside) > SET and after - before < QUICK):
+                self._offset = before - ros
+            elif after - before < QUICK:
+                self._offset += FOLLOWED * beside
+            return self._offset
 
 
 def wait_for(condition: Callable[[], Any], limit: float) -> bool:
