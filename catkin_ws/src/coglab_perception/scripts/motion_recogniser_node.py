@@ -24,6 +24,7 @@ from coglab_perception.frames import AHEAD, FrameNames
 from coglab_perception.recogniser import CLOCK_JUMP, Recogniser, load_patterns
 from coglab_perception.tf_listener import TfListener
 from coglab_py import parameters
+from coglab_py.pace import Pace
 from geometry_msgs.msg import Point, TransformStamped, Vector3
 
 
@@ -47,6 +48,7 @@ class RecogniserNode:
             BeliefSettings.from_mapping(parameters.read("~belief", dict, {}), rospy.resolve_name("~belief"))
         )
         self.hand, self.base = frames.human_hand, frames.world
+        self.pace = Pace().follow()
         self.robot_holds = False
         self.buffer = tf2_ros.Buffer(rospy.Duration(2.0))
         self.listener = TfListener(self.buffer, self.base)
@@ -99,7 +101,7 @@ class RecogniserNode:
         """A sight of an object."""
         transform = self.newest(frame)
         if transform is not None:
-            self.filter.see_object(self.stamp(frame), object_id, position(transform), rospy.get_time())
+            self.filter.see_object(self.stamp(frame), object_id, position(transform), self.pace.of(rospy.get_time()))
 
     def take_hand(self, transform: TransformStamped) -> None:
         """A sight of the hand: what is recognised and believed after it."""
@@ -107,14 +109,14 @@ class RecogniserNode:
         self.recogniser.update(stamp, place.tolist())
         self.publisher.publish(self.recognition())
         end = self.recogniser.pattern_end()
-        belief = self.filter.see_hand(stamp, place, rospy.get_time(), self.robot_holds, end)
+        belief = self.filter.see_hand(stamp, place, self.pace.of(rospy.get_time()), self.robot_holds, end)
         if belief.stamp == stamp:
             self.beliefs.publish(self.message(belief))
             self.broadcast(belief)
 
     def stamp(self, frame: str) -> float:
-        """s, of the newest transform taken."""
-        return float(self.last[frame].to_sec())
+        """s, of the newest transform taken, as time passes in the cell."""
+        return self.pace.of(float(self.last[frame].to_sec()))
 
     def recognition(self) -> Recognition:
         """What the recogniser says."""
