@@ -7,6 +7,7 @@ import time
 from pathlib import Path
 
 import pytest
+from coglab_bringup import ask as ask_module
 from coglab_bringup.ask import brain_of
 from coglab_bringup.run_directory import free_port, record_run, running_systems
 
@@ -73,7 +74,7 @@ def begin(*words: str) -> subprocess.Popen:
     port = os.environ["ROS_MASTER_URI"].rsplit(":", 1)[1]
     environment = {**os.environ, "COGLAB_TOP": str(TOP)}
     return subprocess.Popen(
-        [sys.executable, "-m", "coglab_bringup.ask", *words, "-p", port],
+        [sys.executable, "-I", "-S", ask_module.__file__, *words, "-p", port],  # as ./coglab does: without ROS
         env=environment,
         text=True,
         stdout=subprocess.PIPE,
@@ -124,6 +125,17 @@ def test_what_the_hub_does_not_take_ends_with_what_to_type(brain):
     status, output = ask("start", "put", "--wait", "0.5")
     assert status == 1 and "wait_without_object does not take 'put'" in output
     assert output.endswith("type: ./coglab start exchange_human_to_robot or ./coglab start take\n"), output
+
+
+def test_the_master_never_hears_of_who_asks(brain):
+    import rosgraph
+
+    brain.say(HUB, TAKES)
+    for words in (("status",), ("hold",)):
+        assert ask(*words)[0] == 0
+    assert {name for kind in rosgraph.Master("/test").getSystemState() for _, names in kind for name in names} == {
+        "/coglab"
+    }
 
 
 def test_no_system_and_several(tmp_path, monkeypatch):

@@ -95,7 +95,7 @@ def test_wrong_release(checkout):
     ended = run("unshare", "--mount", "sh", "-c", script, "sh", other, checkout / "coglab")
     assert ended.returncode == 1
     (error,) = lines_of(ended.stdout)
-    assert "Debian 12 (bookworm) is expected" in error and "Ubuntu 20.04" in error and "docker/run" in error
+    assert "(bookworm) or Debian 13 (trixie)" in error and "Ubuntu 20.04" in error and "docker/run" in error
     assert not (checkout / ".coglab").exists()
 
 

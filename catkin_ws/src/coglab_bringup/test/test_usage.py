@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from coglab_bringup.arguments import judge
+from coglab_bringup.ask import COMMANDS, ask_parser
 from coglab_bringup.launch_arguments import judge_launch, launch_arguments
 from coglab_bringup.usage import Refused
 
@@ -90,7 +91,7 @@ def run(top: Path, words: str) -> subprocess.CompletedProcess:
 def test_refused_by_name_with_what_there_is(words):
     command, *rest = words.split()
     with pytest.raises(Refused) as refusal:
-        judge(TOP, command, rest)
+        ask_parser(command).parse_args(rest) if command in COMMANDS else judge(TOP, command, rest)
     assert REFUSED[words] in str(refusal.value) and "\n" not in str(refusal.value)
 
 

@@ -70,7 +70,7 @@ function showBand() {
   at('control').append(answer, ' ', control);
   const draw = () => {
     const roles = store.docs.desk?.roles;
-    setText(words, roles ? (operating() ? `you operate (${store.you})` : `you watch (${store.you}); ${roles.operator || 'nobody'} operates`) : '');
+    setText(words, roles ? (operating() ? `you operate (${store.you})` : `you watch (${store.you}); ${roles.operator || 'nobody'} operates; to operate, press Take over`) : '');
     if (operating()) setText(answer, '');
   };
   onDocs(['desk'], draw);

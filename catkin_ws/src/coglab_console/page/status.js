@@ -51,7 +51,7 @@ function hand({ alive, connected, calibrated, calibrating, holding, motors, mess
   const gone = missing('hand', alive, 'the hand’s program');
   if (gone) return gone;
   if (!connected) return ['fault', message || 'does not answer'];
-  if (calibrating) return ['warn', 'calibrates'];
+  if (calibrating) return ['idle', 'calibrates'];
   if (!calibrated) return ['warn', 'not calibrated'];
   return ['ok', `ready, ${motors}/5 motors, ${holding ? 'holds' : 'empty'}`];
 }
@@ -80,7 +80,7 @@ function contact() {
   if (!store.docs.status.contact.alive) return ['warn', 'no detector, or no torques'];
   if (state === 'waiting') return ['idle', `armed for ${CONTACTS[mode] ?? mode}, until the arm is still`];
   if (margin === null || margin === undefined) return ['idle', `not armed${words ? `; last: ${words}, ${Math.max(0, (store.state?.stamp ?? 0) - stamp).toFixed(0)} s ago` : ''}`];
-  return [margin > 1 ? 'warn' : 'ok', `armed, margin ${margin.toFixed(2)} of 1`];
+  return ['ok', `armed, margin ${margin.toFixed(2)} of 1`];
 }
 
 function phase({ alive, hub, words }, stood) {

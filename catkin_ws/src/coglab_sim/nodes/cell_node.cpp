@@ -2,12 +2,13 @@
 ///
 /// Subscribes (relative names) human_hand, motor_commands, ~push (geometry_msgs/Wrench on the palm,
 /// world axes). Publishes truth/cell, motor_states, ~messages (the controller's message window),
-/// /clock if ~publish_clock, and fingertip_forces if ~tactile. Serves ~fault, ~place_object.
-/// Parameters: every row of the cell's table under the private namespace; ~speed, ~fri_host,
-/// ~fri_port (0: wait for ~port_parameter, by default lwr/fri_port_bound beside this namespace),
-/// ~port_wait, ~fri_source_port (0: any free one), ~log_file, ~truth_rate, ~publish_clock,
-/// ~tactile, ~rt_priority (SCHED_FIFO of the thread of steps); fri_period and seed of the parent
-/// namespace.
+/// /clock if ~publish_clock, fingertip_forces if ~tactile, real_time_factor (std_msgs/Float64,
+/// latched) and, on /diagnostics, whether this computer keeps real time; if not and ~slow_down, the
+/// cell slows. Serves ~fault, ~place_object. Parameters: every row of the cell's table under the
+/// private namespace; ~speed, ~fri_host, ~fri_port (0: wait for ~port_parameter, by default
+/// lwr/fri_port_bound beside this namespace), ~port_wait, ~fri_source_port (0: any free one),
+/// ~log_file, ~truth_rate, ~publish_clock, ~tactile, ~rt_priority (SCHED_FIFO of the thread of
+/// steps); fri_period and seed of the parent namespace.
 #include <fstream>
 #include <memory>
 
@@ -16,9 +17,11 @@
 #include <coglab_msgs/InjectFault.h>
 #include <coglab_msgs/PlaceObject.h>
 #include <coglab_msgs/ReasonCode.h>
+#include <diagnostic_msgs/DiagnosticArray.h>
 #include <geometry_msgs/Wrench.h>
 #include <ros/ros.h>
 #include <rosgraph_msgs/Clock.h>
+#include <std_msgs/Float64.h>
 #include <std_msgs/String.h>
 
 #include "cell_faults.hpp"
@@ -26,6 +29,7 @@
 #include "cell_parameters.hpp"
 #include "coglab_rt/ros/logger_service.hpp"
 #include "coglab_rt/ros/parameter.hpp"
+#include "coglab_sim/pace.hpp"
 #include "coglab_sim/ranges.hpp"
 #include "coglab_sim/real_time_cell.hpp"
 
@@ -73,10 +77,12 @@ class CellNode {
   CellNode()
       : private_("~"),
         config_(readCellConfig(private_)),
+        pace_(within(private_, "speed", 1.0)),
+        slow_down_(flag("slow_down")),
         hand_(config_.hand_model.empty() ? plant::builtInHandTable()
                                          : plant::readHandTable(config_.hand_model)) {
     int port = within(private_, "fri_port", 0);
-    const double speed = within(private_, "speed", 1.0);
+    const double speed = pace_.factor();
     const double rate = within(private_, "truth_rate", 200.0);
     const int priority = within(private_, "rt_priority", 60);
     port_parameter_ = portParameter(text("port_parameter", "lwr/fri_port_bound", "a name"));
@@ -91,6 +97,8 @@ class CellNode {
     truth_ = node_.advertise<coglab_msgs::CellTruth>("truth/cell", 1);
     motor_states_ = node_.advertise<coglab_msgs::MotorStates>("motor_states", 1);
     messages_ = private_.advertise<std_msgs::String>("messages", 50, true);
+    factor_ = node_.advertise<std_msgs::Float64>("real_time_factor", 1, true);
+    diagnostics_ = node_.advertise<diagnostic_msgs::DiagnosticArray>("/diagnostics", 5);
     if (flag("tactile"))
       touch_ = node_.advertise<coglab_msgs::FingertipForces>("fingertip_forces", 1);
     if (flag("publish_clock")) clock_ = node_.advertise<rosgraph_msgs::Clock>("/clock", 1);
@@ -112,6 +120,9 @@ class CellNode {
                                        [this](const ros::WallTimerEvent&) { writeLog(); });
     port_timer_ = node_.createWallTimer(ros::WallDuration(1.0),
                                         [this](const ros::WallTimerEvent&) { checkPort(); });
+    pace_timer_ = node_.createWallTimer(ros::WallDuration(1.0),
+                                        [this](const ros::WallTimerEvent&) { checkPace(); });
+    publishFactor();
     ROS_INFO(
         "robot controller stand-in: FRI toward %s:%d every %.1f ms, KRL program %s, %.3g times "
         "real time",
@@ -187,6 +198,7 @@ class CellNode {
                         "100 rad/s, grip 0..1 and grip_force 0..1000 N");
       return;
     }
+    ++hand_messages_;
     human.grip = message.grip;
     human.grip_force = message.grip_force;
     cell_->setHuman(human);
@@ -261,7 +273,8 @@ class CellNode {
     }
     if (!snapshot.refused_hand.empty())
       ROS_WARN_THROTTLE(5.0, "human_hand ignored: %s", snapshot.refused_hand.c_str());
-    if (snapshot.tick == 0) return;
+    if (snapshot.tick == published_) return;
+    published_ = snapshot.tick;
     if (clock_) {
       rosgraph_msgs::Clock clock;
       clock.clock.fromSec(snapshot.truth.time);
@@ -290,18 +303,93 @@ class CellNode {
       ROS_WARN_THROTTLE(10.0, "no FRI answer for 1 s; is the bridge running?");
   }
 
+  /// Whether this computer keeps up, over the last second; slows the cell down if not.
+  void checkPace() {
+    const CellSnapshot now = cell_->snapshot();
+    const auto share = [](std::uint64_t part, std::uint64_t of) {
+      return of > 0 ? static_cast<double>(part) / static_cast<double>(of) : 0.0;
+    };
+    const double seconds = (ros::WallTime::now() - measured_at_).toSec() * pace_.factor();
+    measured_at_ = ros::WallTime::now();
+    ComputerLoad load;
+    load.latest = cell_->takeLatest();
+    load.late_steps = share(now.late_ticks - measured_.late_ticks, now.tick - measured_.tick);
+    if (now.answers > measured_.answers)  // without any, the bridge is not there
+      load.lost_answers = share(now.unanswered - measured_.unanswered, now.sent - measured_.sent);
+    // The person sends at a constant rate: the highest that was seen.
+    const double rate = seconds > 0.5 * pace_.factor() ? hand_messages_ / seconds : hand_rate_;
+    hand_messages_ = 0;
+    hand_rate_ = std::max(hand_rate_, std::min(rate, kHandRate));
+    if (hand_rate_ > 0.5 * kHandRate && rate > 0.0)
+      load.missing = 1.0 - std::min(1.0, rate / hand_rate_);
+    const bool first = measured_.tick == 0;
+    measured_ = now;
+    if (first) return;  // no whole second yet
+
+    const bool before = pace_.busy();
+    const double factor = pace_.factor();
+    if (slow_down_ && pace_.update(load) != factor) {
+      cell_->setFactor(pace_.factor());
+      publishFactor();
+    }
+    const bool busy = slow_down_ ? pace_.busy() : load.tooBusy();
+    const std::string sentence = describe(load, pace_.factor(), busy);
+    if (pace_.factor() < factor || (busy && !before)) ROS_WARN("%s", sentence.c_str());
+    if (pace_.factor() > factor) ROS_INFO("%s", sentence.c_str());
+    publishLoad(load, busy, sentence);
+  }
+
+  void publishFactor() {
+    std_msgs::Float64 message;
+    message.data = pace_.factor();
+    factor_.publish(message);
+  }
+
+  void publishLoad(const ComputerLoad& load, bool busy, const std::string& sentence) {
+    diagnostic_msgs::DiagnosticArray array;
+    array.header.stamp = ros::Time::now();
+    array.status.resize(1);
+    diagnostic_msgs::DiagnosticStatus& status = array.status.front();
+    status.name = "coglab_sim: computer";
+    status.hardware_id = "coglab_sim";
+    status.level =
+        busy ? diagnostic_msgs::DiagnosticStatus::WARN : diagnostic_msgs::DiagnosticStatus::OK;
+    status.message = sentence;
+    const auto add = [&](const char* key, double value) {
+      diagnostic_msgs::KeyValue row;
+      row.key = key;
+      char text[32];
+      std::snprintf(text, sizeof text, "%.4g", value);
+      row.value = text;
+      status.values.push_back(row);
+    };
+    add("real time factor", pace_.factor());
+    add("late cell steps (%)", 100.0 * load.late_steps);
+    add("latest step (ms)", 1e3 * load.latest);
+    add("late FRI answers (%)", 100.0 * load.lost_answers);
+    add("missing node messages (%)", 100.0 * load.missing);
+    diagnostics_.publish(array);
+  }
+
+  static constexpr double kHandRate = 100.0;  // Hz, of virtual_human.py, in simulated time
+
   ros::NodeHandle node_, private_;
   CellConfig config_;
+  Pace pace_;
+  bool slow_down_;
   plant::HandTable hand_;  // names of the phalanges
   std::unique_ptr<RealTimeCell> cell_;
   std::string port_parameter_;
   bool follow_port_ = false, failed_ = false;
-  std::uint64_t answers_seen_ = 0;
+  std::uint64_t answers_seen_ = 0, published_ = 0;
+  CellSnapshot measured_;  // at the last look at the pace
+  ros::WallTime measured_at_ = ros::WallTime::now();
+  double hand_messages_ = 0.0, hand_rate_ = 0.0;
   std::ofstream log_;
-  ros::Publisher truth_, motor_states_, messages_, clock_, touch_;
+  ros::Publisher truth_, motor_states_, messages_, clock_, touch_, factor_, diagnostics_;
   ros::Subscriber human_, motors_, push_;
   ros::ServiceServer fault_, place_;
-  ros::WallTimer publish_timer_, log_timer_, port_timer_;
+  ros::WallTimer publish_timer_, log_timer_, port_timer_, pace_timer_;
 };
 
 }  // namespace

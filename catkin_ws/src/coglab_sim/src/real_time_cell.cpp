@@ -84,8 +84,10 @@ void RealTimeCell::run() {
     };
     listenUntil(deadline);
     const auto now = Clock::now();
+    const double behind = std::chrono::duration<double>(now - deadline).count();
     const bool late =
         now - deadline > std::chrono::duration_cast<Clock::duration>(period * kLateShare);
+    const bool expected = cell_.sent() && !sent_late;  // an answer, within the period that ends
 
     applyInputs();
     cell_.advance(!sent_late);
@@ -93,11 +95,7 @@ void RealTimeCell::run() {
     if (cell_.sent()) socket_.send(cell_.measurement().data(), cell_.measurement().size(), port_);
     sent_late = late;
     period = periodNow();  // the KRL program may have opened FRI anew
-    leaveResults(answered);
-    if (late) {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      ++snapshot_.late_ticks;
-    }
+    leaveResults(answered, expected, late ? behind : 0.0);
     deadline += period;
     if (now - deadline > kGiveUp * period) deadline = now + period;
   }
@@ -132,7 +130,7 @@ void RealTimeCell::applyInputs() {
   for (auto& entry : due) entry.action(cell_);
 }
 
-void RealTimeCell::leaveResults(bool answered) {
+void RealTimeCell::leaveResults(bool answered, bool expected, double behind) {
   const auto& controller = cell_.controller();
   TickRecord record;
   record.time = controller.time();
@@ -153,6 +151,10 @@ void RealTimeCell::leaveResults(bool answered) {
   snapshot_.touch = touch;
   ++snapshot_.tick;
   if (answered) ++snapshot_.answers;
+  if (expected) ++snapshot_.sent;
+  if (expected && !answered) ++snapshot_.unanswered;
+  if (behind > 0.0) ++snapshot_.late_ticks;
+  snapshot_.latest = std::max(snapshot_.latest, behind);
   if (records_.size() < kMaxRecords) records_.push_back(record);
   const std::uint64_t fresh = std::min<std::uint64_t>(controller.messageCount() - messages_seen_,
                                                       controller.messages().size());
@@ -209,6 +211,11 @@ void RealTimeCell::applyLater(double delay, std::function<void(Cell&)> action) {
 CellSnapshot RealTimeCell::snapshot() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   return snapshot_;
+}
+
+double RealTimeCell::takeLatest() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return std::exchange(snapshot_.latest, 0.0);
 }
 
 std::vector<TickRecord> RealTimeCell::takeRecords() {

@@ -24,6 +24,7 @@ from coglab_msgs.msg import MasterState as MasterStateMsg
 from coglab_msgs.msg import Say, Transition
 from coglab_msgs.srv import Start, StartResponse
 from coglab_py import parameters
+from coglab_py.steady import ClockWatch, exit_status, worker
 from coglab_smach.clocks.clock import SteadyClock
 from coglab_smach.context.config import Config, ConfigError
 from coglab_smach.context.context import Context
@@ -91,7 +92,7 @@ class MasterNode:
             **self.geometry(config),
         )
         self.master = build_master(self.ctx)
-        self.thread = threading.Thread(target=self.master.execute, name="coglab_master", daemon=True)
+        self.thread = worker(self.master.execute, "coglab_master")
         self.states = rospy.Publisher("coglab/state", MasterStateMsg, queue_size=20, latch=True)
         self.watch = StateWatch(self.ctx, self.on_state)
         self.server = None
@@ -202,9 +203,11 @@ class MasterNode:
         self.thread.start()
         # Called before rospy shuts anything: the machine still reaches the arm, to end what it has set in motion.
         rospy.on_shutdown(self.end)
+        clock = ClockWatch()
         while not rospy.is_shutdown() and self.thread.is_alive():
             self.thread.join(STATE_PERIOD)
             self.watch.tell_again()
+            clock.look()
         self.thread.join(1.0)
         if self.server is not None:
             self.server.stop()
@@ -212,7 +215,8 @@ class MasterNode:
     def end(self) -> None:
         """Preempt the machine and wait for its end."""
         self.master.request_preempt()
-        self.thread.join(4.0)
+        if threading.current_thread() is not self.thread:
+            self.thread.join(4.0)
 
 
 def main() -> int:
@@ -224,7 +228,7 @@ def main() -> int:
         rospy.logfatal("coglab cannot start: %s", error)
         return 1
     node.run()
-    return 0
+    return exit_status()
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import pytest
 from actionlib_msgs.msg import GoalStatus
 from coglab_smach.ports.pending import PortError
+from coglab_smach.ros import hand
 from coglab_smach.ros.hand import ActionCall
 
 
@@ -19,9 +20,6 @@ class Client:
         self.server = threading.Event()
         self.calls = []
 
-    def wait_for_server(self, timeout):
-        return self.server.wait(10.0)
-
     def send_goal(self, goal, done_cb):
         self.calls.append("send")
         self.done_cb = done_cb
@@ -31,6 +29,11 @@ class Client:
 
     def get_goal_status_text(self):
         return ""
+
+
+@pytest.fixture(autouse=True)
+def server(monkeypatch):
+    monkeypatch.setattr(hand, "server_is_there", lambda client: client.server.is_set())
 
 
 def ended(call):

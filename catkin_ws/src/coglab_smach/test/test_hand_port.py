@@ -20,10 +20,6 @@ class Client:
         self.name, self.text, self.goals, self.there = name, "", [], True
         self.cancelled = 0
 
-    def wait_for_server(self, timeout):
-        self.waited = timeout.to_sec()
-        return self.there
-
     def send_goal(self, goal, done_cb):
         self.done_cb = done_cb
         self.goals.append(goal)
@@ -51,6 +47,8 @@ class Node:
         clock = SimpleNamespace(monotonic=lambda: self.now)
         monkeypatch.setattr(calls, "time", clock)
         monkeypatch.setattr(hand, "time", clock)
+        monkeypatch.setattr(hand, "wait_for", lambda condition, limit: condition())
+        monkeypatch.setattr(hand, "server_is_there", lambda client: client.there)
         monkeypatch.setattr(hand.threading, "Thread", Thread)
         monkeypatch.setattr(hand.actionlib, "SimpleActionClient", Client)
         monkeypatch.setattr(calls.rospy, "Subscriber", self.subscribe)
@@ -147,7 +145,7 @@ def test_an_action_without_a_server_names_the_node(node):
     node.client("hand_open").there = False
     error = refused(node.port.open(300), ReasonCode.NODE_SILENT)
     assert "right_hand/hand_open has no server after 10 s" in error.sentence and "hand node" in error.sentence
-    assert node.client("hand_open").waited == 10.0 and node.client("hand_open").goals == []
+    assert node.client("hand_open").goals == []
 
 
 def test_ends_of_an_action(node):

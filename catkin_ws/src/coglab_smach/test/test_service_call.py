@@ -8,7 +8,6 @@ import time
 from types import SimpleNamespace
 
 import pytest
-import rospy
 from coglab_msgs.msg import ReasonCode
 from coglab_msgs.srv import LwrCommand
 from coglab_smach.ports.pending import PortError
@@ -23,12 +22,8 @@ class Server:
         self.heard = []
         self.answer = SimpleNamespace(success=True, message="done", reason_code=0)
         monkeypatch.setattr(calls.rospy, "resolve_name", lambda name: "/" + name)
-        monkeypatch.setattr(calls.rospy, "wait_for_service", self.wait_for_service)
+        monkeypatch.setattr(calls, "service_answers", lambda name: self.there.is_set())
         monkeypatch.setattr(calls.rospy, "ServiceProxy", lambda name, kind: self.call)
-
-    def wait_for_service(self, name, timeout):
-        if not self.there.wait(timeout):
-            raise rospy.ROSException("timeout")
 
     def call(self, request):
         assert self.thawed.wait(10.0)

@@ -64,6 +64,7 @@ def node_without_master(monkeypatch: pytest.MonkeyPatch, bench: object) -> hand_
     queue, master = queue_of_goals(monkeypatch)
     monkeypatch.setattr(rospy, "Publisher", Topic)
     monkeypatch.setattr(rospy, "Service", lambda *_: None)
+    monkeypatch.setattr(rospy, "Subscriber", lambda *_, **__: None)
     monkeypatch.setattr(rospy, "loginfo", lambda *_: None)
     monkeypatch.setattr(rospy, "logwarn_throttle", lambda *_: None)
     monkeypatch.setattr(diagnostics, "Updater", Updater)

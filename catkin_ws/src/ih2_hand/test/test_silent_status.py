@@ -24,7 +24,7 @@ def queue(monkeypatch):
 
 def say(queue: goals.GoalQueue) -> None:
     """One hand_status, read just now."""
-    queue._mailbox.put(goals.Item("status", content=status_now()))
+    queue._mailbox.put(goals.Item("status", content=(status_now(), time.monotonic())))
 
 
 def test_a_goal_is_aborted_when_hand_status_falls_silent(queue):

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from coglab_bringup.launch_arguments import judge_launch
-from coglab_bringup.usage import Parser, Refused, master_port, seed, writable_file, writable_folder
+from coglab_bringup.usage import Parser, Refused, seed, writable_file, writable_folder
 
 HELP_GIVEN = 10
 BUILD_OPTIONS = ("--upstream-smach",)
@@ -197,31 +197,6 @@ def bench_options(top: Path, words: list[str]) -> argparse.Namespace:
     return options
 
 
-def ask_parser(command: str) -> Parser:
-    """./coglab start, status, hold, stop, reset: what is said to a system that runs."""
-    about = {
-        "start": "Waits for the hub, then starts an action; by default takes from the person, or gives back.",
-        "status": "State, object and why, of the system that runs.",
-        "hold": "Brakes and latches; ./coglab start reset goes on.",
-        "stop": "STOP: brakes, latches and ends the action; ./coglab start reset goes on.",
-    }[command]
-    parser = Parser(prog=f"coglab {command}", description=about)
-    if command == "start":
-        parser.add_argument(
-            "action",
-            nargs="?",
-            default="",
-            metavar="ACTION",
-            help="exchange_human_to_robot, exchange_robot_to_human, take, put, initialise, reset",
-        )
-        parser.add_argument("object_id", nargs="?", default="", metavar="OBJECT", help="of the object database")
-        parser.add_argument("--wait", type=float, default=90.0, metavar="S", help="for the hub, at most (default 90)")
-    parser.add_argument(
-        "-p", type=master_port, default=0, dest="port", metavar="PORT", help="of the ROS master, if several systems run"
-    )
-    return parser
-
-
 def _judge_install(top: Path, words: list[str]) -> None:
     lines = (top / "debian-packages.txt").read_text(encoding="utf-8").splitlines()
     groups = list(dict.fromkeys(line.split(":")[0] for line in lines if line and not line.startswith("#")))
@@ -276,8 +251,6 @@ def judge(top: Path, command: str, words: list[str]) -> None:
         test_options(top, words)
     elif command == "bench":
         bench_options(top, words)
-    elif command in ("start", "status", "hold", "stop"):
-        ask_parser(command).parse_args(words)
     elif command == "launch":
         judge_launch(top, words)
     elif command == "shell":

@@ -1,4 +1,7 @@
-"""./coglab start, status, hold and stop: what is said to a system that runs, wherever its ROS master listens."""
+"""./coglab start, status, hold and stop: what is said to a system that runs, wherever its ROS master listens.
+
+hold and stop have to be quick beside whatever else runs: this file needs no ROS, no site-packages and no build.
+"""
 
 from __future__ import annotations
 
@@ -6,24 +9,51 @@ import argparse
 import os
 import socket
 import sys
-import threading
 import time
-import xmlrpc.client
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 from urllib.parse import urlparse
 
-from coglab_bringup.arguments import ask_parser
+if not __package__:  # run as a file, isolated: ./coglab does
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from coglab_bringup.ros_wire import Connection, NoAnswer, Reader, call, master_call, subscribe, text
 from coglab_bringup.run_directory import running_systems
-from coglab_bringup.usage import Refused
+from coglab_bringup.usage import Parser, Refused, master_port
 
 DEFAULT_MASTER = "http://127.0.0.1:11311"  # of a plain roslaunch
 ANSWER_LIMIT = 5.0  # s for a service that exists
 STATE_LIMIT = 3.0  # s for the latched state
 CHANGE_LIMIT = 5.0  # s in a hub that does not take the action until it is refused: a hold takes a moment to show
 DEFAULT_ACTIONS = ("exchange_human_to_robot", "exchange_robot_to_human")  # whichever the hub takes
+FACTOR_TOPIC = "/coglab_sim/real_time_factor"
 OBJECT_PARAMETER = "/coglab_sim/cell/object/id"  # what the simulated person holds out
+
+
+def ask_parser(command: str) -> Parser:
+    """./coglab start, status, hold, stop"""
+    about = {
+        "start": "Waits for the hub, then starts an action; by default takes from the person, or gives back.",
+        "status": "State, object and why, of the system that runs.",
+        "hold": "Brakes and latches; ./coglab start reset goes on.",
+        "stop": "STOP: brakes, latches and ends the action; ./coglab start reset goes on.",
+    }[command]
+    parser = Parser(prog=f"coglab {command}", description=about)
+    if command == "start":
+        parser.add_argument(
+            "action",
+            nargs="?",
+            default="",
+            metavar="ACTION",
+            help="exchange_human_to_robot, exchange_robot_to_human, take, put, initialise, reset",
+        )
+        parser.add_argument("object_id", nargs="?", default="", metavar="OBJECT", help="of the object database")
+        parser.add_argument("--wait", type=float, default=90.0, metavar="S", help="for the hub, at most (default 90)")
+    parser.add_argument(
+        "-p", type=master_port, default=0, dest="port", metavar="PORT", help="of the ROS master, if several systems run"
+    )
+    return parser
 
 
 def brain_of(master: str) -> bool:
@@ -31,9 +61,8 @@ def brain_of(master: str) -> bool:
     before = socket.getdefaulttimeout()
     socket.setdefaulttimeout(1.0)
     try:
-        answer: Any = xmlrpc.client.ServerProxy(master).lookupService("/coglab_ask", "/coglab/start")
-        return bool(answer[0] == 1)
-    except (OSError, xmlrpc.client.Error):
+        return bool(master_call(master, "lookupService", "/coglab/start"))
+    except NoAnswer:
         return False
     finally:
         socket.setdefaulttimeout(before)
@@ -59,41 +88,77 @@ def find_master(top: Path, port: int, users_own: str) -> str:
     raise Refused("no system runs; start one: ./coglab launch")
 
 
+@dataclass
+class State:
+    """coglab_msgs/MasterState, as far as it is shown or used here; `state` is empty as long as none has come."""
+
+    state: str = ""
+    in_hub: bool = False
+    actions: list[str] = field(default_factory=list)
+    object_id: str = ""
+    why: str = ""
+
+    @classmethod
+    def of(cls, data: bytes) -> State:
+        """From the bytes of a message."""
+        reader = Reader(data)
+        reader.header()
+        return cls(reader.string(), reader.take("?"), reader.strings(), reader.string(), reader.string())
+
+
 class Brain:
     """The brain of a running system, by its latched state and its services."""
 
-    def __init__(self) -> None:
-        import rospy
-        from coglab_msgs.msg import MasterState
+    def __init__(self, master: str) -> None:
+        self.master = master
+        self.state = State()
+        self._topic: Connection | None = None
 
-        self.changed = threading.Condition()
-        self.state: Any = None
-        rospy.init_node("coglab_ask", anonymous=True, disable_rosout=True, disable_rostime=True, disable_signals=True)
-        rospy.Subscriber("/coglab/state", MasterState, self._on_state, queue_size=1)
-
-    def _on_state(self, message: object) -> None:
-        with self.changed:
-            self.state = message
-            self.changed.notify_all()
-
-    def wait_for_state(self, condition: Callable[[Any], bool], limit: float) -> bool:
-        """Waits until a state has come for which the condition holds; whether it did within `limit` s."""
-        with self.changed:
-            return self.changed.wait_for(lambda: self.state is not None and condition(self.state), limit)
-
-    @staticmethod
-    def call(name: str, kind: type, *request: object) -> Any:
-        """The answer of a service. Refused if it does not exist or does not answer."""
-        import rospy
-
+    def _look(self, limit: float) -> None:
+        """Takes the states that have come; waits `limit` s at most for one."""
         try:
-            rospy.wait_for_service(name, timeout=ANSWER_LIMIT)
-            return rospy.ServiceProxy(name, kind)(*request)
-        except (rospy.ROSException, rospy.ServiceException) as error:
+            self._topic = self._topic or subscribe(self.master, "/coglab/state", ANSWER_LIMIT)
+            while (data := self._topic.message(limit)) is not None:
+                self.state, limit = State.of(data), 0.0
+        except NoAnswer:  # the brain is not there yet, or has ended: a new one is looked for
+            self._topic = None
+            time.sleep(min(limit, 0.1))
+
+    def wait_for_state(self, condition: Callable[[State], bool], limit: float) -> bool:
+        """Waits until a state has come for which the condition holds; whether it did within `limit` s."""
+        end = time.monotonic() + limit
+        self._look(0.0)
+        while not (self.state.state and condition(self.state)):
+            left = end - time.monotonic()
+            if left <= 0.0:
+                return False
+            self._look(left)
+        return True
+
+    def call(self, name: str, request: bytes = b"") -> Reader:
+        """The response of a service. Refused if it does not exist or does not answer."""
+        try:
+            return call(self.master, name, request, ANSWER_LIMIT)
+        except NoAnswer as error:
             raise Refused(f"{name} does not answer ({error}); what runs: ./coglab shell rosnode list") from error
 
+    def command(self, name: str, *words: str) -> tuple[bool, str]:
+        """Success and message of a service that answers with success, reason_code and message."""
+        reader = self.call(name, b"".join(text(word) for word in words))
+        success, _ = reader.take("?"), reader.take("H")
+        return success, reader.string()
 
-def sentence_of(state: Any) -> str:
+    def factor(self) -> float:
+        """Simulated over real time; 1 where nothing is simulated."""
+        try:
+            topic = subscribe(self.master, FACTOR_TOPIC, 1.0)
+            data = topic.message(1.0)
+        except NoAnswer:
+            return 1.0
+        return float(Reader(data).take("d")) if data else 1.0
+
+
+def sentence_of(state: State) -> str:
     """State, object and why, a line each."""
     name = state.state.rpartition("/")[2]
     takes = f"takes {', '.join(state.actions)}" if state.in_hub else "an action is under way"
@@ -109,15 +174,16 @@ def status(brain: Brain, _options: argparse.Namespace) -> int:
             "of ./coglab launch"
         )
     print(sentence_of(brain.state))
+    factor = brain.factor()
+    if factor != 1.0:
+        print(f"pace:   the simulated cell runs at {factor:g} of real time: this computer is too busy, or too slow")
     if brain.state.in_hub and "reset" in brain.state.actions:
         print("next:   ./coglab start reset")
     return 0
 
 
-def choose(options: argparse.Namespace, state: Any) -> tuple[str, str]:
+def choose(master: str, options: argparse.Namespace, state: State) -> tuple[str, str]:
     """Action and object to ask for: what was named, else what this hub is there for. Refused if that cannot be said."""
-    import rospy
-
     action = options.action or next((name for name in DEFAULT_ACTIONS if name in state.actions), "")
     if not action:
         raise Refused(
@@ -126,7 +192,10 @@ def choose(options: argparse.Namespace, state: Any) -> tuple[str, str]:
         )
     object_id = options.object_id
     if not object_id and action == DEFAULT_ACTIONS[0]:
-        object_id = rospy.get_param(OBJECT_PARAMETER, "")
+        try:
+            object_id = str(master_call(master, "getParam", OBJECT_PARAMETER))
+        except NoAnswer:
+            object_id = ""
         if not object_id:
             raise Refused(
                 f"{action} needs an object: ./coglab start {action} OBJECT; which there are: ./coglab object list"
@@ -136,11 +205,9 @@ def choose(options: argparse.Namespace, state: Any) -> tuple[str, str]:
 
 def start(brain: Brain, options: argparse.Namespace) -> int:
     """Waits for the hub, then asks for the action; a refusal that the next hub may not repeat is waited for."""
-    from coglab_msgs.srv import Start
-
     deadline, wanted = time.monotonic() + options.wait, options.action
     if not brain.wait_for_state(lambda state: state.in_hub, min(1.0, options.wait)):
-        now = brain.state.state.rpartition("/")[2] if brain.state else "the brain is starting"
+        now = brain.state.state.rpartition("/")[2] if brain.state.state else "the brain is starting"
         print(f"[coglab] waiting for the hub, {options.wait:.0f} s at most; now: {now}", file=sys.stderr, flush=True)
     while (left := deadline - time.monotonic()) > 0:
         if not brain.wait_for_state(lambda state: state.in_hub, left):
@@ -151,34 +218,31 @@ def start(brain: Brain, options: argparse.Namespace) -> int:
                 there = " or ".join(f"./coglab start {action}" for action in brain.state.actions)
                 raise Refused(f"{brain.state.state.rpartition('/')[2]} does not take '{wanted}'; type: {there}")
             continue
-        action, object_id = choose(options, brain.state)
-        answer = brain.call("/coglab/start", Start, action, object_id)
-        if answer.success:
-            print(f"{f'{action} {object_id}'.strip()}: {answer.message}; watch: ./coglab status")
+        action, object_id = choose(brain.master, options, brain.state)
+        success, message = brain.command("/coglab/start", action, object_id)
+        if success:
+            print(f"{f'{action} {object_id}'.strip()}: {message}; watch: ./coglab status")
             return 0
         if brain.wait_for_state(lambda state: not state.in_hub, 0.5):
             continue  # the hub was left in that moment
-        raise Refused(answer.message)
-    state = brain.state.state if brain.state else "/coglab/state never came"
+        raise Refused(message)
+    state = brain.state.state or "/coglab/state never came"
     raise Refused(f"no hub within {options.wait:.0f} s; the machine is in {state}; more: ./coglab status")
 
 
 def hold(brain: Brain, _options: argparse.Namespace) -> int:
     """Brakes and latches the arm."""
-    from coglab_msgs.srv import LwrCommand
-
-    answer = brain.call("/lwr/command", LwrCommand, "hold")
-    print(f"{answer.message or 'held'}; on again: ./coglab start reset")
-    return 0 if answer.success else 1
+    success, message = brain.command("/lwr/command", "hold")
+    print(f"{message or 'held'}; on again: ./coglab start reset")
+    return 0 if success else 1
 
 
 def stop(brain: Brain, _options: argparse.Namespace) -> int:
     """STOP of the brain."""
-    from std_srvs.srv import Trigger
-
-    answer = brain.call("/coglab/stop", Trigger)
-    print(f"{answer.message}; on again: ./coglab start reset")
-    return 0 if answer.success else 1
+    reader = brain.call("/coglab/stop")
+    success, message = reader.take("?"), reader.string()
+    print(f"{message}; on again: ./coglab start reset")
+    return 0 if success else 1
 
 
 COMMANDS = {"start": start, "status": status, "hold": hold, "stop": stop}
@@ -188,6 +252,7 @@ def main(arguments: list[str]) -> int:
     """Exit status 0: done; 1: refused, with the reason; 2: an argument that there is not."""
     command, words = arguments[0], arguments[1:]
     top = Path(os.environ["COGLAB_TOP"])
+    socket.setdefaulttimeout(ANSWER_LIMIT)  # of the master's answers
     try:
         options = ask_parser(command).parse_args(words)
     except Refused as error:
@@ -195,10 +260,9 @@ def main(arguments: list[str]) -> int:
         return 2
     try:
         master = find_master(top, options.port, os.environ.get("COGLAB_USER_MASTER", ""))
-        os.environ["ROS_MASTER_URI"] = master
         if options.port and not brain_of(master) and command != "start":
             raise Refused(f"no system answers on port {options.port}; there are: {running_systems(top) or 'none'}")
-        return COMMANDS[command](Brain(), options)
+        return COMMANDS[command](Brain(master), options)
     except Refused as error:
         print(f"[coglab] error: {error}", file=sys.stderr)
         return 1
@@ -210,5 +274,4 @@ if __name__ == "__main__":
         sys.stdout.flush()
     except BrokenPipeError:  # whoever reads has seen enough
         code = 0
-    sys.stderr.flush()
-    os._exit(code)  # at once: rospy's threads would take their time
+    sys.exit(code)

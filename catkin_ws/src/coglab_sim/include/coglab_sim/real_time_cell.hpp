@@ -32,6 +32,9 @@ struct CellSnapshot {
   std::uint64_t tick = 0;        ///< number of periods so far
   std::uint64_t late_ticks = 0;  ///< periods that the thread itself began too late
   std::uint64_t answers = 0;     ///< datagrams received so far
+  std::uint64_t sent = 0;        ///< measurements that left in time
+  std::uint64_t unanswered = 0;  ///< those of them without an answer within their period
+  double latest = 0.0;           ///< s, by which the latest period since takeLatest() began late
   /// Why the person's hand is not there, though it was told where it is; empty: it is.
   std::string refused_hand;
 };
@@ -55,6 +58,8 @@ class RealTimeCell {
   /// @pre not running
   std::string start(int priority = 0);
   void stop();
+  /// Simulated over real time from the next period on.
+  void setFactor(double factor) { factor_ = factor; }
   /// Where the PC listens from now on.
   void setPort(std::uint16_t port) { port_ = port; }
 
@@ -71,6 +76,7 @@ class RealTimeCell {
   void applyLater(double delay, std::function<void(Cell&)> action);
 
   CellSnapshot snapshot() const;
+  double takeLatest();                       ///< CellSnapshot::latest since the last call
   std::vector<TickRecord> takeRecords();     ///< since the last call
   std::vector<krc::Message> takeMessages();  ///< of the controller, since the last call
   /// The thread ended by itself with this error; empty while it runs.
@@ -88,11 +94,11 @@ class RealTimeCell {
   std::string schedule(int priority) const;
   void run();
   void applyInputs();
-  void leaveResults(bool answered);
+  void leaveResults(bool answered, bool expected, double behind);
 
   Cell cell_;
   FriSocket socket_;
-  double factor_;
+  std::atomic<double> factor_;
   std::atomic<std::uint16_t> port_;
   std::atomic<bool> running_{false};
   std::thread thread_;

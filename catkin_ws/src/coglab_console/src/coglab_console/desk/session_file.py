@@ -88,7 +88,7 @@ class Session:
 
     def passed(self) -> int:
         """How many trials of the order are behind."""
-        return sum(attempt.outcome in ("done", "skipped") for attempt in self.attempts)
+        return sum(attempt.outcome in ("done", "failed", "skipped") for attempt in self.attempts)
 
 
 # --- files ----------------------------------------------------------------------------------------------------

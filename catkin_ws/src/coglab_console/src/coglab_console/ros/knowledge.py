@@ -56,6 +56,7 @@ class Knowledge:
         self._stamps: dict[str, int] = {}
         self._told: dict[str, str] = {}
         self._now = threading.Event()
+        self._own_frames = view.named
         self._ask: rospy.ServiceProxy | None = None
         self._asked = False
         view.entry = self._entry
@@ -108,6 +109,7 @@ class Knowledge:
                     self._texts[name], self._entries[name] = answer.yaml, entry
         for gone in set(self._texts) - set(ids):
             del self._texts[gone], self._entries[gone]
+        self._view.named = self._own_frames | {str(entry.get("frame", "")) for entry in self._entries.values()}
         self._show_objects([problem[:400] for problem in listed.problems[:MAX_OBJECTS]])
 
     def _show_objects(self, problems: list[str] | None) -> None:

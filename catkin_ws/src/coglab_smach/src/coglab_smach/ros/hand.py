@@ -21,6 +21,7 @@ from coglab_msgs.msg import (
     HandStatus,
     ReasonCode,
 )
+from coglab_py.steady import server_is_there, wait_for
 from std_msgs.msg import String
 
 from coglab_smach.ports.interfaces import HandState
@@ -44,7 +45,7 @@ class ActionCall(Pending):
         threading.Thread(target=self._send, args=(goal,), name=f"action:{name}", daemon=True).start()
 
     def _send(self, goal: Any) -> None:
-        if not self._client.wait_for_server(rospy.Duration(SERVER_WAIT)):
+        if not wait_for(lambda: self._cancelled or server_is_there(self._client), SERVER_WAIT):
             self._fail(
                 f"action {self._name} has no server after {SERVER_WAIT:.0f} s; is the hand node running?",
                 code=ReasonCode.NODE_SILENT,
