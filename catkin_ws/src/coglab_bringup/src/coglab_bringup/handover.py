@@ -12,6 +12,7 @@ import yaml
 from coglab_msgs.msg import ReasonCode
 from coglab_msgs.srv import GetObject, Start
 from coglab_py.packages import package_path
+from coglab_py.steady import wait_for_service
 from coglab_py.yaml_file import read
 
 from coglab_bringup.trial_recorder import TrialRecorder, summarise
@@ -36,7 +37,7 @@ def ask_for(action: str, object_id: str, alive: Callable[[], bool], limit: float
     refusal, code = "the service /coglab/start never appeared", ReasonCode.NODE_SILENT
     while time.monotonic() < deadline and alive():
         try:
-            rospy.wait_for_service("/coglab/start", timeout=1.0)
+            wait_for_service("/coglab/start", 1.0)
             answer = rospy.ServiceProxy("/coglab/start", Start)(action, object_id)
         except rospy.ROSException:
             continue
@@ -53,7 +54,7 @@ def ask_for(action: str, object_id: str, alive: Callable[[], bool], limit: float
 def entry_of(object_id: str) -> Mapping[str, Any] | None:
     """What the database of the running system knows of an object; None if it does not tell."""
     try:
-        rospy.wait_for_service("/object_database/get_object", timeout=2.0)
+        wait_for_service("/object_database/get_object", 2.0)
         answer = rospy.ServiceProxy("/object_database/get_object", GetObject)(object_id)
     except (rospy.ROSException, rospy.ServiceException):
         return None
@@ -65,12 +66,12 @@ def run_handover(
 ) -> tuple[dict, float, float]:
     """Asks for one handover and waits for the hub after it, while `recorder` listens.
 
-    Returns its result row and when it began and ended (s of ROS time).
+    Returns its result row and when it began and ended (s of the steady clock).
     """
     table = package_path("lwr_description", "config", "joint_limits.yaml")
     limits = np.array(read(table).value["default"]["velocity"])
     ask_for(kind, object_id, alive, READY_LIMIT)
-    start = rospy.get_time()
+    start = time.monotonic()
     entry = entry_of(object_id)
 
     def ended() -> list[tuple]:
@@ -78,7 +79,7 @@ def run_handover(
         return [row for row in rows if row[0] >= start and row[1] == MASTER and row[2] == kind and row[4] in HUBS]
 
     recorder.wait_for(lambda: bool(ended()) or not alive(), HANDOVER_LIMIT)
-    end = rospy.get_time()
+    end = time.monotonic()
     if ended():
         _, _, _, outcome, _, reason, code = ended()[0]
         outcome = "success" if outcome == "succeeded" else f"{outcome}: {reason}"
