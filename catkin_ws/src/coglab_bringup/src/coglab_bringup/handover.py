@@ -12,7 +12,7 @@ import yaml
 from coglab_msgs.msg import ReasonCode
 from coglab_msgs.srv import GetObject, Start
 from coglab_py.packages import package_path
-from coglab_py.steady import wait_for_service
+from coglab_py.steady import utc_of, wait_for_service
 from coglab_py.yaml_file import read
 
 from coglab_bringup.trial_recorder import TrialRecorder, summarise
@@ -88,4 +88,4 @@ def run_handover(
     else:
         outcome, code = "the system ended", ReasonCode.NODE_SILENT
     row = summarise(recorder.trial, kind, outcome, start, end, limits, entry)
-    return {**row, "reason_code": int(code)}, start, end
+    return {**row, "reason_code": int(code), "started_utc": utc_of(start)}, start, end
