@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from coglab_bringup.demo import unfinished
+from coglab_bringup.demo import keep, unfinished
 from coglab_bringup.handover import NotTaken
 from coglab_bringup.trial_plot import colours_of, draw_trial, lanes_of, rows_without_overlap, state_intervals
 from coglab_bringup.trial_recorder import Trial, summarise
@@ -144,3 +144,18 @@ def test_the_picture_is_written_with_labels_in_their_bars_and_legends_beside_the
     explained = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
     assert explained == ["contact or load felt", "load taken over"]
     trial_plot.plt.figure(figure).clear()
+
+
+def test_a_result_that_cannot_be_written_leaves_the_old_one_and_a_sentence(tmp_path):
+    def write(path):
+        path.write_text("half")
+        raise OSError(28, "No space left on device")
+
+    (tmp_path / "result.json").write_text("old")
+    problems = []
+    keep(problems, tmp_path, "result.json", write)
+    assert len(problems) == 1 and "No space left on device" in problems[0]
+    assert [path.name for path in tmp_path.iterdir()] == ["result.json"]
+    assert (tmp_path / "result.json").read_text() == "old"
+    keep(problems, tmp_path, "result.json", lambda path: path.write_text("new"))
+    assert (tmp_path / "result.json").read_text() == "new" and len(problems) == 1

@@ -5,8 +5,9 @@ import { ageWords } from './cell.js';
 import { clock } from './log.js';
 import { more } from './more.js';
 
-const ROWS = ['Phase', 'Waits', 'FRI', 'Arm', 'Motion', 'Hand', 'Person', 'Object', 'Contact', 'Why', 'Last'];
-const LONG = ['Waits', 'Why', 'Last'];
+const NOW = ['Phase', 'Waits']; // above everything else
+const ROWS = ['FRI', 'Arm', 'Motion', 'Hand', 'Person', 'Object', 'Contact', 'Why', 'Last'];
+const LONG = ['Why', 'Last'];
 const MOST_LINES = 6;
 const OLD = 0.5; // s, sights of perception older than this deserve a mark
 const UNKNOWN = ['fault', 'not known, the brain is silent'];
@@ -121,9 +122,9 @@ function rows() {
 }
 
 /** The rows, each with the element of its words: { cell, all (mark and words), words, level }. */
-function makeRows(list) {
+function makeRows(names, list) {
   const cells = {};
-  for (const name of ROWS) {
+  for (const name of names) {
     const words = h('span', { 'aria-live': name === 'Phase' ? 'polite' : null });
     const all = h('span', {}, mark('idle'), words);
     const cell = more(h('dd', { class: LONG.includes(name) ? `long ${name.toLowerCase()}` : name.toLowerCase() }, all), all);
@@ -133,9 +134,11 @@ function makeRows(list) {
   return cells;
 }
 
-export function showStatus(parent) {
+export function showStatus(parent, now) {
   const list = h('dl');
-  const cells = makeRows(list);
+  const above = h('dl');
+  const cells = { ...makeRows(NOW, above), ...makeRows(ROWS, list) };
+  now.append(above);
   parent.append(list);
   const update = paced(() => {
     if (!store.docs.status || parent.offsetParent === null) return;

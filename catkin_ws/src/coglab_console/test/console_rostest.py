@@ -273,7 +273,7 @@ class Console(unittest.TestCase):
 
     def test_07b_a_program_that_is_frozen_is_said_to_be_silent(self):
         """Its connections stand, so that nothing but its silence tells."""
-        cell = "[...document.querySelectorAll('#status dt')].find((dt) => dt.innerText === arguments[0]).nextSibling"
+        cell = "[...document.querySelectorAll('#live dt')].find((dt) => dt.innerText === arguments[0]).nextSibling"
         for node, row in (("/ih2_hand", "Hand"), ("/coglab", "Phase")):
             process = self._process_of(node)
             os.kill(process, signal.SIGSTOP)
@@ -293,6 +293,7 @@ class Console(unittest.TestCase):
             picture = self.browser.until("return coglab.docs()['graph:/somebody']", LIMIT)
             self.assertEqual({node["label"] for node in picture["nodes"]}, {"ALPHA", "BETA"})
             self.assertEqual([edge["outcomes"] for edge in picture["edges"]], ["on"])
+            self.browser.tab("Machine")
             show_machine(self.browser, "somebody")
             self.browser.until("return document.querySelectorAll('#graph .node').length === 2", LIMIT)
             somebody.begin()
@@ -303,6 +304,7 @@ class Console(unittest.TestCase):
                 self.browser.js("return document.querySelector('#graph p.last').innerText"), "ALPHA → BETA"
             )
         show_machine(self.browser, "coglab")
+        self.browser.tab("Live")
 
     def test_08b_notes_and_the_next_object_go_both_ways(self):
         heard = {"note": [], "next_object": []}

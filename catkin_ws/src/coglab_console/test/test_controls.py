@@ -211,7 +211,7 @@ def test_the_list_of_objects_stays_closed_for_who_watches(desk):
 def test_a_row_of_what_is_silent_says_for_how_long(desk, source, row, words):
     page = desk.browser
     shown = (
-        "return [...document.querySelectorAll('#status dt')]"
+        "return [...document.querySelectorAll('#live dt')]"
         ".find((one) => one.innerText === arguments[0]).nextSibling.innerText"
     )
     assert "silent" not in page.js(shown, row)

@@ -120,6 +120,17 @@ def test_numbers_that_are_not_finite_are_written_as_json(tmp_path):
     assert json.loads(lines[-1], parse_constant=lambda word: pytest.fail(word))["marks"] == {"contact": None}
 
 
+def test_an_action_says_when_it_began_by_the_clock_of_the_day(tmp_path):
+    """Beside the times of the brain's clock, which no video or questionnaire has."""
+    desk = begun(tmp_path, lambda: 1_700_000_000.0)
+    desk.result({**ROW, "started": 500.0, "ended": 502.0, "marks": {"contact": 501.5}})
+    session = read_session(newest(tmp_path))
+    (row,) = session.attempts[1].results or session.outside.results or session.attempts[0].results
+    assert row["began"] == 1_699_999_998.0
+    (told,) = rows_of([session], "actions")
+    assert told["began"] == "2023-11-14T22:13:18.000Z" and json.loads(told["marks"]) == {"contact": 1.5}
+
+
 def test_a_session_does_not_end_in_the_middle_of_a_trial(tmp_path):
     session = begun(tmp_path).experiment
     with pytest.raises(ExperimentError, match="trial 2 is under way"):

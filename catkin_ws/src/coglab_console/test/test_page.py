@@ -138,6 +138,36 @@ def test_a_tablet_has_stop_and_every_page_within_reach_of_a_finger(desk):
         assert len(desk.robot.stops) > before
 
 
+@pytest.mark.parametrize("size", [(1024, 768), (1280, 720)])
+def test_picture_and_phase_have_the_room(desk, size):
+    """The buttons of the camera lie beside the picture; the charts are all on the page."""
+    boxes = (
+        "return Object.fromEntries(arguments[0].map((id) => {"
+        " const { left, top, right, bottom } = document.getElementById(id).getBoundingClientRect();"
+        " return [id, [left, top, right, bottom]]; }))"
+    )
+    with Browser(size=size) as page:
+        page.open(desk.console.link())
+        found = page.js(boxes, ["picture", "cameras", "charts", "actions"])
+        left, top, right, bottom = found["picture"]
+        assert found["cameras"][1] >= bottom
+        assert (right - left) * (bottom - top) > 0.15 * size[0] * size[1], found
+        assert (right - left) < 2.2 * (bottom - top), found
+        assert found["charts"][3] <= found["actions"][1] and found["charts"][3] - found["charts"][1] > 250, found
+        phase = "return parseFloat(getComputedStyle(document.querySelector('#live .phase')).fontSize)"
+        assert page.js(phase) >= 20
+
+
+def test_a_computer_that_is_too_busy_is_said_on_every_page(desk):
+    page = desk.browser
+    desk.put(busy="This computer is too busy", real_time_factor=0.5)
+    page.until("return document.getElementById('busy').innerText.includes('too busy')", 10.0)
+    assert "0.5" in page.js("return document.getElementById('world').innerText")
+    assert look(page)[0] == []
+    desk.put(busy="", real_time_factor=1.0)
+    page.until("return document.getElementById('busy').hidden", 10.0)
+
+
 def test_the_keyboard_reaches_everything_in_order_on_every_page(desk):
     for name in PAGES:
         desk.browser.tab(name)
@@ -232,9 +262,11 @@ def test_the_way_to_the_active_state_ends_with_it_in_full(desk):
     picture = {**Layout("no-such-program").of({"/M": Container("/M", ("A",), ())}), "problem": "", "roots": ["/M"]}
     desk.loop.call_soon_threadsafe(desk.console.documents.put, "graph:/coglab", picture)
     desk.loop.call_soon_threadsafe(desk.console.documents.put, "active", {"/coglab": {"active": [leaf], "last": {}}})
+    desk.browser.tab("Machine")
     desk.browser.until("return document.querySelector('.crumbs').textContent.endsWith('wait_stop')", 10.0)
     cut = "const c = document.querySelector('.crumbs'); return c.scrollHeight - c.clientHeight"
     assert desk.browser.js(cut) <= 1
+    desk.browser.tab("Live")
 
 
 @pytest.mark.parametrize("promised", [False, True])

@@ -87,6 +87,9 @@ def test_nothing_is_cut_off_that_cannot_be_read_in_full(desk, moment):
     page.until("return document.getElementById('log').textContent.includes(arguments[0])", 10.0, reason)
     page.until("return document.getElementById('status').textContent.includes(arguments[0])", 10.0, reason)
     page.until("return document.querySelector('#graph p.last').textContent.includes(arguments[0])", 10.0, reason)
+    page.tab("Machine")
+    assert look(page)[0] == []
+    page.tab("Live")
     assert look(page)[0] == []
     ActionChains(page.driver).send_keys(Keys.TAB).perform()
     assert page.js("return document.activeElement.id") == "tab-Live", "the look has moved the focus"
@@ -101,7 +104,7 @@ def test_a_tablet_shows_the_whole_column(desk):
     stopped(desk)
     with Browser(size=(1024, 768), touch=True) as tablet:
         tablet.open(desk.console.link())
-        tablet.until("return document.getElementById('status').innerText.includes('stopped')", 10.0)
+        tablet.until("return document.getElementById('now').innerText.includes('stopped')", 10.0)
         assert look(tablet)[0] == []
 
 
@@ -136,7 +139,7 @@ def test_an_event_that_comes_while_one_reads_takes_the_focus_nowhere(desk):
 
 
 def test_a_change_of_the_phase_is_read_out(desk):
-    read_out = "return [...document.querySelectorAll('#status [aria-live=polite]')].map((one) => one.closest('dd'))"
+    read_out = "return [...document.querySelectorAll('#live dd [aria-live=polite]')].map((one) => one.closest('dd'))"
     (cell,) = desk.browser.js(read_out)
     assert "phase" in cell.get_attribute("class").split()
 

@@ -26,6 +26,7 @@ from coglab_perception.frames import AHEAD, FrameNames
 from coglab_perception.recogniser import Recogniser, load_patterns
 from coglab_perception.tf_listener import TfListener
 from coglab_py import parameters, steady
+from coglab_py.pace import Pace
 from geometry_msgs.msg import Point, TransformStamped, Vector3
 
 
@@ -49,6 +50,7 @@ class RecogniserNode:
             BeliefSettings.from_mapping(parameters.read("~belief", dict, {}), rospy.resolve_name("~belief"))
         )
         self.hand, self.base = frames.human_hand, frames.world
+        self.pace = Pace().follow()
         self.robot_holds = False
         self.buffer = tf2_ros.Buffer(rospy.Duration(2.0))
         self.listener = TfListener(self.buffer, self.base)
@@ -92,15 +94,16 @@ class RecogniserNode:
         """A sight of an object."""
         transform = self.newest(frame)
         if transform is not None:
-            self.filter.see_object(self.seen[frame], object_id, position(transform), time.monotonic())
+            seen, now = self.pace.at(self.seen[frame]), self.pace.now()
+            self.filter.see_object(seen, object_id, position(transform), now)
 
     def take_hand(self, transform: TransformStamped) -> None:
         """A sight of the hand: what is recognised and believed after it."""
-        stamp, place = self.seen[self.hand], position(transform)
+        stamp, place = self.pace.at(self.seen[self.hand]), position(transform)
         self.recogniser.update(stamp, place.tolist())
         self.publisher.publish(self.recognition())
         end = self.recogniser.pattern_end()
-        belief = self.filter.see_hand(stamp, place, time.monotonic(), self.robot_holds, end)
+        belief = self.filter.see_hand(stamp, place, self.pace.now(), self.robot_holds, end)
         if belief.stamp == stamp:
             self.beliefs.publish(self.message(belief))
             self.broadcast(belief)

@@ -24,6 +24,7 @@ from coglab_msgs.srv import PlaceObject
 from coglab_objects.database import ObjectError, objects_folder, read_object
 from coglab_py import parameters
 from coglab_py.messages import pose_message, pose_of
+from coglab_py.pace import Pace
 from coglab_py.pose import Pose
 from coglab_sim.person.participant import Participant
 from coglab_sim.person.recorded_person import RecordedPerson, open_recorded_hand
@@ -59,6 +60,7 @@ class VirtualHumanNode:
         self.object_id = parameters.read("cell/object/id", str, "mug")
         self.human = self.person(object_of(self.object_id))
         self.lock = threading.Lock()
+        self.pace = Pace().follow("real_time_factor")  # of the cell, in the same namespace
         self.view = WorldView()
         self.hand = rospy.Publisher("human_hand", HumanHand, queue_size=1, tcp_nodelay=True)
         self.state = rospy.Publisher("human_state", String, queue_size=10, latch=True)
@@ -130,18 +132,18 @@ class VirtualHumanNode:
     def on_say(self, message: Say) -> None:
         """The robot speaks."""
         with self.lock:
-            self.human.hear(time.monotonic(), message.code)
+            self.human.hear(self.pace.now(), message.code)
 
     def run(self) -> None:
-        """100 Hz on the steady clock."""
+        """100 Hz, as time passes in the cell."""
         period = 0.01
-        due = time.monotonic()
+        due = self.pace.now()
         while not rospy.is_shutdown():
             with self.lock:
-                sample = self.human.step(time.monotonic(), self.view)
+                sample = self.human.step(self.pace.now(), self.view)
             self.publish(sample)
-            due = max(due + period, time.monotonic() - period)
-            time.sleep(max(0.0, due - time.monotonic()))
+            due = max(due + period, self.pace.now() - period)
+            time.sleep(max(0.0, due - self.pace.now()) / self.pace.factor)
 
     def publish(self, sample) -> None:
         """Hand for the cell, phase for whoever watches."""

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "coglab_sim/cell.hpp"
+#include "coglab_sim/pace.hpp"
 #include "coglab_sim/random.hpp"
 #include "coglab_sim/ranges.hpp"
 #include "coglab_sim/real_time_cell.hpp"
@@ -18,6 +19,33 @@ namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
+
+TEST(Pace, IsHalvedWhileTheComputerIsTooBusyAndComesBackCarefully) {
+  ComputerLoad busy, calm;
+  busy.late_steps = 0.6;
+  calm.late_steps = 0.1;
+  const auto secondsUntil = [](Pace& pace, const ComputerLoad& load, double factor) {
+    int seconds = 0;
+    while (pace.factor() != factor && seconds < 100) ++seconds, pace.update(load);
+    return seconds;
+  };
+  Pace pace(1.0);
+  EXPECT_LE(secondsUntil(pace, busy, 0.5), 3);
+  EXPECT_LE(secondsUntil(pace, busy, 0.25), 3);
+  for (int i = 0; i < 20; ++i) pace.update(busy);
+  EXPECT_EQ(pace.factor(), 0.25) << "not slower than a quarter";
+  EXPECT_TRUE(pace.busy());
+  const int first = secondsUntil(pace, calm, 0.5);
+  EXPECT_LE(secondsUntil(pace, busy, 0.25), 3);
+  EXPECT_GT(secondsUntil(pace, calm, 0.5), first) << "more careful after it was too early";
+  secondsUntil(pace, calm, 1.0);
+  EXPECT_EQ(pace.factor(), 1.0);
+  EXPECT_FALSE(pace.busy());
+
+  Pace fast(2.0);
+  for (int i = 0; i < 10; ++i) fast.update(busy);
+  EXPECT_EQ(fast.factor(), 2.0);
+}
 
 }  // namespace
 

@@ -32,6 +32,7 @@ from coglab_perception.frames import FrameNames, FramesError
 from coglab_perception.tf_listener import TfListener
 from coglab_py import parameters, steady
 from coglab_py.packages import package_path
+from coglab_py.pace import Pace
 from coglab_py.pose import Pose
 from coglab_py.yaml_file import YamlError
 from coglab_smach.contact.detector import ContactDetector, DetectorSettings
@@ -85,7 +86,9 @@ class ContactDetectorNode:
         self.position: list[float] | None = None
         self.velocity: list[float] | None = None
         self.joint_stamp = 0.0
-        self.last_sample: float | None = None
+        self.pace = Pace().follow()  # stamps are told as time passes in the cell
+        self.last_sample: float | None = None  # of torques, paced
+        self.last_stamp = rospy.Time()
         self.heard = -math.inf  # monotonic s, when it came
         self.publisher = rospy.Publisher("coglab/contact", Contact, queue_size=10)
         self.margin = rospy.Publisher("~margin", Float64, queue_size=1)
@@ -143,7 +146,7 @@ class ContactDetectorNode:
             return
         order = [index[name] for name in self.joints]
         position = [message.position[i] for i in order]
-        stamp = message.header.stamp.to_sec()
+        stamp = self.pace.of(message.header.stamp.to_sec())
         if len(message.velocity) == len(message.name):
             velocity = [message.velocity[i] for i in order]
         elif self.position is not None and stamp > self.joint_stamp:
@@ -173,7 +176,7 @@ class ContactDetectorNode:
             self.detector.holds = message.connected and message.holding
             if message.connected and not message.holding and self.moving.load > 0.0:
                 self.detector.set_payload(0.0)
-            event = self.detector.feed_hand(message.header.stamp.to_sec(), message.motors)
+            event = self.detector.feed_hand(self.pace.of(message.header.stamp.to_sec()), message.motors)
         self.publish_event(event, message.header.stamp)
 
     def on_touch(self, message: FingertipForces) -> None:
@@ -182,7 +185,7 @@ class ContactDetectorNode:
             return
         forces = [(force.x, force.y, force.z) for force in [*message.forces, message.palm]]
         with self.lock:
-            event = self.detector.feed_touch(message.header.stamp.to_sec(), forces, message.deviation)
+            event = self.detector.feed_touch(self.pace.of(message.header.stamp.to_sec()), forces, message.deviation)
             giving = self.detector.share_gone() is not None
         self.publish_event(event, message.header.stamp)
         if giving:  # fingers follow this signal
@@ -193,7 +196,8 @@ class ContactDetectorNode:
         if len(message.effort) != 7 or self.position is None or self.velocity is None or self.refuses(message):
             return
         with self.lock:
-            stamp = self.last_sample = message.header.stamp.to_sec()
+            self.last_stamp = message.header.stamp
+            stamp = self.last_sample = self.pace.of(message.header.stamp.to_sec())
             self.heard = time.monotonic()
             event = self.detector.feed(stamp, message.effort, self.position, self.velocity)
         self.publish_event(event, message.header.stamp)
@@ -216,7 +220,7 @@ class ContactDetectorNode:
 
     def silent(self) -> bool:
         """Whether no torques have come for a second."""
-        return time.monotonic() - self.heard > 1.0
+        return (time.monotonic() - self.heard) * self.pace.factor > 1.0
 
     def on_arm(self, request):
         """Arm or disarm."""
@@ -227,10 +231,13 @@ class ContactDetectorNode:
                 return ArmContactResponse(success=True, message="off")
             now = self.last_sample
             if now is None or self.silent():
+                slowed = f" (the simulated cell runs at {self.pace.factor:g} of real time)"
                 return ArmContactResponse(
                     False,
                     ReasonCode.NODE_SILENT,
-                    f"no torques on {self.torques.resolved_name} for 1 s; is the robot connected?",
+                    f"no joint torques on {self.torques.resolved_name} for 1.0 s. The robot node sends them with every "
+                    "FRI datagram: it is not running, the robot is not connected, or this computer is overloaded"
+                    f"{slowed if self.pace.factor < 1.0 else ''}. See ./coglab status and /diagnostics",
                 )
             try:
                 self.grasp = self.grasp_of(request)
@@ -277,7 +284,7 @@ class ContactDetectorNode:
         speed = float(np.linalg.norm(self.arm.jacobian(np.asarray(position))[:3] @ np.asarray(velocity)))
         now = rospy.Time.now()
         with self.lock:
-            event = self.detector.feed_sight(now.to_sec(), distance, angle, speed)
+            event = self.detector.feed_sight(self.pace.of(now.to_sec()), distance, angle, speed)
         self.publish_event(event, now)
 
     def on_learn_motion(self, request):
@@ -339,7 +346,7 @@ class ContactDetectorNode:
     def publish_signal(self) -> None:
         """What the detector sees, once for a sample of torques, and at most every SIGNAL s."""
         with self.lock:
-            before, stamp = self.shown, self.last_sample
+            before, stamp, sent = self.shown, self.last_sample, self.last_stamp
             if before is not None and stamp is not None and 0.0 < stamp - before < SIGNAL:
                 return
             self.shown = stamp
@@ -362,7 +369,7 @@ class ContactDetectorNode:
             rest_samples=seen.rest_samples,
             learnt=seen.rest_samples >= settings.learn_samples,
         )
-        message.header.stamp = rospy.Time.from_sec(stamp)
+        message.header.stamp = sent
         publish(self.signal, message)
 
 

@@ -25,7 +25,7 @@ from coglab_msgs.msg import Say, Transition
 from coglab_msgs.srv import Start, StartResponse
 from coglab_py import parameters
 from coglab_py.steady import ClockWatch, exit_status, worker
-from coglab_smach.clocks.clock import SteadyClock
+from coglab_smach.clocks.clock import PacedClock
 from coglab_smach.context.config import Config, ConfigError
 from coglab_smach.context.context import Context
 from coglab_smach.context.holding import HoldingMemory
@@ -37,6 +37,7 @@ from coglab_smach.kinematics.board_room import BoardRoom
 from coglab_smach.kinematics.reachability import solve
 from coglab_smach.machines import build_master
 from coglab_smach.ros.arm import RosArm
+from coglab_smach.ros.calls import PACE
 from coglab_smach.ros.hand import RosHand
 from coglab_smach.ros.ports import RosContact, RosDatabase, RosPerception
 from coglab_smach.ros.publish import publish
@@ -70,7 +71,7 @@ class MasterNode:
         if rospy.has_param("~auto_trigger"):
             overrides["auto_trigger"] = parameters.read("~auto_trigger", bool)
         config = Config.load(parameters.read("~config_file", str), overrides, rospy.logwarn)
-        clock = SteadyClock()
+        clock = PacedClock(PACE.follow())
         self.journal = Journal(clock.now)
         self.transitions = rospy.Publisher("coglab/transitions", Transition, queue_size=200)
         self.results = rospy.Publisher("coglab/results", String, queue_size=20, latch=True)
@@ -168,7 +169,7 @@ class MasterNode:
         message.header.stamp = rospy.Time.now()
         if state.deadline:  # told in the brain's steady clock
             # The state may be told again in the moment between its deadline and its end.
-            left = max(0.001, state.deadline - self.ctx.clock.now())
+            left = max(0.001, (state.deadline - self.ctx.clock.now()) / PACE.factor)
             message.deadline = message.header.stamp + rospy.Duration.from_sec(left)
         publish(self.states, message)
 

@@ -8,6 +8,7 @@ from unittest.mock import MagicMock
 import pytest
 import rospy
 from coglab_msgs.msg import FingertipForces, HandStatus
+from coglab_py.pace import Pace
 from sensor_msgs.msg import JointState
 
 SCRIPT = Path(__file__).resolve().parents[1] / "scripts" / "contact_detector_node.py"
@@ -24,6 +25,7 @@ def node(monkeypatch):
         rospy, "logwarn_throttle", lambda period, words: made.said.append(words)
     )  # needs a clock of ROS
     made = module.ContactDetectorNode.__new__(module.ContactDetectorNode)
+    made.pace, made.last_stamp = Pace(), rospy.Time()
     made.joints, made.position, made.velocity, made.joint_stamp = JOINTS, [0.0] * 7, [0.0] * 7, 0.0
     made.lock, made.last_sample, made.recorder, made.force_stamp = threading.Lock(), None, None, 0.0
     made.said = []

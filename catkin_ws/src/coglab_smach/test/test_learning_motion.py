@@ -7,8 +7,10 @@ from pathlib import Path
 from unittest.mock import MagicMock
 
 import pytest
+import rospy
 from coglab_msgs.msg import ReasonCode
 from coglab_msgs.srv import LearnMotionRequest
+from coglab_py.pace import Pace
 from coglab_smach.contact.learning import MotionRecorder, unwritable
 from coglab_smach.contact.motion_thresholds import Thresholds
 from coglab_smach.simulated.world_ports import THRESHOLDS
@@ -24,6 +26,7 @@ def node(tmp_path, monkeypatch):
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     made = module.ContactDetectorNode.__new__(module.ContactDetectorNode)
+    made.pace, made.last_stamp = Pace(), rospy.Time()
     made.lock, made.recorder, made.moving = threading.Lock(), None, MagicMock()
     made.learnt_file = str(tmp_path / "learnt.yaml")
     monkeypatch.setattr(MotionRecorder, "learn", lambda self: Thresholds.load(THRESHOLDS))

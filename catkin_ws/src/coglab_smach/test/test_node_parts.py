@@ -16,6 +16,7 @@ import tf2_ros
 from coglab_msgs.msg import ReasonCode
 from coglab_msgs.srv import ArmContactRequest
 from coglab_objects.database import objects_folder
+from coglab_py.pace import Pace
 from coglab_py.pose import Pose
 from coglab_smach.context.journal import ActionRecord, TransitionRecord
 from coglab_smach.context.master_state import MasterState
@@ -67,6 +68,7 @@ def node(monkeypatch):
     """The contact detector's node, without ROS; ``sent``: what it publishes, by publisher."""
     module = script("contact_detector_node")
     made = module.ContactDetectorNode.__new__(module.ContactDetectorNode)
+    made.pace, made.last_stamp = Pace(), rospy.Time()
     made.joints, made.position, made.velocity, made.joint_stamp = JOINTS, None, None, 0.0
     made.lock, made.last_sample, made.recorder, made.force_stamp = threading.Lock(), None, None, 0.0
     made.detector, made.base, made.grasp, made.shown = Detector(), "world", None, None
@@ -173,7 +175,7 @@ def test_a_signal_is_told_once_for_a_sample_and_every_ten_milliseconds_at_most(n
     node.publish_signal()
     assert [to for to, _ in node.sent] == ["margin"], "no torques have come"
     for stamp in (6.0, 6.0, 6.005, 6.011):
-        node.last_sample = stamp
+        node.last_sample, node.last_stamp = stamp, rospy.Time.from_sec(stamp)
         node.publish_signal()
     signals = [message for to, message in node.sent if to == "signal"]
     assert [round(s.header.stamp.to_sec(), 3) for s in signals] == [6.0, 6.011]
@@ -195,7 +197,7 @@ def request(mode="contact", **fields):
 def test_arming(node):
     assert node.silent()
     refused = node.on_arm(request())
-    assert (refused.success, refused.reason_code) == (False, ReasonCode.NODE_SILENT) and "for 1 s" in refused.message
+    assert (refused.success, refused.reason_code) == (False, ReasonCode.NODE_SILENT)
     node.last_sample = 9.5
     for age, silent in ((1.1, True), (0.0, False)):  # by the steady clock: that of the stamps may be set
         node.heard = time.monotonic() - age

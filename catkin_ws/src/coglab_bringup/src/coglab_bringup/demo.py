@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from coglab_bringup import process_tree
@@ -19,7 +22,8 @@ from coglab_bringup.usage import Refused
 
 OBJECT = "mug"  # what the simulated person offers (coglab_sim/config/cell.yaml)
 KINDS = ("exchange_human_to_robot", "exchange_robot_to_human")  # take it from the person, then give it back
-MASTER_LIMIT = 30.0  # s until the ROS master answers
+MASTER_LIMIT = 30.0  # s until the ROS master answers, or without roslaunch doing anything
+CONSOLE_LIMIT = 30.0  # s after which it is said that the console starts late
 
 
 class System:
@@ -41,6 +45,10 @@ class System:
         """Whether roslaunch still runs."""
         return self._process.poll() is None
 
+    def processor_time(self) -> float:
+        """s that its processes have used so far."""
+        return process_tree.processor_time(self._process.pid)
+
     def stop(self) -> None:
         """SIGINT to roslaunch, as Ctrl-C does; returns when nothing is left of it."""
         self._process.send_signal(signal.SIGINT)
@@ -48,13 +56,53 @@ class System:
         self._log.close()
 
 
-def say_console(home: Path, limit: float = 30.0) -> None:
-    """Prints where the experimenter's page is, as soon as its node has written it; gives up after `limit` s."""
-    deadline, link = time.monotonic() + limit, home / "console.url"
-    while not link.is_file() and time.monotonic() < deadline:
+def say_console(home: Path, alive: Callable[[], bool], limit: float = CONSOLE_LIMIT) -> None:
+    """Prints where the experimenter's page is, as soon as its node has written it; after `limit` s, that it is late."""
+    late, link = time.monotonic() + limit, home / "console.url"
+    while not link.is_file() and alive():
+        if time.monotonic() > late:
+            print(f"[coglab] console: still starting after {limit:.0f} s; its words are in roslaunch.log", flush=True)
+            late = float("inf")
         time.sleep(0.2)
-    words = link.read_text().strip() if link.is_file() else f"no address within {limit:.0f} s; see roslaunch.log"
-    print(f"[coglab] console: {words}", flush=True)
+    if link.is_file():
+        print(f"[coglab] console: {link.read_text().strip()}", flush=True)
+
+
+class PaceWatch:
+    """Says when this computer is too busy for real time; remembers how much the simulated cell was slowed."""
+
+    def __init__(self) -> None:
+        self.lowest = 1.0
+
+    def follow(self) -> None:
+        """Listens to the cell from now on."""
+        from coglab_py.pace import TOPIC
+        from rospy import Subscriber
+        from std_msgs.msg import Float64
+
+        self._subscriber = Subscriber(TOPIC, Float64, lambda message: self.take(message.data))
+
+    def take(self, factor: float) -> None:
+        """The cell runs at this factor from now on."""
+        if factor < self.lowest:
+            self.lowest = factor
+            print(
+                f"[coglab] this computer is too busy for real time: the simulated cell runs at {factor:g} of it, "
+                "and everything takes that much longer; what was measured is in roslaunch.log",
+                flush=True,
+            )
+
+
+def keep(problems: list[str], folder: Path, name: str, write: Callable[[Path], object]) -> None:
+    """Calls `write` with a path and moves what lies there then into `folder`: on a full disk nothing is half written.
+    `problems` gets a sentence where that fails."""
+    try:
+        with tempfile.TemporaryDirectory(prefix=".part-", dir=folder) as part:
+            write(Path(part) / name)
+            for file in Path(part).iterdir():
+                file.replace(folder / file.name)
+    except OSError as error:
+        problems.append(f"{folder / name} could not be written ({error.strerror or error})")
 
 
 def _interrupt(*_signal: object) -> None:
@@ -62,15 +110,17 @@ def _interrupt(*_signal: object) -> None:
 
 
 def wait_for_master(system: System, limit: float) -> None:
-    """Waits until the ROS master of this run answers. RuntimeError after `limit` seconds or if roslaunch ended."""
+    """Waits until the ROS master of this run answers. RuntimeError if roslaunch ended, or did nothing for `limit` s."""
     import rosgraph
 
-    deadline = time.monotonic() + limit
+    moved, before = time.monotonic(), -1.0
     while not rosgraph.is_master_online():
         if not system.alive():
             raise RuntimeError("roslaunch ended before its master answered")
-        if time.monotonic() > deadline:
-            raise RuntimeError(f"the ROS master did not answer within {limit:.0f} s")
+        if (used := system.processor_time()) > before:
+            moved, before = time.monotonic(), used
+        if time.monotonic() > moved + limit:
+            raise RuntimeError(f"the ROS master did not answer, and roslaunch did nothing for {limit:.0f} s")
         time.sleep(0.1)
 
 
@@ -106,6 +156,15 @@ def main(arguments: list[str]) -> int:
     except Refused as error:
         print(f"[coglab] error: {error}", file=sys.stderr)
         return 2
+    try:
+        return run(top, options)
+    except OSError as error:
+        print(f"[coglab] error: the demo cannot write its files: {error}; make room, or use --out DIR", file=sys.stderr)
+        return 1
+
+
+def run(top: Path, options: argparse.Namespace) -> int:
+    """Launches, hands over, writes, stops; the exit status."""
     signal.signal(signal.SIGTERM, _interrupt)  # what happened until then is still written down
     out: Path = options.out.absolute()
     out.mkdir(parents=True, exist_ok=True)
@@ -120,11 +179,12 @@ def main(arguments: list[str]) -> int:
     launch += [f"console:={'false' if options.no_console else 'true'}", *person]
     (out / "ros_home" / "console.url").unlink(missing_ok=True)  # of an earlier demo
     system = System(environment, port, launch, out / "roslaunch.log")
+    pace, problems = PaceWatch(), list[str]()
     result: dict = {"commit": commit_of(top), "seed": options.seed, "person": options.person, "handovers": []}
     try:
         wait_for_master(system, MASTER_LIMIT)
         if not options.no_console:
-            threading.Thread(target=say_console, args=(out / "ros_home",), daemon=True).start()
+            threading.Thread(target=say_console, args=(out / "ros_home", system.alive), daemon=True).start()
         import rospy
 
         from coglab_bringup.handover import run_handover
@@ -133,7 +193,8 @@ def main(arguments: list[str]) -> int:
 
         rospy.init_node("coglab_demo", anonymous=True, disable_signals=True)
         recorder = TrialRecorder()
-        spans = []
+        pace.follow()
+        spans: list[tuple[float, float]] = []
         for kind in KINDS:
             row, start, end = run_handover(kind, OBJECT, recorder, system.alive)
             result["handovers"].append(row)
@@ -141,15 +202,20 @@ def main(arguments: list[str]) -> int:
             if row["outcome"] != "success":
                 break
         title = ", then ".join(f"{row['kind'].replace('_', ' ')}: {row['outcome']}" for row in result["handovers"])
-        draw_trial(
-            recorder.stop(), f"{OBJECT}, seed {options.seed}; {title}", spans[0][0], spans[-1][1], out / "trial.png"
-        )
+        title = f"{OBJECT}, seed {options.seed}; {title}"
+        trial, begin, end = recorder.stop(), spans[0][0], spans[-1][1]
+        keep(problems, out, "trial.png", lambda path: draw_trial(trial, title, begin, end, path))
     except (RuntimeError, KeyboardInterrupt) as error:
         result["handovers"].append(unfinished(KINDS[min(len(result["handovers"]), len(KINDS) - 1)], error))
     finally:
-        (out / "result.json").write_text(json.dumps(result, indent=1) + "\n")
+        result["real_time_factor"] = pace.lowest
+        text = json.dumps(result, indent=1) + "\n"
+        keep(problems, out, "result.json", lambda path: path.write_text(text))
         system.stop()
-    return summarise(out, result["handovers"])
+    status = summarise(out, result["handovers"])
+    for problem in problems:
+        print(f"[coglab] error: {problem}; make room, or name another folder: --out DIR", file=sys.stderr)
+    return 1 if problems else status
 
 
 def summarise(out: Path, handovers: list[dict]) -> int:

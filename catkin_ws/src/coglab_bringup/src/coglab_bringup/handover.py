@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+import socket
 import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+import rosgraph
 import rospy
 import yaml
 from coglab_msgs.msg import ReasonCode
 from coglab_msgs.srv import GetObject, Start
+from coglab_py.pace import Pace
 from coglab_py.packages import package_path
 from coglab_py.yaml_file import read
 
 from coglab_bringup.trial_recorder import TrialRecorder, summarise
 
-READY_LIMIT = 90.0  # s until the system waits in its hub
-HANDOVER_LIMIT = 60.0  # s for one handover
+READY_LIMIT = 90.0  # s without progress until the system waits in its hub
+LONGEST_START = 600.0  # s, with progress
+HANDOVER_LIMIT = 60.0  # s for one handover, as time passes in the cell
 HUBS = ("wait_without_object", "wait_with_object")
 MASTER = "/coglab_master"
 
@@ -30,11 +34,25 @@ class NotTaken(RuntimeError):
         self.code = code
 
 
+def services() -> int:
+    """How many services the nodes of this system have registered so far."""
+    try:
+        return len(rosgraph.Master("/coglab_demo").getSystemState()[2])
+    except (OSError, rosgraph.MasterException, socket.timeout):
+        return 0
+
+
 def ask_for(action: str, object_id: str, alive: Callable[[], bool], limit: float) -> None:
-    """Calls /coglab/start until the master machine takes the action. Raises NotTaken with its last refusal."""
-    deadline = time.monotonic() + limit
+    """Calls /coglab/start until the master machine takes the action. Raises NotTaken with its last refusal.
+
+    `limit` s without progress: no service more, and the same refusal. On a busy computer nodes start late.
+    """
     refusal, code = "the service /coglab/start never appeared", ReasonCode.NODE_SILENT
-    while time.monotonic() < deadline and alive():
+    begun = moved = time.monotonic()
+    before: tuple = ()
+    while time.monotonic() - moved < limit and time.monotonic() - begun < max(limit, LONGEST_START) and alive():
+        if (progress := (services(), refusal)) != before:
+            before, moved = progress, time.monotonic()
         try:
             rospy.wait_for_service("/coglab/start", timeout=1.0)
             answer = rospy.ServiceProxy("/coglab/start", Start)(action, object_id)
@@ -47,7 +65,7 @@ def ask_for(action: str, object_id: str, alive: Callable[[], bool], limit: float
                 return
             refusal, code = answer.message, answer.reason_code
         time.sleep(0.2)
-    raise NotTaken(f"{action} was not taken within {limit:.0f} s: {refusal}", code)
+    raise NotTaken(f"{action} was not taken within {time.monotonic() - begun:.0f} s: {refusal}", code)
 
 
 def entry_of(object_id: str) -> Mapping[str, Any] | None:
@@ -70,6 +88,8 @@ def run_handover(
     table = package_path("lwr_description", "config", "joint_limits.yaml")
     limits = np.array(read(table).value["default"]["velocity"])
     ask_for(kind, object_id, alive, READY_LIMIT)
+    pace = Pace().follow()
+    deadline = pace.now() + HANDOVER_LIMIT
     start = rospy.get_time()
     entry = entry_of(object_id)
 
@@ -77,7 +97,9 @@ def run_handover(
         rows = list(recorder.trial.transitions)
         return [row for row in rows if row[0] >= start and row[1] == MASTER and row[2] == kind and row[4] in HUBS]
 
-    recorder.wait_for(lambda: bool(ended()) or not alive(), HANDOVER_LIMIT)
+    while pace.now() < deadline and not rospy.is_shutdown():
+        if recorder.wait_for(lambda: bool(ended()) or not alive(), 1.0):
+            break
     end = rospy.get_time()
     if ended():
         _, _, _, outcome, _, reason, code = ended()[0]

@@ -69,6 +69,18 @@ def descendants(root: int) -> list[int]:
     return found
 
 
+def processor_time(root: int) -> float:
+    """s that the processes below `root` which run now have used, with those that they have waited for."""
+    ticks = 0
+    for process in descendants(root):
+        try:
+            fields = Path("/proc", str(process), "stat").read_bytes().rpartition(b")")[2].split()
+        except OSError:
+            continue
+        ticks += sum(int(field) for field in fields[11:15])
+    return ticks / os.sysconf("SC_CLK_TCK")
+
+
 def _reap() -> dict[int, int]:
     """Statuses of the children that have ended, by process id."""
     ended: dict[int, int] = {}

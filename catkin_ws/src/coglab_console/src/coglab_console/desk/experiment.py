@@ -1,9 +1,9 @@
 """A session with one participant: conditions, order of trials, notes, and one file that tools can read.
 
 The file holds one JSON object a line, each with `type` and `stamp` (s since 1970): session, trial_begin, trial_end,
-result (as on coglab/results), note, stop (by the page), stopped (the robot stands, whoever asked for it), resumed (by
-the next console after one was killed), session_end. Participants are pseudonyms; no names belong here. What reads it is
-session_file.
+result (as on coglab/results, whose times are of the brain's clock, and `began` like `stamp`), note, stop (by the page),
+stopped (the robot stands, whoever asked for it), resumed (by the next console after one was killed), session_end.
+Participants are pseudonyms; no names belong here. What reads it is session_file.
 """
 
 from __future__ import annotations
@@ -264,7 +264,11 @@ class Experiment:
             named = actions_in(self.condition())
             if named and kind not in named:
                 self._warn(f"trial {self.position + 1} is '{self.condition()}', and {button(kind)} was done in it")
-        self._write("result", **{key: value for key, value in row.items() if key not in ("type", "stamp", "trial")})
+        fields = {key: value for key, value in row.items() if key not in ("type", "stamp", "trial")}
+        took = row.get("duration_s")
+        if isinstance(took, (int, float)):
+            fields.setdefault("began", round(self._now() - took, 3))
+        self._write("result", **fields)
 
     def record(self, kind: str, /, **fields: object) -> None:
         """A note or a stop, into the file of the open session, with the phase in which it was."""

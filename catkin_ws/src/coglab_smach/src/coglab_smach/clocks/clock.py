@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 
+from coglab_py.pace import Pace
+
 
 class Clock(ABC):
     """A source of time and of waiting. Times are in seconds; the origin is arbitrary."""
@@ -26,3 +28,16 @@ class SteadyClock(Clock):
 
     def sleep(self, seconds: float) -> None:
         time.sleep(max(0.0, seconds))
+
+
+class PacedClock(Clock):
+    """The steady clock, slowed while the simulated cell is slowed down on a busy computer."""
+
+    def __init__(self, pace: Pace) -> None:
+        self._pace = pace
+
+    def now(self) -> float:
+        return self._pace.now()
+
+    def sleep(self, seconds: float) -> None:
+        time.sleep(max(0.0, seconds) / self._pace.factor)

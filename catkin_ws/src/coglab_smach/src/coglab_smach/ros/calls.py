@@ -11,12 +11,15 @@ from typing import Any
 
 import rospy
 from coglab_msgs.msg import ReasonCode
+from coglab_py.pace import Pace
 from coglab_py.steady import POLL, service_answers
 
 from coglab_smach.ports.pending import Pending, Permit, Polled, PortError, Threaded
 
 SERVICE_WAIT = 20.0
 """s to wait for a service to appear: a node may still be starting."""
+PACE = Pace()
+"""By which ages pass; the node gives it the topic of the simulated cell."""
 
 
 class Newest:
@@ -34,8 +37,8 @@ class Newest:
             self._on_message(message)
 
     def age(self) -> float:
-        """s since the last message; large if there was none."""
-        return time.monotonic() - self.stamp
+        """s since the last message, as they pass in the cell; large if there was none."""
+        return (time.monotonic() - self.stamp) * PACE.factor
 
 
 def call(name: str, kind: Any, wait: float = SERVICE_WAIT, **fields: Any) -> Pending:
