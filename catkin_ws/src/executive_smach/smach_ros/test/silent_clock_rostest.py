@@ -30,7 +30,7 @@ class TestSilentClock(unittest.TestCase):
         sub = rospy.Subscriber("/silent" + STATUS_TOPIC, SmachContainerStatus, got.append)
         server = smach_ros.IntrospectionServer("/silent", machine, "/SM_ROOT")
         server.start()
-        end = time.monotonic() + 20
+        end = time.monotonic() + 60
         while sum(m.info == "HEARTBEAT" for m in got) < 2 and time.monotonic() < end:
             time.sleep(0.05)
         server.stop()
@@ -39,7 +39,7 @@ class TestSilentClock(unittest.TestCase):
 
     def clock(self):
         pub = rospy.Publisher("/clock", Clock, queue_size=10)
-        end = time.monotonic() + 10
+        end = time.monotonic() + 60
         while pub.get_num_connections() == 0 and time.monotonic() < end:
             time.sleep(0.01)
         return pub
@@ -55,7 +55,7 @@ class TestSilentClock(unittest.TestCase):
             time.sleep(0.3)
         got = []
         sub = rospy.Subscriber("work/status", GoalStatusArray, got.append)
-        end = time.monotonic() + 20
+        end = time.monotonic() + 60
         while len(got) < 3 and time.monotonic() < end:
             time.sleep(0.05)
         sub.unregister()

@@ -40,7 +40,7 @@ class HandClient:
     """Talks to one hand node (`hand`) and, in simulation, to its emulator (`cell`); the names are
     relative to the caller's namespace. Every wait has a time limit and raises TimeoutError."""
 
-    def __init__(self, hand: str = "ih2_hand", cell: str = "coglab_sim", limit: float = 20.0):
+    def __init__(self, hand: str = "ih2_hand", cell: str = "coglab_sim", limit: float = 60.0):
         self.limit = limit
         self.status = HandStatus()
         self.statuses: list[HandStatus] = []
