@@ -98,7 +98,8 @@ class SteadyTimer:
             except Exception as error:
                 if ending():
                     return
-                rospy.logerr_throttle(5.0, f"{rospy.get_name()}: '{self._name}' failed: {type(error).__name__}: {error}")
+                what = f"{type(error).__name__}: {error}"
+                rospy.logerr_throttle(5.0, f"{rospy.get_name()}: '{self._name}' failed: {what}")
                 if time.monotonic() - good > FAILING:
                     raise
 
