@@ -96,8 +96,9 @@ class TrialRecorder:
 
     def _on_transition(self, message: Transition) -> None:
         with self.changed:
-            row = (self._time(message.header.stamp), message.path, message.from_state, message.outcome, message.to_state)
-            self.trial.transitions.append((*row, message.reason, message.reason_code))
+            row = (message.path, message.from_state, message.outcome, message.to_state)
+            stamp = self._time(message.header.stamp)
+            self.trial.transitions.append((stamp, *row, message.reason, message.reason_code))
             self.changed.notify_all()
 
     def _on_contact(self, message: Contact) -> None:

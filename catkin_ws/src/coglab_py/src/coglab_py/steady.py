@@ -27,6 +27,8 @@ SET = 0.04
 """s beside the steady clock, beyond which ROS time counts as set where stamps are told on the other clock"""
 QUICK = 0.005
 """s within which both clocks have to be read to be compared"""
+TRIES = 10
+"""to read them so quickly"""
 FOLLOWED = 0.01
 """share of a small difference by which stamps follow at each look"""
 POLL = 0.1
@@ -98,7 +100,8 @@ class SteadyTimer:
             except Exception as error:
                 if ending():
                     return
-                rospy.logerr_throttle(5.0, f"{rospy.get_name()}: '{self._name}' failed: {type(error).__name__}: {error}")
+                what = f"{type(error).__name__}: {error}"
+                rospy.logerr_throttle(5.0, f"{rospy.get_name()}: '{self._name}' failed: {what}")
                 if time.monotonic() - good > FAILING:
                     raise
 
@@ -120,13 +123,15 @@ class Stamps:
         return rospy.Time.from_sec(max(0.0, steady - self._follow()))
 
     def _follow(self) -> float:
-        before, ros, after = time.monotonic(), rospy.get_time(), time.monotonic()
+        for _ in range(TRIES):  # a thread that loses the processor between the two readings compares nothing
+            before, ros, after = time.monotonic(), rospy.get_time(), time.monotonic()
+            if after - before < QUICK:
+                break
         with self._lock:
-            beside = before - ros - (self._offset or 0.0)
-            if self._offset is None or (abs(beside) > SET and after - before < QUICK):
+            if self._offset is None or abs(before - ros - self._offset) > SET:
                 self._offset = before - ros
-            elif after - before < QUICK:
-                self._offset += FOLLOWED * beside
+            else:
+                self._offset += FOLLOWED * (before - ros - self._offset)
             return self._offset
 
 
