@@ -76,6 +76,8 @@ class CellNode(unittest.TestCase):
     def setUpClass(cls) -> None:
         cls.bridge = Bridge()
         cls.bridge.start()
+        cls.second = Bridge("/second")
+        cls.second.start()
         cls.truth = []
         cls.motors = []
         cls.touch = []
@@ -278,8 +280,7 @@ class CellNode(unittest.TestCase):
 
     def test_7_two_robots_in_one_graph(self) -> None:
         """All names are relative: the cell of another namespace finds the bridge of that namespace."""
-        second = Bridge("/second")
-        second.start()
+        second = self.second
         self.assertTrue(wait_for(lambda: second.fields is not None))
         self.assertFalse(second.peers & self.bridge.peers)
         rospy.wait_for_message("/second/coglab_sim/truth/cell", CellTruth, 60.0)
