@@ -18,8 +18,8 @@ function form(told) {
   const conditions = h('input', { type: 'text', value: 'receive, give', maxlength: 400 });
   const repetitions = h('input', { type: 'number', min: 1, max: 50, value: 5 });
   const order = choice({});
-  order.offer(['latin_square', 'random', 'as_listed'].map((word) => [word, word]));
-  order.show('latin_square');
+  order.offer(['as_listed', 'latin_square', 'random'].map((word) => [word, word]));
+  order.show('as_listed'); // the one that receive and give go through without an action between trials
   const request = () => ['session_begin', {
     participant: participant.value.trim(),
     number: Number(number.value),

@@ -114,14 +114,14 @@ class CellNode {
     fault_ = private_.advertiseService("fault", &CellNode::onFault, this);
     place_ = private_.advertiseService("place_object", &CellNode::onPlace, this);
 
-    publish_timer_ = node_.createWallTimer(ros::WallDuration(1.0 / rate),
-                                           [this](const ros::WallTimerEvent&) { publish(); });
-    log_timer_ = node_.createWallTimer(ros::WallDuration(0.1),
-                                       [this](const ros::WallTimerEvent&) { writeLog(); });
-    port_timer_ = node_.createWallTimer(ros::WallDuration(1.0),
-                                        [this](const ros::WallTimerEvent&) { checkPort(); });
-    pace_timer_ = node_.createWallTimer(ros::WallDuration(1.0),
-                                        [this](const ros::WallTimerEvent&) { checkPace(); });
+    publish_timer_ = node_.createSteadyTimer(ros::WallDuration(1.0 / rate),
+                                             [this](const ros::SteadyTimerEvent&) { publish(); });
+    log_timer_ = node_.createSteadyTimer(ros::WallDuration(0.1),
+                                         [this](const ros::SteadyTimerEvent&) { writeLog(); });
+    port_timer_ = node_.createSteadyTimer(ros::WallDuration(1.0),
+                                          [this](const ros::SteadyTimerEvent&) { checkPort(); });
+    pace_timer_ = node_.createSteadyTimer(ros::WallDuration(1.0),
+                                          [this](const ros::SteadyTimerEvent&) { checkPace(); });
     publishFactor();
     ROS_INFO(
         "robot controller stand-in: FRI toward %s:%d every %.1f ms, KRL program %s, %.3g times "
@@ -389,7 +389,7 @@ class CellNode {
   ros::Publisher truth_, motor_states_, messages_, clock_, touch_, factor_, diagnostics_;
   ros::Subscriber human_, motors_, push_;
   ros::ServiceServer fault_, place_;
-  ros::WallTimer publish_timer_, log_timer_, port_timer_, pace_timer_;
+  ros::SteadyTimer publish_timer_, log_timer_, port_timer_, pace_timer_;
 };
 
 }  // namespace

@@ -245,7 +245,7 @@ def test_a_recorded_person_is_put_their_object_into_the_hand(monkeypatch, tmp_pa
     def proxy(name, kind):
         return lambda **fields: asked.append((name, fields)) or Request(success=len(asked) < 2, message="no")
 
-    monkeypatch.setattr(rospy, "wait_for_service", lambda name, limit: waited.append((name, limit)))
+    monkeypatch.setattr(one.module, "wait_for_service", lambda name, limit: waited.append((name, limit)))
     monkeypatch.setattr(rospy, "ServiceProxy", proxy)
     one.node.put_into_hand()
     name, fields = asked[0]

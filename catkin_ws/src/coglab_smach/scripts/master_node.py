@@ -24,7 +24,7 @@ from coglab_msgs.msg import MasterState as MasterStateMsg
 from coglab_msgs.msg import Say, Transition
 from coglab_msgs.srv import Start, StartResponse
 from coglab_py import parameters
-from coglab_py.steady import ClockWatch, exit_status, worker
+from coglab_py.steady import ClockWatch, Stamps, exit_status, utc_of, worker
 from coglab_smach.clocks.clock import PacedClock
 from coglab_smach.context.config import Config, ConfigError
 from coglab_smach.context.context import Context
@@ -73,6 +73,7 @@ class MasterNode:
         config = Config.load(parameters.read("~config_file", str), overrides, rospy.logwarn)
         clock = PacedClock(PACE.follow())
         self.journal = Journal(clock.now)
+        self.stamps = Stamps()
         self.transitions = rospy.Publisher("coglab/transitions", Transition, queue_size=200)
         self.results = rospy.Publisher("coglab/results", String, queue_size=20, latch=True)
         self.spoken = rospy.Publisher("say", Say, queue_size=20)
@@ -190,7 +191,12 @@ class MasterNode:
 
     def on_result(self, record: ActionRecord) -> None:
         """Topic and result file, one JSON object per action."""
-        line = json.dumps(record.to_dict())
+        row = record.to_dict()
+        for name, when in (("started", record.started), ("ended", record.ended)):
+            steady = PACE.steady(when)
+            row[f"{name}_ros"] = round(self.stamps.stamp(steady).to_sec(), 3)
+            row[f"{name}_utc"] = utc_of(steady)
+        line = json.dumps(row)
         publish(self.results, String(line))
         if self.result_file:
             try:

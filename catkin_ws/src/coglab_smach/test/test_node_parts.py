@@ -284,6 +284,7 @@ def master(monkeypatch, tmp_path):
     made.ctx = SimpleNamespace(clock=clock, stop=stop, arm=SimpleNamespace(hold=lambda why: made.hold))
     made.states, made.transitions, made.results, made.spoken = "states", "transitions", "results", "spoken"
     made.result_file = str(tmp_path / "results.jsonl")
+    made.stamps = SimpleNamespace(stamp=lambda steady: rospy.Time.from_sec(steady + 1000.0))
     made.module = module
     return made
 
@@ -329,7 +330,9 @@ def test_transitions_and_results_are_told_and_written(master):
     master.on_result(record)
     master.on_result(record)
     lines = Path(master.result_file).read_text().splitlines()
-    assert len(lines) == 2 and json.loads(lines[0])["duration_s"] == 2.5 and master.sent[-1][1].data == lines[0]
+    row = json.loads(lines[0])  # beside bags, and beside videos and questionnaires
+    assert (row["started_ros"], row["ended_ros"]) == (1001.0, 1003.5) and row["ended_utc"] > row["started_utc"]
+    assert len(lines) == 2 and row["duration_s"] == 2.5 and master.sent[-1][1].data == lines[0]
     master.result_file = str(Path(master.result_file).parent)
     master.on_result(record)
     assert master.sent[-1][0] == "logerr"

@@ -11,6 +11,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
+from datetime import datetime, timezone
 from typing import Any
 
 import rosgraph
@@ -127,6 +128,12 @@ class Stamps:
             elif after - before < QUICK:
                 self._offset += FOLLOWED * beside
             return self._offset
+
+
+def utc_of(steady: float) -> str:
+    """Date and time of a steady time (s), for people and other records; to the ms."""
+    moment = datetime.fromtimestamp(time.time() - (time.monotonic() - steady), timezone.utc)
+    return moment.isoformat(timespec="milliseconds")
 
 
 def wait_for(condition: Callable[[], Any], limit: float) -> bool:

@@ -15,6 +15,7 @@ import rospy
 import yaml
 from coglab_msgs.srv import GetObject, ListObjects, PredictDmp, PredictDmpRequest, PredictDmpResponse
 from coglab_py import parameters
+from coglab_py.steady import wait_for_service
 from geometry_msgs.msg import Point, Quaternion
 
 from ..scene import path_ahead
@@ -94,7 +95,7 @@ class Knowledge:
 
     def _objects(self) -> None:
         try:
-            rospy.wait_for_service("object_database/list_objects", timeout=1.0)
+            wait_for_service("object_database/list_objects", 1.0)
         except rospy.ROSException:
             self._show_objects(None)
             return
@@ -194,7 +195,7 @@ class Knowledge:
         request.target_orientation = Quaternion(*fields["target_orientation"])
         try:
             if self._ask is None:
-                rospy.wait_for_service(PREDICT, timeout=1.0)
+                wait_for_service(PREDICT, 1.0)
                 self._ask = rospy.ServiceProxy(PREDICT, PredictDmp, persistent=True)
             return self._ask(request)
         except (rospy.ServiceException, rospy.ROSException):
