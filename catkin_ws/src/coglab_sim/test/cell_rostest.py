@@ -255,7 +255,7 @@ class CellNode(unittest.TestCase):
             ("object/size", [0.1, "wide", 0.1], "/object/size: expected a list of numbers"),
         ):
             node = f"bad_{name.replace('/', '_')}"
-            rospy.set_param(f"/{node}/fri_port", 49999)
+            rospy.set_param(f"/{node}/fri_port", 9)
             rospy.set_param(f"/{node}/{name}", value)
             run = subprocess.run(
                 [binary, f"__name:={node}"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=60
@@ -268,7 +268,7 @@ class CellNode(unittest.TestCase):
         push = rospy.Publisher("/torn/push", Wrench, queue_size=1, latch=True)
         push.publish(Wrench(torque=Vector3(1000.0, 1000.0, 1000.0), force=Vector3(1000.0, 1000.0, 1000.0)))
         run = subprocess.run(
-            [cell_binary(), "__name:=torn", "_fri_port:=49999", "_seed:=5"],
+            [cell_binary(), "__name:=torn", "_fri_port:=9", "_seed:=5"],
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
