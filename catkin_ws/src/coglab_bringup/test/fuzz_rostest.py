@@ -79,7 +79,7 @@ if WAY == "split":
     REASONS |= set(range(ReasonCode.ROBOT_DISCONNECTED, ReasonCode.STALE_JOINT_STATE + 1))
 READY_LIMIT = 240.0  # s
 HEARD_BEFORE, HEARD_AFTER = 2.5, 60.0
-"""s in which who speaks is noted, afterwards at most; the rarest word that comes by itself is a state machine's structure, every 2 s"""
+"""s in which publishing topics are noted, afterwards at most; a state machine's structure comes every 2 s"""
 SAID_WITHIN = HEARD_AFTER + 5.0
 """s for which a node's words count as its reason: it says them every 5 s, and may have begun before it is heard"""
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from coglab_bringup import arguments, process_tree, test_runner
 from coglab_bringup.arguments import test_options as options_of_test
-from coglab_bringup.test_runner import FIRST, Program, find_programs, in_groups, report, run
+from coglab_bringup.test_runner import FIRST, Program, find_programs, longest_first, report, run
 from coglab_bringup.usage import Refused
 
 GREEN = (
@@ -172,7 +172,6 @@ def test_what_is_not_the_same_in_each_run_is_listed(tmp_path, monkeypatch, capsy
 
 def test_what_takes_longest_begins_first(tmp_path):
     programs = find_programs(Path(__file__).resolve().parents[4], tmp_path, sys.executable, [])
-    for group in in_groups(programs):
-        names = [one.name for one in group]
-        wanted = [name for name in FIRST if name in names]
-        assert wanted and names[: len(wanted)] == wanted
+    names = [one.name for one in longest_first(programs)]
+    wanted = [name for name in FIRST if name in names]
+    assert wanted and names[: len(wanted)] == wanted

@@ -1,5 +1,6 @@
 // The control thread's time, which goes on with the controller's counter while measurements are
 // lost; and what its cycle makes of a controller that goes on pushing.
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -203,8 +204,7 @@ TEST_F(ControlThreadTest, TheReportSaysHowLongTheCycleTookAndTheLongest) {
   ASSERT_TRUE(robot.measure(*manager, *thread, 1));
   const CycleReport quick = manager->report();
   EXPECT_GT(quick.duration, 0.0);
-  EXPECT_LT(quick.duration, slow.duration);
-  EXPECT_EQ(quick.longest, slow.longest);
+  EXPECT_EQ(quick.longest, std::max(quick.duration, slow.duration));
 }
 
 TEST_F(ControlThreadTest, WithoutAPriorityThereIsNothingToWarnOfAndItStopsAtOnce) {

@@ -123,7 +123,7 @@ def system() -> Iterator[tuple[Robot, subprocess.Popen]]:
         finally:
             rospy.signal_shutdown("the test is over")
             node.kill()
-            node.wait(timeout=20.0)
+            node.wait(timeout=60.0)
 
 
 @pytest.fixture
@@ -293,7 +293,7 @@ def test_a_controller_that_stalls_or_throws_is_told_and_left_again(robot: Robot)
 def test_it_ends_in_order_when_it_is_asked_to(system: tuple[Robot, subprocess.Popen]) -> None:
     _, node = system
     node.send_signal(signal.SIGINT)
-    assert node.wait(timeout=20.0) == 0
+    assert node.wait(timeout=60.0) == 0
 
 
 @pytest.mark.parametrize(

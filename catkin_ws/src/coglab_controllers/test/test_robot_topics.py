@@ -153,7 +153,7 @@ def system() -> Iterator[tuple[TopicArm, subprocess.Popen]]:
         finally:
             rospy.signal_shutdown("the test is over")
             node.terminate()
-            node.wait(timeout=20.0)
+            node.wait(timeout=60.0)
 
 
 def move(target: list[float], speed: float = SPEED) -> AddPtpResponse:
@@ -185,7 +185,7 @@ def test_a_motion_beside_it_reaches_its_end_all_the_limits(system):
     target = [HOME[0] + 0.3, *HOME[1:]]
     answer = move(target)
     assert answer.status == AddPtpRequest.STARTED, answer.message
-    heard, intruder, end = len(arm.heard), Intruder(arm, 2), time.monotonic() + 10.0
+    heard, intruder, end = len(arm.heard), Intruder(arm, 2), time.monotonic() + 60.0
     while answer.ptp_id not in arm.finished and time.monotonic() < end and not arm.unfinished:
         intruder.send()
         time.sleep(0.003)

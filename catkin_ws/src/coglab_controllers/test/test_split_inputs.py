@@ -94,7 +94,7 @@ def arm() -> Iterator[Arm]:
         finally:
             rospy.signal_shutdown("the test is over")
             node.kill()
-            node.wait(timeout=20.0)
+            node.wait(timeout=60.0)
 
 
 def test_a_joint_state_is_answered_once_with_its_stamp_and_the_epoch_of_the_permission(arm: Arm) -> None:

@@ -137,7 +137,7 @@ def system(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Told, sub
         finally:
             rospy.signal_shutdown("the test is over")
             node.kill()
-            node.wait(timeout=20.0)
+            node.wait(timeout=60.0)
 
 
 @pytest.fixture
@@ -397,4 +397,4 @@ def test_states_of_feedback_controllers_are_told_with_names_and_units(robot: Tol
 def test_it_ends_in_order_by_the_other_signal_too(system: tuple[Told, subprocess.Popen]) -> None:
     _, node = system
     node.send_signal(signal.SIGTERM)
-    assert node.wait(timeout=20.0) == 0
+    assert node.wait(timeout=60.0) == 0

@@ -168,6 +168,7 @@ class TopicGoal(FeedbackOnRos):
         publisher = rospy.Publisher("controller_manager/dmp/dmp_goal", DmpGoal, queue_size=1)
         wait_until(lambda: publisher.get_num_connections() > 0, "connection")
         robot.see_hand(None)
+        wait_until(lambda: robot.status.standing, "standing")
         before = robot.feedback.remaining_distance
         for frame, x in (("world", 0.3), ("lwr_base_link", math.nan)):
             wrong = DmpGoal()

@@ -30,7 +30,7 @@ def set_ros(seconds):
 
 
 def wait(condition):
-    end = time.monotonic() + 10.0
+    end = time.monotonic() + 60.0
     while not condition():
         assert time.monotonic() < end, "it waits for ever"
         time.sleep(0.005)

@@ -76,6 +76,8 @@ class CellNode(unittest.TestCase):
     def setUpClass(cls) -> None:
         cls.bridge = Bridge()
         cls.bridge.start()
+        cls.second = Bridge("/second")
+        cls.second.start()
         cls.truth = []
         cls.motors = []
         cls.touch = []
@@ -253,7 +255,7 @@ class CellNode(unittest.TestCase):
             ("object/size", [0.1, "wide", 0.1], "/object/size: expected a list of numbers"),
         ):
             node = f"bad_{name.replace('/', '_')}"
-            rospy.set_param(f"/{node}/fri_port", 49999)
+            rospy.set_param(f"/{node}/fri_port", 9)
             rospy.set_param(f"/{node}/{name}", value)
             run = subprocess.run(
                 [binary, f"__name:={node}"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=60
@@ -266,7 +268,7 @@ class CellNode(unittest.TestCase):
         push = rospy.Publisher("/torn/push", Wrench, queue_size=1, latch=True)
         push.publish(Wrench(torque=Vector3(1000.0, 1000.0, 1000.0), force=Vector3(1000.0, 1000.0, 1000.0)))
         run = subprocess.run(
-            [cell_binary(), "__name:=torn", "_fri_port:=49999", "_seed:=5"],
+            [cell_binary(), "__name:=torn", "_fri_port:=9", "_seed:=5"],
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
@@ -278,8 +280,7 @@ class CellNode(unittest.TestCase):
 
     def test_7_two_robots_in_one_graph(self) -> None:
         """All names are relative: the cell of another namespace finds the bridge of that namespace."""
-        second = Bridge("/second")
-        second.start()
+        second = self.second
         self.assertTrue(wait_for(lambda: second.fields is not None))
         self.assertFalse(second.peers & self.bridge.peers)
         rospy.wait_for_message("/second/coglab_sim/truth/cell", CellTruth, 60.0)

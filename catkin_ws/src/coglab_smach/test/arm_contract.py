@@ -59,7 +59,7 @@ class ArmContract(Contract):
     def start_ptp(self, by=0.4):
         self.ready()
         target = self.away(by)
-        motion = self.port.move_ptp(target, [])
+        motion = self.port.move_ptp(target, [0.05] * 7)  # slow: a test may be late
         self.until(lambda: not self.port.standing().ok, 2.0, "the motion")
         return motion, target
 

@@ -37,7 +37,7 @@ def server(monkeypatch):
 
 
 def ended(call):
-    end = time.monotonic() + 10.0
+    end = time.monotonic() + 60.0
     while not call.done() and time.monotonic() < end:
         time.sleep(0.005)
     return call.done()

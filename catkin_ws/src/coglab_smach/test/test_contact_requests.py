@@ -23,13 +23,13 @@ class Detector:
         monkeypatch.setattr(ports, "Newest", lambda *_: None)
 
     def call(self, request):
-        assert self.gates[request.mode].wait(5.0)
+        assert self.gates[request.mode].wait(60.0)
         self.heard.append(request.mode)
         return SimpleNamespace(success=True, message="")
 
 
 def until(condition):
-    end = time.monotonic() + 5.0
+    end = time.monotonic() + 60.0
     while not condition():
         assert time.monotonic() < end
         time.sleep(0.005)

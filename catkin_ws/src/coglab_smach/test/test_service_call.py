@@ -26,7 +26,7 @@ class Server:
         monkeypatch.setattr(calls.rospy, "ServiceProxy", lambda name, kind: self.call)
 
     def call(self, request):
-        assert self.thawed.wait(10.0)
+        assert self.thawed.wait(60.0)
         buff = io.BytesIO()
         request.serialize(buff)  # as rospy does once the connection stands
         self.heard.append(request.event)
@@ -34,7 +34,7 @@ class Server:
 
 
 def ended(call):
-    end = time.monotonic() + 5.0
+    end = time.monotonic() + 60.0
     while not call.done() and time.monotonic() < end:
         time.sleep(0.005)
     return call.done()
@@ -67,7 +67,7 @@ def test_given_up_while_no_server_is_there_its_thread_ends(monkeypatch):
     with pytest.raises(PortError) as raised:
         call.result()
     assert raised.value.code == ReasonCode.CANCELLED
-    until = time.monotonic() + 1.0
+    until = time.monotonic() + 60.0
     while any(t.name == "call:service lwr/command" for t in threading.enumerate()):
         assert time.monotonic() < until, "its thread is left"
         time.sleep(0.01)

@@ -100,7 +100,7 @@ def works_off(node) -> None:
 def ends_calibration() -> None:
     for thread in threading.enumerate():
         if thread.name == "calibration":
-            thread.join(10.0)
+            thread.join(60.0)
 
 
 def fails(error: Exception):

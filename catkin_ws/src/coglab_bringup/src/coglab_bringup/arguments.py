@@ -120,8 +120,6 @@ NAMED_IN_A_TEST = r"""(?:\bfind |\bpkg=['"]|\bfrom |\bimport |_path\(['"]|\brosr
 def test_targets(top: Path, wanted: list[Wanted]) -> list[str]:
     """Targets of the workspace's CMakeFiles/Makefile2 that these tests need. Pytests and rostests: all of the packages
     that the tests of their package name, and of those that these depend on."""
-    if not wanted:
-        return ["all", "CMakeFiles/tests.dir/all"]
     sources = top / "catkin_ws" / "src"
     rules = (top / "catkin_ws" / "build" / "CMakeFiles" / "Makefile2").read_text(encoding="utf-8")
     of_tests = re.findall(r"^CMakeFiles/tests.dir/all: (\S+)", rules, re.MULTILINE)
@@ -268,8 +266,9 @@ def judge(top: Path, command: str, words: list[str]) -> None:
 def main(words: list[str]) -> int:
     """See the head of this file."""
     top, command, rest = Path(words[0]), words[1], words[2:]
-    if command == "test-targets":  # of the build before `test`, whose arguments these are
-        print(*test_targets(top, test_options(top, rest).tests))
+    if command in ("test-names", "test-targets"):  # for the build before `test`, whose arguments these are
+        tests = test_options(top, rest).tests
+        print(*(test_targets(top, tests) if command == "test-targets" else (one.package for one in tests)))
         return 0
     try:
         judge(top, command, rest)

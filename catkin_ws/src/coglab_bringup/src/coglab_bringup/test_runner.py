@@ -8,7 +8,7 @@ Three kinds, found by where they lie in a package:
 Packages that the build left out (./coglab build --upstream-smach) are named and not tested.
 A program without a single case is a failure, too: a test file that tests nothing hides what it was written for.
 
-First gtests and pytests run, two at a time, then rostests alike. None may be red because others run beside it.
+Two programs run at a time, or one per processor core up to four. None may be red because others run beside it.
 --repeat N runs all of that N times, --load beside two busy processes, and lists each case that did not end alike each
 time.
 """
@@ -30,17 +30,17 @@ from coglab_bringup.arguments import TEST_FILES, Wanted, left_out, package_folde
 from coglab_bringup.run_directory import free_port, run_environment
 from coglab_bringup.usage import Refused
 
-AT_A_TIME = 2
+AT_A_TIME = max(2, min(4, os.cpu_count() or 2))
 BUSY = ("-c", "import os\nparent = os.getppid()\nwhile os.getppid() == parent:\n  sum(range(100000))")
 """a process that uses one core as long as its parent lives"""
 FIRST = (
+    *("console.test", "session.test"),
     *("test_virtual_trials.py", "test_plain_cmake.py", "test_virtual_bad_input.py", "test_corrupted_streams.py"),
     *("test_bridge_and_cell.py", "test_new_motion.py", "test_page.py"),
-    *("lwr_node.test", "port_contracts.test", "hand_node.test", "hand_faults.test", "fuzz.test"),
-    *("console.test", "session.test", "topic_goal.test"),
+    *("lwr_node.test", "port_contracts.test", "hand_node.test", "hand_faults.test", "fuzz.test", "topic_goal.test"),
 )
 """what takes longest begins first: as the last one it would run while nothing is left to run beside it"""
-TIME_LIMIT = 900.0  # s, per test program
+TIME_LIMIT = 1800.0  # s, per test program
 LONG_TIME_LIMIT = 7200.0  # s, with --long
 
 
@@ -164,10 +164,9 @@ def run(program: Program, log: Path, limit: float) -> None:
     )
 
 
-def in_groups(programs: list[Program]) -> list[list[Program]]:
-    """What runs one group after the other: gtests and pytests, then rostests."""
-    programs = sorted(programs, key=lambda one: FIRST.index(one.name) if one.name in FIRST else len(FIRST))
-    return [[one for one in programs if (one.kind == "rostest") == ros] for ros in (False, True)]
+def longest_first(programs: list[Program]) -> list[Program]:
+    """In the order in which they begin."""
+    return sorted(programs, key=lambda one: FIRST.index(one.name) if one.name in FIRST else len(FIRST))
 
 
 def log_of(program: Program, results: Path) -> Path:
@@ -262,9 +261,8 @@ def run_all(top: Path, results: Path, wanted: list[Wanted], limit: float) -> tup
     def run_one(program: Program) -> None:
         run(program, log_of(program, results), limit)
 
-    for group in in_groups(programs):
-        with ThreadPoolExecutor(max_workers=AT_A_TIME) as pool:
-            list(pool.map(run_one, group))
+    with ThreadPoolExecutor(max_workers=AT_A_TIME) as pool:
+        list(pool.map(run_one, longest_first(programs)))
     print(f"all tests: {time.monotonic() - start:.0f} s; JUnit files and logs: {os.path.relpath(results)}")
     return programs, report(programs, results)
 

@@ -42,6 +42,9 @@ from ih2_hand.reasons import Reason, reason_of
 SETTLE_S = 0.02
 """Polls begun earlier than this after a command may still show the status before it."""
 
+LONGEST_GAP_S = 0.1
+"""What lies between two polls counts as no more: on a busy computer nobody looked, and a finger may have moved."""
+
 BACKLOG = 50
 """Requests that may wait besides goals."""
 
@@ -83,6 +86,8 @@ class Running:
     driver: Any = None
     fillers: int = 0
     resends: int = 0
+    looked: float = 0.0  # when the last poll began
+    watched: float = 0.0  # s after the command, LONGEST_GAP_S at most of each gap between polls
 
 
 class HandActionServer(actionlib.ActionServer):
@@ -254,6 +259,9 @@ class GoalQueue:
 
     def _step(self, running: Running, status: HandStatus, begun: float) -> None:
         running.last_status = time.monotonic()
+        since = max(running.looked, running.begun)
+        running.looked = max(begun, since)
+        running.watched += min(running.looked - since, LONGEST_GAP_S)
         if not status.connected:
             self._fail(status.message, Reason.HAND_LINK_LOST)
             return
@@ -265,7 +273,7 @@ class GoalQueue:
             return
         if not status.motors or begun - running.sent < SETTLE_S:
             return
-        verdict = running.task.judge(status.motors, time.monotonic() - running.begun)
+        verdict = running.task.judge(status.motors, running.watched)
         _, _, feedback = SPECS[running.name]
         running.handle.publish_feedback(
             feedback(verdict.text, verdict.status_code, [motor.position for motor in status.motors])

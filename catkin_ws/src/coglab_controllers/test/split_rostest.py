@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The true path through /robot and the simulated cell: load, ptp, reach, switch, refuse."""
+"""Bridge and controller manager as two nodes, and the simulated cell: load, ptp, reach, switch, refuse."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from sensor_msgs.msg import JointState
 GOAL = (0.80, 0.0, 0.45)
 
 
-class TruePath(unittest.TestCase):
+class Split(unittest.TestCase):
     """One robot for all tests; they run in the order of their names."""
 
     @classmethod
@@ -160,9 +160,8 @@ class TruePath(unittest.TestCase):
             lambda: any(f"target_joint_states of {rospy.get_name()} refused" in line for line in told),
             "the reason with the publisher's name",
         )
-        helps = "rosservice call " + rospy.resolve_name("controller_manager/switch_controller") + " \"''\""
-        if rospy.get_param("~split", False):  # the bridge knows only that another node moves the arm
-            helps = "/controller_manager moves the arm; end that one's motion first"
+        # The bridge knows only that another node moves the arm.
+        helps = "/controller_manager moves the arm; end that one's motion first"
         self.assertTrue([line for line in told if helps in line], told)
         answer = robot.manager("switch_controller", "")
         self.assertTrue(answer.success, answer.message)
@@ -180,10 +179,6 @@ class TruePath(unittest.TestCase):
         self.assertTrue(pids)
         end_all(pids)
 
-
-class SplitPath(TruePath):
-    """The same with two nodes, and what only two can suffer."""
-
     def test_7_a_frozen_manager_moves_nothing_after_hold_and_reset(self) -> None:
         """In mid-motion the manager freezes; hold and reset pass without it; then it goes on with what it has."""
         robot = self.robot
@@ -191,8 +186,8 @@ class SplitPath(TruePath):
         target = [angle + 0.8 if joint == 6 else angle for joint, angle in enumerate(HOME)]
         self.assertEqual(robot.add_ptp(target).status, AddPtpRequest.STARTED)
         wait_until(lambda: robot.joints.velocity[6] > 0.2, "in mid-motion")
-        manager = rosnode.get_api_uri(rosgraph.Master("/split_path"), "/controller_manager")
-        process = xmlrpc.client.ServerProxy(manager).getPid("/split_path")[2]
+        manager = rosnode.get_api_uri(rosgraph.Master("/split"), "/controller_manager")
+        process = xmlrpc.client.ServerProxy(manager).getPid("/split")[2]
         os.kill(process, signal.SIGSTOP)
         try:
             for event in ("hold", "reset"):
@@ -210,6 +205,5 @@ class SplitPath(TruePath):
 
 
 if __name__ == "__main__":
-    rospy.init_node("true_path")
-    split = rospy.get_param("~split", False)
-    rostest.rosrun("coglab_controllers", "true_path", SplitPath if split else TruePath)
+    rospy.init_node("split")
+    rostest.rosrun("coglab_controllers", "split", Split)
