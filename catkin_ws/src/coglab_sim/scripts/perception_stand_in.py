@@ -30,6 +30,7 @@ from coglab_msgs.srv import (
 )
 from coglab_perception.frames import FrameNames
 from coglab_py import parameters
+from coglab_py.alone import init_node
 from coglab_py.messages import pose_message, pose_of
 from coglab_py.pose import Pose, about_z
 from coglab_sim.person.recorded_motion import Playback, PlaybackSettings
@@ -195,7 +196,7 @@ def pose(parent: str, stamp: float, frame: Pose) -> PoseStamped:
 
 def main() -> int:
     """Entry point; exit status 1 where parameters or recording cannot be used."""
-    rospy.init_node("perception")
+    init_node("perception")
     try:
         PerceptionNode()
     except (ValueError, TypeError, KeyError) as error:

@@ -30,8 +30,9 @@ from coglab_msgs.srv import ArmContact, ArmContactResponse, Learn, LearnMotion, 
 from coglab_perception.frames import FrameNames, FramesError
 from coglab_perception.tf_listener import TfListener
 from coglab_py import parameters
-from coglab_py.packages import package_path
+from coglab_py.alone import init_node
 from coglab_py.pace import Pace
+from coglab_py.packages import package_path
 from coglab_py.pose import Pose
 from coglab_py.yaml_file import YamlError
 from coglab_smach.contact.detector import ContactDetector, DetectorSettings
@@ -372,7 +373,7 @@ class ContactDetectorNode:
 
 def main() -> int:
     """Entry point."""
-    rospy.init_node("contact_detector")
+    init_node("contact_detector")
     urdf = parameters.found_above("robot_description", str)
     if urdf is None:
         rospy.logfatal("contact_detector: parameter robot_description is missing; load lwr_description's URDF")
