@@ -235,7 +235,7 @@ class ContactDetectorNode:
                     ReasonCode.NODE_SILENT,
                     f"no joint torques on {self.torques.resolved_name} for 1.0 s. The robot node sends them with every "
                     "FRI datagram: it is not running, the robot is not connected, or this computer is overloaded"
-                    f"{slowed if self.pace.factor < 1.0 else ''}. See ./coglab status and /diagnostics",
+                    f"{slowed if self.pace.factor < 1.0 else ''}. See ./coglab doctor",
                 )
             try:
                 self.grasp = self.grasp_of(request)
