@@ -20,6 +20,7 @@ from coglab_bringup import scene
 from coglab_msgs.msg import DmpFeedback, MasterState
 from coglab_perception.tf_listener import TfListener
 from coglab_py import parameters, steady
+from coglab_py.alone import init_node
 from visualization_msgs.msg import MarkerArray
 
 PERIOD = 0.2  # s
@@ -94,7 +95,7 @@ class SceneMarkers:
 
 def main() -> int:
     """Entry point."""
-    rospy.init_node("scene_markers")
+    init_node("scene_markers")
     markers = SceneMarkers()
     steady.SteadyTimer(PERIOD, markers.draw, "markers")
     return steady.spin()

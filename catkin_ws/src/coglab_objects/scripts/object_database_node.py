@@ -12,6 +12,7 @@ from coglab_msgs.msg import ReasonCode
 from coglab_msgs.srv import GetObject, GetObjectResponse, ListObjects, ListObjectsResponse, Reload, ReloadResponse
 from coglab_objects.database import ObjectDatabase, ObjectError
 from coglab_py import parameters, steady
+from coglab_py.alone import init_node
 
 MIRROR = "~objects"
 
@@ -94,7 +95,7 @@ class ObjectDatabaseNode:
 
 def main() -> int:
     """Entry point."""
-    rospy.init_node("object_database")
+    init_node("object_database")
     try:
         ObjectDatabaseNode()
     except parameters.ParameterError as error:

@@ -26,6 +26,7 @@ from coglab_perception.frames import AHEAD, FrameNames
 from coglab_perception.recogniser import Recogniser, load_patterns
 from coglab_perception.tf_listener import TfListener
 from coglab_py import parameters, steady
+from coglab_py.alone import init_node
 from coglab_py.pace import Pace
 from geometry_msgs.msg import Point, TransformStamped, Vector3
 
@@ -174,7 +175,7 @@ def position(transform: TransformStamped) -> np.ndarray:
 
 def main() -> int:
     """Entry point; exit status 1 where frames, patterns or parameters cannot be used."""
-    rospy.init_node("motion_recogniser")
+    init_node("motion_recogniser")
     try:
         RecogniserNode()
     except ValueError as error:

@@ -31,6 +31,7 @@ from coglab_msgs.srv import (
 )
 from coglab_perception.frames import FrameNames
 from coglab_py import parameters, steady
+from coglab_py.alone import init_node
 from coglab_py.messages import pose_message, pose_of
 from coglab_py.pose import Pose, about_z
 from coglab_sim.person.recorded_motion import Playback, PlaybackSettings
@@ -192,7 +193,7 @@ def bounded(timeout: float) -> float:
 
 def main() -> int:
     """Entry point; exit status 1 where parameters or recording cannot be used."""
-    rospy.init_node("perception")
+    init_node("perception")
     try:
         PerceptionNode()
     except (ValueError, TypeError, KeyError) as error:

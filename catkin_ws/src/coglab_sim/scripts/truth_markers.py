@@ -16,6 +16,7 @@ import rospy
 from coglab_msgs.msg import CellTruth
 from coglab_objects.database import ObjectError, cell_parameters, objects_folder, read_object
 from coglab_py import parameters
+from coglab_py.alone import init_node
 from coglab_py.messages import pose_message, pose_of
 from coglab_py.pose import Pose as Frame
 from coglab_sim.plausible import IMPLAUSIBLE, plausible
@@ -162,7 +163,7 @@ def arm_of(hand: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def main() -> int:
     """Entry point."""
-    rospy.init_node("truth_markers")
+    init_node("truth_markers")
     TruthMarkers()
     rospy.spin()
     return 0

@@ -23,6 +23,7 @@ from coglab_msgs.msg import CellTruth, HumanHand, Say
 from coglab_msgs.srv import PlaceObject
 from coglab_objects.database import ObjectError, objects_folder, read_object
 from coglab_py import parameters
+from coglab_py.alone import init_node
 from coglab_py.messages import pose_message, pose_of
 from coglab_py.pace import Pace
 from coglab_py.pose import Pose
@@ -35,6 +36,8 @@ from coglab_sim.plausible import IMPLAUSIBLE, plausible
 from geometry_msgs.msg import Vector3
 from std_msgs.msg import String
 
+OLDEST_WORDS = 30.0
+"""s after which a person who comes late does not act on what the robot has said"""
 CELL_LIMIT = 30.0
 """s for which the cell may take to put a recorded object into the hand"""
 
@@ -131,7 +134,9 @@ class VirtualHumanNode:
             rospy.logwarn("virtual human: %s", error)
 
     def on_say(self, message: Say) -> None:
-        """The robot speaks."""
+        """The robot speaks. What it said long before this node started is latched, and not heard."""
+        if message.header.stamp and (rospy.Time.now() - message.header.stamp).to_sec() > OLDEST_WORDS:
+            return
         with self.lock:
             self.human.hear(self.pace.now(), message.code)
 
@@ -163,7 +168,7 @@ class VirtualHumanNode:
 
 def main() -> int:
     """Entry point."""
-    rospy.init_node("virtual_human")
+    init_node("virtual_human")
     try:
         node = VirtualHumanNode()
         if isinstance(node.human, RecordedPerson) and node.human.recorded.object_in_hand is not None:

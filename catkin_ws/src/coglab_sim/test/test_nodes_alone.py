@@ -206,7 +206,7 @@ def test_a_person_begins_with_their_parameters(monkeypatch):
     human = one.node.human
     assert human.participant == Participant.draw(7) and human.holds() and not isinstance(human, RecordedPerson)
     assert one.node.object_id == "mug" and human.scene.object_mass == shipped("mug")["mass"]
-    assert set(one.ros.subscribed) == {"truth/cell", "human_command", "/a/say"}
+    assert set(one.ros.subscribed) == {"truth/cell", "human_command", "/a/say", "real_time_factor"}
     assert one.ros.made["human_state"]["latch"] is True
     parameters = {"~seed": 3, "~behaviour": "tug", "~profile": "patient", "cell/object/id": "bottle"}
     parameters |= {"~holds_object": False, "~object_mass": 0.7, "~rest": [1.0, 0.1, 0.2], "~say": "/other/say"}
@@ -284,6 +284,12 @@ def test_commands_and_words_reach_the_person(monkeypatch):
     assert "give, receive or rest" in one.ros.said[-1]
     one.ros.subscribed["/a/say"](Say(code=Say.I_HAVE_IT))
     assert one.node.human._heard == [(3.0 + one.node.human.participant.hearing_delay, Say.I_HAVE_IT)]
+    for age in (60.0, 3.0):  # latched: said before this person came
+        one.ros.now = 100.0
+        late = Say(code=Say.READY_TO_RECEIVE)
+        late.header.stamp = rospy.Time.from_sec(100.0 - age)
+        one.ros.subscribed["/a/say"](late)
+    assert [code for _, code in one.node.human._heard] == [Say.I_HAVE_IT, Say.READY_TO_RECEIVE]
 
 
 def test_the_hand_is_published_each_time_and_the_phase_when_it_changes(monkeypatch):

@@ -31,8 +31,9 @@ from coglab_msgs.srv import ArmContact, ArmContactResponse, Learn, LearnMotion, 
 from coglab_perception.frames import FrameNames, FramesError
 from coglab_perception.tf_listener import TfListener
 from coglab_py import parameters, steady
-from coglab_py.packages import package_path
+from coglab_py.alone import init_node
 from coglab_py.pace import Pace
+from coglab_py.packages import package_path
 from coglab_py.pose import Pose
 from coglab_py.yaml_file import YamlError
 from coglab_smach.contact.detector import ContactDetector, DetectorSettings
@@ -237,7 +238,7 @@ class ContactDetectorNode:
                     ReasonCode.NODE_SILENT,
                     f"no joint torques on {self.torques.resolved_name} for 1.0 s. The robot node sends them with every "
                     "FRI datagram: it is not running, the robot is not connected, or this computer is overloaded"
-                    f"{slowed if self.pace.factor < 1.0 else ''}. See ./coglab status and /diagnostics",
+                    f"{slowed if self.pace.factor < 1.0 else ''}. See ./coglab doctor",
                 )
             try:
                 self.grasp = self.grasp_of(request)
@@ -375,7 +376,7 @@ class ContactDetectorNode:
 
 def main() -> int:
     """Entry point."""
-    rospy.init_node("contact_detector")
+    init_node("contact_detector")
     urdf = parameters.found_above("robot_description", str)
     if urdf is None:
         rospy.logfatal("contact_detector: parameter robot_description is missing; load lwr_description's URDF")

@@ -5,7 +5,7 @@ Names are relative to the node's namespace.
 Services: coglab/start (coglab_msgs/Start), coglab/stop, coglab/why (std_srvs/Trigger).
 Topics: coglab/transitions (coglab_msgs/Transition), coglab/results (std_msgs/String, one JSON object per action,
 latched), coglab/holding (std_msgs/String, what the hand holds, latched), coglab/state (coglab_msgs/MasterState,
-latched, and five times a second), say (coglab_msgs/Say, what the robot says to the person).
+latched, and five times a second), say (coglab_msgs/Say, what the robot says to the person, latched).
 Parameters: perception/frames (names of human_hand and board). Private: config_file, dmp_library (path of the
 primitives), auto_trigger, result_file (JSON lines), state_file (what the hand holds, to survive a restart; default
 coglab_holding.json in ROS_HOME), config_overrides (mapping of dotted names), introspection (default true).
@@ -24,6 +24,7 @@ from coglab_msgs.msg import MasterState as MasterStateMsg
 from coglab_msgs.msg import Say, Transition
 from coglab_msgs.srv import Start, StartResponse
 from coglab_py import parameters
+from coglab_py.alone import init_node
 from coglab_py.steady import ClockWatch, Stamps, exit_status, utc_of, worker
 from coglab_smach.clocks.clock import PacedClock
 from coglab_smach.context.config import Config, ConfigError
@@ -76,7 +77,7 @@ class MasterNode:
         self.stamps = Stamps()
         self.transitions = rospy.Publisher("coglab/transitions", Transition, queue_size=200)
         self.results = rospy.Publisher("coglab/results", String, queue_size=20, latch=True)
-        self.spoken = rospy.Publisher("say", Say, queue_size=20)
+        self.spoken = rospy.Publisher("say", Say, queue_size=20, latch=True)  # a listener that starts late hears it, too
         self.result_file = parameters.read("~result_file", str, "")
         self.journal.listen(self.on_transition)
         self.journal.listen_results(self.on_result)
@@ -228,7 +229,7 @@ class MasterNode:
 
 def main() -> int:
     """Entry point; exit status 1 where the configuration cannot be used."""
-    rospy.init_node("coglab")
+    init_node("coglab")
     try:
         node = MasterNode()
     except (ConfigError, parameters.ParameterError) as error:

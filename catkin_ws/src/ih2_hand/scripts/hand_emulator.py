@@ -76,10 +76,11 @@ def main() -> int:
     arguments, announce = sys.argv[1:], None
     if as_node:
         import rospy
+        from coglab_py.alone import init_node
         from ih2_hand.ros.emulator_node import EmulatorNode
         from ih2_hand.ros.shutdown import end_quietly
 
-        rospy.init_node("hand_emulator", disable_signals=True)
+        init_node("hand_emulator", disable_signals=True)
         end_quietly()
         arguments, announce = rospy.myargv(sys.argv)[1:], EmulatorNode.announce
     options = parse(arguments)

@@ -4,12 +4,13 @@
 import sys
 
 import rospy
+from coglab_py.alone import init_node
 from ih2_hand.ros.hand_node import HandNode
 from ih2_hand.ros.shutdown import end_quietly
 
 
 def main() -> int:
-    rospy.init_node("ih2_hand")
+    init_node("ih2_hand")
     end_quietly()
     try:
         node = HandNode()

@@ -115,6 +115,15 @@ def findings(top: Path) -> list[tuple[bool, str]]:
         result.append(
             (True, f"the host name {socket.gethostname()} does not resolve; harmless, because ROS_IP=127.0.0.1 is set")
         )
+    load, cores = os.getloadavg()[0], os.cpu_count() or 1
+    if load > cores:
+        result.append(
+            (
+                True,
+                f"this computer is busy: load {load:.1f} on {cores} cores; a simulated cell runs slower than real time, "
+                "and answers to a robot may come late: end other programs",
+            )
+        )
     if shutil.disk_usage(top).free < 2e9:
         result.append((False, "less than 2 GB free where this folder lies; make room before building"))
     return result

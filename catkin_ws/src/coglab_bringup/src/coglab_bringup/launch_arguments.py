@@ -118,7 +118,7 @@ def _rules(sources: Path, objects: Path) -> dict[str, Callable[[str], object]]:
         "objects": _folder,
         "recording": _file,
     }
-    for name in ("sim", "split", "rviz", "perfect_perception", "auto_trigger", "recogniser", "console"):
+    for name in ("alone", "sim", "split", "rviz", "perfect_perception", "auto_trigger", "recogniser", "console"):
         rules[name] = lambda value: _one_of(boolean, value.lower())
     for name in ("controllers", "dmp_library", "machines", "patterns"):
         rules[name] = _required_file
