@@ -15,6 +15,7 @@ import yaml
 from coglab_bringup.handover import run_handover
 from coglab_bringup.trial_recorder import TrialRecorder
 from interface import FRAMES, missing_names
+from rosgraph_msgs.msg import Log
 from tf2_msgs.msg import TFMessage
 
 PAGE = Path(__file__).resolve().parents[4] / "docs" / "architecture.md"
@@ -34,6 +35,8 @@ class Handover(unittest.TestCase):
         cls.listener = tf2_ros.TransformListener(cls.frames)
         for topic in ("/tf", "/tf_static"):
             rospy.Subscriber(topic, TFMessage, cls.on_tf, queue_size=100)
+        cls.logged = []
+        rospy.Subscriber("/rosout", Log, cls.logged.append, queue_size=1000)
         recorder = TrialRecorder()
         cls.row, cls.start, cls.end = run_handover("exchange_human_to_robot", "mug", recorder)
         cls.trial = recorder.stop()
@@ -68,6 +71,13 @@ class Handover(unittest.TestCase):
 
     def test_outcome(self):
         self.assertEqual(self.row["outcome"], "success", self.trial.transitions[-8:])
+
+    def test_success_logs_no_error_and_no_warning_about_a_motion(self):
+        during = [m for m in self.logged if self.start <= m.header.stamp.to_sec() <= self.end]
+        self.assertTrue(during)
+        self.assertEqual([m.msg for m in during if m.level >= Log.ERROR], [])
+        motions = [m for m in during if m.file.endswith("_controller_ros.cpp")]
+        self.assertEqual([m.msg for m in motions if m.level > Log.INFO], [])
 
     def test_every_reach_ends_and_has_its_error(self):
         """How large it may be is judged in virtual time."""

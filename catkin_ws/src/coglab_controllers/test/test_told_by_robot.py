@@ -95,9 +95,10 @@ class Told(Robot):
     def log(self) -> str:
         return self._log.read_text(encoding="utf-8", errors="replace")
 
-    def said(self, words: str) -> None:
-        """Waits until the log has these words."""
+    def said(self, words: str) -> str:
+        """Waits until the log has these words; the line."""
         wait_until(lambda: words in self.log(), f"in the log: {words}")
+        return next(line for line in self.log().splitlines() if words in line)
 
     def ask(self, name: str, kind: type, *arguments: object):
         """A service below the manager."""
@@ -229,7 +230,8 @@ def test_a_motion_of_ones_own_is_told_often_while_it_moves_and_seldom_at_rest(ro
     wait_until(lambda: any(m.state == "aborted" for m in robot.told["circle"]), "its end")
     last = next(m for m in robot.told["circle"] if m.state == "aborted")
     assert (last.motion_id, last.reason_code) == (third.motion_id, ReasonCode.CANCELLED) and "enough" in last.reason
-    robot.said(f"motion_id {third.motion_id} was not executed: {last.reason}")
+    line = robot.said(f"motion_id {third.motion_id} was not executed: {last.reason}")
+    assert "INFO" in line, "a cancel that was asked for is no warning"
     assert "circle/cancel: " not in robot.log()
 
 
@@ -243,7 +245,7 @@ def test_a_cancel_of_another_controller_than_the_one_that_moves_is_refused_and_l
     assert "no motion of 'dmp' was running; 'ptp' moves the arm" in other.message
     robot.said("dmp/cancel: " + other.message)
     assert robot.ask("ptp/cancel", CancelMotion, 0.0, "").success
-    robot.said(f"ptp_id {going.ptp_id} was not executed: ")
+    assert "INFO" in robot.said(f"ptp_id {going.ptp_id} was not executed: ")
 
 
 def broadcast(robot: Told) -> list[TransformStamped]:
