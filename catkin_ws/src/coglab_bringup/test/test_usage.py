@@ -106,6 +106,13 @@ def test_refused_before_anything_is_done(bare, words):
     assert not (bare / ".coglab").exists() and not (bare / "out").exists()
 
 
+def test_results_need_space(tmp_path, monkeypatch):
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: shutil._ntuple_diskusage(10**9, 10**9 - 10**7, 10**7))
+    with pytest.raises(Refused, match=f"{tmp_path} has 10 MB left"):
+        judge(TOP, "demo", ["--out", str(tmp_path / "results")])
+    assert not (tmp_path / "results").exists()
+
+
 def test_an_unknown_group_is_refused_where_python_is_missing_too(tmp_path):
     """Arguments are judged by a program of Python's; a bare machine has none yet."""
     for name in ("coglab", "debian-packages.txt"):
