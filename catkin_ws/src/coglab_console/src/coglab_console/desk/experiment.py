@@ -12,6 +12,7 @@ import os
 import random
 import re
 from collections.abc import Callable, Sequence
+from datetime import datetime
 from pathlib import Path
 
 from ..web.fan_out import to_json
@@ -264,11 +265,15 @@ class Experiment:
             named = actions_in(self.condition())
             if named and kind not in named:
                 self._warn(f"trial {self.position + 1} is '{self.condition()}', and {button(kind)} was done in it")
-        fields = {key: value for key, value in row.items() if key not in ("type", "stamp", "trial")}
-        took = row.get("duration_s")
-        if isinstance(took, (int, float)):
-            fields.setdefault("began", round(self._now() - took, 3))
-        self._write("result", **fields)
+        fields = {key: value for key, value in row.items() if key not in ("type", "stamp", "trial", "began")}
+        self._write("result", **fields, began=self._began(row))
+
+    def _began(self, row: dict) -> float:
+        """When the action of a result began, s since 1970: as the brain says, or from the end, which is now."""
+        try:
+            return datetime.fromisoformat(row["started_utc"]).timestamp()
+        except (KeyError, TypeError, ValueError):
+            return round(self._now() - row.get("duration_s", 0.0), 3)
 
     def record(self, kind: str, /, **fields: object) -> None:
         """A note or a stop, into the file of the open session, with the phase in which it was."""
