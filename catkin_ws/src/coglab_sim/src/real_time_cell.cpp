@@ -19,6 +19,7 @@ using Clock = std::chrono::steady_clock;
 constexpr double kLateShare = 0.2;
 // Periods behind schedule after which the schedule starts anew instead of catching up.
 constexpr int kGiveUp = 5;
+constexpr double kPatience = 0.5;            // s for a late answer, where the cell waits for them
 constexpr std::size_t kMaxRecords = 100000;  // if nobody takes them
 
 }  // namespace
@@ -67,11 +68,11 @@ void RealTimeCell::run() {
   auto period = periodNow();
   auto deadline = Clock::now();
   auto sent_at = deadline;
-  bool sent_late = false;
+  bool sent_late = false, answered = false;
   std::array<std::uint8_t, 2048> buffer{};
   while (running_) {
-    bool answered = false;
-    const auto listenUntil = [&](Clock::time_point until) {
+    const bool answered_before = std::exchange(answered, false);
+    const auto listenUntil = [&](Clock::time_point until, bool for_one) {
       for (;;) {
         const long size = socket_.receive(buffer.data(), buffer.size(), until);
         if (size < 0) return;
@@ -79,15 +80,22 @@ void RealTimeCell::run() {
             std::chrono::duration<double>(Clock::now() - sent_at).count() * factor_;
         cell_.receive(buffer.data(), static_cast<std::size_t>(size), latency);
         answered = true;
-        if (Clock::now() >= until) return;  // a flood of datagrams does not stop the clock
+        // A flood of datagrams does not stop the clock.
+        if (for_one || Clock::now() >= until) return;
       }
     };
-    listenUntil(deadline);
+    listenUntil(deadline, false);
+    const bool expected = cell_.sent() && !sent_late;  // an answer, within the period that ends
+    const bool unanswered = expected && !answered;
+    // The PC answers, but this computer is too busy: simulated time stands until it does.
+    if (waits_ && answered_before && cell_.sent() && !answered)
+      listenUntil(deadline + std::chrono::duration_cast<Clock::duration>(
+                                 std::chrono::duration<double>(kPatience)),
+                  true);
     const auto now = Clock::now();
     const double behind = std::chrono::duration<double>(now - deadline).count();
     const bool late =
         now - deadline > std::chrono::duration_cast<Clock::duration>(period * kLateShare);
-    const bool expected = cell_.sent() && !sent_late;  // an answer, within the period that ends
 
     applyInputs();
     cell_.advance(!sent_late);
@@ -95,9 +103,10 @@ void RealTimeCell::run() {
     if (cell_.sent()) socket_.send(cell_.measurement().data(), cell_.measurement().size(), port_);
     sent_late = late;
     period = periodNow();  // the KRL program may have opened FRI anew
-    leaveResults(answered, expected, late ? behind : 0.0);
+    leaveResults(answered, expected, unanswered, late ? behind : 0.0);
     deadline += period;
-    if (now - deadline > kGiveUp * period) deadline = now + period;
+    // Where simulated time may stand, nothing has to be caught up with.
+    if (now - deadline > (waits_ ? 0 : kGiveUp) * period) deadline = now + period;
   }
 }
 
@@ -130,7 +139,7 @@ void RealTimeCell::applyInputs() {
   for (auto& entry : due) entry.action(cell_);
 }
 
-void RealTimeCell::leaveResults(bool answered, bool expected, double behind) {
+void RealTimeCell::leaveResults(bool answered, bool expected, bool unanswered, double behind) {
   const auto& controller = cell_.controller();
   TickRecord record;
   record.time = controller.time();
@@ -152,7 +161,7 @@ void RealTimeCell::leaveResults(bool answered, bool expected, double behind) {
   ++snapshot_.tick;
   if (answered) ++snapshot_.answers;
   if (expected) ++snapshot_.sent;
-  if (expected && !answered) ++snapshot_.unanswered;
+  if (unanswered) ++snapshot_.unanswered;
   if (behind > 0.0) ++snapshot_.late_ticks;
   snapshot_.latest = std::max(snapshot_.latest, behind);
   if (records_.size() < kMaxRecords) records_.push_back(record);
