@@ -28,6 +28,7 @@
 #include "cell_faults.hpp"
 #include "cell_messages.hpp"
 #include "cell_parameters.hpp"
+#include "coglab_rt/ros/alone.hpp"
 #include "coglab_rt/ros/logger_service.hpp"
 #include "coglab_rt/ros/parameter.hpp"
 #include "coglab_rt/ros/ros_time.hpp"
@@ -97,6 +98,7 @@ class CellNode {
     cell_ = std::make_unique<RealTimeCell>(config_, host, static_cast<std::uint16_t>(port), speed,
                                            static_cast<std::uint16_t>(source_port));
     cell_->setSnapshotInterval(speed / rate);
+    cell_->waitForAnswers(slow_down_);
     openLog(text("log_file", "", "a path"));
 
     truth_ = node_.advertise<coglab_msgs::CellTruth>("truth/cell", kQueue);
@@ -405,6 +407,7 @@ class CellNode {
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "cell");
+  if (!coglab_rt::nameIsFree()) return 1;
   const ros::NodeHandle keep;  // the last handle that goes would take the log along
   coglab_rt::LoggerServices logger_services;
   try {

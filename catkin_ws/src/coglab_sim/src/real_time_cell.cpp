@@ -21,6 +21,7 @@ constexpr double kLateShare = 0.2;
 // Periods behind schedule after which the schedule starts anew instead of catching up.
 constexpr int kGiveUp = 5;
 constexpr std::size_t kMaxRecords = 100000, kMaxSnapshots = 2000;  // if nobody takes them
+constexpr double kPatience = 0.5;            // s for a late answer, where the cell waits for them
 
 }  // namespace
 
@@ -68,11 +69,11 @@ void RealTimeCell::run() {
   auto period = periodNow();
   auto deadline = Clock::now();
   auto sent_at = deadline;
-  bool sent_late = false, kept = true;
+  bool sent_late = false, answered = false, kept = true;
   std::array<std::uint8_t, 2048> buffer{};
   while (running_) {
-    bool answered = false;
-    const auto listenUntil = [&](Clock::time_point until) {
+    const bool answered_before = std::exchange(answered, false);
+    const auto listenUntil = [&](Clock::time_point until, bool for_one) {
       for (;;) {
         const long size = socket_.receive(buffer.data(), buffer.size(), until);
         if (size < 0) return;
@@ -80,15 +81,22 @@ void RealTimeCell::run() {
             std::chrono::duration<double>(Clock::now() - sent_at).count() * factor_;
         cell_.receive(buffer.data(), static_cast<std::size_t>(size), latency);
         answered = true;
-        if (Clock::now() >= until) return;  // a flood of datagrams does not stop the clock
+        // A flood of datagrams does not stop the clock.
+        if (for_one || Clock::now() >= until) return;
       }
     };
-    listenUntil(deadline);
+    listenUntil(deadline, false);
+    const bool expected = cell_.sent() && !sent_late;  // an answer, within the period that ends
+    const bool unanswered = expected && !answered;
+    // The PC answers, but this computer is too busy: simulated time stands until it does.
+    if (waits_ && answered_before && cell_.sent() && !answered)
+      listenUntil(deadline + std::chrono::duration_cast<Clock::duration>(
+                                 std::chrono::duration<double>(kPatience)),
+                  true);
     const auto now = Clock::now();
     const double behind = std::chrono::duration<double>(now - deadline).count();
     const bool late =
         now - deadline > std::chrono::duration_cast<Clock::duration>(period * kLateShare);
-    const bool expected = cell_.sent() && !sent_late;  // an answer, within the period that ends
 
     applyInputs();
     cell_.advance(!sent_late, kept);
@@ -99,9 +107,10 @@ void RealTimeCell::run() {
     const double time = cell_.controller().time();
     kept = time > next_snapshot_ - 1e-9;
     if (kept) next_snapshot_ = std::max(next_snapshot_, time - cell_.period()) + interval_;
-    leaveResults(answered, expected, late ? behind : 0.0, kept);
+    leaveResults(answered, expected, unanswered, late ? behind : 0.0, kept);
     deadline += period;
-    if (now - deadline > kGiveUp * period) deadline = now + period;
+    // Where simulated time may stand, nothing has to be caught up with.
+    if (now - deadline > (waits_ ? 0 : kGiveUp) * period) deadline = now + period;
   }
 }
 
@@ -134,7 +143,8 @@ void RealTimeCell::applyInputs() {
   for (auto& entry : due) entry.action(cell_);
 }
 
-void RealTimeCell::leaveResults(bool answered, bool expected, double behind, bool keep) {
+void RealTimeCell::leaveResults(bool answered, bool expected, bool unanswered, double behind,
+                                bool keep) {
   const std::int64_t stepped_ns = coglab_rt::steadyNow();
   const auto& controller = cell_.controller();
   TickRecord record;
@@ -158,7 +168,7 @@ void RealTimeCell::leaveResults(bool answered, bool expected, double behind, boo
   ++snapshot_.tick;
   if (answered) ++snapshot_.answers;
   if (expected) ++snapshot_.sent;
-  if (expected && !answered) ++snapshot_.unanswered;
+  if (unanswered) ++snapshot_.unanswered;
   if (behind > 0.0) ++snapshot_.late_ticks;
   snapshot_.latest = std::max(snapshot_.latest, behind);
   if (keep && snapshots_.size() == kMaxSnapshots) snapshots_.erase(snapshots_.begin());

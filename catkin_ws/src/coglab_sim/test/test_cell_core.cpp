@@ -209,6 +209,43 @@ TEST(RealTimeCell, TheLatencyOfAnswersIsToldInTimeOfTheCell) {
   }
 }
 
+/// A computer that is too busy answers three periods late: where simulated time may stand, no
+/// answer is lost.
+TEST(RealTimeCell, LateAnswersAreWaitedForWhereTimeMayStand) {
+  const auto [fd, port] = loopbackSocket();
+  const timeval limit{5, 0};
+  setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
+  CellConfig config;
+  config.urdf = URDF;
+  config.krc.period = 0.01;
+  RealTimeCell cell(config, "127.0.0.1", port, 1.0);
+  cell.waitForAnswers(true);
+  cell.start();
+  std::uint32_t misses = 0;
+  for (std::uint16_t counter = 1; counter <= 20; ++counter) {
+    sockaddr_in peer{};
+    socklen_t length = sizeof peer;
+    std::array<std::uint8_t, fri::kMeasurementSize> bytes{};
+    fri::MeasurementDatagram measurement{};
+    ASSERT_EQ(
+        recvfrom(fd, bytes.data(), bytes.size(), 0, reinterpret_cast<sockaddr*>(&peer), &length),
+        static_cast<ssize_t>(bytes.size()));
+    ASSERT_TRUE(fri::decode(bytes.data(), bytes.size(), measurement));
+    if (counter == 10) misses = measurement.miss_counter;
+    if (counter > 10) {
+      EXPECT_EQ(measurement.miss_counter, misses) << counter;
+      std::this_thread::sleep_for(std::chrono::milliseconds(30));
+    }
+    fri::CommandDatagram answer{};
+    answer.header = fri::commandHeader(counter, measurement.header.counter);
+    std::array<std::uint8_t, fri::kCommandSize> command{};
+    fri::encode(answer, command.data());
+    sendto(fd, command.data(), command.size(), 0, reinterpret_cast<sockaddr*>(&peer), sizeof peer);
+  }
+  cell.stop();
+  close(fd);
+}
+
 TEST(Cell, LateStandInDoesNotBlameThePc) {
   CellConfig config;
   config.urdf = URDF;

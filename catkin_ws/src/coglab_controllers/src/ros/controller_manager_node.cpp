@@ -14,6 +14,7 @@
 #include "coglab_controllers/ros/manager_ros.hpp"
 #include "coglab_controllers/ros/robot_topics.hpp"
 #include "coglab_controllers/ros/ros_parameters.hpp"
+#include "coglab_rt/ros/alone.hpp"
 #include "coglab_rt/ros/exit_limit.hpp"
 #include "coglab_rt/ros/logger_service.hpp"
 #include "coglab_rt/ros/parameter.hpp"
@@ -25,6 +26,7 @@ void onSignal(int) { asked_to_end = 1; }
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "controller_manager", ros::init_options::NoSigintHandler);
+  if (!coglab_rt::nameIsFree()) return 1;
   std::signal(SIGINT, onSignal);
   std::signal(SIGTERM, onSignal);
   try {

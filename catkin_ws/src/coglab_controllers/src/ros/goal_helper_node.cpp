@@ -12,6 +12,7 @@
 #include "coglab_controllers/manager/parameters.hpp"
 #include "coglab_controllers/ros/tf_goal_source.hpp"
 #include "coglab_msgs/DmpGoal.h"
+#include "coglab_rt/ros/alone.hpp"
 #include "coglab_rt/ros/logger_service.hpp"
 #include "coglab_rt/ros/parameter_tree.hpp"
 
@@ -103,6 +104,7 @@ class GoalHelper {
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "goal_helper");
+  if (!coglab_rt::nameIsFree()) return 1;
   try {
     coglab_rt::LoggerServices logger_services;
     coglab_controllers::GoalHelper(ros::NodeHandle(), ros::NodeHandle("~")).run();

@@ -17,6 +17,7 @@
 #include "coglab_controllers/ideal/ideal_arm_ros.hpp"
 #include "coglab_controllers/ros/manager_ros.hpp"
 #include "coglab_rt/arm_port.hpp"
+#include "coglab_rt/ros/alone.hpp"
 #include "coglab_rt/ros/exit_limit.hpp"
 #include "coglab_rt/ros/logger_service.hpp"
 #include "coglab_rt/ros/parameter.hpp"
@@ -40,6 +41,7 @@ std::unique_ptr<coglab_rt::ArmPort> makeArm(const ros::NodeHandle& lwr) {
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "robot", ros::init_options::NoSigintHandler);
+  if (!coglab_rt::nameIsFree()) return 1;
   std::signal(SIGINT, onSignal);
   std::signal(SIGTERM, onSignal);
   try {

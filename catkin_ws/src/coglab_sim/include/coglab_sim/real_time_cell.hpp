@@ -62,6 +62,8 @@ class RealTimeCell {
   void stop();
   /// Simulated over real time from the next period on.
   void setFactor(double factor) { factor_ = factor; }
+  /// Whether simulated time stands while an answer of a PC that answers is late, 0.5 s at most.
+  void waitForAnswers(bool waits) { waits_ = waits; }
   /// Where the PC listens from now on.
   void setPort(std::uint16_t port) { port_ = port; }
 
@@ -101,11 +103,12 @@ class RealTimeCell {
   std::string schedule(int priority) const;
   void run();
   void applyInputs();
-  void leaveResults(bool answered, bool expected, double behind, bool keep);
+  void leaveResults(bool answered, bool expected, bool unanswered, double behind, bool keep);
 
   Cell cell_;
   FriSocket socket_;
   std::atomic<double> factor_;
+  std::atomic<bool> waits_{false};
   std::atomic<std::uint16_t> port_;
   std::atomic<bool> running_{false};
   std::thread thread_;

@@ -1,11 +1,15 @@
 #include "bridge_diagnostics.hpp"
 
+#include <cstdio>
+
 #include "coglab_rt/ros/parameter.hpp"
 #include "lwr_fri_bridge/bridge/diagnosis.hpp"
 #include "target_topic.hpp"
 
 namespace lwr_fri_bridge {
 namespace {
+
+constexpr double kLateAnswers = 0.05;  // share from which the computer counts as too busy
 
 unsigned char levelOf(Severity severity) { return static_cast<unsigned char>(severity); }
 
@@ -23,6 +27,7 @@ BridgeDiagnostics::BridgeDiagnostics(BridgeRos& owner)
       updater_(ros::NodeHandle(), owner.nh_, owner.nh_.getNamespace()) {
   updater_.setHardwareID("KUKA LWR 4+");
   updater_.add("FRI connection", this, &BridgeDiagnostics::connection);
+  updater_.add("computer", this, &BridgeDiagnostics::computer);
   updater_.add("arm", this, &BridgeDiagnostics::arm);
   updater_.add("commands", this, &BridgeDiagnostics::commands);
 }
@@ -62,6 +67,31 @@ void BridgeDiagnostics::connection(diagnostic_updater::DiagnosticStatusWrapper& 
   status.add("datagrams of a second sender", thread.foreign);
   status.add("last second sender", thread.last_foreign);
   status.add("send errors", thread.send_errors);
+}
+
+/// Whether this computer answers in time, over the last second. Nothing is slowed: a robot is not.
+void BridgeDiagnostics::computer(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  const fri::SessionCounters session = owner_.bridge_.snapshot().session;
+  const FriThreadStatistics thread = owner_.fri_thread_.statistics();
+  const std::uint64_t late = session.lost_answers + thread.superseded;
+  const std::uint64_t all = session.accepted + thread.superseded;
+  const double share = all > answers_before_ ? static_cast<double>(late - late_before_) /
+                                                   static_cast<double>(all - answers_before_)
+                                             : 0.0;
+  late_before_ = late;
+  answers_before_ = all;
+  const bool busy = share > kLateAnswers;
+  char text[300];
+  std::snprintf(text, sizeof text,
+                "%.0f %% of the FRI answers of the last second were late or lost (limit %.0f %%)%s",
+                100.0 * share, 100.0 * kLateAnswers,
+                busy ? ": this computer is too busy, or packets are lost on the way. The arm is "
+                       "not slowed; end other programs, give this node real-time priority"
+                     : "");
+  say(status, Diagnosis{busy ? Severity::Warning : Severity::Ok, text});
+  status.add("late FRI answers (%)", 100.0 * share);
+  status.add("real-time priority", thread.real_time);
+  if (busy) ROS_WARN_THROTTLE(10.0, "lwr: %s", status.message.c_str());
 }
 
 void BridgeDiagnostics::arm(diagnostic_updater::DiagnosticStatusWrapper& status) {

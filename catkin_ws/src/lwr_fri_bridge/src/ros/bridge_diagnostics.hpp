@@ -8,7 +8,7 @@
 
 namespace lwr_fri_bridge {
 
-/// Three statuses: connection, arm, commands.
+/// Four statuses: connection, computer, arm, commands.
 class BridgeDiagnostics {
  public:
   explicit BridgeDiagnostics(BridgeRos& owner);
@@ -18,13 +18,14 @@ class BridgeDiagnostics {
 
  private:
   void connection(diagnostic_updater::DiagnosticStatusWrapper& status);
+  void computer(diagnostic_updater::DiagnosticStatusWrapper& status);
   void arm(diagnostic_updater::DiagnosticStatusWrapper& status);
   void commands(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   BridgeRos& owner_;
   const double hot_;  // degree Celsius
   diagnostic_updater::Updater updater_;
-  std::uint64_t refused_before_ = 0;
+  std::uint64_t refused_before_ = 0, late_before_ = 0, answers_before_ = 0;
 };
 
 }  // namespace lwr_fri_bridge

@@ -9,6 +9,7 @@
 
 #include <ros/ros.h>
 
+#include "coglab_rt/ros/alone.hpp"
 #include "coglab_rt/ros/exit_limit.hpp"
 #include "coglab_rt/ros/logger_service.hpp"
 #include "coglab_rt/ros/parameter.hpp"
@@ -25,6 +26,7 @@ void onSignal(int) { interrupted = true; }
 int main(int argc, char** argv) {
   // Own handlers: the arm must come to rest before the node goes.
   ros::init(argc, argv, "lwr", ros::init_options::NoSigintHandler);
+  if (!coglab_rt::nameIsFree()) return 1;
   std::signal(SIGINT, onSignal);
   std::signal(SIGTERM, onSignal);
   // Lives longest, because ROS logs what goes wrong only as long as there is a handle.
