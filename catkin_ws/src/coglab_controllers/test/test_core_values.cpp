@@ -125,10 +125,7 @@ TEST(Guard, KeepsWhatTheInterfaceOfTheRobotNeeds) {
   for (const double bad : {0.0, -1.0, std::nan("")}) {
     EXPECT_NE(refusal(&GuardParameters::workspace_deceleration, bad).find("workspace_deceleration"),
               std::string::npos);
-    EXPECT_NE(refusal(&GuardParameters::block_time, bad).find("block_time: expected a positive"),
-              std::string::npos);
   }
-  EXPECT_EQ(refusal(&GuardParameters::block_time, 1e-9), "");
   EXPECT_EQ(refusal(&GuardParameters::reaction_time, 0.0), "");
 }
 
@@ -163,11 +160,9 @@ TEST(Defaults, OfTheLimitsAreTheDocumentedOnes) {
   EXPECT_EQ(guard.elbow_speed, 1.0);
   EXPECT_EQ(guard.workspace_deceleration, 2.0);
   EXPECT_EQ(guard.reaction_time, 0.015);
-  EXPECT_EQ(guard.block_time, 0.5);
   const GuardResult result;
   EXPECT_EQ(result.scale, 1.0);
   EXPECT_EQ(result.joint, -1);
-  EXPECT_EQ(result.blocked_joint, -1);
   const Workspace::Margin margin;
   EXPECT_EQ(margin.distance, 0.0);
   EXPECT_EQ(margin.rate, 0.0);

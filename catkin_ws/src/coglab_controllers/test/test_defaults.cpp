@@ -111,7 +111,7 @@ TEST(Defaults, ACycleThatHasNotRunTellsNothing) {
   EXPECT_EQ(settings.sample_timeout, 0.1);
   EXPECT_EQ(settings.silent_time, 0.5);
   EXPECT_EQ(settings.overrun_time, 0.004);
-  EXPECT_EQ(settings.border_time, 1.0);
+  EXPECT_EQ(settings.blocked_time, 0.5);
   EXPECT_EQ(settings.overruns_to_fault, 5);
   EXPECT_EQ(CancelOrder().number, 0u);
   EXPECT_EQ(CancelOrder().cycles, 0u);
