@@ -21,7 +21,7 @@ constexpr double kLateShare = 0.2;
 // Periods behind schedule after which the schedule starts anew instead of catching up.
 constexpr int kGiveUp = 5;
 constexpr std::size_t kMaxRecords = 100000, kMaxSnapshots = 2000;  // if nobody takes them
-constexpr double kPatience = 0.5;            // s for a late answer, where the cell waits for them
+constexpr double kPatience = 0.5;  // s for a late answer, where the cell waits for them
 
 }  // namespace
 

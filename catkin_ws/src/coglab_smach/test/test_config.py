@@ -124,3 +124,11 @@ def test_a_file_that_became_bad_keeps_the_values_read_before(tmp_path):
     os.utime(path, ns=(5, 5))
     assert config.get("hand.open_speed") == 100
     assert len(warnings) == 1 and "hand.open_speed: 1000 is greater" in warnings[0] and "stay in force" in warnings[0]
+
+
+@pytest.mark.parametrize("low, field", [("[450, -500, 50]", "region_low"), ("[0.9, -0.5, 0.05]", "region_low")])
+def test_a_handover_region_in_millimetres_or_upside_down_is_refused(tmp_path, low, field):
+    path = tmp_path / "machines.yaml"
+    path.write_text(SHIPPED.read_text().replace("region_low: [0.45, -0.50, 0.05]", f"region_low: {low}"))
+    with pytest.raises(ConfigError, match=field):
+        Config.load(str(path))

@@ -39,6 +39,7 @@ ManagerSettings readManagerSettings(const YAML::Node& node, const std::string& u
   cycle.cycle_time = parameters.number("cycle_time", cycle.cycle_time, 0.0005, 0.1);
   cycle.sample_timeout = parameters.number("sample_timeout", cycle.sample_timeout, 0.005, 5.0);
   cycle.silent_time = parameters.number("silent_time", cycle.silent_time, 0.01, 10.0);
+  cycle.blocked_time = parameters.number("blocked_time", cycle.blocked_time, 0.05, 10.0);
   cycle.overrun_time =
       lockstep ? 0.0 : parameters.number("overrun_time", cycle.cycle_time, 0.0, 10.0);
   settings.plan_timeout = parameters.number("plan_timeout", settings.plan_timeout, 0.05, 30.0);
