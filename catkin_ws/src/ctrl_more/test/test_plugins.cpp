@@ -290,7 +290,9 @@ TEST_F(Plugins, ShippedListAndProfilesLoad) {
 
 // A folder with a library that is built twice.
 struct TwoBuilds : Plugins {
-  fs::path folder = fs::path(::testing::TempDir()) / "ctrl_more_builds";
+  // One for each test: what stays in memory of another one is known by its path.
+  fs::path folder = fs::path(::testing::TempDir()) / "ctrl_more_builds" /
+                    ::testing::UnitTest::GetInstance()->current_test_info()->name();
   TwoBuilds() {
     fs::remove_all(folder);
     fs::create_directories(folder);
