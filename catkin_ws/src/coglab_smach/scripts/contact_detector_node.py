@@ -55,6 +55,12 @@ SIGNAL = 0.01
 """s between two messages on ~signal at least"""
 
 
+def made_at(message: JointState) -> float | None:
+    """s on the robot controller's clock, which the bridge writes as ns into frame_id; None from another driver."""
+    text = message.header.frame_id
+    return 1e-9 * int(text) if text.isdecimal() else None
+
+
 def pose_of(place, turn) -> Pose | None:
     """Of a message's point and quaternion; None where they are no pose."""
     p, q = np.array([place.x, place.y, place.z]), np.array([turn.x, turn.y, turn.z, turn.w])
@@ -158,7 +164,7 @@ class ContactDetectorNode:
         if len(message.effort) != len(message.name):
             return
         with self.lock:
-            event = self.detector.feed_measured(stamp, position, [message.effort[i] for i in order])
+            event = self.detector.feed_measured(stamp, position, [message.effort[i] for i in order], made_at(message))
             if self.recorder is not None:
                 self.recorder.look()
             force = self.detector.force() if abs(stamp - self.force_stamp) >= FORCE_PERIOD else None

@@ -115,6 +115,19 @@ def test_stamps_beside_the_grid_of_the_measurements(aside, told):
     assert later and not any(each.fresh for each in later)
 
 
+def test_late_stamps_are_no_push_where_the_robots_own_time_is_known():
+    """A fast motion that nothing touches; one sample in twenty is received up to 0.4 s late, as on a busy computer."""
+    rng, observer = np.random.default_rng(5), MomentumObserver(Plain(2.0), period=DT)
+    time = DT * np.arange(600)
+    position, velocity = 0.3 * np.sin(4.0 * time), 1.2 * np.cos(4.0 * time)
+    torque = 2.0 * np.diff(velocity, prepend=velocity[0]) / DT
+    late = np.where(rng.random(600) < 0.05, rng.uniform(0.0, 0.4, 600), rng.exponential(8e-4, 600))
+    stamps = np.maximum.accumulate(time + late) + 1e-6 * np.arange(600)
+    found = [observer.feed(s, seven(q), seven(t), m) for s, q, t, m in zip(stamps, position, torque, time, strict=True)]
+    assert all(each is not None for each in found[2:])
+    assert max(np.abs(each.torque).max() for each in found[2:]) < 0.2, "Nm, of 10 Nm that the motion takes"
+
+
 def test_the_grid_follows_stamps_slowly():
     """A twentieth of what they are late; after ten samples that are 0.3 late, 0.22 early is still beside it."""
     for early, told in ((0.22, True), (0.36, False)):

@@ -109,7 +109,9 @@ def test_velocities_are_those_of_the_message_or_of_two_positions(node):
     mixed.position = [*[float(k) for k in range(7)], 99.0]
     mixed.effort = mixed.position
     node.on_joints(mixed)
-    assert node.detector.fed == [("feed_measured", 4.0, [6.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.0], [6, 5, 4, 3, 2, 1, 0])]
+    assert node.detector.fed == [
+        ("feed_measured", 4.0, [6.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.0], [6, 5, 4, 3, 2, 1, 0], None)
+    ]
 
 
 def test_forces_are_told_a_hundred_times_a_second_at_most(node):

@@ -277,6 +277,8 @@ void BridgeRos::publishSample(const Snapshot& snapshot) {
   const RobotSample& sample = snapshot.sample;
   const ros::Time stamp = coglab_rt::toRos(sample.stamp_ns);
   joint_message_.header.stamp = stamp;
+  // The stamp is the time of receipt, late on a busy computer; who differentiates needs this one.
+  joint_message_.header.frame_id = std::to_string(sample.controller_ns);
   copyJoints(sample.position, joint_message_.position);
   copyJoints(sample.velocity, joint_message_.velocity);
   copyJoints(sample.torque, joint_message_.effort);

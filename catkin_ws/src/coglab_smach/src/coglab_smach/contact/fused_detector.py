@@ -175,12 +175,14 @@ class FusedDetector:
             self.set_payload(0.0)
         return event
 
-    def feed_measured(self, stamp: float, position: Joints, torque: Joints) -> ContactEvent | None:
-        """Joints and torques as measured (rad, Nm)."""
+    def feed_measured(
+        self, stamp: float, position: Joints, torque: Joints, made: float | None = None
+    ) -> ContactEvent | None:
+        """Joints and torques as measured (rad, Nm); ``made``: see MomentumObserver.feed."""
         if self.moving is None:
             return None
         self._follow_clock(stamp)
-        self.moving.feed(stamp, position, torque)
+        self.moving.feed(stamp, position, torque, made)
         if self._lift is not None:
             return self._watch_lift(stamp, self._lift)
         if self._leaving is not None:

@@ -23,6 +23,8 @@ Joints = Sequence[float] | np.ndarray
 
 LONGEST_GAP = 0.05
 """s between two samples that the observer bridges; after a longer one it begins anew"""
+SILENCE = 1.0
+"""s without a sample, after which the robot may have begun a new session, whose time does not follow the old one"""
 BESIDE = 0.4
 """periods by which a stamp may lie beside the grid of the measurements; farther away nobody can say how many have
 passed, and one too many or too few would look like a push"""
@@ -93,6 +95,7 @@ class MomentumObserver:
     def reset(self) -> None:
         """Forget everything."""
         self._stamp: float | None = None
+        self._made: float | None = None
         self._grid = 0.0
         self._position = self._torque = np.zeros(7)
         self._step = 0.0
@@ -108,15 +111,17 @@ class MomentumObserver:
         self._dynamics.set_payload(mass, np.asarray(centre, dtype=float))
         self.reset()
 
-    def feed(self, stamp: float, position: Joints, torque: Joints) -> Residual | None:
-        """One sample: s, rad, Nm. None while too few samples have followed each other."""
+    def feed(self, stamp: float, position: Joints, torque: Joints, made: float | None = None) -> Residual | None:
+        """One sample: s, rad, Nm. None while too few samples have followed each other. ``made``: s, the robot's time
+        of the measurement, if it is known: then no stamp counts, which a busy computer gives too late."""
         q, tau = np.asarray(position, dtype=float), np.asarray(torque, dtype=float)
         if not (math.isfinite(stamp) and np.isfinite(q).all() and np.isfinite(tau).all()):
             return None
-        step = self._since_last(stamp)
+        step = self._since_last(stamp, made)
         if step is None:
             self.reset()
             self._grid = stamp
+        self._made = made
         if step == 0.0:
             return None
         if step is not None and step < 0.0:  # the estimate stays, velocities begin anew
@@ -127,12 +132,15 @@ class MomentumObserver:
         self._stamp, self._position, self._torque = stamp, q, tau
         return None if step is None else self._advance(stamp, step, last_position, last_torque)
 
-    def _since_last(self, stamp: float) -> float | None:
+    def _since_last(self, stamp: float, made: float | None) -> float | None:
         """s since the last sample; None if this one does not follow it; 0 for one that was there already; negative
         where nobody can say."""
-        if self._stamp is None:
+        if self._stamp is None or (made is None) != (self._made is None):
             return None
         step = stamp - self._stamp
+        if made is not None and self._made is not None:
+            step = made - self._made
+            return step if 0.0 <= step <= LONGEST_GAP and abs(stamp - self._stamp) <= SILENCE else None
         if step == 0.0 or not -LONGEST_GAP <= step <= LONGEST_GAP:
             return 0.0 if step == 0.0 else None
         if self.period > 0.0:

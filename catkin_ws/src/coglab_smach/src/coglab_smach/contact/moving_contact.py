@@ -151,16 +151,19 @@ class MovingContact:
             self._rest = rest + share * (residual.torque - rest)
             self._rest_position, self._rest_stamp = residual.position, residual.stamp
 
-    def feed(self, stamp: float, position: Joints, torque: Joints) -> None:
-        """One sample: s, rad, Nm as measured."""
-        residual = self.residual = self.observer.feed(stamp, position, torque)
+    def feed(self, stamp: float, position: Joints, torque: Joints, made: float | None = None) -> None:
+        """One sample: s, rad, Nm as measured; ``made``: see MomentumObserver.feed."""
+        residual = self.residual = self.observer.feed(stamp, position, torque, made)
         if residual is None:
             return
         if residual.fresh:
             self._forget()
         self._follow_rest(residual)
-        self._growing.append((residual.stamp, residual.torque))
-        while self._growing[0][0] < residual.stamp - GROWTH - 1e-9:
+        now = residual.stamp if made is None else made
+        if self._growing and now < self._growing[-1][0]:
+            self._growing.clear()
+        self._growing.append((now, residual.torque))
+        while self._growing[0][0] < now - GROWTH - 1e-9:
             self._growing.popleft()
         self.change = self._changes.feed(residual, self.load)
         if self.change is not None:
