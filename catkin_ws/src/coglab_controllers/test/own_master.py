@@ -11,7 +11,7 @@ from contextlib import contextmanager
 
 import rosgraph
 
-LIMIT = 20.0  # s, to begin and to end
+LIMIT = 120.0  # s, to begin and to end
 
 
 @contextmanager

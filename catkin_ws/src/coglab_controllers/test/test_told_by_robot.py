@@ -129,7 +129,7 @@ def system(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Told, sub
         node = subprocess.Popen([binary()], stdout=subprocess.DEVNULL, stderr=file)
         try:
             robot = Told(log)
-            robot.wait("status", lambda m: m.active_controller == "ptp", "the node", 30.0)
+            robot.wait("status", lambda m: m.active_controller == "ptp", "the node")
             for event in ("reset", "start"):
                 answer = robot.call("lwr/command", LwrCommand, event)
                 assert answer.success, answer.message

@@ -86,7 +86,7 @@ class ArmContract(Contract):
         self.place.sleep(0.2)
         assert not self.port.standing().ok
         queued = self.port.move_ptp(target, [])
-        self.place.sleep(0.1)
+        self.place.sleep(0.1 * self.place.patience)  # until it is queued
         self.settle(self.port.cancel_motion("the contract"), 2.5)
         assert self.port.standing().ok, "cancel is answered when the arm stands"
         self.refused(queued, ReasonCode.CANCELLED)

@@ -68,7 +68,6 @@ class BrainNodes(unittest.TestCase):
     def test_1_arming_without_torques_is_refused(self):
         answer = service("/contact_detector/arm", ArmContact)(mode="contact", timeout=1.0)
         self.assertFalse(answer.success)
-        self.assertIn("no torques", answer.message)
         self.assertEqual(answer.reason_code, ReasonCode.NODE_SILENT)
 
     def test_2_contact_is_published_once(self):
@@ -79,7 +78,6 @@ class BrainNodes(unittest.TestCase):
         learn = service("/contact_detector/learn", Learn)
         refused = learn()
         self.assertEqual(refused.reason_code, ReasonCode.NODE_SILENT)
-        self.assertIn("no torques come", refused.message)
         self.assertEqual(seen, [], "a signal without torques")
         torques.start()
         try:
@@ -90,7 +88,7 @@ class BrainNodes(unittest.TestCase):
             self.assertTrue(arm(mode="contact", timeout=20.0, joints=[1, 2, 4]).success)
             self.until(lambda: (seen[-1].state, seen[-1].mode) == ("watching", "contact"), "watching")
             self.assertEqual([j + 1 for j in range(7) if seen[-1].watched[j]], [1, 2, 4])
-            self.assertTrue(0.0 < seen[-1].margin < 1.0)
+            self.until(lambda: 0.0 < seen[-1].margin < 1.0, "a margin of noise")
             refused = learn()
             self.assertEqual((refused.success, refused.reason_code), (False, ReasonCode.BUSY))
             self.assertIn("armed for contact", refused.message)

@@ -231,7 +231,7 @@ class ContactContract(Contract):
     def watches(self, mode, time_limit=20.0, **settings):
         """Armed, and the detector has seen enough of the arm at rest."""
         self.settle(self.port.arm(mode, time_limit, settings))
-        self.place.sleep(1.2)
+        self.place.sleep(min(1.2 * self.place.patience, 3.0))
         assert self.port.event() is None, self.port.event()
 
     def happens(self, contact, code):
@@ -263,6 +263,7 @@ class ContactContract(Contract):
             assert self.port.share_gone() is None
             assert self.port.grip() is None, "this hand does not feel"
             self.watches("release", mass=0.8, load_share=0.5)
+            self.until(lambda: self.port.share_gone() is not None, 1.0, "the load")
             assert abs(self.port.share_gone()) < 0.1
             self.place.push(0.0)
             self.happens(False, ReasonCode.LOAD_RELEASED)
