@@ -104,7 +104,7 @@ def test_wrong_release(checkout):
 APT_GET = """#!/bin/sh
 umask >"$UMASK_LOG"
 case "$*" in
-  *indextargets*) echo "$APT_SUITE" ;;
+  *indextargets*) . /etc/os-release; printf '%s\n' "$VERSION_CODENAME" "$VERSION_CODENAME-updates" $APT_SUITE ;;
   *install*) echo "E: Unable to correct problems, you have held broken packages."; exit 100 ;;
 esac
 """
