@@ -19,7 +19,7 @@ using Clock = std::chrono::steady_clock;
 constexpr double kLateShare = 0.2;
 // Periods behind schedule after which the schedule starts anew instead of catching up.
 constexpr int kGiveUp = 5;
-constexpr double kPatience = 0.5;            // s for a late answer, where the cell waits for them
+constexpr double kPatience = 1.5;  // s from one answer to the next, where the cell waits for them
 constexpr std::size_t kMaxRecords = 100000;  // if nobody takes them
 
 }  // namespace
@@ -67,11 +67,11 @@ void RealTimeCell::run() {
   };
   auto period = periodNow();
   auto deadline = Clock::now();
-  auto sent_at = deadline;
+  auto sent_at = deadline, answered_at = deadline - std::chrono::hours(1);
   bool sent_late = false, answered = false;
   std::array<std::uint8_t, 2048> buffer{};
   while (running_) {
-    const bool answered_before = std::exchange(answered, false);
+    answered = false;
     const auto listenUntil = [&](Clock::time_point until, bool for_one) {
       for (;;) {
         const long size = socket_.receive(buffer.data(), buffer.size(), until);
@@ -80,6 +80,7 @@ void RealTimeCell::run() {
             std::chrono::duration<double>(Clock::now() - sent_at).count() * factor_;
         cell_.receive(buffer.data(), static_cast<std::size_t>(size), latency);
         answered = true;
+        answered_at = Clock::now();
         // A flood of datagrams does not stop the clock.
         if (for_one || Clock::now() >= until) return;
       }
@@ -88,9 +89,9 @@ void RealTimeCell::run() {
     const bool expected = cell_.sent() && !sent_late;  // an answer, within the period that ends
     const bool unanswered = expected && !answered;
     // The PC answers, but this computer is too busy: simulated time stands until it does.
-    if (waits_ && answered_before && cell_.sent() && !answered)
-      listenUntil(deadline + std::chrono::duration_cast<Clock::duration>(
-                                 std::chrono::duration<double>(kPatience)),
+    if (waits_ && cell_.sent() && !answered)
+      listenUntil(answered_at + std::chrono::duration_cast<Clock::duration>(
+                                    std::chrono::duration<double>(kPatience)),
                   true);
     const auto now = Clock::now();
     const double behind = std::chrono::duration<double>(now - deadline).count();
