@@ -1,11 +1,18 @@
-# Sourced by docker/test and docker/run: finds a container engine that really starts a container, and a Debian 12 base.
-# Sets: engine_build (array), engine_run (array). Uses a registry only if the base image is neither present nor makeable.
+# Sourced by docker/test, docker/run and docker/prove_bare. Reads --suite bookworm|trixie (Debian 12 or 13) off their arguments.
+# prepare_engine finds a container engine that really starts a container, and a base image of that suite, and sets
+# engine_build and engine_run (arrays). It uses a registry only if the base image is neither present nor makeable.
 
 say() { printf '[container] %s\n' "$*" >&2; }
 die() { local status=$1; shift; say "error: $*"; exit "$status"; }
 
-base=debian:bookworm
-image=coglab:latest
+suite=bookworm
+if [ "${1:-}" = --suite ]; then
+  suite=${2:-}
+  shift $(($# < 2 ? $# : 2))
+fi
+case $suite in bookworm | trixie) ;; *) die 2 "no suite named '$suite'; there are: bookworm trixie" ;; esac
+base=debian:$suite
+image=coglab:$suite
 # podman's defaults ask for more than some hosts' hard limits allow; these stay below them
 limits=(--ulimit "nofile=$(ulimit -Hn):$(ulimit -Hn)" --ulimit nproc=30000:30000)
 
@@ -24,15 +31,20 @@ find_engine() {
 
 have_base() { "${engine[@]}" image inspect "$base" >/dev/null 2>&1 || "${engine[@]}" image inspect "localhost/$base" >/dev/null 2>&1; }
 
-make_base() { # a minimal tree by debootstrap, with this machine's package sources
+make_tree() { # make_tree FOLDER: a minimal Debian of the suite, from this machine's mirror
+  local mirror
+  mirror=$({ apt-get indextargets --format '$(SITE)' 'Created-By: Packages' 'Label: Debian' 2>/dev/null
+    echo http://deb.debian.org/debian; } | sed -n 1p)
+  debootstrap --variant=minbase "$suite" "$1" "$mirror" >"$1.log" 2>&1
+}
+
+make_base() {
   command -v debootstrap >/dev/null || return 1
   [ "$(id -u)" = 0 ] || return 1
-  local tree mirror
+  local tree
   tree=$(mktemp -d)
-  mirror=$(apt-get indextargets --format '$(SITE)' 'Created-By: Packages' 2>/dev/null | grep -v security | head -n1)
-  [ -n "$mirror" ] || return 1
   say "making the base image with debootstrap ..."
-  if debootstrap --variant=minbase bookworm "$tree" "$mirror" >"$tree.log" 2>&1; then
+  if make_tree "$tree"; then
     rm -f "$tree"/etc/resolv.conf "$tree"/etc/hostname "$tree"/var/cache/apt/archives/*.deb
     tar -C "$tree" --numeric-owner -c . | "${engine[@]}" import - "$base" >/dev/null
   fi
@@ -62,6 +74,6 @@ prepare_engine() {
   find_way
   engine_build=("${engine[@]}" build)
   [ "${engine[0]}" = docker ] || engine_build+=(--isolation=chroot)
-  engine_build+=(--network host -f "$top/docker/Dockerfile" -t "$image" "$top")
+  engine_build+=(--network host --build-arg "SUITE=$suite" -f "$top/docker/Dockerfile" -t "$image" "$top")
   engine_run=("${engine[@]}" run --rm "${extra[@]}")
 }

@@ -19,7 +19,7 @@ import tf2_ros
 from coglab_bringup import scene
 from coglab_msgs.msg import DmpFeedback, MasterState
 from coglab_perception.tf_listener import TfListener
-from coglab_py import parameters
+from coglab_py import parameters, steady
 from coglab_py.alone import init_node
 from visualization_msgs.msg import MarkerArray
 
@@ -82,27 +82,23 @@ class SceneMarkers:
         _, points, _ = cc.Dmp(chosen, position=start, goal=target).roll_out(target, 1.5 * chosen.duration, 0.02)
         return [scene.goal(target), scene.path(np.asarray(points))]
 
-    def run(self) -> None:
-        """Publishes until shut-down."""
-        while not rospy.is_shutdown():
-            markers = [scene.pedestal(), *self.motion()]
-            board = self.place("board")
-            if board is not None:
-                markers += scene.board(self.board_size, board[2])
-            if self.words:
-                markers.append(scene.text(self.words))
-            self.publisher.publish(MarkerArray(markers))
-            rospy.sleep(PERIOD)
+    def draw(self) -> None:
+        """Publishes everything."""
+        markers = [scene.pedestal(), *self.motion()]
+        board = self.place("board")
+        if board is not None:
+            markers += scene.board(self.board_size, board[2])
+        if self.words:
+            markers.append(scene.text(self.words))
+        self.publisher.publish(MarkerArray(markers))
 
 
 def main() -> int:
     """Entry point."""
     init_node("scene_markers")
-    try:
-        SceneMarkers().run()
-    except rospy.ROSInterruptException:
-        pass
-    return 0
+    markers = SceneMarkers()
+    steady.SteadyTimer(PERIOD, markers.draw, "markers")
+    return steady.spin()
 
 
 if __name__ == "__main__":

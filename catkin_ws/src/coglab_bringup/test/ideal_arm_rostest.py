@@ -15,7 +15,7 @@ import rostest
 sys.path.insert(0, rospkg.RosPack().get_path("coglab_controllers") + "/test")
 from coglab_msgs.msg import ControllerStatus, FeedbackStatus, LwrState, ReasonCode
 from coglab_msgs.srv import AddPtpRequest, FeedbackSelect, LwrCommand
-from robot_fixture import HOME, JOINTS, Robot, end_within, robot_processes, wait_until
+from robot_fixture import HOME, JOINTS, Robot, end_all, robot_processes, wait_until
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
@@ -44,7 +44,7 @@ class IdealArm(unittest.TestCase):
         self.assertEqual((state.supervisor, state.motion_allowed), ("monitor", False))
         self.assertEqual(state.reason_code, ReasonCode.NOT_IN_COMMAND_MODE)
         self.assertIn("rosservice call /lwr/command start", state.reason)
-        wait_until(lambda: self.robot.manager("get_active_controller").controller_id == "ptp", 20.0, "ptp active")
+        wait_until(lambda: self.robot.manager("get_active_controller").controller_id == "ptp", "ptp active")
         self.assertEqual(self.robot.manager("list_controllers").controller_ids[:2], ["dmp", "ptp"])
         refused = self.robot.add_ptp(AWAY)
         self.assertEqual(refused.status, AddPtpRequest.REJECTED)
@@ -58,7 +58,7 @@ class IdealArm(unittest.TestCase):
         told: list[ControllerStatus] = []
         rospy.Subscriber("controller_manager/status", ControllerStatus, told.append)
         count = len(self.states)
-        wait_until(lambda: len(told) >= 4 and len(self.states) >= count + 4, 20.0, "four messages more of each")
+        wait_until(lambda: len(told) >= 4 and len(self.states) >= count + 4, "four messages more of each")
         self.assertEqual(len({(one.state, one.active_controller, one.plan_generation) for one in told[1:]}), 1)
 
     def test_2_goes_from_point_to_point(self) -> None:
@@ -71,12 +71,12 @@ class IdealArm(unittest.TestCase):
         robot = self.robot
         motion = robot.add_ptp(HOME)
         self.assertEqual(motion.status, AddPtpRequest.STARTED, motion.message)
-        wait_until(lambda: max(abs(v) for v in robot.joints.velocity) > 0.1, 10.0, "in motion")
+        wait_until(lambda: max(abs(v) for v in robot.joints.velocity) > 0.1, "in motion")
         self.events.publish("hold")
-        wait_until(lambda: robot.state.hold_latched, 10.0, "hold")
+        wait_until(lambda: robot.state.hold_latched, "hold")
         self.assertEqual((robot.state.supervisor, robot.state.reason_code), ("holding", ReasonCode.HELD))
-        wait_until(lambda: not any(robot.joints.velocity), 10.0, "stand-still")
-        wait_until(lambda: motion.ptp_id in robot.unfinished, 10.0, "unfinished_ptp")
+        wait_until(lambda: not any(robot.joints.velocity), "stand-still")
+        wait_until(lambda: motion.ptp_id in robot.unfinished, "unfinished_ptp")
         held = robot.arm()
         refused = self.command("start")
         self.assertEqual((refused.success, refused.reason_code), (False, ReasonCode.HELD))
@@ -84,7 +84,7 @@ class IdealArm(unittest.TestCase):
         time.sleep(0.3)
         self.assertEqual(robot.arm(), held)
         self.assertTrue(self.command("reset").success)
-        wait_until(lambda: robot.state.motion_allowed, 10.0, "motion allowed")
+        wait_until(lambda: robot.state.motion_allowed, "motion allowed")
         self.assertEqual(robot.arm(), held)  # what ran before the hold is over
         robot.go(HOME)
 
@@ -104,8 +104,8 @@ class IdealArm(unittest.TestCase):
             answers.append(robot.execute())
             return answers[-1].success
 
-        wait_until(begun, 10.0, "execute_dmp")
-        wait_until(lambda: robot.feedback.state == "reached", 20.0, "reached")
+        wait_until(begun, "execute_dmp")
+        wait_until(lambda: robot.feedback.state == "reached", "reached")
         self.assertLess(robot.feedback.remaining_distance, 0.006)
 
     def test_5_modes_with_forces_are_refused(self) -> None:
@@ -117,7 +117,7 @@ class IdealArm(unittest.TestCase):
 
     def test_6_a_stop_needs_a_start(self) -> None:
         self.assertTrue(self.command("stop").success)
-        wait_until(lambda: self.robot.state.supervisor == "monitor", 10.0, "monitor")
+        wait_until(lambda: self.robot.state.supervisor == "monitor", "monitor")
         self.assertFalse(self.robot.state.motion_allowed)
         epochs = [state.motion_epoch for state in self.states]
         self.assertEqual(epochs, sorted(epochs))
@@ -125,8 +125,8 @@ class IdealArm(unittest.TestCase):
     def test_7_ends_at_once_and_comes_again(self) -> None:
         first = robot_processes()
         self.assertEqual(len(first), 1)
-        end_within(first, 10.0)
-        wait_until(lambda: robot_processes() not in ([], first), 20.0, "a new process")
+        end_all(first)
+        wait_until(lambda: robot_processes() not in ([], first), "a new process")
 
 
 if __name__ == "__main__":

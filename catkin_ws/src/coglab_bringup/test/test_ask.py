@@ -59,14 +59,14 @@ def brain():
     master = subprocess.Popen(["rosmaster", "--core", "-p", str(port)], stdout=subprocess.DEVNULL)
     import rosgraph
 
-    end = time.monotonic() + 30.0
+    end = time.monotonic() + 60.0
     while not rosgraph.is_master_online() and time.monotonic() < end:
         time.sleep(0.05)
     double = BrainDouble()
     assert brain_of(os.environ["ROS_MASTER_URI"])
     yield double
     master.terminate()
-    master.wait(10)
+    master.wait(60.0)
 
 
 def begin(*words: str) -> subprocess.Popen:

@@ -44,6 +44,8 @@ def checkout():
     folder.chmod(0o777)
     shutil.copy(TOP / "coglab", folder)
     (folder / "debian-packages.txt").write_text(f"run: {ABSENT}\nbuild: {ABSENT}\n")
+    for path in folder.iterdir():
+        path.chmod(0o755)  # whatever umask this checkout was made with
     yield folder
     shutil.rmtree(folder)
 
@@ -95,8 +97,52 @@ def test_wrong_release(checkout):
     ended = run("unshare", "--mount", "sh", "-c", script, "sh", other, checkout / "coglab")
     assert ended.returncode == 1
     (error,) = lines_of(ended.stdout)
-    assert "Debian 12 (bookworm) is expected" in error and "Ubuntu 20.04" in error and "docker/run" in error
+    assert "(bookworm) or Debian 13 (trixie)" in error and "Ubuntu 20.04" in error and "docker/run" in error
     assert not (checkout / ".coglab").exists()
+
+
+APT_GET = """#!/bin/sh
+umask >"$UMASK_LOG"
+case "$*" in
+  *indextargets*) echo "$APT_SUITE" ;;
+  *install*) echo "E: Unable to correct problems, you have held broken packages."; exit 100 ;;
+esac
+"""
+
+
+@needs("unshare", "--mount", "true")
+@pytest.mark.parametrize("suite, advice", [("sid", "/etc/apt also names sid"), ("", "to go on by hand: apt-get")])
+def test_packages_that_cannot_be_installed(checkout, suite, advice):
+    """An upgrade of Debian that is half done is named; umask 077 of the caller does not reach Debian's packages."""
+    tool = checkout / "apt-get"
+    tool.write_text(APT_GET)
+    tool.chmod(0o755)
+    script = 'umask 077; mount --bind "$1" /usr/bin/apt-get && exec "$2" build'
+    log = checkout / "umask"
+    words = ("unshare", "--mount", "sh", "-c", script, "sh", tool, checkout / "coglab")
+    ended = run(*words, APT_SUITE=suite, UMASK_LOG=str(log))
+    assert ended.returncode == 1 and "held broken packages" in ended.stdout
+    (error,) = lines_of(ended.stdout)
+    assert advice in error and log.read_text() == "0022\n"
+
+
+def test_path_with_a_space(checkout, tmp_path):
+    folder = tmp_path / "my robot"
+    shutil.copytree(checkout, folder)
+    ended = run(folder / "coglab", "build")
+    assert ended.returncode == 1 and f"'{folder}'" in lines_of(ended.stdout)[0]
+    assert sorted(path.name for path in folder.iterdir()) == ["coglab", "debian-packages.txt"]
+
+
+@needs("unshare", "--mount", "true")
+def test_full_disk(workspace, tmp_path):
+    script = (
+        'mount -t tmpfs -o size=20m small "$1" && cp -r "$2/." "$1" && "$1/coglab" build; ls -A "$1" "$1/catkin_ws"'
+    )
+    ended = run("unshare", "--mount", "sh", "-c", script, "sh", tmp_path, workspace)
+    (error,) = lines_of(ended.stdout)
+    assert f"needs 300 MB, and {tmp_path}/catkin_ws has " in error
+    assert ".coglab" not in ended.stdout and ended.stdout.splitlines()[-1] == "src"
 
 
 def test_doctor_names_a_missing_package_and_the_way_to_it(checkout):

@@ -54,8 +54,9 @@ def checkout(tmp_path):
     return Checkout(tmp_path)
 
 
-def expected_build(top: Path) -> list[str]:
-    return ["build", "--network", "host", "-f", f"{top}/docker/Dockerfile", "-t", "coglab:latest", str(top)]
+def expected_build(top: Path, suite: str = "bookworm") -> list[str]:
+    image = ["--build-arg", f"SUITE={suite}", "-f", f"{top}/docker/Dockerfile", "-t", f"coglab:{suite}"]
+    return ["build", "--network", "host", *image, str(top)]
 
 
 @pytest.mark.parametrize(
@@ -68,16 +69,24 @@ def test_run_builds_what_is_there_now_and_runs_the_command_in_it(checkout, words
         checkout.log.unlink(missing_ok=True)
         ended = checkout.run("run", *words)
         assert ended.returncode == 0, ended.stderr
-        mounted = ["-v", f"{checkout.top}/out:/coglab/out", "coglab:latest"]
+        mounted = ["-v", f"{checkout.top}/out:/coglab/out", "coglab:bookworm"]
         assert checkout.asked() == [expected_build(checkout.top), [*IN_CONTAINER, *mounted, *command]]
     assert (checkout.top / "out").is_dir()
 
 
 def test_test_runs_the_tests_named_without_a_network(checkout):
-    ended = checkout.run("test", "--long", "ctrl_more")
+    ended = checkout.run("test", "--suite", "trixie", "--long", "ctrl_more")
     assert ended.returncode == 0, ended.stderr
-    tests = [*IN_CONTAINER, "coglab:latest", "./coglab", "test", "--long", "ctrl_more"]
-    assert checkout.asked() == [expected_build(checkout.top), tests]
+    tests = [*IN_CONTAINER, "coglab:trixie", "./coglab", "test", "--long", "ctrl_more"]
+    assert checkout.asked() == [expected_build(checkout.top, "trixie"), tests]
+
+
+@pytest.mark.parametrize("script", ["run", "test"])
+@pytest.mark.parametrize("words", [["--suite", "focal"], ["--suite"]])
+def test_unknown_suite_is_named(checkout, script, words):
+    ended = checkout.run(script, *words)
+    assert ended.returncode == 2 and "there are: bookworm trixie" in ended.stderr
+    assert not checkout.log.exists()
 
 
 @pytest.mark.parametrize("script", ["run", "test"])

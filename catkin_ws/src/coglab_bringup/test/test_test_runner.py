@@ -1,14 +1,14 @@
 """The runner that counts all other tests must not lie: red, dead, hanging and empty programs are told apart."""
 
+import os
 import signal
 import sys
-import time
 from pathlib import Path
 
 import pytest
-from coglab_bringup import test_runner
+from coglab_bringup import arguments, process_tree, test_runner
 from coglab_bringup.arguments import test_options as options_of_test
-from coglab_bringup.test_runner import BESIDE, FIRST, Program, find_programs, in_groups, report, run
+from coglab_bringup.test_runner import FIRST, Program, find_programs, longest_first, report, run
 from coglab_bringup.usage import Refused
 
 GREEN = (
@@ -86,7 +86,7 @@ def test_a_package_that_the_build_left_out_is_not_tested(tmp_path):
         (package / "package.xml").write_text(f"<package><name>{name}</name></package>")
         (package / "test" / "test_it.py").write_text("")
     assert len(find_programs(tmp_path, tmp_path, sys.executable, [])) == 2
-    assert options_of_test(tmp_path, ["smach"]).packages == ["smach"]
+    assert [one.package for one in options_of_test(tmp_path, ["smach"]).tests] == ["smach"]
     (tmp_path / "catkin_ws" / "build").mkdir()
     cache = tmp_path / "catkin_ws" / "build" / "CMakeCache.txt"
     cache.write_text("A:STRING=b\nCATKIN_BLACKLIST_PACKAGES:STRING=smach;smach_msgs;smach_ros\nC:BOOL=ON\n")
@@ -109,49 +109,69 @@ def package_with(top, *files: tuple[str, str]) -> None:
         (package / "test" / name).write_text(text)
 
 
-def test_a_rostest_runs_alone_unless_its_file_says_that_it_may_have_others_beside_it(tmp_path):
-    package_with(
-        tmp_path,
-        ("test_it.py", ""),
-        ("busy.test", "<launch/>"),
-        ("resting.test", f"<launch>\n  {BESIDE} it waits. -->\n</launch>"),
-    )
-    groups = in_groups(find_programs(tmp_path, tmp_path, sys.executable, []))
-    assert [[(one.name, one.beside) for one in group] for group in groups] == [
-        [("test_it.py", 2)],
-        [("resting.test", 2)],
-        [("busy.test", 1)],
-    ]
+def test_a_word_names_a_package_a_file_or_a_case(tmp_path):
+    package_with(tmp_path, ("test_a.py", ""), ("test_b.cpp", ""), ("c.test", "<launch/>"))
+
+    def chosen(*words):
+        wanted = options_of_test(tmp_path, list(words)).tests
+        return {one.name: one.command[-1] for one in find_programs(tmp_path, tmp_path, sys.executable, wanted)}
+
+    assert set(chosen("pkg")) == {"test_a.py", "pkg_test_b", "c.test"}
+    assert set(chosen("pkg/c.test")) == {"c.test"}
+    assert chosen("pkg/test_a.py::test_one")["test_a.py"].endswith("test_a.py::test_one")
+    assert chosen("pkg/test_a.py::test_one", "pkg/test_a.py")["test_a.py"].endswith("test_a.py")
+    two = chosen("pkg/test_b.cpp::Thing.one", "pkg/test_b.cpp::Thing.two")
+    assert two == {"pkg_test_b": "--gtest_filter=*Thing.one*:*Thing.two*"}
+    for words, names in ((["pkg/d.test"], "c.test, test_a.py"), (["pkg/c.test::x"], "c.test"), (["other"], "pkg")):
+        with pytest.raises(Refused) as refusal:
+            options_of_test(tmp_path, words)
+        assert names in str(refusal.value)
 
 
-def test_who_has_others_beside_it_never_meets_who_runs_alone(tmp_path, monkeypatch):
-    resting = f"{BESIDE} it waits. -->"
-    package_with(
-        tmp_path, *((f"alone_{i}.test", "") for i in range(2)), *((f"resting_{i}.test", resting) for i in range(4))
+def test_a_named_test_builds_what_it_needs(tmp_path):
+    package_with(tmp_path, ("test_a.py", "import needed"), ("test_b.cpp", ""))
+    for name in ("needed", "other"):
+        (tmp_path / "catkin_ws" / "src" / name).mkdir()
+        (tmp_path / "catkin_ws" / "src" / name / "package.xml").write_text(f"<package><name>{name}</name></package>")
+    rules = tmp_path / "catkin_ws" / "build" / "CMakeFiles" / "Makefile2"
+    rules.parent.mkdir(parents=True)
+    rules.write_text(
+        "".join(
+            f"CMakeFiles/tests.dir/all: {name}/CMakeFiles/{name}_test_{thing}.dir/all\n"
+            for name, thing in (("pkg", "b"), ("other", "x"))
+        )
     )
-    ran: dict[str, tuple[float, float]] = {}
+    wanted = options_of_test(tmp_path, ["pkg"]).tests
+    assert arguments.test_targets(tmp_path, wanted) == ["needed/all", "pkg/CMakeFiles/pkg_test_b.dir/all", "pkg/all"]
+    wanted = options_of_test(tmp_path, ["pkg/test_b.cpp::x"]).tests
+    assert arguments.test_targets(tmp_path, wanted) == ["pkg/CMakeFiles/pkg_test_b.dir/all"]
+
+
+def test_what_is_not_the_same_in_each_run_is_listed(tmp_path, monkeypatch, capsys):
+    """With two busy processes beside it, that end with the run."""
+    package_with(tmp_path, ("test_a.py", ""), ("test_b.py", ""))
+    ends = iter((1, 0, 1, 1))  # cases passed by each program: test_b is red in the first run
+    seen: set[int] = set()
 
     def pretend(program: Program, _log, _limit: float) -> None:
-        begin = time.monotonic()
-        time.sleep(0.1)
-        ran[program.name] = (begin, time.monotonic())
-        program.passed = 1
+        passed = next(ends)
+        program.passed, program.failed = passed, 1 - passed
+        program.cases = {"one": "passed" if passed else "failed"}
+        seen.update(process_tree.descendants(os.getpid()))
 
+    monkeypatch.setattr(test_runner, "AT_A_TIME", 1)
     monkeypatch.setattr(test_runner, "run", pretend)
     monkeypatch.setenv("COGLAB_TOP", str(tmp_path))
-    assert test_runner.main(["--out", str(tmp_path / "out")]) == 0
-    assert len(ran) == 6
-    at_begin = {name: [other for other, (a, b) in ran.items() if a <= begin < b] for name, (begin, _) in ran.items()}
-    assert max(len(running) for running in at_begin.values()) == 2, at_begin
-    for name in ("alone_0.test", "alone_1.test"):
-        begin, end = ran[name]
-        assert [other for other, (a, b) in ran.items() if a < end and begin < b] == [name], ran
+    assert test_runner.main(["--out", str(tmp_path / "out"), "--repeat", "2", "--load"]) == 1
+    told = capsys.readouterr().out
+    assert "DIFFERS pkg test_b.py: one" in told and "failed in run 1\n" in told and "passed in run 2\n" in told
+    assert str(tmp_path / "out" / "run_1" / "logs" / "pkg.test_b.py.log") in told
+    assert "test_a.py: one" not in told
+    assert len(seen) == 2 and not seen & set(process_tree.descendants(os.getpid()))
 
 
-def test_what_takes_longest_is_there_and_begins_first(tmp_path):
+def test_what_takes_longest_begins_first(tmp_path):
     programs = find_programs(Path(__file__).resolve().parents[4], tmp_path, sys.executable, [])
-    names = [[one.name for one in group] for group in in_groups(programs)]
-    assert sorted(name for group in names for name in group if name in FIRST) == sorted(FIRST), "each is one program"
-    for group in names:
-        wanted = [name for name in FIRST if name in group]
-        assert group[: len(wanted)] == wanted
+    names = [one.name for one in longest_first(programs)]
+    wanted = [name for name in FIRST if name in names]
+    assert wanted and names[: len(wanted)] == wanted

@@ -106,12 +106,19 @@ def test_refused_before_anything_is_done(bare, words):
     assert not (bare / ".coglab").exists() and not (bare / "out").exists()
 
 
+def test_results_need_space(tmp_path, monkeypatch):
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: shutil._ntuple_diskusage(10**9, 10**9 - 10**7, 10**7))
+    with pytest.raises(Refused, match=f"{tmp_path} has 10 MB left"):
+        judge(TOP, "demo", ["--out", str(tmp_path / "results")])
+    assert not (tmp_path / "results").exists()
+
+
 def test_an_unknown_group_is_refused_where_python_is_missing_too(tmp_path):
     """Arguments are judged by a program of Python's; a bare machine has none yet."""
     for name in ("coglab", "debian-packages.txt"):
         shutil.copy(TOP / name, tmp_path)
     ended = subprocess.run(
-        [tmp_path / "coglab", "install", "run", "vizz"], capture_output=True, text=True, timeout=20, check=False
+        [tmp_path / "coglab", "install", "run", "vizz"], capture_output=True, text=True, timeout=120, check=False
     )
     assert ended.returncode == 2 and "installed" not in ended.stderr
     assert "no group named 'vizz'; there are: browser build run test viz" in ended.stderr

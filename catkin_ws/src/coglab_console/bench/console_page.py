@@ -20,7 +20,8 @@ LOADED = (
     " && performance.getEntriesByName('first-contentful-paint').length > 0"
 )
 FILLED = {  # what a page has when all of it is there
-    "Live": ("#graph .node.active", "#charts .last canvas"),
+    "Live": ("#charts .last canvas",),
+    "Machine": ("#graph .node.active",),
     "Experiment": ("#page form",),
     "Contact": ("#page .bar",),
     "Objects": ("#object-problems li", "#page td"),

@@ -93,7 +93,7 @@ function sideReason() {
   const words = h('span', { class: 'why', id: 'why-side' });
   watch(words, () => {
     const [object, speed] = [blocked('select_object'), blocked('speed_scale')];
-    setText(words, object || speed);
+    setText(words, (object || speed).split(';')[0]); // one short line
   });
   return words;
 }

@@ -115,26 +115,26 @@ function optionsOf(strip, last) {
     drawGrid: true,
     gridLineColor: '#dde2e6',
     axisLineColor: '#8b939b',
-    axes: { x: { drawAxis: last, axisLabelFormatter: axis, valueFormatter: axis, axisLabelWidth: 40, pixelsPerLabel: 90 }, y: { axisLabelWidth: 38, pixelsPerLabel: 17, axisLabelFormatter: (value) => String(Number(value.toPrecision(2))) } },
+    axes: { x: { drawAxis: last, axisLabelFormatter: axis, valueFormatter: axis, axisLabelWidth: 40, pixelsPerLabel: 60 }, y: { axisLabelWidth: 38, pixelsPerLabel: 17, axisLabelFormatter: (value) => String(Number(value.toPrecision(2))) } },
     dateWindow: [-WINDOW, 0],
   };
 }
 
 /** A name of the legend with a piece of its line, as the chart draws it. */
 function legend(name, i) {
-  const line = svg('line', { x1: 0, y1: 5, x2: 26, y2: 5, stroke: COLOURS[i], 'stroke-width': 3, ...(DASHES[i] && { 'stroke-dasharray': DASHES[i].join(' ') }) });
-  return h('i', {}, svg('svg', { width: 26, height: 10, 'aria-hidden': 'true' }, line), name);
+  const line = svg('line', { x1: 0, y1: 5, x2: 22, y2: 5, stroke: COLOURS[i], 'stroke-width': 3, ...(DASHES[i] && { 'stroke-dasharray': DASHES[i].join(' ') }) });
+  return h('i', {}, svg('svg', { width: 22, height: 10, 'aria-hidden': 'true' }, line), name);
 }
 
 export function showCharts(parent) {
   const canvas = h('canvas', { role: 'img', 'aria-label': 'Phases' });
-  parent.append(h('div', { class: 'strip phases' }, h('div', { class: 'name' }, 'Phase'), canvas));
+  parent.append(h('div', { class: 'strip phases' }, canvas));
   const note = h('p', { hidden: true }, 'Strip charts need libjs-dygraphs: apt install libjs-dygraphs.');
   for (const [i, strip] of STRIPS.entries()) {
     strip.rows = [];
     strip.place = h('div', { role: 'img', 'aria-label': strip.name });
     const names = strip.series.map((name, k) => legend(name, strip.colours[k]));
-    parent.append(h('div', { class: `strip${i === STRIPS.length - 1 ? ' last' : ''}` }, h('div', { class: 'name' }, strip.name, h('br'), names), strip.place));
+    parent.append(h('div', { class: `strip${i === STRIPS.length - 1 ? ' last' : ''}` }, h('div', { class: 'name' }, h('b', {}, strip.name), names), strip.place));
   }
   parent.append(note);
 
@@ -149,6 +149,10 @@ export function showCharts(parent) {
     });
   }, () => 250);
 
+  new ResizeObserver(() => {
+    if (parent.offsetParent !== null) for (const { chart } of STRIPS) chart?.resize();
+    redraw();
+  }).observe(parent);
   on('state', (state) => {
     rememberPhase(state);
     latest = state.stamp;

@@ -12,7 +12,7 @@ export function blocked(name) {
   const desk = store.docs.desk;
   if (store.lost) return 'not live';
   if (!desk) return 'not connected yet';
-  if (!operating()) return `${desk.roles.operator || 'nobody'} operates`;
+  if (!operating()) return `${desk.roles.operator || 'nobody'} operates; press Take over`;
   return desk.reasons[name] ?? '';
 }
 

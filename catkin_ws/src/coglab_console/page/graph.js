@@ -116,6 +116,7 @@ export function showGraph(parent) {
     picture.setAttribute('viewBox', frameOf(active, extent.button.value === 'follow', picture).join(' '));
   }
 
+  new ResizeObserver(update).observe(picture);
   on('doc', (name) => {
     if (name.startsWith('graph:') || name === 'active') update();
   });

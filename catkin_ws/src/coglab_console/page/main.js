@@ -13,7 +13,7 @@ import { contactPage } from './tab_contact.js';
 import { feedbackPage, objectsPage, primitivesPage } from './tab_lists.js';
 import { healthPage, helpPage, takeOver } from './tab_health.js';
 
-const PAGES = [['Live', null], ['Experiment', experimentPage], ['Contact', contactPage], ['Objects', objectsPage], ['Primitives', primitivesPage],
+const PAGES = [['Live', null], ['Machine', null], ['Experiment', experimentPage], ['Contact', contactPage], ['Objects', objectsPage], ['Primitives', primitivesPage],
   ['Feedback', feedbackPage], ['Events', eventsPage], ['Health', healthPage], ['Help', helpPage]];
 
 const at = (id) => document.getElementById(id);
@@ -27,6 +27,8 @@ function open(name) {
     tab.tabIndex = chosen ? 0 : -1;
   }
   at('live').hidden = Boolean(build);
+  at('live').classList.toggle('machine', name === 'Machine'); // its graph alone
+  setAttribute(at('live'), 'aria-label', name);
   at('page').hidden = !build;
   at('page').replaceChildren();
   setAttribute(at('page'), 'aria-label', name);
@@ -34,7 +36,7 @@ function open(name) {
 }
 
 function makeTabs(bar) {
-  for (const [name] of PAGES) bar.append(h('button', { type: 'button', role: 'tab', id: `tab-${name}`, 'aria-controls': name === 'Live' ? 'live' : 'page', onclick: () => open(name) }, name));
+  for (const [name, build] of PAGES) bar.append(h('button', { type: 'button', role: 'tab', id: `tab-${name}`, 'aria-controls': build ? 'page' : 'live', onclick: () => open(name) }, name));
   bar.addEventListener('keydown', (event) => {
     const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
     if (!step) return;
@@ -70,16 +72,21 @@ function showBand() {
   at('control').append(answer, ' ', control);
   const draw = () => {
     const roles = store.docs.desk?.roles;
-    setText(words, roles ? (operating() ? `you operate (${store.you})` : `you watch (${store.you}); ${roles.operator || 'nobody'} operates`) : '');
+    setText(words, roles ? (operating() ? `you operate (${store.you})` : `you watch (${store.you}); ${roles.operator || 'nobody'} operates; to operate, press Take over`) : '');
     if (operating()) setText(answer, '');
   };
   onDocs(['desk'], draw);
   on('link', draw);
-  onDocs(['model'], () => {
+  onDocs(['model', 'real_time_factor'], () => {
     const model = store.docs.model;
     if (!model) return;
-    setText(at('world'), model.real ? 'REAL ROBOT' : 'SIMULATION');
+    const factor = store.docs.real_time_factor ?? 1;
+    setText(at('world'), model.real ? 'REAL ROBOT' : factor < 1 ? `SIMULATION at ${factor} x real time` : 'SIMULATION');
     at('band').className = model.real ? 'real' : 'simulation';
+  });
+  onDocs(['busy'], () => {
+    setText(at('busy'), store.docs.busy ? `▲ ${store.docs.busy}` : '');
+    at('busy').hidden = !store.docs.busy;
   });
   showSession(at('session'));
 }
@@ -91,8 +98,8 @@ showBand();
 keys(showActions(at('actions')));
 showCause(at('stop-cause'));
 showLog(at('log'));
-showStatus(at('status'));
-showView(at('view'));
+showStatus(at('status'), at('now'));
+showView(at('picture'));
 showGraph(at('graph'));
 showCharts(at('charts'));
 connect();

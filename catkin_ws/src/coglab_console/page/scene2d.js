@@ -59,7 +59,7 @@ export class Scene2D {
     this.drawPath(context, at);
     context.fillStyle = '#1b1f24';
     context.font = '14px "DejaVu Sans", Verdana, sans-serif';
-    context.fillText(view.name, left + 62, 20); // beside the button
+    context.fillText(view.name, left + 8, 20);
   }
 
   drawWorkspace(context, view, at) {

@@ -4,6 +4,8 @@ import { OrbitControls } from '/lib/three/examples/jsm/controls/OrbitControls.js
 import { fixedShapes, robotShapes, robotPoses, objectShape, path, HAND_SHAPES } from './cell.js';
 import { store } from './store.js';
 
+const HALF_HIGH = Math.tan((19 * Math.PI) / 180); // half the height of the picture, at a distance of 1
+const NARROW = 1.5; // width by height below which the picture keeps its width: arm and person stay in it
 const CAMERAS = {
   front: [[1.75, -1.55, 0.75], [0.42, 0.02, 0.24]],
   side: [[0.45, -2.2, 0.5], [0.45, 0, 0.27]],
@@ -173,6 +175,7 @@ export class Scene3D {
       this.height = height;
       this.renderer.setSize(width, height, false);
       this.camera.aspect = width / height;
+      this.camera.fov = (2 * Math.atan(HALF_HIGH * Math.max(1, NARROW / this.camera.aspect)) * 180) / Math.PI;
       this.camera.updateProjectionMatrix();
     }
     this.update();

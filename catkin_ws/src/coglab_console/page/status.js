@@ -5,8 +5,9 @@ import { ageWords } from './cell.js';
 import { clock } from './log.js';
 import { more } from './more.js';
 
-const ROWS = ['Phase', 'Waits', 'FRI', 'Arm', 'Motion', 'Hand', 'Person', 'Object', 'Contact', 'Why', 'Last'];
-const LONG = ['Waits', 'Why', 'Last'];
+const NOW = ['Phase', 'Waits']; // above everything else
+const ROWS = ['FRI', 'Arm', 'Motion', 'Hand', 'Person', 'Object', 'Contact', 'Why', 'Last'];
+const LONG = ['Why', 'Last'];
 const MOST_LINES = 6;
 const OLD = 0.5; // s, sights of perception older than this deserve a mark
 const UNKNOWN = ['fault', 'not known, the brain is silent'];
@@ -51,7 +52,7 @@ function hand({ alive, connected, calibrated, calibrating, holding, motors, mess
   const gone = missing('hand', alive, 'the hand’s program');
   if (gone) return gone;
   if (!connected) return ['fault', message || 'does not answer'];
-  if (calibrating) return ['warn', 'calibrates'];
+  if (calibrating) return ['idle', 'calibrates'];
   if (!calibrated) return ['warn', 'not calibrated'];
   return ['ok', `ready, ${motors}/5 motors, ${holding ? 'holds' : 'empty'}`];
 }
@@ -80,7 +81,7 @@ function contact() {
   if (!store.docs.status.contact.alive) return ['warn', 'no detector, or no torques'];
   if (state === 'waiting') return ['idle', `armed for ${CONTACTS[mode] ?? mode}, until the arm is still`];
   if (margin === null || margin === undefined) return ['idle', `not armed${words ? `; last: ${words}, ${Math.max(0, (store.state?.stamp ?? 0) - stamp).toFixed(0)} s ago` : ''}`];
-  return [margin > 1 ? 'warn' : 'ok', `armed, margin ${margin.toFixed(2)} of 1`];
+  return ['ok', `armed, margin ${margin.toFixed(2)} of 1`];
 }
 
 function phase({ alive, hub, words }, stood) {
@@ -121,9 +122,9 @@ function rows() {
 }
 
 /** The rows, each with the element of its words: { cell, all (mark and words), words, level }. */
-function makeRows(list) {
+function makeRows(names, list) {
   const cells = {};
-  for (const name of ROWS) {
+  for (const name of names) {
     const words = h('span', { 'aria-live': name === 'Phase' ? 'polite' : null });
     const all = h('span', {}, mark('idle'), words);
     const cell = more(h('dd', { class: LONG.includes(name) ? `long ${name.toLowerCase()}` : name.toLowerCase() }, all), all);
@@ -133,9 +134,11 @@ function makeRows(list) {
   return cells;
 }
 
-export function showStatus(parent) {
+export function showStatus(parent, now) {
   const list = h('dl');
-  const cells = makeRows(list);
+  const above = h('dl');
+  const cells = { ...makeRows(NOW, above), ...makeRows(ROWS, list) };
+  now.append(above);
   parent.append(list);
   const update = paced(() => {
     if (!store.docs.status || parent.offsetParent === null) return;

@@ -10,7 +10,7 @@ export function field(label, input) {
   return h('label', {}, label, input);
 }
 
-const OUTCOMES = [['done', 'The trial is done'], ['repeat', 'Do the trial again'], ['skipped', 'Skip the trial']];
+const OUTCOMES = [['done', 'The trial is done'], ['failed', 'The robot has failed'], ['repeat', 'Do the trial again'], ['skipped', 'Skip the trial']];
 
 function form(told) {
   const participant = h('input', { type: 'text', maxlength: 32, autocomplete: 'off', placeholder: 'P07' });
@@ -18,8 +18,8 @@ function form(told) {
   const conditions = h('input', { type: 'text', value: 'receive, give', maxlength: 400 });
   const repetitions = h('input', { type: 'number', min: 1, max: 50, value: 5 });
   const order = choice({});
-  order.offer(['latin_square', 'random', 'as_listed'].map((word) => [word, word.replace('_', ' ')]));
-  order.show('latin_square');
+  order.offer(['as_listed', 'latin_square', 'random'].map((word) => [word, word]));
+  order.show('as_listed'); // the one that receive and give go through without an action between trials
   const request = () => ['session_begin', {
     participant: participant.value.trim(),
     number: Number(number.value),
@@ -42,7 +42,7 @@ function running(told, session) {
     h('p', {}, `Session of ${session.participant}: ${session.position} of ${session.trials.length} trials. File: ${session.file}; as a table: ./coglab shell rosrun coglab_console console_session.py`),
     h('div', { class: 'row' },
       commandButton(next ? `Begin trial ${session.position + 1}: ${next.condition}` : 'All trials are done', { name: 'trial_begin', told, request: () => ['trial_begin', {}] }),
-      ...OUTCOMES.map(([outcome, label]) => commandButton(label, { name: 'trial_end', told, request: () => ['trial_end', { outcome }] })),
+      ...OUTCOMES.map(([outcome, label]) => commandButton(label, { name: outcome === 'done' ? 'trial_done' : 'trial_end', told, request: () => ['trial_end', { outcome }] })),
       commandButton('End the session', { name: 'session_end', told, request: () => ['session_end', {}] })),
     table(['Trial', 'Condition', 'Outcome'], around, 'Trials around the present one'),
   ];

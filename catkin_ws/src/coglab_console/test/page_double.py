@@ -52,7 +52,7 @@ class Desk:
         self._ready, self._over = threading.Event(), asyncio.Event()
         self._thread = threading.Thread(target=self.loop.run_until_complete, args=(self._serve(folder),))
         self._thread.start()
-        assert self._ready.wait(20.0)
+        assert self._ready.wait(60.0)
         self.browser = Browser()
         self.browser.driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": IN_HAND})
         self.browser.open(self.console.link())
@@ -81,4 +81,4 @@ class Desk:
     def close(self):
         self.browser.__exit__()
         self.loop.call_soon_threadsafe(self._over.set)
-        self._thread.join(20.0)
+        self._thread.join(60.0)

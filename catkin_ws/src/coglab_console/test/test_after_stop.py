@@ -9,7 +9,7 @@ from coglab_console.desk.desk import Answer
 from coglab_console.desk.gates import MotionGuard, Standstills
 from coglab_console.desk.hold import HOLD_TIME, HeldButton
 from console_double import running
-from desk_double import RECEIVE, Clock, ask, hold_for, newest
+from desk_double import RECEIVE, Clock, ask, hold_for, newest, shown
 
 
 def test_after_a_stop_acknowledge_then_hold(desk):
@@ -198,3 +198,16 @@ def test_a_connection_that_dies_with_the_button_held_starts_nothing(tmp_path):
             assert console.robot.calls == []
 
     asyncio.run(test())
+
+
+def test_a_stop_that_was_lifted_in_a_terminal_is_said_to_be_over(desk):
+    """`./coglab hold`, `./coglab start reset`: the page does not ask for Go on, which nothing waits for any more."""
+    desk.observe(False, "")
+    desk.observe(True, "the arm is blocked: hold is latched; when its cause is away, press Go on", 1)
+    assert not shown(desk)["guard"]["lifted"] and "press Go on" in shown(desk)["guard"]["cause"]
+    desk.observe(False, "", 1)
+    guard = shown(desk)["guard"]
+    assert guard["lifted"] and guard["unacknowledged"]
+    assert "hold is latched" in guard["cause"] and "Go on" not in guard["cause"]
+    desk.observe(True, "hold is latched", 2)
+    assert not shown(desk)["guard"]["lifted"]

@@ -25,7 +25,7 @@ def serving(functions):
     finally:
         server.shutdown()
         server.server_close()
-        thread.join(10.0)
+        thread.join(60.0)
 
 
 @pytest.fixture

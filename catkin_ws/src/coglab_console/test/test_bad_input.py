@@ -44,7 +44,7 @@ def events_of(console, source):
     return [event["text"] for event in console.events.since(0)[0] if event["source"] == source]
 
 
-async def until(condition, limit=10.0):
+async def until(condition, limit=60.0):
     end = asyncio.get_running_loop().time() + limit
     while not condition():
         assert asyncio.get_running_loop().time() < end, "not in time"
@@ -72,7 +72,7 @@ def test_of_two_operators_at_once_one_is_served_and_the_other_is_told_who_operat
                     await first.send_str(frame)
                     await second.send_str(frame)
                     await asyncio.sleep(0.1)
-                while (message := await second.receive_json(timeout=5))["t"] != "answer":
+                while (message := await second.receive_json(timeout=60.0))["t"] != "answer":
                     pass
                 assert not message["success"] and "browser 1 is the operator" in message["message"]
                 await until(lambda: len(console.robot.calls) == 6)

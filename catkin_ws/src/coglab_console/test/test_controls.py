@@ -65,7 +65,7 @@ def desk(tmp_path_factory):
     found.close()
 
 
-def soon(condition, limit=10.0):
+def soon(condition, limit=60.0):
     end = time.monotonic() + limit
     while not condition():
         assert time.monotonic() < end, "not in time"
@@ -79,7 +79,7 @@ def words_of(label):
 def test_who_watches_is_told_at_every_control_who_operates(desk):
     with Browser() as other:
         other.open(desk.console.link())
-        other.until("return document.getElementById('role').innerText.includes('you watch')", 10.0)
+        other.until("return document.getElementById('role').innerText.includes('you watch')", 60.0)
         for page in PAGES:
             other.tab(page)
             time.sleep(0.2)
@@ -94,14 +94,16 @@ def test_a_stop_shows_who_watches_its_cause_and_why_they_cannot_acknowledge_it(d
     with Browser() as other:
         other.open(desk.console.link())
         desk.loop.call_soon_threadsafe(desk.console.desk.guard.stop, "the arm is blocked")
-        other.until("return document.getElementById('stop-cause').innerText.includes('the arm is blocked')", 10.0)
-        other.until("return document.getElementById('why-acknowledge').innerText === 'browser 1 operates'", 10.0)
+        other.until("return document.getElementById('stop-cause').innerText.includes('the arm is blocked')", 60.0)
+        other.until(
+            "return document.getElementById('why-acknowledge').innerText.startsWith('browser 1 operates')", 10.0
+        )
         assert other.js("return document.getElementById('acknowledge').getAttribute('aria-disabled')") == "true"
         assert look(other)[0] == []
         other.js("document.getElementById('acknowledge').click()")
-        other.until("return document.getElementById('told').innerText.includes('browser 1 operates')", 5.0)
+        other.until("return document.getElementById('told').innerText.includes('browser 1 operates')", 60.0)
     assert desk.console.desk.guard.unacknowledged
-    desk.browser.until("return !document.getElementById('acknowledge').hasAttribute('aria-disabled')", 10.0)
+    desk.browser.until("return !document.getElementById('acknowledge').hasAttribute('aria-disabled')", 60.0)
     desk.browser.js("document.getElementById('acknowledge').click()")
     soon(lambda: not desk.console.desk.guard.unacknowledged)
 
@@ -116,20 +118,20 @@ def test_what_is_not_possible_now_says_why_to_the_operator_in_every_tab(desk):
             ("Feedback", "controllers"),
         ):
             page.tab(name)
-            page.until(f"return {DISABLED.strip()[7:-1]}.some((one) => one[1].includes(arguments[0]))", 10.0, part)
+            page.until(f"return {DISABLED.strip()[7:-1]}.some((one) => one[1].includes(arguments[0]))", 60.0, part)
             assert look(page)[0] == [], name
         page.tab("Live")
-        page.until("return document.getElementById('why-side').innerText === 'no motion control'", 10.0)
+        page.until("return document.getElementById('why-side').innerText === 'no motion control'", 60.0)
     finally:
         desk.robot.now = replace(desk.robot.now, manager_alive=True, detector_alive=True, database_alive=True)
     page.tab("Experiment")
     desk.loop.call_soon_threadsafe(desk.console.desk.experiment.begin, "P1", ["receive ball"], 1, "as_listed", 0)
-    page.until("return document.getElementById('page').innerText.includes('no trial is under way')", 10.0)
+    page.until("return document.getElementById('page').innerText.includes('no trial is under way')", 60.0)
     assert look(page)[0] == []
     desk.loop.call_soon_threadsafe(desk.console.desk.experiment.trial_begin)
-    page.until("return document.getElementById('page').innerText.includes('trial 1 is under way; end it first')", 10.0)
+    page.until("return document.getElementById('page').innerText.includes('trial 1 is under way; end it first')", 60.0)
     page.tab("Contact")
-    page.until(f"return {DISABLED.strip()[7:-1]}.some((one) => one[1].includes('under way'))", 10.0)
+    page.until(f"return {DISABLED.strip()[7:-1]}.some((one) => one[1].includes('under way'))", 60.0)
     desk.loop.call_soon_threadsafe(desk.console.desk.experiment.trial_end, "done")
     desk.loop.call_soon_threadsafe(desk.console.desk.experiment.end)
     page.tab("Live")
@@ -149,7 +151,7 @@ def test_one_click_changes_no_threshold_and_opens_no_hand(desk, tab, label, comm
     page = desk.browser
     page.tab(tab)
     found = f"[...document.querySelectorAll('#page button')].find((one) => one.innerText === '{label}')"
-    page.until(f"const b = {found}; return b && !b.hasAttribute('aria-disabled')", 10.0)
+    page.until(f"const b = {found}; return b && !b.hasAttribute('aria-disabled')", 60.0)
     before = len(desk.robot.calls)
     page.js(f"{found}.click()")
     time.sleep(0.3)
@@ -186,10 +188,10 @@ def test_a_held_button_that_has_begun_something_is_not_refused_when_it_is_let_go
 def test_the_list_of_objects_stays_closed_for_who_watches(desk):
     with Browser() as other:
         other.open(desk.console.link())
-        other.until("return document.getElementById('why-side').innerText === 'browser 1 operates'", 10.0)
+        other.until("return document.getElementById('why-side').innerText === 'browser 1 operates'", 60.0)
         other.js("document.getElementById('object').click()")
         assert other.js("return document.querySelector('ul.choice')") is None
-        other.until("return document.getElementById('told').innerText.includes('browser 1 operates')", 5.0)
+        other.until("return document.getElementById('told').innerText.includes('browser 1 operates')", 60.0)
 
 
 @pytest.mark.parametrize(
@@ -209,7 +211,7 @@ def test_the_list_of_objects_stays_closed_for_who_watches(desk):
 def test_a_row_of_what_is_silent_says_for_how_long(desk, source, row, words):
     page = desk.browser
     shown = (
-        "return [...document.querySelectorAll('#status dt')]"
+        "return [...document.querySelectorAll('#live dt')]"
         ".find((one) => one.innerText === arguments[0]).nextSibling.innerText"
     )
     assert "silent" not in page.js(shown, row)
@@ -232,9 +234,9 @@ def test_what_was_long_ago_says_when(desk):
     page = desk.browser
     contact = {**STATUS["contact"], "words": "contact by momentum, margin 2.2", "stamp": time.monotonic() - 12.0}
     desk.loop.call_soon_threadsafe(desk.console.documents.put, "status", {**STATUS, "contact": contact})
-    page.until("return /margin 2.2, 1[2-9] s ago/.test(document.getElementById('status').innerText)", 5.0)
+    page.until("return /margin 2.2, 1[2-9] s ago/.test(document.getElementById('status').innerText)", 60.0)
     desk.event("a touch")
-    page.until("return /[0-9:]{8} a touch/.test(document.getElementById('status').innerText)", 5.0)
+    page.until("return /[0-9:]{8} a touch/.test(document.getElementById('status').innerText)", 60.0)
     desk.loop.call_soon_threadsafe(desk.console.documents.put, "status", STATUS)
 
 

@@ -87,9 +87,25 @@ def test_two_who_want_to_operate_and_one_who_went_away():
     roles.disconnected("b")
     assert roles.view()["claimant"] == ""
     roles.disconnected("a")
-    assert roles.operator == "a"  # a reload is no farewell
+    clock.time += ABSENCE - 0.1
+    assert not roles.tick() and roles.operator == "a"  # a reload is no farewell
+    roles.connected("a")
+    clock.time += ABSENCE
+    assert not roles.tick() and roles.operator == "a"
+
+
+def test_the_role_of_an_operator_who_went_away_falls_free():
+    """Its browser was closed: whoever comes next operates, and who watches is told how to."""
+    said, clock = [], Clock()
+    roles = Roles(lambda text, level: said.append(text), clock)
+    roles.connected("a")
+    roles.connected("b")
+    roles.disconnected("a")
     clock.time += ABSENCE + 0.1
-    assert "you are the operator" in roles.take_over("c") and roles.operator == "c"
+    assert roles.tick() and roles.operator == "" and "Take over" in said[-1]
+    assert not roles.tick()
+    roles.connected("c")
+    assert roles.operator == "c"
 
 
 # --- reasons --------------------------------------------------------------------------------------------------

@@ -1,15 +1,18 @@
 """The session of a console that was killed goes on in the next one, and its file stays whole whatever happens."""
 
+import itertools
 import json
 import time
+from dataclasses import replace
 
 import pytest
 from coglab_console.desk.desk import Desk
 from coglab_console.desk.events import EventLog
-from coglab_console.desk.experiment import RESUME, Experiment, ExperimentError
+from coglab_console.desk.experiment import RESUME, Experiment, ExperimentError, order_of, unprepared
 from coglab_console.desk.session_file import newest, read_session, rows_of
 from coglab_console.web.fan_out import Documents
 from console_double import RobotDouble
+from desk_double import ask
 
 ROW = {"kind": "take", "object_id": "mug", "outcome": "succeeded", "started": 1.0, "ended": 3.0, "duration_s": 2.0}
 
@@ -117,6 +120,16 @@ def test_numbers_that_are_not_finite_are_written_as_json(tmp_path):
     assert json.loads(lines[-1], parse_constant=lambda word: pytest.fail(word))["marks"] == {"contact": None}
 
 
+def test_an_action_says_when_it_began_by_the_clock_of_the_day(tmp_path):
+    """Beside the times of the brain's clock, which no video or questionnaire has."""
+    desk = begun(tmp_path, lambda: 1_700_000_000.0)
+    desk.result({**ROW, "started": 500.0, "ended": 502.0, "marks": {"contact": 501.5}})
+    desk.result({**ROW, "started": 400.0, "started_utc": "2023-11-14T22:11:40.500+00:00"})  # as the brain says it
+    rows = rows_of([read_session(newest(tmp_path))], "actions")
+    assert [row["began"] for row in rows] == ["2023-11-14T22:11:40.500Z", "2023-11-14T22:13:18.000Z"]
+    assert json.loads(rows[1]["marks"]) == {"contact": 1.5}
+
+
 def test_a_session_does_not_end_in_the_middle_of_a_trial(tmp_path):
     session = begun(tmp_path).experiment
     with pytest.raises(ExperimentError, match="trial 2 is under way"):
@@ -135,3 +148,65 @@ def test_a_note_without_a_session_says_where_it_is(tmp_path):
     assert "no session is open" in session.note("a", "x")
     session.begin("P07", ["a"], 1, "as_listed", 0)
     assert session.note("a", "y") == "noted"
+
+
+RECEIVE, GIVE = "exchange_human_to_robot", "exchange_robot_to_human"
+TIMES = itertools.count(10.0, 5.0)
+
+
+def results(desk, kind, outcome, held=""):
+    """The robot has done this, and its hand holds that."""
+    at = next(TIMES)
+    desk.result({**ROW, "kind": kind, "outcome": outcome, "started": at, "ended": at + 1})
+    desk.backend.now = replace(desk.backend.now, object_id=held, actions=(GIVE, "put") if held else (RECEIVE, "take"))
+
+
+def opened(desk, *conditions):
+    given = {"participant": "P1", "conditions": list(conditions), "repetitions": 1, "order": "as_listed"}
+    return ask(desk, "a", "session_begin", **given)
+
+
+def test_a_trial_begins_with_the_hand_that_its_action_needs(desk):
+    """Also where a Latin square has Give before Receive: the hand is filled between the trials."""
+    assert unprepared(order_of(["receive", "give"], 2, "latin_square", 1), held=False) == [1, 3]
+    assert "before trial 1" in opened(desk, "give", "receive ball", "give slowly")["message"]
+    refused = ask(desk, "a", "trial_begin")
+    assert not refused["success"] and "the hand is empty" in refused["message"]
+    assert ask(desk, "a", "start", action=RECEIVE)["success"]
+    results(desk, RECEIVE, "succeeded", held="mug")
+    assert ask(desk, "a", "trial_begin")["success"]
+    results(desk, GIVE, "succeeded")
+    assert ask(desk, "a", "trial_end", outcome="done")["success"]
+    (attempt,) = read_session(newest(desk.experiment._folder)).attempts
+    assert [row["kind"] for row in attempt.results] == [GIVE]
+
+
+def test_a_trial_takes_its_own_action_alone(desk):
+    opened(desk, "receive", "give")
+    assert ask(desk, "a", "trial_begin")["success"]
+    refused = ask(desk, "a", "start", action="take")
+    assert not refused["success"] and "Receive" in refused["message"]
+    results(desk, "take", "succeeded", held="mug")  # asked for in a terminal
+    warned = [event["text"] for event in desk.events.since(0)[0] if event["source"] == "experiment"]
+    assert len(warned) == 1 and "Take" in warned[0]
+
+
+def test_only_what_has_succeeded_is_done(desk):
+    desk.backend.now = replace(desk.backend.now, object_id="mug", actions=(GIVE, "put"))
+    opened(desk, "give", "give slowly", "by hand")
+    ask(desk, "a", "trial_begin")
+    assert "no Give" in ask(desk, "a", "trial_end", outcome="done")["message"]
+    results(desk, GIVE, "failed_holding", held="mug")
+    assert not ask(desk, "a", "trial_end", outcome="done")["success"]
+    assert ask(desk, "a", "trial_end", outcome="failed")["success"]
+    ask(desk, "a", "trial_begin")
+    results(desk, GIVE, "failed_holding", held="mug")
+    results(desk, GIVE, "succeeded")
+    desk.backend.now = replace(desk.backend.now, in_hub=False)
+    assert "under way" in ask(desk, "a", "trial_end", outcome="done")["message"]
+    desk.backend.now = replace(desk.backend.now, in_hub=True)
+    assert ask(desk, "a", "trial_end", outcome="done")["success"]
+    ask(desk, "a", "trial_begin")
+    assert ask(desk, "a", "trial_end", outcome="done")["success"]  # a trial that names no action
+    session = read_session(newest(desk.experiment._folder))
+    assert [attempt.outcome for attempt in session.attempts] == ["failed", "done", "done"] and session.passed() == 3

@@ -63,7 +63,7 @@ def test_a_reconnect_has_no_gap(tmp_path):
     async def read(ws, until):
         seen = []
         while not seen or seen[-1] < until:
-            message = await ws.receive_json(timeout=5)
+            message = await ws.receive_json(timeout=60.0)
             if message["t"] == "events":
                 assert message["lost"] == 0
                 seen += [event["seq"] for event in message["events"]]
@@ -118,7 +118,7 @@ def test_a_browser_that_never_reads_slows_nobody_and_is_cut_off(tmp_path):
             began = time.monotonic()
             while time.monotonic() - began < 12.0 and len(console.server.clients) == 2:
                 console.server.publish_state({"at": time.monotonic(), "text": text})
-                while (message := await good.receive_json(timeout=5))["t"] != "state":
+                while (message := await good.receive_json(timeout=60.0))["t"] != "state":
                     pass
                 await good.send_json({"t": "seen", "n": message["n"]})
                 got += 1
@@ -144,7 +144,7 @@ def test_five_browsers_get_the_same(tmp_path):
             for ws in sockets:
                 seen = 0
                 while seen < number:
-                    message = await ws.receive_json(timeout=5)
+                    message = await ws.receive_json(timeout=60.0)
                     seen = message["events"][-1]["seq"] if message["t"] == "events" else seen
 
     asyncio.run(test())

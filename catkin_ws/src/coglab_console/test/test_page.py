@@ -26,13 +26,13 @@ def desk(tmp_path_factory):
 def test_a_connection_that_is_dead_but_open_is_given_up_and_no_event_is_lost(desk):
     page = desk.browser
     desk.event("before")
-    page.until("return coglab.events().some((e) => e.text === 'before')", 10.0)
+    page.until("return coglab.events().some((e) => e.text === 'before')", 60.0)
     page.js("window.connections.at(-1).deaf = true")
     desk.event("meanwhile")
-    page.until("return document.body.classList.contains('lost')", 5.0)
-    page.until("return !document.body.classList.contains('lost')", 15.0)
+    page.until("return document.body.classList.contains('lost')", 60.0)
+    page.until("return !document.body.classList.contains('lost')", 60.0)
     desk.event("after")
-    page.until("return coglab.events().some((e) => e.text === 'after')", 10.0)
+    page.until("return coglab.events().some((e) => e.text === 'after')", 60.0)
     seen = page.js("return coglab.events().map((e) => e.seq)")
     assert seen == list(range(1, len(seen) + 1))
     assert page.js("return window.connections.length") <= 3
@@ -46,7 +46,7 @@ def test_a_slow_page_shows_the_newest_state_and_every_event(desk):
         time.sleep(0.1)
     ages = [desk.age() for _ in range(5)]
     page.js("window.slow = 0")
-    page.until("return coglab.events().some((e) => e.text === 'slow 39')", 10.0)
+    page.until("return coglab.events().some((e) => e.text === 'slow 39')", 60.0)
     texts = page.js("return coglab.events().map((e) => e.text).filter((text) => text.startsWith('slow'))")
     assert texts == [f"slow {number}" for number in range(40)]
     assert sorted(ages)[2] < 1.0, ages
@@ -55,9 +55,9 @@ def test_a_slow_page_shows_the_newest_state_and_every_event(desk):
 def test_a_page_that_is_behind_says_by_how_much(desk):
     page = desk.browser
     page.js("window.slow = 300")
-    page.until("return /s behind/.test(document.getElementById('lost').textContent)", 10.0)
+    page.until("return /s behind/.test(document.getElementById('lost').textContent)", 60.0)
     page.js("window.slow = 0")
-    page.until("return document.getElementById('lost').hidden", 10.0)
+    page.until("return document.getElementById('lost').hidden", 60.0)
 
 
 @pytest.mark.parametrize(
@@ -76,13 +76,13 @@ def test_the_path_ahead_in_words(desk, shown, words):
     robot = {"root": "world", "joints": [], "shapes": {}}
     desk.loop.call_soon_threadsafe(desk.console.documents.put, "model", {**PAGE_DOCUMENTS["model"], "robot": robot})
     desk.loop.call_soon_threadsafe(desk.console.documents.put, "path", shown)
-    page.until("return document.getElementById('view-words').textContent.includes(arguments[0])", 10.0, words)
+    page.until("return document.getElementById('view-words').textContent.includes(arguments[0])", 60.0, words)
 
 
 def test_a_click_on_a_disabled_button_says_why(desk):
     page = desk.browser
     button = "[data-action=exchange_robot_to_human]"
-    page.until(f"return document.querySelector('{button}').hasAttribute('aria-disabled')", 10.0)
+    page.until(f"return document.querySelector('{button}').hasAttribute('aria-disabled')", 60.0)
     page.js(f"document.querySelector('{button}').click()")
     words = page.js("const told = document.getElementById('told'); return told.checkVisibility() && told.textContent")
     assert "Give" in words and "the hand is empty" in words
@@ -94,7 +94,7 @@ def test_a_button_is_held_by_touch(desk):
     page = desk.browser
     desk.loop.call_soon_threadsafe(desk.console.desk.guard.stop, "a test")
     desk.loop.call_soon_threadsafe(lambda: desk.console.desk.guard.acknowledge(desk.console.desk.guard.stops))
-    page.until("return document.getElementById('why-home').textContent.includes('hold')", 10.0)
+    page.until("return document.getElementById('why-home').textContent.includes('hold')", 60.0)
     box = page.js(
         "const b = document.querySelector('[data-action=home]').getBoundingClientRect();"
         "return [b.left + b.width / 2, b.top + b.height / 2]"
@@ -114,7 +114,7 @@ def test_a_button_is_held_by_touch(desk):
     touch("touchEnd")
     assert not desk.robot.calls
     touch("touchStart", box)
-    end = time.monotonic() + 10.0
+    end = time.monotonic() + 60.0
     while not desk.robot.calls and time.monotonic() < end:
         time.sleep(0.05)
     touch("touchEnd")
@@ -128,14 +128,44 @@ def test_a_tablet_has_stop_and_every_page_within_reach_of_a_finger(desk):
         assert tablet.js("return navigator.maxTouchPoints") > 0
         for name in PAGES:
             tablet.touch(f"#tab-{name}")
-            tablet.until("return document.getElementById('tab-' + arguments[0]).ariaSelected === 'true'", 5.0, name)
+            tablet.until("return document.getElementById('tab-' + arguments[0]).ariaSelected === 'true'", 60.0, name)
             assert look(tablet)[0] == [], name
         before = len(desk.robot.stops)
         tablet.touch("#stop")
-        end = time.monotonic() + 10.0
+        end = time.monotonic() + 60.0
         while len(desk.robot.stops) == before and time.monotonic() < end:
             time.sleep(0.02)
         assert len(desk.robot.stops) > before
+
+
+@pytest.mark.parametrize("size", [(1024, 768), (1280, 720)])
+def test_picture_and_phase_have_the_room(desk, size):
+    """The buttons of the camera lie beside the picture; the charts are all on the page."""
+    boxes = (
+        "return Object.fromEntries(arguments[0].map((id) => {"
+        " const { left, top, right, bottom } = document.getElementById(id).getBoundingClientRect();"
+        " return [id, [left, top, right, bottom]]; }))"
+    )
+    with Browser(size=size) as page:
+        page.open(desk.console.link())
+        found = page.js(boxes, ["picture", "cameras", "charts", "actions"])
+        left, top, right, bottom = found["picture"]
+        assert found["cameras"][1] >= bottom
+        assert (right - left) * (bottom - top) > 0.15 * size[0] * size[1], found
+        assert (right - left) < 2.2 * (bottom - top), found
+        assert found["charts"][3] <= found["actions"][1] and found["charts"][3] - found["charts"][1] > 250, found
+        phase = "return parseFloat(getComputedStyle(document.querySelector('#live .phase')).fontSize)"
+        assert page.js(phase) >= 20
+
+
+def test_a_computer_that_is_too_busy_is_said_on_every_page(desk):
+    page = desk.browser
+    desk.put(busy="This computer is too busy", real_time_factor=0.5)
+    page.until("return document.getElementById('busy').innerText.includes('too busy')", 60.0)
+    assert "0.5" in page.js("return document.getElementById('world').innerText")
+    assert look(page)[0] == []
+    desk.put(busy="", real_time_factor=1.0)
+    page.until("return document.getElementById('busy').hidden", 60.0)
 
 
 def test_the_keyboard_reaches_everything_in_order_on_every_page(desk):
@@ -160,7 +190,7 @@ def test_diagnostics_are_a_tree_by_node_whose_branches_show_their_worst(desk):
         "return [...document.querySelectorAll('#diagnostics > details')].map((branch) =>"
         " [...words(branch, ':scope > summary'), words(branch, ':scope details > summary')])"
     )
-    page.until("return document.querySelectorAll('#diagnostics > details').length === 3", 10.0)
+    page.until("return document.querySelectorAll('#diagnostics > details').length === 3", 60.0)
     assert page.js(tree) == [
         ["▲robot: warning", ["●FRI connection: ok, words", "▲arm: warning, words"]],
         ["●ih2_hand: ok", ["●hand: ok, words"]],
@@ -172,7 +202,7 @@ def test_diagnostics_are_a_tree_by_node_whose_branches_show_their_worst(desk):
     page.js("document.querySelectorAll('#diagnostics summary')[3].focus()")
     time.sleep(0.2)
     desk.loop.call_soon_threadsafe(desk.console.documents.put, "health", {**health, "rows": rows[:3]})
-    page.until("return document.querySelectorAll('#diagnostics > details').length === 2", 10.0)
+    page.until("return document.querySelectorAll('#diagnostics > details').length === 2", 60.0)
     kept = "return [...document.querySelectorAll('#diagnostics details')].map((one) => one.open)"
     assert page.js(kept) == [False, False, False, True, False]
     assert page.js("return document.activeElement.dataset.name") == "ih2_hand"
@@ -189,12 +219,12 @@ def test_a_note_that_was_not_taken_stays_in_its_field_and_says_why(desk):
     here, told = "return document.getElementById('note').value", "return document.getElementById('page').innerText"
     page.js("window.kept = window.fetch; window.fetch = () => Promise.reject(new Error('no network'))")
     page.js(write, "the cup slipped")
-    page.until(f"{told}.includes('no network')", 10.0)
+    page.until(f"{told}.includes('no network')", 60.0)
     assert page.js(here) == "the cup slipped"
     page.js("window.fetch = window.kept")
     page.js(write, "the cup slipped")
-    page.until("return coglab.events().some((e) => e.text.endsWith('the cup slipped'))", 10.0)
-    page.until("return document.getElementById('note').value === ''", 10.0)
+    page.until("return coglab.events().some((e) => e.text.endsWith('the cup slipped'))", 60.0)
+    page.until("return document.getElementById('note').value === ''", 60.0)
     page.tab("Live")
 
 
@@ -209,10 +239,10 @@ def test_a_branch_of_the_diagnostics_stays_the_same_while_only_its_words_change(
         desk.loop.call_soon_threadsafe(desk.console.documents.put, "health", health)
 
     put("CMD, PERFECT", "0.001")
-    page.until("return document.getElementById('diagnostics').textContent.includes('PERFECT')", 10.0)
+    page.until("return document.getElementById('diagnostics').textContent.includes('PERFECT')", 60.0)
     page.js("window.pressed = document.querySelectorAll('#diagnostics summary')[1]")
     put("CMD, OK", "0.002")
-    page.until("return /CMD, OK.*0.002/s.test(document.getElementById('diagnostics').textContent)", 10.0)
+    page.until("return /CMD, OK.*0.002/s.test(document.getElementById('diagnostics').textContent)", 60.0)
     assert page.js("return window.pressed.isConnected")
     page.tab("Live")
 
@@ -221,7 +251,7 @@ def test_without_graphviz_the_page_has_the_states_and_says_what_is_missing(desk)
     containers = {"/M": Container("/M", ("A", "B", "C"), (("ok", "A", "B"),))}
     picture = {**Layout("no-such-program").of(containers), "roots": ["/M"]}
     desk.loop.call_soon_threadsafe(desk.console.documents.put, "graph:/coglab", picture)
-    desk.browser.until("return document.querySelectorAll('#graph .node').length >= 3", 10.0)
+    desk.browser.until("return document.querySelectorAll('#graph .node').length >= 3", 60.0)
     words = desk.browser.js("return document.getElementById('graph').innerText")
     assert "apt install graphviz" in words
 
@@ -232,9 +262,11 @@ def test_the_way_to_the_active_state_ends_with_it_in_full(desk):
     picture = {**Layout("no-such-program").of({"/M": Container("/M", ("A",), ())}), "problem": "", "roots": ["/M"]}
     desk.loop.call_soon_threadsafe(desk.console.documents.put, "graph:/coglab", picture)
     desk.loop.call_soon_threadsafe(desk.console.documents.put, "active", {"/coglab": {"active": [leaf], "last": {}}})
-    desk.browser.until("return document.querySelector('.crumbs').textContent.endsWith('wait_stop')", 10.0)
+    desk.browser.tab("Machine")
+    desk.browser.until("return document.querySelector('.crumbs').textContent.endsWith('wait_stop')", 60.0)
     cut = "const c = document.querySelector('.crumbs'); return c.scrollHeight - c.clientHeight"
     assert desk.browser.js(cut) <= 1
+    desk.browser.tab("Live")
 
 
 @pytest.mark.parametrize("promised", [False, True])
@@ -244,10 +276,10 @@ def test_without_libjs_there_are_two_dimensions_and_a_sentence(tmp_path, promise
     try:
         page = desk.browser
         assert page.js("return coglab.view()") == "2D"
-        page.until("return /Strip charts/.test(document.getElementById('charts').innerText)", 10.0)
+        page.until("return /Strip charts/.test(document.getElementById('charts').innerText)", 60.0)
         assert look(page)[0] == []
         page.js("document.getElementById('stop').click()")
-        end = time.monotonic() + 10.0
+        end = time.monotonic() + 60.0
         while not desk.robot.stops and time.monotonic() < end:
             time.sleep(0.02)
         assert desk.robot.stops == ["browser 1"] or len(desk.robot.stops) == 2  # by both ways
@@ -265,8 +297,8 @@ def test_a_page_that_is_let_in_no_more_says_what_to_do_and_that_its_stop_went_no
         (key,) = [key for key, one in sessions.items() if one.name == mine]
         del sessions[key]
         page.js("window.connections.at(-1).close()")
-        page.until("return document.getElementById('lost').textContent.includes('console.url')", 15.0)
+        page.until("return document.getElementById('lost').textContent.includes('console.url')", 60.0)
         stops = len(desk.robot.stops)
         page.js("document.getElementById('stop').click()")
-        page.until("return document.getElementById('told').textContent.includes('red button')", 10.0)
+        page.until("return document.getElementById('told').textContent.includes('red button')", 60.0)
         assert len(desk.robot.stops) == stops

@@ -2,6 +2,7 @@
 
 import io
 import random
+import re
 import struct
 from pathlib import Path
 
@@ -282,3 +283,11 @@ def test_versions_of_debian_packages_and_of_a_checkout(tmp_path):
     assert versions.commit(tmp_path) == "1234567890"
     (tmp_path / ".git" / "refs" / "heads" / "x").write_text("abcdef1234567890\n")
     assert versions.commit(tmp_path) == "abcdef1234"
+
+
+def test_health_shows_the_version_of_the_release():
+    """That of package.xml, which is one for all packages and the newest of CHANGELOG.md."""
+    (newest, *_) = re.findall(r"^## (\d\S*)", (SOURCES.parents[1] / "CHANGELOG.md").read_text(), re.M)
+    assert versions.of_everything()["CogLab"].split(",")[0] == newest
+    told = [re.search("<version>(.*)</version>", path.read_text()).group(1) for path in SOURCES.glob("*/package.xml")]
+    assert set(told) == {newest}

@@ -34,7 +34,7 @@ NEWEST = "return coglab.strips().map((strip) => strip.rows.at(-1).slice(1))"
 @pytest.fixture(scope="module")
 def desk(tmp_path_factory):
     found = Desk(tmp_path_factory.mktemp("console"), {"charts": True})
-    found.browser.until("return coglab.strips().every((strip) => strip.axis)", 20.0)
+    found.browser.until("return coglab.strips().every((strip) => strip.axis)", 60.0)
     yield found
     found.close()
 
@@ -94,7 +94,7 @@ def test_bars_are_the_phases_and_lie_on_the_axis_of_the_charts(desk):
     for words in ("reaches", "closes the hand", "goes home"):
         began[words] = time.monotonic()
         desk.state = {"words": words}
-        page.until("return coglab.bars().at(-1).label === arguments[0]", 10.0, words)
+        page.until("return coglab.bars().at(-1).label === arguments[0]", 60.0, words)
         time.sleep(0.5)
     time.sleep(0.5)
     both = "return [coglab.bars(), coglab.strips().map(({ axis, edges }) => [...axis, ...edges])]"

@@ -2,6 +2,7 @@
 the recogniser believes."""
 
 import math
+import time
 
 import pytest
 from coglab_console.ros import tables
@@ -16,6 +17,7 @@ from coglab_msgs.msg import (
 from coglab_py.packages import package_path
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rospy import Time
+from std_msgs.msg import Float64
 
 
 @pytest.fixture
@@ -71,6 +73,22 @@ def test_controllers_with_their_pauses_and_recognition_with_its_confidences(show
     assert documents["recognition"] == {
         "pattern": "high", "decided": True, "stamp": 7.5, "progress": 0.46, "rows": [["low", 0.1], ["high", 0.9]]
     }  # fmt: skip
+
+
+def test_a_computer_that_is_too_busy_is_said_beside_everything_else(shown):
+    table, documents = shown
+
+    def tell(name, level, message):
+        table._on_diagnostics(DiagnosticArray(status=[DiagnosticStatus(name=name, level=level, message=message)]))
+        return table.busy(time.monotonic())
+
+    for number in range(200):
+        assert tell(f"somebody: part {number}", b"\x01", "worn") == ""
+    assert tell("coglab_sim: computer", b"\x00", "in time") == ""
+    assert tell("coglab_sim: computer", b"\x01", "too busy") == "too busy"
+    assert table.busy(time.monotonic() + 5.0) == ""  # the cell has ended
+    table._on_factor(Float64(0.5))
+    assert documents["real_time_factor"] == 0.5
 
 
 def test_latency_and_answer_time_are_those_that_the_bridge_names(shown):

@@ -49,7 +49,7 @@ def test_feedback_controllers_by_order_with_activity_pauses_and_who_changed_what
     ]
     inside = [{"controller": "yield", "values": [["force", 3.25, "N"], ["offset", 0.004, "m"]]}]
     desk.put(feedback={"profile": "approach", "rows": [yields, limit]}, attribution={"rows": rows, "inside": inside})
-    page.until("return document.querySelectorAll('#page table').length === 2", 10.0)
+    page.until("return document.querySelectorAll('#page table').length === 2", 60.0)
     shown = page.js(TABLE, 0)
     assert [row[:6] for row in shown] == [
         ["1", "yield", "task", "waits for the wrench", "·", "2 / 7"],
@@ -61,7 +61,7 @@ def test_feedback_controllers_by_order_with_activity_pauses_and_who_changed_what
     assert "yield: force 3.25 N, offset 0.004 m" in page.js("return document.getElementById('page').innerText")
     # Another order is another table, and nobody's correction is said to be nobody's.
     desk.put(feedback={"profile": "", "rows": [limit, yields]}, attribution={"rows": [], "inside": []})
-    page.until("return document.getElementById('page').innerText.includes('Nobody changed a reference.')", 10.0)
+    page.until("return document.getElementById('page').innerText.includes('Nobody changed a reference.')", 60.0)
     assert [row[:2] for row in page.js(TABLE, 0)] == [["1", "limit"], ["2", "yield"]]
     assert page.js("return document.getElementById('feedback-profile').innerText") == "Profile: none"
     page.tab("Live")
@@ -73,14 +73,14 @@ def test_recognition_with_the_confidence_of_each_pattern(desk):
     rows = [["low", 0.07], ["high", 0.9], ["middle", 0.03]]
     seen = {"pattern": "high", "decided": True, "progress": 0.4, "stamp": time.monotonic() - 7.0, "rows": rows}
     desk.put(recognition=seen)
-    page.until("return document.querySelectorAll('#page .bar').length === 3", 10.0)
+    page.until("return document.querySelectorAll('#page .bar').length === 3", 60.0)
     bars = page.js(BARS)
     assert [[name, value] for name, _, _, value in bars] == [["low", "0.07"], ["high", "0.90"], ["middle", "0.03"]]
     assert [width for _, width, _, _ in bars] == pytest.approx([0.07, 0.9, 0.03], abs=0.01)
     words = page.js("return document.getElementById('page').innerText")
     assert "Decided: high, 40 % of the reach seen, 7 s ago" in words
     desk.put(recognition={**seen, "decided": False})
-    page.until("return document.getElementById('page').innerText.includes('Not decided: high')", 10.0)
+    page.until("return document.getElementById('page').innerText.includes('Not decided: high')", 60.0)
     page.tab("Live")
 
 
@@ -101,7 +101,7 @@ def test_objects_with_what_the_database_has_against_a_file(desk):
     ]
     problem = "ball.yaml: mass: -1 is less than the minimum of 0"
     desk.put(objects={"rows": rows, "asked": True, "problems": [problem]})
-    page.until("return document.getElementById('object-problems').innerText.includes('ball.yaml')", 10.0)
+    page.until("return document.getElementById('object-problems').innerText.includes('ball.yaml')", 60.0)
     assert page.js("return document.getElementById('object-problems').innerText") == f"▲{problem}"
     assert [row[:4] for row in page.js(TABLE, 0)] == [
         ["box", "a box", "0.5", "box"],
@@ -115,7 +115,7 @@ def test_objects_with_what_the_database_has_against_a_file(desk):
         "return document.getElementById('object-problems').innerText.includes('2 objects, every file fits')", 10.0
     )
     desk.put(objects={"rows": [], "asked": False, "problems": []})
-    page.until("return document.getElementById('object-problems').innerText.includes('has not been asked')", 10.0)
+    page.until("return document.getElementById('object-problems').innerText.includes('has not been asked')", 60.0)
     page.tab("Live")
 
 
@@ -129,8 +129,8 @@ def test_contact_by_joint_against_its_threshold_and_learning(desk):
     desk.state = {"rate": rate, "threshold": threshold, "watched": watched, "margin": 1.5}
     desk.put(status={**STATUS, "contact": contact})
     words = "return document.getElementById('page').innerText"
-    page.until(f"{words}.includes('321 samples')", 10.0)
-    page.until("return [...document.querySelectorAll('#page .bar')][3].innerText.includes('0.900')", 10.0)
+    page.until(f"{words}.includes('321 samples')", 60.0)
+    page.until("return [...document.querySelectorAll('#page .bar')][3].innerText.includes('0.900')", 60.0)
     bars = page.js(BARS)
     names = ["A1 ●", "A2 ●", "E1 ○", "A3 ●", "A4 ○", "A5 ○", "A6 ○"]
     assert [name for name, *_ in bars] == names
@@ -147,8 +147,8 @@ def test_contact_by_joint_against_its_threshold_and_learning(desk):
     assert "Learnt: 321 samples" in shown
     desk.state = {**desk.state, "margin": None}
     desk.put(status={**STATUS, "contact": {**contact, "learnt": False, "state": "waiting", "samples": 12}})
-    page.until(f"{words}.includes('Learning; leave the arm alone: 12 samples')", 10.0)
-    page.until(f"{words}.includes('Armed for contact; waits until the arm stands still')", 10.0)
+    page.until(f"{words}.includes('Learning; leave the arm alone: 12 samples')", 60.0)
+    page.until(f"{words}.includes('Armed for contact; waits until the arm stands still')", 60.0)
     button = page.js(
         "return [...document.querySelectorAll('#page button')].find((b) => b.innerText === 'Learn anew at rest')"
     )

@@ -1,6 +1,8 @@
 """What the node makes of the robot's messages for the page, without a ROS master."""
 
+import io
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from coglab_console.ros import view as ros_view
@@ -9,16 +11,20 @@ from coglab_console.scene.urdf_model import RobotModel
 from coglab_msgs.msg import (
     ContactSignal,
     ControllerStatus,
+    DmpFeedback,
     HandStatus,
     LwrState,
     MasterState,
     PredictedPath,
+    ReasonCode,
     Transition,
+    UnfinishedPtp,
 )
-from geometry_msgs.msg import Point, Pose
+from geometry_msgs.msg import Point, Pose, TransformStamped
 from rospy import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
+from tf2_msgs.msg import TFMessage
 
 URDF = Path(__file__).resolve().parents[2] / "lwr_description" / "urdf" / "lwr_ih2.urdf"
 
@@ -133,6 +139,50 @@ def test_a_transition_belongs_to_the_phase_that_has_ended(seen):
     view._on_transition(told)
     words = "the arm is blocked, because hold is latched (reaches: failed; now: recovers)"
     assert events[1:] == [("machine", words, "warning", "reaches")]
+
+
+@pytest.mark.parametrize(
+    "code, level",
+    [
+        (ReasonCode.CANCELLED, "info"),
+        (ReasonCode.SUPERSEDED, "info"),
+        (ReasonCode.WORKSPACE_BORDER, "warning"),
+        (ReasonCode.HELD, "warning"),
+    ],
+)
+def test_a_motion_that_was_to_end_is_no_warning(seen, code, level):
+    """The brain cancels the reach when something touches the hand: that is how an exchange succeeds."""
+    view, _, events = seen
+    view._on_dmp(DmpFeedback(state="aborted", reason_code=code, reason="something touches the hand"))
+    view._on_unfinished(UnfinishedPtp(ptp_id=1, reason_code=code, reason="the weight has come"))
+    assert [event[2] for event in events] == [level, level]
+
+
+def tf_of(*children, stamp=100.0):
+    """As it comes: nothing but its bytes."""
+    frames = [TransformStamped(child_frame_id=child) for child in children]
+    for frame in frames:
+        frame.header.frame_id, frame.header.stamp = "world", Time(stamp)
+        frame.transform.translation.x, frame.transform.rotation.w = 0.5, 1.0
+    stream = io.BytesIO()
+    TFMessage(frames).serialize(stream)
+    return SimpleNamespace(_buff=stream.getvalue())
+
+
+def test_the_picture_follows_its_frames_beside_a_motion_capture_system(seen):
+    """Hundreds of markers and of joints of other robots, told first and over and over."""
+    view, _, _ = seen
+    view.entry = lambda: {"frame": "object_mug"}
+    view.named |= {"object_mug"}
+    markers = [f"marker_{number}" for number in range(300)]
+    view._on_joints(JointState(name=markers, position=[0.0] * 300))
+    for stamp in (98.0, 99.0):
+        view._on_tf(tf_of(*markers, stamp=stamp))
+        view._on_tf(tf_of("human_hand", "board", "object_mug", "dmp_goal", stamp=stamp))
+    view._on_joints(JointState(name=[*markers, "lwr_a1"], position=[0.0] * 300 + [0.1]))
+    frame = view.frame()
+    assert frame["ages"] == {"hand": 1.0, "object": 1.0, "board": 1.0, "goal": 1.0} and frame["q"][0] == 0.1
+    assert set(view.frames) == {"human_hand", "board", "object_mug", "dmp_goal"}
 
 
 def path_of(motion, *places):

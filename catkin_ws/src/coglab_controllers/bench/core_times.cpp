@@ -140,7 +140,7 @@ class Calls {
   double cycle(int i) {
     chain_.evaluate(posture(i), state_);
     ik_.solve(state_, posture(i), reference(motion_, i), result_);
-    guard_.limit(state_, posture(i), result_.velocity, 0.005, limited_);
+    guard_.limit(state_, posture(i), result_.velocity, limited_);
     return limited_.velocity[0];
   }
   template <typename Solver>
@@ -148,7 +148,7 @@ class Calls {
     const JointVector velocity =
         kdlCycle(fk_, this->*solver, posture(i), reference(kdl_motion_, i), limit_);
     chain_.evaluate(posture(i), state_);
-    guard_.limit(state_, posture(i), velocity, 0.005, limited_);
+    guard_.limit(state_, posture(i), velocity, limited_);
     return limited_.velocity[0];
   }
 

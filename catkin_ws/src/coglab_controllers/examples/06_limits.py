@@ -15,7 +15,7 @@ request = np.array([0.5, 0.2, 0.0, 0.3, 0.4, 0.0, 1.4])
 
 time, scales, reasons = CYCLE * np.arange(600), [], []
 for _ in time:
-    result = guard.limit(chain, interpolator.position, request, CYCLE)
+    result = guard.limit(chain, interpolator.position, request)
     interpolator.step(result.velocity, CYCLE)
     scales.append(result.scale)
     reasons.append(result.reason)

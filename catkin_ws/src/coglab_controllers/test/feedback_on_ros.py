@@ -28,7 +28,7 @@ class FeedbackOnRos(unittest.TestCase):
 
     def test_5_feedback_services(self) -> None:
         name = "controller_manager/feedback/"
-        wait_until(lambda: bool(self.feedback), 5.0, "feedback/status")
+        wait_until(lambda: bool(self.feedback), "feedback/status")
         names = [c.name for c in self.feedback[-1].controllers]
         self.assertEqual(sorted(names), ["ee_admittance", "joint_limits"])
         self.assertEqual(self.feedback[-1].profile, "dmp")
@@ -43,7 +43,7 @@ class FeedbackOnRos(unittest.TestCase):
         answer = call(name + "enable", FeedbackSelect, ["ee_admittance"], "")
         self.assertTrue(answer.success, answer.message)
         wait_until(
-            lambda: next(c for c in self.feedback[-1].controllers if c.name == "ee_admittance").enabled, 5.0, "enabled"
+            lambda: next(c for c in self.feedback[-1].controllers if c.name == "ee_admittance").enabled, "enabled"
         )
         answer = call(name + "pause_by_signal", FeedbackBySignal, "wrench", False)
         self.assertTrue(answer.success, answer.message)
@@ -86,7 +86,7 @@ class FeedbackOnRos(unittest.TestCase):
             found = [s for s in shown[-1].states if s.controller == "second"] if shown else []
             return dict(zip(found[0].names, found[0].values, strict=True)) if found else {}
 
-        wait_until(lambda: "offset_x" in state(), 5.0, "state of the controller that was loaded")
+        wait_until(lambda: "offset_x" in state(), "state of the controller that was loaded")
         self.assertEqual(set(shown[-1].states[-1].units), {"m", "rad", "N"})
         wait_until(
             lambda: any(
@@ -95,7 +95,6 @@ class FeedbackOnRos(unittest.TestCase):
                 and len(c.before) == len(c.after) == 7
                 for c in shown[-1].corrections
             ),
-            5.0,
             "its correction of the pose",
         )
         self.say_on_rosout("second")
@@ -105,8 +104,8 @@ class FeedbackOnRos(unittest.TestCase):
         self.assertIn("disable", answer.message)
         self.assertEqual(answer.reason_code, ReasonCode.BUSY)
         self.assertTrue(call(name + "disable", FeedbackSelect, ["second"], "").success)
-        wait_until(lambda: call(name + "unload", FeedbackSelect, ["second"], "").success, 5.0, "unloaded")
-        wait_until(lambda: "second" not in [c.name for c in self.feedback[-1].controllers], 5.0, "gone")
+        wait_until(lambda: call(name + "unload", FeedbackSelect, ["second"], "").success, "unloaded")
+        wait_until(lambda: "second" not in [c.name for c in self.feedback[-1].controllers], "gone")
         self.assertFalse(call(name + "unload", FeedbackSelect, [], "").success)
         self.assertFalse(call(name + "unload", FeedbackSelect, ["ee_admittance"], "").success, "part of a profile")
 
@@ -136,7 +135,7 @@ class FeedbackOnRos(unittest.TestCase):
         self.assertTrue(call(name + "resume", FeedbackSelect, ["ee_admittance"], "").success, "nothing to withdraw")
         # All of them: with the reason that was given.
         self.assertTrue(call(name + "resume", FeedbackSelect, [], "lunch ☃").success)
-        wait_until(lambda: not any(c.paused for c in self.feedback[-1].controllers), 5.0, "nothing paused")
+        wait_until(lambda: not any(c.paused for c in self.feedback[-1].controllers), "nothing paused")
 
     def say_on_rosout(self, controller: str) -> None:
         """A controller that holds at a bound says so, with its name, place in the source, cycle and numbers."""
@@ -152,5 +151,5 @@ class FeedbackOnRos(unittest.TestCase):
         def own_words() -> list[Log]:
             return [line for line in told if re.search(words, line.msg)]
 
-        wait_until(lambda: bool(own_words()), 5.0, "what it logs on /rosout")
+        wait_until(lambda: bool(own_words()), "what it logs on /rosout")
         self.assertEqual((own_words()[0].level, own_words()[0].name), (Log.WARN, "/robot"))

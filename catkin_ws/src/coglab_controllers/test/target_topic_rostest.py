@@ -41,14 +41,14 @@ class TargetTopic(unittest.TestCase):
             target.publish(message)
 
         timer = rospy.Timer(rospy.Duration(0.02), publish)
-        wait_until(lambda: robot.joints is not None, 20.0, "joint states")
+        wait_until(lambda: robot.joints is not None, "joint states")
         before = robot.arm()[A6]
         robot.start()  # no controller is loaded
-        wait_until(lambda: robot.arm()[A6] > before + 0.1, 10.0, "motion asked for over the topic")
+        wait_until(lambda: robot.arm()[A6] > before + 0.1, "motion asked for over the topic")
         answer = robot.manager("load_controller", "ptp", "coglab/PtpController")
         self.assertTrue(answer.success, answer.message)
         robot.switch("ptp")
-        wait_until(lambda: abs(robot.joints.velocity[A6]) < 0.01, 5.0, "standing still")
+        wait_until(lambda: abs(robot.joints.velocity[A6]) < 0.01, "standing still")
         robot_node = rosnode.get_api_uri(rosgraph.Master("/target_topic"), "/robot")
         by_thread = priorities(xmlrpc.client.ServerProxy(robot_node).getPid("/target_topic")[2])
         # Asked for as much as the FRI thread has: the answers to the robot come first all the same.

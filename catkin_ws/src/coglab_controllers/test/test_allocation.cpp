@@ -87,7 +87,7 @@ TEST(Allocation, AWholeCycleTouchesNoHeap) {
       } else {
         ik.solve(state, q, reference, posture, result);
       }
-      guard.limit(state, q, result.velocity, 0.005, limited);
+      guard.limit(state, q, result.velocity, limited);
       trajectory.at(0.001 * (i % 5000), point);
       q += 0.005 * limited.velocity;
     }

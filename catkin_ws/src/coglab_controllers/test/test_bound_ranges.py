@@ -121,11 +121,14 @@ def test_kinds_of_weights_are_told_as_they_were_given() -> None:
 def test_learning_that_is_told_nothing_has_the_documented_options() -> None:
     times = np.linspace(0.0, 1.2, 61)
     path = np.outer(np.sin(0.5 * np.pi * times / 1.2), [0.4, 0.1, 0.0])
-    plain = cc.learn("p", [(times, path)])
-    told = cc.learn("p", [(times, path)], 20, math.log(100.0), 150.0, cc.GoalWeight("linear"), "none", 1e-6)
+    plain = cc.learn("p", [(times, path)], allow=["moving"])
+    told = cc.learn("p", [(times, path)], 20, math.log(100.0), 150.0, cc.GoalWeight("linear"), "none", 1e-6, ["moving"])
     np.testing.assert_allclose(plain.weights, told.weights, rtol=0.0, atol=1e-9)
     assert plain.weights.shape == (20, 3) and plain.mapping == "none" and plain.goal_weight.kind == "linear"
-    assert np.abs(plain.weights - cc.learn("p", [(times, path)], regularisation=2e-6).weights).max() > 1e-8
+    assert (
+        np.abs(plain.weights - cc.learn("p", [(times, path)], regularisation=2e-6, allow=["moving"]).weights).max()
+        > 1e-8
+    )
 
 
 def motion_of(reach: cc.Primitive, **options: object) -> cc.CartesianMotion:
@@ -245,19 +248,6 @@ def test_an_estimator_is_updated_with_the_step_first() -> None:
     for call in (lambda: estimator.reset(bad), lambda: estimator.update(CYCLE, bad)):
         assert refusal(call) == "goal: expected finite numbers"
     assert "dt: expected seconds" in refusal(lambda: estimator.update(-CYCLE, [0.0] * 3))
-
-
-def test_a_guard_counts_cycles_of_five_milliseconds_unless_it_is_told(chain: cc.Chain) -> None:
-    limits = cc.load_joint_limits(str(LIMITS))
-    q = np.where(AXES[3] > 0, limits.upper_position[3], HOME)
-
-    def told(*dt: float) -> list[int]:
-        guard = cc.Guard(chain, limits, cc.WorkspaceParameters(**EVERYWHERE), 0.0, 0.0)
-        return [guard.limit(chain, q, AXES[3], *dt).blocked_joint for _ in range(110)]
-
-    assert told() == told(CYCLE) != told(0.01)
-    assert told().count(3) in range(8, 13), "0.5 s of 0.55"
-    assert "dt: expected seconds" in refusal(lambda: told(-CYCLE))
 
 
 def test_joints_are_judged_before_the_chain_is_asked(chain: cc.Chain) -> None:

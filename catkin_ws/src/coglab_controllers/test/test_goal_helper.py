@@ -41,9 +41,7 @@ class Tracker:
         self.moving = rospy.Publisher("/tf", TFMessage, queue_size=100)
         self.still = rospy.Publisher("/tf_static", TFMessage, queue_size=10, latch=True)
         self.heard = rospy.Subscriber(topic, DmpGoal, self.goals.append)
-        wait_until(
-            lambda: self.heard.get_num_connections() > 0 and self.moving.get_num_connections() > 0, 20.0, "the helper"
-        )
+        wait_until(lambda: self.heard.get_num_connections() > 0 and self.moving.get_num_connections() > 0, "the helper")
 
     @staticmethod
     def frame(name: str, x: float, base: str = "lwr_base_link") -> TransformStamped:
@@ -73,7 +71,7 @@ def running(hear: str = TOPIC, **parameters: object) -> Iterator[tuple[Tracker, 
         tracker.heard.unregister()
     finally:
         node.kill()
-        node.wait(timeout=20.0)
+        node.wait(timeout=60.0)
         for name in parameters:
             rospy.delete_param(f"/goal_helper/{name}")
 
@@ -93,7 +91,7 @@ def test_a_frame_that_moves_is_passed_on_once_it_agrees_each_once_and_without_wh
         for i in range(12):
             stamps.append(tracker.see("human_hand", 0.5 + 0.001 * i))
             if tracker.goals:
-                wait_until(lambda: tracker.goals[-1].header.stamp == stamps[-1], 20.0, f"the goal of frame {i + 1}")
+                wait_until(lambda: tracker.goals[-1].header.stamp == stamps[-1], f"the goal of frame {i + 1}")
             else:
                 rospy.sleep(0.1)
         told = [goal.header.stamp for goal in tracker.goals]
@@ -104,18 +102,18 @@ def test_a_frame_that_moves_is_passed_on_once_it_agrees_each_once_and_without_wh
         assert place == pytest.approx((0.511, 0.1, 0.02), abs=1e-9), "the offset turns with the frame"
         leap = tracker.see("human_hand", 0.9)
         back = tracker.see("human_hand", 0.512)
-        wait_until(lambda: tracker.goals[-1].header.stamp == back, 20.0, "the frame after the leap")
+        wait_until(lambda: tracker.goals[-1].header.stamp == back, "the frame after the leap")
         assert leap not in [goal.header.stamp for goal in tracker.goals]
         node.send_signal(signal.SIGINT)
-        assert node.wait(timeout=10.0) == 0
+        assert node.wait(timeout=60.0) == 0
 
 
 def test_a_static_frame_is_told_at_once_and_then_once_a_second_where_it_is_asked_for() -> None:
     with running("/elsewhere", topic="elsewhere", frame="cup", dmp_frame_name="table") as (tracker, _):
         tracker.still.publish(TFMessage([Tracker.frame("cup", 0.3, "table")]))
-        wait_until(lambda: len(tracker.goals) == 1, 20.0, "the first one")
+        wait_until(lambda: len(tracker.goals) == 1, "the first one")
         begun = rospy.get_time()
-        wait_until(lambda: len(tracker.goals) >= 3, 10.0, "two more")
+        wait_until(lambda: len(tracker.goals) >= 3, "two more")
         assert rospy.get_time() - begun > 1.8
         goal = tracker.goals[-1]
         assert (goal.header.frame_id, goal.header.stamp) == ("table", rospy.Time())

@@ -58,7 +58,10 @@ def test_counts_are_taken_up_to_their_limits() -> None:
     assert "expected at most 50 trajectories" in refusal(library(learnt(TRAJECTORY * 51)))
     samples = "".join(f'<sample t="{0.001 * i:.4f}" position="{0.001 * i:.4f} 0 0"/>' for i in range(20001))
     one_more = samples.rindex("<sample")
-    assert len(parsed(learnt(f"<trajectory>{samples[:one_more]}</trajectory>", learn='<learn basis="2"/>'))) == 1
+    assert (
+        len(parsed(learnt(f"<trajectory>{samples[:one_more]}</trajectory>", learn='<learn basis="2" allow="moving"/>')))
+        == 1
+    )
     assert "at most 20000 samples" in refusal(library(learnt(f"<trajectory>{samples}</trajectory>")))
 
 
@@ -214,7 +217,7 @@ def line(count: int = 9, step: float = 0.1, way: float = 0.5) -> tuple[np.ndarra
 
 def test_demonstrations_are_taken_within_their_limits() -> None:
     for count, step in ((5, 0.1), (9, 0.05 / 8), (9, 600.0 / 8)):
-        cc.learn("a", [line(count, step, 0.02)], 3)
+        cc.learn("a", [line(count, step, 0.02)], 3, allow=["short", "brief"])
     for count, step, words in (
         (4, 0.1, "demonstration 1: trajectory: expected at least 5 samples, got 4"),
         (9, 0.0499 / 8, "trajectory duration: expected a number from 0.05 to 600"),
@@ -239,7 +242,7 @@ def test_demonstrations_are_taken_within_their_limits() -> None:
                 cc.learn("a", [(times, bad)], 3)
     with pytest.raises(ValueError, match=r"one position per time \(9\), got 8"):
         cc.learn("a", [(times, path[:8])], 3)
-    cc.learn("a", [line(way=1.01e-4)], 3)
+    cc.learn("a", [line(way=1.01e-4)], 3, allow=["short"])
     with pytest.raises(ValueError, match="expected a path of at least 0.1 mm, got one of 0.000099 m"):
         cc.learn("a", [line(way=0.99e-4)], 3)
     for count in (2, 64):
@@ -271,10 +274,10 @@ def test_demonstrations_that_are_mapped_begin_and_end_where_the_first_does() -> 
     times, path = line(21, 0.05)
     other = np.outer(np.linspace(0.0, 0.3, 21) ** 0.5, [0.0, 0.6, 0.2]) + [1.0, 2.0, 0.5]
     for mapping in ("similarity", "upright"):
-        both = cc.learn("a", [(times, path), (times, other)], 5, mapping=mapping)
+        both = cc.learn("a", [(times, path), (times, other)], 5, mapping=mapping, allow=["moving"])
         np.testing.assert_allclose(both.start, path[0], atol=1e-12)
         np.testing.assert_allclose(both.goal, path[-1], atol=1e-12)
-    apart = cc.learn("a", [(times, path), (times, other)], 5)
+    apart = cc.learn("a", [(times, path), (times, other)], 5, allow=["moving"])
     np.testing.assert_allclose(apart.start, 0.5 * (path[0] + other[0]), atol=1e-12)
     np.testing.assert_allclose(apart.goal, 0.5 * (path[-1] + other[-1]), atol=1e-12)
 

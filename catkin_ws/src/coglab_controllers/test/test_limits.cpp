@@ -44,7 +44,7 @@ TEST(Guard, ScalesTheWholeVectorAndKeepsEveryLimit) {
                       request = random.joints(std::pow(10.0, random.uniform(-2, 1)));
     const ChainState state = robot().evaluate(q);
     GuardResult result;
-    guard.limit(state, q, request, kCycle, result);
+    guard.limit(state, q, request, result);
     ASSERT_GE(result.scale, 0.0);
     ASSERT_LE(result.scale, 1.0);
     // The direction is kept, but for joints at their stop that asked for next to nothing.
@@ -89,7 +89,7 @@ TEST(Guard, AJointNeverReachesItsStopAtFullSpeed) {
       if (i % 100 == 99 && k % 2 == 0) request = random.joints(3.0);
       const JointVector q = interpolator.position();
       GuardResult result;
-      guard.limit(robot().evaluate(q), q, request, kCycle, result);
+      guard.limit(robot().evaluate(q), q, request, result);
       // One cycle late, as from another thread.
       interpolator.step(last, kCycle);
       last = result.velocity;
@@ -97,29 +97,6 @@ TEST(Guard, AJointNeverReachesItsStopAtFullSpeed) {
       ASSERT_LE((p.lower_position - interpolator.position()).maxCoeff(), 0.0) << k;
     }
   }
-}
-
-TEST(Guard, NamesTheJointThatBlocksTheMotion) {
-  GuardParameters p = armLimits();
-  p.workspace = everywhere();
-  Guard guard(p, robot());
-  JointVector q = JointVector::Zero(), request = JointVector::Zero();
-  q[3] = p.upper_position[3] - p.position_margin;
-  request[3] = 0.5;
-  request[0] = 0.1;
-  GuardResult result;
-  double blocked_after = -1.0;
-  for (int i = 0; i < 200 && blocked_after < 0.0; ++i) {
-    guard.limit(robot().evaluate(q), q, request, kCycle, result);
-    if (result.blocked_joint >= 0) blocked_after = i * kCycle;
-  }
-  EXPECT_EQ(result.blocked_joint, 3);
-  EXPECT_EQ(result.reason, GuardReason::JointPosition);
-  EXPECT_NEAR(blocked_after, 0.5, 0.011);
-  request[3] = -0.5;
-  guard.limit(robot().evaluate(q), q, request, kCycle, result);
-  EXPECT_EQ(result.blocked_joint, -1);
-  EXPECT_EQ(result.scale, 1.0);
 }
 
 TEST(Guard, AJointAtItsStopThatAsksForNextToNothingDoesNotStopTheArm) {
@@ -132,15 +109,14 @@ TEST(Guard, AJointAtItsStopThatAsksForNextToNothingDoesNotStopTheArm) {
   for (const double outward : {1e-12, 1e-9, 1e-6, 2e-4}) {
     request[3] = outward;
     GuardResult result;
-    for (int i = 0; i < 300; ++i) guard.limit(robot().evaluate(q), q, request, kCycle, result);
+    guard.limit(robot().evaluate(q), q, request, result);
     EXPECT_EQ(result.scale, 1.0) << outward;
     EXPECT_EQ(result.velocity[0], 0.3) << outward;
     EXPECT_EQ(result.velocity[3], 0.0) << outward;
-    EXPECT_EQ(result.blocked_joint, -1);
   }
   request[3] = 0.01;  // this is a share of the motion
   GuardResult result;
-  guard.limit(robot().evaluate(q), q, request, kCycle, result);
+  guard.limit(robot().evaluate(q), q, request, result);
   EXPECT_EQ(result.scale, 0.0);
 }
 
@@ -149,14 +125,14 @@ TEST(Guard, AnswersNanWithStandstill) {
   JointVector q = JointVector::Zero(), request = JointVector::Constant(0.1);
   request[2] = std::nan("");
   GuardResult result;
-  guard.limit(robot().evaluate(q), q, request, kCycle, result);
+  guard.limit(robot().evaluate(q), q, request, result);
   EXPECT_TRUE(result.velocity.isZero(0.0));
   EXPECT_EQ(result.reason, GuardReason::NotFinite);
   request[2] = std::numeric_limits<double>::infinity();
-  guard.limit(robot().evaluate(q), q, request, kCycle, result);
+  guard.limit(robot().evaluate(q), q, request, result);
   EXPECT_TRUE(result.velocity.isZero(0.0));
   q[0] = std::nan("");
-  guard.limit(robot().evaluate(JointVector::Zero()), q, JointVector::Zero(), kCycle, result);
+  guard.limit(robot().evaluate(JointVector::Zero()), q, JointVector::Zero(), result);
   EXPECT_EQ(result.reason, GuardReason::NotFinite);
 }
 
@@ -182,7 +158,7 @@ TEST(Guard, KeepsTheHandInTheWorkspaceAndTheArmFromStretching) {
     const JointVector request = random.joints(1.5);
     for (int i = 0; i < 400; ++i) {
       GuardResult result;
-      guard.limit(robot().evaluate(q), q, request, kCycle, result);
+      guard.limit(robot().evaluate(q), q, request, result);
       q += kCycle * result.velocity;
       ASSERT_GT(smallest(), -1e-3);
     }
@@ -202,10 +178,10 @@ TEST(Guard, LetsPassWhatLeadsBackInside) {
   ASSERT_GT(state.tool.position.z(), 0.5);
   request[1] = state.jacobian(2, 1) > 0.0 ? 0.3 : -0.3;
   GuardResult result;
-  guard.limit(state, q, request, kCycle, result);
+  guard.limit(state, q, request, result);
   EXPECT_EQ(result.scale, 0.0);
   EXPECT_EQ(result.border, WorkspaceBorder::BoxMax);
-  guard.limit(state, q, -request, kCycle, result);
+  guard.limit(state, q, -request, result);
   EXPECT_EQ(result.scale, 1.0);
 }
 
@@ -302,13 +278,12 @@ TEST(Guard, OfAVelocityThatIsNoNumberNothingElseIsSaid) {
     (position ? q : request)[1] = std::nan("");
     GuardResult result;
     result.velocity.setConstant(3.0);
-    result.joint = result.blocked_joint = 4;
+    result.joint = 4;
     result.border = WorkspaceBorder::Stretch;
-    guard.limit(state, q, request, kCycle, result);
+    guard.limit(state, q, request, result);
     EXPECT_EQ(result.reason, GuardReason::NotFinite);
     EXPECT_EQ(result.scale, 0.0);
     EXPECT_EQ(result.joint, -1);
-    EXPECT_EQ(result.blocked_joint, -1);
     EXPECT_EQ(result.border, WorkspaceBorder::None);
     EXPECT_TRUE(result.velocity.isZero(0.0));
   }
@@ -336,7 +311,7 @@ TEST(Guard, OfJointsThatAreEquallyTooFastTheFirstIsNamedAndAtTheLimitNone) {
     request[2] = third;
     request[4] = fifth;
     GuardResult result;
-    guard.limit(state, q, request, kCycle, result);
+    guard.limit(state, q, request, result);
     return result;
   };
   EXPECT_EQ(limited(3.0, -3.0).scale, 0.5);
@@ -354,7 +329,7 @@ TEST(Guard, AJointAtItsStopMayAskForNothingAndForAThousandthButNoMore) {
   const auto scale = [&](double fastest, double outward) {
     request[0] = fastest;
     request[3] = outward;
-    guard.limit(robot().evaluate(q), q, request, kCycle, result);
+    guard.limit(robot().evaluate(q), q, request, result);
     return result.scale;
   };
   for (const double side : {1.0, -1.0}) {
@@ -373,24 +348,4 @@ TEST(Guard, AJointAtItsStopMayAskForNothingAndForAThousandthButNoMore) {
     EXPECT_EQ(scale(1.0, side * 0.9e-3), 1.0);
     EXPECT_EQ(result.velocity[3], side * guard.speedToStop(3, room));
   }
-}
-
-TEST(Guard, AJointBlocksOnlyByItselfAndWithoutAPause) {
-  const GuardParameters p = jointLimitsOnly();
-  Guard guard(p, robot());
-  const auto blocked = [&](int joint, double room) {
-    JointVector q = JointVector::Zero();
-    q[joint] = p.upper_position[joint] - room;
-    GuardResult result;
-    guard.limit(robot().evaluate(q), q, JointVector::Unit(joint), 0.125, result);
-    EXPECT_EQ(result.joint, joint);
-    return result.blocked_joint;
-  };
-  for (int i = 0; i < 3; ++i) EXPECT_EQ(blocked(3, 0.0), -1);
-  for (int i = 0; i < 3; ++i) EXPECT_EQ(blocked(5, 0.0), -1) << "another joint's time is its own";
-  EXPECT_EQ(blocked(5, 0.0), 5);
-  for (int i = 0; i < 3; ++i) EXPECT_EQ(blocked(3, 0.0), -1);
-  EXPECT_EQ(blocked(3, 0.05), -1) << "it moves on, slowly";
-  for (int i = 0; i < 3; ++i) EXPECT_EQ(blocked(3, 0.0), -1);
-  EXPECT_EQ(blocked(3, 0.0), 3);
 }

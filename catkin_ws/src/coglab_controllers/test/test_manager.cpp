@@ -1,6 +1,7 @@
 // The controller manager in virtual time: loading, switching, faults, limits; D4.10 Table 6.
 #include <atomic>
 #include <chrono>
+#include <filesystem>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -37,6 +38,15 @@ TEST(Manager, RefusesBadPluginsAndKeepsWhatIsThere) {
   EXPECT_EQ(types, (std::vector<std::string>{"coglab/DmpController", "coglab/PtpController",
                                              "test/Misbehaving"}));
   EXPECT_TRUE(VirtualRobot::ok(manager.load("odd2", "test/Misbehaving")));  // still makes new ones
+}
+
+TEST(Manager, LibraryThatIsCutShortIsRefused) {
+  const std::string cut = ::testing::TempDir() + "libcut.so";
+  std::filesystem::copy_file(PLUGIN_DIR "/libcoglab_test_own_exception.so", cut,
+                             std::filesystem::copy_options::overwrite_existing);
+  std::filesystem::resize_file(cut, 5000);
+  VirtualRobot robot("{types: {test/Cut: " + cut + "}}");
+  EXPECT_TRUE(refused(robot.manager->load("a", "test/Cut"), {"cut short"}));
 }
 
 TEST(Manager, TypesGoWithTheirLibraryAndComeBackWithIt) {

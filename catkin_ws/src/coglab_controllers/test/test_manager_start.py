@@ -55,16 +55,16 @@ def started(master: rosgraph.Master, end: signal.Signals = signal.SIGINT) -> str
     """What a start that succeeds says; the node is then asked to end, and ends with 0."""
     node = subprocess.Popen([binary()], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     try:
-        limit = time.monotonic() + 30.0
+        limit = time.monotonic() + 60.0
         while SERVICE not in [name for name, _ in master.getSystemState()[2]]:
             assert node.poll() is None, node.communicate()[1][-2000:]
             assert time.monotonic() < limit, "no service within 30 s"
             time.sleep(0.02)
         node.send_signal(end)
-        _, told = node.communicate(timeout=20.0)
+        _, told = node.communicate(timeout=60.0)
     finally:
         node.kill()
-        node.wait(timeout=20.0)
+        node.wait(timeout=60.0)
     assert node.returncode == 0, told
     return told
 

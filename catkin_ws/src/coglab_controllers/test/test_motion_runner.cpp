@@ -309,16 +309,6 @@ TEST_F(Runner, AControllerIsToldWhetherItMayMoveInEveryCycleAndNotWithoutAJointS
   EXPECT_FALSE(Plain::allowed);
 }
 
-TEST(Defaults, OfAControllerAreThatItSlowsNothingAndWaitsForNothing) {
-  EXPECT_EQ(Plain().limitScale(), 1.0);
-  EXPECT_FALSE(Plain().waitsAtBorder());
-  const RunnerPolicy policy;
-  EXPECT_FALSE(policy.open_end);
-  EXPECT_FALSE(policy.waits_at_border);
-  EXPECT_EQ(policy.longest_queue, 64);
-  EXPECT_STREQ(policy.id_name, "motion_id");
-}
-
 TEST_F(Runner, FaultsOfAMotionEndInStandStillWithTheReason) {
   EXPECT_TRUE(ask(0.2, 1.0, false, 4.0).success);
   arm.run(1.0);

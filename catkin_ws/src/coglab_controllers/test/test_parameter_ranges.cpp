@@ -160,8 +160,11 @@ TEST(ParameterRanges, OfTheManager) {
     });
   }
   for (const std::string name : {"box_min", "box_max", "base_centre"}) {
-    EXPECT_NE(starting("{workspace: {" + name + ": [1, 2]}}").find("expected 3 finite numbers"),
-              std::string::npos);
+    for (const std::string bad : {"[1, 2]", "[-1200, 1200, 1600]"}) {
+      EXPECT_NE(starting("{workspace: {" + name + ": " + bad + "}}")
+                    .find(name + ": expected 3 finite numbers"),
+                std::string::npos);
+    }
   }
   EXPECT_NE(starting("{workspace: 7}").find("workspace: expected a block"), std::string::npos);
   EXPECT_NE(starting("{plugin_paths: {a: b}}").find("expected a list of texts"), std::string::npos);
@@ -209,7 +212,7 @@ TEST(ParameterDefaults, OfTheManagerAreTheDocumentedOnes) {
   EXPECT_EQ(settings.cycle.cycle_time, 0.005);
   EXPECT_EQ(settings.cycle.sample_timeout, 0.1);
   EXPECT_EQ(settings.cycle.silent_time, 0.5);
-  EXPECT_EQ(settings.cycle.border_time, 1.0);
+  EXPECT_EQ(settings.cycle.blocked_time, 0.5);
   EXPECT_EQ(settings.cycle.overruns_to_fault, 5);
   EXPECT_EQ(CycleSettings().overrun_time, 0.004);
   EXPECT_EQ(robot.manager->report().speed_scale, 1.0);
@@ -222,7 +225,6 @@ TEST(ParameterDefaults, OfTheManagerAreTheDocumentedOnes) {
   EXPECT_EQ(setup.guard.position_margin, robot.limits.position_margin);
   EXPECT_EQ(setup.guard.hand_speed, 1.0);
   EXPECT_EQ(setup.guard.elbow_speed, 1.0);
-  EXPECT_EQ(setup.guard.block_time, 0.5);
   EXPECT_EQ(setup.guard.workspace_deceleration, 2.0);
   EXPECT_FALSE(setup.tactile);
   EXPECT_NEAR(setup.tool_from_wrench.w(), 1.0, 1e-12) << "the wrench is that of the palm";

@@ -100,8 +100,42 @@ def test_the_start_velocity_is_the_mean_over_the_demonstrations(reach: cc.Primit
     demonstrations = [cc.Dmp(reach, reach.start, reach.goal, v).roll_out(reach.goal, 1.2)[:2] for v in velocities]
     for (times, path), velocity in zip(demonstrations, velocities, strict=True):
         np.testing.assert_allclose((path[1] - path[0]) / (times[1] - times[0]), velocity, atol=0.03)
-    several = cc.learn("several", demonstrations).start_velocity
+    several = cc.learn("several", demonstrations, allow=["moving"]).start_velocity
     np.testing.assert_allclose(several, velocities.mean(axis=0), atol=1e-3)
+
+
+def demonstration(length: float = 0.5, duration: float = 1.2, noise: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    times = np.linspace(0.0, duration, 121)
+    path = np.outer(minimum_jerk(times / duration), [length, 0.0, 0.0])
+    return times, path + np.random.default_rng(1).normal(0.0, noise, path.shape)
+
+
+def jumping() -> tuple[np.ndarray, np.ndarray]:
+    times, path = demonstration()
+    path[60:] += [0.0, 0.15, 0.0]
+    return times, path
+
+
+@pytest.mark.parametrize(
+    ("fault", "bad"),
+    [
+        ("short", demonstration(length=0.006, duration=0.49)),  # a bad cut of a noisy track
+        ("brief", demonstration(duration=0.2)),
+        ("jump", jumping()),
+        ("moving", tuple(part[30:90] for part in demonstration())),
+        ("noisy", demonstration(duration=3.0, noise=0.012)),
+    ],
+)
+def test_demonstrations_that_are_no_reach_are_refused_unless_allowed(fault: str, bad: tuple) -> None:
+    cc.learn("good", [demonstration(noise=0.002)])
+    with pytest.raises(ValueError, match=f"demonstration 1: {fault}: "):
+        cc.learn("bad", [bad])
+    rest = {"short", "brief", "jump", "moving", "noisy"} - {fault}
+    with pytest.raises(ValueError, match=f"{fault}: "):
+        cc.learn("bad", [bad], allow=sorted(rest))
+    assert cc.learn("bad", [bad], allow=[fault]).id == "bad"
+    with pytest.raises(ValueError, match="allow: expected short, brief"):
+        cc.learn("bad", [bad], allow=["everything"])
 
 
 @pytest.mark.parametrize(

@@ -153,7 +153,7 @@ def system() -> Iterator[tuple[TopicArm, subprocess.Popen]]:
         finally:
             rospy.signal_shutdown("the test is over")
             node.terminate()
-            node.wait(timeout=20.0)
+            node.wait(timeout=60.0)
 
 
 def move(target: list[float], speed: float = SPEED) -> AddPtpResponse:
@@ -162,30 +162,30 @@ def move(target: list[float], speed: float = SPEED) -> AddPtpResponse:
 
 def test_the_manager_keeps_the_limits_of_its_profile(system):
     arm, _ = system
-    wait_until(lambda: len(arm.heard) > 20, 10.0, "target velocities")
+    wait_until(lambda: len(arm.heard) > 20, "target velocities")
     answer = move([HOME[0] + 0.3, *HOME[1:]], 0.3)
     assert (answer.status, answer.reason_code) == (AddPtpRequest.REJECTED, ReasonCode.OUT_OF_RANGE), answer.message
 
 
 def test_a_standing_arm_stays_and_the_node_lives(system):
     arm, node = system
-    wait_until(lambda: len(arm.heard) > 20, 10.0, "target velocities")
+    wait_until(lambda: len(arm.heard) > 20, "target velocities")
     intruder, before, heard = Intruder(arm, 1), list(arm.position), len(arm.heard)
     for _ in range(150):
         intruder.send()
         time.sleep(0.003)
-    wait_until(lambda: len(arm.heard) > heard + 50, 10.0, "target velocities after it")
+    wait_until(lambda: len(arm.heard) > heard + 50, "target velocities after it")
     assert node.poll() is None
     assert arm.position == before
     assert all(math.isfinite(v) for message in arm.heard for v in message.velocity)
 
 
-def test_a_motion_beside_it_reaches_its_end_within_the_limits(system):
+def test_a_motion_beside_it_reaches_its_end_all_the_limits(system):
     arm, node = system
     target = [HOME[0] + 0.3, *HOME[1:]]
     answer = move(target)
     assert answer.status == AddPtpRequest.STARTED, answer.message
-    heard, intruder, end = len(arm.heard), Intruder(arm, 2), time.monotonic() + 10.0
+    heard, intruder, end = len(arm.heard), Intruder(arm, 2), time.monotonic() + 60.0
     while answer.ptp_id not in arm.finished and time.monotonic() < end and not arm.unfinished:
         intruder.send()
         time.sleep(0.003)

@@ -59,15 +59,19 @@ def test_requests_against_the_control_thread_and_exceptions_of_plugins(sanitizer
     for source in sources():
         objects.append(tmp_path / f"{len(objects)}_{source.stem}.o")
         compiled(["g++", *flags, "-c", str(source), "-o", str(objects[-1]), *includes])
-    for program in ("thread_stress", "plugin_exceptions"):
+    for program in (
+        PACKAGE / "test" / "thread_stress.cpp",
+        PACKAGE / "test" / "plugin_exceptions.cpp",
+        SOURCES / "ctrl_more" / "tools" / "probe.cpp",
+    ):
         compiled(
             [
                 "g++",
                 *flags,
                 "-rdynamic",
-                str(PACKAGE / "test" / f"{program}.cpp"),
+                str(program),
                 "-o",
-                str(tmp_path / program),
+                str(tmp_path / ("ctrl_more_probe" if program.stem == "probe" else program.stem)),
                 *map(str, objects),
                 *includes,
                 *LIBRARIES,

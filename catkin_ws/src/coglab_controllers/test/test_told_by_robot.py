@@ -95,23 +95,24 @@ class Told(Robot):
     def log(self) -> str:
         return self._log.read_text(encoding="utf-8", errors="replace")
 
-    def said(self, words: str) -> None:
-        """Waits until the log has these words."""
-        wait_until(lambda: words in self.log(), 10.0, f"in the log: {words}")
+    def said(self, words: str) -> str:
+        """Waits until the log has these words; the line."""
+        wait_until(lambda: words in self.log(), f"in the log: {words}")
+        return next(line for line in self.log().splitlines() if words in line)
 
     def ask(self, name: str, kind: type, *arguments: object):
         """A service below the manager."""
         return self.call(MANAGER + name, kind, *arguments)
 
-    def wait(self, name: str, condition: Callable[[object], bool], what: str, seconds: float = 15.0) -> None:
+    def wait(self, name: str, condition: Callable[[object], bool], what: str) -> None:
         """Until the newest message of a topic is so."""
         heard = self.told[name]
-        wait_until(lambda: bool(heard) and condition(heard[-1]), seconds, what)
+        wait_until(lambda: bool(heard) and condition(heard[-1]), what)
 
     def more(self, name: str, count: int) -> list:
         """The next messages of a topic."""
         known = len(self.told[name])
-        wait_until(lambda: len(self.told[name]) >= known + count, 20.0, f"{count} more of {name}")
+        wait_until(lambda: len(self.told[name]) >= known + count, f"{count} more of {name}")
         return self.told[name][known:]
 
 
@@ -137,7 +138,7 @@ def system(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Told, sub
         finally:
             rospy.signal_shutdown("the test is over")
             node.kill()
-            node.wait(timeout=20.0)
+            node.wait(timeout=60.0)
 
 
 @pytest.fixture
@@ -226,10 +227,11 @@ def test_a_motion_of_ones_own_is_told_often_while_it_moves_and_seldom_at_rest(ro
     robot.wait("circle", lambda m: m.motion_id == third.motion_id and m.time > 0.1, "the third")
     done = robot.ask("circle/cancel", CancelMotion, 0.0, "enough")
     assert (done.success, done.was_running, done.reason_code) == (True, True, 0), done.message
-    wait_until(lambda: any(m.state == "aborted" for m in robot.told["circle"]), 10.0, "its end")
+    wait_until(lambda: any(m.state == "aborted" for m in robot.told["circle"]), "its end")
     last = next(m for m in robot.told["circle"] if m.state == "aborted")
     assert (last.motion_id, last.reason_code) == (third.motion_id, ReasonCode.CANCELLED) and "enough" in last.reason
-    robot.said(f"motion_id {third.motion_id} was not executed: {last.reason}")
+    line = robot.said(f"motion_id {third.motion_id} was not executed: {last.reason}")
+    assert "INFO" in line, "a cancel that was asked for is no warning"
     assert "circle/cancel: " not in robot.log()
 
 
@@ -243,7 +245,7 @@ def test_a_cancel_of_another_controller_than_the_one_that_moves_is_refused_and_l
     assert "no motion of 'dmp' was running; 'ptp' moves the arm" in other.message
     robot.said("dmp/cancel: " + other.message)
     assert robot.ask("ptp/cancel", CancelMotion, 0.0, "").success
-    robot.said(f"ptp_id {going.ptp_id} was not executed: ")
+    assert "INFO" in robot.said(f"ptp_id {going.ptp_id} was not executed: ")
 
 
 def broadcast(robot: Told) -> list[TransformStamped]:
@@ -262,7 +264,7 @@ def test_a_reach_tells_its_goal_and_its_progress_and_ik_debug_when_it_is_asked_f
     request = ExecuteDmpRequest(primitive_id="reach_human", dmp_ratio=2.0, goal_frame="human_hand")
     request.orientation_control, request.target_orientation = True, Quaternion(*orientation)
     time.sleep(1.2)  # the parameter is looked at once a second
-    wait_until(lambda: robot.ask("dmp/execute_dmp", ExecuteDmp, request).success, 10.0, "execute_dmp")
+    wait_until(lambda: robot.ask("dmp/execute_dmp", ExecuteDmp, request).success, "execute_dmp")
     robot.wait("reach", lambda m: m.state == "reached", "the reach")
     running = [m for m in robot.told["reach"] if m.state == "running"]
     assert spacing(running) < 0.12, "fifty times a second"
@@ -311,7 +313,7 @@ def look_at(records: list[IkDebug], goal: np.ndarray) -> None:
 
 def test_a_goal_that_is_refused_is_counted(robot: Told) -> None:
     publisher = rospy.Publisher("controller_manager/dmp/dmp_goal", DmpGoal, queue_size=1)
-    wait_until(lambda: publisher.get_num_connections() > 0, 10.0, "connection")
+    wait_until(lambda: publisher.get_num_connections() > 0, "connection")
     wrong = DmpGoal()
     wrong.header.frame_id = "world"
     publisher.publish(wrong)
@@ -324,14 +326,14 @@ def test_a_speed_by_the_topic_that_is_refused_is_logged(robot: Told) -> None:
     assert (refused.success, refused.reason_code) == (False, ReasonCode.OUT_OF_RANGE)
     assert refused.message not in robot.log(), "the answer has it"
     topic = rospy.Publisher("controller_manager/speed_scale", Float64, queue_size=1)
-    wait_until(lambda: topic.get_num_connections() > 0, 10.0, "connection")
+    wait_until(lambda: topic.get_num_connections() > 0, "connection")
     topic.publish(7.0)
     robot.said(refused.message)
 
 
 def test_touch_sensors_are_heard_in_the_tools_frame_alone(robot: Told) -> None:
     topic = rospy.Publisher("/ih2_hand/fingertip_forces", FingertipForces, queue_size=1)
-    wait_until(lambda: topic.get_num_connections() > 0, 10.0, "connection")
+    wait_until(lambda: topic.get_num_connections() > 0, "connection")
     message = FingertipForces()
     message.header.frame_id, message.header.stamp = "world", rospy.Time.now()
     topic.publish(message)
@@ -363,9 +365,9 @@ def test_feedback_requests_have_whole_answers_and_their_status(robot: Told) -> N
     unknown = robot.ask("feedback/describe", DescribeController, "nobody")
     assert (unknown.success, unknown.reason_code) == (False, ReasonCode.UNKNOWN_NAME) and "nobody" in unknown.text
     assert ask("enable", FeedbackSelect, ["ee_admittance"], "") == (True, 0, "")
-    wait_until(lambda: entry(robot, "ee_admittance").enabled, 10.0, "enabled")
+    wait_until(lambda: entry(robot, "ee_admittance").enabled, "enabled")
     assert ask("pause", FeedbackSelect, ["ee_admittance"], "lunch") == (True, 0, "")
-    wait_until(lambda: entry(robot, "ee_admittance").paused, 10.0, "paused")
+    wait_until(lambda: entry(robot, "ee_admittance").paused, "paused")
     own = entry(robot, "ee_admittance")
     assert (list(own.pause_reasons), list(own.pause_codes)) == (["lunch"], [ReasonCode.PAUSED_BY_USER])
     assert (own.type, own.fault, own.fault_code, own.faults, own.safety) == ("EeAdmittance", "", 0, 0, False)
@@ -374,7 +376,7 @@ def test_feedback_requests_have_whole_answers_and_their_status(robot: Told) -> N
     assert both.success and list(both.affected) == ["ee_admittance"], "paused once more, for another reason"
     again = robot.ask("feedback/pause_by_signal", FeedbackBySignal, "wrench", False)
     assert list(again.affected) == [], "nothing changed"
-    wait_until(lambda: len(entry(robot, "ee_admittance").pause_codes) == 2, 10.0, "both reasons")
+    wait_until(lambda: len(entry(robot, "ee_admittance").pause_codes) == 2, "both reasons")
     assert entry(robot, "ee_admittance").pause_codes[1] == ReasonCode.PAUSED_BY_SIGNAL
     robot.more("status", 4)
     known_statuses = len(robot.told["profile"])
@@ -386,7 +388,7 @@ def test_feedback_requests_have_whole_answers_and_their_status(robot: Told) -> N
 def test_states_of_feedback_controllers_are_told_with_names_and_units(robot: Told) -> None:
     shown: list[FeedbackState] = []
     heard = rospy.Subscriber("controller_manager/feedback/state", FeedbackState, shown.append)
-    wait_until(lambda: len(shown) > 2, 10.0, "states")
+    wait_until(lambda: len(shown) > 2, "states")
     stamps = [m.header.stamp for m in shown]
     assert stamps == sorted(stamps) and stamps[-1] > stamps[0]
     for m in shown:
@@ -397,4 +399,4 @@ def test_states_of_feedback_controllers_are_told_with_names_and_units(robot: Tol
 def test_it_ends_in_order_by_the_other_signal_too(system: tuple[Told, subprocess.Popen]) -> None:
     _, node = system
     node.send_signal(signal.SIGTERM)
-    assert node.wait(timeout=20.0) == 0
+    assert node.wait(timeout=60.0) == 0

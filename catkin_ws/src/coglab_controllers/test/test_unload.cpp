@@ -211,15 +211,6 @@ TEST(Unload, NeitherTheControllerThatStillRunsNorTheOneThatIsOrderedGoes) {
   control.join();
 }
 
-TEST(Controllers, WaitAtBordersAndSlowTheClockOnlyIfTheySaySo) {
-  VirtualRobot robot;
-  robot.loadBoth();
-  EXPECT_TRUE(robot.dmp().waitsAtBorder()) << "its goal may come closer";
-  EXPECT_FALSE(robot.ptp().waitsAtBorder());
-  EXPECT_FALSE(Lingering().waitsAtBorder());
-  EXPECT_EQ(Lingering().limitScale(), 1.0);
-}
-
 TEST(Controllers, AreListedAndMissedByTheirNames) {
   VirtualRobot robot("{" + kTypes + "}");
   ControllerManager& manager = *robot.manager;

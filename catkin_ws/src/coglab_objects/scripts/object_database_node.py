@@ -11,7 +11,7 @@ import rospy
 from coglab_msgs.msg import ReasonCode
 from coglab_msgs.srv import GetObject, GetObjectResponse, ListObjects, ListObjectsResponse, Reload, ReloadResponse
 from coglab_objects.database import ObjectDatabase, ObjectError
-from coglab_py import parameters
+from coglab_py import parameters, steady
 from coglab_py.alone import init_node
 
 MIRROR = "~objects"
@@ -31,7 +31,7 @@ class ObjectDatabaseNode:
         rospy.Service("~get_object", GetObject, self.on_get)
         rospy.Service("~list_objects", ListObjects, self.on_list)
         rospy.Service("~reload", Reload, self.on_reload)
-        rospy.Timer(rospy.Duration(1.0), self.on_timer)
+        steady.SteadyTimer(1.0, self.on_timer, "reload")
 
     def reload(self, only_changed: bool) -> list[str]:
         """Read, warn about each problem that is new, mirror to the parameter server."""
@@ -64,8 +64,8 @@ class ObjectDatabaseNode:
                 rospy.logwarn("object database: %s is not up to date: %s", rospy.resolve_name(MIRROR), error)
             self.behind = True
 
-    def on_timer(self, _event) -> None:
-        """Hot reload. Nothing may end the timer."""
+    def on_timer(self) -> None:
+        """Hot reload. No file may end the node."""
         try:
             if self.database.changed():
                 self.reload(only_changed=True)
@@ -101,8 +101,7 @@ def main() -> int:
     except parameters.ParameterError as error:
         rospy.logfatal("object_database: %s; ~folder is the folder with one YAML file per object", error)
         return 1
-    rospy.spin()
-    return 0
+    return steady.spin()
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import pytest
 import rospy
 from coglab_msgs.msg import ReasonCode
+from coglab_py import steady
 
 SHARE = Path(__file__).resolve().parent.parent
 HOSTILE = {
@@ -59,8 +60,8 @@ def make(tmp_path, monkeypatch):
     for name in ("get_param", "has_param", "set_param", "delete_param"):
         monkeypatch.setattr(rospy, name, getattr(master, name))
     begun = []
-    for name in ("Service", "Timer"):
-        monkeypatch.setattr(rospy, name, lambda *args: begun.append(args))
+    monkeypatch.setattr(rospy, "Service", lambda *args: begun.append(args))
+    monkeypatch.setattr(steady, "SteadyTimer", lambda *args: begun.append(args))
     for name in ("logwarn", "logerr_throttle"):
         monkeypatch.setattr(rospy, name, lambda *args: warnings.append(args))
     monkeypatch.setattr(rospy, "resolve_name", lambda name: name)
@@ -91,7 +92,7 @@ def test_no_file_ends_the_timer_and_each_is_reported_once(make):
     started = make()
     hostile(started.folder)
     for _ in range(3):
-        started.node.on_timer(None)
+        started.node.on_timer()
     assert len(started.warnings) == len(HOSTILE)
     assert started.node.on_get(SimpleNamespace(object_id="x" * 1_000_000)).success is False
 
@@ -100,7 +101,7 @@ def test_deleted_objects_leave_the_parameter_server_and_only_changes_go_there(ma
     started = make()
     before = started.master.calls
     (started.folder / "mug.yaml").unlink()
-    started.node.on_timer(None)
+    started.node.on_timer()
     assert started.master.objects() == ["ball"] and started.node.database.ids() == ["ball"]
     assert started.master.calls == before
 
@@ -109,26 +110,26 @@ def test_a_master_that_is_away_is_caught_up_with(make):
     started = make()
     started.master.down = True
     (started.folder / "mug.yaml").unlink()
-    started.node.on_timer(None)
-    started.node.on_timer(None)
+    started.node.on_timer()
+    started.node.on_timer()
     assert started.node.database.ids() == ["ball"] and started.master.objects() == ["ball", "mug"]
     assert len(started.warnings) == 1
     started.master.down = False
-    started.node.on_timer(None)
+    started.node.on_timer()
     assert started.master.objects() == ["ball"]
 
 
 def test_an_unexpected_error_is_told_and_the_timer_goes_on(make, monkeypatch):
     started = make()
     monkeypatch.setattr(started.node.database, "changed", lambda: 1 / 0)
-    started.node.on_timer(None)
+    started.node.on_timer()
     assert "ZeroDivisionError" in started.warnings[-1][1]
 
 
 def test_the_list_names_the_files_that_do_not_fit(make, tmp_path):
     started = make()
     (tmp_path / "mug.yaml").write_text("id: mug\nmass: heavy\n")
-    started.node.on_timer(None)
+    started.node.on_timer()
     listed = started.node.on_list(None)
     assert listed.object_ids == ["ball", "mug"] and len(listed.problems) == 1
     assert "mug.yaml" in listed.problems[0] and "the old entry stays" in listed.problems[0]
@@ -146,13 +147,13 @@ def test_reading_again_says_by_a_code_whether_all_files_fit(make, tmp_path):
 
 def test_three_services_and_a_timer_of_a_second(make):
     started = make()
-    *services, (period, on_timer) = started.begun
+    *services, (period, on_timer, _) = started.begun
     assert [(name, served) for name, _, served in services] == [
         ("~get_object", started.node.on_get),
         ("~list_objects", started.node.on_list),
         ("~reload", started.node.on_reload),
     ]
-    assert period.to_sec() == 1.0 and on_timer == started.node.on_timer
+    assert period == 1.0 and on_timer == started.node.on_timer
 
 
 def test_an_entry_is_answered_as_its_file_has_it(make, tmp_path):
@@ -173,7 +174,7 @@ def test_a_file_that_is_written_is_read_at_the_next_tick_and_mirrored_once(make)
     path = started.folder / "mug.yaml"
     path.write_text(path.read_text().replace("mass: 0.31", "mass: 0.3333"))
     for _ in range(3):
-        started.node.on_timer(None)
+        started.node.on_timer()
     assert started.master.values["~objects/mug"]["mass"] == 0.3333 and started.master.calls == 3
     assert started.warnings == []
 
@@ -182,10 +183,10 @@ def test_the_timer_reads_only_what_has_changed_and_the_service_all(make, monkeyp
     started = make()
     asked, reload = [], started.node.database.reload
     monkeypatch.setattr(started.node.database, "reload", lambda only: asked.append(only) or reload(only))
-    started.node.on_timer(None)
+    started.node.on_timer()
     assert asked == []
     (started.folder / "mug.yaml").unlink()
-    started.node.on_timer(None)
+    started.node.on_timer()
     assert asked == [True]
     started.node.on_reload(None)
     assert asked == [True, False]
@@ -206,25 +207,25 @@ def test_a_master_that_is_away_at_the_start_and_later_again_is_told_each_time(ma
     started = make(node=False)
     started.master.down = True
     node = started.module.ObjectDatabaseNode()
-    node.on_timer(None)
+    node.on_timer()
     assert node.behind and len(started.warnings) == 1 and node.database.ids() == ["ball", "mug"]
     assert started.warnings[0][0] == "object database: %s is not up to date: %s"
     assert started.warnings[0][1] == "~objects"
     started.master.down = False
-    node.on_timer(None)
+    node.on_timer()
     calls = started.master.calls
-    node.on_timer(None)
+    node.on_timer()
     assert not node.behind and started.master.objects() == ["ball", "mug"] and started.master.calls == calls
     started.master.down = True
     (started.folder / "mug.yaml").unlink()
-    node.on_timer(None)
+    node.on_timer()
     assert node.behind and len(started.warnings) == 2
 
 
 def test_errors_of_the_timer_are_told_at_most_every_ten_seconds(make, monkeypatch):
     started = make()
     monkeypatch.setattr(started.node.database, "changed", lambda: 1 / 0)
-    started.node.on_timer(None)
+    started.node.on_timer()
     assert started.warnings[-1][0] == 10.0
 
 

@@ -13,7 +13,9 @@ train_patterns.py), memory (s, how long an estimate outlives its reach; default 
 from __future__ import annotations
 
 import dataclasses
+import math
 import sys
+import time
 
 import numpy as np
 import rospy
@@ -21,9 +23,9 @@ import tf2_ros
 from coglab_msgs.msg import HandoverBelief, HandStatus, Recognition
 from coglab_perception.belief import Belief, BeliefFilter, BeliefSettings
 from coglab_perception.frames import AHEAD, FrameNames
-from coglab_perception.recogniser import CLOCK_JUMP, Recogniser, load_patterns
+from coglab_perception.recogniser import Recogniser, load_patterns
 from coglab_perception.tf_listener import TfListener
-from coglab_py import parameters
+from coglab_py import parameters, steady
 from coglab_py.alone import init_node
 from coglab_py.pace import Pace
 from geometry_msgs.msg import Point, TransformStamped, Vector3
@@ -56,20 +58,15 @@ class RecogniserNode:
         self.broadcaster = tf2_ros.TransformBroadcaster()
         self.publisher = rospy.Publisher("perception/recognition", Recognition, queue_size=1)
         self.beliefs = rospy.Publisher("perception/belief", HandoverBelief, queue_size=1)
+        self.stamps = steady.Stamps()
         self.last: dict[str, rospy.Time] = {}  # stamp of the newest transform taken, by frame
+        self.seen: dict[str, float] = {}  # the same on the steady clock, which no step of ROS time moves, s
         rospy.Subscriber("ih2_hand/hand_status", HandStatus, self.on_hand_status, queue_size=1)
-        rospy.Timer(rospy.Duration(0.01), self.on_timer)
+        steady.SteadyTimer(0.01, self.take_newest, "newest transforms")
 
     def on_hand_status(self, status: HandStatus) -> None:
         """The robot's hand."""
         self.robot_holds = bool(status.holding)
-
-    def on_timer(self, _event: rospy.timer.TimerEvent) -> None:
-        """The timer's thread would not survive an exception."""
-        try:
-            self.take_newest()
-        except Exception as error:
-            rospy.logerr_throttle(5.0, f"motion_recogniser: a transform of '{self.hand}' was not used: {error}")
 
     def take_newest(self) -> None:
         """Take the newest transforms once: objects first, as the belief is about them when the hand is seen."""
@@ -78,13 +75,8 @@ class RecogniserNode:
             if object_id and frame != self.hand:
                 self.take_object(frame, object_id)
         transform = self.newest(self.hand)
-        if transform is None:
-            return
-        try:
+        if transform is not None:
             self.take_hand(transform)
-        except rospy.ROSException:
-            if not rospy.core.is_shutdown_requested():
-                raise  # else: rospy has closed the topic under a last tick of the timer
 
     def newest(self, frame: str) -> TransformStamped | None:
         """The newest transform of a frame, None where it was taken already."""
@@ -92,32 +84,30 @@ class RecogniserNode:
             transform = self.buffer.lookup_transform(self.base, frame, rospy.Time(0))
         except tf2_ros.TransformException:
             return None
-        last = self.last.get(frame, rospy.Time(0))
-        if 0.0 <= (last - transform.header.stamp).to_sec() <= CLOCK_JUMP:
+        stamp = transform.header.stamp
+        seen = self.stamps.steady(stamp)
+        if stamp == self.last.get(frame) or seen <= self.seen.get(frame, -math.inf):
             return None
-        self.last[frame] = transform.header.stamp
+        self.last[frame], self.seen[frame] = stamp, seen
         return transform
 
     def take_object(self, frame: str, object_id: str) -> None:
         """A sight of an object."""
         transform = self.newest(frame)
         if transform is not None:
-            self.filter.see_object(self.stamp(frame), object_id, position(transform), self.pace.of(rospy.get_time()))
+            seen, now = self.pace.at(self.seen[frame]), self.pace.now()
+            self.filter.see_object(seen, object_id, position(transform), now)
 
     def take_hand(self, transform: TransformStamped) -> None:
         """A sight of the hand: what is recognised and believed after it."""
-        stamp, place = self.stamp(self.hand), position(transform)
+        stamp, place = self.pace.at(self.seen[self.hand]), position(transform)
         self.recogniser.update(stamp, place.tolist())
         self.publisher.publish(self.recognition())
         end = self.recogniser.pattern_end()
-        belief = self.filter.see_hand(stamp, place, self.pace.of(rospy.get_time()), self.robot_holds, end)
+        belief = self.filter.see_hand(stamp, place, self.pace.now(), self.robot_holds, end)
         if belief.stamp == stamp:
             self.beliefs.publish(self.message(belief))
             self.broadcast(belief)
-
-    def stamp(self, frame: str) -> float:
-        """s, of the newest transform taken, as time passes in the cell."""
-        return self.pace.of(float(self.last[frame].to_sec()))
 
     def recognition(self) -> Recognition:
         """What the recogniser says."""
@@ -191,8 +181,7 @@ def main() -> int:
     except ValueError as error:
         rospy.logfatal("motion_recogniser: %s", error)
         return 1
-    rospy.spin()
-    return 0
+    return steady.spin()
 
 
 if __name__ == "__main__":

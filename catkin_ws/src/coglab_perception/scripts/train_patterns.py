@@ -3,17 +3,22 @@
 
 Usage: train_patterns.py -o patterns.json NAME=FILE.csv[,FILE.csv...] ...
 Each CSV holds one reach: a header line, then t,x,y,z[,...] in s and m (robot base frame), with at least 0.4 s of rest
-before the reach. Exit status: 0 well, 1 the recordings cannot be used, 2 usage.
+before the reach. A recording that goes less than 0.05 m, or faster than 5 m/s between two samples, is refused; --allow
+short and --allow jump take it all the same. Exit status: 0 well, 1 the recordings cannot be used, 2 usage.
 """
 
 import argparse
 import sys
+from collections.abc import Sequence
 
 import numpy as np
 from coglab_perception.recogniser import RecogniserSettings, save_patterns, train_patterns
 
+SHORTEST, FASTEST = 0.05, 5.0
+"""m, farthest point of a reach from its start; m/s between two samples"""
 
-def read(path: str) -> tuple[np.ndarray, np.ndarray]:
+
+def read(path: str, allow: Sequence[str] = ()) -> tuple[np.ndarray, np.ndarray]:
     """(stamps, positions) of one recording."""
     try:
         data = np.loadtxt(path, delimiter=",", skiprows=1, usecols=(0, 1, 2, 3), ndmin=2)
@@ -21,7 +26,14 @@ def read(path: str) -> tuple[np.ndarray, np.ndarray]:
         raise ValueError(f"{path}: expected a header and lines t,x,y,z: {error}") from None
     if len(data) < 10 or not np.all(np.isfinite(data)) or np.any(np.diff(data[:, 0]) <= 0):
         raise ValueError(f"{path}: expected at least 10 finite lines with increasing time")
-    return data[:, 0], data[:, 1:4]
+    times, positions = data[:, 0], data[:, 1:4]
+    far = np.linalg.norm(positions - positions[0], axis=1).max()
+    if far < SHORTEST and "short" not in allow:
+        raise ValueError(f"{path}: goes {far:.3f} m, expected at least {SHORTEST} m; cut it anew, or --allow short")
+    fastest = (np.linalg.norm(np.diff(positions, axis=0), axis=1) / np.diff(times)).max()
+    if fastest > FASTEST and "jump" not in allow:
+        raise ValueError(f"{path}: {fastest:.1f} m/s between two samples, expected {FASTEST} at most; or --allow jump")
+    return times, positions
 
 
 def main() -> int:
@@ -29,6 +41,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("-o", "--output", required=True)
     parser.add_argument("patterns", nargs="+", metavar="NAME=FILE.csv,...")
+    parser.add_argument("--allow", action="append", default=[], choices=["short", "jump"])
     arguments = parser.parse_args()
     try:
         recordings = {}
@@ -36,7 +49,7 @@ def main() -> int:
             name, _, files = item.partition("=")
             if not name or not files:
                 parser.error(f"expected NAME=FILE.csv,..., got '{item}'")
-            recordings[name] = [read(f) for f in files.split(",")]
+            recordings[name] = [read(f, arguments.allow) for f in files.split(",")]
         patterns = train_patterns(recordings)
     except ValueError as error:
         print(error, file=sys.stderr)

@@ -3,6 +3,9 @@ hysteresis."""
 
 import itertools
 import json
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -239,3 +242,16 @@ def test_pattern_files_round_trip_and_are_checked(patterns, tmp_path):
 def test_too_little_to_train_on_is_said():
     with pytest.raises(ValueError, match="at least 2 are needed"):
         train_patterns({"one": demonstrations(1, 3)["high"]})
+
+
+@pytest.mark.parametrize("fault, step, jump", [("short", 0.0001, 0.0), ("jump", 0.005, 0.2)])
+def test_recordings_that_are_no_reach_are_not_trained_with(tmp_path, fault, step, jump) -> None:
+    lines = [f"{0.01 * i},{step * i + jump * (i > 50)},0,0" for i in range(100)]
+    file = tmp_path / "reach.csv"
+    file.write_text("t,x,y,z\n" + "\n".join(lines) + "\n")
+    script = Path(__file__).resolve().parents[1] / "scripts" / "train_patterns.py"
+    command = [sys.executable, str(script), "-o", str(tmp_path / "p.json"), f"one={file}"]
+    refused = subprocess.run(command, capture_output=True, text=True, check=False)
+    allowed = subprocess.run([*command, "--allow", fault], capture_output=True, text=True, check=False)
+    assert refused.returncode == 1 and f"--allow {fault}" in refused.stderr
+    assert "--allow" not in allowed.stderr

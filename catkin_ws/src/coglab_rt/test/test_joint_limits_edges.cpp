@@ -2,6 +2,7 @@
 /// the line and the whole sentence of what is refused.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <fstream>
 #include <stdexcept>
@@ -18,8 +19,8 @@ const std::string kNames = "joints: [j1, j2, j3, j4, j5, j6, j7]\n";  // line 1
 const std::string kMargin = "position_margin: 0.02\n";                // line 2
 const std::string kDefault =                                          // lines 3 to 9
     "default:\n"
-    "  lower_position: [-1, -2, -3, -4, -5, -6, -7]\n"
-    "  upper_position: [1, 2, 3, 4, 5, 6, 7]\n"
+    "  lower_position: [-1, -2, -3, -4, -5, -6, -6.2]\n"
+    "  upper_position: [1, 2, 3, 4, 5, 6, 6.2]\n"
     "  velocity: [1, 2, 3, 4, 5, 6, 7]\n"
     "  acceleration: [11, 12, 13, 14, 15, 16, 17]\n"
     "  jerk: [21, 22, 23, 24, 25, 26, 27]\n"
@@ -59,8 +60,8 @@ TEST_F(Edges, EveryValueComesToItsPlace) {
   const JointLimits limits = load(kTable);
   for (int i = 0; i < 7; ++i) {
     EXPECT_EQ(limits.names[static_cast<std::size_t>(i)], "j" + std::to_string(i + 1));
-    EXPECT_EQ(limits.lower_position[i], -1.0 - i);
-    EXPECT_EQ(limits.upper_position[i], 1.0 + i);
+    EXPECT_EQ(limits.lower_position[i], -std::min(1.0 + i, 6.2));
+    EXPECT_EQ(limits.upper_position[i], std::min(1.0 + i, 6.2));
     EXPECT_EQ(limits.velocity[i], 1.0 + i);
     EXPECT_EQ(limits.acceleration[i], 11.0 + i);
     EXPECT_EQ(limits.jerk[i], 21.0 + i);
@@ -91,7 +92,44 @@ TEST_F(Edges, APositionIsAnyFiniteNumberButBelowTheOtherEnd) {
             ":4: default.lower_position[0] = inf: expected a finite number");
   const std::string order = ": lower_position must be below upper_position";
   EXPECT_EQ(error(with("lower_position: [-1,", "lower_position: [1,")), ":1: j1" + order);
-  EXPECT_EQ(error(with("-6, -7]", "-6, 7]")), ":1: j7" + order);
+  EXPECT_EQ(error(with("-6, -6.2]", "-6, 6.2]")), ":1: j7" + order);
+}
+
+TEST_F(Edges, ValuesInDegreesAreRefused) {
+  for (const auto& [field, value] : {std::pair("lower_position: [-1,", "lower_position: [-170,"),
+                                     {"upper_position: [1,", "upper_position: [170,"},
+                                     {"velocity: [1,", "velocity: [110,"},
+                                     {"acceleration: [11,", "acceleration: [570,"},
+                                     {"jerk: [21,", "jerk: [28648,"}}) {
+    EXPECT_NE(error(with(field, value)).find("is it in degrees?"), std::string::npos) << value;
+  }
+}
+
+TEST_F(Edges, AFileMayBeWiderThanTheRobotOnlyIfItSaysSo) {
+  const std::string own = path_ + "_own";
+  std::ofstream(own) << kTable;
+  const auto wider = [&](const std::string& text) {
+    std::ofstream(path_) << text;
+    try {
+      loadJointLimits(path_, "default", own);
+    } catch (const std::runtime_error& caught) {
+      return std::string(caught.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(wider(kTable), "");
+  EXPECT_EQ(wider(with("upper_position: [1,", "upper_position: [0.9,")), "");
+  for (const auto& [field, value] : {std::pair("upper_position: [1,", "upper_position: [1.1,"),
+                                     {"lower_position: [-1,", "lower_position: [-1.1,"},
+                                     {"velocity: [1,", "velocity: [1.1,"},
+                                     {"torque: [31,", "torque: [32,"},
+                                     {"position_margin: 0.02", "position_margin: 0.01"}}) {
+    EXPECT_NE(wider(with(field, value)).find("wider than the robot's own"), std::string::npos)
+        << value;
+    EXPECT_EQ(wider(with(field, value) + "wider_than_robot: true\n"), "") << value;
+  }
+  EXPECT_NE(wider(kTable + "wider_than_robot: perhaps\n").find("true or false"), std::string::npos);
+  std::remove(own.c_str());
 }
 
 TEST_F(Edges, ListsHaveSevenNumbers) {

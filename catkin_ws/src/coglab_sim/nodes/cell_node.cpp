@@ -4,11 +4,12 @@
 /// world axes). Publishes truth/cell, motor_states, ~messages (the controller's message window),
 /// /clock if ~publish_clock, fingertip_forces if ~tactile, real_time_factor (std_msgs/Float64,
 /// latched) and, on /diagnostics, whether this computer keeps real time; if not and ~slow_down, the
-/// cell slows. Serves ~fault, ~place_object. Parameters: every row of the cell's table under the
-/// private namespace; ~speed, ~fri_host, ~fri_port (0: wait for ~port_parameter, by default
-/// lwr/fri_port_bound beside this namespace), ~port_wait, ~fri_source_port (0: any free one),
-/// ~log_file, ~truth_rate, ~publish_clock, ~tactile, ~rt_priority (SCHED_FIFO of the thread of
-/// steps); fri_period and seed of the parent namespace.
+/// cell slows. What the cell measures is stamped with the time of its physics step. Serves ~fault,
+/// ~place_object. Parameters: every row of the cell's table under the private namespace; ~speed,
+/// ~fri_host, ~fri_port (0: wait for ~port_parameter, by default lwr/fri_port_bound beside this
+/// namespace), ~port_wait, ~fri_source_port (0: any free one), ~log_file, ~truth_rate,
+/// ~publish_clock, ~tactile, ~rt_priority (SCHED_FIFO of the thread of steps); fri_period and seed
+/// of the parent namespace.
 #include <fstream>
 #include <memory>
 
@@ -30,12 +31,15 @@
 #include "coglab_rt/ros/alone.hpp"
 #include "coglab_rt/ros/logger_service.hpp"
 #include "coglab_rt/ros/parameter.hpp"
+#include "coglab_rt/ros/ros_time.hpp"
 #include "coglab_sim/pace.hpp"
 #include "coglab_sim/ranges.hpp"
 #include "coglab_sim/real_time_cell.hpp"
 
 namespace coglab_sim {
 namespace {
+
+constexpr int kQueue = 100;  // messages of truth and touch that wait for a slow subscriber
 
 /// Full name of the parameter with the bridge's port. A relative one counts from the namespace
 /// above the cell's own: the bridge /a/lwr and the cell /a/coglab_sim/cell belong to one robot.
@@ -93,16 +97,17 @@ class CellNode {
     const int source_port = within(private_, "fri_source_port", 0);
     cell_ = std::make_unique<RealTimeCell>(config_, host, static_cast<std::uint16_t>(port), speed,
                                            static_cast<std::uint16_t>(source_port));
+    cell_->setSnapshotInterval(speed / rate);
     cell_->waitForAnswers(slow_down_);
     openLog(text("log_file", "", "a path"));
 
-    truth_ = node_.advertise<coglab_msgs::CellTruth>("truth/cell", 1);
+    truth_ = node_.advertise<coglab_msgs::CellTruth>("truth/cell", kQueue);
     motor_states_ = node_.advertise<coglab_msgs::MotorStates>("motor_states", 1);
     messages_ = private_.advertise<std_msgs::String>("messages", 50, true);
     factor_ = node_.advertise<std_msgs::Float64>("real_time_factor", 1, true);
     diagnostics_ = node_.advertise<diagnostic_msgs::DiagnosticArray>("/diagnostics", 5);
     if (flag("tactile"))
-      touch_ = node_.advertise<coglab_msgs::FingertipForces>("fingertip_forces", 1);
+      touch_ = node_.advertise<coglab_msgs::FingertipForces>("fingertip_forces", kQueue);
     if (flag("publish_clock")) clock_ = node_.advertise<rosgraph_msgs::Clock>("/clock", 1);
     const auto hints = ros::TransportHints().tcpNoDelay();
     human_ = node_.subscribe<coglab_msgs::HumanHand>(
@@ -116,14 +121,14 @@ class CellNode {
     fault_ = private_.advertiseService("fault", &CellNode::onFault, this);
     place_ = private_.advertiseService("place_object", &CellNode::onPlace, this);
 
-    publish_timer_ = node_.createWallTimer(ros::WallDuration(1.0 / rate),
-                                           [this](const ros::WallTimerEvent&) { publish(); });
-    log_timer_ = node_.createWallTimer(ros::WallDuration(0.1),
-                                       [this](const ros::WallTimerEvent&) { writeLog(); });
-    port_timer_ = node_.createWallTimer(ros::WallDuration(1.0),
-                                        [this](const ros::WallTimerEvent&) { checkPort(); });
-    pace_timer_ = node_.createWallTimer(ros::WallDuration(1.0),
-                                        [this](const ros::WallTimerEvent&) { checkPace(); });
+    publish_timer_ = node_.createSteadyTimer(ros::WallDuration(1.0 / rate),
+                                             [this](const ros::SteadyTimerEvent&) { publish(); });
+    log_timer_ = node_.createSteadyTimer(ros::WallDuration(0.1),
+                                         [this](const ros::SteadyTimerEvent&) { writeLog(); });
+    port_timer_ = node_.createSteadyTimer(ros::WallDuration(1.0),
+                                          [this](const ros::SteadyTimerEvent&) { checkPort(); });
+    pace_timer_ = node_.createSteadyTimer(ros::WallDuration(1.0),
+                                          [this](const ros::SteadyTimerEvent&) { checkPace(); });
     publishFactor();
     ROS_INFO(
         "robot controller stand-in: FRI toward %s:%d every %.1f ms, KRL program %s, %.3g times "
@@ -275,17 +280,20 @@ class CellNode {
     }
     if (!snapshot.refused_hand.empty())
       ROS_WARN_THROTTLE(5.0, "human_hand ignored: %s", snapshot.refused_hand.c_str());
-    if (snapshot.tick == published_) return;
-    published_ = snapshot.tick;
-    if (clock_) {
-      rosgraph_msgs::Clock clock;
-      clock.clock.fromSec(snapshot.truth.time);
-      clock_.publish(clock);
+    // All of them: where this timer comes late, nothing that happened meanwhile is lost.
+    for (const CellSnapshot& each : cell_->takeSnapshots()) {
+      ros::Time stamp;
+      if (clock_) {
+        rosgraph_msgs::Clock clock;
+        clock.clock = stamp.fromSec(each.truth.time);
+        clock_.publish(clock);
+      } else {
+        stamp = coglab_rt::toRos(each.stepped_ns);
+      }
+      truth_.publish(truthMessage(each.truth, config_.object.id, stamp));
+      motor_states_.publish(motorsMessage(each.motors, stamp));
+      if (touch_) touch_.publish(touchMessage(each.touch, hand_, stamp));
     }
-    const ros::Time now = ros::Time::now();
-    truth_.publish(truthMessage(snapshot.truth, config_.object.id, now));
-    motor_states_.publish(motorsMessage(snapshot.motors, now));
-    if (touch_) touch_.publish(touchMessage(snapshot.touch, hand_, now));
     for (const krc::Message& message : cell_->takeMessages()) {
       ROS_WARN("KRC %.3f s: %s", message.time, message.text.c_str());
       std_msgs::String text;
@@ -383,7 +391,7 @@ class CellNode {
   std::unique_ptr<RealTimeCell> cell_;
   std::string port_parameter_;
   bool follow_port_ = false, failed_ = false;
-  std::uint64_t answers_seen_ = 0, published_ = 0;
+  std::uint64_t answers_seen_ = 0;
   CellSnapshot measured_;  // at the last look at the pace
   ros::WallTime measured_at_ = ros::WallTime::now();
   double hand_messages_ = 0.0, hand_rate_ = 0.0;
@@ -391,7 +399,7 @@ class CellNode {
   ros::Publisher truth_, motor_states_, messages_, clock_, touch_, factor_, diagnostics_;
   ros::Subscriber human_, motors_, push_;
   ros::ServiceServer fault_, place_;
-  ros::WallTimer publish_timer_, log_timer_, port_timer_, pace_timer_;
+  ros::SteadyTimer publish_timer_, log_timer_, port_timer_, pace_timer_;
 };
 
 }  // namespace

@@ -93,11 +93,11 @@ class PyCell {
   }
 
   py::dict touch() const {
-    const plant::Plant& plant = cell_.plant();
+    const auto& phalanges = cell_.plant().config().hand.phalanges;
     py::dict touch;
-    for (std::size_t i = 0; i < plant.touch().phalanges.size(); ++i)
-      touch[py::str(plant.config().hand.phalanges[i].name)] = plant.touch().phalanges[i];
-    touch["palm"] = plant.touch().palm;
+    for (std::size_t i = 0; i < cell_.touch().phalanges.size(); ++i)
+      touch[py::str(phalanges[i].name)] = cell_.touch().phalanges[i];
+    touch["palm"] = cell_.touch().palm;
     return touch;
   }
 

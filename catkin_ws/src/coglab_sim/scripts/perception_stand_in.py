@@ -15,6 +15,7 @@ others (places of the other people's hands, m), partner_margin (m, see PartnerCh
 from __future__ import annotations
 
 import sys
+import time
 
 import numpy as np
 import rospy
@@ -29,7 +30,7 @@ from coglab_msgs.srv import (
     LocateObjectResponse,
 )
 from coglab_perception.frames import FrameNames
-from coglab_py import parameters
+from coglab_py import parameters, steady
 from coglab_py.alone import init_node
 from coglab_py.messages import pose_message, pose_of
 from coglab_py.pose import Pose, about_z
@@ -65,15 +66,16 @@ class PerceptionNode:
                 {name: np.array(place, dtype=float) for name, place in board["slots"].items()},
             ),
             seed,
-            rospy.get_time,
+            time.monotonic,
             parameters.read("~partner_margin", float, 0.0, 0.0),
         )
+        self.stamps = steady.Stamps()
         self.others = [Pose(np.array(place)) for place in parameters.points("~others", OTHERS)]
         self.people = parameters.read("~people", int, 1, 0, 255)
         self.truth: CellTruth | None = None
         self.broadcaster = tf2_ros.TransformBroadcaster()
         self.static = tf2_ros.StaticTransformBroadcaster()
-        board_sight = Sight(names.board, rospy.get_time(), self.vision.board.frame)
+        board_sight = Sight(names.board, time.monotonic(), self.vision.board.frame)
         self.static.sendTransform(self.transform(board_sight))
         recording = {"frame": names.human_hand, **parameters.read("~recording", dict, {})}
         playback = PlaybackSettings.from_mapping(recording)
@@ -86,7 +88,7 @@ class PerceptionNode:
                 ", ".join(self.playback.names),
                 self.playback.recording.duration,
             )
-            self.timer = rospy.Timer(rospy.Duration(1.0 / PLAYBACK_HZ), self.on_timer)
+            steady.SteadyTimer(1.0 / PLAYBACK_HZ, self.see, "playback")
         rospy.Subscriber("coglab_sim/truth/cell", CellTruth, self.on_truth, queue_size=1, tcp_nodelay=True)
         rospy.Subscriber("~people", UInt8, self.on_people, queue_size=1)
         rospy.Service("~init_vision", InitVision, self.on_init)
@@ -105,10 +107,6 @@ class PerceptionNode:
         if not self.playback:
             self.see()
 
-    def on_timer(self, _event: rospy.timer.TimerEvent) -> None:
-        """The next frames of the recording."""
-        self.see()
-
     def on_people(self, message: UInt8) -> None:
         """Somebody comes into view, or leaves."""
         self.people = message.data
@@ -123,7 +121,7 @@ class PerceptionNode:
             if truth.object_id:
                 objects[names.object_frame(truth.object_id)] = pose_of(truth.object)
         if self.playback:
-            played = self.playback.frames(rospy.get_time(), robot)
+            played = self.playback.frames(time.monotonic(), robot)
             if names.human_hand in self.playback.names:
                 hand = None
             hand = played.pop(names.human_hand, hand)
@@ -141,7 +139,7 @@ class PerceptionNode:
     def transform(self, sight: Sight) -> TransformStamped:
         """A sight as a tf message, stamped with its capture time."""
         message = TransformStamped()
-        message.header.stamp = rospy.Time.from_sec(sight.captured)
+        message.header.stamp = self.stamps.stamp(sight.captured)
         message.header.frame_id = self.vision.names.world
         message.child_frame_id = sight.name
         message.transform.translation = Vector3(*sight.frame.position)
@@ -164,7 +162,7 @@ class PerceptionNode:
         except NotSeen as reason:
             return LocateObjectResponse(success=False, reason_code=reason.code, message=str(reason))
         return LocateObjectResponse(
-            success=True, frame_id=frame, age=age, pose=pose(self.vision.names.world, sight.captured, sight.frame)
+            success=True, frame_id=frame, age=age, pose=self.pose(self.vision.names.world, sight.captured, sight.frame)
         )
 
     def on_places(self, request):
@@ -176,22 +174,21 @@ class PerceptionNode:
         return FreePlacesResponse(
             success=True,
             message=", ".join(name for name, _ in places),
-            places=[pose(self.vision.names.board, rospy.get_time(), Pose(place)) for _, place in places],
+            places=[self.pose(self.vision.names.board, time.monotonic(), Pose(place)) for _, place in places],
         )
+
+    def pose(self, parent: str, captured: float, frame: Pose) -> PoseStamped:
+        """PoseStamped of a frame that was seen at ``captured`` (monotonic s)."""
+        message = PoseStamped()
+        message.header.frame_id = parent
+        message.header.stamp = self.stamps.stamp(captured)
+        message.pose = pose_message(frame)
+        return message
 
 
 def bounded(timeout: float) -> float:
     """A time-out as asked for, s, where a service can keep it: 0 to LONGEST_WAIT."""
     return min(max(timeout, 0.0), LONGEST_WAIT) if timeout == timeout else 0.0
-
-
-def pose(parent: str, stamp: float, frame: Pose) -> PoseStamped:
-    """PoseStamped of a frame."""
-    message = PoseStamped()
-    message.header.frame_id = parent
-    message.header.stamp = rospy.Time.from_sec(stamp)
-    message.pose = pose_message(frame)
-    return message
 
 
 def main() -> int:
@@ -202,8 +199,7 @@ def main() -> int:
     except (ValueError, TypeError, KeyError) as error:
         rospy.logfatal("perception stand-in: %s", error)
         return 1
-    rospy.spin()
-    return 0
+    return steady.spin()
 
 
 if __name__ == "__main__":

@@ -75,7 +75,7 @@ class TruthMarkers:
             ns=name, id=0, type=kind, action=Marker.ADD, pose=pose, scale=Vector3(*size), color=ColorRGBA(*colour)
         )
         marker.header.frame_id = truth.header.frame_id or "world"
-        marker.header.stamp = rospy.Time.now()
+        marker.header.stamp = truth.header.stamp
         return marker
 
     def hand(self, truth: CellTruth) -> Marker:
@@ -137,7 +137,7 @@ class TruthMarkers:
         """A pose of the truth as a frame truth/<name>."""
         out = TransformStamped(child_frame_id=f"truth/{name}")
         out.header.frame_id = truth.header.frame_id or "world"
-        out.header.stamp = rospy.Time.now()
+        out.header.stamp = truth.header.stamp
         p = pose.position
         out.transform.translation, out.transform.rotation = Vector3(p.x, p.y, p.z), pose.orientation
         return out

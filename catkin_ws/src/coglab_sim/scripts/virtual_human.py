@@ -27,6 +27,7 @@ from coglab_py.alone import init_node
 from coglab_py.messages import pose_message, pose_of
 from coglab_py.pace import Pace
 from coglab_py.pose import Pose
+from coglab_py.steady import wait_for_service
 from coglab_sim.person.participant import Participant
 from coglab_sim.person.recorded_person import RecordedPerson, open_recorded_hand
 from coglab_sim.person.scene import Scene, WorldView
@@ -94,7 +95,7 @@ class VirtualHumanNode:
     def put_into_hand(self) -> None:
         """The recorded object lies in the hand as it was recorded. ROSException if the cell does not answer."""
         scene = self.human.scene
-        rospy.wait_for_service("cell/place_object", CELL_LIMIT)
+        wait_for_service("cell/place_object", CELL_LIMIT)
         place = pose_message(Pose(scene.object_in_hand, scene.object_turn))
         answer = rospy.ServiceProxy("cell/place_object", PlaceObject)(where="human_hand", pose=place)
         if not answer.success:

@@ -84,7 +84,8 @@ const MeasurementBytes& Cell::step(const std::uint8_t* answer, std::size_t size)
   return advance(true);
 }
 
-const MeasurementBytes& Cell::advance(bool on_time) {
+const MeasurementBytes& Cell::advance(bool on_time, bool anew) {
+  if (anew) felt_for_ = 0.0;
   const krc::PeriodCommand command = controller_.tick(servos_, on_time);
   plant_.setBrakes(controller_.brakesWanted());
 
@@ -112,6 +113,7 @@ const MeasurementBytes& Cell::advance(bool on_time) {
     plant_.step(servos_.motorTorque(), dt);
     servos_.observe(plant_.position(), plant_.velocity());
     torque_sensor_.advance(plant_.velocity(), dt);
+    feel(dt);
     torque += plant_.jointTorque() / steps;
     fastest_ = i > 1 ? Vector7(fastest_.cwiseMax(plant_.velocity().cwiseAbs()))
                      : Vector7(plant_.velocity().cwiseAbs());
@@ -129,6 +131,21 @@ const MeasurementBytes& Cell::advance(bool on_time) {
   return bytes_;
 }
 
+/// Takes one physics step into the means of the forces: a touch may last a single step.
+void Cell::feel(double dt) {
+  felt_for_ += dt;
+  const double share = dt / felt_for_;
+  const auto average = [share](auto& mean, const auto& now) { mean += share * (now - mean); };
+  const plant::Touch& touch = plant_.touch();
+  touch_.phalanges.resize(touch.phalanges.size(), Vector3d::Zero());
+  for (std::size_t i = 0; i < touch.phalanges.size(); ++i)
+    average(touch_.phalanges[i], touch.phalanges[i]);
+  average(touch_.palm, touch.palm);
+  average(touch_force_, plant_.touchForce());
+  average(palm_force_, plant_.objectForce());
+  average(external_torque_, plant_.externalTorque());
+}
+
 krc::ArmSignals Cell::signals(const Vector7& torque, const Vector7& acceleration) const {
   return {plant_.position(), torque_sensor_.measured(torque),
           torque_sensor_.external(servos_.external(torque, acceleration), plant_.position())};
@@ -142,8 +159,8 @@ CellTruth Cell::truth() const {
   truth.human_hand = plant_.personHand();
   truth.robot_hand = plant_.palm();
   truth.hand_closure = plant_.handClosure();
-  truth.palm_force = plant_.objectForce();
-  truth.touch_force = plant_.touchForce();
+  truth.palm_force = palm_force_;
+  truth.touch_force = touch_force_;
   truth.robot_load_share = plant_.robotShare();
   truth.human_load_share = plant_.personShare();
   truth.human_force = plant_.personForce();
@@ -152,7 +169,7 @@ CellTruth Cell::truth() const {
   truth.position = plant_.position();
   truth.velocity = plant_.velocity();
   truth.set_point = controller_.setPoint();
-  truth.external_torque = plant_.externalTorque();
+  truth.external_torque = external_torque_;
   return truth;
 }
 

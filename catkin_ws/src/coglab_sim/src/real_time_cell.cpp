@@ -6,6 +6,7 @@
 
 #include <pthread.h>
 
+#include "coglab_rt/clock.hpp"
 #include "coglab_rt/real_time.hpp"
 #include "coglab_sim/ranges.hpp"
 
@@ -19,8 +20,8 @@ using Clock = std::chrono::steady_clock;
 constexpr double kLateShare = 0.2;
 // Periods behind schedule after which the schedule starts anew instead of catching up.
 constexpr int kGiveUp = 5;
-constexpr double kPatience = 1.5;  // s from one answer to the next, where the cell waits for them
-constexpr std::size_t kMaxRecords = 100000;  // if nobody takes them
+constexpr double kPatience = 0.9;  // s from one answer to the next, where the cell waits for them
+constexpr std::size_t kMaxRecords = 100000, kMaxSnapshots = 2000;  // if nobody takes them
 
 }  // namespace
 
@@ -68,7 +69,7 @@ void RealTimeCell::run() {
   auto period = periodNow();
   auto deadline = Clock::now();
   auto sent_at = deadline, answered_at = deadline - std::chrono::hours(1);
-  bool sent_late = false, answered = false;
+  bool sent_late = false, answered = false, kept = true;
   std::array<std::uint8_t, 2048> buffer{};
   while (running_) {
     answered = false;
@@ -99,15 +100,18 @@ void RealTimeCell::run() {
         now - deadline > std::chrono::duration_cast<Clock::duration>(period * kLateShare);
 
     applyInputs();
-    cell_.advance(!sent_late);
+    cell_.advance(!sent_late, kept);
     sent_at = Clock::now();
     if (cell_.sent()) socket_.send(cell_.measurement().data(), cell_.measurement().size(), port_);
     sent_late = late;
     period = periodNow();  // the KRL program may have opened FRI anew
-    leaveResults(answered, expected, unanswered, late ? behind : 0.0);
+    const double time = cell_.controller().time();
+    kept = time > next_snapshot_ - 1e-9;
+    if (kept) next_snapshot_ = std::max(next_snapshot_, time - cell_.period()) + interval_;
+    leaveResults(answered, expected, unanswered, late ? behind : 0.0, kept);
     deadline += period;
-    // Where simulated time may stand, nothing has to be caught up with.
-    if (now - deadline > (waits_ ? 0 : kGiveUp) * period) deadline = now + period;
+    // Where simulated time may stand, no more than a period has to be caught up with.
+    if (now - deadline > (waits_ ? 1 : kGiveUp) * period) deadline = now + period;
   }
 }
 
@@ -140,7 +144,9 @@ void RealTimeCell::applyInputs() {
   for (auto& entry : due) entry.action(cell_);
 }
 
-void RealTimeCell::leaveResults(bool answered, bool expected, bool unanswered, double behind) {
+void RealTimeCell::leaveResults(bool answered, bool expected, bool unanswered, double behind,
+                                bool keep) {
+  const std::int64_t stepped_ns = coglab_rt::steadyNow();
   const auto& controller = cell_.controller();
   TickRecord record;
   record.time = controller.time();
@@ -153,18 +159,21 @@ void RealTimeCell::leaveResults(bool answered, bool expected, bool unanswered, d
   record.measured = cell_.plant().position();
   const CellTruth truth = cell_.truth();
   const MotorStates motors = cell_.motors();
-  const plant::Touch touch = cell_.plant().touch();
+  const plant::Touch touch = cell_.touch();
 
   const std::lock_guard<std::mutex> lock(mutex_);
   snapshot_.truth = truth;
   snapshot_.motors = motors;
   snapshot_.touch = touch;
+  snapshot_.stepped_ns = stepped_ns;
   ++snapshot_.tick;
   if (answered) ++snapshot_.answers;
   if (expected) ++snapshot_.sent;
   if (unanswered) ++snapshot_.unanswered;
   if (behind > 0.0) ++snapshot_.late_ticks;
   snapshot_.latest = std::max(snapshot_.latest, behind);
+  if (keep && snapshots_.size() == kMaxSnapshots) snapshots_.erase(snapshots_.begin());
+  if (keep) snapshots_.push_back(snapshot_);
   if (records_.size() < kMaxRecords) records_.push_back(record);
   const std::uint64_t fresh = std::min<std::uint64_t>(controller.messageCount() - messages_seen_,
                                                       controller.messages().size());
@@ -226,6 +235,11 @@ CellSnapshot RealTimeCell::snapshot() const {
 double RealTimeCell::takeLatest() {
   const std::lock_guard<std::mutex> lock(mutex_);
   return std::exchange(snapshot_.latest, 0.0);
+}
+
+std::vector<CellSnapshot> RealTimeCell::takeSnapshots() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return std::exchange(snapshots_, {});
 }
 
 std::vector<TickRecord> RealTimeCell::takeRecords() {

@@ -1,10 +1,12 @@
 """The rospy nodes of the cell without a master: parameters from a dictionary, publications and log lines in lists."""
 
 import importlib.util
+import time
 from pathlib import Path
 
 import rospy
 import tf2_ros
+from coglab_py import steady
 
 SCRIPTS = Path(__file__).resolve().parents[1] / "scripts"
 
@@ -24,7 +26,7 @@ class Alone:
         self.parameters = {name.replace("__", "/"): value for name, value in parameters.items()}
         self.published, self.subscribed, self.services, self.said = {}, {}, {}, []
         self.made, self.timers, self.sent, self.static = {}, [], [], []
-        self.now = 5.0
+        self.now, self.boot = 5.0, 100.0
         monkeypatch.setattr(rospy, "get_param", lambda name, default=None: self.parameters.get(name, default))
         monkeypatch.setattr(rospy, "has_param", lambda name: name in self.parameters)
         monkeypatch.setattr(rospy, "resolve_name", lambda name: name)
@@ -34,8 +36,8 @@ class Alone:
         monkeypatch.setattr(rospy, "Publisher", self.publisher)
         monkeypatch.setattr(rospy, "Subscriber", lambda name, kind, call, **_: self.subscribed.update({name: call}))
         monkeypatch.setattr(rospy, "Service", lambda name, kind, call: self.services.update({name: call}))
-        monkeypatch.setattr(rospy, "Duration", float)
-        monkeypatch.setattr(rospy, "Timer", lambda period, call: self.timers.append((period, call)))
+        monkeypatch.setattr(time, "monotonic", lambda: self.now + self.boot)
+        monkeypatch.setattr(steady, "SteadyTimer", lambda period, call, name: self.timers.append((period, call)))
         for level in ("loginfo", "logwarn", "logfatal"):
             monkeypatch.setattr(rospy, level, lambda text, *values: self.said.append(text % values))
         monkeypatch.setattr(rospy, "logwarn_throttle", lambda period, text: self.said.append(text))

@@ -2,6 +2,7 @@
 """A recorded hand on ROS: the real cell puts the object into it as it was recorded, and both go as recorded; another
 object that is placed later is the one that the person then holds."""
 
+import socket
 import subprocess
 import tempfile
 import time
@@ -37,7 +38,7 @@ def write_recording(path: Path) -> None:
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def wait_for(condition, limit: float = 10.0) -> bool:
+def wait_for(condition, limit: float = 60.0) -> bool:
     """Polls until the condition holds or the limit (s, wall) is over."""
     end = time.monotonic() + limit
     while time.monotonic() < end:
@@ -53,6 +54,9 @@ class RecordedHand(unittest.TestCase):
     @classmethod
     def setUpClass(cls) -> None:
         cls.truth, cls.hand, cls.phases = [], [], []
+        cls.bridge = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)  # one that never answers
+        cls.bridge.bind(("127.0.0.1", 0))
+        rospy.set_param("/lwr/fri_port_bound", cls.bridge.getsockname()[1])
         rospy.Subscriber("/coglab_sim/truth/cell", CellTruth, cls.truth.append)
         rospy.Subscriber("/coglab_sim/human_hand", HumanHand, cls.hand.append)
         rospy.Subscriber("/coglab_sim/human_state", String, lambda m: cls.phases.append(m.data))
@@ -67,7 +71,8 @@ class RecordedHand(unittest.TestCase):
     @classmethod
     def tearDownClass(cls) -> None:
         cls.person.terminate()
-        cls.person.wait(10.0)
+        cls.person.wait(60.0)
+        cls.bridge.close()
         cls.folder.cleanup()
 
     def held_as_recorded(self) -> float:
@@ -78,7 +83,7 @@ class RecordedHand(unittest.TestCase):
         return float(np.linalg.norm(in_hand.position - IN_HAND.position))
 
     def test_1_the_object_lies_in_the_hand_as_it_was_recorded(self) -> None:
-        self.assertTrue(wait_for(lambda: self.hand and self.truth, 20.0), "no person, or no cell")
+        self.assertTrue(wait_for(lambda: self.hand and self.truth), "no person, or no cell")
         self.assertTrue(wait_for(lambda: self.truth[-1].held_by == "human"), self.truth[-1].held_by)
         self.assertTrue(wait_for(lambda: self.held_as_recorded() < 0.005), self.held_as_recorded())
 
@@ -88,7 +93,7 @@ class RecordedHand(unittest.TestCase):
         there = lambda: np.linalg.norm(pose_of(self.truth[-1].human_hand).position - end) < 0.02  # noqa: E731
         self.assertTrue(wait_for(lambda: "waiting" in self.phases and there()), self.phases)
         self.assertEqual(self.truth[-1].held_by, "human")
-        self.assertLess(self.held_as_recorded(), 0.01)
+        self.assertTrue(wait_for(lambda: self.held_as_recorded() < 0.01), self.held_as_recorded())
 
     def test_3_another_object_is_the_one_that_the_person_holds(self) -> None:
         ball = Scene.of(shipped("ball"))

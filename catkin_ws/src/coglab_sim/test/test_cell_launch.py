@@ -21,7 +21,7 @@ def launched(*arguments):
     command = ["roslaunch", "-p", port, "coglab_sim", "cell.launch", *arguments]
     with subprocess.Popen(command, stderr=subprocess.STDOUT, stdout=subprocess.PIPE, text=True) as process:
         try:
-            return process.communicate(timeout=30)[0]
+            return process.communicate(timeout=60.0)[0]
         except subprocess.TimeoutExpired:
             process.send_signal(signal.SIGINT)  # it ends what it has started
             process.communicate()

@@ -297,6 +297,14 @@ TEST(RealTimeCell, LeavesRecordsMessagesAndASnapshot) {
   const auto records = cell.takeRecords();
   ASSERT_EQ(records.size(), snapshot.tick);
   EXPECT_TRUE(cell.takeRecords().empty());
+  // However late the reader is, nothing is lost, and each has the time of its own step.
+  const auto kept = cell.takeSnapshots();
+  ASSERT_EQ(kept.size(), std::min<std::uint64_t>(snapshot.tick, 2000));
+  for (std::size_t i = 1; i < kept.size(); ++i) {
+    EXPECT_EQ(kept[i].tick, kept[i - 1].tick + 1);
+    EXPECT_GT(kept[i].stepped_ns, kept[i - 1].stepped_ns);
+  }
+  EXPECT_EQ(kept.back().truth.time, snapshot.truth.time);
   EXPECT_EQ(records.back().time, snapshot.truth.time);
   EXPECT_NEAR(records[10].time - records[9].time, 0.005, 1e-9);
   EXPECT_EQ(records.back().state, 1);

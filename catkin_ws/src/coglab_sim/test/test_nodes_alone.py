@@ -103,6 +103,14 @@ def test_hand_and_object_are_broadcast_with_their_capture_time(monkeypatch):
     assert sorted(one.see(no_object)) == ["human_hand"]
 
 
+def test_a_clock_that_is_set_costs_no_sight(monkeypatch):
+    one = Perception(monkeypatch)
+    one.see()
+    one.ros.now, one.ros.boot = one.ros.now - 3.0, one.ros.boot + 3.0
+    seen = one.see()
+    assert seen["human_hand"].header.stamp.to_sec() == pytest.approx(one.ros.now)
+
+
 def test_of_several_the_nearer_one_by_the_margin_is_shown(monkeypatch):
     one = Perception(monkeypatch, **{"~people": 2, "~partner_margin": 0.2, "~others": [[0.6, 0.0, 0.4]]})
     place = one.see()["human_hand"].transform.translation
@@ -156,7 +164,7 @@ def test_a_recording_takes_the_place_of_what_it_shows(monkeypatch, tmp_path, fra
     seen = {}
     for _ in range(3):
         one.ros.now += 0.25
-        look(None)
+        look()
     for sent in one.ros.sent:
         seen |= {each.child_frame_id: each for each in sent}
     assert sorted(seen) == (shown or ["human_hand", "object_ball", "object_mug"])
@@ -237,7 +245,7 @@ def test_a_recorded_person_is_put_their_object_into_the_hand(monkeypatch, tmp_pa
     def proxy(name, kind):
         return lambda **fields: asked.append((name, fields)) or Request(success=len(asked) < 2, message="no")
 
-    monkeypatch.setattr(rospy, "wait_for_service", lambda name, limit: waited.append((name, limit)))
+    monkeypatch.setattr(one.module, "wait_for_service", lambda name, limit: waited.append((name, limit)))
     monkeypatch.setattr(rospy, "ServiceProxy", proxy)
     one.node.put_into_hand()
     name, fields = asked[0]

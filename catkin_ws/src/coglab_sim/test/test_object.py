@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from fri_client import parse
+from conftest import URDF
+from fri_client import Session, parse
 from scipy.spatial.transform import Rotation
 
 WEIGHT = 0.31 * 9.81
@@ -145,6 +146,25 @@ def test_what_touches_the_hand_is_told_apart_from_the_object(session):
     rotation = Rotation.from_quat(truth["robot_hand"]["rotation"])
     felt = sum(rotation.apply(force) for force in s.cell.touch().values())
     assert truth["touch_force"] == pytest.approx(felt, abs=1e-3)  # the palm has turned a step since
+
+
+def test_touch_within_a_period_is_not_lost():
+    """Forces of the truth and of the touch sensors are means over the FRI period: a hand that bumps into the palm and
+    is away again 40 ms before the end of a long period leaves the same impulse as with short ones."""
+    sums = []
+    for period in (0.1, 0.001):
+        s = Session(URDF, krc__period=period, object__start="world", object__position=[0.3, 0.9, 0.5])
+        palm = s.cell.truth()["robot_hand"]["position"]
+        s.cell.set_human(palm + [0.0, 0.12, 0.0], velocity=[0.0, -2.0, 0.0], grip=0.0)
+        impulse, touch = np.zeros(3), np.zeros(3)
+        for _ in range(round(0.1 / period)):
+            s.cell.step(None)
+            impulse += period * s.cell.truth()["touch_force"]
+            touch += period * sum(s.cell.touch().values())
+        sums.append((impulse, touch))
+    (long, long_touch), (short, short_touch) = sums
+    assert np.linalg.norm(short) > 0.1, "Ns"
+    assert long == pytest.approx(short, abs=1e-3) and long_touch == pytest.approx(short_touch, abs=1e-3)
 
 
 def test_early_release_drops_it(session):

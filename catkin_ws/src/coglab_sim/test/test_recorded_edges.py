@@ -22,6 +22,7 @@ ROWS = "".join(f"{0.5 * i},{i},0,0\n" for i in range(5))
 def test_settings_are_those_that_are_documented():
     shipped = {"file": "", "frame": "human_hand", "rename": {}, "time_scale": 1.0, "mirror": False, "turn_deg": 0.0}
     shipped |= {"end_at": None, "at_end": "hold", "wait_at": None, "wait_distance": 0.15, "wait_limit": 10.0}
+    shipped |= {"allow_jumps": False}
     assert {field.name: getattr(PlaybackSettings(), field.name) for field in fields(PlaybackSettings)} == shipped
 
 

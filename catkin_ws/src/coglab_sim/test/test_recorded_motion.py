@@ -216,3 +216,11 @@ def test_bad_names_and_settings(tmp_path):
     ):
         with pytest.raises(RecordingError, match=words):
             PlaybackSettings.from_mapping(fault)
+
+
+def test_a_track_that_jumps_is_refused_unless_allowed(tmp_path) -> None:
+    file = tmp_path / "jump.csv"
+    file.write_text("t,x,y,z\n0,0,0,0\n0.1,0.05,0,0\n0.11,0.4,0,0\n0.2,0.4,0,0\n")
+    with pytest.raises(RecordingError, match="human_hand.*jumps"):
+        Playback.open(PlaybackSettings(file=str(file)))
+    assert list(Playback.open(PlaybackSettings(file=str(file), allow_jumps=True)).names) == ["human_hand"]

@@ -20,7 +20,7 @@ def pose(place, turn=(0, 0, 0, 1)):
 
 def truth(object_id="mug", frame="", **fields):
     message = CellTruth(object_id=object_id, object=pose(MUG), human_hand=pose(HAND), robot_hand=pose(ROBOT), **fields)
-    message.header.frame_id = frame
+    message.header.frame_id, message.header.stamp.secs = frame, 7
     return message
 
 
@@ -77,7 +77,7 @@ def test_frames_of_the_truth_have_names_of_their_own(shown):
         frame = frames[f"truth/{name}"]
         found = frame.transform.translation
         assert (found.x, found.y, found.z) == where and frame.header.frame_id == "map"
-        assert frame.header.stamp.to_sec() == 5.0 and frame.transform.rotation.w == 1.0
+        assert frame.header.stamp.to_sec() == 7.0 and frame.transform.rotation.w == 1.0
     shown.clock += 1.0
     markers, frames = shown.show(truth(object_id=""))
     assert sorted(frames) == ["truth/human_hand", "truth/robot_hand"] and "object" not in markers

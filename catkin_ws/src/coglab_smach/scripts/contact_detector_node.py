@@ -19,6 +19,7 @@ import dataclasses
 import math
 import sys
 import threading
+import time
 from pathlib import Path
 
 import coglab_controllers as cc
@@ -29,7 +30,7 @@ from coglab_msgs.msg import Contact, ContactSignal, FingertipForces, HandStatus,
 from coglab_msgs.srv import ArmContact, ArmContactResponse, Learn, LearnMotion, LearnMotionResponse, LearnResponse
 from coglab_perception.frames import FrameNames, FramesError
 from coglab_perception.tf_listener import TfListener
-from coglab_py import parameters
+from coglab_py import parameters, steady
 from coglab_py.alone import init_node
 from coglab_py.pace import Pace
 from coglab_py.packages import package_path
@@ -86,9 +87,10 @@ class ContactDetectorNode:
         self.position: list[float] | None = None
         self.velocity: list[float] | None = None
         self.joint_stamp = 0.0
-        self.pace = Pace().follow()  # by which stamps pass: filters, windows and time limits are those of the cell
+        self.pace = Pace().follow()  # stamps are told as time passes in the cell
         self.last_sample: float | None = None  # of torques, paced
         self.last_stamp = rospy.Time()
+        self.heard = -math.inf  # monotonic s, when it came
         self.publisher = rospy.Publisher("coglab/contact", Contact, queue_size=10)
         self.margin = rospy.Publisher("~margin", Float64, queue_size=1)
         self.signal = rospy.Publisher("~signal", ContactSignal, queue_size=1)
@@ -113,7 +115,7 @@ class ContactDetectorNode:
         rospy.Service("~arm", ArmContact, self.on_arm)
         rospy.Service("~learn", Learn, self.on_learn)
         rospy.Service("~learn_motion", LearnMotion, self.on_learn_motion)
-        rospy.Timer(rospy.Duration(0.05), self.on_timer)
+        steady.SteadyTimer(0.05, self.on_timer, "signal")
 
     def thresholds(self) -> Thresholds:
         """Those that this robot has learnt, else those that come with the package."""
@@ -197,6 +199,7 @@ class ContactDetectorNode:
         with self.lock:
             self.last_stamp = message.header.stamp
             stamp = self.last_sample = self.pace.of(message.header.stamp.to_sec())
+            self.heard = time.monotonic()
             event = self.detector.feed(stamp, message.effort, self.position, self.velocity)
         self.publish_event(event, message.header.stamp)
 
@@ -218,7 +221,7 @@ class ContactDetectorNode:
 
     def silent(self) -> bool:
         """Whether no torques have come for a second."""
-        return self.last_sample is None or abs(self.pace.of(rospy.Time.now().to_sec()) - self.last_sample) > 1.0
+        return (time.monotonic() - self.heard) * self.pace.factor > 1.0
 
     def on_arm(self, request):
         """Arm or disarm."""
@@ -336,7 +339,7 @@ class ContactDetectorNode:
             except ValueError as error:
                 return LearnResponse(False, ReasonCode.NODE_SILENT if self.silent() else ReasonCode.BUSY, str(error))
 
-    def on_timer(self, _event) -> None:
+    def on_timer(self) -> None:
         """The object as seen; live margin and signal."""
         self.look_at_object()
         self.publish_signal()
@@ -383,8 +386,7 @@ def main() -> int:
     except (parameters.ParameterError, FramesError, ThresholdError, YamlError, OSError) as error:
         rospy.logfatal("contact_detector: %s", error)
         return 1
-    rospy.spin()
-    return 0
+    return steady.spin()
 
 
 if __name__ == "__main__":

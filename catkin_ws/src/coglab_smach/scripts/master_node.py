@@ -25,6 +25,7 @@ from coglab_msgs.msg import Say, Transition
 from coglab_msgs.srv import Start, StartResponse
 from coglab_py import parameters
 from coglab_py.alone import init_node
+from coglab_py.steady import ClockWatch, Stamps, exit_status, utc_of, worker
 from coglab_smach.clocks.clock import PacedClock
 from coglab_smach.context.config import Config, ConfigError
 from coglab_smach.context.context import Context
@@ -73,6 +74,7 @@ class MasterNode:
         config = Config.load(parameters.read("~config_file", str), overrides, rospy.logwarn)
         clock = PacedClock(PACE.follow())
         self.journal = Journal(clock.now)
+        self.stamps = Stamps()
         self.transitions = rospy.Publisher("coglab/transitions", Transition, queue_size=200)
         self.results = rospy.Publisher("coglab/results", String, queue_size=20, latch=True)
         self.spoken = rospy.Publisher("say", Say, queue_size=20, latch=True)  # a listener that starts late hears it, too
@@ -93,7 +95,7 @@ class MasterNode:
             **self.geometry(config),
         )
         self.master = build_master(self.ctx)
-        self.thread = threading.Thread(target=self.master.execute, name="coglab_master", daemon=True)
+        self.thread = worker(self.master.execute, "coglab_master")
         self.states = rospy.Publisher("coglab/state", MasterStateMsg, queue_size=20, latch=True)
         self.watch = StateWatch(self.ctx, self.on_state)
         self.server = None
@@ -190,7 +192,12 @@ class MasterNode:
 
     def on_result(self, record: ActionRecord) -> None:
         """Topic and result file, one JSON object per action."""
-        line = json.dumps(record.to_dict())
+        row = record.to_dict()
+        for name, when in (("started", record.started), ("ended", record.ended)):
+            steady = PACE.steady(when)
+            row[f"{name}_ros"] = round(self.stamps.stamp(steady).to_sec(), 3)
+            row[f"{name}_utc"] = utc_of(steady)
+        line = json.dumps(row)
         publish(self.results, String(line))
         if self.result_file:
             try:
@@ -204,9 +211,11 @@ class MasterNode:
         self.thread.start()
         # Called before rospy shuts anything: the machine still reaches the arm, to end what it has set in motion.
         rospy.on_shutdown(self.end)
+        clock = ClockWatch()
         while not rospy.is_shutdown() and self.thread.is_alive():
             self.thread.join(STATE_PERIOD)
             self.watch.tell_again()
+            clock.look()
         self.thread.join(1.0)
         if self.server is not None:
             self.server.stop()
@@ -214,7 +223,8 @@ class MasterNode:
     def end(self) -> None:
         """Preempt the machine and wait for its end."""
         self.master.request_preempt()
-        self.thread.join(4.0)
+        if threading.current_thread() is not self.thread:
+            self.thread.join(4.0)
 
 
 def main() -> int:
@@ -226,7 +236,7 @@ def main() -> int:
         rospy.logfatal("coglab cannot start: %s", error)
         return 1
     node.run()
-    return 0
+    return exit_status()
 
 
 if __name__ == "__main__":

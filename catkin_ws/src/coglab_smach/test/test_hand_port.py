@@ -6,6 +6,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import pytest
+from actionlib import CommState
 from actionlib_msgs.msg import GoalStatus
 from coglab_msgs.msg import HandStatus, MotorStatus, ReasonCode
 from coglab_smach.ports.interfaces import HandState
@@ -17,22 +18,32 @@ class Client:
     """An action server that takes every goal at once; the test says how it ends."""
 
     def __init__(self, name, kind):
-        self.name, self.text, self.goals, self.there = name, "", [], True
-        self.cancelled = 0
+        self.name, self.goals, self.there, self.ends_at_once = name, [], True, False
+        self.handles = []
 
-    def wait_for_server(self, timeout):
-        self.waited = timeout.to_sec()
-        return self.there
-
-    def send_goal(self, goal, done_cb):
-        self.done_cb = done_cb
+    def send_goal(self, goal, transition_cb, feedback_cb=None):
         self.goals.append(goal)
+        self.handles.append(Handle(transition_cb))
+        if self.ends_at_once:
+            self.handles[-1].end(GoalStatus.SUCCEEDED, None)
+        return self.handles[-1]
 
-    def cancel_goal(self):
+
+class Handle:
+    """One goal, as actionlib.ClientGoalHandle."""
+
+    def __init__(self, transition_cb):
+        self.transition_cb, self.cancelled = transition_cb, 0
+        self.state, self.status, self.result, self.text = CommState.ACTIVE, GoalStatus.ACTIVE, None, ""
+        self.get_comm_state, self.get_result = lambda: self.state, lambda: self.result
+        self.get_goal_status, self.get_goal_status_text = lambda: self.status, lambda: self.text
+
+    def cancel(self):
         self.cancelled += 1
 
-    def get_goal_status_text(self):
-        return self.text
+    def end(self, status, result, text=""):
+        self.state, self.status, self.result, self.text = CommState.DONE, status, result, text
+        self.transition_cb(self)
 
 
 class Thread:
@@ -51,8 +62,11 @@ class Node:
         clock = SimpleNamespace(monotonic=lambda: self.now)
         monkeypatch.setattr(calls, "time", clock)
         monkeypatch.setattr(hand, "time", clock)
+        monkeypatch.setattr(hand, "wait_for", lambda condition, limit: condition())
+        monkeypatch.setattr(hand, "server_is_there", lambda client: client.there)
         monkeypatch.setattr(hand.threading, "Thread", Thread)
-        monkeypatch.setattr(hand.actionlib, "SimpleActionClient", Client)
+        monkeypatch.setattr(hand.actionlib, "ActionClient", Client)
+        monkeypatch.setattr("actionlib.simple_action_client.ActionClient", Client)
         monkeypatch.setattr(calls.rospy, "Subscriber", self.subscribe)
         monkeypatch.setattr(hand.rospy, "Publisher", self.publisher)
         self.port = hand.RosHand("right_hand")
@@ -140,14 +154,29 @@ def test_goals_go_to_their_actions(node):
     }
     assert not any(call.done() for call in pending)
     pending[3].cancel()
-    assert node.client("hand_open").cancelled == 1 and node.client("hand_close").cancelled == 0
+    assert [node.client(f"hand_{name}").handles[0].cancelled for name in ("open", "close")] == [1, 0]
+
+
+def test_goal_that_ends_while_it_is_sent_is_done(node):
+    node.client("hand_close").ends_at_once = True
+    assert node.port.close(200).done()
+
+
+def test_late_end_of_an_older_goal_ends_that_goal_alone(node):
+    first, second = node.port.close(200), node.port.close(300)
+    older, newer = node.client("hand_close").handles
+    older.end(GoalStatus.PREEMPTED, None)
+    assert first.done() and not second.done()
+    second.cancel()
+    first.cancel()
+    assert (older.cancelled, newer.cancelled) == (0, 1)
 
 
 def test_an_action_without_a_server_names_the_node(node):
     node.client("hand_open").there = False
     error = refused(node.port.open(300), ReasonCode.NODE_SILENT)
     assert "right_hand/hand_open has no server after 10 s" in error.sentence and "hand node" in error.sentence
-    assert node.client("hand_open").waited == 10.0 and node.client("hand_open").goals == []
+    assert node.client("hand_open").goals == []
 
 
 def test_ends_of_an_action(node):
@@ -155,8 +184,7 @@ def test_ends_of_an_action(node):
 
     def ended(status, result, text=""):
         call = node.port.close(200)
-        client.text = text
-        client.done_cb(status, result)
+        client.handles[-1].end(status, result, text)
         return call
 
     good = SimpleNamespace(isOk=True, message="", reason_code=0)

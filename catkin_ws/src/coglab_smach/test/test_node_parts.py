@@ -5,6 +5,7 @@ import importlib.util
 import json
 import math
 import threading
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -71,6 +72,7 @@ def node(monkeypatch):
     made.joints, made.position, made.velocity, made.joint_stamp = JOINTS, None, None, 0.0
     made.lock, made.last_sample, made.recorder, made.force_stamp = threading.Lock(), None, None, 0.0
     made.detector, made.base, made.grasp, made.shown = Detector(), "world", None, None
+    made.heard = -math.inf
     made.moving = SimpleNamespace(load=0.0, observer=SimpleNamespace(period=0.0))
     made.torques, made.arm = SimpleNamespace(resolved_name="/lwr/external_torques"), default_arm()
     made.sent = []
@@ -196,11 +198,11 @@ def test_arming(node):
     assert node.silent()
     refused = node.on_arm(request())
     assert (refused.success, refused.reason_code) == (False, ReasonCode.NODE_SILENT)
-    for last, silent in ((8.99, True), (9.0, False), (11.0, False), (11.01, True)):
-        node.last_sample = last
-        assert node.silent() == silent, last
-        assert node.on_arm(request()).success is not silent
     node.last_sample = 9.5
+    for age, silent in ((1.1, True), (0.0, False)):  # by the steady clock: that of the stamps may be set
+        node.heard = time.monotonic() - age
+        assert node.silent() == silent, age
+        assert node.on_arm(request()).success is not silent
     for mode, when in (("contact", "once the arm is still"), ("load", "once the arm is still"), ("lift", "now")):
         assert node.on_arm(request(mode)).message == f"watching for {mode} for 6.0 s, {when}"
     assert node.detector.armed[:3] == ("lift", 9.5, 6.0) and list(node.detector.armed[4]) == [2]
@@ -260,7 +262,7 @@ def test_what_learning_answers(node):
     assert node.on_learn(None).success and node.on_learn(None).message == "learning"
     node.detector.still.learn = lambda: (_ for _ in ()).throw(ValueError("moves"))
     assert node.on_learn(None).reason_code == ReasonCode.NODE_SILENT
-    node.last_sample = 9.9
+    node.heard = time.monotonic()
     assert node.on_learn(None).reason_code == ReasonCode.BUSY
 
 
@@ -282,6 +284,7 @@ def master(monkeypatch, tmp_path):
     made.ctx = SimpleNamespace(clock=clock, stop=stop, arm=SimpleNamespace(hold=lambda why: made.hold))
     made.states, made.transitions, made.results, made.spoken = "states", "transitions", "results", "spoken"
     made.result_file = str(tmp_path / "results.jsonl")
+    made.stamps = SimpleNamespace(stamp=lambda steady: rospy.Time.from_sec(steady + 1000.0))
     made.module = module
     return made
 
@@ -327,7 +330,9 @@ def test_transitions_and_results_are_told_and_written(master):
     master.on_result(record)
     master.on_result(record)
     lines = Path(master.result_file).read_text().splitlines()
-    assert len(lines) == 2 and json.loads(lines[0])["duration_s"] == 2.5 and master.sent[-1][1].data == lines[0]
+    row = json.loads(lines[0])  # beside bags, and beside videos and questionnaires
+    assert (row["started_ros"], row["ended_ros"]) == (1001.0, 1003.5) and row["ended_utc"] > row["started_utc"]
+    assert len(lines) == 2 and row["duration_s"] == 2.5 and master.sent[-1][1].data == lines[0]
     master.result_file = str(Path(master.result_file).parent)
     master.on_result(record)
     assert master.sent[-1][0] == "logerr"

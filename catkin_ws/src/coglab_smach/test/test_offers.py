@@ -223,7 +223,7 @@ def test_a_region_without_a_configuration_is_what_the_arm_can_reach():
 def test_a_reach_has_the_pace_of_the_timing_and_arrives_slowly():
     ctx = Offers(timing="calm").ctx
     assert paced(ctx, GOAL)["dmp_ratio"] == pytest.approx(2.0 * 1.7) and paced(ctx, GOAL)["arrival_speed"] == 0.05
-    assert paced(Offers(timing="brisk").ctx, GOAL)["dmp_ratio"] == pytest.approx(1.4)
+    assert paced(Offers(timing="natural").ctx, GOAL)["dmp_ratio"] == pytest.approx(2.0)
 
 
 def test_the_first_goal_with_a_posture_is_taken_where_it_is_checked():

@@ -249,6 +249,28 @@ def test_a_way_may_take_half_as_long_again_and_five_seconds():
     assert allowed == [pytest.approx(5.0 + 1.5 * longest), 1.5]
 
 
+@pytest.mark.parametrize(("holds", "code", "tries"), [(2, 405, 3), (9, 405, 4), (9, 403, 1)])
+def test_motion_home_is_resumed_once_the_person_has_let_go(holds, code, tries):
+    """The person holds the arm for ``holds`` tries. 405: it did not come to its target; 403: a joint is at its stop."""
+    trial = Trial()
+    state, begun, home = PtpMotion(trial.ctx, "home"), [], trial.ctx.config.get("postures.home")
+    trial.ctx.arm.joint_positions = lambda: tuple(home)
+    trial.ctx.arm.switch_controller = lambda *a: Ready()
+
+    def move_ptp(*_):
+        begun.append(trial.clock.now())
+        return Ready(error=PortError("ended before its target", code=code) if len(begun) <= holds else None)
+
+    trial.ctx.arm.move_ptp = move_ptp
+    if tries > holds:
+        assert ran(trial, state)[0] == "succeeded"
+    else:
+        with pytest.raises(PortError) as error:
+            ran(trial, state)
+        assert error.value.code == code
+    assert len(begun) == tries and all(b - a >= 1.0 for a, b in zip(begun, begun[1:], strict=False))
+
+
 def test_the_go_ahead_is_waited_for_an_hour_unless_it_is_given_beforehand():
     trial = Trial(auto_trigger=False)
     with pytest.raises(TimeLimit):

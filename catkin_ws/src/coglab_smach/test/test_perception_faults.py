@@ -106,7 +106,6 @@ def two_people(seed, margin, other, **overrides):
         seed,
         lambda: trial.rig.t,
         margin,
-        steady=lambda: trial.rig.t,
     )
     shared = SharedTracker(vision, other)
     trial.rig.trackers = {name: shared.of(name) for name in ("object_mug", "human_hand")}

@@ -143,7 +143,7 @@ def test_a_request_to_the_detector_has_what_the_settings_say(nodes):
 
 
 def sent(nodes, count):
-    end = time.monotonic() + 5.0
+    end = time.monotonic() + 60.0
     while len(nodes.asked) < count:
         assert time.monotonic() < end
         time.sleep(0.002)
@@ -229,30 +229,11 @@ def test_a_message_is_as_old_as_it_is_since_it_came(monkeypatch):
 
 
 def test_a_node_that_shuts_down_calls_nobody(monkeypatch):
-    def never(name, timeout):
-        raise rospy.ROSException("timeout")
-
-    monkeypatch.setattr(calls.rospy, "wait_for_service", never)
+    monkeypatch.setattr(calls, "service_answers", lambda name: False)
     monkeypatch.setattr(calls.rospy, "is_shutdown", lambda: True)
     with pytest.raises(PortError) as error:
         calls._await_service("/s", 20.0, Permit())
     assert error.value.code == ReasonCode.PREEMPTED
-
-
-def test_a_service_is_waited_for_in_short_pieces(monkeypatch):
-    now, pieces = [0.0], []
-
-    def never(name, timeout):
-        pieces.append(timeout)
-        now[0] += timeout
-        raise rospy.ROSException("timeout")
-
-    monkeypatch.setattr(calls, "time", SimpleNamespace(monotonic=lambda: now[0]))
-    monkeypatch.setattr(calls.rospy, "wait_for_service", never)
-    monkeypatch.setattr(calls.rospy, "is_shutdown", lambda: False)
-    with pytest.raises(PortError, match="is not there after 1 s"):
-        calls._await_service("/s", 1.2, Permit())
-    assert pieces == pytest.approx([0.5, 0.5, 0.2])
 
 
 def test_stamps_that_a_message_can_carry():

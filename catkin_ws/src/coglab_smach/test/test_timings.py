@@ -1,4 +1,4 @@
-"""The timings calm and brisk in whole trials: one drawn person gives the mug, by the truth of the cell."""
+"""The timings calm and natural in whole trials: one drawn person gives the mug, by the truth of the cell."""
 
 import sys
 
@@ -22,9 +22,9 @@ def receive(timing):
     return each, each.truth["arm_onset"] - each.truth["onset"]
 
 
-def test_brisk_starts_before_calm_and_both_take_the_object():
-    (calm, after_calm), (brisk, after_brisk) = receive("calm"), receive("brisk")
-    for each in (calm, brisk):
+def test_natural_starts_before_calm_and_both_take_the_object():
+    (calm, after_calm), (natural, after_natural) = receive("calm"), receive("natural")
+    for each in (calm, natural):
         assert (each.end, each.truth["held_by"]) == ("succeeded", "robot"), (each.end, each.sentence)
     # Calm waits 0.3 s more from what it can see later.
-    assert after_calm - after_brisk > 0.3, (after_calm, after_brisk)
+    assert after_calm - after_natural > 0.3, (after_calm, after_natural)

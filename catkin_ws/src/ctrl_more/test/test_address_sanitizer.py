@@ -43,6 +43,7 @@ def test_libraries_come_throw_and_go(tmp_path: Path) -> None:
         list(pool.map(lambda s: compiled("-c", s, "-o", tmp_path / f"{s.stem}.o"), sources))
     compiled("-shared", *(tmp_path / f"{s.stem}.o" for s in sources), "-o", core, "-lyaml-cpp", "-ldl")
     link = [core, f"-Wl,-rpath,{tmp_path}"]
+    compiled(PACKAGE / "tools" / "probe.cpp", "-o", tmp_path / "ctrl_more_probe", *link, "-ldl")
     for name in PLUGINS:
         compiled("-shared", PACKAGE / "test" / "plugins" / f"{name}.cpp", "-o", plugins / f"lib{name}.so", *link)
     compiled(

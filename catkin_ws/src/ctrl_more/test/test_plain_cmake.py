@@ -6,6 +6,7 @@ No catkin and no workspace is in the environment of these tests.
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -87,7 +88,8 @@ def test_wrong_version_is_refused(prefix: Path, tmp_path: Path) -> None:
         timeout=120,
         env=clean_environment(),
     )
-    assert result.returncode != 0 and "0.1.0" in result.stderr
+    (version,) = re.findall("<version>(.*)</version>", (PACKAGE / "package.xml").read_text())
+    assert result.returncode != 0 and f"version: {version}" in result.stderr
 
 
 def test_installed_tool_describes_an_installed_controller(prefix: Path) -> None:

@@ -1,6 +1,12 @@
+#include <unistd.h>
+
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <future>
+#include <iostream>
+#include <map>
+#include <thread>
 
 #include "ctrl_more/feedback_controller.hpp"
 #include "test_support.hpp"
@@ -352,6 +358,98 @@ TEST_F(TwoBuilds, LibraryThatStaysInMemoryIsLoadedAgain) {
   const LoadReport report = loadIt();
   EXPECT_TRUE(contains(report.text(), "keeps the old build in memory")) << report.text();
   EXPECT_TRUE(contains(report.text(), "start the program again"));
+}
+
+// In a process of its own, because a fault of the loader would end or block the tests.
+struct HarmfulLibraries : TwoBuilds {
+  // Refused with all parts in the sentence, and another thread can load a good library afterwards.
+  void refused(const std::vector<std::string>& parts) {
+    const LoadReport report = load("loadControllers: [A]\nA: {libPath: libstatic_object.so}\n");
+    for (const std::string& part : parts) {
+      if (!contains(report.text(), part)) fail("not in '" + report.text() + "': " + part);
+    }
+    std::thread([this] {
+      fail(load("loadControllers: [Good]\nGood: {libPath: libgood.so}\n").text());
+    }).join();
+  }
+  static void fail(const std::string& why) {
+    if (why.empty()) return;
+    std::cerr << why << std::endl;
+    _exit(1);
+  }
+  template <typename Function>
+  static void within20s(Function function) {
+    EXPECT_EXIT(
+        {
+          alarm(20);
+          function();
+          _exit(0);
+        },
+        ::testing::ExitedWithCode(0), "");
+  }
+};
+
+TEST_F(HarmfulLibraries, AreRefusedAndBlockNobody) {
+  const std::string opened = "while it was opened", described = "'StaticObject' was made";
+  for (const auto& [fault, parts] : std::map<std::string, std::vector<std::string>>{
+           {"open_throw", {"no such camera"}},
+           {"open_exit", {"ended the process", opened}},
+           {"open_abort", {"crashed", "Aborted", opened}},
+           {"open_crash", {"crashed", "Segmentation", opened}},
+           {"open_hang", {"did not return within", opened}},
+           {"describe_exit", {"ended the process", described}},
+           {"describe_hang", {"did not return within", described}}}) {
+    SCOPED_TRACE(fault);
+    setenv("CTRL_MORE_TEST_FAULT", fault.c_str(), 1);
+    within20s([this, parts = parts] { refused(parts); });
+  }
+  unsetenv("CTRL_MORE_TEST_FAULT");
+}
+
+TEST_F(HarmfulLibraries, InitializeThatHangsBlocksNoQuestionAndIsNamedToOtherChanges) {
+  within20s([this] {
+    ASSERT_TRUE(load("loadControllers: [Good]\nGood: {libPath: libgood.so}\n").ok());
+    std::promise<void> hangs;
+    auto controller = std::make_unique<TestController>();
+    controller->on_initialize = [&](TestController&, ctrl_more::Setup&) {
+      hangs.set_value();
+      while (true) pause();
+    };
+    std::thread([&] { rig.manager->addController(std::move(controller), "odd"); }).detach();
+    hangs.get_future().wait();
+    if (rig.manager->statusAll().size() != 1 || rig.manager->has("odd")) fail("not as it was");
+    if (rig.manager->enable("Good").cause() != Cause::Busy) fail("not busy");
+  });
+}
+
+TEST_F(HarmfulLibraries, CutShortIsRefused) {
+  const auto whole = fs::file_size(library("good"));
+  for (const auto size : {std::uintmax_t{0}, std::uintmax_t{5000}, whole / 2, whole - 1}) {
+    SCOPED_TRACE(size);
+    within20s([&] {
+      build("good");
+      fs::resize_file(folder / "libit.so", size);
+      if (loadIt().ok()) fail("loaded");
+      build("good");
+      fail(loadIt().text());
+    });
+  }
+}
+
+TEST_F(HarmfulLibraries, OverwrittenWhileLoadedRunsAsItWasAndIsLoadedAnew) {
+  within20s([this] {
+    build("good");
+    fail(loadIt().text());
+    fs::resize_file(folder / "libit.so", 0);
+    if (runOnce() != 1.0) fail("not running");
+    std::ofstream(folder / "libit.so") << std::ifstream(library("rebuilt")).rdbuf();
+    if (runOnce() != 1.0) fail("not running");
+    unloadIt();
+    fail(loadIt().text());
+    if (runOnce() != 10.0) fail("not the new one");
+    const auto files = std::distance(fs::directory_iterator(folder), fs::directory_iterator());
+    if (files != 1) fail("a copy stays behind");
+  });
 }
 
 }  // namespace

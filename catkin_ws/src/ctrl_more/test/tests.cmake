@@ -28,7 +28,7 @@ endfunction()
 
 # Libraries that a manager must cope with.
 foreach(plugin good none two again paper_maker unresolved throwing wrong_type other_abi
-    strangers rebuilt resident)
+    strangers rebuilt static_object resident)
   set(source ${plugin})
   if(plugin STREQUAL resident)
     set(source good)
@@ -39,6 +39,7 @@ foreach(plugin good none two again paper_maker unresolved throwing wrong_type ot
     OUTPUT_NAME ${plugin}
     LIBRARY_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/test_plugins)
   list(APPEND CTRL_MORE_TEST_PLUGINS ctrl_more_test_plugin_${plugin})
+  add_dependencies(ctrl_more_test_plugin_${plugin} ctrl_more_probe)
 endforeach()
 
 # One that the dynamic linker never closes.

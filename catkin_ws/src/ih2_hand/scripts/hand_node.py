@@ -17,8 +17,7 @@ def main() -> int:
     except (TypeError, ValueError, OSError) as error:
         rospy.logfatal("hand node: %s", error)
         return 1
-    node.run()
-    return 0
+    return node.run()
 
 
 if __name__ == "__main__":

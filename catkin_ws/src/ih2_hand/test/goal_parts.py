@@ -123,18 +123,10 @@ class Server:
 
 
 class Master:
-    """What the queue has told rospy: subscriptions that last, and warnings."""
+    """What the queue has told rospy: warnings."""
 
     def __init__(self) -> None:
-        self.subscribed = 0
         self.warnings: list[str] = []
-
-    def subscribe(self, *arguments: object, **options: object) -> SimpleNamespace:
-        self.subscribed += 1
-        return SimpleNamespace(unregister=self._unregister)
-
-    def _unregister(self) -> None:
-        self.subscribed -= 1
 
 
 def queue_of_goals(monkeypatch: pytest.MonkeyPatch) -> tuple[goals.GoalQueue, Master]:
@@ -142,7 +134,6 @@ def queue_of_goals(monkeypatch: pytest.MonkeyPatch) -> tuple[goals.GoalQueue, Ma
     master = Master()
     Server.started = 0
     monkeypatch.setattr(goals, "HandActionServer", Server)
-    monkeypatch.setattr(goals.rospy, "Subscriber", master.subscribe)
     monkeypatch.setattr(goals.rospy, "resolve_name", lambda name: name)
     monkeypatch.setattr(goals.rospy, "get_name", lambda: "/ih2_hand")
     monkeypatch.setattr(goals.rospy, "is_shutdown", lambda: False)

@@ -64,6 +64,7 @@ def node_without_master(monkeypatch: pytest.MonkeyPatch, bench: object) -> hand_
     queue, master = queue_of_goals(monkeypatch)
     monkeypatch.setattr(rospy, "Publisher", Topic)
     monkeypatch.setattr(rospy, "Service", lambda *_: None)
+    monkeypatch.setattr(rospy, "Subscriber", lambda *_, **__: None)
     monkeypatch.setattr(rospy, "loginfo", lambda *_: None)
     monkeypatch.setattr(rospy, "logwarn_throttle", lambda *_: None)
     monkeypatch.setattr(diagnostics, "Updater", Updater)
@@ -99,7 +100,7 @@ def works_off(node) -> None:
 def ends_calibration() -> None:
     for thread in threading.enumerate():
         if thread.name == "calibration":
-            thread.join(10.0)
+            thread.join(60.0)
 
 
 def fails(error: Exception):

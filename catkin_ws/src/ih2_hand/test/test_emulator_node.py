@@ -42,7 +42,7 @@ class Cell:
         rospy.rostime.switch_to_wallclock()
         monkeypatch.setattr(rospy, "Publisher", Topic)
         monkeypatch.setattr(rospy, "Subscriber", lambda name, _, call, **__: self.heard.update({name: call}))
-        monkeypatch.setattr(rospy, "Timer", self._timer)
+        monkeypatch.setattr(emulator_node, "SteadyTimer", self._timer)
         monkeypatch.setattr(rospy, "on_shutdown", self.on_shutdown.append)
         monkeypatch.setattr(rospy, "loginfo", lambda text, *values: self.logged.append(text % values))
         monkeypatch.setattr(rospy, "logwarn", lambda text, *values: self.logged.append(text % values))
@@ -57,11 +57,9 @@ class Cell:
         )
         self.node = emulator_node.EmulatorNode(self.server)
 
-    def _timer(self, period: rospy.Duration, call: object) -> SimpleNamespace:
-        self.period, self.tick, self.ended = period.to_sec(), call, []
-        return SimpleNamespace(
-            shutdown=lambda: self.ended.append("shut down"), join=lambda seconds: self.ended.append("joined")
-        )
+    def _timer(self, period: float, call: object, _name: str) -> SimpleNamespace:
+        self.period, self.tick, self.ended = period, call, []
+        return SimpleNamespace(shutdown=lambda: self.ended.append("shut down"))
 
 
 @pytest.fixture
@@ -79,7 +77,7 @@ def test_fingers_are_told_fifty_times_a_second_as_they_move(cell):
     cell.hand.set_contacts([255, 255, 100, 255, 255], [20] * 5)
     cell.hand.receive(bytes.fromhex("C8 80 CD FF"))
     cell.clock.sleep(3.0)
-    cell.tick(None)
+    cell.tick()
     (fingers,) = Topic.every["finger_positions"].told
     assert isinstance(fingers, FingerPositions) and fingers.header.stamp != rospy.Time()
     pressed = 1000.0 * 128 / 511
@@ -87,7 +85,7 @@ def test_fingers_are_told_fifty_times_a_second_as_they_move(cell):
     assert list(fingers.current) == [0, 0, int(pressed), 0, 0]
     assert list(fingers.effort) == pytest.approx([0.0, 0.0, pressed, 0.0, 0.0], abs=0.1)
     cell.hand.motors[1].current = 5000.0
-    cell.tick(None)
+    cell.tick()
     assert Topic.every["finger_positions"].told[-1].current[1] == 1023
 
 
@@ -136,7 +134,7 @@ def test_a_fault_is_carried_out_or_refused_with_words(cell):
 def test_the_end_of_ros_ends_the_port_and_the_end_of_the_port_the_timer(cell):
     assert cell.on_shutdown == [cell.server.request_shutdown]
     cell.node.stop()
-    assert cell.ended == ["shut down", "joined"]
+    assert cell.ended == ["shut down"]
 
 
 def test_the_port_is_told_as_a_parameter_while_there_is_one(monkeypatch):

@@ -50,7 +50,7 @@ class Recorder:
 
     def read(self, count, timeout):
         self.reading.set()
-        self.go.wait(5.0)
+        self.go.wait(60.0)
         self.closed_while_reading = self.closed
         return b"\x08"
 
@@ -69,7 +69,7 @@ def test_closing_waits_for_the_read_under_way():
     line = HandLine(link)
     reader = threading.Thread(target=line.answers, args=(b"\x4b\x00", 1))
     reader.start()
-    assert link.reading.wait(5.0)
+    assert link.reading.wait(60.0)
     closer = threading.Thread(target=line.close)
     closer.start()
     with pytest.raises(HandConnectionLost):  # from now on, though the port is not closed yet
@@ -78,7 +78,7 @@ def test_closing_waits_for_the_read_under_way():
             time.sleep(0.001)
     link.go.set()
     for thread in (reader, closer):
-        thread.join(5.0)
+        thread.join(60.0)
     assert link.closed and not link.closed_while_reading
 
 

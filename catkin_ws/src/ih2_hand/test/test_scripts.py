@@ -79,7 +79,7 @@ def test_the_node_runs_or_says_why_it_does_not(monkeypatch, ros, error):
     def node() -> SimpleNamespace:
         if error:
             raise error
-        return SimpleNamespace(run=lambda: ros.done.append("ran"))
+        return SimpleNamespace(run=lambda: ros.done.append("ran") or 0)
 
     monkeypatch.setattr(hand_node, "HandNode", node)
     monkeypatch.setattr("ih2_hand.ros.shutdown.end_quietly", lambda: None)

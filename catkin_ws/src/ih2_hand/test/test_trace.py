@@ -115,11 +115,11 @@ def test_a_line_begins_with_time_and_direction():
 def test_script_explains_hex():
     script = Path(__file__).resolve().parents[1] / "scripts" / "hand_trace.py"
     done = subprocess.run(
-        [sys.executable, str(script), "--hex", "44 04 64 61"], capture_output=True, text=True, timeout=30, check=True
+        [sys.executable, str(script), "--hex", "44 04 64 61"], capture_output=True, text=True, timeout=120, check=True
     )
     assert "SetFingerPosition motor 4 to 100" in done.stdout
     assert "grasp cylindrical medium" in done.stdout
     bad = subprocess.run(
-        [sys.executable, str(script), "--hex", "4"], capture_output=True, text=True, timeout=30, check=False
+        [sys.executable, str(script), "--hex", "4"], capture_output=True, text=True, timeout=120, check=False
     )
     assert bad.returncode == 2 and "pairs of hex digits" in bad.stderr

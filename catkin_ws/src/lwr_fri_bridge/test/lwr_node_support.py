@@ -9,7 +9,7 @@ import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from sensor_msgs.msg import JointState
 
-LIMIT = 20.0  # s, for everything that is waited for
+LIMIT = 60.0  # s, for everything that is waited for
 
 
 def wait_for(condition, what: str, limit: float = LIMIT):

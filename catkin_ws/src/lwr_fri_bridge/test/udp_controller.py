@@ -46,7 +46,7 @@ class UdpController:
 
     def close(self) -> None:
         self._running = False
-        self._thread.join(timeout=5)
+        self._thread.join(timeout=60.0)
         self._socket.close()
 
     def _run(self) -> None:

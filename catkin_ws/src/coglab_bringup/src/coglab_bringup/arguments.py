@@ -15,6 +15,7 @@ import shutil
 import sys
 from collections.abc import Iterable
 from pathlib import Path
+from typing import NamedTuple
 
 from coglab_bringup.launch_arguments import judge_launch
 from coglab_bringup.usage import Parser, Refused, seed, writable_file, writable_folder
@@ -22,6 +23,7 @@ from coglab_bringup.usage import Parser, Refused, seed, writable_file, writable_
 HELP_GIVEN = 10
 BUILD_OPTIONS = ("--upstream-smach",)
 BUILD_TARGETS = ("tests",)
+TEST_FILES = ("test_*.cpp", "test_*.py", "*.test")  # in the folder test of a package
 
 
 def demo_parser(top: Path) -> Parser:
@@ -85,6 +87,57 @@ def left_out(top: Path) -> list[str]:
     return found.group(1).split(";") if found else []
 
 
+class Wanted(NamedTuple):
+    """Tests that a word of the command line names: PACKAGE, PACKAGE/FILE or PACKAGE/FILE::CASE."""
+
+    package: str
+    file: str = ""  # in the package's folder test; "": all
+    case: str = ""
+
+    @classmethod
+    def of(cls, word: str) -> Wanted:
+        """E.g. "coglab_rt/test_clock.cpp::counts"."""
+        place, _, case = word.partition("::")
+        package, _, file = place.rstrip("/").partition("/")
+        return cls(package, file.removeprefix("test/"), case)
+
+    def check(self, sources: Path) -> None:
+        """Raises Refused, with what there is, if there is no such test."""
+        folders = package_folders(sources)
+        _named([self.package], folders, "package")
+        test = folders[self.package] / "test"
+        files = sorted(path.name for kind in TEST_FILES for path in test.glob(kind))
+        if self.file:
+            _named([self.file], files, f"test of {self.package}")
+        if self.case and not self.file.endswith((".cpp", ".py")):
+            raise Refused(f"{self.file or self.package} runs as a whole: leave out ::{self.case}")
+
+
+NAMED_IN_A_TEST = r"""(?:\bfind |\bpkg=['"]|\bfrom |\bimport |_path\(['"]|\brosrun['"], ['"])(\w+)"""
+"""how launch files and Python programs name a package that they run or import"""
+
+
+def test_targets(top: Path, wanted: list[Wanted]) -> list[str]:
+    """Targets of the workspace's CMakeFiles/Makefile2 that these tests need. Pytests and rostests: all of the packages
+    that the tests of their package name, and of those that these depend on."""
+    sources = top / "catkin_ws" / "src"
+    rules = (top / "catkin_ws" / "build" / "CMakeFiles" / "Makefile2").read_text(encoding="utf-8")
+    of_tests = re.findall(r"^CMakeFiles/tests.dir/all: (\S+)", rules, re.MULTILINE)
+    folders = package_folders(sources)
+    targets = set[str]()
+    for one in wanted:
+        place = folders[one.package].relative_to(sources)
+        if one.file.endswith(".cpp"):
+            targets.add(f"{place}/CMakeFiles/{one.package}_{one.file.removesuffix('.cpp')}.dir/all")
+            continue
+        targets |= {target for target in of_tests if target.startswith(f"{place}/CMakeFiles/")}
+        text = "\n".join(path.read_text(encoding="utf-8") for path in (folders[one.package] / "test").glob("*.*"))
+        named = {one.package, *(name for name in re.findall(NAMED_IN_A_TEST, text) if name in folders)}
+        needed = named.union(*(used_by(name, folders) for name in named)) - set(left_out(top))
+        targets |= {f"{folders[name].relative_to(sources)}/all" for name in needed}
+    return sorted(targets)
+
+
 def find_benches(sources: Path) -> dict[str, list[Path]]:
     """The files of each bench by its name, from the packages below `sources`."""
     benches: dict[str, list[Path]] = {}
@@ -102,8 +155,12 @@ def _named(names: list[str], known: Iterable[str], what: str) -> None:
 def test_options(top: Path, words: list[str]) -> argparse.Namespace:
     """./coglab test"""
     parser = Parser(prog="coglab test", description="Runs every test; the last line counts them.")
-    parser.add_argument("packages", nargs="*", metavar="PACKAGE", help="default: all")
+    parser.add_argument("tests", nargs="*", metavar="PACKAGE[/FILE[::CASE]]", type=Wanted.of, help="default: all")
     parser.add_argument("--long", action="store_true", help="the campaigns too (hours)")
+    parser.add_argument(
+        "--repeat", type=int, default=1, metavar="N", help="N times; lists what was not always the same"
+    )
+    parser.add_argument("--load", action="store_true", help="beside two busy processes")
     parser.add_argument(
         "--out",
         type=writable_folder,
@@ -115,11 +172,14 @@ def test_options(top: Path, words: list[str]) -> argparse.Namespace:
     out: Path = options.out
     if out.is_dir() and any(out.iterdir()) and not (out / "logs").is_dir():
         raise Refused(f"--out {out} holds other files, and would be emptied; name a new folder")
-    _named(options.packages, package_folders(top / "catkin_ws" / "src"), "package")
-    for package in options.packages:
-        if package in left_out(top):
+    if options.repeat < 1:
+        raise Refused(f"--repeat takes a number of runs from 1, got {options.repeat}")
+    for one in options.tests:
+        one.check(top / "catkin_ws" / "src")
+        if one.package in left_out(top):
             raise Refused(
-                f"this build leaves out {package} for the one installed on this machine; to test ours: ./coglab build"
+                f"this build leaves out {one.package} for the one installed on this machine; "
+                "to test ours: ./coglab build"
             )
     return options
 
@@ -206,6 +266,10 @@ def judge(top: Path, command: str, words: list[str]) -> None:
 def main(words: list[str]) -> int:
     """See the head of this file."""
     top, command, rest = Path(words[0]), words[1], words[2:]
+    if command in ("test-names", "test-targets"):  # for the build before `test`, whose arguments these are
+        tests = test_options(top, rest).tests
+        print(*(test_targets(top, tests) if command == "test-targets" else (one.package for one in tests)))
+        return 0
     try:
         judge(top, command, rest)
     except SystemExit:  # argparse printed its help

@@ -70,11 +70,9 @@ def findings(top: Path) -> list[tuple[bool, str]]:
     """Each finding: whether it is fine, and a sentence (with what to do where it is not)."""
     result: list[tuple[bool, str]] = []
     system = release()
-    fine = system.get("VERSION_CODENAME") == "bookworm"
+    fine = system.get("VERSION_CODENAME") in ("bookworm", "trixie")
     name = system.get("PRETTY_NAME", "unknown")
-    result.append(
-        (fine, f"Debian 12 (bookworm): {name}" + ("" if fine else "; use Debian 12, or a container: docker/run"))
-    )
+    result.append((fine, f"release: {name}" + ("" if fine else "; use Debian 12 or 13, or a container: docker/run")))
     result += package_findings(top)
     built = (top / "catkin_ws" / "devel" / "setup.bash").exists()
     result.append((built, "workspace: built" if built else "workspace: not built yet; do it: ./coglab build"))

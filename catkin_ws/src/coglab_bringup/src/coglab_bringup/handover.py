@@ -15,6 +15,7 @@ from coglab_msgs.msg import ReasonCode
 from coglab_msgs.srv import GetObject, Start
 from coglab_py.pace import Pace
 from coglab_py.packages import package_path
+from coglab_py.steady import utc_of, wait_for_service
 from coglab_py.yaml_file import read
 
 from coglab_bringup.trial_recorder import TrialRecorder, summarise
@@ -54,7 +55,7 @@ def ask_for(action: str, object_id: str, alive: Callable[[], bool], limit: float
         if (progress := (services(), refusal)) != before:
             before, moved = progress, time.monotonic()
         try:
-            rospy.wait_for_service("/coglab/start", timeout=1.0)
+            wait_for_service("/coglab/start", 1.0)
             answer = rospy.ServiceProxy("/coglab/start", Start)(action, object_id)
         except rospy.ROSException:
             continue
@@ -71,7 +72,7 @@ def ask_for(action: str, object_id: str, alive: Callable[[], bool], limit: float
 def entry_of(object_id: str) -> Mapping[str, Any] | None:
     """What the database of the running system knows of an object; None if it does not tell."""
     try:
-        rospy.wait_for_service("/object_database/get_object", timeout=2.0)
+        wait_for_service("/object_database/get_object", 2.0)
         answer = rospy.ServiceProxy("/object_database/get_object", GetObject)(object_id)
     except (rospy.ROSException, rospy.ServiceException):
         return None
@@ -83,14 +84,14 @@ def run_handover(
 ) -> tuple[dict, float, float]:
     """Asks for one handover and waits for the hub after it, while `recorder` listens.
 
-    Returns its result row and when it began and ended (s of ROS time).
+    Returns its result row and when it began and ended (s of the steady clock).
     """
     table = package_path("lwr_description", "config", "joint_limits.yaml")
     limits = np.array(read(table).value["default"]["velocity"])
     ask_for(kind, object_id, alive, READY_LIMIT)
     pace = Pace().follow()
     deadline = pace.now() + HANDOVER_LIMIT
-    start = rospy.get_time()
+    start = time.monotonic()
     entry = entry_of(object_id)
 
     def ended() -> list[tuple]:
@@ -100,7 +101,7 @@ def run_handover(
     while pace.now() < deadline and not rospy.is_shutdown():
         if recorder.wait_for(lambda: bool(ended()) or not alive(), 1.0):
             break
-    end = rospy.get_time()
+    end = time.monotonic()
     if ended():
         _, _, _, outcome, _, reason, code = ended()[0]
         outcome = "success" if outcome == "succeeded" else f"{outcome}: {reason}"
@@ -109,4 +110,4 @@ def run_handover(
     else:
         outcome, code = "the system ended", ReasonCode.NODE_SILENT
     row = summarise(recorder.trial, kind, outcome, start, end, limits, entry)
-    return {**row, "reason_code": int(code)}, start, end
+    return {**row, "reason_code": int(code), "started_utc": utc_of(start)}, start, end

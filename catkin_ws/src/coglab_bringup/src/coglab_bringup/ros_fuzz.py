@@ -224,8 +224,8 @@ class Fuzz:
             return 0
         return int(pid) if code == 1 else 0
 
-    def talking(self, seconds: float) -> set[str]:
-        """Topics of ours on which a node of ours says something within this time."""
+    def talking(self, seconds: float, wanted: set[str] | None = None) -> set[str]:
+        """Topics of ours on which a node of ours publishes within this time; ends early with all that are wanted."""
         heard: set[str] = set()
         ours = set(self.nodes)
 
@@ -234,7 +234,9 @@ class Fuzz:
                 heard.add(name)
 
         listeners = [rospy.Subscriber(name, rospy.AnyMsg, note, name, queue_size=1) for name in self.published]
-        time.sleep(seconds)
+        end = time.monotonic() + seconds
+        while time.monotonic() < end and (wanted is None or not heard.issuperset(wanted)):
+            time.sleep(0.1)
         for listener in listeners:
             listener.unregister()
         return heard

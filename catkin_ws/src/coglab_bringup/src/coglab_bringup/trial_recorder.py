@@ -14,6 +14,7 @@ import numpy as np
 import rospy
 from coglab_msgs.msg import CellTruth, Contact, DmpFeedback, HandStatus, Transition
 from coglab_py.pose import Pose
+from coglab_py.steady import Stamps
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Pose as PoseMessage
 from sensor_msgs.msg import JointState
@@ -26,7 +27,7 @@ LOST_KEYS = ("measurements lost", "answers lost")  # diagnostics values of the b
 
 @dataclass
 class Trial:
-    """Time series of one trial; times in s of ROS time, rows beside them."""
+    """Time series of one trial; times in s of the steady clock, rows beside them."""
 
     joints: list[tuple] = field(default_factory=list)  # (t, position[7], velocity[7])
     external_torques: list[tuple] = field(default_factory=list)  # (t, torque[7]) in Nm
@@ -45,6 +46,7 @@ class TrialRecorder:
     def __init__(self) -> None:
         self.trial = Trial()
         self.changed = threading.Condition()
+        self._time = Stamps().steady
         self._subscribers = [
             rospy.Subscriber("/lwr/joint_states", JointState, self._on_joints, queue_size=400),
             rospy.Subscriber("/lwr/external_torques", JointState, self._on_torques, queue_size=400),
@@ -68,10 +70,10 @@ class TrialRecorder:
             return bool(self.changed.wait_for(lambda: condition() or rospy.is_shutdown(), limit)) and condition()
 
     def _on_joints(self, message: JointState) -> None:
-        self.trial.joints.append((message.header.stamp.to_sec(), message.position, message.velocity))
+        self.trial.joints.append((self._time(message.header.stamp), message.position, message.velocity))
 
     def _on_torques(self, message: JointState) -> None:
-        self.trial.external_torques.append((message.header.stamp.to_sec(), message.effort))
+        self.trial.external_torques.append((self._time(message.header.stamp), message.effort))
 
     def _on_truth(self, message: CellTruth) -> None:
         points = [
@@ -81,31 +83,32 @@ class TrialRecorder:
             message.touch_force,
         ]
         robot, human, thing, force = ([p.x, p.y, p.z] for p in points)
-        stamp = message.header.stamp.to_sec()
+        stamp = self._time(message.header.stamp)
         self.trial.truth.append((stamp, robot, human, thing, float(np.linalg.norm(force))))
         self.trial.poses.append((stamp, *map(_pose, (message.robot_hand, message.human_hand, message.object))))
 
     def _on_hand(self, message: HandStatus) -> None:
         if len(message.motors) == 5:
-            self.trial.fingers.append((message.header.stamp.to_sec(), [motor.position for motor in message.motors]))
+            self.trial.fingers.append((self._time(message.header.stamp), [motor.position for motor in message.motors]))
 
     def _on_feedback(self, message: DmpFeedback) -> None:
-        self.trial.feedback.append((message.header.stamp.to_sec(), message.state, message.remaining_distance))
+        self.trial.feedback.append((self._time(message.header.stamp), message.state, message.remaining_distance))
 
     def _on_transition(self, message: Transition) -> None:
         with self.changed:
-            row = (message.header.stamp.to_sec(), message.path, message.from_state, message.outcome, message.to_state)
-            self.trial.transitions.append((*row, message.reason, message.reason_code))
+            row = (message.path, message.from_state, message.outcome, message.to_state)
+            stamp = self._time(message.header.stamp)
+            self.trial.transitions.append((stamp, *row, message.reason, message.reason_code))
             self.changed.notify_all()
 
     def _on_contact(self, message: Contact) -> None:
         words = f"{message.source}: {message.message}"
-        self.trial.contacts.append((message.header.stamp.to_sec(), message.contact, message.margin, words))
+        self.trial.contacts.append((self._time(message.header.stamp), message.contact, message.margin, words))
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         counts = [int(value.value) for status in message.status for value in status.values if value.key in LOST_KEYS]
         if counts:
-            self.trial.fri_lost.append((message.header.stamp.to_sec(), sum(counts)))
+            self.trial.fri_lost.append((self._time(message.header.stamp), sum(counts)))
 
 
 def _pose(message: PoseMessage) -> Pose:

@@ -5,8 +5,12 @@ from __future__ import annotations
 import argparse
 import os
 import re
+import shutil
 from pathlib import Path
 from typing import NoReturn
+
+
+RESULTS_SPACE = 50e6  # bytes, for the results of a demo or of the tests
 
 
 class Refused(Exception):
@@ -35,6 +39,10 @@ def writable_folder(text: str) -> Path:
     # os.access says yes to root even where the file system does not write, as in /proc
     if not there.is_dir() or not os.access(there, os.W_OK | os.X_OK) or str(there).split("/")[1] in ("proc", "sys"):
         raise argparse.ArgumentTypeError(f"{text} cannot be written: {there} is no folder that takes files")
+    free = shutil.disk_usage(there).free
+    if free < RESULTS_SPACE:
+        need = f"{free / 1e6:.0f} MB left, and results need {RESULTS_SPACE / 1e6:.0f} MB"
+        raise argparse.ArgumentTypeError(f"{text} cannot be written: {there} has {need}")
     return path
 
 

@@ -43,7 +43,7 @@ for (const why of document.querySelectorAll('#actions .why')) {
 // What has no room must be seen in full with the focus on it.
 const status = document.getElementById('status');
 if (seen(status) && status.scrollHeight > status.clientHeight + 1) problems.push('the column of the status is cut off');
-for (const place of document.querySelectorAll('#status dd, #graph p.last, .crumbs, #log-place, #log')) {
+for (const place of document.querySelectorAll('#now dd, #status dd, #graph p.last, .crumbs, #log-place, #log')) {
   const words = place.querySelector('.all') ?? place;
   const cut = () => [words, ...words.querySelectorAll('li')].some((one) => one.scrollHeight > one.clientHeight + 1 || one.scrollWidth > one.clientWidth + 1);
   if (!seen(place) || place.matches('.all') || !cut()) continue;

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from .browser import Browser
 
-PAGES = ("Live", "Experiment", "Contact", "Objects", "Primitives", "Feedback", "Events", "Health", "Help")
+PAGES = ("Live", "Machine", "Experiment", "Contact", "Objects", "Primitives", "Feedback", "Events", "Health", "Help")
 _LOOK = Path(__file__).with_name("look_at_page.js").read_text()
 MOST_STEPS = 300
 _BEGIN = "const b = document.body; b.tabIndex = -1; b.focus(); b.removeAttribute('tabindex')"  # Tab goes on from there

@@ -134,9 +134,13 @@ def learn(
     goal_weight: GoalWeight = ...,
     mapping: str = "none",
     regularisation: float = ...,
+    allow: Sequence[str] = (),
 ) -> Primitive:
     """Learns from one or several demonstrations, each (times (n,) in s, positions (n, 3) in m), by regularised least
-    squares on the path. Raises ValueError saying which demonstration or option is wrong."""
+    squares on the path. Raises ValueError saying which demonstration or option is wrong. A demonstration that is no
+    reach is refused unless ``allow`` names the fault: 'short' (goes less than 0.05 m), 'brief' (takes less than
+    0.25 s), 'jump' (faster than 5 m/s between two samples, or one step much longer than those around it), 'moving'
+    (faster than half its mean speed at an end), 'noisy' (noise above 2 % of the way it goes)."""
 
 def reproduce(primitive: Primitive, times: ArrayLike, dt: float = 0.001) -> Array:
     """Path (n, 3) in m from the primitive's own start to its own goal, at times (n,) in s."""
@@ -405,8 +409,9 @@ class JointLimits:
 
     def __init__(self) -> None: ...
 
-def load_joint_limits(path: str, profile: str = "default") -> JointLimits:
-    """Reads lwr_description/config/joint_limits.yaml."""
+def load_joint_limits(path: str, profile: str = "default", own_path: str = "") -> JointLimits:
+    """Reads lwr_description/config/joint_limits.yaml. A file that is wider than the robot's own table at ``own_path``
+    is refused unless it has the line ``wider_than_robot: true``."""
 
 class Interpolator:
     """Jerk-limited interpolator from target velocities to position commands, as the bridge runs it."""
@@ -462,9 +467,6 @@ class GuardResult:
     def joint(self) -> int:
         """Index of the joint that bound, or -1."""
     @property
-    def blocked_joint(self) -> int:
-        """Joint at its stop that has held up the motion too long, or -1."""
-    @property
     def reason(self) -> str: ...
     @property
     def border(self) -> str: ...
@@ -482,11 +484,10 @@ class Guard:
         position_margin: float = 0.01,
         reaction_time: float = 0.015,
     ) -> None: ...
-    def limit(self, chain: Chain, q: ArrayLike, velocity: ArrayLike, dt: float = 0.005) -> GuardResult:
+    def limit(self, chain: Chain, q: ArrayLike, velocity: ArrayLike) -> GuardResult:
         """One cycle at q (7,) with the requested velocity (7,)."""
     def speed_to_stop(self, joint: int, room: float) -> float:
         """Largest speed in rad/s of a joint `room` rad before its stop."""
-    def reset(self) -> None: ...
 
 class PhaseGovernor:
     """Slows the clock of a motion so that the reference waits for the arm."""

@@ -148,6 +148,19 @@ const CartesianReference& CartesianMotion::step(double dt, const Pose& goal, dou
   return reference_;
 }
 
+void CartesianMotion::endAt(const Pose& pose) noexcept {
+  dmp_.endAt(pose.position);
+  end_.latch(pose.position);
+  goal_ = pose.position;
+  orientation_ = pose.orientation.normalized();
+  reference_.pose = {pose.position, orientation_};
+  reference_.velocity.setZero();
+  reference_.angular_velocity.setZero();
+  drawn_ = 0.0;
+  phase_ = Phase::Ended;
+  settled_ = true;
+}
+
 void CartesianMotion::stop() noexcept {
   phase_ = Phase::Idle;
   reference_.pose.position = dmp_.state().position;

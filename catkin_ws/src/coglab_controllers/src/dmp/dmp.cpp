@@ -13,6 +13,9 @@ namespace {
 // micrometres at most, whatever the cycle time.
 constexpr double kPoleShare = 0.1, kBasisShare = 0.5;
 
+// Phase of a motion that has ended: nothing is left of its shape.
+constexpr double kEndPhase = 1e-6;
+
 }  // namespace
 
 void Dmp::start(const TransformationSystem& system, const Vector3& position,
@@ -29,6 +32,11 @@ void Dmp::switchTo(const TransformationSystem& system, const Vector3& goal, doub
   system_ = system;
   tau_ = ratio * system_.duration();
   system_.mapShape(start_, goal);
+  phi_ = system_.movingPoint(state_.phase);
+}
+
+void Dmp::endAt(const Vector3& position) noexcept {
+  state_ = {position, Vector3::Zero(), Vector3::Zero(), std::min(state_.phase, kEndPhase)};
   phi_ = system_.movingPoint(state_.phase);
 }
 

@@ -121,6 +121,75 @@ Example prepare(const Trajectory& trajectory) {
   return example;
 }
 
+// Whether the faults of this name are refused. Throws for one that is.
+class Faults {
+ public:
+  explicit Faults(const std::vector<std::string>& allow) : allow_(allow) {
+    const char* names[] = {"short", "brief", "jump", "moving", "noisy"};
+    for (const std::string& name : allow) {
+      if (std::find(std::begin(names), std::end(names), name) != std::end(names)) continue;
+      throw std::invalid_argument("allow: expected short, brief, jump, moving or noisy, got '" +
+                                  name + "'");
+    }
+  }
+  void refuse(const std::string& name, const std::string& what, double value,
+              const std::string& expected) const {
+    if (std::find(allow_.begin(), allow_.end(), name) != allow_.end()) return;
+    throw std::invalid_argument(name + ": " + what + " " + std::to_string(value) + ", expected " +
+                                expected + "; cut or record it anew, or allow '" + name + "'");
+  }
+
+ private:
+  const std::vector<std::string>& allow_;
+};
+
+// Noise of the positions, m, from fourth differences, which a smooth path hardly has.
+double noiseOf(const Eigen::Matrix3Xd& p) {
+  const Eigen::Index n = p.cols() - 4;
+  const Eigen::Matrix3Xd fourth = p.leftCols(n) - 4.0 * p.middleCols(1, n) +
+                                  6.0 * p.middleCols(2, n) - 4.0 * p.middleCols(3, n) +
+                                  p.rightCols(n);
+  return std::sqrt(fourth.squaredNorm() / (70.0 * static_cast<double>(n)));
+}
+
+// Refuses a demonstration that no person would call one reach: see DemonstrationLimits.
+void checkReach(const Example& example, const Faults& faults) {
+  using Limits = DemonstrationLimits;
+  const Eigen::Matrix3Xd& p = example.positions;
+  const Eigen::Index last = p.cols() - 1;
+  const double far = (p.colwise() - p.col(0)).colwise().norm().maxCoeff();
+  if (far < Limits::kShort)
+    faults.refuse("short", "its farthest point from its start (m) is", far, "at least 0.05");
+  if (example.duration < Limits::kBrief)
+    faults.refuse("brief", "its duration (s) is", example.duration, "at least 0.25");
+  const Eigen::VectorXd steps = (p.rightCols(last) - p.leftCols(last)).colwise().norm();
+  for (Eigen::Index i = 0; i < last; ++i) {
+    const double speed = steps[i] / (example.times[i + 1] - example.times[i]);
+    if (speed > Limits::kJump)
+      faults.refuse("jump", "between two samples its speed (m/s) is", speed, "at most 5");
+    const Eigen::Index from = std::max<Eigen::Index>(0, i - 3), to = std::min(last - 1, i + 3);
+    const double around = (steps.segment(from, to - from + 1).sum() - steps[i]) /
+                          static_cast<double>(std::max<Eigen::Index>(1, to - from));
+    if (steps[i] > 0.2 * far && steps[i] > Limits::kJumpShare * around)
+      faults.refuse("jump", "it has a step (m) of", steps[i], "steps like those around it");
+  }
+  const auto window = (last + 1) / 20;
+  if (window == 0) return;  // too few samples for speeds at the ends, and for noise
+  const double mean = example.scale / example.duration;
+  for (const Eigen::Index from : {Eigen::Index(0), last - window}) {
+    const double speed = (p.col(from + window) - p.col(from)).norm() /
+                         (example.times[from + window] - example.times[from]);
+    if (speed > Limits::kMoving * mean) {
+      faults.refuse("moving",
+                    from == 0 ? "its speed (m/s) at its start is" : "its speed (m/s) at its end is",
+                    speed, "at most half its mean speed, " + std::to_string(mean));
+    }
+  }
+  const double noise = noiseOf(p);
+  if (noise > Limits::kNoisy * far)
+    faults.refuse("noisy", "its noise (m) is", noise, "at most 2 % of the way it goes");
+}
+
 // Mapped and shifted so that start and goal are those of the reference.
 void alignTo(const Example& reference, ShapeMapping mapping, Example& example) {
   const auto line = [](const Example& e) -> Vector3 {
@@ -146,7 +215,9 @@ void check(const LearningOptions& options) {
 }
 
 std::vector<Example> prepareAll(const std::vector<Trajectory>& demonstrations,
-                                ShapeMapping mapping) {
+                                const LearningOptions& options) {
+  const ShapeMapping mapping = options.mapping;
+  const Faults faults(options.allow);
   if (demonstrations.empty())
     throw std::invalid_argument("expected at least one demonstration, got none");
   std::vector<Example> examples;
@@ -154,6 +225,7 @@ std::vector<Example> prepareAll(const std::vector<Trajectory>& demonstrations,
     try {
       validate(demonstrations[i]);
       examples.push_back(prepare(demonstrations[i]));
+      checkReach(examples.back(), faults);
     } catch (const std::invalid_argument& error) {
       throw std::invalid_argument("demonstration " + std::to_string(i + 1) + ": " + error.what());
     }
@@ -247,7 +319,7 @@ class Equations {
 Primitive learn(const std::string& id, const std::vector<Trajectory>& demonstrations,
                 const LearningOptions& options) {
   check(options);
-  const std::vector<Example> examples = prepareAll(demonstrations, options.mapping);
+  const std::vector<Example> examples = prepareAll(demonstrations, options);
   Primitive primitive = withoutWeights(id, examples, options);
   const Eigen::MatrixX3d solution = Equations(primitive, examples).solve(options.regularisation);
   const Eigen::Index n = primitive.basisCount();

@@ -155,11 +155,14 @@ class PrimitiveReader {
 
   Primitive learnt() {
     LearningOptions options;
-    const Element element = child("learn", {"basis", "alpha", "stiffness", "regularisation"});
+    const Element element =
+        child("learn", {"basis", "alpha", "stiffness", "regularisation", "allow"});
     options.basis_count = element.integer("basis", options.basis_count);
     options.alpha = element.number("alpha", options.alpha);
     options.stiffness = element.number("stiffness", options.stiffness);
     options.regularisation = element.number("regularisation", options.regularisation);
+    std::istringstream allow(element.has("allow") ? element.text("allow") : "");
+    for (std::string fault; allow >> fault;) options.allow.push_back(fault);
     if (once_.count("goal_weight") != 0) {
       options.goal_weight = readGoalWeight(child("goal_weight", {"kind", "centre", "steepness"}));
     }

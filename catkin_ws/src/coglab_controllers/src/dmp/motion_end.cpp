@@ -34,9 +34,7 @@ MotionEnd::Event MotionEnd::update(double dt, double phase, double speed, double
         (position - goal).norm() >= p.distance || (goal - raw_goal).norm() >= p.follow_distance) {
       return Event::None;
     }
-    latched_ = true;
-    goal_ = goal;
-    away_ = 0.0;
+    latch(goal);
     return Event::Ended;
   }
   away_ = (raw_goal - goal_).norm() > parameters_.follow_distance ? away_ + dt : 0.0;

@@ -27,9 +27,6 @@ void requirePoint(const std::string& field, const Vector3& point) {
     requireRange(field + "." + "xyz"[axis], point[axis], -100.0, 100.0);
 }
 
-// Lines shorter than this (m) have no direction.
-constexpr double kShortestLine = 1e-3;
-
 double logistic(double x) { return 1.0 / (1.0 + std::exp(x)); }
 
 }  // namespace

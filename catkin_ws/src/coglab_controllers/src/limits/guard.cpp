@@ -8,9 +8,6 @@
 namespace coglab_controllers {
 namespace {
 
-// Below this share of the request the motion counts as held up.
-constexpr double kBlockedScale = 0.01;
-
 // A joint at its stop whose outward speed is below this share of the fastest joint's, or below this
 // speed (rad/s), is stopped alone: it must not stop the arm, and turns the motion by no more than
 // the share.
@@ -78,7 +75,6 @@ Guard::Guard(const GuardParameters& parameters, const Chain& chain)
   require("elbow_speed", p.elbow_speed, true);
   require("workspace_deceleration", p.workspace_deceleration, false);
   require("reaction_time", p.reaction_time, true);
-  require("block_time", p.block_time, false);
 }
 
 double Guard::speedToStop(int joint, double room) const noexcept {
@@ -91,7 +87,7 @@ double Guard::speedToStop(int joint, double room) const noexcept {
 }
 
 void Guard::limit(const ChainState& state, const JointVector& q, const JointVector& asked_for,
-                  double dt, GuardResult& result) noexcept {
+                  GuardResult& result) const noexcept {
   result = GuardResult{};
   const int joints = chain_.joints();
   if (!asked_for.head(joints).allFinite() || !q.head(joints).allFinite()) {
@@ -141,12 +137,6 @@ void Guard::limit(const ChainState& state, const JointVector& q, const JointVect
     bind(-margin.rate, allowed, GuardReason::WorkspaceBorder, -1, margin.border);
   }
   result.velocity = result.scale * request;
-
-  const bool blocked = result.reason == GuardReason::JointPosition && result.scale < kBlockedScale;
-  if (!blocked || result.joint != blocking_joint_) blocked_for_ = 0.0;
-  blocking_joint_ = blocked ? result.joint : -1;
-  if (blocked) blocked_for_ += dt;
-  if (blocked_for_ >= parameters_.block_time) result.blocked_joint = blocking_joint_;
 }
 
 }  // namespace coglab_controllers

@@ -74,7 +74,8 @@ ControlCycle::ControlCycle(std::shared_ptr<const RobotSetup> robot, FeedbackStag
     : robot_(std::move(robot)),
       feedback_(feedback),
       settings_(settings),
-      guard_(robot_->guard, robot_->chain) {
+      guard_(robot_->guard, robot_->chain),
+      progress_(settings.blocked_time) {
   input_.dt = settings_.cycle_time;
 }
 
@@ -124,7 +125,7 @@ void ControlCycle::adopt() noexcept {
     fault_ = false;
     fault_reason_.clear();
     overruns_in_row_ = 0;
-    guard_.reset();
+    watched_ = -1;
     // Cancels of the time when it was not the active one have nothing to end.
     Reason old;
     if (cancel_ != nullptr && cancel_->take(old)) cancel_->confirm(false);
@@ -176,21 +177,28 @@ void ControlCycle::watchRobot() noexcept {
               << (again ? "it left command mode for a moment" : coglab_rt::describe(sample.block)));
 }
 
-void ControlCycle::watchGuard(double dt) noexcept {
+void ControlCycle::watchLimits(double dt) noexcept {
+  const JointVector& set_point = input_.robot.commanded_position;
   const bool under_way = moving(motionState());
-  const GuardResult& guard = report_.guard;
-  const bool stopped =
-      under_way && guard.reason == GuardReason::WorkspaceBorder && guard.scale < 0.02;
-  at_border_ = stopped ? at_border_ + dt : 0.0;
+  if (!under_way || motion_->motionId() != watched_) progress_.restart(set_point);
   if (!under_way) return;
-  limit_scale_ = std::clamp(motion_->limitScale() * guard.scale, 0.0, 1.0);
-  if (guard.blocked_joint >= 0) {
+  watched_ = motion_->motionId();
+  limit_scale_ = std::clamp(motion_->limitScale() * report_.guard.scale, 0.0, 1.0);
+  const GuardResult* const bound =
+      progress_.update(dt, speedScale(), input_.time_scale, set_point, report_.guard);
+  if (bound == nullptr) return;
+  bool there = false;
+  guarded("endIfThere", [&] { there = motion_->endIfThere(input_); });
+  if (there) return;
+  if (bound->reason == GuardReason::JointPosition) {
     abortMotion(Reason(ReasonCode::JointBlocked, "joint ")
-                << robot_->chain.jointNames()[guard.blocked_joint].c_str()
-                << " is at its stop and blocks the motion");
-  } else if (at_border_ > settings_.border_time && !motion_->waitsAtBorder()) {
-    abortMotion(Reason(ReasonCode::WorkspaceBorder, "a border of the workspace blocks the motion: ")
-                << describe(guard.border));
+                << robot_->chain.jointNames()[bound->joint].c_str()
+                << " is at its stop and blocks the motion for " << settings_.blocked_time
+                << " s; choose another goal or posture");
+  } else {
+    abortMotion(Reason(ReasonCode::WorkspaceBorder, "a border of the workspace blocks the motion (")
+                << describe(bound->border) << ") for " << settings_.blocked_time
+                << " s; choose another goal or way");
   }
 }
 
@@ -265,8 +273,8 @@ void ControlCycle::run(const RobotSample& sample, double dt, VelocityCommand& ou
     compute(velocity);
     // Step 8: guard.
     guard_.setInterfaceReserve(sample.stop_delay, sample.stop_rounding);
-    guard_.limit(input_.chain, furthest(sample, velocity), velocity, dt, report_.guard);
-    watchGuard(dt);
+    guard_.limit(input_.chain, furthest(sample, velocity), velocity, report_.guard);
+    watchLimits(dt);
     ++numbers_;
   } else {
     ++report_.stale;

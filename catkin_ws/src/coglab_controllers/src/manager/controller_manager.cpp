@@ -39,6 +39,7 @@ ManagerSettings readManagerSettings(const YAML::Node& node, const std::string& u
   cycle.cycle_time = parameters.number("cycle_time", cycle.cycle_time, 0.0005, 0.1);
   cycle.sample_timeout = parameters.number("sample_timeout", cycle.sample_timeout, 0.005, 5.0);
   cycle.silent_time = parameters.number("silent_time", cycle.silent_time, 0.01, 10.0);
+  cycle.blocked_time = parameters.number("blocked_time", cycle.blocked_time, 0.05, 10.0);
   cycle.overrun_time =
       lockstep ? 0.0 : parameters.number("overrun_time", cycle.cycle_time, 0.0, 10.0);
   settings.plan_timeout = parameters.number("plan_timeout", settings.plan_timeout, 0.05, 30.0);
@@ -104,28 +105,34 @@ std::string ControllerManager::loadedMotions() const {
   return joined(ids);
 }
 
+// Other requests do not wait for it: a plug-in's code and the ROS master may take seconds.
 Answer ControllerManager::load(const std::string& id, const std::string& type,
                                const Attach& attach) {
-  std::unique_lock<std::mutex> requests(requests_);
   if (!validId(id)) {
     return Answer::invalid("controller_id '" + id +
                            "': expected up to 48 letters, digits and '_', beginning with a "
                            "letter");
   }
-  {
-    const std::lock_guard<std::mutex> lock(table_);
-    if (find(id) != nullptr || loading_.count(id) != 0 || feedback_.manager().has(id)) {
-      return Answer::refusal(
-          ReasonCode::InvalidArgument,
-          "controller_id '" + id + "' is in use; choose another id, or go on with the loaded one");
-    }
-    loading_.insert(id);
+  const std::shared_ptr<void> claimed = claim(id);
+  if (!claimed) {
+    return Answer::refusal(
+        ReasonCode::InvalidArgument,
+        "controller_id '" + id + "' is in use; choose another id, or go on with the loaded one");
   }
   const bool motion = !libraryOf(type).empty() || MotionTypes::instance().find(type).controller;
-  const Answer answer = motion ? loadMotion(id, type, attach, requests) : loadFeedback(id, type);
-  const std::lock_guard<std::mutex> lock(table_);
-  loading_.erase(id);
-  return answer;
+  return motion ? loadMotion(id, type, attach) : loadFeedback(id, type);
+}
+
+std::shared_ptr<void> ControllerManager::claim(const std::string& id) {
+  {
+    const std::lock_guard<std::mutex> lock(table_);
+    if (find(id) != nullptr || feedback_.manager().has(id) || !loading_.insert(id).second)
+      return {};
+  }
+  return {this, [this, id](void*) {
+            const std::lock_guard<std::mutex> lock(table_);
+            loading_.erase(id);
+          }};
 }
 
 /// The library that the parameter `types` names, else lib<package>.so of a type <package>/<class>
@@ -145,7 +152,7 @@ std::string ControllerManager::libraryOf(const std::string& type) const {
 }
 
 Answer ControllerManager::loadMotion(const std::string& id, const std::string& type,
-                                     const Attach& attach, std::unique_lock<std::mutex>& requests) {
+                                     const Attach& attach) {
   const std::string what = "controller '" + id + "' of type '" + type + "' was not loaded: ";
   // Outlives what is thrown below: the type of an exception may live in the library.
   auto loaded = std::make_shared<LoadedMotion>();
@@ -174,7 +181,6 @@ Answer ControllerManager::loadMotion(const std::string& id, const std::string& t
     setup.robot = settings_.robot;
     setup.host = this;
     loaded->controller->configure(setup);
-    requests.unlock();  // what is attached may wait for others, such as the ROS master
     if (attach) attach(*loaded->controller, maker);
     const std::lock_guard<std::mutex> lock(table_);
     motions_.push_back(std::move(loaded));

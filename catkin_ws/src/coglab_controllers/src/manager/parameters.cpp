@@ -82,17 +82,22 @@ std::vector<std::string> Parameters::texts(const std::string& name) const {
   refuse(name, "a list of texts");
 }
 
-Eigen::VectorXd Parameters::numbers(const std::string& name,
-                                    const Eigen::VectorXd& fallback) const {
+Eigen::VectorXd Parameters::numbers(const std::string& name, const Eigen::VectorXd& fallback,
+                                    double most) const {
   if (!has(name)) return fallback;
   try {
     const std::vector<double> values = node_[name].as<std::vector<double>>();
     const Eigen::VectorXd result =
         Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<int>(values.size()));
-    if (result.size() == fallback.size() && result.allFinite()) return result;
+    if (result.size() == fallback.size() && result.allFinite() &&
+        result.lpNorm<Eigen::Infinity>() <= most) {
+      return result;
+    }
   } catch (const YAML::Exception&) {
   }
-  refuse(name, std::to_string(fallback.size()) + " finite numbers");
+  std::ostringstream range;
+  range << fallback.size() << " finite numbers from " << -most << " to " << most;
+  refuse(name, range.str());
 }
 
 Parameters Parameters::block(const std::string& name) const {

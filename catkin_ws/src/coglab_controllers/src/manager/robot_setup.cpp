@@ -8,6 +8,8 @@ namespace coglab_controllers {
 
 namespace {
 
+constexpr double kFarthest = 10.0;  // m, of the workspace; a number in mm is larger
+
 /// Limits count for the joints of the chain in their order. @throws std::runtime_error otherwise
 void requireJointsOf(const Chain& chain, const coglab_rt::JointLimits& table) {
   const std::vector<std::string>& names = chain.jointNames();
@@ -54,11 +56,11 @@ std::shared_ptr<const RobotSetup> makeRobotSetup(const std::string& urdf,
       parameters.number("position_margin", table.position_margin, table.position_margin, 0.5);
   guard.hand_speed = parameters.number("hand_speed_limit", guard.hand_speed, 0.0, 5.0);
   guard.elbow_speed = parameters.number("elbow_speed_limit", guard.elbow_speed, 0.0, 5.0);
-  guard.block_time = parameters.number("blocked_time", guard.block_time, 0.05, 10.0);
   const Parameters space = parameters.block("workspace");
-  guard.workspace.box_min = space.numbers("box_min", guard.workspace.box_min);
-  guard.workspace.box_max = space.numbers("box_max", guard.workspace.box_max);
-  guard.workspace.base_centre = space.numbers("base_centre", guard.workspace.base_centre);
+  guard.workspace.box_min = space.numbers("box_min", guard.workspace.box_min, kFarthest);
+  guard.workspace.box_max = space.numbers("box_max", guard.workspace.box_max, kFarthest);
+  guard.workspace.base_centre =
+      space.numbers("base_centre", guard.workspace.base_centre, kFarthest);
   guard.workspace.base_radius = space.number("base_radius", guard.workspace.base_radius, 0.0, 5.0);
   guard.workspace.max_stretch = space.number("max_stretch", guard.workspace.max_stretch, 0.2, 1.0);
   guard.workspace_deceleration =

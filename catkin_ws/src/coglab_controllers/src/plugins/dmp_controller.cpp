@@ -1,6 +1,7 @@
 // Requests of the DMP plug-in: checked here, outside the cycle, and turned into plans.
 #include "coglab_controllers/plugins/dmp_controller.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 #include <stdexcept>
@@ -15,6 +16,7 @@ namespace {
 constexpr double kFastestStart = 2.0;     // m/s
 constexpr double kSlowestArrival = 0.02;  // m/s
 constexpr double kLongestApproach = 0.3;  // m
+constexpr double kOnBorder = 1e-3;        // m that a path may be outside of the workspace
 
 std::string text(const Vector3& v) {
   std::ostringstream out;
@@ -45,7 +47,6 @@ Answer readOrientation(const DmpRequest& request, HandGoal& hand) {
 RunnerPolicy dmpPolicy() {
   RunnerPolicy policy;
   policy.open_end = true;
-  policy.waits_at_border = true;
   policy.id_name = nullptr;
   policy.longest_queue = 0;
   return policy;
@@ -71,6 +72,8 @@ void DmpController::configure(const MotionSetup& setup) {
   predicted_ = parameters.text("predicted_goals", "");
   reach_margin_ = parameters.number("goal_reach_margin", 0.5, 0.0, 5.0);
   max_initial_distance_ = parameters.number("max_initial_distance", 0.1, 0.0, 1.0);
+  max_scale_ = parameters.number("max_scale", max_scale_, 1.0, 1000.0);
+  arrive_distance_ = parameters.number("arrive_distance", arrive_distance_, 1e-4, 0.5);
   goals_.configure(dmp_frame_, readGoalGate(parameters), *setup.host);
   MotionRunner<DmpPlan>::configure(setup);
   MotionConfiguration configuration(setup);
@@ -86,7 +89,9 @@ void DmpController::configure(const MotionSetup& setup) {
 // --------------------------------------------------------------------------
 
 Reason DmpController::unwelcome(const DmpPlan& plan) const {
-  if (plan.execute || stage() == RunnerStage::Moving) return {};
+  if (plan.execute) return {};
+  if (stage() == RunnerStage::Moving)
+    return scaledTooFar(plan, motion().dmp().startPosition(), motion().goal());
   if (stage() == RunnerStage::Rest) {
     return Reason(ReasonCode::NothingRuns, "no motion is running; use execute_dmp");
   }
@@ -123,7 +128,11 @@ Answer DmpController::ask(const DmpRequest& request, bool execute) {
   const MotionRequest begun = setup().host->beginRequest(id());
   if (!begun.welcome.success) return begun.welcome;
   DmpPlan plan;
-  const Answer checked = check(request, execute, plan);
+  Answer checked = check(request, execute, plan);
+  if (checked.success && execute) {
+    PredictedPath path;
+    checked = rollOutPlan(plan, false, path);
+  }
   if (!checked.success) return checked;
   const Answer answer = offer(begun, plan, false);
   if (answer.success && execute) goals_.follow(request.goal_frame, plan.goal);
@@ -141,21 +150,67 @@ bool DmpController::readPath(PredictedPath& path) {
 Answer DmpController::predict(const DmpRequest& request, PredictedPath& path) {
   DmpPlan plan;
   const Answer checked = check(request, true, plan);
-  if (!checked.success) return checked;
+  return checked.success ? rollOutPlan(plan, true, path) : checked;
+}
+
+/// The path of a plan from where the arm is commanded to be; refused if it leaves the workspace.
+Answer DmpController::rollOutPlan(const DmpPlan& plan, bool at_rest, PredictedPath& path) {
   CycleInput input;
   input.robot = setup().host->robotSnapshot();
   if (input.robot.sequence == 0) {
     return Answer::refusal(ReasonCode::RobotDisconnected,
                            "no joint state has come yet; is the arm there?");
   }
+  const ChainState arm = setup().robot->chain.evaluate(input.robot.commanded_position);
   SetPoint from;
-  from.pose = setup().robot->chain.evaluate(input.robot.commanded_position).tool;
+  from.pose = arm.tool;
+  if (!at_rest) from.velocity = arm.jacobian.topRows<3>() * input.robot.commanded_velocity;
   const std::lock_guard<std::mutex> lock(predict_mutex_);
   imagined_.start({plan, from, input});
   const DmpSnapshot begun = imagined_.snapshot(setup().host->now_ns());
   imagined_.stop();
-  path = {begun.stamp_ns, request.primitive_id,
+  const Reason too_far =
+      scaledTooFar(plan, begun.motion.dmp().startPosition(), begun.goal.position);
+  if (!too_far.empty()) return Answer::refusal(too_far);
+  path = {begun.stamp_ns, plan.primitive.str(),
           rollOut(begun.motion, begun.goal, 1.0, begun.approach)};
+  const Answer checked = checkPath(plan, arm.tool.position, path.path);
+  if (!checked.success) path = {};
+  return checked;
+}
+
+/// Why a demonstration is too small for this way; empty: it is not.
+Reason DmpController::scaledTooFar(const DmpPlan& plan, const Vector3& start,
+                                   const Vector3& goal) const {
+  const double shown = plan.motion.system.demonstratedLine().norm(), way = (goal - start).norm();
+  if (shown < kShortestLine || way <= max_scale_ * shown) return {};
+  return Reason(ReasonCode::OutOfRange, "the goal is ")
+         << way << " m away, " << way / shown << " times as far as the " << shown
+         << " m that were demonstrated; allowed: " << max_scale_
+         << " times (max_scale); choose another primitive";
+}
+
+/// A path may come in from outside, but not go out; near its end the motion ends well at a border.
+Answer DmpController::checkPath(const DmpPlan& plan, const Vector3& hand,
+                                const TimedPath& path) const {
+  const Workspace& workspace = setup().robot->workspace;
+  const auto outside = [&](const Vector3& point) {
+    return (workspace.project(point) - point).norm();
+  };
+  double allowed = outside(hand) + kOnBorder;
+  for (std::size_t i = 0; i < path.poses.size(); ++i) {
+    const Vector3& in_dmp = path.poses[i].position;
+    const Vector3 point = plan.base_from_dmp.position + plan.base_from_dmp.orientation * in_dmp;
+    const double away = outside(point);
+    if (away > allowed && (in_dmp - path.poses.back().position).norm() > arrive_distance_) {
+      return Answer::refusal(
+          ReasonCode::WorkspaceBorder,
+          "the path of primitive '" + plan.primitive.str() + "' leaves the workspace at " +
+              text(point) + ", " + std::to_string(path.times[i]) + " s after its start (" +
+              describe(workspace.violated(point)) + "); choose another primitive, start or goal");
+    }
+    allowed = std::min(allowed, away + kOnBorder);
+  }
   return {};
 }
 

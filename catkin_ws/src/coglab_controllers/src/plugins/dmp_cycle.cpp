@@ -143,6 +143,15 @@ void DmpCycle::stop() noexcept {
   if (stage_ != DmpStage::GivenUp) stage_ = DmpStage::Rest;
 }
 
+bool DmpCycle::endIfThere(const CycleInput& input) {
+  const Pose hand = dmp_from_base_ * input.chain.tool;
+  if ((goal_.position - hand.position).norm() > arrive_distance_) return false;
+  motion_.endAt(hand);
+  stage_ = DmpStage::Watch;
+  reason_.clear();
+  return true;
+}
+
 void DmpCycle::giveUp(const Reason& why) noexcept {
   stage_ = DmpStage::GivenUp;
   reason_ = why;

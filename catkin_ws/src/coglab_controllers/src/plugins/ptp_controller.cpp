@@ -39,6 +39,7 @@ class PtpMotion : public Motion<PtpTarget> {
  public:
   void configure(MotionConfiguration& configuration) override {
     joints_ = configuration.robot.chain.joints();
+    tolerance_ = configuration.parameters.number("tolerance", tolerance_, 1e-5, 0.1);
   }
   void start(const MotionStart<PtpTarget>& start) override {
     const PtpTarget& to = start.request;
@@ -55,6 +56,11 @@ class PtpMotion : public Motion<PtpTarget> {
     time_ = cycle.next;
     rate_ = cycle.input.time_scale;
   }
+  bool endIfThere(const CycleInput& input) override {
+    PtpPoint end;
+    trajectory_.at(trajectory_.duration(), end);
+    return (end.position - input.robot.position).lpNorm<Eigen::Infinity>() <= tolerance_;
+  }
   MotionState state() const override {
     return time_ >= trajectory_.duration() ? MotionState::Reached : MotionState::Running;
   }
@@ -65,6 +71,7 @@ class PtpMotion : public Motion<PtpTarget> {
 
  private:
   int joints_ = kMaxJoints;
+  double tolerance_ = 0.002;  // rad
   PtpTrajectory trajectory_;
   double time_ = 0.0, rate_ = 1.0;
 };

@@ -176,19 +176,20 @@ void bindDmp(py::module_& module) {
       [](const std::string& id,
          const std::vector<std::pair<Eigen::VectorXd, Points>>& demonstrations, int basis_count,
          double alpha, double stiffness, const GoalWeight& goal_weight, const std::string& mapping,
-         double regularisation) {
+         double regularisation, const std::vector<std::string>& allow) {
         std::vector<Trajectory> trajectories;
         for (const auto& [times, positions] : demonstrations)
           trajectories.push_back(toTrajectory(times, positions));
-        return learn(
-            id, trajectories,
-            {basis_count, alpha, stiffness, goal_weight, toShapeMapping(mapping), regularisation});
+        return learn(id, trajectories,
+                     {basis_count, alpha, stiffness, goal_weight, toShapeMapping(mapping),
+                      regularisation, allow});
       },
       py::arg("id"), py::arg("demonstrations"),
       py::arg("basis_count") = LearningOptions().basis_count,
       py::arg("alpha") = LearningOptions().alpha,
       py::arg("stiffness") = LearningOptions().stiffness, py::arg("goal_weight") = GoalWeight(),
       py::arg("mapping") = "none", py::arg("regularisation") = LearningOptions().regularisation,
+      py::arg("allow") = std::vector<std::string>(),
       "Learns a primitive from one or several demonstrations, each (times (n,) in s, positions (n, "
       "3) in m).");
   module.def(

@@ -21,7 +21,8 @@ void bindTable(py::module_& module) {
       .def_readwrite("jerk", &JointLimits::jerk)
       .def_readwrite("torque", &JointLimits::torque);
   module.def("load_joint_limits", &coglab_rt::loadJointLimits, py::arg("path"),
-             py::arg("profile") = "default", "Reads lwr_description/config/joint_limits.yaml.");
+             py::arg("profile") = "default", py::arg("own_path") = "",
+             "Reads lwr_description/config/joint_limits.yaml.");
 
   py::class_<Interpolator>(module, "Interpolator",
                            "Jerk-limited interpolator from target velocities to positions.")
@@ -79,7 +80,6 @@ void bindGuard(py::module_& module) {
       .def_readonly("velocity", &GuardResult::velocity)
       .def_readonly("scale", &GuardResult::scale)
       .def_readonly("joint", &GuardResult::joint)
-      .def_readonly("blocked_joint", &GuardResult::blocked_joint)
       .def_property_readonly("reason", [](const GuardResult& r) { return describe(r.reason); })
       .def_property_readonly("border", [](const GuardResult& r) { return describe(r.border); });
 
@@ -108,15 +108,14 @@ void bindGuard(py::module_& module) {
            py::arg("reaction_time") = standard.reaction_time)
       .def(
           "limit",
-          [](Guard& guard, const Chain& chain, const JointVector& q, const JointVector& velocity,
-             double dt) {
+          [](const Guard& guard, const Chain& chain, const JointVector& q,
+             const JointVector& velocity) {
             GuardResult result;
-            guard.limit(chain.evaluate(q), q, velocity, requireStep(dt), result);
+            guard.limit(chain.evaluate(q), q, velocity, result);
             return result;
           },
-          py::arg("chain"), py::arg("q"), py::arg("velocity"), py::arg("dt") = 0.005)
-      .def("speed_to_stop", &Guard::speedToStop, py::arg("joint"), py::arg("room"))
-      .def("reset", &Guard::reset);
+          py::arg("chain"), py::arg("q"), py::arg("velocity"))
+      .def("speed_to_stop", &Guard::speedToStop, py::arg("joint"), py::arg("room"));
 
   py::class_<PhaseGovernor>(module, "PhaseGovernor",
                             "Slows the clock of a motion so that the reference waits.")

@@ -36,7 +36,9 @@ void AuthoredControllerRos::spinOnce() {
     last.state = end.executed ? MotionState::Reached : MotionState::Aborted;
     last.reason = end.reason;
     publish(last);
-    if (!end.executed) ROS_WARN("motion_id %d was not executed: %s", end.id, end.reason.c_str());
+    if (!end.executed)
+      ROS_LOG(endLevel(end.reason), ROSCONSOLE_DEFAULT_NAME, "motion_id %d was not executed: %s",
+              end.id, end.reason.c_str());
   }
   if (!fresh) return;
   const bool changed = progress_.state != before.state || progress_.id != before.id ||

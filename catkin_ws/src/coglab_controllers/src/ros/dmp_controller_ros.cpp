@@ -217,7 +217,8 @@ class DmpControllerRos : public MotionControllerRos {
     message.remaining_time = progress_.remaining_time;
     feedback_.publish(message);
     if (changed && progress_.state == MotionState::Aborted) {
-      ROS_WARN("DMP motion '%s' aborted: %s", message.primitive_id.c_str(), message.reason.c_str());
+      ROS_LOG(endLevel(progress_.reason), ROSCONSOLE_DEFAULT_NAME, "DMP motion '%s' ended: %s",
+              message.primitive_id.c_str(), message.reason.c_str());
     } else if (changed && !message.reason.empty()) {
       ROS_INFO("DMP motion '%s': %s", message.primitive_id.c_str(), message.reason.c_str());
     }

@@ -195,10 +195,9 @@ bool FeedbackRos::onSetGains(coglab_msgs::SetGains::Request& request,
 
 bool FeedbackRos::onLoad(coglab_msgs::LoadFeedback::Request& request,
                          coglab_msgs::LoadFeedback::Response& response) {
-  const auto lock = manager_.lockRequests();
-  std::vector<std::string> ids, types;
-  manager_.list(ids, types);
-  if (std::count(ids.begin(), ids.end(), request.name) != 0) {
+  // Without the lock of requests: a plug-in's code may take seconds.
+  const std::shared_ptr<void> claimed = manager_.claim(request.name);
+  if (!claimed) {
     return refuse(response, Code::BUSY,
                   "'" + request.name + "' is in use; choose another name, or unload it first");
   }

@@ -273,7 +273,7 @@ void ManagerRos::publishLoop() {
       publishTarget(report);
       if (round % 4 == 0) publishStatus(report);
       if (round % 40 == 0) feedback_->publishStatus();
-      if (round % 40 == 20) diagnostics_->update();
+      if (round % 200 == 20) diagnostics_->force_update();  // not by ROS time
     });
     next = std::max(next + kPublishPeriod, std::chrono::steady_clock::now() - kPublishPeriod);
     std::this_thread::sleep_until(next);

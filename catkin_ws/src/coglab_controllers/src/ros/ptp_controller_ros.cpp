@@ -38,7 +38,8 @@ class PtpControllerRos : public MotionControllerRos {
         message.reason_code = end.reason.number();
         message.reason = end.reason.str();
         unfinished_.publish(message);
-        ROS_WARN("ptp_id %d was not executed: %s", end.id, end.reason.c_str());
+        ROS_LOG(endLevel(end.reason), ROSCONSOLE_DEFAULT_NAME, "ptp_id %d was not executed: %s",
+                end.id, end.reason.c_str());
       }
     }
     path_.spin(*controller_, controller_->moving());

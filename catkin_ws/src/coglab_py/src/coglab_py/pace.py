@@ -22,6 +22,11 @@ class Slowed:
         since, time_then, factor = self._pieces[-1] if clock >= self._pieces[-1][0] else self._pieces[0]
         return time_then + (clock - since) * factor
 
+    def clock(self, time_here: float) -> float:
+        """The time of the clock at a time here, s."""
+        since, time_then, factor = self._pieces[-1] if time_here >= self._pieces[-1][1] else self._pieces[0]
+        return since + (time_here - time_then) / factor
+
     def change(self, clock: float, factor: float) -> None:
         """From this time of the clock on, time passes by this factor."""
         self._pieces = [self._pieces[-1], (clock, self.at(clock), factor)]
@@ -51,8 +56,17 @@ class Pace:
 
     def now(self) -> float:
         """s, of the steady clock, slowed: for durations."""
+        return self.at(time.monotonic())
+
+    def at(self, steady: float) -> float:
+        """A time of the steady clock (s), slowed."""
         with self._lock:
-            return self._steady.at(time.monotonic())
+            return self._steady.at(steady)
+
+    def steady(self, slowed: float) -> float:
+        """The time of the steady clock (s) at a slowed one."""
+        with self._lock:
+            return self._steady.clock(slowed)
 
     def of(self, stamp: float) -> float:
         """A stamp (s of ROS time), slowed: two of them are as far apart as in the cell."""

@@ -18,18 +18,22 @@ namespace coglab_rt {
 
 namespace detail {
 
-/// A vector of the table: its name, where it goes, whether its values must be positive.
+/// A vector of the table: its name, where it goes, whether its values must be positive, and the
+/// largest size that an arm can have; a number in degrees is larger.
 struct LimitField {
   const char* name;
   Vector7 JointLimits::*member;
   bool positive;
+  double most;
+  const char* unit;
 };
-constexpr LimitField kLimitFields[] = {{"lower_position", &JointLimits::lower_position, false},
-                                       {"upper_position", &JointLimits::upper_position, false},
-                                       {"velocity", &JointLimits::velocity, true},
-                                       {"acceleration", &JointLimits::acceleration, true},
-                                       {"jerk", &JointLimits::jerk, true},
-                                       {"torque", &JointLimits::torque, true}};
+constexpr LimitField kLimitFields[] = {
+    {"lower_position", &JointLimits::lower_position, false, 6.2832, "rad"},
+    {"upper_position", &JointLimits::upper_position, false, 6.2832, "rad"},
+    {"velocity", &JointLimits::velocity, true, 20.0, "rad/s"},
+    {"acceleration", &JointLimits::acceleration, true, 200.0, "rad/s^2"},
+    {"jerk", &JointLimits::jerk, true, 2e4, "rad/s^3"},
+    {"torque", &JointLimits::torque, true, 2e3, "Nm"}};
 
 [[noreturn]] inline void failTable(const std::string& path, const YAML::Mark& mark,
                                    const std::string& what) {
@@ -60,6 +64,12 @@ inline bool readLimitVector(const std::string& path, const YAML::Node& section,
       failTable(path, node[i].Mark(),
                 name + "[" + std::to_string(i) + "] = " + std::to_string(number) + ": expected a " +
                     (field.positive ? "positive " : "") + "finite number");
+    }
+    if (std::abs(number) > field.most) {
+      failTable(path, node[i].Mark(),
+                name + "[" + std::to_string(i) + "] = " + std::to_string(number) +
+                    ": expected at most " + std::to_string(field.most) + " " + field.unit +
+                    "; is it in degrees?");
     }
     value[static_cast<Eigen::Index>(i)] = number;
   }
@@ -136,14 +146,46 @@ inline double servoOvershoot(const std::string& path, const YAML::Node& root) {
   return share;
 }
 
+/// Whether the file says that its limits may be wider than those of the arm's own table.
+inline bool mayBeWider(const std::string& path, const YAML::Node& root) {
+  const YAML::Node node = root["wider_than_robot"];
+  bool wider = false;
+  if (node && !YAML::convert<bool>::decode(node, wider))
+    failTable(path, node.Mark(), "wider_than_robot: expected true or false");
+  return wider;
+}
+
+/// @throws std::runtime_error naming the field if a limit is wider than the arm's own.
+inline void requireWithin(const std::string& path, const JointLimits& limits,
+                          const std::string& own_path, const JointLimits& own) {
+  const auto compare = [&](const std::string& field, double value, double allowed, double excess) {
+    if (excess <= 1e-9) return;
+    throw std::runtime_error("joint limits " + path + ": " + field + " = " + std::to_string(value) +
+                             " is wider than the robot's own " + std::to_string(allowed) + " (" +
+                             own_path +
+                             "); narrow it, or add the line 'wider_than_robot: true' to the file");
+  };
+  for (const LimitField& field : kLimitFields) {
+    for (int i = 0; i < 7; ++i) {
+      const double value = (limits.*field.member)[i], allowed = (own.*field.member)[i];
+      const bool lower = field.member == &JointLimits::lower_position;
+      compare(std::string(field.name) + "[" + std::to_string(i) + "]", value, allowed,
+              lower ? allowed - value : value - allowed);
+    }
+  }
+  compare("position_margin", limits.position_margin, own.position_margin,
+          own.position_margin - limits.position_margin);
+}
+
 }  // namespace detail
 
 /// Reads the table. `profile` is "default" or a profile of the file such as "t1", which overrides
-/// what it names.
+/// what it names. `own_path`: table of the arm itself; a limit that is wider than there is refused
+/// unless the file has the line `wider_than_robot: true`. Empty: none.
 /// @throws std::runtime_error naming file, line, field and what was expected if anything is
-/// missing, of the wrong length, not finite or out of order.
-inline JointLimits loadJointLimits(const std::string& path,
-                                   const std::string& profile = "default") {
+/// missing, of the wrong length, not finite, out of range or out of order.
+inline JointLimits loadJointLimits(const std::string& path, const std::string& profile = "default",
+                                   const std::string& own_path = "") {
   const YAML::Node root = detail::openLimitsTable(path);
   JointLimits limits;
   limits.names = detail::jointNames(path, root);
@@ -163,6 +205,8 @@ inline JointLimits loadJointLimits(const std::string& path,
     }
   }
   limits.velocity /= 1.0 + detail::servoOvershoot(path, root);
+  if (!detail::mayBeWider(path, root) && !own_path.empty())
+    detail::requireWithin(path, limits, own_path, loadJointLimits(own_path));
   return limits;
 }
 

@@ -13,7 +13,8 @@ namespace coglab_sim {
 
 using MeasurementBytes = std::array<std::uint8_t, lwr_fri_bridge::fri::kMeasurementSize>;
 
-/// What really happens in the cell. Nothing in control may read it.
+/// What really happens in the cell. Nothing in control may read it. Forces and torques are means
+/// over the last period: a touch can be shorter than a period.
 struct CellTruth {
   double time = 0.0;  ///< s, simulated
   Pose object, human_hand, robot_hand;
@@ -48,8 +49,8 @@ class Cell {
   /// the measurement...
   void receive(const std::uint8_t* bytes, std::size_t size, double latency);
   /// ...and advance when the period is over. `on_time` false: the caller was late, a missing answer
-  /// is not the PC's fault.
-  const MeasurementBytes& advance(bool on_time = true);
+  /// is not the PC's fault. `anew` false: means of forces go on from the period before.
+  const MeasurementBytes& advance(bool on_time = true, bool anew = true);
 
   bool sent() const { return sent_; }
   const MeasurementBytes& measurement() const { return bytes_; }
@@ -79,6 +80,8 @@ class Cell {
   double period() const { return controller_.parameters().period; }
   CellTruth truth() const;
   MotorStates motors() const;
+  /// On the robot's hand, mean over the last period.
+  const plant::Touch& touch() const { return touch_; }
   /// rad/s, largest speed of each joint in any step of the last period.
   const Vector7& fastest() const { return fastest_; }
   const plant::Plant& plant() const { return plant_; }
@@ -87,6 +90,7 @@ class Cell {
 
  private:
   bool lost(double share);
+  void feel(double dt);
   krc::ArmSignals signals(const Vector7& torque, const Vector7& acceleration) const;
 
   CellConfig config_;
@@ -100,6 +104,11 @@ class Cell {
   bool losing_ = false;
   bool sent_ = false;
   Vector7 fastest_ = Vector7::Zero();
+  // Means over felt_for_ s; see CellTruth
+  double felt_for_ = 0.0;
+  plant::Touch touch_;
+  Vector3d touch_force_ = Vector3d::Zero(), palm_force_ = Vector3d::Zero();
+  Vector7 external_torque_ = Vector7::Zero();
   MeasurementBytes bytes_{};
 };
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <functional>
 #include <future>
 #include <memory>
@@ -29,6 +30,7 @@ struct CellSnapshot {
   CellTruth truth;
   MotorStates motors;
   plant::Touch touch;
+  std::int64_t stepped_ns = 0;   ///< steady clock, when the last physics step was made
   std::uint64_t tick = 0;        ///< number of periods so far
   std::uint64_t late_ticks = 0;  ///< periods that the thread itself began too late
   std::uint64_t answers = 0;     ///< datagrams received so far
@@ -60,7 +62,7 @@ class RealTimeCell {
   void stop();
   /// Simulated over real time from the next period on.
   void setFactor(double factor) { factor_ = factor; }
-  /// Whether simulated time stands while an answer of a PC that answers is late, up to 1.5 s after
+  /// Whether simulated time stands while an answer of a PC that answers is late, up to 0.9 s after
   /// the one before.
   void waitForAnswers(bool waits) { waits_ = waits; }
   /// Where the PC listens from now on.
@@ -80,6 +82,11 @@ class RealTimeCell {
 
   CellSnapshot snapshot() const;
   double takeLatest();                       ///< CellSnapshot::latest since the last call
+  /// Simulated seconds between the snapshots that takeSnapshots() returns; forces are means over
+  /// them. @pre not running
+  void setSnapshotInterval(double interval) { interval_ = interval; }
+  std::vector<CellSnapshot>
+  takeSnapshots();                           ///< since the last call, oldest first, of 2000 at most
   std::vector<TickRecord> takeRecords();     ///< since the last call
   std::vector<krc::Message> takeMessages();  ///< of the controller, since the last call
   /// The thread ended by itself with this error; empty while it runs.
@@ -97,7 +104,7 @@ class RealTimeCell {
   std::string schedule(int priority) const;
   void run();
   void applyInputs();
-  void leaveResults(bool answered, bool expected, bool unanswered, double behind);
+  void leaveResults(bool answered, bool expected, bool unanswered, double behind, bool keep);
 
   Cell cell_;
   FriSocket socket_;
@@ -106,6 +113,7 @@ class RealTimeCell {
   std::atomic<std::uint16_t> port_;
   std::atomic<bool> running_{false};
   std::thread thread_;
+  double interval_ = 0.005, next_snapshot_ = 0.0;  // simulated, s
 
   mutable std::mutex mutex_;  // guards everything below
   bool new_human_ = false;
@@ -115,6 +123,7 @@ class RealTimeCell {
   std::vector<std::shared_ptr<Action>> actions_;
   std::vector<Delayed> delayed_;
   CellSnapshot snapshot_;
+  std::vector<CellSnapshot> snapshots_;
   std::vector<TickRecord> records_;
   std::vector<krc::Message> messages_;
   std::string failure_;

@@ -1,6 +1,5 @@
 #include "ctrl_more/loading/plugin_library.hpp"
 
-#include <dlfcn.h>
 #include <sys/stat.h>
 
 #include <algorithm>
@@ -13,6 +12,8 @@
 #include <utility>
 
 #include "ctrl_more/log/words.hpp"
+#include "loading/library_file.hpp"
+#include "loading/probe.hpp"
 
 namespace fs = std::filesystem;
 
@@ -45,8 +46,14 @@ Build buildOf(const std::string& file) {
           info.st_mtim.tv_sec * 1'000'000'000LL + info.st_mtim.tv_nsec};
 }
 
+// The linker keeps its lock when an exception leaves it: from then on it blocks all other threads.
+// That a library was tried in another process before makes this very unlikely.
+bool linker_locked = false;  // under the loader's mutex
+const char* const kLinkerLocked =
+    "No library can be opened or closed any more; start the program again";
+
 bool isMapped(const std::string& file) {
-  void* const still = dlopen(file.c_str(), RTLD_LAZY | RTLD_NOLOAD);
+  void* const still = file.empty() ? nullptr : dlopen(file.c_str(), RTLD_LAZY | RTLD_NOLOAD);
   if (still) dlclose(still);
   return still != nullptr;
 }
@@ -59,6 +66,7 @@ bool isMapped(const std::string& file) {
 struct PluginLibrary::InMemory {
   std::weak_ptr<PluginLibrary> open;
   Build build;
+  std::string mapped;  // the copy that was opened
   std::vector<std::string> types;
 
   using Key = std::pair<std::string, const PluginTypes*>;
@@ -69,54 +77,70 @@ struct PluginLibrary::InMemory {
 };
 
 std::shared_ptr<PluginLibrary> PluginLibrary::open(const std::string& path, PluginTypes& types) {
-  const std::lock_guard<std::recursive_mutex> lock(loaderMutex());
   std::error_code no_error;
   if (!fs::is_regular_file(path, no_error)) {
     throw std::runtime_error("there is no library " + path +
                              "; check the path, and that its package is built");
   }
   const std::string file = fs::canonical(path, no_error).string();
-  InMemory& memory = InMemory::all()[{file, &types}];
-  if (const auto open_already = memory.open.lock()) {
-    if (memory.build == buildOf(file)) return open_already;
-    throw std::runtime_error("library " + file + " was built again, and controllers of the old " +
-                             "build are loaded; unload each of them first");
+  std::unique_ptr<LibraryCopy> copy;
+  Build build;  // of the copy
+  for (;;) {
+    {
+      const std::lock_guard<std::recursive_mutex> lock(loaderMutex());
+      if (linker_locked) throw std::runtime_error(kLinkerLocked);
+      InMemory& memory = InMemory::all()[{file, &types}];
+      if (const auto open_already = memory.open.lock()) {
+        if (memory.build == buildOf(file)) return open_already;
+        throw std::runtime_error("library " + file + " was built again, and controllers of the " +
+                                 "old build are loaded; unload each of them first");
+      }
+      std::shared_ptr<PluginLibrary> library(new PluginLibrary(file, types));
+      if (isMapped(memory.mapped)) {
+        library->mapAgain(memory);
+      } else if (copy) {
+        memory.build = build;
+        library->mapCopy(memory, copy->path());
+      }
+      if (library->handle_) {
+        memory.open = library;
+        return library;
+      }
+    }
+    build = buildOf(file);
+    copy = std::make_unique<LibraryCopy>(file);
+    copy->check();  // without the lock: it may take seconds
   }
-  std::shared_ptr<PluginLibrary> library(new PluginLibrary(file, types));
-  library->load(memory);
-  memory.open = library;
-  return library;
 }
 
-// Opens the file, and sees what it registers.
-void PluginLibrary::load(InMemory& memory) {
-  const Build build = buildOf(path_);
+void PluginLibrary::mapCopy(InMemory& memory, const std::string& copy) {
   const std::vector<std::string> before = list_.types();
   list_.takeRefused();
-  // All functions are resolved at once: one that nobody has would end the process when it is
-  // called.
-  handle_ = dlopen(path_.c_str(), RTLD_NOW | RTLD_LOCAL);
-  if (!handle_) {
-    throw std::runtime_error("library " + path_ + " cannot be loaded: " + dlerror());
-  }
+  map(copy);
   const std::vector<std::string> after = list_.types();
   std::set_difference(after.begin(), after.end(), before.begin(), before.end(),
                       std::back_inserter(types_));
-  std::vector<PluginTypes::Refusal> refused = list_.takeRefused();
-  if (types_.empty() && refused.empty() && !memory.types.empty()) {
-    if (!(memory.build == build)) {
-      throw std::runtime_error(
-          "library " + path_ + " was built again, but the dynamic linker keeps the old build in " +
-          "memory; start the program again, or build the library so that it can be closed " +
-          "(-fno-gnu-unique, no thread_local objects with destructors, no -z nodelete)");
-    }
-    types_ = list_.bringBack(memory.types);
-    refused = list_.takeRefused();
-  } else {
-    memory.types = types_;
-    for (const PluginTypes::Refusal& refusal : refused) memory.types.push_back(refusal.type);
-    memory.build = build;
+  const std::vector<PluginTypes::Refusal> refused = list_.takeRefused();
+  memory.mapped = copy;
+  memory.types = types_;
+  for (const PluginTypes::Refusal& refusal : refused) memory.types.push_back(refusal.type);
+  expectTypes(refused);
+}
+
+// What static objects cannot do twice is done here: they do not register again.
+void PluginLibrary::mapAgain(const InMemory& memory) {
+  if (!(memory.build == buildOf(path_))) {
+    throw std::runtime_error(
+        "library " + path_ + " was built again, but the dynamic linker keeps the old build in " +
+        "memory; start the program again, or build the library so that it can be closed " +
+        "(-fno-gnu-unique, no thread_local objects with destructors, no -z nodelete)");
   }
+  map(memory.mapped);
+  types_ = list_.bringBack(memory.types);
+  expectTypes(list_.takeRefused());
+}
+
+void PluginLibrary::expectTypes(const std::vector<PluginTypes::Refusal>& refused) const {
   if (!refused.empty()) {
     std::vector<std::string> clauses;
     for (const PluginTypes::Refusal& refusal : refused) clauses.push_back(refusal.clause);
@@ -128,14 +152,27 @@ void PluginLibrary::load(InMemory& memory) {
   }
 }
 
+void PluginLibrary::map(const std::string& file) {
+  mapped_ = file;
+  try {
+    handle_ = openLibrary(file.c_str());
+  } catch (...) {
+    linker_locked = true;
+    throw std::runtime_error("library " + path_ + " threw while it was opened. " + kLinkerLocked);
+  }
+  if (!handle_) {
+    throw std::runtime_error("library " + path_ + " cannot be loaded: " + dlerror());
+  }
+}
+
 PluginLibrary::~PluginLibrary() {
   const std::lock_guard<std::recursive_mutex> lock(loaderMutex());
-  if (!handle_) return;
+  if (!handle_ || linker_locked) return;
   // Makers written as in the paper do not take themselves out, nor do those of a library that
   // stays in memory.
   list_.setAside(types_);
   dlclose(handle_);
-  if (isMapped(path_)) return;
+  if (isMapped(mapped_)) return;
   list_.forget(types_);
   auto& all = InMemory::all();
   for (auto it = all.begin(); it != all.end(); ++it) {

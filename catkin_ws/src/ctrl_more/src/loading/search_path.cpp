@@ -27,13 +27,14 @@ std::vector<std::string> foldersOf(const char* variable) {
 }
 
 // Folder of the core library.
+
+}  // namespace
+
 std::string coreFolder() {
   Dl_info info;
   if (dladdr(reinterpret_cast<void*>(&coreFolder), &info) == 0 || !info.dli_fname) return "";
   return fs::path(info.dli_fname).parent_path().string();
 }
-
-}  // namespace
 
 SearchPath::SearchPath(std::string base, std::vector<std::string> extra)
     : base_(std::move(base)), extra_(std::move(extra)) {}

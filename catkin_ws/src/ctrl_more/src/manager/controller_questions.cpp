@@ -96,13 +96,16 @@ std::vector<ControllerStatus> ControllerQuestions::statusAll() const {
 }
 
 void ControllerQuestions::plot(const std::string& name, std::ostream& out) const {
-  const RosterLock lock(roster_->mutex);
-  roster_->member(name).slot->controller().plot(out);
+  std::shared_ptr<const ControllerSlot> slot;
+  {
+    const RosterLock lock(roster_->mutex);
+    slot = roster_->member(name).slot;
+  }
+  slot->controller().plot(out);  // its own code, which asks back through ControllerOwner
 }
 
 void ControllerQuestions::plotAll(std::ostream& out) const {
-  const RosterLock lock(roster_->mutex);
-  for (const std::string& name : roster_->order) plot(name, out);
+  for (const std::string& name : getExecutionOrder()) plot(name, out);
 }
 
 }  // namespace ctrl_more

@@ -31,7 +31,8 @@ Status FeedbackControllersManager::prepare(const Change& change) {
 
 // Everything that can fail comes before the publication: what fails has changed nothing.
 Status FeedbackControllersManager::change(const Change& change, bool prepared) {
-  const RosterLock lock(roster_->mutex);
+  const ChangeLock lock(*roster_);
+  if (!lock) return ChangeLock::busy();
   Draft draft = roster_->draft();
   const Status tried = tryChange(*roster_, change, draft);
   if (!tried) return tried;
@@ -53,7 +54,10 @@ Status FeedbackControllersManager::publish(Draft draft, bool prepared) {
 
 // The part of publish() that cannot fail; the plan is stored.
 Status FeedbackControllersManager::commit(Draft draft, bool prepared) noexcept {
-  roster_->accept(std::move(draft));
+  {
+    const RosterLock lock(roster_->mutex);
+    roster_->accept(std::move(draft));
+  }
   before_last_.reset();
   runner_->plans().offer(prepared);
   return Status::published(runner_->plans().generation());
@@ -64,7 +68,8 @@ bool FeedbackControllersManager::waitAdopted(std::uint64_t generation, double ti
 }
 
 Status FeedbackControllersManager::withdraw(std::uint64_t generation) {
-  const RosterLock lock(roster_->mutex);
+  const ChangeLock lock(*roster_);
+  if (!lock) return ChangeLock::busy();
   PlanExchange& plans = runner_->plans();
   if (generation != plans.generation() || !before_last_ ||
       before_last_->states.size() != roster_->members.size()) {

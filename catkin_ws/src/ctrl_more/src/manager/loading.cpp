@@ -47,12 +47,20 @@ class FeedbackControllersManager::Undo {
   }
   ~Undo() {
     if (kept_) return;
-    auto& members = manager_.roster_->members;
-    for (std::size_t i = members_; i < members.size(); ++i) members[i]->slot->setOwner(nullptr);
-    members.erase(members.begin() + static_cast<std::ptrdiff_t>(members_), members.end());
-    manager_.roster_->order.swap(order_);
-    manager_.roster_->profiles.swap(profiles_);
-    manager_.roster_->refuse_shared = refuse_shared_;
+    Roster& roster = *manager_.roster_;
+    while (roster.members.size() > members_) {
+      roster.members.back()->slot->setOwner(nullptr);
+      std::unique_ptr<Member> out;  // destroyed without the mutex
+      const RosterLock lock(roster.mutex);
+      out = std::move(roster.members.back());
+      roster.members.pop_back();
+    }
+    {
+      const RosterLock lock(roster.mutex);
+      roster.order.swap(order_);
+      roster.profiles.swap(profiles_);
+      roster.refuse_shared = refuse_shared_;
+    }
     if (robot_) manager_.robot_ = std::move(*robot_);
     if (control_) manager_.control_ = std::move(*control_);
   }
@@ -74,8 +82,12 @@ class FeedbackControllersManager::Undo {
 // The cycle is offered the whole list at once, or nothing of it.
 LoadReport FeedbackControllersManager::load(const ConfigNode& list, const std::string& base,
                                             bool strict) {
-  const RosterLock lock(roster_->mutex);
   LoadReport report;
+  const ChangeLock lock(*roster_);
+  if (!lock) {
+    report.errors.push_back(ChangeLock::busy().message());
+    return report;
+  }
   Undo undo(*this);
   try {
     readList(ListFile(list, base), report);
@@ -110,27 +122,34 @@ void FeedbackControllersManager::readList(const ListFile& list, LoadReport& repo
   if (profiles->kind() != ConfigNode::Kind::Map) throw profiles->error("profiles expects a map");
   for (const auto& entry : profiles->entries()) {
     const Status status =
-        roster_->setProfile(entry.first, entry.second.texts("profile '" + entry.first + "'"));
+        setProfile(entry.first, entry.second.texts("profile '" + entry.first + "'"));
     if (!status) report.errors.push_back(entry.second.place() + ": " + status.message());
   }
 }
 
 Status FeedbackControllersManager::loadController(const std::string& name,
                                                   const ControllerEntry& entry) {
-  const RosterLock lock(roster_->mutex);
   return loadNamed(name, entry, true);
 }
 
-// Without `offer` the cycle is not told: the caller publishes.
+// Without `offer` the cycle is not told: the caller publishes, and holds the lock of changes.
 Status FeedbackControllersManager::loadNamed(const std::string& name, const ControllerEntry& entry,
                                              bool offer) {
-  // A library that only an outdated plan holds is closed, so that a new build of it is loaded.
-  runner_->plans().collect();
   try {
-    if (roster_->indexOf(name) >= 0) {
-      return Status::failure("a controller named '" + name + "' is loaded already");
+    {
+      const ChangeLock lock(*roster_);
+      if (!lock) return ChangeLock::busy();
+      // A library that only an outdated plan holds is closed, so that a new build of it is loaded.
+      runner_->plans().collect();
+      if (roster_->indexOf(name) >= 0) {
+        return Status::failure("a controller named '" + name + "' is loaded already");
+      }
     }
-    return take(makeController(entry.library, entry.type), name, entry, offer);
+    // Without the lock: a library may take seconds.
+    ControllerInstance instance = makeController(entry.library, entry.type);
+    const ChangeLock lock(*roster_);
+    if (!lock) return ChangeLock::busy();
+    return take(std::move(instance), name, entry, offer);
   } catch (const std::exception& e) {
     return Status::failure("controller '" + name + "': " + e.what());
   }
@@ -139,7 +158,8 @@ Status FeedbackControllersManager::loadNamed(const std::string& name, const Cont
 Status FeedbackControllersManager::addController(std::unique_ptr<FeedbackController> controller,
                                                  const std::string& name,
                                                  const ControllerEntry& entry) {
-  const RosterLock lock(roster_->mutex);
+  const ChangeLock lock(*roster_);
+  if (!lock) return ChangeLock::busy();
   if (!controller) return Status::failure("controller '" + name + "': there is no instance");
   ControllerInstance instance;
   instance.controller = std::move(controller);
@@ -171,7 +191,10 @@ Status FeedbackControllersManager::take(ControllerInstance instance, const std::
     member->state.enabled = entry.enabled;
     member->slot->configure(config.gains, config.settings, robot_, control_, logger_,
                             &runner_->number());
-    roster_->members.push_back(std::move(member));
+    {
+      const RosterLock write(roster_->mutex);
+      roster_->members.push_back(std::move(member));
+    }
     Draft draft = roster_->draft();
     draft.order.push_back(name);
     Status status = roster_->checkShared(draft);
@@ -180,6 +203,7 @@ Status FeedbackControllersManager::take(ControllerInstance instance, const std::
     if (offer) {
       status = publish(std::move(draft));
     } else {
+      const RosterLock write(roster_->mutex);
       roster_->order = std::move(draft.order);
     }
     roster_->members.back()->slot->setOwner(this);
@@ -196,7 +220,8 @@ Status FeedbackControllersManager::take(ControllerInstance instance, const std::
 }
 
 Status FeedbackControllersManager::unload(const std::string& name) {
-  const RosterLock lock(roster_->mutex);
+  const ChangeLock lock(*roster_);
+  if (!lock) return ChangeLock::busy();
   auto& members = roster_->members;
   const int i = roster_->indexOf(name);
   if (i < 0) return Status::failure(roster_->unknownName(name), Cause::UnknownName);
@@ -218,21 +243,31 @@ Status FeedbackControllersManager::unload(const std::string& name) {
   Draft draft = roster_->draft();
   draft.states.erase(draft.states.begin() + i);
   draft.order.erase(std::find(draft.order.begin(), draft.order.end(), name));
-  std::unique_ptr<Member> out = std::move(members[i]);
-  members.erase(members.begin() + i);
+  std::vector<std::string> order = draft.order;
+  std::unique_ptr<Member> out;  // destroyed without the mutex
+  {
+    const RosterLock write(roster_->mutex);
+    out = std::move(members[i]);
+    members.erase(members.begin() + i);
+    roster_->order.swap(order);
+  }
   try {
     const Status status = publish(std::move(draft));
     out->slot->setOwner(nullptr);
     return status;
   } catch (...) {
+    const RosterLock write(roster_->mutex);
     members.insert(members.begin() + i, std::move(out));  // its room is still there
+    roster_->order.swap(order);
     throw;
   }
 }
 
 Status FeedbackControllersManager::setProfile(const std::string& profile,
                                               const std::vector<std::string>& controllers) {
-  const RosterLock lock(roster_->mutex);
+  const ChangeLock lock(*roster_);
+  if (!lock) return ChangeLock::busy();
+  const RosterLock write(roster_->mutex);
   return roster_->setProfile(profile, controllers);
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -43,12 +44,16 @@ struct Draft {
   std::vector<std::string> order;
 };
 
-/// The loaded controllers of a manager as the services see them. Whoever calls holds the mutex.
+/// The loaded controllers of a manager as the services see them. Whoever reads holds one of the two
+/// mutexes; whoever writes holds both, `changes` first.
 struct Roster {
   /// Controllers by profile.
   using Profiles = std::map<std::string, std::vector<std::string>>;
 
-  mutable std::recursive_mutex mutex;  ///< recursive: plotting asks back through ControllerOwner
+  /// One change at a time, for as long as it takes: controllers' own code runs under it.
+  std::recursive_timed_mutex changes;
+  /// For short, never while a controller's own code runs.
+  mutable std::mutex mutex;
   std::vector<std::unique_ptr<Member>> members;  ///< load order
   std::vector<std::string> order;                ///< execution order
   Profiles profiles;
@@ -75,7 +80,21 @@ struct Roster {
   Status setProfile(const std::string& profile, const std::vector<std::string>& controllers);
 };
 
-using RosterLock = std::lock_guard<std::recursive_mutex>;
+using RosterLock = std::lock_guard<std::mutex>;
+
+/// Holds `changes`, unless another change does not end: then it is false.
+class ChangeLock : public std::unique_lock<std::recursive_timed_mutex> {
+ public:
+  explicit ChangeLock(Roster& roster)
+      : std::unique_lock<std::recursive_timed_mutex>(roster.changes, std::chrono::seconds(2)) {}
+  /// The refusal if it is false.
+  static Status busy() {
+    return Status::failure(
+        "another change has not ended within 2 s: the code of a controller does "
+        "not return; if this goes on, start the program again",
+        Cause::Busy);
+  }
+};
 
 /// Tries a change on a draft, step by step.
 /// @param roster the controllers

@@ -112,7 +112,7 @@ def in_thread(function):
     return runner
 
 
-def wait_for(condition, limit=10.0):
+def wait_for(condition, limit=60.0):
     """Whether `condition()` becomes true within `limit` s."""
     end = time.monotonic() + limit
     while time.monotonic() < end:

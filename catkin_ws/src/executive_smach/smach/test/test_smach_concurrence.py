@@ -217,7 +217,7 @@ def test_a_child_that_raises_preempts_the_others_and_ends_the_container(capsys):
 def test_a_child_without_a_valid_outcome_ends_the_container_better(outcome):
     both = concurrence(children={"A": Says(outcome, registered=["done"]), "B": Serves(patience=20)})
     run = in_thread(both.execute)
-    run.join(10)
+    run.join(60.0)
     assert isinstance(run.error, smach.InvalidStateError) and "'A'" in str(run.error)
 
 
@@ -227,12 +227,12 @@ def test_child_termination_cb_that_raises_ends_the_container_better():
         child_termination_cb=lambda outcomes: 1 / 0,
     )
     run = in_thread(both.execute)
-    run.join(10)
+    run.join(60.0)
     assert isinstance(run.error, smach.InvalidUserCodeError) and "child_termination_cb" in str(run.error)
     assert not both.is_running()
 
 
 def test_a_child_that_calls_exit_ends_the_container_better():
     run = in_thread(concurrence(children={"A": Raises(SystemExit()), "B": Serves(patience=20)}).execute)
-    run.join(10)
+    run.join(60.0)
     assert isinstance(run.error, smach.InvalidStateError)

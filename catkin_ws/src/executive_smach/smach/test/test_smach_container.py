@@ -181,7 +181,7 @@ def test_a_with_block_that_raises_is_closed_better(log):
     assert not smach.Container._construction_stack
     assert "construction went wrong" in log.text("error")
     other = in_thread(lambda: machine(Says("done")).execute())
-    other.join(5)
+    other.join(60.0)
     assert other.result == "done"
 
 
@@ -217,7 +217,7 @@ def test_another_thread_cannot_add_to_an_open_container_better():
     with smach.StateMachine(["done"]) as sm:
         smach.StateMachine.add("A", Says("done"))
         other = in_thread(lambda: smach.StateMachine.add("B", Says("done")))
-        other.join(5)
+        other.join(60.0)
     assert isinstance(other.error, smach.InvalidStateError) and list(sm.get_children()) == ["A"]
 
 
@@ -227,7 +227,7 @@ def test_construction_in_many_threads():
         threading.Thread(target=lambda: results.append(machine(Says("done"), Says("done")).execute()))
         for _ in range(20)
     ]
-    [t.start() for t in threads], [t.join(20) for t in threads]
+    [t.start() for t in threads], [t.join(60.0) for t in threads]
     assert results == ["done"] * 20
 
 

@@ -87,9 +87,9 @@ def test_preempted_by_a_served_request():
     state = Serves(patience=20)
     each = iterator(state, range(5), ["preempted"], loop_outcomes=["done"])
     run = in_thread(each.execute)
-    assert state.started.wait(5)
+    assert state.started.wait(60.0)
     each.request_preempt()
-    run.join(10)
+    run.join(60.0)
     assert run.result == "preempted" and state.runs == 1 and not each.preempt_requested()
 
 

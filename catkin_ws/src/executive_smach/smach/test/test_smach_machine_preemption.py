@@ -8,9 +8,9 @@ def test_served():
     state = Serves(patience=10)
     sm = machine(state)
     run = in_thread(sm.execute)
-    assert state.started.wait(5)
+    assert state.started.wait(60.0)
     sm.request_preempt()
-    run.join(5)
+    run.join(60.0)
     assert run.result == "preempted"
     assert not sm.preempt_requested() and not state.preempt_requested()
 
@@ -65,9 +65,9 @@ def test_nested():
     inner, after = machine(leaf), Says("done")
     outer = machine(inner, after)
     run = in_thread(outer.execute)
-    assert leaf.started.wait(5)
+    assert leaf.started.wait(60.0)
     outer.request_preempt()
-    run.join(5)
+    run.join(60.0)
     assert run.result == "preempted" and after.runs == 0
     assert not any(s.preempt_requested() for s in (leaf, inner, outer))
 
@@ -89,9 +89,9 @@ def test_nested_with_concurrence():
         smach.Concurrence.add("B", Serves(patience=10))
     outer = machine(machine(both))
     run = in_thread(outer.execute)
-    assert leaf.started.wait(5)
+    assert leaf.started.wait(60.0)
     outer.request_preempt()
-    run.join(5)
+    run.join(60.0)
     assert run.result == "preempted" and not outer.preempt_requested()
 
 

@@ -15,7 +15,7 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path.insert(0, HERE)
 from reference_server import ReferenceServer  # noqa: E402
 
-LIMIT = 30.0
+LIMIT = 60.0
 
 
 KINDS = """action_without_server action_under_way monitor condition service service_that_hangs

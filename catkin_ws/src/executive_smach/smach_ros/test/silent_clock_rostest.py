@@ -8,6 +8,7 @@ import rospy
 import smach
 import smach_ros
 from actionlib.msg import TestAction, TestGoal
+from actionlib_msgs.msg import GoalStatusArray
 from rosgraph_msgs.msg import Clock
 from smach_msgs.msg import SmachContainerStatus
 from smach_ros.introspection import STATUS_TOPIC
@@ -29,18 +30,39 @@ class TestSilentClock(unittest.TestCase):
         sub = rospy.Subscriber("/silent" + STATUS_TOPIC, SmachContainerStatus, got.append)
         server = smach_ros.IntrospectionServer("/silent", machine, "/SM_ROOT")
         server.start()
-        end = time.monotonic() + 20
+        end = time.monotonic() + 60
         while sum(m.info == "HEARTBEAT" for m in got) < 2 and time.monotonic() < end:
             time.sleep(0.05)
         server.stop()
         sub.unregister()
         self.assertGreaterEqual(sum(m.info == "HEARTBEAT" for m in got), 2)
 
-    def test_limits_count_ros_time_while_it_moves(self):
+    def clock(self):
         pub = rospy.Publisher("/clock", Clock, queue_size=10)
-        end = time.monotonic() + 10
+        end = time.monotonic() + 60
         while pub.get_num_connections() == 0 and time.monotonic() < end:
             time.sleep(0.01)
+        return pub
+
+    def test_an_action_outlives_a_clock_that_goes_back(self):
+        pub = self.clock()
+        machine = smach.StateMachine(["done"], ["action_goal"])
+        with machine:
+            smach.StateMachine.add("A", smach.CBState(lambda ud: "done", outcomes=["done"]))
+        smach_ros.ActionServerWrapper("work", TestAction, machine, ["done"]).run_server()
+        for second in (100, 101, 70, 70.1, 70.5):
+            pub.publish(rospy.Time(second))
+            time.sleep(0.3)
+        got = []
+        sub = rospy.Subscriber("work/status", GoalStatusArray, got.append)
+        end = time.monotonic() + 60
+        while len(got) < 3 and time.monotonic() < end:
+            time.sleep(0.05)
+        sub.unregister()
+        self.assertGreaterEqual(len(got), 3)
+
+    def test_limits_count_ros_time_while_it_moves(self):
+        pub = self.clock()
         limit = smach_ros.util.TimeLimit(rospy.Duration(100))
         for second in range(1, 121):  # 120 s of ROS time in 1.2 s
             pub.publish(rospy.Time(second))

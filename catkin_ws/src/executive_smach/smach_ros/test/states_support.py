@@ -3,7 +3,7 @@
 import threading
 import time
 
-LIMIT = 20.0
+LIMIT = 60.0
 
 
 def in_thread(function, *args):

@@ -16,7 +16,7 @@ from actionlib_msgs.msg import GoalStatus
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from reference_server import ABORT, SUCCEED, UNTIL_CANCELLED
 
-LIMIT = 20.0
+LIMIT = 60.0
 
 
 def wait_for(condition, limit=LIMIT):

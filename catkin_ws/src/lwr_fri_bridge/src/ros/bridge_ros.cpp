@@ -107,8 +107,8 @@ void BridgeRos::startThreads() {
   ROS_INFO("lwr: waiting for FRI datagrams on port %d, KRL convention %s", fri_thread_.port(),
            fri::nameOf(bridge_.config().krl_convention));
 
-  diagnostics_timer_ = nh_.createTimer(ros::Duration(1.0),
-                                       [this](const ros::TimerEvent&) { diagnostics_->publish(); });
+  diagnostics_timer_ = nh_.createSteadyTimer(
+      ros::WallDuration(1.0), [this](const ros::SteadyTimerEvent&) { diagnostics_->publish(); });
   publisher_.start("lwr_publisher", 512 * 1024, [this] { publishLoop(); });
   spinner_ = std::make_unique<ros::AsyncSpinner>(kSpinnerThreads, &queue_);
   spinner_->start();
@@ -214,13 +214,13 @@ void BridgeRos::publishLoop() {
   std::int64_t last_warning_ns = steadyNow();
   while (!stopping_) {
     timespec deadline{};
-    clock_gettime(CLOCK_REALTIME, &deadline);
+    clock_gettime(CLOCK_MONOTONIC, &deadline);
     deadline.tv_nsec += 50'000'000;
     if (deadline.tv_nsec >= 1'000'000'000) {
       deadline.tv_nsec -= 1'000'000'000;
       ++deadline.tv_sec;
     }
-    while (sem_timedwait(&new_sample_, &deadline) != 0 && errno == EINTR) {
+    while (sem_clockwait(&new_sample_, CLOCK_MONOTONIC, &deadline) != 0 && errno == EINTR) {
     }
     while (sem_trywait(&new_sample_) == 0) {  // several posts, one newest sample
     }

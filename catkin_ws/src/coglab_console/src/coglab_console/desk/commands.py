@@ -1,4 +1,7 @@
-"""The closed list of commands with a JSON Schema each. What is not here cannot be asked for by a browser."""
+"""The closed list of commands with a JSON Schema each. What is not here cannot be asked for by a browser.
+
+`python3 -m coglab_console.desk.commands` prints the table of docs/console.md.
+"""
 
 from __future__ import annotations
 
@@ -43,34 +46,35 @@ class Command:
 
 
 _ALL = (
-    Command("stop", "brake, latch, end the action", {}, operator=False),
-    Command("note", "a note with the time of now", {"text": _TEXT}, ("text",), operator=False),
-    Command("take_over", "become the operator", {}, operator=False),
-    Command("keep", "stay the operator while another browser takes over", {}),
-    Command("invite", "a link for one more browser", {}),
-    Command("parameters", "what the parameter server holds", {}, operator=False),
-    Command("acknowledge", "the cause of the stop of this number was read",
+    Command("stop", "brakes and holds the arm, ends the action", {}, operator=False),
+    Command("note", "writes a note with the time of now", {"text": _TEXT}, ("text",), operator=False),
+    Command("take_over", "makes you the operator", {}, operator=False),
+    Command("keep", "keeps you the operator when another browser takes over", {}),
+    Command("invite", "gives a link for one more browser", {}),
+    Command("parameters", "gives the ROS parameters", {}, operator=False),
+    Command("acknowledge", "says that the cause of the stop of this number was read",
             {"stop": {"type": "integer", "minimum": 0}}, ("stop",)),
-    Command("start", "an action of the state machine", {"action": {"enum": list(STARTS)}, "object_id": _OBJECT},
+    Command("start", "starts an action of the state machine", {"action": {"enum": list(STARTS)}, "object_id": _OBJECT},
             ("action",), motion=True),
-    Command("calibrate", "the hand", {"mode": {"enum": ["fast", "complete"]}, "force": {"type": "boolean"}},
+    Command("calibrate", "calibrates the hand", {"mode": {"enum": ["fast", "complete"]}, "force": {"type": "boolean"}},
             ("mode",), motion=True),
-    Command("home", "the arm to its home posture", {}, motion=True),
-    Command("speed_scale", "slows the references down", {"value": {"type": "number", "minimum": 0, "maximum": 1}},
+    Command("home", "moves the arm to its home posture", {}, motion=True),
+    Command("speed_scale", "slows all motions down", {"value": {"type": "number", "minimum": 0, "maximum": 1}},
             ("value",)),
-    Command("select_object", "the object of the next action", {"object_id": _OBJECT}, ("object_id",)),
-    Command("session_begin", "a session with a participant", {
+    Command("select_object", "chooses the object of the next action", {"object_id": _OBJECT}, ("object_id",)),
+    Command("session_begin", "begins a session with a participant", {
         "participant": {"type": "string", "pattern": r"^[A-Za-z0-9_-]{1,32}\Z"},
         "number": {"type": "integer", "minimum": 0, "maximum": 9999},
         "conditions": {"type": "array", "minItems": 1, "maxItems": 12, "uniqueItems": True, "items": _LABEL},
         "repetitions": {"type": "integer", "minimum": 1, "maximum": 50},
         "order": {"enum": ["as_listed", "latin_square", "random"]},
     }, ("participant", "conditions", "repetitions", "order")),
-    Command("session_end", "closes the session's file", {}),
-    Command("trial_begin", "the next trial of the order", {}),
-    Command("trial_end", "the trial is over", {"outcome": {"enum": ["done", "repeat", "skipped"]}}, ("outcome",)),
-    Command("contact_learn", "noise of the torques from 5 s at rest", {}),
-    Command("contact_arm", "the contact detector, to try it", {
+    Command("session_end", "ends the session", {}),
+    Command("trial_begin", "begins the next trial of the order", {}),
+    Command("trial_end", "ends the trial", {"outcome": {"enum": ["done", "failed", "repeat", "skipped"]}},
+            ("outcome",)),
+    Command("contact_learn", "learns the noise of the torques from 5 s at rest", {}),
+    Command("contact_arm", "arms the contact detector, to try it", {
         "mode": {"enum": ["contact", "off"]},
         "k": {"type": "number", "minimum": 3, "maximum": 50},
         "timeout": {"type": "number", "minimum": 1, "maximum": 60},
@@ -78,9 +82,9 @@ _ALL = (
                    "items": {"type": "integer", "minimum": 1, "maximum": 7}},
     }, ("mode",)),
     Command("objects_reload", "reads the object files again", {}),
-    Command("feedback", "one feedback controller", {
+    Command("feedback", "switches one feedback controller", {
         "verb": {"enum": ["enable", "disable", "pause", "resume"]}, "name": _NAME}, ("verb", "name")),
-    Command("feedback_order", "execution order of the feedback controllers", {
+    Command("feedback_order", "sets the order of the feedback controllers", {
         "names": {"type": "array", "minItems": 1, "maxItems": 64, "items": _NAME}}, ("names",)),
 )  # fmt: skip
 COMMANDS = {command.name: command for command in _ALL}
@@ -105,3 +109,32 @@ def judge(name: Any, arguments: Any) -> Command:
         where = ".".join(str(part) for part in error.absolute_path)
         raise BadCommand(f"{name}{': ' + where if where else ''}: {error.message[:200]}")
     return COMMANDS[name]
+
+
+def _values(schema: dict[str, Any]) -> str:
+    """What a field may hold, in words."""
+    if "enum" in schema:
+        return ", ".join(f"`{value}`" for value in schema["enum"])
+    if schema["type"] == "array":
+        return f"list of {_values(schema['items'])}"
+    if "minimum" in schema:
+        top = f" to {schema['maximum']}" if "maximum" in schema else " or more"
+        return f"{schema['type']}, {schema['minimum']}{top}"
+    return {"string": "text", "boolean": "true or false"}[schema["type"]]
+
+
+def table() -> list[str]:
+    """The commands as rows of Markdown; fields in brackets may be left out."""
+    rows = ["| command | does | fields | by |", "| --- | --- | --- | --- |"]
+    for one in _ALL:
+        fields = []
+        for name, schema in one.properties.items():
+            text = f"`{name}`: {_values(schema)}"
+            fields.append(text if name in one.required else f"[{text}]")
+        who = "the operator" if one.operator else "everybody"
+        rows.append(f"| `{one.name}` | {one.about} | {'; '.join(fields)} | {who} |")
+    return rows
+
+
+if __name__ == "__main__":
+    print("\n".join(table()))

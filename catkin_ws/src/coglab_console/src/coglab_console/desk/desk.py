@@ -13,15 +13,13 @@ from typing import Any, Protocol
 from ..web.fan_out import Documents
 from .commands import BadCommand, judge
 from .events import EventLog
-from .experiment import Experiment, ExperimentError
+from .experiment import GIVES, TAKES, Experiment, ExperimentError
 from .gates import MotionGuard, Standing, control, reasons
 from .hold import HeldButton
 from .roles import Roles
 from .words import command as words_of
 from .words import plain
 
-TAKES = ("exchange_human_to_robot", "take")
-GIVES = ("exchange_robot_to_human", "put")
 UNKNOWN = "unknown"
 """what the brain says of an object that was in the hand before it began"""
 
@@ -174,10 +172,11 @@ class Desk:
             "desk",
             {
                 "roles": self.roles.view(),
-                "reasons": reasons(now, self.guard, self.experiment.refusals()),
+                "reasons": reasons(now, self.guard, self.experiment.refusals(now)),
                 "guard": {
                     "stop": self.guard.stops,
-                    "cause": self.guard.cause,
+                    "cause": self.guard.told(),
+                    "lifted": self.guard.lifted,
                     "unacknowledged": self.guard.unacknowledged,
                     "hold": self.guard.needs_hold,
                 },
@@ -195,8 +194,9 @@ class Desk:
         except BadCommand as error:
             return str(error)
         if command.operator and who != self.roles.operator:
-            return f"{who} watches; {self.roles.operator or 'nobody'} is the operator: take over first"
-        found = reasons(self.backend.standing(), self.guard, self.experiment.refusals())
+            return f"{who} watches; {self.roles.operator or 'nobody'} is the operator: press Take over first"
+        now = self.backend.standing()
+        found = reasons(now, self.guard, self.experiment.refusals(now))
         reason = found.get(control(name, arguments), "")
         return f"{words_of(name, arguments)}: {reason}" if reason else ""
 
@@ -278,6 +278,7 @@ class Desk:
                     given["repetitions"],
                     given["order"],
                     given.get("number", 0),
+                    bool(self.backend.standing().object_id),
                 ),
             )
         if name == "session_end":

@@ -1,24 +1,34 @@
 """A session with one participant: conditions, order of trials, notes, and one file that tools can read.
 
 The file holds one JSON object a line, each with `type` and `stamp` (s since 1970): session, trial_begin, trial_end,
-result (as on coglab/results), note, stop (by the page), stopped (the robot stands, whoever asked for it), resumed (by
-the next console after one was killed), session_end. Participants are pseudonyms; no names belong here. What reads it is
-session_file.
+result (as on coglab/results, whose times are of the brain's clock, and `began` like `stamp`), note, stop (by the page),
+stopped (the robot stands, whoever asked for it), resumed (by the next console after one was killed), session_end.
+Participants are pseudonyms; no names belong here. What reads it is session_file.
 """
 
 from __future__ import annotations
 
 import os
 import random
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Sequence
+from datetime import datetime
 from pathlib import Path
 
 from ..web.fan_out import to_json
+from .gates import Standing
 from .session_file import Session, SessionFileError, newest, read_session
+from .words import button, outcome
 
 MAX_TRIALS = 600
 RESUME = 4 * 3600.0
 """s without a line after which the session of a console that was killed does not go on"""
+
+
+TAKES = ("exchange_human_to_robot", "take")
+"""actions that begin with an empty hand and end with an object in it"""
+GIVES = ("exchange_robot_to_human", "put")
+_ACTION = {word: name for name in (*TAKES, *GIVES) for word in (name, button(name).lower())}
 
 
 class ExperimentError(Exception):
@@ -56,6 +66,22 @@ def order_of(conditions: list[str], repetitions: int, order: str, number: int) -
     return trials
 
 
+def actions_in(condition: str) -> list[str]:
+    """Actions that the words of a condition name: 'receive ball' names Receive, 'slowly' none."""
+    return [_ACTION[word] for word in re.split(r"[^a-z0-9_]+", condition.lower()) if word in _ACTION]
+
+
+def unprepared(trials: Sequence[str], held: bool) -> list[int]:
+    """Numbers of the trials before which somebody has to fill or empty the robot's hand, which holds something at the
+    beginning if `held`."""
+    found = []
+    for number, named in enumerate(map(actions_in, trials), 1):
+        if named and held != (named[0] in GIVES):
+            found.append(number)
+        held = named[-1] in TAKES if named else held
+    return found
+
+
 def _mark(row: dict) -> tuple:
     """What tells one result from another: when its action began and ended, by the brain's clock."""
     return row.get("kind"), row.get("started"), row.get("ended")
@@ -74,6 +100,8 @@ class Experiment:
         self._goes = 0
         self.notes: list[dict] = []
         self._last_result: tuple = ()
+        self._results: list[dict] = []
+        """of the trial that is under way, of actions with an object"""
         self.phase: Callable[[], str] = lambda: ""
 
     def resume(self) -> str:
@@ -104,9 +132,13 @@ class Experiment:
         self.notes = [{name: note[name] for name in ("stamp", "who", "text")} for note in notes[-100:]]
         results = [row for place in places for row in place.results]
         self._last_result = _mark(max(results, key=lambda row: row["stamp"])) if results else ()
+        running = found.running()
+        self._results = [row for row in running.results if row["kind"] in (*TAKES, *GIVES)] if running else []
 
-    def begin(self, participant: str, conditions: list[str], repetitions: int, order: str, number: int) -> str:
-        """Opens a session; the answer in words."""
+    def begin(
+        self, participant: str, conditions: list[str], repetitions: int, order: str, number: int, held: bool = False
+    ) -> str:
+        """Opens a session; the answer in words. `held`: something is in the robot's hand."""
         self._needs("session_begin")
         trials = order_of(conditions, repetitions, order, number)
         self._folder.mkdir(parents=True, exist_ok=True)
@@ -120,19 +152,60 @@ class Experiment:
         self._write(
             "session", participant=participant, number=number, order=order, conditions=conditions, trials=trials
         )
-        return f"session of {participant}: {len(trials)} trials, written to {path}"
+        sentence = f"session of {participant}: {len(trials)} trials, written to {path}"
+        first = unprepared(trials, held)
+        if first:
+            listed = ", ".join(map(str, first[:8])) + (" …" if len(first) > 8 else "")
+            sentence += f"; the hand has to be filled or emptied before trial {listed}"
+        return sentence
 
-    def refusals(self) -> dict[str, str]:
-        """Why each of the commands of sessions and trials is not possible now; empty where it is."""
+    def refusals(self, now: Standing | None = None) -> dict[str, str]:
+        """Why each of the commands of sessions and trials is not possible now, and the actions that are none of the
+        trial under way; empty where it is. `now`: how the robot stands."""
         none = "" if self.participant else "no session is open; begin one first"
         running = f"trial {self.position + 1} is under way; end it first" if self.running else ""
         over = "every trial is done; end the session" if self.position >= len(self.trials) else ""
         return {
             "session_begin": self.participant and f"the session of {self.participant} is open; end it first",
             "session_end": none or running,
-            "trial_begin": none or running or over,
+            "trial_begin": none or running or over or self._not_ready(now),
             "trial_end": "" if self.running else "no trial is under way",
+            "trial_done": self._not_done(now) if self.running else "no trial is under way",
+            **self._foreign(),
         }
+
+    def _not_ready(self, now: Standing | None) -> str:
+        """Why the next trial cannot begin with the hand as it is."""
+        if now is None or not now.master_alive:
+            return ""
+        if now.under_way:
+            return "an action is under way"
+        named = actions_in(self.condition())
+        if not named or bool(now.object_id) == (named[0] in GIVES):
+            return ""
+        stands, means = ("holds " + now.object_id, GIVES) if now.object_id else ("is empty", TAKES)
+        return f"the hand {stands}: first {' or '.join(map(button, means))}, which counts for no trial"
+
+    def _foreign(self) -> dict[str, str]:
+        """The actions that the trial under way is not about."""
+        named = actions_in(self.condition()) if self.running else []
+        words = " and ".join(map(button, dict.fromkeys(named)))
+        return {
+            name: f"the trial is for {words}; end it first" for name in (*TAKES, *GIVES) if named and name not in named
+        }
+
+    def _not_done(self, now: Standing | None) -> str:
+        """Why the trial under way cannot be called done."""
+        if now is not None and now.under_way:
+            return "an action is under way"
+        newest_of = {row["kind"]: row["outcome"] for row in self._results}
+        named = actions_in(self.condition()) or [row["kind"] for row in self._results[-1:]]
+        for name in named:
+            if name not in newest_of:
+                return f"no {button(name)} in this trial yet"
+            if newest_of[name] != "succeeded":
+                return f"{button(name)}: {outcome(newest_of[name])}"
+        return ""
 
     def _needs(self, command: str) -> None:
         refusal = self.refusals()[command]
@@ -160,12 +233,13 @@ class Experiment:
         self._needs("trial_begin")
         self.running = True
         self._goes += 1
+        self._results = []
         condition = self.trials[self.position]["condition"]
         self._write("trial_begin", trial=self.position + 1, condition=condition)
         return f"trial {self.position + 1} of {len(self.trials)}: {condition}"
 
     def trial_end(self, outcome: str) -> str:
-        """`repeat` leaves the trial to be done again."""
+        """`repeat` leaves the trial to be done again; `failed`: the robot has failed, and the next trial follows."""
         self._needs("trial_end")
         self.running = False
         trial = self.position + 1
@@ -185,7 +259,21 @@ class Experiment:
         if _mark(row) == self._last_result:
             return
         self._last_result = _mark(row)
-        self._write("result", **{key: value for key, value in row.items() if key not in ("type", "stamp", "trial")})
+        kind = row.get("kind")
+        if self.running and kind in (*TAKES, *GIVES):
+            self._results.append(row)
+            named = actions_in(self.condition())
+            if named and kind not in named:
+                self._warn(f"trial {self.position + 1} is '{self.condition()}', and {button(kind)} was done in it")
+        fields = {key: value for key, value in row.items() if key not in ("type", "stamp", "trial", "began")}
+        self._write("result", **fields, began=self._began(row))
+
+    def _began(self, row: dict) -> float:
+        """When the action of a result began, s since 1970: as the brain says, or from the end, which is now."""
+        try:
+            return datetime.fromisoformat(row["started_utc"]).timestamp()
+        except (KeyError, TypeError, ValueError):
+            return round(self._now() - row.get("duration_s", 0.0), 3)
 
     def record(self, kind: str, /, **fields: object) -> None:
         """A note or a stop, into the file of the open session, with the phase in which it was."""

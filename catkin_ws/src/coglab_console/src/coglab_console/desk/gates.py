@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from .commands import COMMANDS, STARTS
-from .words import action_of, button, phase
+from .words import action_of, button, phase, without_advice
 
 CALIBRATIONS = ("calibrate", "calibrate_complete", "calibrate_forced")
 STANDSTILL = ("stopped", "fault")
@@ -39,6 +39,8 @@ class MotionGuard:
     real: bool = False
     cause: str = ""
     unacknowledged: bool = False
+    lifted: bool = False
+    """the robot stands no more though the stop was not acknowledged: somebody has reset it without the page"""
     needs_hold: bool = field(default=False)
     stops: int = 0
     """how many there were: a motion that was asked for before the newest one is not the first after it"""
@@ -50,16 +52,28 @@ class MotionGuard:
 
     def stop(self, cause: str) -> None:
         """A stop, by whomever. Its number is `stops`."""
-        self.cause, self.unacknowledged, self.needs_hold = cause, True, True
+        self.cause, self.unacknowledged, self.needs_hold, self.lifted = cause, True, True, False
         self.stops += 1
+
+    def told(self) -> str:
+        """What the page says of the newest stop."""
+        if not self.lifted:
+            return self.cause
+        return (
+            f"This stop is over, it was lifted without this page: {without_advice(self.cause) or 'no reason was told'}"
+        )
 
     def observe(self, stopped: bool, cause: str, standstills: int = 0) -> bool:
         """How the robot stands, several times a second, and how often it has come to stand (Standstills); True where a
         stop has begun since the last look, also one that followed another without a motion between them."""
         begun = (stopped and not self._was_stopped) or standstills > self._standstills
+        ended = self._was_stopped and not stopped
         self._was_stopped, self._standstills = stopped, standstills
         if begun:
             self.stop(cause or self.cause)
+            self.lifted = not stopped
+        elif ended:
+            self.lifted = self.unacknowledged
         elif stopped and cause:
             self.cause = cause
         return begun
@@ -217,7 +231,7 @@ def reasons(now: Standing, guard: MotionGuard, session: Mapping[str, str] | None
         if name in SECOND_THOUGHT and (now.under_way or trial):
             found[name] = "not while an action or a trial is under way"
     found["acknowledge"] = "" if guard.unacknowledged else "no stop waits to be acknowledged"
-    return {**found, **given}
+    return {**found, **{name: found.get(name) or reason for name, reason in given.items()}}
 
 
 def control(name: str, arguments: Mapping[str, Any]) -> str:
@@ -228,4 +242,4 @@ def control(name: str, arguments: Mapping[str, Any]) -> str:
         return "calibrate_forced"
     if name == "calibrate" and arguments.get("mode") == "complete":
         return "calibrate_complete"
-    return name
+    return "trial_done" if name == "trial_end" and arguments["outcome"] == "done" else name

@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 NOTICE = 3.0
 """s between the announcement and the change"""
-ABSENCE = 5.0
-"""s without a connection after which the operator is not asked any more"""
+ABSENCE = 10.0
+"""s without a connection after which nobody operates; longer than a page takes to load again"""
 
 
 class Roles:
@@ -29,7 +29,7 @@ class Roles:
             self._make(name, f"{name} is the operator", "info")
 
     def disconnected(self, name: str) -> None:
-        """The last connection of a browser closed. It stays the operator until somebody takes over."""
+        """The last connection of a browser closed. The operator stays it for ABSENCE s."""
         if name == self.operator:
             self._absent_since = self._now()
         if name == self.claimant:
@@ -42,8 +42,8 @@ class Roles:
             return "you are the operator"
         if self.claimant and self.claimant != name:
             return f"{self.claimant} is taking over already"
-        if not self.operator or self._absent():
-            self._make(name, f"{name} is the operator now; {self.operator or 'nobody'} was not there")
+        if not self.operator:
+            self._make(name, f"{name} is the operator now; nobody was")
             return "you are the operator now"
         if not self.claimant:
             self.claimant, self._due = name, self._now() + NOTICE
@@ -63,17 +63,19 @@ class Roles:
 
     def tick(self) -> bool:
         """Called several times a second; whether the operator changed."""
-        if not self.claimant or not (self._now() >= self._due or self._absent()):
+        absent = self._absent_since is not None and self._now() - self._absent_since > ABSENCE
+        if self.claimant and (absent or self._now() >= self._due):
+            self._make(self.claimant, f"{self.claimant} is the operator now, {self.operator} watches")
+        elif absent:
+            gone, self.operator, self._absent_since = self.operator, "", None
+            self._say(f"{gone} has been away for {ABSENCE:.0f} s: nobody operates; press Take over", "warning")
+        else:
             return False
-        self._make(self.claimant, f"{self.claimant} is the operator now, {self.operator} watches")
         return True
 
     def view(self) -> dict:
         """What every browser is shown."""
-        return {"operator": self.operator, "claimant": self.claimant, "absent": self._absent()}
-
-    def _absent(self) -> bool:
-        return self._absent_since is not None and self._now() - self._absent_since > ABSENCE
+        return {"operator": self.operator, "claimant": self.claimant}
 
     def _make(self, name: str, sentence: str, level: str = "warning") -> None:
         self.operator, self.claimant, self._absent_since = name, "", None

@@ -88,7 +88,7 @@ class Session:
 
     def passed(self) -> int:
         """How many trials of the order are behind."""
-        return sum(attempt.outcome in ("done", "skipped") for attempt in self.attempts)
+        return sum(attempt.outcome in ("done", "failed", "skipped") for attempt in self.attempts)
 
 
 # --- files ----------------------------------------------------------------------------------------------------
@@ -233,8 +233,14 @@ def _place(session: Session, row: dict) -> Attempt:
     """The attempt in which the action began: trials are often ended while the arm is on its way home, and the journal
     tells an action at its end. Where it began in none, the one in which it ended."""
     ended_in = row.pop("_ended_in")
-    began = row["stamp"] - row["duration_s"]
+    began = _action_began(row)
     return next((attempt for attempt in reversed(session.attempts) if attempt.covers(began)), ended_in)
+
+
+def _action_began(row: dict) -> float:
+    """When an action began, s since 1970; older files have the time of its end alone."""
+    began = row.get("began")
+    return float(began if _number(began) else row["stamp"] - row["duration_s"])
 
 
 # --- tables ---------------------------------------------------------------------------------------------------
@@ -306,7 +312,7 @@ def _action_rows(session: Session) -> list[dict[str, Any]]:
                 {
                     **_head(session, attempt),
                     **_action(row),
-                    "began": _time(row["stamp"] - row["duration_s"]),
+                    "began": _time(_action_began(row)),
                     "causes": "; ".join(map(str, row.get("causes") or ())),
                     "marks": json.dumps(after),
                 }

@@ -99,6 +99,7 @@ _LONG = sorted((name for name in PHASES if "_" in name), reverse=True)  # short 
 _NAMES = re.compile(rf"(?<![\w/])'?({'|'.join(_LONG)})'?(?![\w/])")
 _PRESSED = re.compile(r"(press|or) (initialise|reset|take|put)\b")
 _TYPED = re.compile(r"type: (\./coglab start \w+(?: or \./coglab start \w+)*)")
+_ADVICE = re.compile(r"; when its cause is away, press .*?(?=, because |$)")
 _CALLED = re.compile(r"(; send \w+)?: rosservice call \S+ \w+|; send (reset|start)\b")
 
 
@@ -139,6 +140,11 @@ def plain(sentence: str) -> str:
     pressed = _TYPED.sub(lambda found: "press " + found[1].replace("./coglab start ", ""), _CALLED.sub("", sentence))
     pressed = _PRESSED.sub(lambda found: f"{found[1]} {BUTTONS[found[2]]}", pressed)
     return _NAMES.sub(lambda found: BUTTONS.get(found[1]) or f"'{PHASES[found[1]]}'", pressed)
+
+
+def without_advice(sentence: str) -> str:
+    """The sentence of `plain` without what to press."""
+    return _ADVICE.sub("", sentence)
 
 
 def transition(path: str, before: str, how: str, after: str, reason: str = "") -> str:

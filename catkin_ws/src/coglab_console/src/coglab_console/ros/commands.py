@@ -23,6 +23,7 @@ from coglab_msgs.srv import (
     Start,
     SwitchController,
 )
+from coglab_py.steady import wait_for_service
 from std_msgs.msg import String
 
 from ..desk.desk import Answer
@@ -105,7 +106,7 @@ class RosBackend:
 
     @staticmethod
     def _ask(service: str, kind: Any, *fields: Any) -> Any:
-        rospy.wait_for_service(service, timeout=2.0)
+        wait_for_service(service, 2.0)
         return rospy.ServiceProxy(service, kind)(*fields)
 
     def _told(self, service: str, kind: Any, *fields: Any) -> Answer:

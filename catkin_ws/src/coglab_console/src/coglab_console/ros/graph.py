@@ -13,7 +13,8 @@ from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
 from ..scene.graph_layout import Container, Layout, roots
 
 STRUCTURE, STATUS = "/smach/container_structure", "/smach/container_status"
-MAX_MACHINES = 12
+MAIN = "/coglab"
+MAX_MACHINES = 12  # besides that one
 MAX_CONTAINERS = 120
 SILENCE = 10.0  # s without a word (heartbeats come every 2 s) after which a machine is taken to be gone
 
@@ -73,7 +74,7 @@ class SmachGraphs:
 
     def _add(self, name: str) -> None:
         with self._lock:
-            if name in self._machines or len(self._machines) >= MAX_MACHINES:
+            if name in self._machines or (len(self._machines) > MAX_MACHINES and name != MAIN):
                 return
             machine = self._machines[name] = Machine(name)
         machine.subscribers = [

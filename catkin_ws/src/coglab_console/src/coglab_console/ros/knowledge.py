@@ -15,6 +15,7 @@ import rospy
 import yaml
 from coglab_msgs.srv import GetObject, ListObjects, PredictDmp, PredictDmpRequest, PredictDmpResponse
 from coglab_py import parameters
+from coglab_py.steady import wait_for_service
 from geometry_msgs.msg import Point, Quaternion
 
 from ..scene import path_ahead
@@ -56,6 +57,7 @@ class Knowledge:
         self._stamps: dict[str, int] = {}
         self._told: dict[str, str] = {}
         self._now = threading.Event()
+        self._own_frames = view.named
         self._ask: rospy.ServiceProxy | None = None
         self._asked = False
         view.entry = self._entry
@@ -93,7 +95,7 @@ class Knowledge:
 
     def _objects(self) -> None:
         try:
-            rospy.wait_for_service("object_database/list_objects", timeout=1.0)
+            wait_for_service("object_database/list_objects", 1.0)
         except rospy.ROSException:
             self._show_objects(None)
             return
@@ -108,6 +110,7 @@ class Knowledge:
                     self._texts[name], self._entries[name] = answer.yaml, entry
         for gone in set(self._texts) - set(ids):
             del self._texts[gone], self._entries[gone]
+        self._view.named = self._own_frames | {str(entry.get("frame", "")) for entry in self._entries.values()}
         self._show_objects([problem[:400] for problem in listed.problems[:MAX_OBJECTS]])
 
     def _show_objects(self, problems: list[str] | None) -> None:
@@ -192,7 +195,7 @@ class Knowledge:
         request.target_orientation = Quaternion(*fields["target_orientation"])
         try:
             if self._ask is None:
-                rospy.wait_for_service(PREDICT, timeout=1.0)
+                wait_for_service(PREDICT, 1.0)
                 self._ask = rospy.ServiceProxy(PREDICT, PredictDmp, persistent=True)
             return self._ask(request)
         except (rospy.ServiceException, rospy.ROSException):

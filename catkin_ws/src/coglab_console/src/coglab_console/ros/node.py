@@ -32,13 +32,13 @@ from .commands import RosBackend
 from .graph import SmachGraphs
 from .knowledge import Knowledge
 from .stop import StopPath
+from .tables import SILENT_DIAGNOSTICS
 from .view import RosView
 
 ADDRESS, PORT = "127.0.0.1", 8790
 STATE_RATE = 30.0  # Hz
 TICK = 0.1  # s
 HEALTH = 1.0  # s
-SILENT_DIAGNOSTICS = 2.5  # s without a word of diagnostics, which come once a second
 FRAMES = {"human_hand": "human_hand", "board": "board"}
 
 
@@ -253,6 +253,7 @@ class ConsoleNode:
             for name, row in sorted(self.view.tables.diagnostics.items())
         ]
         browsers = [{"name": one.name, "connections": one.sockets} for one in self.access.sessions() if one.sockets]
+        self.documents.put("busy", self.view.tables.busy(now))
         self.documents.put("health", {"rows": rows, "versions": self.versions, "browsers": browsers})
 
     def _careful(self, work: Any) -> None:

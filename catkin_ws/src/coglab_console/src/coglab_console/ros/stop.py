@@ -14,6 +14,7 @@ from typing import Any
 
 import rospy
 from coglab_msgs.srv import LwrCommand
+from coglab_py.steady import worker
 from rospy.core import parse_rosrpc_uri
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -56,7 +57,7 @@ class StopPath:
         self._arm = DirectService("lwr/command", LwrCommand)
         self._brain = DirectService("coglab/stop", Trigger)
         self._waiting = threading.Semaphore(MAX_WAITING)
-        self._keeper = threading.Thread(target=self._keep, name="stop_addresses", daemon=True)
+        self._keeper = worker(self._keep, "stop_addresses")
         self._keeper.start()
 
     def press(self, who: str) -> None:

@@ -10,10 +10,16 @@ from typing import Any
 import rospy
 from coglab_msgs.msg import FeedbackState, FeedbackStatus, Recognition
 from diagnostic_msgs.msg import DiagnosticArray
+from std_msgs.msg import Float64
+
+SILENT_DIAGNOSTICS = 2.5  # s without a word of diagnostics, which come once a second
+COMPUTER = ": computer"  # names of the diagnostics that say whether this computer keeps up end so
+OK = 0
 
 
 class Tables:
-    """`put(name, value)` gets the documents `feedback`, `attribution`, `recognition`; diagnostics are kept by name."""
+    """`put(name, value)` gets the documents `feedback`, `attribution`, `recognition`, `real_time_factor` (of the
+    simulation); diagnostics are kept by name."""
 
     def __init__(self, put: Callable[[str, Any], None]) -> None:
         self._put = put
@@ -24,8 +30,18 @@ class Tables:
             ("controller_manager/feedback/state", FeedbackState, self._on_feedback_state),
             ("perception/recognition", Recognition, self._on_recognition),
             ("diagnostics", DiagnosticArray, self._on_diagnostics),
+            ("coglab_sim/real_time_factor", Float64, self._on_factor),
         ):
             rospy.Subscriber(topic, kind, callback, queue_size=20)
+
+    def busy(self, now: float) -> str:
+        """What is said of a computer that does not keep up; empty while it does."""
+        rows = [row for name, row in sorted(self.diagnostics.items()) if name.endswith(COMPUTER)]
+        fresh = [row for row in rows if now - row["at"] < SILENT_DIAGNOSTICS]
+        return " ".join(row["message"] for row in fresh if row["level"] != OK)
+
+    def _on_factor(self, message: Float64) -> None:
+        self._put("real_time_factor", round(message.data, 2))
 
     def _on_recognition(self, message: Recognition) -> None:
         rows = [[name, round(p, 2)] for name, p in zip(message.names[:20], message.probabilities[:20], strict=False)]
@@ -78,7 +94,7 @@ class Tables:
         for status in message.status[:50]:
             level = status.level if isinstance(status.level, int) else status.level[0]
             values = [[pair.key[:80], pair.value[:120]] for pair in status.values[:60]]
-            if len(self.diagnostics) < 100 or status.name in self.diagnostics:
+            if len(self.diagnostics) < 100 or status.name in self.diagnostics or status.name.endswith(COMPUTER):
                 self.diagnostics[status.name] = {
                     "level": level,
                     "message": status.message[:200],

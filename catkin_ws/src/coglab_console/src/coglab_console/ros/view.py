@@ -18,6 +18,7 @@ from coglab_msgs.msg import (
     LwrState,
     MasterState,
     PredictedPath,
+    ReasonCode,
     Transition,
     UnfinishedPtp,
 )
@@ -35,7 +36,11 @@ from .tables import Tables
 PALM = "ih2_palm"
 FRAME_PARENTS = ("world", "lwr_base_link")
 OLD = 1.0  # s without a message after which a motion's path or progress is over
+GOAL_FRAME = "dmp_goal"
+ASKED_FOR = (ReasonCode.CANCELLED, ReasonCode.SWITCHED, ReasonCode.SUPERSEDED)
+"""a motion that ends for one of these ends because the brain or a person asked for it: no failure"""
 MOST_POSES = 200
+MOST_STATIC = 1000  # frames of /tf_static that are kept by name, as the object they belong to may be chosen later
 
 
 def _round(values: Any, digits: int = 4) -> list[float]:
@@ -81,6 +86,9 @@ class RosView:
         self.objects: Callable[[], tuple[str, ...] | None] = lambda: None
         """of the database; None where it is not there"""
         self.objects_read: Callable[[], None] = lambda: None
+        self.named = frozenset({self.hand_frame, self._board_frame, GOAL_FRAME})
+        """frames that the picture may show, however many others there are; Knowledge adds those of the objects"""
+        self._moving = frozenset(model.moving()) if model else None
         self._subscribers: dict[str, rospy.Subscriber] = {}
 
     def listen(self) -> None:
@@ -99,7 +107,7 @@ class RosView:
             ("controller_manager/dmp/feedback", DmpFeedback, self._on_dmp, 5),
             ("controller_manager/ptp/unfinished_ptp", UnfinishedPtp, self._on_unfinished, 10),
             ("/tf", rospy.AnyMsg, self._on_tf, 50),
-            ("/tf_static", rospy.AnyMsg, self._on_tf, 50),
+            ("/tf_static", rospy.AnyMsg, lambda message: self._on_tf(message, static=True), 50),
         ):
             self._subscribers[topic] = rospy.Subscriber(topic, kind, callback, queue_size=queue, tcp_nodelay=True)
         for name in ("dmp", "ptp"):
@@ -170,7 +178,7 @@ class RosView:
         now = time.monotonic()
         self._measure_palm(now)
         object_frame = str(self.entry().get("frame", ""))
-        wanted = {"hand": self.hand_frame, "object": object_frame, "board": self._board_frame, "goal": "dmp_goal"}
+        wanted = {"hand": self.hand_frame, "object": object_frame, "board": self._board_frame, "goal": GOAL_FRAME}
         stamp = rospy.get_time()
         shown = {role: _round(self.frames[name], 4) for role, name in wanted.items() if name in self.frames}
         ages = {role: round(stamp - self._stamps[name], 3) for role, name in wanted.items() if name in self._stamps}
@@ -229,11 +237,12 @@ class RosView:
     def _on_joints(self, message: JointState) -> None:
         if len(message.name) != len(message.position):
             return
-        stamp, before = message.header.stamp.to_sec(), self.joints
-        joints = {**before, **dict(zip(message.name, message.position, strict=True))}
-        if not all(map(math.isfinite, joints.values())) or len(joints) > 200:
+        told = zip(message.name, message.position, strict=True)
+        ours = {name: value for name, value in told if self._moving is None or name in self._moving}
+        if not ours or not all(map(math.isfinite, ours.values())):
             return
-        self.joints, self._joints_stamp, self._joints_at = joints, stamp, time.monotonic()
+        self.joints = {**self.joints, **ours} if self._moving else {}
+        self._joints_stamp, self._joints_at = message.header.stamp.to_sec(), time.monotonic()
 
     def _on_signal(self, message: ContactSignal) -> None:
         self.signal = message
@@ -242,13 +251,13 @@ class RosView:
     def _on_latency(self, message: Float64) -> None:
         self.latency, self._latency_at = message.data, time.monotonic()
 
-    def _on_tf(self, message: rospy.AnyMsg) -> None:
+    def _on_tf(self, message: rospy.AnyMsg, static: bool = False) -> None:
         try:
             for parent, child, stamp, pose in wire.transforms(message._buff):
-                if parent in FRAME_PARENTS and not child.startswith(("lwr_", "ih2_")) and len(self.frames) < 100:
-                    if all(map(math.isfinite, pose)) and any(pose[3:]):
-                        self.frames[child] = pose
-                        self._stamps[child] = stamp
+                kept = child in self.named or (static and len(self.frames) < MOST_STATIC)
+                if kept and parent in FRAME_PARENTS and all(map(math.isfinite, pose)) and any(pose[3:]):
+                    self.frames[child] = pose
+                    self._stamps[child] = stamp
         except wire.BadBytes:
             return
 
@@ -314,7 +323,7 @@ class RosView:
     def _on_dmp(self, message: DmpFeedback) -> None:
         before, self.dmp, self._dmp_at = self.dmp, message, time.monotonic()
         if message.state == "aborted" and before.state != "aborted":
-            self._say("controller", f"motion aborted: {message.reason}", "warning")
+            self._ended("reach", message)
 
     def _on_path(self, message: PredictedPath, controller: str) -> None:
         if message.poses:
@@ -325,4 +334,9 @@ class RosView:
             self._put("path", None)
 
     def _on_unfinished(self, message: UnfinishedPtp) -> None:
-        self._say("controller", f"motion {message.ptp_id} ended before its target: {message.reason}", "warning")
+        self._ended(f"motion {message.ptp_id}", message)
+
+    def _ended(self, what: str, message: DmpFeedback | UnfinishedPtp) -> None:
+        """A motion that ended before its goal."""
+        level = "info" if message.reason_code in ASKED_FOR else "warning"
+        self._say("controller", f"{what} ended before its goal: {message.reason}", level)

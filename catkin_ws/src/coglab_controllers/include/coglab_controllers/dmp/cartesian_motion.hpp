@@ -63,6 +63,10 @@ class CartesianMotion {
   const CartesianReference& step(double dt, const Pose& goal, double rate = 1.0,
                                  const Vector3& approach = Vector3::Zero()) noexcept;
 
+  /// Ends the motion as reached at this pose, where the hand stands; a goal that leaves it by more
+  /// than follow_distance is followed again.
+  void endAt(const Pose& pose) noexcept;
+
   /// Ends the motion where it is; the set-point rests at the present one.
   void stop() noexcept;
 

@@ -31,6 +31,9 @@ class Dmp {
   /// Another time constant; position, velocity and phase are kept.
   void setRatio(double ratio) noexcept;
 
+  /// The motion has ended, and rests here.
+  void endAt(const Vector3& position) noexcept;
+
   /// One cycle.
   /// @param dt s; a step of 0 changes nothing.
   /// @param goal, goal_velocity g (m) and g' (m/s) of eq. (1), g at the beginning of the cycle.

@@ -18,6 +18,20 @@ struct LearningOptions {
   GoalWeight goal_weight;
   ShapeMapping mapping = ShapeMapping::None;
   double regularisation = 1e-6;  ///< ridge, relative to the mean diagonal of the normal matrix
+  /// Faults of a demonstration (DemonstrationLimits) that are not refused.
+  std::vector<std::string> allow;
+};
+
+/// What a demonstration of one reach must be like; the names are those of LearningOptions::allow.
+/// The last two are judged from 20 samples on.
+struct DemonstrationLimits {
+  static constexpr double kShort = 0.05;     ///< "short": m, goes at least so far from its start
+  static constexpr double kBrief = 0.25;     ///< "brief": s, takes at least so long
+  static constexpr double kJump = 5.0;       ///< "jump": m/s between two samples, or one step so
+  static constexpr double kJumpShare = 6.0;  ///< many times as long as those around it
+  static constexpr double kMoving = 0.5;     ///< "moving": largest speed at both ends, share of the
+                                             ///< mean speed: a reach begins and ends at rest
+  static constexpr double kNoisy = 0.02;     ///< "noisy": largest noise, share of the way it goes
 };
 
 /// Learns from one or several demonstrations of one motion, which may differ in duration, start and
@@ -28,6 +42,8 @@ struct LearningOptions {
 /// units of each path's length) and never need the second derivative of a noisy recording. The
 /// start velocity of the demonstration is kept.
 /// @throws std::invalid_argument for invalid demonstrations or options, saying which and why.
+/// Demonstrations outside of DemonstrationLimits are refused unless `options.allow` names the
+/// fault.
 Primitive learn(const std::string& id, const std::vector<Trajectory>& demonstrations,
                 const LearningOptions& options = {});
 

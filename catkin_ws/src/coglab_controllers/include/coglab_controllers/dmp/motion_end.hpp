@@ -33,6 +33,12 @@ class MotionEnd {
   Event update(double dt, double phase, double speed, double turning, const Vector3& position,
                const Vector3& goal, const Vector3& raw_goal) noexcept;
 
+  /// The motion has ended at this goal, m.
+  void latch(const Vector3& goal) noexcept {
+    latched_ = true;
+    goal_ = goal;
+    away_ = 0.0;
+  }
   bool latched() const noexcept { return latched_; }
   const Vector3& latchedGoal() const noexcept { return goal_; }  ///< m, if latched()
 

@@ -38,6 +38,9 @@ enum class ShapeMapping {
   Upright      ///< turned about the vertical and scaled; what the demonstration lifts stays lifted
 };
 
+/// Lines shorter than this (m) have no direction, and shapes are not scaled with them.
+constexpr double kShortestLine = 1e-3;
+
 /// The linear map of a shape from the demonstration's line (start to goal, m) to the present one:
 /// it takes `demonstrated` to `line` (unless one is shorter than a millimetre). Eq. (1)-(5) are
 /// invariant under it.

@@ -25,6 +25,9 @@ class TransformationSystem {
   /// (ShapeMapping).
   void mapShape(const Vector3& start, const Vector3& goal) noexcept;
 
+  /// Start to goal of the demonstration, m.
+  const Vector3& demonstratedLine() const noexcept { return demonstrated_line_; }
+
   /// w(s), 0 at the start and 1 at the end.
   double goalWeight(double s) const noexcept { return goal_weight_(s); }
   /// phi(s) of eq. (5), m relative to the start. Never divides by a vanishing sum.

@@ -22,8 +22,6 @@ struct GuardParameters {
   double workspace_deceleration =
       2.0;  ///< m/s^2 with which a border of the workspace is approached at most
   double reaction_time = 0.015;  ///< s from a command until the arm brakes: cycle and interpolator
-  double block_time =
-      0.5;  ///< s at a standstill because of one joint's stop, then the motion shall end
   WorkspaceParameters workspace;
 };
 
@@ -47,9 +45,6 @@ struct GuardResult {
   GuardReason reason = GuardReason::None;  ///< of the restriction that bound hardest
   int joint = -1;                          ///< for JointVelocity and JointPosition
   WorkspaceBorder border = WorkspaceBorder::None;
-  /// Joint at its stop that has held up the motion for block_time, or -1: abort the motion and name
-  /// it.
-  int blocked_joint = -1;
 };
 
 /// Limits joint velocities. Construction validates and may throw; `limit` neither allocates nor
@@ -66,9 +61,9 @@ class Guard {
 
   /// @param state kinematics at the measured joints, from the chain given at construction.
   /// @param q rad; where measured and commanded joints differ, the ones further on their way.
-  /// @param request rad/s.  @param dt s since the last call, for blocked_joint.
-  void limit(const ChainState& state, const JointVector& q, const JointVector& request, double dt,
-             GuardResult& result) noexcept;
+  /// @param request rad/s.
+  void limit(const ChainState& state, const JointVector& q, const JointVector& request,
+             GuardResult& result) const noexcept;
 
   /// What the robot's interface keeps before joints' stops besides position_margin, so that it cuts
   /// nothing that was let pass here: the time (s, >= 0) that the arm may go on without hearing of a
@@ -77,9 +72,6 @@ class Guard {
     lost_time_ = lost_time;
     rounding_ = rounding;
   }
-
-  /// Forgets how long a joint has been blocked: a new motion begins.
-  void reset() noexcept { blocked_for_ = 0.0; }
 
   /// Largest speed (rad/s, >= 0) of a joint `room` rad before its stop.
   double speedToStop(int joint, double room) const noexcept;
@@ -92,8 +84,6 @@ class Guard {
   Chain chain_;
   Workspace workspace_;
   double lost_time_ = 0.0, rounding_ = 0.0;
-  double blocked_for_ = 0.0;
-  int blocking_joint_ = -1;
 };
 
 }  // namespace coglab_controllers

@@ -8,6 +8,7 @@
 
 #include "coglab_controllers/limits/guard.hpp"
 #include "coglab_controllers/limits/phase_governor.hpp"
+#include "coglab_controllers/limits/progress_watch.hpp"
 #include "coglab_controllers/manager/feedback_stage.hpp"
 #include "coglab_controllers/manager/motion_controller.hpp"
 #include "coglab_controllers/names.hpp"
@@ -21,7 +22,8 @@ struct CycleSettings {
   double silent_time = 0.5;     ///< no joint state for this long ends a motion, s
   double overrun_time =
       0.004;  ///< a motion controller slower than this overruns, s; 0: not judged (lockstep)
-  double border_time = 1.0;  ///< a border of the workspace that stops a motion this long ends it, s
+  double blocked_time =
+      0.5;  ///< a motion that a limit keeps from any progress for this long ends, s
   int overruns_to_fault = 5;  ///< overruns in a row that fault it
 };
 
@@ -110,7 +112,7 @@ class ControlCycle {
   bool tooSlow(double taken) noexcept;
   void compute(JointVector& velocity) noexcept;
   void watchRobot() noexcept;
-  void watchGuard(double dt) noexcept;
+  void watchLimits(double dt) noexcept;
   void abortMotion(const Reason& reason) noexcept;
   void fault(const Reason& reason) noexcept;
   void publish(std::int64_t begin_ns) noexcept;
@@ -122,6 +124,7 @@ class ControlCycle {
   CycleSettings settings_;
   Guard guard_;
   PhaseGovernor governor_;
+  ProgressWatch progress_;
 
   PlanExchange<CyclePlan> plans_;
   std::atomic<double> speed_scale_{1.0};
@@ -141,7 +144,7 @@ class ControlCycle {
   std::uint64_t numbers_ = 0;  // of cycles with a joint state
   bool asked_still_ = false;   // the last cycle with a joint state asked for no velocity
   int overruns_in_row_ = 0;
-  double at_border_ = 0.0;  // s that a border of the workspace has stopped the motion
+  int watched_ = 0;  // id of the motion that progress_ watches
   coglab_rt::TripleBuffer<CycleReport> reports_;
 };
 

@@ -71,6 +71,9 @@ class ControllerManager : public MotionHost {
   /// Loads a controller of a type under an id: a motion controller, or a feedback controller if the
   /// type is one of Ctrl-MORE's. All or nothing, whatever the plug-in throws.
   Answer load(const std::string& id, const std::string& type, const Attach& attach = {});
+  /// Keeps an id for a controller that is being loaded, until the result is gone; null if the id is
+  /// in use.
+  std::shared_ptr<void> claim(const std::string& id);
   /// What has to end before a controller that is unloaded may go: its services. It keeps the
   /// controller for as long as it needs it.
   using Detach = std::function<void(std::shared_ptr<const LoadedMotion>)>;
@@ -145,8 +148,7 @@ class ControllerManager : public MotionHost {
   /// in.
   std::string notAdopted(PlanOutcome outcome) const override;
 
-  Answer loadMotion(const std::string& id, const std::string& type, const Attach& attach,
-                    std::unique_lock<std::mutex>& requests);
+  Answer loadMotion(const std::string& id, const std::string& type, const Attach& attach);
   Answer loadFeedback(const std::string& id, const std::string& type);
   std::string libraryOf(const std::string& type) const;
   Answer planSwitch(const std::string& id, CyclePlan& plan, std::string& type);

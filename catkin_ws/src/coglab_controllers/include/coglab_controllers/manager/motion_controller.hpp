@@ -141,9 +141,12 @@ class MotionController {
   /// slows the time scale.
   virtual double limitScale() const { return 1.0; }
 
-  /// Whether a border of the workspace that stops the arm is a reason to wait (a goal that may come
-  /// closer) and not to give up.
-  virtual bool waitsAtBorder() const { return false; }
+  /// Number of the motion under way: another number is another motion.
+  virtual int motionId() const { return 0; }
+
+  /// A limit keeps the motion from going on. Ends it as reached if the arm is within its tolerance
+  /// of the goal. @return whether it did; if not, abort() follows
+  virtual bool endIfThere(const CycleInput& /*input*/) { return false; }
 
   virtual MotionState state() const = 0;
   /// Why it aborted or holds; empty otherwise.

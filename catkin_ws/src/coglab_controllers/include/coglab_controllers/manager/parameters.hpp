@@ -28,8 +28,9 @@ class Parameters {
   std::string choice(const std::string& name, const std::string& fallback,
                      const std::vector<std::string>& allowed) const;
   std::vector<std::string> texts(const std::string& name) const;
-  /// Exactly `size` finite numbers.
-  Eigen::VectorXd numbers(const std::string& name, const Eigen::VectorXd& fallback) const;
+  /// As many numbers as the fallback has, none larger than `most`, whatever its sign.
+  Eigen::VectorXd numbers(const std::string& name, const Eigen::VectorXd& fallback,
+                          double most = 1e6) const;
   /// A block inside this one; empty if there is none.
   Parameters block(const std::string& name) const;
   const YAML::Node& node() const { return node_; }

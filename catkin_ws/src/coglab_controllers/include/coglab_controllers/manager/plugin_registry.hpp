@@ -27,7 +27,7 @@ struct MotionMaker {
 /// one is raised when classes or meanings change. Static, so that a library keeps its own.
 static inline constexpr ctrl_more::Abi motionAbi() {
   return ctrl_more::abiOf<MotionController, MotionSetup, CycleInput, References, MotionRequest,
-                          RobotSample, RobotSetup, Reason>(1);
+                          RobotSample, RobotSetup, Reason>(2);
 }
 
 /// The types that libraries have registered; a name that is known is refused. Any thread.

@@ -34,7 +34,7 @@ struct MotionProgress {
 /// so that a library keeps its own.
 static inline constexpr ctrl_more::Abi authoredAbi() {
   return ctrl_more::abiOf<Motion<>, MotionConfiguration, MotionArgument, MotionArguments,
-                          MotionStart<>, SetPoint, MotionCycle, IkResult, MotionReference>(1);
+                          MotionStart<>, SetPoint, MotionCycle, IkResult, MotionReference>(2);
 }
 
 /// Runs any Motion<>. Parameters: those of MotionRunner, and one for the default of each argument.

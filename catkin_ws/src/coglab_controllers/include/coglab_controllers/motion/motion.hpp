@@ -125,6 +125,9 @@ class Motion {
     static const Reason none;
     return none;
   }
+  /// A limit keeps the motion from going on. Ends it as reached if the arm is at its goal.
+  /// @return whether it did; if not, the motion is aborted
+  virtual bool endIfThere(const CycleInput& /*input*/) { return false; }
   /// It was ended from outside: cancelled, replaced, or its controller is no longer the active one.
   virtual void stop() noexcept {}
   /// @}

@@ -40,7 +40,6 @@ struct EndedMotion {
 struct RunnerPolicy {
   /// The motion goes on after it was reached (a goal may leave again) until something ends it.
   bool open_end = false;
-  bool waits_at_border = false;       ///< see MotionController::waitsAtBorder()
   const char* id_name = "motion_id";  ///< of motions in reasons; null: they are not named
   int longest_queue = 64;             ///< largest max_queue; 0: no queue
 };
@@ -80,7 +79,8 @@ class MotionRunner : public MotionController {
     report(input.robot.stamp_ns);
   }
   double limitScale() const override { return loop_.ik().scale; }
-  bool waitsAtBorder() const override { return policy_.waits_at_border; }
+  int motionId() const override { return current_.id; }
+  bool endIfThere(const CycleInput& input) override;
   MotionState state() const override { return state_; }
   const Reason& reason() const override { return reason_; }
 
@@ -120,6 +120,7 @@ class MotionRunner : public MotionController {
   void place(Plan& plan);
   void begin(const CycleInput& input, bool at_rest);
   void arrive(const CycleInput& input);
+  void reach(const CycleInput& input);
   void follow();
   void endQueued(const Reason& why, Reason& told);
   void tell(int id, const Reason& why, Reason& told);

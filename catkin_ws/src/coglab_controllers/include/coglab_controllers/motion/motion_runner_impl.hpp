@@ -143,8 +143,13 @@ void MotionRunner<Request>::arrive(const CycleInput& input) {
       giveUp(loop_.stuck(input));
       return;
     case Arrival::State::There:
-      break;
+      reach(input);
+      return;
   }
+}
+
+template <typename Request>
+void MotionRunner<Request>::reach(const CycleInput& input) {
   ends_.push({current_.id, true, {}});
   if (queued_ > 0) {
     next_ = queue_[first_];
@@ -155,6 +160,17 @@ void MotionRunner<Request>::arrive(const CycleInput& input) {
   }
   stage_ = RunnerStage::Rest;
   state_ = MotionState::Reached;
+}
+
+template <typename Request>
+bool MotionRunner<Request>::endIfThere(const CycleInput& input) {
+  if (stage_ != RunnerStage::Moving || !motion_->endIfThere(input)) return false;
+  if (policy_.open_end) {
+    follow();
+  } else {
+    reach(input);
+  }
+  return true;
 }
 
 template <typename Request>

@@ -29,7 +29,8 @@ namespace coglab_controllers {
 /// `goal_lost_time` (s), `goal_finish_distance` (m), `goal_reach_margin` (m), `goal_time_constant`,
 /// `noisy_goal_time_constant` (s), `goal_max_speed`, `predicted_goal_speed` (m/s),
 /// `predicted_goals` (how the names of frames end that tell where something will rest),
-/// `max_initial_distance` (m), `end_phase`, `end_speed` (m/s), `end_turning` (rad/s),
+/// `max_initial_distance` (m), `max_scale` (largest distance of a goal, in distances of the
+/// demonstration), `end_phase`, `end_speed` (m/s), `end_turning` (rad/s),
 /// `end_distance` (m), `follow_distance` (m), `follow_time` (s), `arrive_distance` (m),
 /// `settle_time` (s), `correction_speed` (m/s), `singularity_threshold`,
 /// `rotation_first_scaling`, `hold_blend` (s), `dmp_file` (a library to load at once); on ROS also
@@ -90,11 +91,15 @@ class DmpController : public MotionRunner<DmpPlan> {
   Answer checkPrimitive(const DmpRequest& request, DmpPlan& plan) const;
   Answer checkStart(const DmpRequest& request, DmpPlan& plan) const;
   Answer checkReach(const DmpPlan& plan) const;
+  Answer rollOutPlan(const DmpPlan& plan, bool at_rest, PredictedPath& path);
+  Reason scaledTooFar(const DmpPlan& plan, const Vector3& start, const Vector3& goal) const;
+  Answer checkPath(const DmpPlan& plan, const Vector3& hand, const TimedPath& path) const;
 
   // set once, by configure()
   std::string base_frame_, dmp_frame_, goal_tf_frame_;
   std::string predicted_;  // end of the names of frames that tell where something will rest
-  double reach_margin_ = 0.5, max_initial_distance_ = 0.1;
+  double reach_margin_ = 0.5, max_initial_distance_ = 0.1, max_scale_ = 5.0;
+  double arrive_distance_ = 0.01;
 
   mutable std::mutex library_mutex_;
   Library library_;

@@ -67,6 +67,7 @@ class DmpCycle : public Motion<DmpPlan> {
   MotionState state() const override;
   const Reason& reason() const override { return reason_; }
   void stop() noexcept override;
+  bool endIfThere(const CycleInput& input) override;
 
   DmpStage stage() const noexcept { return stage_; }
   /// The arm follows the set-point.

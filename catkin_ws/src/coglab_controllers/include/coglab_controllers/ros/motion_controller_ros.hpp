@@ -2,6 +2,7 @@
 /// The ROS side of a motion controller plug-in: its services and topics, below its id.
 #pragma once
 
+#include <ros/console.h>
 #include <ros/node_handle.h>
 #include <tf2_ros/buffer.h>
 
@@ -15,6 +16,14 @@ using coglab_rt::ageOf;
 using coglab_rt::nanoseconds;
 using coglab_rt::toRos;
 using coglab_rt::toSteady;
+
+/// Level at which the early end of a motion is logged: one that was asked for is no warning.
+inline ros::console::Level endLevel(const Reason& why) {
+  const ReasonCode code = why.code();
+  const bool asked = code == ReasonCode::Cancelled || code == ReasonCode::Switched ||
+                     code == ReasonCode::Superseded;
+  return asked ? ros::console::levels::Info : ros::console::levels::Warn;
+}
 
 /// What every ROS side shares.
 struct RosContext {

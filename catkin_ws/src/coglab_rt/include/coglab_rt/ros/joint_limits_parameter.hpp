@@ -15,22 +15,23 @@ namespace coglab_rt {
 
 /// Reads the table.
 /// @param file name of the parameter with its path; unset or empty: the table of the package
-/// `description`, config/joint_limits.yaml.
+/// `description`, config/joint_limits.yaml, than which a file may not be wider without saying so.
 /// @param profile name of the parameter with the profile; unset: "default".
 /// @throws std::invalid_argument naming the parameter, std::runtime_error naming file and line.
 inline JointLimits readJointLimits(const ros::NodeHandle& node, const char* file,
                                    const char* profile, const std::string& description) {
   auto path = readParameter<std::string>(node, file, "", "a path");
+  const std::string package = ros::package::getPath(description);
+  const std::string own = package.empty() ? "" : package + "/config/joint_limits.yaml";
   if (path.empty()) {
-    const std::string package = ros::package::getPath(description);
-    if (package.empty()) {
+    if (own.empty()) {
       throw std::runtime_error("package " + description +
                                " is not found; build and source the workspace or set " +
                                node.resolveName(file));
     }
-    path = package + "/config/joint_limits.yaml";
+    path = own;
   }
-  return loadJointLimits(path, readParameter<std::string>(node, profile, "default", "a name"));
+  return loadJointLimits(path, readParameter<std::string>(node, profile, "default", "a name"), own);
 }
 
 }  // namespace coglab_rt

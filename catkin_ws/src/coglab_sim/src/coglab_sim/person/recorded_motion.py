@@ -23,6 +23,8 @@ from scipy.spatial.transform import Rotation
 
 MOST_SAMPLES = 1_000_000
 """Samples that are read of one file; a day at 10 Hz."""
+FASTEST = 10.0
+"""m/s between two samples; a tracked hand or object that is faster was lost, or is another one."""
 
 
 class RecordingError(ValueError):
@@ -83,6 +85,17 @@ def load_recording(path: str, frame: str = "human_hand", world: str = "world", t
         raise RecordingError(f"{path}: no samples in it")
     begin = min(track[0][0] for track in samples.values())
     return Recording({name: _track(f"{path}: frame '{name}'", rows, begin) for name, rows in samples.items()})
+
+
+def _require_no_jump(where: str, track: Track) -> None:
+    steps = np.linalg.norm(np.diff(track.positions, axis=0), axis=1)
+    speeds = steps / np.diff(track.stamps)
+    if len(speeds) and float(np.max(speeds)) > FASTEST:
+        worst = int(np.argmax(speeds))
+        raise RecordingError(
+            f"{where}: jumps by {steps[worst]:.2f} m after {track.stamps[worst]:.2f} s ({speeds[worst]:.0f} m/s, "
+            f"allowed {FASTEST:.0f}); cut the recording, or set allow_jumps: true"
+        )
 
 
 Rows = dict[str, list[tuple[float, ...]]]
@@ -215,6 +228,8 @@ class PlaybackSettings:
     """it goes on when the robot's hand is this near to the first frame"""
     wait_limit: float = 10.0
     """or after so long"""
+    allow_jumps: bool = False
+    """frames may be faster than FASTEST between two samples"""
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.time_scale) and self.time_scale > 0.0):
@@ -267,6 +282,9 @@ class Playback:
                 f"({', '.join(recording.tracks)}) is one that perception shows; "
                 "see rename"
             )
+        if not settings.allow_jumps:
+            for name, track in kept.items():
+                _require_no_jump(f"{settings.file}: frame '{name}'", track)
         return Playback(Recording(kept), settings)
 
     @property

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import threading
-import time
 from collections.abc import Callable, Mapping
 
 import numpy as np
@@ -71,8 +70,7 @@ class Vision:
     """What the perception stand-in sees. Thread-safe.
 
     `board`: as it is. It stands still and is seen once, as far off as everything that the tracker sees.
-    `clock` gives the time of the stamps (s); `steady` that of arrivals, which runs on when the
-    other stands still.
+    `clock` gives the time (s), for sights as well; it never goes back.
     """
 
     def __init__(
@@ -83,18 +81,16 @@ class Vision:
         seed: int,
         clock: Callable[[], float],
         partner_margin: float = 0.0,
-        steady: Callable[[], float] = time.monotonic,
     ) -> None:
         self.names, self.settings, self.seed = names, settings, seed
         self.board = Board(settings.calibration(seed) * board.frame, board.slots)
-        self.clock, self.steady = clock, steady
+        self.clock = clock
         self.choice = PartnerChoice(partner_margin)
         self.people = 0
         self._hands: list[np.ndarray] = []
         self._partner = ""
         self._changed = threading.Condition()
         self._trackers: dict[str, Tracker] = {}
-        self._arrived: dict[str, float] = {}
         self._visible = -math.inf
 
     # -- seeing ----------------------------------------------------------------------------------
@@ -106,7 +102,7 @@ class Vision:
         """
         now = self.clock()
         with self._changed:
-            self._visible = self.steady()
+            self._visible = now
             self.people = len(hands)
             self._hands = [hand.position for hand in hands.values()]
             self._partner = self.choice.choose(hands, robot)
@@ -122,10 +118,7 @@ class Vision:
     def _track(self, name: str, now: float, frame: Pose, robot: Pose | None, others: list[Pose]) -> list[Sight]:
         if name not in self._trackers:
             self._trackers[name] = Tracker(name, self.settings, self.seed)
-        sights = self._trackers[name].step(now, frame, robot, others)
-        if sights:
-            self._arrived[name] = self.steady()
-        return sights
+        return self._trackers[name].step(now, frame, robot, others)
 
     # -- answers ---------------------------------------------------------------------------------
 
@@ -191,14 +184,13 @@ class Vision:
     # -- judging ---------------------------------------------------------------------------------
 
     def _world_is_visible(self) -> bool:
-        return self.steady() - self._visible < OLDEST
+        return self.clock() - self._visible < OLDEST
 
     def _is_fresh(self, name: str) -> bool:
         tracker = self._trackers.get(name)
         if tracker is None or tracker.newest is None:
             return False
-        # By both clocks: the stamps' clock may stand still.
-        return self.clock() - tracker.newest.captured < OLDEST and self.steady() - self._arrived[name] < OLDEST
+        return self.clock() - tracker.newest.captured < OLDEST
 
     def _doubt(self, name: str) -> str:
         """The sentence if somebody's hand is meant and it cannot be told whose; else empty."""

@@ -93,7 +93,15 @@ def _read(path: str) -> dict[str, Any]:
         raise ConfigError(str(error)) from None
     values = _checked(document)
     _known_timing(path, str(values.get("timing", "")), values)
+    _region_in_order(path, values.get("handover", {}))
     return values
+
+
+def _region_in_order(path: str, handover: Mapping[str, Any]) -> None:
+    """ConfigError where the handover region is no box."""
+    low, high = handover.get("region_low"), handover.get("region_high")
+    if low is not None and high is not None and any(a >= b for a, b in zip(low, high, strict=True)):
+        raise ConfigError(f"{path}: handover.region_low {low} is not below region_high {high} (m, each axis)")
 
 
 def _checked(document: Document) -> dict[str, Any]:

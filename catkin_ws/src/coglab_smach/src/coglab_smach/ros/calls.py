@@ -12,6 +12,7 @@ from typing import Any
 import rospy
 from coglab_msgs.msg import ReasonCode
 from coglab_py.pace import Pace
+from coglab_py.steady import POLL, service_answers
 
 from coglab_smach.ports.pending import Pending, Permit, Polled, PortError, Threaded
 
@@ -73,22 +74,18 @@ def call_now(name: str, kind: Any, permit: Permit, wait: float = SERVICE_WAIT, *
 
 
 def _await_service(full: str, wait: float, permit: Permit) -> None:
-    """Until the service is registered; in short waits, so that a call that is given up leaves no thread behind."""
+    """Until the service answers; a call that is given up leaves no thread behind."""
     end = time.monotonic() + wait
-    while True:
+    permit.check()
+    while not service_answers(full):
         permit.check()
-        try:
-            rospy.wait_for_service(full, timeout=max(0.05, min(0.5, end - time.monotonic())))
-            return
-        except rospy.ROSException:
-            if rospy.is_shutdown():
-                raise PortError(
-                    f"service {full} was not called: this node shuts down", code=ReasonCode.PREEMPTED
-                ) from None
-            if time.monotonic() >= end:
-                raise PortError(
-                    f"service {full} is not there after {wait:.0f} s; is its node running?", code=ReasonCode.NODE_SILENT
-                ) from None
+        if rospy.is_shutdown():
+            raise PortError(f"service {full} was not called: this node shuts down", code=ReasonCode.PREEMPTED)
+        if time.monotonic() >= end:
+            raise PortError(
+                f"service {full} is not there after {wait:.0f} s; is its node running?", code=ReasonCode.NODE_SILENT
+            )
+        time.sleep(POLL)
 
 
 def mapped(pending: Pending, value: Callable[[Any], Any]) -> Pending:

@@ -21,6 +21,7 @@ from coglab_msgs.msg import (
     HandStatus,
     ReasonCode,
 )
+from coglab_py.steady import server_is_there, wait_for
 from std_msgs.msg import String
 
 from coglab_smach.ports.interfaces import HandState
@@ -34,17 +35,19 @@ SERVER_WAIT = 10.0
 class ActionCall(Pending):
     """One goal sent to an action server; the result's ``isOk`` decides, ``message`` is the reason."""
 
-    def __init__(self, client: actionlib.SimpleActionClient, name: str, goal: Any) -> None:
+    # Not actionlib.SimpleActionClient: it loses an end that comes while its send_goal() still runs.
+    def __init__(self, client: actionlib.ActionClient, name: str, goal: Any) -> None:
         self._client, self._name = client, name
         self._done = threading.Event()
         self._error: PortError | None = None
         self._result: Any = None
         self._lock = threading.Lock()
-        self._sent = self._cancelled = False
+        self._handle: actionlib.ClientGoalHandle | None = None
+        self._cancelled = False
         threading.Thread(target=self._send, args=(goal,), name=f"action:{name}", daemon=True).start()
 
     def _send(self, goal: Any) -> None:
-        if not self._client.wait_for_server(rospy.Duration(SERVER_WAIT)):
+        if not wait_for(lambda: self._cancelled or server_is_there(self._client), SERVER_WAIT):
             self._fail(
                 f"action {self._name} has no server after {SERVER_WAIT:.0f} s; is the hand node running?",
                 code=ReasonCode.NODE_SILENT,
@@ -54,16 +57,18 @@ class ActionCall(Pending):
             if self._cancelled:
                 self._fail(f"action {self._name} was cancelled before its goal was sent", code=ReasonCode.CANCELLED)
                 return
-            self._client.send_goal(goal, done_cb=self._on_done)
-            self._sent = True
+            self._handle = self._client.send_goal(goal, self._on_transition)
 
     def _fail(self, sentence: str, causes: tuple[str, ...] = (), code: int = 0) -> None:
         self._error = PortError(sentence, causes, code)
         self._done.set()
 
-    def _on_done(self, status: int, result: Any) -> None:
+    def _on_transition(self, handle: actionlib.ClientGoalHandle) -> None:
+        if handle.get_comm_state() != actionlib.CommState.DONE:
+            return
+        status, result = handle.get_goal_status(), handle.get_result()
         self._result = result
-        message = getattr(result, "message", "") or self._client.get_goal_status_text()
+        message = getattr(result, "message", "") or handle.get_goal_status_text()
         if status != GoalStatus.SUCCEEDED or (result is not None and not result.isOk):
             self._fail(
                 f"action {self._name} ended {GoalStatus.to_string(status)}",
@@ -85,8 +90,8 @@ class ActionCall(Pending):
         """End the action; a goal that is not sent yet never will be."""
         with self._lock:
             self._cancelled = True
-            if self._sent and not self._done.is_set():
-                self._client.cancel_goal()
+            if self._handle is not None and not self._done.is_set():
+                self._handle.cancel()
 
 
 class RosHand:
@@ -95,7 +100,7 @@ class RosHand:
     def __init__(self, namespace: str = "ih2_hand") -> None:
         self._ns = namespace
         self._clients = {
-            name: actionlib.SimpleActionClient(f"{namespace}/{name}", kind)
+            name: actionlib.ActionClient(f"{namespace}/{name}", kind)
             for name, kind in (
                 ("hand_open", HandOpenAction),
                 ("hand_close", HandCloseAction),

@@ -15,6 +15,10 @@ from coglab_smach.states.base import CoglabState, TimeLimit
 from coglab_smach.states.held import LOOK, HeldObject
 from coglab_smach.states.where import person_at, seen_at
 
+RESUMES = 3
+"""times that a motion is begun again where the arm did not come to its target, as when a person still holds on"""
+RESUME_AFTER = 1.0
+"""s from such an end to the next try"""
 FELL = 0.5
 """m below the person's hand in which an object is not in it any more"""
 
@@ -91,7 +95,8 @@ class SwitchController(CoglabState):
 
 class PtpMotion(CoglabState):
     """Point-to-point motion to a named posture of the configuration (``postures.<name>``); 'home' is
-    coglab_home_robot. It may take ``ptp_timeout`` beyond half as long again as its limits and its way ask for."""
+    coglab_home_robot. It may take ``ptp_timeout`` beyond half as long again as its limits and its way ask for. Where
+    something keeps the arm from its target the motion is begun again, RESUMES times at most."""
 
     default_time_limit = 20.0
     owns_motion = True
@@ -105,21 +110,34 @@ class PtpMotion(CoglabState):
         speed = [float(v) for v in self.ctx.config.get("ptp_velocity", [])]
         arm = self.ctx.arm
         self.await_pending(arm.switch_controller("ptp"), "switching to controller 'ptp'", 5.0)
+        look = self._look_after(ud)
+        for tries in range(RESUMES + 1):
+            try:
+                self._move(target, speed, look)
+                break
+            except PortError as error:
+                if error.code != ReasonCode.TARGET_NOT_REACHED or tries == RESUMES:
+                    raise
+            self.allow(2.0 * RESUME_AFTER)
+            self.pause(RESUME_AFTER)
+        self._verify(target)
+        return "succeeded"
+
+    def _move(self, target: list[float], speed: list[float], look: Callable[[], object]) -> None:
+        arm = self.ctx.arm
         here = arm.joint_positions()
         if here is not None:
             self.allow(
                 float(self.ctx.config.get("ptp_timeout", 5.0))
                 + 1.5 * ptp_time(arm.motion_limits(), here, target, speed)
             )
-        motion, look = arm.move_ptp(target, speed), self._look_after(ud)
+        motion = arm.move_ptp(target, speed)
         self.await_pending(
             Polled(lambda: bool(look()) or motion.done(), motion.result, motion.cancel),
             f"the motion to posture '{self.posture}'",
             pace=arm.speed_scale,
             code=ARM,
         )
-        self._verify(target)
-        return "succeeded"
 
     def _look_after(self, ud: Any) -> Callable[[], object]:
         """What is to be looked at again and again on the way: it raises what ends the motion, and returns nothing."""

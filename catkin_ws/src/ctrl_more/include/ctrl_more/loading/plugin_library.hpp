@@ -36,9 +36,12 @@ class PluginLibrary {
   struct InMemory;
 
   PluginLibrary(std::string path, PluginTypes& list) : path_(std::move(path)), list_(list) {}
-  void load(InMemory& memory);
+  void mapCopy(InMemory& memory, const std::string& copy);
+  void mapAgain(const InMemory& memory);
+  void expectTypes(const std::vector<PluginTypes::Refusal>& refused) const;
+  void map(const std::string& file);
 
-  std::string path_;
+  std::string path_, mapped_;  // the user's file, and the copy of it that was opened
   PluginTypes& list_;
   std::vector<std::string> types_;
   void* handle_ = nullptr;  // of the dynamic linker

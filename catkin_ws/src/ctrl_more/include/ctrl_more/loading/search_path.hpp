@@ -31,4 +31,7 @@ class SearchPath {
   std::vector<std::string> extra_;
 };
 
+/// Folder of the ctrl_more library, or of the program that contains it.
+std::string coreFolder();
+
 }  // namespace ctrl_more

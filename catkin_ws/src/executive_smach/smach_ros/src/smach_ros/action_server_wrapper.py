@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import threading
+import time
 import traceback
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 import rospy
 import smach
+from actionlib.action_server import ActionServer
 from actionlib.simple_action_server import SimpleActionServer
 
 
@@ -91,6 +93,13 @@ class ActionServerWrapper:
             self._server_name, self._action_spec, execute_cb=self._execute, auto_start=False
         )
         self._action_server.register_preempt_callback(self._on_cancel)
+        self._action_server.action_server = _SteadyActionServer(
+            self._server_name,
+            self._action_spec,
+            self._action_server.internal_goal_callback,
+            self._action_server.internal_preempt_callback,
+            auto_start=False,
+        )
         self._action_server.start()
 
     def _on_cancel(self) -> None:
@@ -165,3 +174,29 @@ class ActionServerWrapper:
         for slot, key in keys.items():
             setattr(feedback, slot, userdata[key])
         self._action_server.publish_feedback(feedback)
+
+
+class _SteadyActionServer(ActionServer):
+    """Publishes its status by the steady clock: a step of `/clock` backwards ends actionlib's timer."""
+
+    @property
+    def status_frequency(self) -> float:
+        """0, for which actionlib makes no timer."""
+        return 0.0
+
+    @status_frequency.setter
+    def status_frequency(self, frequency: float) -> None:
+        self._frequency = frequency
+
+    def initialize(self) -> None:
+        super().initialize()
+        if self._frequency > 0.0:
+            threading.Thread(target=self._publish, name="action_status", daemon=True).start()
+
+    def _publish(self) -> None:
+        while not rospy.is_shutdown():
+            time.sleep(1.0 / self._frequency)
+            try:
+                self.publish_status_async(None)
+            except rospy.ROSException:  # shutdown has closed the topic
+                return

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import threading
+import time
 import traceback
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
@@ -11,7 +12,10 @@ from typing import Any
 import rospy
 import smach
 
-from smach_ros.util import POLL, callback_userdata, check_slots, register_callback
+from smach_ros.util import POLL, callback_userdata, check_slots, register_callback, service_answers
+
+#: How often (s) the master is asked for a service that is not there yet.
+SERVICE_POLL = 0.2
 
 
 class ServiceState(smach.State):
@@ -101,21 +105,17 @@ class ServiceState(smach.State):
     def _await_service(self) -> str | None:
         """None when the service is there, else the outcome."""
         said = False
-        while True:
+        while not service_answers(self._service_name):
             if self.preempt_requested():
                 self.service_preempt()
                 return "preempted"
             if rospy.is_shutdown():
                 return "aborted"
-            try:
-                rospy.wait_for_service(self._service_name, timeout=1.0)
-                return None
-            except rospy.ROSInterruptException:
-                return "aborted"
-            except rospy.ROSException:
-                if not said:
-                    said = True
-                    smach.logwarn(f"waiting for service '{rospy.resolve_name(self._service_name)}'")
+            if not said:
+                said = True
+                smach.logwarn(f"waiting for service '{rospy.resolve_name(self._service_name)}'")
+            time.sleep(SERVICE_POLL)
+        return None
 
     def _make_request(self, ud: Any) -> Any:
         request = self._service_spec._request_class() if self._request is None else copy.deepcopy(self._request)

@@ -4,11 +4,13 @@ shutdown.
 
 from __future__ import annotations
 
+import socket
 import threading
 import time
 from collections.abc import Callable
 from typing import Any
 
+import rosgraph
 import rospy
 import smach
 
@@ -29,8 +31,9 @@ def seconds(duration: Any) -> float | None:
 
 
 class TimeLimit:
-    """A limit in ROS time that also runs while the ROS clock is silent.
+    """A limit by the steady clock; with simulated time, by `/clock` while that runs.
 
+    Steps of the wall clock, and of `/clock` backwards or at its first message, count nothing.
     `limit`: rospy.Duration or seconds; None or 0: no limit.
 
     Example::
@@ -43,19 +46,39 @@ class TimeLimit:
     def __init__(self, limit: Any) -> None:
         self.limit = seconds(limit) or 0.0
         self._spent = 0.0
-        self._ros = rospy.get_time()
-        self._moved = time.monotonic()
+        self._ros, self._moved = _simulated_time(), time.monotonic()
 
     def expired(self) -> bool:
         """Whether the limit is over; to be asked regularly. Example: `if limit.expired(): ...`."""
         if self.limit <= 0.0:
             return False
-        ros, steady = rospy.get_time(), time.monotonic()
+        ros, steady = _simulated_time(), time.monotonic()
+        passed = max(0.0, steady - self._moved - (CLOCK_SILENCE if self._ros else 0.0))
         if ros != self._ros:
-            self._spent += max(0.0, ros - self._ros)
-            self._ros, self._moved = ros, steady
-        silence = max(0.0, steady - self._moved - CLOCK_SILENCE)
-        return self._spent + silence >= self.limit
+            self._spent += max(passed, ros - self._ros if self._ros else 0.0)
+            self._ros, self._moved, passed = ros, steady, 0.0
+        return self._spent + passed >= self.limit
+
+
+def _simulated_time() -> float:
+    """The time on `/clock`, s; 0 before its first message, and without simulated time."""
+    return 0.0 if rospy.rostime.is_wallclock() else float(rospy.get_time())
+
+
+def service_answers(name: str) -> bool:
+    """Whether a service is registered and its node takes connections.
+
+    rospy.wait_for_service measures its time-out by the wall clock, which may step.
+    """
+    caller, name = rospy.get_name(), rospy.resolve_name(name)
+    try:
+        address = rospy.core.parse_rosrpc_uri(rosgraph.Master(caller).lookupService(name))
+        with socket.create_connection(address, timeout=1.0) as link:
+            header = {"probe": "1", "md5sum": "*", "callerid": caller, "service": name}
+            rosgraph.network.write_ros_handshake_header(link, header)
+        return True
+    except Exception:  # of the socket, of XML-RPC, or of the master that does not know it
+        return False
 
 
 def callback_userdata(ud: Any, cb: Callable | None, state: smach.State) -> smach.Remapper:

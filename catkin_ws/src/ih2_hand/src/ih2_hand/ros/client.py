@@ -8,6 +8,7 @@ from typing import Any
 
 import actionlib
 import rospy
+from actionlib.simple_action_client import SimpleGoalState
 from coglab_msgs.msg import (
     FingerContact,
     FingerPositions,
@@ -21,6 +22,7 @@ from coglab_msgs.msg import (
     HandPreshapeGoal,
     HandStatus,
 )
+from coglab_py.steady import server_is_there
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -38,7 +40,7 @@ class HandClient:
     """Talks to one hand node (`hand`) and, in simulation, to its emulator (`cell`); the names are
     relative to the caller's namespace. Every wait has a time limit and raises TimeoutError."""
 
-    def __init__(self, hand: str = "ih2_hand", cell: str = "coglab_sim", limit: float = 20.0):
+    def __init__(self, hand: str = "ih2_hand", cell: str = "coglab_sim", limit: float = 60.0):
         self.limit = limit
         self.status = HandStatus()
         self.statuses: list[HandStatus] = []
@@ -79,8 +81,7 @@ class HandClient:
     def wait_ready(self) -> None:
         """Until the node is connected and its actions are there."""
         for name, client in self.clients.items():
-            if not client.wait_for_server(rospy.Duration(self.limit)):
-                raise TimeoutError(f"no action server {name}")
+            self.wait(lambda client=client: server_is_there(client), f"action server {name}")
         self.wait(lambda: self.status.connected, "hand connected")
 
     def send(self, name: str, *arguments: Any) -> Any:
@@ -92,8 +93,7 @@ class HandClient:
     def result(self, name: str) -> Any:
         """Result of the goal sent last."""
         client = self.clients[name]
-        if not client.wait_for_result(rospy.Duration(self.limit)):
-            raise TimeoutError(f"no result of {name} within {self.limit} s")
+        self.wait(lambda: client.simple_state == SimpleGoalState.DONE, f"result of {name}")
         return client.get_result()
 
     def run(self, name: str, *arguments: Any) -> Any:
@@ -102,9 +102,9 @@ class HandClient:
         return self.result(name)
 
     def fresh_status(self) -> HandStatus:
-        """A status whose poll began after this call."""
-        now = rospy.Time.now()
-        self.wait(lambda: self.status.header.stamp > now, "fresh hand_status")
+        """A status whose poll began after this call; not by stamps, as the clock may step."""
+        count = len(self.statuses)
+        self.wait(lambda: len(self.statuses) >= count + 5, "fresh hand_status")
         return self.status
 
     def _publish(self, publisher: rospy.Publisher, message: Any) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from typing import Any
 
+from coglab_py.steady import ClockWatch
 from diagnostic_msgs.msg import DiagnosticStatus
 from diagnostic_updater import DiagnosticStatusWrapper, Updater
 
@@ -22,12 +23,14 @@ class Diagnostics:
 
     def __init__(self, node: Any):
         self._node = node
+        self._clock = ClockWatch()
         self._updater = Updater()
         self._updater.add("hand", self._fill)
         self._next = 0.0
 
     def tick(self) -> None:
         """Publish when a second has passed."""
+        self._clock.look()
         if time.monotonic() >= self._next:
             self.publish()
 
@@ -44,7 +47,9 @@ class Diagnostics:
             level = DiagnosticStatus.ERROR
         elif not node.calibrated or node.event_code not in NEUTRAL:
             level = DiagnosticStatus.WARN
-        status.summary(level, node.message)
+        if self._clock.fault:
+            level = max(level, DiagnosticStatus.WARN)
+        status.summary(level, "; ".join(filter(None, (node.message, self._clock.fault))))
         values = {
             "port": node.port,
             "connected": driver is not None,

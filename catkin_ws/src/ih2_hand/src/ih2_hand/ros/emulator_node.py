@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import rospy
 from coglab_msgs.msg import FingerContact, FingerPositions, MotorCommands, MotorStates
+from coglab_py.steady import SteadyTimer
 from std_msgs.msg import String
 
 from ih2_hand.emulator.physical_motor import MotorState
@@ -26,14 +27,13 @@ class EmulatorNode:
         else:
             rospy.Subscriber("finger_contact", FingerContact, self._on_contact, queue_size=5)
         rospy.Subscriber("hand_fault", String, self._on_fault, queue_size=5)
-        self._timer = rospy.Timer(rospy.Duration(1.0 / PUBLISH_HZ), self._publish)
+        self._timer = SteadyTimer(1.0 / PUBLISH_HZ, self._publish, "finger_positions")
         # rospy may end without a signal (rosnode kill): the process ends with it.
         rospy.on_shutdown(server.request_shutdown)
 
     def stop(self) -> None:
         """Publish no more: to be called before rospy shuts down."""
         self._timer.shutdown()
-        self._timer.join(1.0)
 
     @staticmethod
     def announce(path: str) -> None:
@@ -76,7 +76,7 @@ class EmulatorNode:
         except ValueError as error:
             rospy.logwarn("%s", error)
 
-    def _publish(self, _: rospy.timer.TimerEvent) -> None:
+    def _publish(self) -> None:
         message = FingerPositions()
         message.header.stamp = rospy.Time.now()
         with self._server.lock:

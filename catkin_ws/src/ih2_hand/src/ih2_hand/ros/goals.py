@@ -33,14 +33,17 @@ from coglab_msgs.msg import (
     HandPreshapeResult,
     HandStatus,
 )
+from coglab_py.steady import SteadyTimer, ending, worker
 
 from ih2_hand.errors import HandError
 from ih2_hand.progress import RESENDS, Task, Verdict
 from ih2_hand.reasons import Reason, reason_of
-from ih2_hand.ros.shutdown import ending
 
 SETTLE_S = 0.02
 """Polls begun earlier than this after a command may still show the status before it."""
+
+LONGEST_GAP_S = 0.1
+"""What lies between two polls counts as no more: on a busy computer nobody looked, and a finger may have moved."""
 
 BACKLOG = 50
 """Requests that may wait besides goals."""
@@ -78,19 +81,42 @@ class Running:
     handle: Any
     task: Task
     begun: float
-    begun_stamp: rospy.Time
+    sent: float
     last_status: float
     driver: Any = None
     fillers: int = 0
     resends: int = 0
+    looked: float = 0.0  # when the last poll began
+    watched: float = 0.0  # s after the command, LONGEST_GAP_S at most of each gap between polls
 
 
 class HandActionServer(actionlib.ActionServer):
-    """An action server that no cancel can close for the future.
+    """An action server that no cancel and no step of the clock can close for the future.
 
     actionlib refuses every goal that is older than the newest stamp of a cancel request: one
-    request with a stamp of the year 2106 and no goal is ever taken again.
+    request with a stamp of the year 2106 and no goal is ever taken again. Its timer publishes no
+    status while /clock stands still, and ends for good when it goes back.
     """
+
+    @property
+    def status_frequency(self) -> float:
+        """0, for which actionlib makes no timer of its own."""
+        return 0.0
+
+    @status_frequency.setter
+    def status_frequency(self, frequency: float) -> None:
+        self._frequency = frequency
+
+    def initialize(self) -> None:
+        super().initialize()
+        if self._frequency > 0.0:
+            period = 1.0 / self._frequency
+            self.status_timer = SteadyTimer(period, lambda: self.publish_status_async(None), "action_status")
+
+    def internal_goal_callback(self, goal: Any) -> None:
+        if self.last_cancel > rospy.Time.now():  # the clock went back
+            self.last_cancel = rospy.Time()
+        super().internal_goal_callback(goal)
 
     def internal_cancel_callback(self, goal_id: GoalID) -> None:
         goal_id.stamp = min(goal_id.stamp, rospy.Time.now())
@@ -105,7 +131,6 @@ class GoalQueue:
         self._mailbox: queue.Queue[Item] = queue.Queue()
         self._running: Running | None = None
         self._newest: Any = None  # the goal that came last
-        self._status: rospy.Subscriber | None = None
         self._servers = {}
         for name, (action, _, _) in SPECS.items():
             self._servers[name] = HandActionServer(
@@ -115,7 +140,7 @@ class GoalQueue:
                 lambda handle, name=name: self._mailbox.put(Item("cancel", name, handle)),
                 auto_start=False,
             )
-        self._thread = threading.Thread(target=self._work, name="goals", daemon=True)
+        self._thread = worker(self._work, "goals")
 
     def start(self) -> None:
         """Offer the actions."""
@@ -127,7 +152,8 @@ class GoalQueue:
         """Abort what runs and end the thread, bounded; the results are sent before it returns."""
         was_running = self._running is not None
         self._mailbox.put(Item("quit"))
-        self._thread.join(1.0)
+        if threading.current_thread() is not self._thread:
+            self._thread.join(1.0)
         if was_running:
             time.sleep(SENDING_S)
 
@@ -147,6 +173,11 @@ class GoalQueue:
             self._mailbox.put(Item("call", content=function))
         else:
             rospy.logwarn_throttle(1.0, "hand: %d requests wait; further ones are dropped", BACKLOG)
+
+    def polled(self, status: HandStatus, begun: float) -> None:
+        """The goal under way takes a poll of the hand, which began at `begun` (monotonic s)."""
+        if self._running:
+            self._mailbox.put(Item("status", content=(status, begun)))
 
     def _on_goal(self, name: str, handle: Any) -> None:
         self._newest = handle
@@ -184,19 +215,16 @@ class GoalQueue:
                 item.content.set_accepted()
                 replaced = Verdict("replaced by a new goal before it began", reason=Reason.SUPERSEDED)
                 item.content.set_canceled(_result(item.name, replaced), replaced.text)
-            if not self._running:
-                self._unsubscribe()
         elif item.kind == "cancel":
             if running and item.content == running.handle:
                 self._cancel("preempted; fingers stopped", Reason.CANCELLED)
-                self._unsubscribe()
         elif item.kind == "stop":
             self._end_running(item.name, Reason.STOPPING)
         elif item.kind == "call":
             item.content()
         elif running:
             if item.kind == "status":
-                self._step(running, item.content)
+                self._step(running, *item.content)
             if self._running is running:
                 self._watch_time(running)
 
@@ -216,30 +244,24 @@ class GoalQueue:
             cancelled = Verdict("cancelled before it began", reason=Reason.CANCELLED)
             handle.set_canceled(_result(name, cancelled))
             return
-        if self._status is None:  # else the replaced goal's subscription goes on
-            self._status = rospy.Subscriber(
-                rospy.resolve_name("~hand_status"), HandStatus, self._on_status, queue_size=2, tcp_nodelay=True
-            )
         now = time.monotonic()
-        self._running = Running(name, handle, task, now, rospy.Time.now(), now)
+        self._running = Running(name, handle, task, now, now, now)
         self._begin(self._running)
-
-    def _on_status(self, status: HandStatus) -> None:
-        # Only what this node has read from the hand: anybody can publish on a topic.
-        if status._connection_header.get("callerid") == rospy.get_name():
-            self._mailbox.put(Item("status", content=status))
 
     def _begin(self, running: Running) -> None:
         driver = self._owner.connected_driver()
         running.driver = driver
         running.fillers = driver.counters.fillers  # before: a stop during the command counts too
         running.task.begin(driver)
-        running.begun_stamp = rospy.Time.now()
+        running.sent = time.monotonic()
         if not running.resends:
-            running.begun = time.monotonic()
+            running.begun = running.sent
 
-    def _step(self, running: Running, status: HandStatus) -> None:
+    def _step(self, running: Running, status: HandStatus, begun: float) -> None:
         running.last_status = time.monotonic()
+        since = max(running.looked, running.begun)
+        running.looked = max(begun, since)
+        running.watched += min(running.looked - since, LONGEST_GAP_S)
         if not status.connected:
             self._fail(status.message, Reason.HAND_LINK_LOST)
             return
@@ -249,10 +271,9 @@ class GoalQueue:
         if running.driver.counters.fillers != running.fillers:
             self._resend(running)
             return
-        age = (status.header.stamp - running.begun_stamp).to_sec()
-        if not status.motors or age < SETTLE_S:
+        if not status.motors or begun - running.sent < SETTLE_S:
             return
-        verdict = running.task.judge(status.motors, time.monotonic() - running.begun)
+        verdict = running.task.judge(status.motors, running.watched)
         _, _, feedback = SPECS[running.name]
         running.handle.publish_feedback(
             feedback(verdict.text, verdict.status_code, [motor.position for motor in status.motors])
@@ -312,15 +333,8 @@ class GoalQueue:
     def _finish(self, verdict: Verdict) -> None:
         running = self._running
         self._running = None
-        self._unsubscribe()
         assert running is not None
         self._finish_handle(running.name, running.handle, verdict)
-
-    def _unsubscribe(self) -> None:
-        """Leave hand_status; in a thread, as it asks the master and the result need not wait."""
-        if self._status:
-            status, self._status = self._status, None
-            threading.Thread(target=status.unregister, daemon=True).start()
 
     def _finish_handle(self, name: str, handle: Any, verdict: Verdict) -> None:
         result = _result(name, verdict)

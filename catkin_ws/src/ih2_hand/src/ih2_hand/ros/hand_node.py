@@ -9,7 +9,8 @@ from typing import Any
 
 import rospy
 from coglab_msgs.msg import HandStatus
-from coglab_py import parameters
+from coglab_py import parameters, steady
+from coglab_py.steady import ending
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger, TriggerResponse
@@ -35,7 +36,6 @@ from ih2_hand.reasons import NEUTRAL, Reason, reason_of
 from ih2_hand.ros.diagnostics import Diagnostics
 from ih2_hand.ros.goals import GoalQueue
 from ih2_hand.ros.messages import joint_state, motor_status
-from ih2_hand.ros.shutdown import ending
 from ih2_hand.ros.tracing import TracePublisher
 from ih2_hand.wire_choices import WIRE
 
@@ -80,6 +80,8 @@ class HandNode(HandMemory):
         self.port = self._port_setting or ONLY_DEVICE
         self._event = (Reason.HAND_LINK_LOST, "not connected yet")
         self._last_status = HandStatus()
+        self._last_begun = 0.0
+        """When the poll behind it began, monotonic s."""
         self._contradictions = 0
         self._lost_lock = threading.Lock()
         self._ended = threading.Event()
@@ -90,20 +92,21 @@ class HandNode(HandMemory):
         self.goals = GoalQueue(self)
         rospy.Service("~stop", Trigger, self._on_stop)
         rospy.Subscriber("~hand_calibration", String, self._on_calibration, queue_size=5)
-        self._thread = threading.Thread(target=self._poll, name="poll", daemon=True)
+        self._thread = steady.worker(self._poll, "poll")
 
-    def run(self) -> None:
+    def run(self) -> int:
         """Work until the node is shut down: a goal under way is aborted and the fingers stopped;
-        without one they keep what they do."""
+        without one they keep what they do. The exit status."""
         # Before rospy closes the topics, so that who waits for the goal learns how it ended.
         rospy.on_shutdown(self.goals.shutdown)
         self._thread.start()
         self.goals.start()
-        rospy.spin()
+        status = steady.spin()
         self._ended.set()
         self._thread.join(2.0)
         if self.driver:
             self.driver.close()
+        return status
 
     # -- connection ------------------------------------------------------------------------------
 
@@ -217,7 +220,7 @@ class HandNode(HandMemory):
             self._ended.wait(next_time - time.monotonic())
 
     def _poll_once(self) -> None:
-        driver, stamp = self.driver, rospy.Time.now()
+        driver, stamp, begun = self.driver, rospy.Time.now(), time.monotonic()
         readings: list[dict[str, Any]] = []
         if driver is not None and not self.calibrating:
             try:
@@ -235,16 +238,16 @@ class HandNode(HandMemory):
                 if not self.calibrating:
                     self.lost(error, driver)
                 return
-        self._publish(readings, stamp)
+        self._publish(readings, stamp, begun)
 
-    def _publish(self, readings: list[dict[str, Any]], stamp: rospy.Time) -> None:
+    def _publish(self, readings: list[dict[str, Any]], stamp: rospy.Time, begun: float) -> None:
         status = HandStatus(motors=[motor_status(reading) for reading in readings])
         if readings and not self.calibrating:
             if self.look(status.motors):
                 self.event("the hand is open: it holds nothing")
             self._joints.publish(joint_state(readings, stamp))
         status.header.stamp = stamp
-        self._last_status = status
+        self._last_status, self._last_begun = status, begun
         self._fill_and_send(status)
 
     def _fill_and_send(self, status: HandStatus) -> None:
@@ -256,6 +259,7 @@ class HandNode(HandMemory):
             status.motors = []  # read before it began
         status.event_code, status.message = self._event
         self._publisher.publish(status)
+        self.goals.polled(status, self._last_begun)
 
     # -- goals -----------------------------------------------------------------------------------
 

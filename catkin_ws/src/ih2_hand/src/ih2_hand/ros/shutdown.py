@@ -6,11 +6,7 @@ import threading
 from typing import Any
 
 import rospy
-
-
-def ending() -> bool:
-    """Whether rospy shuts down; true before it closes the topics, unlike rospy.is_shutdown()."""
-    return rospy.core.is_shutdown_requested() or rospy.is_shutdown()
+from coglab_py.steady import ending
 
 
 def end_quietly() -> None:

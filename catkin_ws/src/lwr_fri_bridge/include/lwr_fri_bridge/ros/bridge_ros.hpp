@@ -101,7 +101,7 @@ class BridgeRos : public coglab_rt::ArmPort {
   std::unique_ptr<TargetTopic> target_;
   ros::Subscriber events_;
   ros::ServiceServer command_;
-  ros::Timer diagnostics_timer_;
+  ros::SteadyTimer diagnostics_timer_;
   BoundedThread publisher_;
   sem_t new_sample_;
   std::int64_t publish_period_ns_ = 5'000'000;

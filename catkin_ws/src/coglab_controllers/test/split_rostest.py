@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The true path through /robot and the simulated cell: load, ptp, reach, switch, refuse."""
+"""Bridge and controller manager as two nodes, and the simulated cell: load, ptp, reach, switch, refuse."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from coglab_msgs.msg import ReasonCode
 from coglab_msgs.srv import AddPtpRequest, LwrCommand
 from diagnostic_msgs.msg import DiagnosticArray
-from robot_fixture import HOME, Robot, end_within, robot_processes, wait_until
+from robot_fixture import HOME, Robot, end_all, robot_processes, wait_until
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import JointState
 
 GOAL = (0.80, 0.0, 0.45)
 
 
-class TruePath(unittest.TestCase):
+class Split(unittest.TestCase):
     """One robot for all tests; they run in the order of their names."""
 
     @classmethod
@@ -55,17 +55,15 @@ class TruePath(unittest.TestCase):
         answer = robot.switch("dmp")
         self.assertEqual(answer.controller_type, "coglab/DmpController")
         robot.see_hand(GOAL)
-        wait_until(lambda: robot.execute().success, 5.0, "execute_dmp")
-        wait_until(lambda: robot.feedback.state == "running", 5.0, "running")
-        wait_until(
-            lambda: self.frames.can_transform("lwr_base_link", "dmp_goal", rospy.Time(0)), 5.0, "tf2 frame dmp_goal"
-        )
+        wait_until(lambda: robot.execute().success, "execute_dmp")
+        wait_until(lambda: robot.feedback.state == "running", "running")
+        wait_until(lambda: self.frames.can_transform("lwr_base_link", "dmp_goal", rospy.Time(0)), "tf2 frame dmp_goal")
         goal = self.frames.lookup_transform("lwr_base_link", "dmp_goal", rospy.Time(0))
         place = goal.transform.translation
         for value, wanted in zip((place.x, place.y, place.z), GOAL, strict=False):
             self.assertAlmostEqual(value, wanted, delta=0.01)
-        wait_until(lambda: robot.feedback.state == "reached", 10.0, "reached")
-        wait_until(lambda: robot.feedback.remaining_distance < 0.002, 5.0, "2 mm from the goal")
+        wait_until(lambda: robot.feedback.state == "reached", "reached")
+        wait_until(lambda: robot.feedback.remaining_distance < 0.002, "2 mm from the goal")
         phases = [m.phase for m in robot.feedbacks if m.state == "running"]
         self.assertTrue(all(a >= b for a, b in zip(phases[-20:], phases[-19:], strict=False)))
 
@@ -73,8 +71,8 @@ class TruePath(unittest.TestCase):
         robot = self.robot
         robot.go(HOME)
         robot.switch("dmp")
-        self.assertTrue(robot.execute().success)
-        wait_until(lambda: robot.feedback.state == "running" and robot.feedback.phase < 0.6, 5.0, "in mid-motion")
+        self.assertTrue(robot.execute(dmp_ratio=6.0).success)
+        wait_until(lambda: robot.feedback.state == "running" and robot.feedback.phase < 0.8, "in mid-motion")
         refused = robot.add_ptp(HOME)
         self.assertEqual(refused.status, AddPtpRequest.REJECTED)
         self.assertEqual(refused.reason_code, ReasonCode.NOT_ACTIVE)
@@ -88,43 +86,36 @@ class TruePath(unittest.TestCase):
         robot = self.robot
         robot.switch("dmp")
         robot.see_hand(GOAL)
-        rospy.sleep(0.3)
-        answer = robot.execute(dmp_ratio=6.0)
-        self.assertTrue(answer.success, answer.message)
-        rospy.sleep(0.5)
+        wait_until(lambda: robot.execute(dmp_ratio=6.0).success, "execute_dmp")
+        wait_until(lambda: robot.feedback.state == "running", "running")
         robot.see_hand(None)
-        wait_until(lambda: robot.feedback.state == "aborted", 5.0, "aborted")
+        wait_until(lambda: robot.feedback.state == "aborted", "aborted")
         self.assertEqual(robot.feedback.reason_code, ReasonCode.GOAL_LOST)
         self.assertIn("lost", robot.feedback.reason)
-        wait_until(lambda: max(abs(v) for v in robot.joints.velocity) < 0.01, 3.0, "standing still")
+        wait_until(lambda: max(abs(v) for v in robot.joints.velocity) < 0.01, "standing still")
 
     def test_5_cancel_ends_a_motion_and_its_queue_and_answers_when_the_arm_stands(self) -> None:
         robot = self.robot
         robot.switch("ptp")
-        wait_until(lambda: robot.status.standing, 5.0, "standing")
+        wait_until(lambda: robot.status.standing, "standing")
         there = [HOME[0] + 0.6, *HOME[1:]]
         ids = [robot.add_ptp(there).ptp_id, robot.add_ptp(HOME).ptp_id]
-        wait_until(lambda: max(abs(v) for v in robot.joints.velocity) > 0.1, 5.0, "in motion")
-        wait_until(lambda: not robot.status.standing, 5.0, "status of a moving arm")
+        wait_until(lambda: max(abs(v) for v in robot.joints.velocity) > 0.1, "in motion")
+        wait_until(lambda: not robot.status.standing, "status of a moving arm")
         answer = robot.cancel("ptp", "a test gives up")
         self.assertTrue(answer.success, answer.message)
         self.assertTrue(answer.was_running)
         self.assertEqual(answer.reason_code, ReasonCode.NONE)
-        before = robot.arm()
-        wait_until(lambda: all(i in robot.unfinished for i in ids), 5.0, "unfinished_ptp")
+        wait_until(lambda: all(i in robot.unfinished for i in ids), "unfinished_ptp")
         for i in ids:
             self.assertEqual(robot.unfinished[i].reason_code, ReasonCode.CANCELLED)
             self.assertNotIn(i, robot.finished)
         wait_until(
             lambda: robot.status.standing and robot.status.reason_code == ReasonCode.CANCELLED,
-            5.0,
             "status after the cancel",
         )
         self.assertIn("a test gives up", robot.status.reason)
-        # The simulated arm follows its set-point with a delay; after that nothing moves any more.
-        rospy.sleep(0.3)
-        for now, then in zip(robot.arm(), before, strict=True):
-            self.assertAlmostEqual(now, then, delta=0.03)
+        self.assertGreater(abs(robot.arm()[0] - there[0]), 0.05, "it went on to its target")
         again = robot.cancel("dmp")
         self.assertTrue(again.success, again.message)
         self.assertFalse(again.was_running)
@@ -144,7 +135,7 @@ class TruePath(unittest.TestCase):
         rospy.Subscriber("/rosout", Log, lambda m: told.append(m.msg))
         rospy.Subscriber("/diagnostics", DiagnosticArray, diagnosed)
         foreign = rospy.Publisher("lwr/target_joint_states", JointState, queue_size=1)
-        wait_until(lambda: foreign.get_num_connections() > 0 and counted, 10.0, "connections")
+        wait_until(lambda: foreign.get_num_connections() > 0 and counted, "connections")
         before = robot.arm()
 
         def publish(cycles: int) -> None:
@@ -161,37 +152,32 @@ class TruePath(unittest.TestCase):
             return sum(counted.get(key, 0) for key in keys)
 
         # A queue of one message loses some on a busy machine, so that the counter ends this, not a number sent.
-        publish(150)
-        until = rospy.get_time() + 15.0
-        while refused() <= 100 and rospy.get_time() < until:
+        while refused() <= 100:  # the time limit of the rostest ends it
             publish(20)
-        self.assertGreater(refused(), 100)
         for now, then in zip(robot.arm(), before, strict=True):
             self.assertAlmostEqual(now, then, delta=0.01)
         wait_until(
             lambda: any(f"target_joint_states of {rospy.get_name()} refused" in line for line in told),
-            8.0,
             "the reason with the publisher's name",
         )
-        helps = "rosservice call " + rospy.resolve_name("controller_manager/switch_controller") + " \"''\""
-        if rospy.get_param("~split", False):  # the bridge knows only that another node moves the arm
-            helps = "/controller_manager moves the arm; end that one's motion first"
+        # The bridge knows only that another node moves the arm.
+        helps = "/controller_manager moves the arm; end that one's motion first"
         self.assertTrue([line for line in told if helps in line], told)
         answer = robot.manager("switch_controller", "")
         self.assertTrue(answer.success, answer.message)
-        publish(100)
-        self.assertGreater(robot.arm()[6] - before[6], 0.1)
+
+        def moves() -> bool:
+            publish(20)
+            return robot.arm()[6] - before[6] > 0.1
+
+        wait_until(moves, "motion asked for over the topic")
         foreign.unregister()
         robot.go(HOME)  # and the controller's own velocities still count
 
     def test_8_it_ends_when_it_is_asked_to(self) -> None:
         pids = robot_processes()
         self.assertTrue(pids)
-        end_within(pids, 3.0)
-
-
-class SplitPath(TruePath):
-    """The same with two nodes, and what only two can suffer."""
+        end_all(pids)
 
     def test_7_a_frozen_manager_moves_nothing_after_hold_and_reset(self) -> None:
         """In mid-motion the manager freezes; hold and reset pass without it; then it goes on with what it has."""
@@ -199,16 +185,16 @@ class SplitPath(TruePath):
         robot.go(HOME)
         target = [angle + 0.8 if joint == 6 else angle for joint, angle in enumerate(HOME)]
         self.assertEqual(robot.add_ptp(target).status, AddPtpRequest.STARTED)
-        wait_until(lambda: robot.joints.velocity[6] > 0.2, 10.0, "in mid-motion")
-        manager = rosnode.get_api_uri(rosgraph.Master("/split_path"), "/controller_manager")
-        process = xmlrpc.client.ServerProxy(manager).getPid("/split_path")[2]
+        wait_until(lambda: robot.joints.velocity[6] > 0.2, "in mid-motion")
+        manager = rosnode.get_api_uri(rosgraph.Master("/split"), "/controller_manager")
+        process = xmlrpc.client.ServerProxy(manager).getPid("/split")[2]
         os.kill(process, signal.SIGSTOP)
         try:
             for event in ("hold", "reset"):
                 answer = robot.call("lwr/command", LwrCommand, event)
                 self.assertTrue(answer.success, answer.message)
-            wait_until(lambda: robot.state.motion_allowed, 5.0, "motion allowed again")
-            wait_until(lambda: max(abs(v) for v in robot.joints.velocity) < 0.01, 5.0, "standing still")
+            wait_until(lambda: robot.state.motion_allowed, "motion allowed again")
+            wait_until(lambda: max(abs(v) for v in robot.joints.velocity) < 0.01, "standing still")
             stood = robot.arm()
         finally:
             os.kill(process, signal.SIGCONT)
@@ -219,6 +205,5 @@ class SplitPath(TruePath):
 
 
 if __name__ == "__main__":
-    rospy.init_node("true_path")
-    split = rospy.get_param("~split", False)
-    rostest.rosrun("coglab_controllers", "true_path", SplitPath if split else TruePath)
+    rospy.init_node("split")
+    rostest.rosrun("coglab_controllers", "split", Split)

@@ -1,0 +1,35 @@
+"""The recogniser's node takes every sight once, whatever ROS time does. No roscore."""
+
+import importlib.util
+import time
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+import rospy
+from coglab_py import steady
+from geometry_msgs.msg import TransformStamped
+
+SCRIPT = Path(__file__).resolve().parents[1] / "scripts" / "motion_recogniser_node.py"
+
+
+@pytest.mark.parametrize("step", [0.0, -3.0, -30.0, 60.0])
+def test_a_clock_that_is_set_costs_no_sight(monkeypatch, step):
+    spec = importlib.util.spec_from_file_location("node", SCRIPT)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    ros, boot = [1000.0], 50.0
+    monkeypatch.setattr(rospy, "get_time", lambda: ros[0])
+    monkeypatch.setattr(time, "monotonic", lambda: boot)
+    node = module.RecogniserNode.__new__(module.RecogniserNode)
+    node.base, node.last, node.seen, node.stamps = "world", {}, {}, steady.Stamps()
+    node.buffer = SimpleNamespace(lookup_transform=lambda *_: seen)
+    taken = []
+    for tick in range(20):
+        boot, ros[0] = boot + 0.01, ros[0] + 0.01 + (step if tick == 10 else 0.0)
+        seen = TransformStamped()
+        seen.header.stamp = rospy.Time.from_sec(ros[0] - 0.05)
+        for _ in range(2):
+            if node.newest("human_hand") is not None:
+                taken.append(node.seen["human_hand"])
+    assert [b - a for a, b in zip(taken, taken[1:], strict=False)] == pytest.approx([0.01] * 19, abs=0.001)

@@ -1,0 +1,113 @@
+"""Timers, workers and waits across steps of every clock. No roscore."""
+
+import threading
+import time
+
+import pytest
+import rospy
+from coglab_py import steady
+
+
+@pytest.fixture(autouse=True)
+def ros(monkeypatch):
+    """rospy without a master; what was logged and why the node ended."""
+    said = []
+    rospy.rostime.set_rostime_initialized(True)
+    rospy.rostime.switch_to_wallclock()
+    for log in ("loginfo", "logwarn", "logerr", "logfatal"):
+        monkeypatch.setattr(rospy, log, lambda text, *values: said.append(text % values))
+    monkeypatch.setattr(rospy, "logerr_throttle", lambda _, text: said.append(text))
+    monkeypatch.setattr(rospy, "signal_shutdown", said.append)
+    monkeypatch.setattr(rospy, "spin", lambda: None)
+    monkeypatch.setattr(steady, "ending", lambda: False)
+    monkeypatch.setattr(steady, "_failed", threading.Event())
+    yield said
+    rospy.rostime.switch_to_wallclock()
+
+
+def set_ros(seconds):
+    rospy.rostime._set_rostime(rospy.Time.from_sec(seconds))
+
+
+def wait(condition):
+    end = time.monotonic() + 60.0
+    while not condition():
+        assert time.monotonic() < end, "it waits for ever"
+        time.sleep(0.005)
+
+
+def test_a_timer_goes_on_while_the_clock_stands_and_goes_back():
+    calls = []
+    set_ros(100.0)
+    timer = steady.SteadyTimer(0.01, lambda: calls.append(rospy.get_time()), "timer")
+    wait(lambda: len(calls) > 2)
+    set_ros(70.0)
+    wait(lambda: calls.count(70.0) > 2)
+    timer.shutdown()
+    count = len(calls)
+    time.sleep(0.05)
+    assert len(calls) == count and calls.count(100.0) > 2
+
+
+def test_a_failing_call_costs_no_timer_but_failing_for_good_ends_the_node(ros, monkeypatch):
+    calls = []
+
+    def fail_at_first():
+        calls.append(1)
+        if len(calls) < 3:
+            raise ValueError("early")
+
+    timer = steady.SteadyTimer(0.01, fail_at_first, "timer")
+    wait(lambda: len(calls) > 5)
+    timer.shutdown()
+    assert steady.spin() == 0 and len(ros) == 2
+    monkeypatch.setattr(steady, "FAILING", 0.1)
+    steady.SteadyTimer(0.01, lambda: [][0], "always")
+    wait(steady._failed.is_set)
+    wait(lambda: "the thread 'always' has ended" in ros)
+    assert steady.spin() == 1
+
+
+def test_stamps_are_told_on_the_steady_clock_across_a_step(monkeypatch):
+    now = [50.0, 1000.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(time, "time", lambda: now[1])
+    stamps = steady.Stamps()
+    assert stamps.steady(rospy.Time.from_sec(999.8)) == pytest.approx(49.8)
+    for late in (0.03, -0.03):  # as /clock is, which comes now and then
+        now[1] += late
+        assert stamps.steady(rospy.Time.from_sec(999.8)) == pytest.approx(49.8, abs=0.001)
+    now[1] -= 30.0
+    assert stamps.steady(rospy.Time.from_sec(969.9)) == pytest.approx(49.9, abs=0.001)
+    assert stamps.stamp(49.9).to_sec() == pytest.approx(969.9, abs=0.001)
+
+
+def test_a_service_is_given_up_by_the_steady_clock(monkeypatch):
+    monkeypatch.setattr(time, "time", lambda: 1000.0)  # rospy's own wait would never end
+    begun = time.monotonic()
+    with pytest.raises(rospy.ROSException):
+        steady.wait_for_service("/nobody", 0.3)
+    assert time.monotonic() - begun < 10.0
+
+
+def test_a_silent_clock_is_a_fault_and_a_set_one_is_told(ros, monkeypatch):
+    now = [50.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    set_ros(0.0)
+    watch = steady.ClockWatch()
+    now[0] += 0.9
+    assert not watch.look()
+    now[0] += 0.2
+    assert "/clock" in watch.look() and "/clock" in watch.look() and len(ros) == 1
+    set_ros(100.0)
+    assert not watch.look() and len(ros) == 2
+    set_ros(70.0)
+    assert not watch.look() and "back by 30.0 s" in ros[-1]
+    rospy.rostime.switch_to_wallclock()
+    wall = [1000.0]
+    monkeypatch.setattr(time, "time", lambda: wall[0])
+    watch, count = steady.ClockWatch(), len(ros)
+    for step in (0.0, 60.0, 0.0):
+        now[0], wall[0] = now[0] + 0.2, wall[0] + 0.2 + step
+        assert not watch.look()
+    assert len(ros) == count + 1 and "forward by 60.0 s" in ros[-1]

@@ -1,0 +1,63 @@
+// Tries a library of controllers in a process that may die of it. PluginLibrary runs this program
+// before it opens the library itself.
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <memory>
+#include <string>
+
+#include "ctrl_more/loading/prototypes.hpp"
+#include "loading/probe.hpp"
+
+namespace {
+
+void report(const std::string& text) {
+  const std::string line = text + "\n";
+  if (write(ctrl_more::kProbeReport, line.data(), line.size()) < 0) _exit(1);
+}
+
+[[noreturn]] void refuse(const std::string& clause) {
+  std::string line = clause;
+  for (char& letter : line) {
+    if (letter == '\n') letter = ' ';
+  }
+  report(ctrl_more::kProbeError + line);
+  _exit(1);
+}
+
+// What is thrown here is refused by the program that makes the controller, in words.
+void make(const std::string& type) {
+  report("while controller '" + type + "' was made and described");
+  try {
+    const std::unique_ptr<ctrl_more::FeedbackController> controller(
+        ctrl_more::prototypes().find(type)());
+    if (controller) controller->describe();
+  } catch (...) {
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 2) return 2;
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  const rlimit no_core{0, 0};
+  setrlimit(RLIMIT_CORE, &no_core);
+  report("while it was opened");
+  void* library = nullptr;
+  try {
+    library = ctrl_more::openLibrary(argv[1]);
+  } catch (const std::exception& error) {
+    refuse(std::string("threw while it was opened: ") + error.what());
+  } catch (...) {
+    refuse("threw something that is not a std::exception while it was opened");
+  }
+  if (!library) refuse(std::string("cannot be loaded: ") + dlerror());
+  for (const std::string& type : ctrl_more::prototypes().types()) make(type);
+  report("while it was closed");
+  dlclose(library);
+  report(ctrl_more::kProbeDone);
+  _exit(0);
+}
