@@ -20,8 +20,8 @@ using Clock = std::chrono::steady_clock;
 constexpr double kLateShare = 0.2;
 // Periods behind schedule after which the schedule starts anew instead of catching up.
 constexpr int kGiveUp = 5;
+constexpr double kPatience = 0.9;  // s from one answer to the next, where the cell waits for them
 constexpr std::size_t kMaxRecords = 100000, kMaxSnapshots = 2000;  // if nobody takes them
-constexpr double kPatience = 0.5;  // s for a late answer, where the cell waits for them
 
 }  // namespace
 
@@ -68,11 +68,11 @@ void RealTimeCell::run() {
   };
   auto period = periodNow();
   auto deadline = Clock::now();
-  auto sent_at = deadline;
+  auto sent_at = deadline, answered_at = deadline - std::chrono::hours(1);
   bool sent_late = false, answered = false, kept = true;
   std::array<std::uint8_t, 2048> buffer{};
   while (running_) {
-    const bool answered_before = std::exchange(answered, false);
+    answered = false;
     const auto listenUntil = [&](Clock::time_point until, bool for_one) {
       for (;;) {
         const long size = socket_.receive(buffer.data(), buffer.size(), until);
@@ -81,6 +81,7 @@ void RealTimeCell::run() {
             std::chrono::duration<double>(Clock::now() - sent_at).count() * factor_;
         cell_.receive(buffer.data(), static_cast<std::size_t>(size), latency);
         answered = true;
+        answered_at = Clock::now();
         // A flood of datagrams does not stop the clock.
         if (for_one || Clock::now() >= until) return;
       }
@@ -89,9 +90,9 @@ void RealTimeCell::run() {
     const bool expected = cell_.sent() && !sent_late;  // an answer, within the period that ends
     const bool unanswered = expected && !answered;
     // The PC answers, but this computer is too busy: simulated time stands until it does.
-    if (waits_ && answered_before && cell_.sent() && !answered)
-      listenUntil(deadline + std::chrono::duration_cast<Clock::duration>(
-                                 std::chrono::duration<double>(kPatience)),
+    if (waits_ && cell_.sent() && !answered)
+      listenUntil(answered_at + std::chrono::duration_cast<Clock::duration>(
+                                    std::chrono::duration<double>(kPatience)),
                   true);
     const auto now = Clock::now();
     const double behind = std::chrono::duration<double>(now - deadline).count();
@@ -109,8 +110,8 @@ void RealTimeCell::run() {
     if (kept) next_snapshot_ = std::max(next_snapshot_, time - cell_.period()) + interval_;
     leaveResults(answered, expected, unanswered, late ? behind : 0.0, kept);
     deadline += period;
-    // Where simulated time may stand, nothing has to be caught up with.
-    if (now - deadline > (waits_ ? 0 : kGiveUp) * period) deadline = now + period;
+    // Where simulated time may stand, no more than a period has to be caught up with.
+    if (now - deadline > (waits_ ? 1 : kGiveUp) * period) deadline = now + period;
   }
 }
 

@@ -62,7 +62,8 @@ class RealTimeCell {
   void stop();
   /// Simulated over real time from the next period on.
   void setFactor(double factor) { factor_ = factor; }
-  /// Whether simulated time stands while an answer of a PC that answers is late, 0.5 s at most.
+  /// Whether simulated time stands while an answer of a PC that answers is late, up to 0.9 s after
+  /// the one before.
   void waitForAnswers(bool waits) { waits_ = waits; }
   /// Where the PC listens from now on.
   void setPort(std::uint16_t port) { port_ = port; }

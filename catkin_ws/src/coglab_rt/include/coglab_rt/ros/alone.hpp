@@ -13,6 +13,7 @@
 #include <ros/network.h>
 #include <ros/this_node.h>
 #include <xmlrpcpp/XmlRpcClient.h>
+#include <xmlrpcpp/XmlRpcDispatch.h>
 #include <xmlrpcpp/XmlRpcValue.h>
 
 namespace coglab_rt {
@@ -30,11 +31,15 @@ inline std::string livingNamesake() {
   XmlRpc::XmlRpcValue caller, process;
   caller[0] = ros::this_node::getName();
   if (!node.executeNonBlock("getPid", caller)) return "";
+  XmlRpc::XmlRpcDispatch dispatch;
+  dispatch.addSource(&node,
+                     XmlRpc::XmlRpcDispatch::WritableEvent | XmlRpc::XmlRpcDispatch::Exception);
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(2);
-  while (!node.executeCheckDone(process)) {
-    if (std::chrono::steady_clock::now() > end) return "at " + address + ", which does not answer";
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
+  bool done = false;
+  while (!(done = node.executeCheckDone(process)) && std::chrono::steady_clock::now() < end)
+    dispatch.work(0.02);  // s
+  dispatch.removeSource(&node);
+  if (!done) return "at " + address + ", which does not answer";
   if (process.getType() != XmlRpc::XmlRpcValue::TypeArray || process.size() != 3) return "";
   return "process " + std::to_string(static_cast<int>(process[2])) + " at " + address;
 }
