@@ -171,8 +171,8 @@ def wait_for_service(name: str, limit: float) -> None:
 
 
 def server_is_there(client: Any) -> bool:
-    """Whether the server of an actionlib.SimpleActionClient is there, with every topic connected."""
-    action = client.action_client
+    """Whether the server of an actionlib.ActionClient or SimpleActionClient is there, with every topic connected."""
+    action = getattr(client, "action_client", client)
     if not action.last_status_msg:
         return False
     server = action.last_status_msg._connection_header["callerid"]
