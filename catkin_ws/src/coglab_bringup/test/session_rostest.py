@@ -57,7 +57,8 @@ def loaded_by_this_session() -> set[str]:
         subprocess.run(dump, env={**os.environ, **told}, stdout=subprocess.DEVNULL, timeout=240, check=True)
         text += "".join(file.read_text(errors="replace") for file in Path(out).iterdir())
     paths = re.findall(rf"{re.escape(str(WORKSPACE / 'devel'))}/[^\s;\]]+", text)
-    return {path.rsplit("/", 1)[-1] for path in paths}
+    # A plug-in library is opened as a hidden copy: .NAME.so.LETTERS
+    return {re.sub(r"^\.(.+\.so)\.\w+$", r"\1", path.rsplit("/", 1)[-1]) for path in paths}
 
 
 class Session(Handover):
