@@ -243,6 +243,7 @@ def test_a_newer_source_is_built_and_data_is_not(workspace):
 
 
 def test_the_template_of_a_controller_is_named_as_the_runner_expects(tmp_path):
+    from coglab_bringup.arguments import Wanted
     from coglab_bringup.test_runner import find_programs
 
     package = TOP / "catkin_ws" / "src" / "ctrl_more"
@@ -251,7 +252,7 @@ def test_the_template_of_a_controller_is_named_as_the_runner_expects(tmp_path):
     (tmp_path / "coglab").touch()
     made = run(sys.executable, package / "scripts" / "new_controller.py", "WristDamper", "--into", target)
     assert made.returncode == 0 and "./coglab build && ./coglab test wrist_damper" in made.stdout
-    (program,) = find_programs(tmp_path, tmp_path, sys.executable, ["wrist_damper"])
+    (program,) = find_programs(tmp_path, tmp_path, sys.executable, [Wanted("wrist_damper")])
     cmake = (target / "wrist_damper" / "CMakeLists.txt").read_text()
     assert f"set(test_target {program.name})" in cmake and "test/test_controller.cpp" in cmake
 
