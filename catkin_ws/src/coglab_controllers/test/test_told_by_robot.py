@@ -126,7 +126,8 @@ def system(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Told, sub
         manager = {"cycle_time": PERIOD, "overrun_time": 5.0, "load": ALL, "active": "ptp", "tactile": True}
         master.setParam("/controller_manager", {**manager, "feedback_file": feedback})
         rospy.init_node("told_by_robot_test", disable_signals=True)
-        node = subprocess.Popen([binary()], stdout=subprocess.DEVNULL, stderr=file)
+        lines = {**os.environ, "ROSCONSOLE_STDOUT_LINE_BUFFERED": "1"}
+        node = subprocess.Popen([binary()], stdout=file, stderr=file, env=lines)
         try:
             robot = Told(log)
             robot.wait("status", lambda m: m.active_controller == "ptp", "the node")

@@ -84,7 +84,7 @@ TEST(JointLimits, ErrorsNameFileLineAndField) {
   EXPECT_NE(
       errorFor(replaced(original(), "  torque:", "  torq:")).find("default.torq: unknown field"),
       std::string::npos);
-  EXPECT_NE(errorFor(replaced(original(), "lower_position: [-2.96", "lower_position: [12.96"))
+  EXPECT_NE(errorFor(replaced(original(), "lower_position: [-2.96", "lower_position: [3.96"))
                 .find("lower_position must be below"),
             std::string::npos);
   EXPECT_NE(errorFor(replaced(original(), "position_margin: 0.01", "position_margin: wide"))
