@@ -149,7 +149,6 @@ class Perception(unittest.TestCase):
             for script, name in zip(scripts, names, strict=True)
         ]
         try:
-            self.wait_for_line("/played/perception", f"perception plays {path}: played_hand, 4.0 s")
             self.wait(lambda: any(m.decided and m.pattern == "high" for m in seen), "the recognition of 'high'")
             message = next(m for m in seen if m.decided)
             self.assertAlmostEqual(sum(message.probabilities), 1.0)

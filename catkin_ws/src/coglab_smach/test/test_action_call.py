@@ -7,6 +7,7 @@ import time
 from types import SimpleNamespace
 
 import pytest
+from actionlib import CommState
 from actionlib_msgs.msg import GoalStatus
 from coglab_smach.ports.pending import PortError
 from coglab_smach.ros import hand
@@ -20,15 +21,24 @@ class Client:
         self.server = threading.Event()
         self.calls = []
 
-    def send_goal(self, goal, done_cb):
+    def send_goal(self, goal, transition_cb):
         self.calls.append("send")
-        self.done_cb = done_cb
+        self.handle = Handle(self.calls, transition_cb)
+        return self.handle
 
-    def cancel_goal(self):
+
+class Handle:
+    """The goal, as actionlib.ClientGoalHandle."""
+
+    def __init__(self, calls, transition_cb):
+        self.calls, self.transition_cb = calls, transition_cb
+        self.get_comm_state = lambda: CommState.DONE
+        self.get_goal_status = lambda: GoalStatus.PREEMPTED
+        self.get_result = lambda: SimpleNamespace(isOk=False, message="preempted")
+        self.get_goal_status_text = lambda: ""
+
+    def cancel(self):
         self.calls.append("cancel")
-
-    def get_goal_status_text(self):
-        return ""
 
 
 @pytest.fixture(autouse=True)
@@ -62,7 +72,7 @@ def test_cancelled_afterwards():
         time.sleep(0.005)
     call.cancel()
     assert client.calls == ["send", "cancel"]
-    client.done_cb(GoalStatus.PREEMPTED, SimpleNamespace(isOk=False, message="preempted"))
+    client.handle.transition_cb(client.handle)
     assert ended(call)
     call.cancel()
     assert client.calls == ["send", "cancel"], "an action that is over is not cancelled"

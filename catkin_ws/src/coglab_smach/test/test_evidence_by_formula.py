@@ -234,7 +234,7 @@ class Moving:
         self.residual = self.told = self.before = None
         self.payloads = []
 
-    def feed(self, stamp, position, torque):
+    def feed(self, stamp, position, torque, made=None):
         self.residual = SimpleNamespace(torque=np.full(7, self.hangs), position=np.zeros(7), fresh=self.fresh)
 
     def weight_since(self, before):

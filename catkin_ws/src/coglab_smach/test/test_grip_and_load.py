@@ -91,7 +91,7 @@ class Moving:
         self.load, self.hangs, self.fast, self.change = 0.0, WEIGHT, False, None
         self.residual = None
 
-    def feed(self, stamp, position, torque):
+    def feed(self, stamp, position, torque, made=None):
         self.residual = SimpleNamespace(stamp=stamp, torque=np.zeros(7), position=np.zeros(7), fresh=False)
 
     def weight(self, residual, position):

@@ -128,10 +128,10 @@ class Stamps:
             if after - before < QUICK:
                 break
         with self._lock:
-            if self._offset is None or abs(before - ros - self._offset) > SET:
-                self._offset = before - ros
-            else:
-                self._offset += FOLLOWED * (before - ros - self._offset)
+            offset = before - ros if self._offset is None else self._offset
+            if abs(before - ros - offset) > SET:
+                offset = before - ros
+            self._offset = offset + FOLLOWED * (before - ros - offset)
             return self._offset
 
 

@@ -240,7 +240,7 @@ def _place(session: Session, row: dict) -> Attempt:
 def _action_began(row: dict) -> float:
     """When an action began, s since 1970; older files have the time of its end alone."""
     began = row.get("began")
-    return float(began if _number(began) else row["stamp"] - row["duration_s"])
+    return float(began) if began is not None and _number(began) else float(row["stamp"] - row["duration_s"])
 
 
 # --- tables ---------------------------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import time
 from collections.abc import Callable
 from typing import Any
@@ -81,7 +82,7 @@ class HandClient:
     def wait_ready(self) -> None:
         """Until the node is connected and its actions are there."""
         for name, client in self.clients.items():
-            self.wait(lambda client=client: server_is_there(client), f"action server {name}")
+            self.wait(functools.partial(server_is_there, client), f"action server {name}")
         self.wait(lambda: self.status.connected, "hand connected")
 
     def send(self, name: str, *arguments: Any) -> Any:

@@ -98,6 +98,8 @@ class HandActionServer(actionlib.ActionServer):
     status while /clock stands still, and ends for good when it goes back.
     """
 
+    last_cancel: Any
+
     @property
     def status_frequency(self) -> float:
         """0, for which actionlib makes no timer of its own."""
