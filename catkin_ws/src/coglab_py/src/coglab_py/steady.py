@@ -131,8 +131,9 @@ class Stamps:
             offset = before - ros if self._offset is None else self._offset
             if abs(before - ros - offset) > SET:
                 offset = before - ros
-            self._offset = offset + FOLLOWED * (before - ros - offset)
-            return self._offset
+            offset += FOLLOWED * (before - ros - offset)
+            self._offset = offset
+            return offset
 
 
 def utc_of(steady: float) -> str:
