@@ -315,7 +315,7 @@ TEST(ControlCycle, TheFirstJointThatBlocksAMotionIsNamedToo) {
 }
 
 TEST(ControlCycle, ABorderThatAllowsLessAndLessSpeedEndsAMotion) {
-  PushedRobot robot("workspace: {box_max: [0.9, 1.2, 1.6]}");
+  PushedRobot robot("workspace: {box_max: [0.7, 1.2, 1.6]}");
   const ChainState home = robot.manager->settings().robot->chain.evaluate(kHome);
   robot.push->velocity = 0.2 * home.jacobian.row(0).transpose().normalized();
   double moved = robot.hand().position.x(), stands = 0.0;

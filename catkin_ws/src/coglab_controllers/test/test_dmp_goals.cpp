@@ -109,7 +109,12 @@ TEST(DmpController, NothingIsChased) {
   EXPECT_LT(depth, 0.16);
   EXPECT_EQ(reachAfter(only_down, lowered).first, ReasonCode::None);
   EXPECT_EQ(reachAfter(limits, sway).first, ReasonCode::None);
-  EXPECT_EQ(reachAfter({}, back).first, ReasonCode::None);  // without limits it is followed
+  // Without limits it is followed, and as far as the arm reaches.
+  const auto little = [](double t) { return Vector3(0.11 * std::min(t, 1.0), 0, 0); };
+  EXPECT_EQ(reachAfter({}, little).first, ReasonCode::None);
+  const auto [stretched, far] = reachAfter({}, back);
+  EXPECT_EQ(stretched, ReasonCode::WorkspaceBorder);
+  EXPECT_NEAR(far, 0.3, 1e-9);
 }
 
 TEST(DmpController, AGoalOutsideItsRegionFromTheBeginningIsWaitedFor) {

@@ -127,7 +127,7 @@ def test_a_static_frame_is_told_at_once_and_then_once_a_second_where_it_is_asked
     [
         ("rate", 0.09375, "a number from 0.1 to 1000, got 0.09375"),
         ("rate", 1001.0, "a number from 0.1 to 1000, got 1001"),
-        ("offset", [0.0, 0.0], "3 finite numbers, got "),
+        ("offset", [0.0, 0.0], "3 finite numbers"),
         ("frame", [1.0], "a text, got "),
         ("dmp_frame_name", [1.0], "a text, got "),
         ("topic", [1.0], "a text, got "),

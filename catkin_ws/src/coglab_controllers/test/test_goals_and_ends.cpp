@@ -35,8 +35,10 @@ GoalGate begun(double x = 1.0, const GoalGateParameters& parameters = {}) {
 }
 
 CartesianMotionPlan reachPlan(double duration = 1.0) {
+  LearningOptions options;
+  options.allow = {"brief"};
   const Primitive p =
-      learn("reach", {minimumJerkReach(Vector3::Zero(), Vector3(0.5, 0, 0), duration)});
+      learn("reach", {minimumJerkReach(Vector3::Zero(), Vector3(0.5, 0, 0), duration)}, options);
   return {TransformationSystem(p), 1.0, true};
 }
 

@@ -356,7 +356,7 @@ TEST(Parameters, AreReadWithTheirKindAndRefusedWithTheirName) {
   for (const char* name : {"bad", "l", "n"}) {
     EXPECT_NE(refusal([&] {
                 block.numbers(name, Eigen::VectorXd::Zero(3));
-              }).find(": expected 3 finite numbers, got "),
+              }).find(": expected 3 finite numbers"),
               std::string::npos);
   }
   EXPECT_NE(refusal([&] { block.numbers("v", Eigen::VectorXd::Zero(2)); }), "");

@@ -33,7 +33,7 @@ class ProgressWatch {
     own_ += time_scale * dt;
     const bool goes_on = speed_scale <= 0.0 || own_ >= kOwnShare * speed_scale * time_ ||
                          (set_point - from_).lpNorm<Eigen::Infinity>() >= kWay;
-    if (!goes_on && waited_ <= time_) return nullptr;
+    if (!goes_on && waited_ < time_) return nullptr;
     if (goes_on || bound_.reason == GuardReason::None) {
       restart(set_point);
       return nullptr;
