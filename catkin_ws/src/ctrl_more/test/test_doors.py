@@ -11,7 +11,6 @@ ROOMS = ["log", "states", "description", "docs", "controller", "loading", "cycle
 # What authors include; nothing inside does.
 FRONT_DOORS = {"feedback_controller.hpp", "feedback_controllers_manager.hpp", "central_module.hpp"}
 INCLUDE = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
-LONGEST_FILE = 400
 
 
 def sources(package: Path) -> dict[str, tuple[str, list[str]]]:
@@ -86,13 +85,3 @@ def test_an_arrow_back_up_and_a_circle_are_found(tmp_path: Path) -> None:
     assert "log/a.hpp includes ctrl_more/states/b.hpp, which is above it" in text
     assert "includes ctrl_more/manager.hpp, which is in no room" in text
     assert "ctrl_more/states/b.hpp -> ctrl_more/states/c.hpp -> ctrl_more/states/b.hpp" in text
-
-
-def test_files_are_short() -> None:
-    long = [
-        path.name
-        for folder in ("include", "src", "controllers", "test", "bench", "tools")
-        for path in (PACKAGE / folder).rglob("*.?pp")
-        if len(path.read_text().splitlines()) > LONGEST_FILE
-    ]
-    assert not long, f"more than {LONGEST_FILE} lines; split them by subject"
