@@ -71,7 +71,7 @@ def init_node(name: str, **options: Any) -> None:
     import rospy
 
     own = rosgraph.names.load_mappings(sys.argv).get("__name", name)
-    full = rosgraph.names.resolve_name(own, rosgraph.names.get_ros_namespace())
+    full = rosgraph.names.ns_join(rosgraph.names.get_ros_namespace(), own)
     end = time.monotonic() + PATIENCE
     while there := _living(os.environ.get("ROS_MASTER_URI", ""), full):
         if time.monotonic() > end:
