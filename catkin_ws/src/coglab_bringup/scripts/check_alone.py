@@ -28,8 +28,8 @@ def main() -> int:
             refuse(f"the ROS master {master} does not answer; end what runs there")
         if there:
             refuse(
-                f"a system runs already on the ROS master {master}: {there}. End it first, or give this one a master of "
-                "its own: ./coglab launch, or roslaunch -p PORT"
+                f"a system runs already on the ROS master {master}: {there}. End it first, or give this one a master "
+                "of its own: ./coglab launch, or roslaunch -p PORT"
             )
     sys.stdout.write("alone")
     return 0

@@ -25,8 +25,9 @@ TEST(Manager, RefusesBadPluginsAndKeepsWhatIsThere) {
   EXPECT_TRUE(refused(manager.load("a", "test/Twin"), {"test/Misbehaving", "registered already"}));
   EXPECT_TRUE(refused(manager.load("a", "test/Twin"), {"registered already"}));  // and again
   EXPECT_TRUE(refused(manager.load("a", "test/Other"), {"has no type", "test/Misbehaving"}));
-  EXPECT_TRUE(refused(manager.load("a", "test/OtherAbi"),
-                      {"compiled for another coglab_controllers", "(interface ", "has interface "}));
+  EXPECT_TRUE(
+      refused(manager.load("a", "test/OtherAbi"),
+              {"compiled for another coglab_controllers", "(interface ", "has interface "}));
   EXPECT_TRUE(
       refused(manager.load("a", "my_lab/Unknown"), {"my_lab/Unknown", "coglab/DmpController"}));
   EXPECT_TRUE(refused(manager.load("dmp", "coglab/DmpController"), {"in use"}));

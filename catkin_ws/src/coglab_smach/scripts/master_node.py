@@ -77,7 +77,9 @@ class MasterNode:
         self.stamps = Stamps()
         self.transitions = rospy.Publisher("coglab/transitions", Transition, queue_size=200)
         self.results = rospy.Publisher("coglab/results", String, queue_size=20, latch=True)
-        self.spoken = rospy.Publisher("say", Say, queue_size=20, latch=True)  # a listener that starts late hears it, too
+        self.spoken = rospy.Publisher(
+            "say", Say, queue_size=20, latch=True
+        )  # a listener that starts late hears it, too
         self.result_file = parameters.read("~result_file", str, "")
         self.journal.listen(self.on_transition)
         self.journal.listen_results(self.on_result)

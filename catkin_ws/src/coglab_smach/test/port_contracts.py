@@ -263,7 +263,9 @@ class ContactContract(Contract):
             assert self.port.share_gone() is None
             assert self.port.grip() is None, "this hand does not feel"
             self.watches("release", mass=0.8, load_share=0.5)
-            self.until(lambda: abs(1.0 if (gone := self.port.share_gone()) is None else gone) < 0.1, 1.0, "the whole load")
+            self.until(
+                lambda: abs(1.0 if (gone := self.port.share_gone()) is None else gone) < 0.1, 1.0, "the whole load"
+            )
             self.place.push(0.0)
             self.happens(False, ReasonCode.LOAD_RELEASED)
             self.until(lambda: self.port.share_gone() > 0.7, 2.0, "the load")

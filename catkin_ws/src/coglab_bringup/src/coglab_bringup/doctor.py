@@ -120,7 +120,7 @@ def findings(top: Path) -> list[tuple[bool, str]]:
         result.append(
             (
                 True,
-                f"this computer is busy: load {load:.1f} on {cores} cores; a simulated cell runs slower than real time, "
+                f"this computer is busy: load {load:.1f} on {cores} cores; a simulated cell runs slower than real time "
                 "and answers to a robot may come late: end other programs",
             )
         )

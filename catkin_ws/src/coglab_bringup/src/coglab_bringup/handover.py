@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 import time
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -39,7 +38,7 @@ def services() -> int:
     """How many services the nodes of this system have registered so far."""
     try:
         return len(rosgraph.Master("/coglab_demo").getSystemState()[2])
-    except (OSError, rosgraph.MasterException, socket.timeout):
+    except (TimeoutError, OSError, rosgraph.MasterException):
         return 0
 
 

@@ -9,7 +9,6 @@ import shutil
 from pathlib import Path
 from typing import NoReturn
 
-
 RESULTS_SPACE = 50e6  # bytes, for the results of a demo or of the tests
 
 

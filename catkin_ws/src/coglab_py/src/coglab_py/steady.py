@@ -11,7 +11,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
-from datetime import datetime, timezone
+from datetime import UTC, datetime
 from typing import Any
 
 import rosgraph
@@ -138,7 +138,7 @@ class Stamps:
 
 def utc_of(steady: float) -> str:
     """Date and time of a steady time (s), for people and other records; to the ms."""
-    moment = datetime.fromtimestamp(time.time() - (time.monotonic() - steady), timezone.utc)
+    moment = datetime.fromtimestamp(time.time() - (time.monotonic() - steady), UTC)
     return moment.isoformat(timespec="milliseconds")
 
 

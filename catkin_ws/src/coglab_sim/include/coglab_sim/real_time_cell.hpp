@@ -81,7 +81,7 @@ class RealTimeCell {
   void applyLater(double delay, std::function<void(Cell&)> action);
 
   CellSnapshot snapshot() const;
-  double takeLatest();                       ///< CellSnapshot::latest since the last call
+  double takeLatest();  ///< CellSnapshot::latest since the last call
   /// Simulated seconds between the snapshots that takeSnapshots() returns; forces are means over
   /// them. @pre not running
   void setSnapshotInterval(double interval) { interval_ = interval; }
