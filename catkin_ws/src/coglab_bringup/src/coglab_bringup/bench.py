@@ -1,8 +1,8 @@
 """./coglab bench: runs the benches and prints every figure beside its goal and its peer.
 
 A bench is an executable `bench/bench_<name>.py` in a package. It prints a JSON list of rows {bench, figure, value,
-unit, goal, peer, peer_value, ok} on standard output, and ends with status 0, also where a figure misses its goal. Another
-status is a failure, whatever rows were printed. Packages may share a name: each gives its rows.
+unit, goal, peer, peer_value, ok} on standard output and ends with status 0, also where a figure misses its goal.
+Another status is a failure, whatever rows were printed. Packages may share a name: each gives its rows.
 """
 
 from __future__ import annotations
