@@ -24,6 +24,7 @@ HELP_GIVEN = 10
 BUILD_OPTIONS = ("--upstream-smach",)
 BUILD_TARGETS = ("tests",)
 TEST_FILES = ("test_*.cpp", "test_*.py", "*.test")  # in the folder test of a package
+GTEST_CASE = re.compile(r"^\s*(TYPED_TEST|TEST_F|TEST_P|TEST)\(\s*(\w+)\s*,\s*(\w+)\s*\)", re.MULTILINE)
 
 
 def demo_parser(top: Path) -> Parser:
@@ -87,11 +88,29 @@ def left_out(top: Path) -> list[str]:
     return found.group(1).split(";") if found else []
 
 
+def cases_in(path: Path) -> list[str]:
+    """The gtests of a C++ file, as --gtest_filter takes them."""
+    forms = {"TEST_P": "*{}.{}/*", "TYPED_TEST": "{}/*.{}"}
+    found = GTEST_CASE.findall(path.read_text(encoding="utf-8"))
+    return [forms.get(macro, "{}.{}").format(suite, name) for macro, suite, name in found]
+
+
+def test_files(test: Path) -> list[Path]:
+    """The test files in a package's folder test and in its rooms: folders whose .cpp files together are one gtest."""
+    files = [path for kind in TEST_FILES for path in sorted(test.glob(kind))]
+    return files + [path for path in sorted(test.glob("*/*.cpp")) if cases_in(path)]
+
+
+def binary_of(package: str, path: Path) -> str:
+    """The gtest that holds this file, which is also its target: of the file itself, or of its room."""
+    return f"{package}_{path.stem}" if path.parent.name == "test" else f"{package}_test_{path.parent.name}"
+
+
 class Wanted(NamedTuple):
-    """Tests that a word of the command line names: PACKAGE, PACKAGE/FILE or PACKAGE/FILE::CASE."""
+    """Tests that a word of the command line names: PACKAGE, PACKAGE/ROOM, PACKAGE/FILE or PACKAGE/FILE::CASE."""
 
     package: str
-    file: str = ""  # in the package's folder test; "": all
+    file: str = ""  # in the package's folder test or in a room of it; "": all
     case: str = ""
 
     @classmethod
@@ -101,14 +120,19 @@ class Wanted(NamedTuple):
         package, _, file = place.rstrip("/").partition("/")
         return cls(package, file.removeprefix("test/"), case)
 
+    def names(self, path: Path) -> bool:
+        """Whether it names this file of its package, or the file's room."""
+        room = "" if path.parent.name == "test" else path.parent.name
+        return self.file in {"", path.name, room, f"{room}/{path.name}"}
+
     def check(self, sources: Path) -> None:
         """Raises Refused, with what there is, if there is no such test."""
         folders = package_folders(sources)
         _named([self.package], folders, "package")
-        test = folders[self.package] / "test"
-        files = sorted(path.name for kind in TEST_FILES for path in test.glob(kind))
-        if self.file:
-            _named([self.file], files, f"test of {self.package}")
+        files = test_files(folders[self.package] / "test")
+        if not any(self.names(path) for path in files) and self.file:
+            rooms = {path.parent.name for path in files} - {"test"}
+            _named([self.file], sorted(rooms.union(path.name for path in files)), f"test of {self.package}")
         if self.case and not self.file.endswith((".cpp", ".py")):
             raise Refused(f"{self.file or self.package} runs as a whole: leave out ::{self.case}")
 
@@ -127,8 +151,9 @@ def test_targets(top: Path, wanted: list[Wanted]) -> list[str]:
     targets = set[str]()
     for one in wanted:
         place = folders[one.package].relative_to(sources)
-        if one.file.endswith(".cpp"):
-            targets.add(f"{place}/CMakeFiles/{one.package}_{one.file.removesuffix('.cpp')}.dir/all")
+        files = [path for path in test_files(folders[one.package] / "test") if one.names(path)]
+        if one.file and all(path.suffix == ".cpp" for path in files):
+            targets |= {f"{place}/CMakeFiles/{binary_of(one.package, path)}.dir/all" for path in files}
             continue
         targets |= {target for target in of_tests if target.startswith(f"{place}/CMakeFiles/")}
         text = "\n".join(path.read_text(encoding="utf-8") for path in (folders[one.package] / "test").glob("*.*"))
