@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from coglab_bringup.launch_arguments import judge_launch
-from coglab_bringup.usage import Parser, Refused, seed, writable_file, writable_folder
+from coglab_bringup.usage import Parser, Refused, seed, writable_folder
 
 HELP_GIVEN = 10
 BUILD_OPTIONS = ("--upstream-smach",)
@@ -163,12 +163,10 @@ def test_targets(top: Path, wanted: list[Wanted]) -> list[str]:
     return sorted(targets)
 
 
-def find_benches(sources: Path) -> dict[str, list[Path]]:
-    """The files of each bench by its name, from the packages below `sources`."""
-    benches: dict[str, list[Path]] = {}
-    for path in sorted(sources.rglob("bench/bench_*.py")):
-        benches.setdefault(path.stem.removeprefix("bench_"), []).append(path)
-    return benches
+def benchmarks(top: Path) -> list[str]:
+    """Names of the programs of the folder benchmarks."""
+    files = sorted((top / "benchmarks").glob("*.py"))
+    return [path.stem for path in files if '__name__ == "__main__"' in path.read_text() and path.stem != "report"]
 
 
 def _named(names: list[str], known: Iterable[str], what: str) -> None:
@@ -211,12 +209,15 @@ def test_options(top: Path, words: list[str]) -> argparse.Namespace:
 
 def bench_options(top: Path, words: list[str]) -> argparse.Namespace:
     """./coglab bench"""
-    parser = Parser(prog="coglab bench", description="Every figure beside its goal and a peer.")
-    parser.add_argument("names", nargs="*", metavar="NAME", help="default: all")
-    parser.add_argument("--json", type=writable_file, metavar="FILE", help="write the rows as a JSON list")
-    parser.add_argument("--long", action="store_true", help="the campaigns too (hours)")
+    known = benchmarks(top)
+    parser = Parser(prog="coglab bench", description="Measures, beside goals and other programs.")
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"{', '.join(known)}; default: all, without --report")
+    parser.add_argument("--quick", action="store_true", help="few repetitions; prints the rows and keeps none")
+    parser.add_argument("--report", action="store_true", help="writes docs/benchmarks.md from benchmarks/results.csv")
     options = parser.parse_args(words)
-    _named(options.names, find_benches(top / "catkin_ws" / "src"), "bench")
+    _named(options.names, known, "benchmark")
+    if not options.names and not options.report:
+        options.names = known
     return options
 
 
