@@ -169,15 +169,6 @@ def test_a_foreign_ros_is_named_and_left_aside():
     assert "a ROS from /opt/ros is in ROS_PACKAGE_PATH; open a shell without it" in ended.stdout
 
 
-def test_the_environment_of_this_workspace_is_no_foreign_ros():
-    """Built with --upstream-smach, it names the place below /opt/ros where that smach lies."""
-    prefixes = f"{TOP}/catkin_ws/devel:/opt/ros/somewhere"
-    packages = f"{TOP}/catkin_ws/src:/opt/ros/somewhere/share"
-    for command in ("help", "doctor"):
-        ended = run(TOP / "coglab", command, CMAKE_PREFIX_PATH=prefixes, ROS_PACKAGE_PATH=packages)
-        assert "a ROS from /opt/ros" not in ended.stdout
-
-
 def test_pyenv_first_in_path(tmp_path):
     shim = tmp_path / "python3"
     shim.write_text("#!/bin/sh\nexit 42\n")

@@ -21,8 +21,7 @@ from coglab_bringup.launch_arguments import judge_launch
 from coglab_bringup.usage import Parser, Refused, seed, writable_folder
 
 HELP_GIVEN = 10
-BUILD_OPTIONS = ("--upstream-smach",)
-BUILD_TARGETS = ("tests",)
+BUILD_WORDS = ("--upstream-smach", "tests")
 TEST_FILES = ("test_*.cpp", "test_*.py", "*.test")  # in the folder test of a package
 GTEST_CASE = re.compile(r"^\s*(TYPED_TEST|TEST_F|TEST_P|TEST)\(\s*(\w+)\s*,\s*(\w+)\s*\)", re.MULTILINE)
 
@@ -221,20 +220,6 @@ def bench_options(top: Path, words: list[str]) -> argparse.Namespace:
     return options
 
 
-def _judge_install(top: Path, words: list[str]) -> None:
-    lines = (top / "debian-packages.txt").read_text(encoding="utf-8").splitlines()
-    groups = list(dict.fromkeys(line.split(":")[0] for line in lines if line and not line.startswith("#")))
-    unknown = [word for word in words if word not in groups]
-    if unknown:
-        raise Refused(f"no group named {', '.join(unknown)}; there are: {', '.join(groups)}")
-
-
-def _judge_build(_top: Path, words: list[str]) -> None:
-    unknown = [word for word in words if word not in BUILD_OPTIONS + BUILD_TARGETS]
-    if unknown:
-        raise Refused(f"build takes {', '.join(BUILD_OPTIONS + BUILD_TARGETS)}, not {', '.join(unknown)}")
-
-
 def _judge_shell(top: Path, words: list[str]) -> None:
     path = os.pathsep.join((os.environ["PATH"], str(top / "catkin_ws" / "devel" / "bin")))
     if words and (top / "catkin_ws" / "devel" / "setup.bash").exists() and not shutil.which(words[0], path=path):
@@ -243,8 +228,8 @@ def _judge_shell(top: Path, words: list[str]) -> None:
         )
 
 
-def _judge_tool(command: str, verbs: dict[str, int], words: list[str]) -> None:
-    """`verbs`: what may come first, and how many more words it needs at least."""
+def _judge_tool(command: str, words: list[str]) -> None:
+    verbs = TOOLS[command]
     if words[:1] == ["--folder"]:  # of object_tool.py, which may come first
         words = words[2:]
     if not words or words[0] not in verbs:
@@ -254,17 +239,13 @@ def _judge_tool(command: str, verbs: dict[str, int], words: list[str]) -> None:
         raise Refused(f"{command} {words[0]} expects a NAME")
 
 
-def _judge_nothing(command: str, words: list[str]) -> None:
-    if words:
-        raise Refused(f"{command} takes no arguments, got '{' '.join(words)}'")
-
-
 TOOLS = {
     "hand": {"trace": 0},
     "controller": {"new": 1},
     "object": {"new": 1, "check": 0, "list": 0},
     "console": {"picture": 0},
 }
+"""of each command what may come first, and how many more words it needs at least"""
 
 
 def judge(top: Path, command: str, words: list[str]) -> None:
@@ -280,13 +261,16 @@ def judge(top: Path, command: str, words: list[str]) -> None:
     elif command == "shell":
         _judge_shell(top, words)
     elif command == "install":
-        _judge_install(top, words)
+        lines = (top / "debian-packages.txt").read_text(encoding="utf-8").splitlines()
+        _named(words, dict.fromkeys(line.split(":")[0] for line in lines if line and line[0] != "#"), "group")
     elif command == "build":
-        _judge_build(top, words)
+        unknown = [word for word in words if word not in BUILD_WORDS]
+        if unknown:
+            raise Refused(f"build takes {', '.join(BUILD_WORDS)}, not {', '.join(unknown)}")
     elif command in TOOLS:
-        _judge_tool(command, TOOLS[command], words)
-    else:
-        _judge_nothing(command, words)
+        _judge_tool(command, words)
+    elif words:
+        raise Refused(f"{command} takes no arguments, got '{' '.join(words)}'")
 
 
 def main(words: list[str]) -> int:
