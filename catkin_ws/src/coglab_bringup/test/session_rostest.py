@@ -110,11 +110,18 @@ class Session(Handover):
         self.assertEqual(loaded - built_for_the_first_demo(), set())
 
     def test_y_odd_messages_end_no_node_and_do_not_move_the_arm(self):
-        joints, thrown = [], []
-        rospy.Subscriber("/lwr/joint_states", JointState, lambda m: m._connection_header["callerid"] == "/robot" and
-                         joints.append(m.position), queue_size=50)  # fmt: skip
-        rospy.Subscriber("/rosout", Log, lambda m: m.msg.startswith(THROWN) and thrown.append(m.msg), queue_size=1000)
-        odd = OddMessages()
+        joints, thrown, odd = [], [], OddMessages()
+
+        def on_joints(message):
+            if message._connection_header["callerid"] == "/robot":
+                joints.append(message.position)
+
+        def on_log(message):
+            if message.name in odd.nodes and message.msg.startswith(THROWN):
+                thrown.append(f"{message.name}: {message.msg[:200]}")
+
+        rospy.Subscriber("/lwr/joint_states", JointState, on_joints, queue_size=50)
+        rospy.Subscriber("/rosout", Log, on_log, queue_size=1000)
         self.assertLessEqual({"/robot", "/coglab", "/ih2_hand", "/perception", "/contact_detector"}, set(odd.nodes))
         odd.send(each=30)
         self.assertEqual((odd.ended, odd.unanswered, thrown), ([], [], []))

@@ -153,15 +153,6 @@ def test_doctor_names_a_missing_package_and_the_way_to_it(checkout):
     assert "not built yet; do it: ./coglab build" in ended.stdout
 
 
-def test_doctor_names_a_second_smach(checkout):
-    second = checkout / "catkin_ws/src/somewhere/smach_ros"
-    second.mkdir(parents=True)
-    (second / "package.xml").write_text("<package/>")
-    doctor = TOP / "catkin_ws/src/coglab_bringup/src/coglab_bringup/doctor.py"
-    ended = run("/usr/bin/python3", "-I", doctor, checkout)
-    assert f"a second copy of smach_ros lies in {second}" in ended.stdout and "--upstream-smach" in ended.stdout
-
-
 def test_a_foreign_ros_is_named_and_left_aside():
     ended = run(TOP / "coglab", "help", ROS_PACKAGE_PATH="/opt/ros/noetic/share")
     assert ended.returncode == 0 and "a ROS from /opt/ros is in your environment" in ended.stdout
