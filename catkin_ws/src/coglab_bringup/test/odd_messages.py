@@ -7,6 +7,7 @@ import random
 import re
 import threading
 import time
+from collections.abc import Iterator
 from typing import Any
 from xmlrpc.client import ServerProxy
 
@@ -19,7 +20,7 @@ import rosservice
 FOREIGN = ("/rosout", "/joint_state_publisher", "/robot_state_publisher", "/rviz")
 LEFT_OUT = ("/coglab/stop",)  # would refuse every motion from then on
 FLOATS = (math.nan, math.inf, -math.inf, 3e38, -3e38)
-TEXTS = (" ", "\0", "a\0b", "../../etc/passwd", "%s%n%x", "☃" * 50, "{[}:", "//x", "-1", "nan", "\x1b[2J", "x" * 65536)
+TEXTS = (" ", "\0", "a\0b", "../../etc/passwd", "%s%n%x", "☃" * 50, "{[}:", "//x", "-1", "nan", "\x1b[2J", "x" * 5000)
 KNOWN = ("mug", "human_hand", "object_mug", "world", "dmp", "ptp", "reach_human", "lwr_a1")
 SECONDS = (0, 1, 2**31 - 1, 2**32 - 1)
 ARRAY = re.compile(r"(.*)\[(\d*)\]$")
@@ -34,10 +35,28 @@ def fill(message: Any, draw: random.Random, fine: bool) -> Any:
             setattr(message, name, value_of(of, draw, fine))
             continue
         element, fixed = array.groups()
-        count = int(fixed) if fixed else draw.choice((1, 2, 7, 8, 100))
+        count = int(fixed) if fixed else draw.choice((1, 2, 7, 8, 20))
         values = [value_of(element, draw, fine) for _ in range(count)]
         setattr(message, name, bytes(v % 256 for v in values) if element in ("uint8", "char") else values)
     return message
+
+
+def has_time(kind: Any) -> bool:
+    """Whether a message has a stamp or a duration, in itself or in a part."""
+    for of in kind._slot_types:
+        name = (ARRAY.match(of) or [of, of])[1]
+        if name in ("time", "duration", "Header", "std_msgs/Header"):
+            return True
+        if "/" in name and has_time(roslib.message.get_message_class(name)):
+            return True
+    return False
+
+
+def odd_messages(kind: Any, count: int, draw: random.Random) -> Iterator[Any]:
+    """So many; of those with a time every third one is odd in that alone."""
+    timed = has_time(kind)
+    for number in range(count):
+        yield fill(kind(), draw, timed and number % 3 == 0)
 
 
 def value_of(of: str, draw: random.Random, fine: bool) -> Any:
@@ -83,20 +102,20 @@ class OddMessages:
         except Exception:  # of whatever kind: no answer
             return 0
 
-    def send(self, each: int, limit: float = 60.0) -> None:
-        """So many to each topic and service; every third one is odd in its times alone."""
+    def send(self, to_topics: int, to_services: int, limit: float = 60.0) -> None:
+        """So many to each topic, and to each service."""
         threads = {
-            name: threading.Thread(target=self._call, args=(name, kind, each), daemon=True)
+            name: threading.Thread(target=self._call, args=(name, kind, to_services), daemon=True)
             for name, kind in self.services.items()
         }
         for thread in threads.values():
             thread.start()
         publishers = {name: rospy.Publisher(name, kind, queue_size=200) for name, kind in self.topics.items()}
         time.sleep(0.7)  # for the subscribers to connect
-        draw = random.Random(1)
-        for number in range(each):
+        messages = {name: odd_messages(kind, to_topics, random.Random(name)) for name, kind in self.topics.items()}
+        for _ in range(to_topics):
             for name, publisher in publishers.items():
-                publisher.publish(fill(self.topics[name](), draw, number % 3 == 0))
+                publisher.publish(next(messages[name]))
             time.sleep(0.05)
         end = time.monotonic() + limit
         for thread in threads.values():
@@ -107,9 +126,9 @@ class OddMessages:
         self.ended = [node for node in self.nodes if self._process(node) != self.processes[node]]
 
     def _call(self, name: str, kind: Any, each: int) -> None:
-        draw, proxy = random.Random(name), rospy.ServiceProxy(name, kind)
-        for number in range(each):
+        proxy = rospy.ServiceProxy(name, kind)
+        for request in odd_messages(kind._request_class, each, random.Random(name)):
             try:
-                proxy(fill(kind._request_class(), draw, number % 3 == 0))
+                proxy(request)
             except Exception:  # an error that the service answers with, or a request that cannot be serialised
                 continue

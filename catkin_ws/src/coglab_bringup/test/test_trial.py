@@ -106,7 +106,7 @@ def test_containers_of_one_name_share_a_lane_and_a_state_has_one_colour():
     assert len(set(colours.values())) == len(colours)
 
 
-def test_the_picture_is_written_with_labels_in_their_bars_and_legends_beside_the_curves(tmp_path, monkeypatch):
+def test_the_picture_is_written_with_labels_in_their_bars(tmp_path, monkeypatch):
     import coglab_bringup.trial_plot as trial_plot
 
     kept = []
@@ -119,12 +119,6 @@ def test_the_picture_is_written_with_labels_in_their_bars_and_legends_beside_the
     for label in figure.axes[0].texts:
         box = label.get_window_extent(renderer)
         assert any(bar.x0 <= box.x0 and box.x1 <= bar.x1 for bar in bars), label.get_text()
-    for axis in figure.axes:
-        if axis.get_legend():
-            assert axis.get_legend().get_window_extent(renderer).x0 >= axis.get_window_extent(renderer).x1 - 1
-        assert axis is figure.axes[0] or axis.get_ylabel()
-    explained = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
-    assert explained == ["contact or load felt", "load taken over"]
     trial_plot.plt.figure(figure).clear()
 
 
