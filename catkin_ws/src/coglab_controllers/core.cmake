@@ -75,13 +75,3 @@ if(CATKIN_ENABLE_TESTING)
     endif()
   endforeach()
 endif()
-
-# Helper of bench_dmp.py and bench_ik.py; built with the tests.
-add_executable(coglab_controllers_core_times EXCLUDE_FROM_ALL bench/core_times.cpp)
-if(TARGET tests)
-  add_dependencies(tests coglab_controllers_core_times)
-endif()
-target_link_libraries(coglab_controllers_core_times coglab_controllers_core)
-set_target_properties(coglab_controllers_core_times PROPERTIES
-  OUTPUT_NAME core_times
-  RUNTIME_OUTPUT_DIRECTORY ${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_BIN_DESTINATION})

@@ -34,12 +34,6 @@ def test_no_contact_is_waited_for_where_the_robot_gives():
     assert summarise(trial, "exchange_robot_to_human", "success", 0.9, 8.0, LIMITS)["contact_delay_ms"] is None
 
 
-def test_a_goal_that_is_held_on_the_way_is_no_arrival():
-    trial = Trial()
-    trial.feedback = [(4.0, "running", 0.25), (4.1, "holding", 0.18), (4.2, "running", 0.15)]
-    assert summarise(trial, "exchange_human_to_robot", "success", 1.0, 8.0, LIMITS)["believed_error_mm"] is None
-
-
 def test_summary_without_measurements_says_none():
     row = summarise(Trial(), "take", "no end", 0.0, 1.0, LIMITS)
     assert row["final_error_mm"] is None and row["contact_delay_ms"] is None and row["peak_velocity_share"] is None
@@ -75,18 +69,6 @@ def test_a_child_of_a_concurrence_begins_with_it():
         (3.0, "/m", "both", "done", "idle", ""),
     ]
     assert state_intervals(trial, 5.0)["/m/both/left"] == [(1.0, 2.5, "first")]
-
-
-def test_an_outcome_named_like_the_next_state_leads_to_it():
-    trial = Trial()
-    trial.transitions = [
-        (1.0, "/m", "hub", "give", "give", ""),
-        (2.0, "/m/give", "first", "done", "done", ""),
-        (2.0, "/m", "give", "done", "hub", ""),
-    ]
-    intervals = state_intervals(trial, 5.0)
-    assert intervals["/m/give"] == [(1.0, 2.0, "first")]
-    assert intervals["/m"][1:] == [(1.0, 2.0, "give"), (2.0, 5.0, "hub")]
 
 
 def test_children_of_a_concurrence_get_rows_of_their_own():
