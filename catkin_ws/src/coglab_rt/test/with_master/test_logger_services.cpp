@@ -10,26 +10,14 @@
 #include <ros/service.h>
 
 #include "coglab_rt/ros/logger_service.hpp"
-#include "own_master.hpp"
 
 namespace coglab_rt {
 namespace {
 
-/// Refusals are told by ROS time, which stands still here and is set. It never goes back, because
-/// the line that tells them remembers when it did so last.
 class Loggers : public ::testing::Test {
  protected:
-  void SetUp() override {
-    ros::Time::init();
-    pass(100.0);
-  }
   void TearDown() override { set("ros", "info"); }
 
-  static void pass(double seconds) {
-    static ros::Time now(1000.0);
-    now += ros::Duration(seconds);
-    ros::Time::setNow(now);
-  }
   static bool set(const std::string& logger, const std::string& level) {
     roscpp::SetLoggerLevel call;
     call.request.logger = logger;
@@ -49,10 +37,6 @@ class Loggers : public ::testing::Test {
   const std::string own_ = ROSCONSOLE_DEFAULT_NAME;
   LoggerServices services_;
 };
-
-TEST_F(Loggers, ThereAreTwoAndBothBeginWithInfo) {
-  EXPECT_EQ(levels(), (std::map<std::string, std::string>{{"ros", "info"}, {own_, "info"}}));
-}
 
 TEST_F(Loggers, EveryLevelIsTakenInSmallAndInLargeLettersAndTold) {
   for (const char* level :
@@ -90,24 +74,5 @@ TEST_F(Loggers, WhatIsNoLoggerOrNoLevelChangesNothing) {
   EXPECT_EQ(levels(), before);
 }
 
-TEST_F(Loggers, ARefusalSaysWhatIsExpectedOnceASecond) {
-  const auto told = [] {
-    ::testing::internal::CaptureStderr();
-    set("ros", "loud");
-    return ::testing::internal::GetCapturedStderr().find(
-               "set_logger_level refused: expected a logger of ~get_loggers and one of debug, "
-               "info, warn, error, fatal") != std::string::npos;
-  };
-  EXPECT_TRUE(told());
-  pass(0.75);
-  EXPECT_FALSE(told());
-  pass(0.5);
-  EXPECT_TRUE(told());
-}
-
 }  // namespace
 }  // namespace coglab_rt
-
-int main(int count, char** words) {
-  return coglab_rt::runWithOwnMaster(count, words, "logger_services_test");
-}

@@ -47,8 +47,3 @@ TEST_F(ExitLimit, AProcessThatEndsBeforeKeepsItsStatusAndSaysNothing) {
 
 }  // namespace
 }  // namespace coglab_rt
-
-int main(int count, char** words) {
-  ::testing::InitGoogleTest(&count, words);
-  return RUN_ALL_TESTS();
-}

@@ -17,7 +17,6 @@
 #include "coglab_rt/ros/joint_limits_parameter.hpp"
 #include "coglab_rt/ros/parameter.hpp"
 #include "coglab_rt/ros/parameter_tree.hpp"
-#include "own_master.hpp"
 
 namespace coglab_rt {
 namespace {
@@ -91,14 +90,6 @@ TEST_F(RosParameters, BothEndsOfARangeBelongToIt) {
   EXPECT_THROW(readNumber(node_, "missing", 3.0, -0.5, 2.5), std::invalid_argument);
 }
 
-TEST_F(RosParameters, ARefusedNumberIsNamedWithValueAndRange) {
-  node_.setParam("x", 3.25);
-  const auto outside = [&] { readNumber(node_, "x", 1.0, -0.5, 2.5); };
-  EXPECT_EQ(refusal(outside), "parameter /test/x = 3.25 is outside its range -0.5..2.5");
-  node_.setParam("x", std::string("wide"));
-  EXPECT_EQ(refusal(outside), "parameter /test/x: expected a number");
-}
-
 TEST_F(RosParameters, ATreeHasEveryTypeThatYamlCanSay) {
   node_.setParam("flag", true);
   node_.setParam("count", -3);
@@ -116,20 +107,6 @@ TEST_F(RosParameters, ATreeHasEveryTypeThatYamlCanSay) {
     EXPECT_EQ(tree["word"].as<std::string>(), "arm");
     EXPECT_EQ(tree["list"].as<std::vector<int>>(), (std::vector<int>{4, 5, 6}));
     EXPECT_EQ(tree["inner"]["deep"]["value"].as<int>(), 8);
-  }
-}
-
-TEST_F(RosParameters, WhatYamlCannotSayIsEmptyAndNoMapIsAnEmptyOne) {
-  char bytes[] = "ab";
-  node_.setParam("inner", XmlRpc::XmlRpcValue(bytes, 2));
-  const YAML::Node tree = readParameterTree(node_);
-  EXPECT_EQ(tree.size(), 1U);
-  EXPECT_TRUE(tree["inner"].IsNull());
-  node_.setParam("number", 5);
-  for (const char* name : {"/test/number", "/test/missing"}) {
-    const YAML::Node empty = readParameterTree(ros::NodeHandle(name));
-    EXPECT_TRUE(empty.IsMap()) << name;
-    EXPECT_EQ(empty.size(), 0U) << name;
   }
 }
 
@@ -185,7 +162,3 @@ TEST_F(LimitsParameters, AMissingPackageAndValuesOfAnotherTypeAreNamed) {
 
 }  // namespace
 }  // namespace coglab_rt
-
-int main(int count, char** words) {
-  return coglab_rt::runWithOwnMaster(count, words, "ros_parameters_test");
-}

@@ -136,12 +136,6 @@ TEST(BoundedThread, TheLowerHalfOfTheStackIsNotTouched) {
   EXPECT_EQ(present, 0U);
 }
 
-TEST(RealTime, APriorityThatThereIsNotIsRefusedInWords) {
-  EXPECT_EQ(enterRealTime(100),
-            "SCHED_FIFO priority 100 not granted (Invalid argument): answers may come late under "
-            "load; give the binary cap_sys_nice");
-}
-
 /// In a thread of its own, which takes the priority with it: granted or not, what it says is so.
 TEST(RealTime, ThePriorityThatIsGrantedIsTheOneAskedFor) {
   BoundedThread thread;

@@ -88,37 +88,6 @@ TEST(Interpolator, AccelerationBeyondTheLimitComesBackFirst) {
   EXPECT_EQ(s.velocity, 1.5);
 }
 
-TEST(Interpolator, MatchesNumericIntegrationOfItsJerk) {
-  const AxisState start{0.0, 0.4, -3.0};
-  const AxisProfile profile = planVelocity(start.velocity, start.acceleration, -1.2, 10.0, 500.0);
-  double p = start.position, v = start.velocity, a = start.acceleration, t = 0.0;
-  const double h = 1e-7, end = 0.9 * profile.totalTime();
-  while (t < end) {
-    const double j = t < profile.duration[0]                         ? profile.jerk[0]
-                     : t < profile.duration[0] + profile.duration[1] ? profile.jerk[1]
-                                                                     : profile.jerk[2];
-    p += h * v;
-    v += h * a;
-    a += h * j;
-    t += h;
-  }
-  const AxisState s = advance(start, profile, t);
-  EXPECT_NEAR(s.position, p, 1e-6);
-  EXPECT_NEAR(s.velocity, v, 1e-5);
-  EXPECT_NEAR(s.acceleration, a, 1e-3);
-}
-
-/// After its phases the velocity is kept: exactly the target's, whatever the phases came to.
-TEST(Interpolator, AtTheEndOfAProfileTheVelocityIsTheTarget) {
-  const AxisProfile profile{{0.25, 0.25, 0.25}, {1.0, 0.0, -1.0}, 5.0};
-  const AxisState end = advance({0.0, 0.0, 0.0}, profile, 0.75);
-  EXPECT_EQ(end.velocity, 5.0);
-  EXPECT_EQ(end.acceleration, 0.0);
-  const AxisState later = advance({0.0, 0.0, 0.0}, profile, 1.75);
-  EXPECT_DOUBLE_EQ(later.position - end.position, 5.0);
-  EXPECT_DOUBLE_EQ(profile.totalTime(), 0.75);
-}
-
 TEST(Interpolator, StandsOnlyWithoutVelocityAndWithoutAccelerationOfAnyJoint) {
   Interpolator interpolator(loadJointLimits(LIMITS_FILE));
   EXPECT_TRUE(interpolator.standsStill());

@@ -1,16 +1,47 @@
-/// Text that is composed without allocation.
+/// Codes and texts that are composed without allocation.
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <cstdio>
+#include <iterator>
 #include <limits>
 #include <random>
+#include <set>
 #include <string>
 
 #include "coglab_rt/fixed_text.hpp"
+#include "coglab_rt/reason.hpp"
 
 namespace coglab_rt {
 namespace {
+
+TEST(Reason, EveryBlockHasWordsACodeOfItsOwnAndTheWayBack) {
+  std::set<std::uint16_t> seen;
+  for (int i = 0; i < 256; ++i) {
+    const auto block = static_cast<MotionBlock>(i);
+    if (std::string(describe(block)) == "?") continue;  // no value of the enum
+    const auto code = static_cast<std::uint16_t>(codeOf(block));
+    EXPECT_EQ(code == 0, block == MotionBlock::None) << describe(block);
+    EXPECT_TRUE(seen.insert(code).second) << describe(block);
+    EXPECT_EQ(motionBlockOf(code), block) << describe(block);
+  }
+  EXPECT_EQ(seen.size(), std::size(kBlockCodes));
+  EXPECT_EQ(motionBlockOf(12345), MotionBlock::NotStarted);
+}
+
+TEST(Reason, IsEmptyOnlyWithoutACode) {
+  Reason reason;
+  EXPECT_TRUE(reason.empty());
+  reason = Reason(ReasonCode::GoalStale, "the goal is ") << 0.25 << " s old";
+  EXPECT_FALSE(reason.empty());
+  EXPECT_EQ(reason.str(), "the goal is 0.250 s old");
+  const Answer answer = Answer::refusal(reason);
+  EXPECT_FALSE(answer.success);
+  EXPECT_EQ(answer.number(), 301);
+  EXPECT_EQ(answer.message, reason.str());
+  reason.clear();
+  EXPECT_TRUE(reason.empty());
+}
 
 TEST(FixedText, IsCutAndAlwaysTerminated) {
   FixedText<8> text("abc");
@@ -62,22 +93,6 @@ TEST(FixedText, NumbersAtTheEdges) {
   EXPECT_EQ(written(-1.1e15), "->1e15");
   EXPECT_EQ(written(std::uint64_t{0}), "0");
   EXPECT_EQ(written(std::uint64_t{10}), "10");
-}
-
-TEST(FixedText, EqualityLooksAtEveryCharacterAndAtTheEnd) {
-  const FixedText<8> text("abc");
-  for (const char* other : {"xbc", "axc", "abx", "ab", "abcd", ""}) {
-    EXPECT_NE(text, FixedText<8>(other));
-    EXPECT_NE(FixedText<8>(other), text);
-  }
-  EXPECT_EQ(FixedText<8>(), FixedText<8>(""));
-  EXPECT_TRUE(FixedText<8>().empty());
-  EXPECT_FALSE(text.empty());
-}
-
-TEST(FixedText, AnIdHasAtMost63Characters) {
-  EXPECT_EQ(Name(std::string(63, 'n').c_str()).str(), std::string(63, 'n'));
-  EXPECT_EQ(Name(std::string(64, 'n').c_str()).str(), std::string(63, 'n'));
 }
 
 }  // namespace
