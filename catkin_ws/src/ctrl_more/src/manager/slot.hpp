@@ -3,16 +3,17 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <mutex>
 #include <string>
 #include <vector>
 
-#include "ctrl_more/controller/feedback_controller.hpp"
-#include "ctrl_more/cycle/controller_entry.hpp"
-#include "ctrl_more/cycle/controller_status.hpp"
+#include "coglab_rt/fixed_text.hpp"
+#include "coglab_rt/triple_buffer.hpp"
+#include "ctrl_more/feedback_controller.hpp"
 #include "ctrl_more/loading/controller_instance.hpp"
-#include "cycle/guard.hpp"
-#include "cycle/plan.hpp"
-#include "cycle/shared_text.hpp"
+#include "ctrl_more/manager/controller_status.hpp"
+#include "manager/guard.hpp"
+#include "manager/plan.hpp"
 
 namespace ctrl_more {
 
@@ -24,27 +25,27 @@ struct StageRun {
   ControlStates& control;
   std::vector<double>* compared;  ///< test mode: room for all of `control`; else null
   bool timed;
-  unsigned buffer;           ///< the cycle's buffer of records, see RecordExchange
+  unsigned buffer;           ///< the cycle's buffer of records
   std::int64_t boundary_ns;  ///< steady clock between the last controller and this one
 };
 
 /// One loaded controller in the control cycle: runs it under guard, blends its corrections, and
-/// tells the other threads what happened.
+/// publishes its state for other threads.
 ///
 /// A controller runs on the references themselves. What it left is judged, then either taken back,
 /// or blended and recorded, before and after, for attribution and for the next fade.
 ///
 /// configure() and the const queries are for services; adopt() and run() are for the cycle and
 /// neither allocate nor lock nor throw.
-class ControllerSlot {
+class Slot {
  public:
   /// @param instance the controller and its library
   /// @param name its name
   /// @param entry overrun, blend time and fault policy
   /// @param options of the manager
   /// @param owner number for permissions
-  ControllerSlot(ControllerInstance instance, const std::string& name, const ControllerEntry& entry,
-                 const ManagerOptions& options, std::uint32_t owner);
+  Slot(ControllerInstance instance, const std::string& name, const ControllerEntry& entry,
+       const ManagerOptions& options, std::uint32_t owner);
 
   /// Gives the controller its configuration, and finds its signals. Throws what initialize()
   /// throws, std::invalid_argument for a description that cannot be run.
@@ -74,7 +75,7 @@ class ControllerSlot {
   void fillStatus(ControllerStatus& status) const;
   /// Adds what it changed, and its state, in the newest complete cycle.
   /// @param names for the names of signals
-  /// @param buffer the reader's buffer of records, from RecordExchange::acquire()
+  /// @param buffer the reader's buffer of records
   /// @param record of the cycle with its number; what is of another one is left out
   void addRecord(const ControlStates& names, unsigned buffer, CycleRecord& record) const;
   /// True if the duration of its update() is judged.
@@ -125,7 +126,7 @@ class ControllerSlot {
 
   Guard guard_;
   std::vector<Needed> needed_;
-  std::array<Record, 2> records_;  // one for each buffer of the cycle
+  std::array<Record, 3> records_;  // one for each buffer of the cycle
   unsigned last_ = 0;              // the newer one
   std::vector<double> state_;      // what state() wrote last
   std::vector<double> from_;       // correction that the blend starts from
@@ -156,7 +157,8 @@ class ControllerSlot {
   std::atomic<std::uint64_t> overruns_{0};
   std::atomic<std::int64_t> last_ns_{0};
   std::atomic<int> waiting_{-1};
-  SharedText fault_text_;
+  mutable coglab_rt::TripleBuffer<coglab_rt::FixedText<120>> fault_texts_;
+  mutable std::mutex fault_text_mutex_;  // of its readers; the cycle does not take it
 };
 
 }  // namespace ctrl_more

@@ -1,4 +1,4 @@
-#include "ctrl_more/controller/feedback_controller.hpp"
+#include "ctrl_more/feedback_controller.hpp"
 
 #include <algorithm>
 
@@ -188,6 +188,19 @@ Status FeedbackController::setGains(const std::map<std::string, std::vector<doub
   }
   gains_ = values;
   return {};
+}
+
+FeedbackControllerPrototypes::FeedbackControllerPrototypes()
+    : PluginTypesOf("controller", "CTRL_MORE_REGISTER_CONTROLLER", "ctrl_more", thisAbi()) {}
+
+bool FeedbackControllerPrototypes::insert(
+    const std::pair<const std::string, FeedbackControllerMaker>& entry, const Abi& abi) {
+  return add(entry.first, entry.second, abi);
+}
+
+FeedbackControllerPrototypes& prototypes() {
+  static FeedbackControllerPrototypes the_map;
+  return the_map;
 }
 
 }  // namespace ctrl_more

@@ -1,10 +1,8 @@
-#include "cycle/guard.hpp"
+#include "manager/guard.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-
-#include "cycle/correction.hpp"
 
 namespace ctrl_more {
 
