@@ -25,6 +25,7 @@ from coglab_msgs.msg import Say, Transition
 from coglab_msgs.srv import Start, StartResponse
 from coglab_py import parameters
 from coglab_py.alone import init_node
+from coglab_py.publish import publish
 from coglab_py.steady import ClockWatch, Stamps, exit_status, utc_of, worker
 from coglab_smach.clocks.clock import PacedClock
 from coglab_smach.context.config import Config, ConfigError
@@ -41,7 +42,6 @@ from coglab_smach.ros.arm import RosArm
 from coglab_smach.ros.calls import PACE
 from coglab_smach.ros.hand import RosHand
 from coglab_smach.ros.ports import RosContact, RosDatabase, RosPerception
-from coglab_smach.ros.publish import publish
 from std_msgs.msg import String
 from std_srvs.srv import Trigger, TriggerResponse
 

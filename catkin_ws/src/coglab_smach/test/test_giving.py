@@ -5,10 +5,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from coglab_contact.load import SAME, LeavingLoad
 from coglab_msgs.msg import ReasonCode, Say
 from coglab_py.pose import Pose
 from coglab_sim.conditions import Conditions
-from coglab_smach.contact.leaving_load import SAME, LeavingLoad
 from coglab_smach.context.config import Config
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.interfaces import HandState, Located

@@ -10,7 +10,6 @@ import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_py.pose import Pose
 from coglab_smach.clocks.virtual_clock import ClockStalled, VirtualClock, VirtualCondition, using
-from coglab_smach.contact.learning import MotionRecorder
 from coglab_smach.context.holding import HoldingMemory
 from coglab_smach.context.journal import Failure, Journal, TransitionRecord
 from coglab_smach.context.requests import Requests, command
@@ -22,7 +21,7 @@ from coglab_smach.states.arm import ConfigureLwr, PtpMotion
 from coglab_smach.states.base import TimeLimit
 from coglab_smach.states.hub import WaitForTrigger
 from conftest import Trial
-from test_node_parts import script
+from test_master_node import script
 
 RECEIVE, GIVE = "exchange_human_to_robot", "exchange_robot_to_human"
 
@@ -248,49 +247,7 @@ def test_the_go_ahead_is_waited_for_an_hour_unless_it_is_given_beforehand():
     assert ran(Trial(), state)[0] == "succeeded" and state.reason == "auto_trigger is set"
 
 
-# --- a recorder, a descent and a clock --------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("samples", "speed", "kept"), [(40, 0.11, 1), (39, 0.11, 0), (60, 0.09, 0)])
-def test_a_motion_counts_with_40_samples_and_a_tenth_of_a_radian_per_second(samples, speed, kept):
-    moving = SimpleNamespace(change=None, load=0.0, still=lambda: False, offset_of_motion=lambda: "offset")
-    recorder = MotionRecorder(moving)
-    recorder.look()
-    for k in range(samples):
-        moving.change = SimpleNamespace(stamp=1.0 + k, features=np.full((7, 6), speed))
-        recorder.look()
-        recorder.look()
-    recorder.end()
-    assert (len(recorder.reaches), len(recorder.offsets)) == (kept, kept)
-    assert not kept or len(recorder.reaches[0]) == samples, "each sample once"
-    moving.load = 0.3
-    for k in range(60):
-        moving.change = SimpleNamespace(stamp=100.0 + k, features=np.full((7, 6), 0.2))
-        recorder.look()
-    recorder.end()
-    assert (len(recorder.reaches), len(recorder.offsets)) == (kept + 1, kept), "a load leaves an offset of its own"
-
-
-def test_of_a_rest_the_last_40_samples_belong_to_the_motion_and_4000_are_kept():
-    rests = [True]
-    moving = SimpleNamespace(change=None, load=0.0, still=lambda: rests[0], offset_of_motion=lambda: None)
-    recorder = MotionRecorder(moving)
-
-    def feed(count, speed):
-        for _ in range(count):
-            stamp = 1.0 if moving.change is None else moving.change.stamp + 1.0
-            moving.change = SimpleNamespace(stamp=stamp, features=np.full((7, 6), speed))
-            recorder.look()
-
-    feed(100, 0.0)
-    rests[0] = False
-    feed(50, 0.2)
-    rests[0] = True
-    feed(1, 0.0)
-    assert [len(reach) for reach in recorder.reaches] == [91] and recorder.offsets == []
-    rests[0] = False
-    feed(4100, 0.2)
-    assert [len(reach) for reach in recorder.reaches] == [91, 4000]
+# --- a descent and a clock --------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("joint", range(7))

@@ -6,13 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
+from coglab_py.packages import package_path
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.interfaces import DmpProgress, DmpRequest, HandState, Verdict
 from coglab_smach.ports.pending import Polled, PortError
 from coglab_smach.simulated.virtual_arm import VirtualArm
 from coglab_smach.simulated.virtual_node import VirtualNode
 from coglab_smach.simulated.world_ports import VirtualHand
-from moving_arm import URDF
 
 REPORT = {
     **{"motion_allowed": True, "blocked_by": "", "blocked_code": 0, "standing": True, "fault": False, "reason": "why"},
@@ -44,7 +44,8 @@ class Rig:
         self.after_period, self.seen = [], {}
         virtual = self.virtual = Virtual()
         self.robot = SimpleNamespace(virtual=virtual, parameters={}, loaded={}, report=dict(REPORT), ended={}, debug=1)
-        self.robot.urdf, self.robot.chain = URDF, default_arm()
+        urdf = package_path("lwr_description", "urdf", "lwr_ih2.urdf").read_text(encoding="utf-8")
+        self.robot.urdf, self.robot.chain = urdf, default_arm()
         self.hand = SimpleNamespace(
             dead=False, calibrated=True, calibrating=False, holding=False, message="m", reason=4
         )

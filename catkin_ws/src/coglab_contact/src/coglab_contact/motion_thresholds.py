@@ -25,7 +25,7 @@ import yaml
 from coglab_py.yaml_file import read
 from scipy.optimize import nnls
 
-from coglab_smach.contact.momentum_observer import Residual
+from coglab_contact.momentum_observer import Residual
 
 FEATURES = (
     "constant",

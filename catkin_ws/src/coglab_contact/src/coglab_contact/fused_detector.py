@@ -17,11 +17,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from coglab_msgs.msg import ReasonCode
 
-from coglab_smach.contact.detector import ContactDetector, Joints, Signal
-from coglab_smach.contact.evidence import (
+from coglab_contact.detector import ContactDetector, Joints, Signal
+from coglab_contact.evidence import (
     DECIDED,
     FUSED,
     MOMENTUM,
+    ContactEvent,
     Evidence,
     Fingers,
     InPalm,
@@ -31,10 +32,8 @@ from coglab_smach.contact.evidence import (
     probability,
     together,
 )
-from coglab_smach.contact.grip_and_load import GripAndLoad
-from coglab_smach.contact.leaving_load import LeavingLoad
-from coglab_smach.contact.moving_contact import MovingContact
-from coglab_smach.ports.interfaces import ContactEvent
+from coglab_contact.load import GripAndLoad, LeavingLoad
+from coglab_contact.moving_contact import MovingContact
 
 IN_MOTION = "contact_in_motion"
 LIFT = "lift"
@@ -100,12 +99,13 @@ class FusedDetector:
     ) -> None:
         """As ContactDetector.arm, with the modes IN_MOTION and LIFT besides. ValueError says what is wrong with the
         request."""
+        request = (mode, now, timeout, k, joints, mass, load_share)
         if mode in (IN_MOTION, LIFT) and self.moving is None:
             raise ValueError(f"{mode} needs a model of the arm and learnt thresholds, and there are none")
         leaving = None
         if mode == RELEASE and self.moving is not None:
             # Armed too, so that it does not learn what a hand that takes the load does; its own event is not told.
-            self.still.arm(mode, now, timeout, k, joints, mass, load_share)
+            self.still.arm(*request)
             share = load_share if load_share > 0.0 else self.still.settings.load_share
             leaving = LeavingLoad(mass, share, now + timeout, self.moving.weight_before_motion())
             self._lift = None
@@ -116,8 +116,7 @@ class FusedDetector:
             self._lift = _Lift((load_share if load_share > 0.0 else self.still.settings.load_share) * mass * GRAVITY)
         else:
             carries = mode == IN_MOTION and self.moving is not None and self.moving.load > 0.0
-            watched = "contact" if mode == IN_MOTION else mode
-            self.still.arm(watched, now, timeout, k, joints, mass, load_share, carries)
+            self.still.arm("contact" if mode == IN_MOTION else mode, *request[1:], carries)
             self._lift = None
         if mode == IN_MOTION and self.moving is not None:
             self._before_reach = self.moving.before_motion()

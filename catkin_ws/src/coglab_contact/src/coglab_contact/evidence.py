@@ -29,6 +29,22 @@ SPEAKS_TOO = 0.5
 
 
 @dataclass(frozen=True)
+class ContactEvent:
+    """Contact found (contact=True) or load released (False), as coglab_msgs/Contact has it.
+
+    ``margin`` is the signal over its threshold, ``confidence`` the probability that the signal is over its threshold
+    given the noise of the sensor (0..1), ``code`` the ReasonCode of the message.
+    """
+
+    contact: bool
+    source: str
+    margin: float
+    message: str = ""
+    confidence: float = 1.0
+    code: int = 0
+
+
+@dataclass(frozen=True)
 class Evidence:
     """What one source says at one time (s) and until when it counts."""
 
