@@ -11,7 +11,7 @@ from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.interfaces import HandState, Located
 from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states import hand as hands
-from coglab_smach.states import hand_tracking, seat, yielding
+from coglab_smach.states import hand_tracking, regrasp, yield_to_pull
 from coglab_smach.states.grip import Grip
 from coglab_smach.states.hand import CalibrateHand, HandClose, HandTighten, LetGo
 from coglab_smach.states.hand_tracking import (
@@ -22,8 +22,8 @@ from coglab_smach.states.hand_tracking import (
     way_to_grasp,
     way_to_hand,
 )
-from coglab_smach.states.held import HeldObject
-from coglab_smach.states.yielding import GivesWay
+from coglab_smach.states.held_object import HeldObject
+from coglab_smach.states.yield_to_pull import YieldToPull
 from conftest import Trial
 
 HERE = (0.0, 0.5, 0.0, 1.0, 0.0, 0.5, 0.0)
@@ -207,7 +207,7 @@ def test_an_object_stays_that_a_later_sight_shows_as_far_from_the_palm_as_at_fir
 
 
 class Pulled:
-    """A GivesWay at the palm of a still arm; ``way``: what was asked of the arm (m, base frame; m/s)."""
+    """A YieldToPull at the palm of a still arm; ``way``: what was asked of the arm (m, base frame; m/s)."""
 
     def __init__(self):
         self.trial, self.palm, self.force = Trial(), np.zeros(3), np.zeros(3)
@@ -215,14 +215,14 @@ class Pulled:
         self.moved, self.cancelled, self.done = [], [], False
         ctx.contact.force = lambda: tuple(self.force)
         ctx.arm.cancel_motion = lambda why: self.cancelled.append(why) or Ready()
-        self.way = GivesWay(ctx)
+        self.way = YieldToPull(ctx)
 
     def follow(self, monkeypatch, *newton, seconds=0.0, step=0.01):
         self.force = np.array(newton)
         motion = Polled(lambda: self.done, lambda: None)
-        monkeypatch.setattr(yielding, "palm_at", lambda ctx: self.palm)
-        monkeypatch.setattr(yielding, "palm_axis", lambda ctx: np.array([0.0, 0.0, 1.0]))
-        monkeypatch.setattr(yielding, "shift", lambda ctx, way, speed: self.moved.append((way, speed)) or motion)
+        monkeypatch.setattr(yield_to_pull, "palm_at", lambda ctx: self.palm)
+        monkeypatch.setattr(yield_to_pull, "palm_axis", lambda ctx: np.array([0.0, 0.0, 1.0]))
+        monkeypatch.setattr(yield_to_pull, "shift", lambda ctx, way, speed: self.moved.append((way, speed)) or motion)
         with using(self.trial.clock) as clock:
             for _ in range(round(seconds / step) + 1):
                 self.way.follow()
@@ -384,9 +384,9 @@ def test_the_palm_draws_back_once_a_finger_has_opened_by_40_counts(monkeypatch, 
 @pytest.mark.parametrize(("off", "goes"), [(0.0049, None), (0.0051, 0.0051), (0.05, 0.05), (0.09, 0.05)])
 def test_a_palm_beside_its_grasp_goes_there_by_5_cm_at_most(monkeypatch, off, goes):
     seen, asked = Seen(), []
-    monkeypatch.setattr(seat, "way_to_grasp", lambda *_: np.array([0.0, 0.0, -off]))
-    monkeypatch.setattr(seat, "shift", lambda ctx, way, speed: asked.append((way, speed)) or Ready())
-    assert seen.run(seat.Seat(seen.ctx), goal={})[0] == "succeeded"
+    monkeypatch.setattr(regrasp, "way_to_grasp", lambda *_: np.array([0.0, 0.0, -off]))
+    monkeypatch.setattr(regrasp, "shift", lambda ctx, way, speed: asked.append((way, speed)) or Ready())
+    assert seen.run(regrasp.Regrasp(seen.ctx), goal={})[0] == "succeeded"
     assert [(-way[2], speed) for way, speed in asked] == ([] if goes is None else [(pytest.approx(goes), 0.06)])
 
 
@@ -397,9 +397,9 @@ IN_THE_WAY, LATE = "something is in the way", "the way to the grasp within 1.7 s
 def test_the_way_to_the_grasp_ends_where_6_5_newton_push_or_in_time(monkeypatch, newton, arrives, why):
     seen, cancelled = Seen(), []
     clock = seen.trial.clock
-    monkeypatch.setattr(seat, "way_to_grasp", lambda *_: np.array([0.0, 0.0, -0.03]))
-    monkeypatch.setattr(seat, "shift", lambda ctx, way, speed: Polled(lambda: clock.now() > arrives, lambda: None))
+    monkeypatch.setattr(regrasp, "way_to_grasp", lambda *_: np.array([0.0, 0.0, -0.03]))
+    monkeypatch.setattr(regrasp, "shift", lambda ctx, way, speed: Polled(lambda: clock.now() > arrives, lambda: None))
     seen.ctx.contact.force = lambda: (0.0, 0.0, newton)
     seen.ctx.arm.cancel_motion = lambda reason: cancelled.append(reason) or Ready()
-    assert seen.run(seat.Seat(seen.ctx), goal={})[0] == "succeeded"
+    assert seen.run(regrasp.Regrasp(seen.ctx), goal={})[0] == "succeeded"
     assert [reason[: len(why)] for reason in cancelled] == [why] * bool(why)

@@ -15,7 +15,7 @@ from coglab_smach.ports.interfaces import HandState, Located
 from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states import give
 from coglab_smach.states.grip import Grip
-from coglab_smach.states.held import FARTHER, LOST_TIME, NEAR, HeldObject
+from coglab_smach.states.held_object import FARTHER, LOST_TIME, NEAR, HeldObject
 from conftest import SHARE, Trial
 from ih2_hand.emulator.hand import GRASP_CURRENT
 from ih2_hand.emulator.motor import STALL_CURRENT

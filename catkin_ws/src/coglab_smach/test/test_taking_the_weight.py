@@ -11,7 +11,7 @@ from coglab_py.pose import Pose
 from coglab_smach.clocks.virtual_clock import using
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.pending import Polled, Ready
-from coglab_smach.states import seat, weight
+from coglab_smach.states import regrasp, weight
 from coglab_smach.states.hand import AT_END, stopped_by_object
 from conftest import Trial
 
@@ -161,12 +161,12 @@ class Beside:
 
     def __init__(self, monkeypatch, off, force=(0.0, 0.0, 0.0)):
         self.trial, self.asked, self.cancelled = Trial(), [], []
-        monkeypatch.setattr(seat, "way_to_grasp", lambda *_: None if off is None else np.array(off))
+        monkeypatch.setattr(regrasp, "way_to_grasp", lambda *_: None if off is None else np.array(off))
         motion = Polled(lambda: bool(self.cancelled) or np.linalg.norm(force) == 0.0, lambda: None)
-        monkeypatch.setattr(seat, "shift", lambda ctx, way, speed: self.asked.append(way) or motion)
+        monkeypatch.setattr(regrasp, "shift", lambda ctx, way, speed: self.asked.append(way) or motion)
         self.trial.ctx.contact.force = lambda: force
         self.trial.ctx.arm.cancel_motion = lambda why: self.cancelled.append(why) or Ready()
-        self.state = seat.Seat(self.trial.ctx)
+        self.state = regrasp.Regrasp(self.trial.ctx)
         with using(self.trial.clock):
             self.outcome = self.state.run(SimpleNamespace(goal={}))
 
@@ -175,17 +175,17 @@ def test_the_palm_goes_to_the_grasp_beside_which_it_was_touched(monkeypatch):
     beside = Beside(monkeypatch, (0.0, 0.01, -0.02))
     assert beside.outcome == "succeeded" and np.allclose(beside.asked, [[0.0, 0.01, -0.02]])
     far = Beside(monkeypatch, (0.0, 0.0, -0.2))
-    assert np.allclose(far.asked, [[0.0, 0.0, -seat.FARTHEST]])
+    assert np.allclose(far.asked, [[0.0, 0.0, -regrasp.FARTHEST]])
 
 
-@pytest.mark.parametrize("off", [None, (0.0, 0.0, 0.5 * seat.LEAST)])
+@pytest.mark.parametrize("off", [None, (0.0, 0.0, 0.5 * regrasp.LEAST)])
 def test_without_a_sight_or_a_way_nothing_moves(monkeypatch, off):
     beside = Beside(monkeypatch, off)
     assert beside.outcome == "succeeded" and beside.asked == []
 
 
 def test_where_it_pushes_the_way_to_the_grasp_ends(monkeypatch):
-    beside = Beside(monkeypatch, (0.0, 0.0, -0.03), (0.0, 1.2 * seat.PUSHES, 0.0))
+    beside = Beside(monkeypatch, (0.0, 0.0, -0.03), (0.0, 1.2 * regrasp.PUSHES, 0.0))
     assert beside.outcome == "succeeded" and len(beside.cancelled) == 1
 
 

@@ -13,7 +13,7 @@ from coglab_smach.kinematics.motion_time import ptp_time
 from coglab_smach.ports.pending import Polled, PortError
 from coglab_smach.states.base import CoglabState, TimeLimit
 from coglab_smach.states.hand_tracking import person_at, seen_at
-from coglab_smach.states.held import LOOK, HeldObject
+from coglab_smach.states.held_object import LOOK, HeldObject
 
 RESUMES = 3
 """times that a motion is begun again where the arm did not come to its target, as when a person still holds on"""

@@ -17,7 +17,7 @@ from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
 from coglab_smach.states.grip import Grip
 from coglab_smach.states.hand import firm_speed
 from coglab_smach.states.hand_tracking import AWAY, HandLook, HandTrack, from_palm, hand_from_palm, way_to_hand
-from coglab_smach.states.held import HeldObject
+from coglab_smach.states.held_object import HeldObject
 from coglab_smach.states.loosening_grip import LooseningGrip
 from coglab_smach.states.motion import await_rest, rise, shift
 from coglab_smach.states.reach import WaitForPerson

@@ -14,7 +14,7 @@ from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
 from coglab_smach.states.hand_tracking import AT_HAND, AWAY, HandLook, HandTrack, from_palm, hand_from_palm, palm_axis
 from coglab_smach.states.motion import shift, shift_time
-from coglab_smach.states.yielding import GivesWay
+from coglab_smach.states.yield_to_pull import YieldToPull
 
 LOOSE = 40
 """counts of 254 that the fingers have opened when the palm begins to draw back"""
@@ -99,7 +99,7 @@ class HandClose(CoglabState):
 
     Outcomes missed and edge, with ``from_person``: the fingers have closed on nothing, or do not stand around it
     (stopped_by_object), for the first time in this action; a person who offers waits, so the arm may try once more.
-    Meanwhile the palm goes along with who pulls (GivesWay).
+    Meanwhile the palm goes along with who pulls (YieldToPull).
     """
 
     default_time_limit = 12.0
@@ -166,7 +166,7 @@ class HandClose(CoglabState):
 
     def _give_way(self, closing: Pending, hand: HandLook) -> None:
         """Until the fingers have closed."""
-        way = GivesWay(self.ctx)
+        way = YieldToPull(self.ctx)
 
         def closed() -> bool:
             way.follow()

@@ -12,9 +12,9 @@ from coglab_smach.context.wait_reasons import PERSON
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.base import CoglabState, TimeLimit
 from coglab_smach.states.hand_tracking import AT_HAND, AWAY, HandTrack, from_palm, hand_name, palm_at, sight_of
-from coglab_smach.states.held import HeldObject
+from coglab_smach.states.held_object import HeldObject
 from coglab_smach.states.motion import await_rest, rise
-from coglab_smach.states.yielding import LEAST_WAY, GivesWay
+from coglab_smach.states.yield_to_pull import LEAST_WAY, YieldToPull
 
 GRAVITY = 9.81
 MOST_RISES = 8
@@ -130,7 +130,7 @@ class TakeWeight(CoglabState):
     gentle fingers has taken it back. Where the tracker has lost the hand, or taken another one for it (HandTrack), the
     person may have gone: it is felt whether they hold it. Where that is not sure nothing is opened, and the arm stays.
 
-    The palm goes along with who pulls (GivesWay), and the rise goes on afterwards. The fingers close again and again
+    The palm goes along with who pulls (YieldToPull), and the rise goes on afterwards. The fingers close again and again
     (``give.close_speed``, the lowest force).
     """
 
@@ -144,7 +144,7 @@ class TakeWeight(CoglabState):
             output_keys=["hand_seen_away"],
             io_keys=["grip"],
         )
-        self._way: GivesWay
+        self._way: YieldToPull
         self._top: float | None = None
         """m, height to which the palm rises"""
         self._rises = 0
@@ -172,7 +172,7 @@ class TakeWeight(CoglabState):
             "mass": float(ud.object_entry.get("mass", 0.0)),
             "load_share": self.ctx.config.number("hand.load_share"),
         }
-        self._way, self._rises, self._on, self._told = GivesWay(self.ctx), 0, None, False
+        self._way, self._rises, self._on, self._told = YieldToPull(self.ctx), 0, None, False
         self._seen_away = False
         self._closing, self._closes = None, 0.0
         self.await_pending(contact.arm("lift", limit, settings), "arming of the contact detector", 2.0)

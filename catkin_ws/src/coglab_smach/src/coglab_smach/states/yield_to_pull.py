@@ -13,7 +13,7 @@ LEAST_WAY = 0.005
 """m, a shorter way is not begun"""
 
 
-class GivesWay:
+class YieldToPull:
     """The one motion of an arm that stands beside a person: what a state wants (``begin``), until somebody pulls; then
     the palm goes along with the pull (``follow``, called again and again), by ``pull.way`` m in all at most.
 
