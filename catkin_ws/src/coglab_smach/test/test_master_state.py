@@ -5,10 +5,9 @@ import math
 import re
 
 import pytest
-from coglab_msgs.msg import MasterState as Message
 from coglab_msgs.msg import ReasonCode
 from coglab_smach.context.journal import Journal, Wait
-from coglab_smach.context.master_state import MasterState, StateWatch
+from coglab_smach.context.master_state import StateWatch
 from coglab_smach.context.requests import Answer
 from coglab_smach.context.trigger import ask_for
 from coglab_smach.ports.pending import PortError
@@ -27,10 +26,6 @@ class Watched(Trial):
 
     def ask(self, action, object_id=""):
         return ask_for(self.ctx, action, object_id)
-
-
-def test_the_fields_are_those_of_the_message():
-    assert set(MasterState.__dataclass_fields__) == set(Message.__slots__) - {"header"}
 
 
 def test_the_newest_is_told_again_for_who_looks_on():
