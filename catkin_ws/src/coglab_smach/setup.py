@@ -17,7 +17,6 @@ setup(
                     "context",
                     "states",
                     "machines",
-                    "simulated",
                     "ros",
                 )
             ),

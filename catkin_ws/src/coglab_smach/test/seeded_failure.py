@@ -5,8 +5,8 @@ import numpy as np
 import smach
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState, TimeLimit
+from coglab_trials.trial import VirtualTrial
 from motion_watch import MotionWatch
-from virtual_trial import VirtualTrial
 
 HOLDING = {"exchange_robot_to_human": "exchange_human_to_robot", "put": "take"}
 """action -> the one that brings the object into the hand before it"""

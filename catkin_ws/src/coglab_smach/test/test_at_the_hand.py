@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode, Say
 from coglab_py.pose import Pose, about_z
-from coglab_smach.clocks.virtual_clock import using
 from coglab_smach.context.hand_track import HandTrack
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.interfaces import HandState, Located
@@ -17,6 +16,7 @@ from coglab_smach.states.hand import CalibrateHand, HandClose, HandTighten, LetG
 from coglab_smach.states.held import HeldObject
 from coglab_smach.states.where import off_grasp, palm_at, palm_axis, seen_at, way_to_grasp, way_to_hand
 from coglab_smach.states.yielding import GivesWay
+from coglab_trials.virtual_clock import using
 from conftest import Trial
 
 HERE = (0.0, 0.5, 0.0, 1.0, 0.0, 0.5, 0.0)

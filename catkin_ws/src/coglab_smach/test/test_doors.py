@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 SOURCE = Path(__file__).resolve().parents[1] / "src" / "coglab_smach"
-DOORS = ("clocks", "kinematics", "ports", "contact", "context", "states", "machines", "simulated", "ros")
+DOORS = ("clocks", "kinematics", "ports", "contact", "context", "states", "machines", "ros")
 """from the bottom up"""
 CLIENT_LIBRARIES = {"rospy", "actionlib", "tf2_ros", "smach_ros", "roslib", "rosbag"}
 MODULES = sorted(path for path in SOURCE.rglob("*.py") if path.parent != SOURCE)
@@ -37,13 +37,7 @@ def test_a_module_imports_nothing_above_its_door(path):
         if parts[0] == "coglab_smach" and len(parts) > 1:
             assert DOORS.index(parts[1]) <= DOORS.index(here), f"{here} imports {name}"
         assert here == "ros" or parts[0] not in CLIENT_LIBRARIES, f"{here} imports {name}: that belongs to ros"
-        assert parts[0] not in ("coglab_sim", "coglab_bringup"), f"{name} is above this package"
-
-
-def test_ros_and_the_simulated_cell_do_not_know_each_other():
-    for door, other in (("ros", "simulated"), ("simulated", "ros")):
-        for path in (SOURCE / door).glob("*.py"):
-            assert not any(name.startswith(f"coglab_smach.{other}") for name in imports(path)), path.name
+        assert parts[0] not in ("coglab_sim", "coglab_trials", "coglab_bringup"), f"{name} is above this package"
 
 
 def test_modules_import_each_other_in_no_circle():

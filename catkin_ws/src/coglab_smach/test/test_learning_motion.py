@@ -13,7 +13,7 @@ from coglab_msgs.srv import LearnMotionRequest
 from coglab_py.pace import Pace
 from coglab_smach.contact.learning import MotionRecorder, unwritable
 from coglab_smach.contact.motion_thresholds import Thresholds
-from coglab_smach.simulated.world_ports import THRESHOLDS
+from coglab_trials.world_ports import THRESHOLDS
 
 SCRIPT = Path(__file__).resolve().parents[1] / "scripts" / "contact_detector_node.py"
 BEGIN, END = LearnMotionRequest(gather=True), LearnMotionRequest(gather=False)

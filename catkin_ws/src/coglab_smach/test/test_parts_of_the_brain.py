@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_py.pose import Pose
-from coglab_smach.clocks.virtual_clock import ClockStalled, VirtualClock, VirtualCondition, using
 from coglab_smach.contact.learning import MotionRecorder
 from coglab_smach.context.config import Config, ConfigError
 from coglab_smach.context.holding import HoldingMemory
@@ -23,6 +22,7 @@ from coglab_smach.states.arm import ConfigureLwr, PtpMotion
 from coglab_smach.states.base import TimeLimit
 from coglab_smach.states.hub import WaitForTrigger
 from coglab_smach.states.reach import WaitStop
+from coglab_trials.virtual_clock import ClockStalled, VirtualClock, VirtualCondition, using
 from conftest import Trial
 from test_node_parts import script
 

@@ -6,13 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
-from coglab_smach.clocks.virtual_clock import using
 from coglab_smach.ports.interfaces import ContactEvent, DmpProgress, Verdict
 from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states import reach
 from coglab_smach.states.base import TimeLimit
 from coglab_smach.states.monitor import MonitorDmp
 from coglab_smach.states.reach import ExecuteDmp, WaitStop, dmp_request, start
+from coglab_trials.virtual_clock import using
 from conftest import Trial
 from early_goal import GOAL, HIGH
 
