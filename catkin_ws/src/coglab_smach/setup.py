@@ -22,6 +22,5 @@ setup(
             ),
         ],
         package_dir={"": "src"},
-        package_data={"coglab_smach.context": ["machines_schema.json"]},
     )
 )

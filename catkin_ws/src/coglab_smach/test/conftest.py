@@ -29,6 +29,11 @@ class Trial:
             self.master = build_master(self.ctx)
         self.error = None
 
+    @property
+    def grip(self):
+        """What the states of a handover leave for each other."""
+        return self.master.userdata.grip
+
     def run(self, script, limit=600.0):
         """Walk the machine until the script ends; whatever the script raises is raised here."""
         with using(self.clock):

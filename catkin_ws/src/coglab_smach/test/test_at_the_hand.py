@@ -6,15 +6,22 @@ import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode, Say
 from coglab_py.pose import Pose, about_z
-from coglab_smach.context.hand_track import HandTrack
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.interfaces import HandState, Located
 from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states import hand as hands
-from coglab_smach.states import seat, where, yielding
+from coglab_smach.states import hand_tracking, seat, yielding
+from coglab_smach.states.grip import Grip
 from coglab_smach.states.hand import CalibrateHand, HandClose, HandTighten, LetGo
+from coglab_smach.states.hand_tracking import (
+    off_grasp,
+    palm_at,
+    palm_axis,
+    seen_at,
+    way_to_grasp,
+    way_to_hand,
+)
 from coglab_smach.states.held import HeldObject
-from coglab_smach.states.where import off_grasp, palm_at, palm_axis, seen_at, way_to_grasp, way_to_hand
 from coglab_smach.states.yielding import GivesWay
 from coglab_trials.virtual_clock import using
 from conftest import Trial
@@ -46,7 +53,7 @@ class Seen:
         state._deadline = 1e9
         with using(self.trial.clock):
             begin = self.trial.clock.now()
-            outcome = state.run(SimpleNamespace(**ud))
+            outcome = state.run(SimpleNamespace(grip=self.trial.grip, **ud))
             return outcome, self.trial.clock.now() - begin
 
 
@@ -60,7 +67,7 @@ def test_a_sight_tells_for_half_a_second(age, known):
     release = {"pose": {"xyz": [0.0, 0.1, 0.0]}}
     with using(seen.trial.clock):
         assert (seen_at(seen.state, "mug") is not None) == known
-        away = where.hand_from_palm(seen.state)
+        away = hand_tracking.hand_from_palm(seen.state)
         assert away == (pytest.approx(0.3) if known else None)
         way = way_to_grasp(seen.state, goal)
         assert (way is not None) == known and (off_grasp(seen.state, goal) is not None) == known
@@ -72,7 +79,7 @@ def test_a_sight_tells_for_half_a_second(age, known):
         assert (way_to_hand(seen.state, "mug", release) is not None) == known
         assert off_grasp(seen.state, {}) is None
         seen.ctx.arm.joint_positions = lambda: None
-        assert where.hand_from_palm(seen.state) is None and way_to_grasp(seen.state, goal) is None
+        assert hand_tracking.hand_from_palm(seen.state) is None and way_to_grasp(seen.state, goal) is None
         assert palm_at(seen.ctx) is None and palm_axis(seen.ctx) is None
 
 
@@ -110,6 +117,7 @@ class Carried:
         see = lambda *_: Ready(  # noqa: E731
             Located("", "world", (position[0], position[1], position[2] - self.down), IDENTITY, self.age)
         )
+        self.grip = Grip(shared=True)
         self.ctx = SimpleNamespace(
             arm=SimpleNamespace(joint_positions=lambda: HERE),
             hand=SimpleNamespace(state=lambda: self.state),
@@ -118,7 +126,7 @@ class Carried:
             holding="mug",
             shared=True,
         )
-        self.held = HeldObject(self.ctx, "mug")
+        self.held = HeldObject(self.ctx, "mug", self.grip)
 
     def gone_after(self, down, looks=60):
         """s after which it is lost, seen so far away every 10 ms; None: it is not."""
@@ -168,7 +176,7 @@ def test_fingers_at_their_ends_hold_nothing(positions, lost):
         assert error.value.causes == ("the fingers have closed past it",)
     else:
         carried.held.check()
-    assert carried.ctx.holding == ("" if lost else "mug") and carried.ctx.shared is not lost
+    assert carried.ctx.holding == ("" if lost else "mug") and carried.grip.shared is not lost
 
 
 def test_a_hand_says_itself_why_it_holds_nothing():
@@ -270,13 +278,12 @@ def tightened(monkeypatch, away, at_home=False, before=0.1, sure=True, **ud):
     seen, closed, clock = (it := Seen()), [], it.trial.clock
     monkeypatch.setattr(hands, "hand_from_palm", lambda state: away(clock.now()))
     monkeypatch.setattr(hands, "from_palm", lambda state, track, *_: away(clock.now()))
-    seen.ctx.holding, seen.ctx.firm = "mug", 140
-    track = seen.ctx.hand_track = HandTrack()
-    track.is_sure = sure
+    seen.ctx.holding, seen.trial.grip.firm = "mug", 140
+    seen.trial.grip.hand.is_sure = sure
     seen.ctx.hand.close = lambda speed: closed.append(speed) or Polled(lambda: False, lambda: None)
     fields = {} if at_home else {"hand_distance": before, "hand_seen_away": True, **ud}
     outcome, seconds = seen.run(HandTighten(seen.ctx, at_home), **fields)
-    assert outcome == "succeeded" and (seen.ctx.firm == 0) == bool(closed)
+    assert outcome == "succeeded" and (seen.trial.grip.firm == 0) == bool(closed)
     return closed, seconds
 
 
@@ -336,7 +343,7 @@ def test_a_hand_is_given_three_tenths_of_a_second_to_say_that_it_holds(monkeypat
     ud = {"object_id": "mug", "grasp": {"hand": {"mode": "cylindrical", "firm": 140}}}
     seen.ctx.journal.begin_action("x", "mug")
     assert seen.run(HandClose(seen.ctx, True), **ud)[0] == outcome
-    assert (seen.ctx.holding, seen.ctx.shared) == (("mug", True) if outcome == "succeeded" else ("", False))
+    assert (seen.ctx.holding, seen.trial.grip.shared) == (("mug", True) if outcome == "succeeded" else ("", False))
 
 
 def test_a_hand_that_misses_again_says_where_its_motors_are(monkeypatch):
@@ -345,7 +352,7 @@ def test_a_hand_that_misses_again_says_where_its_motors_are(monkeypatch):
     seen.ctx.hand.state = lambda: HandState(True, True, False, False, "slipped", (0, 254, 254, 254, 254))
     ud = {"object_id": "mug", "grasp": {"hand": {"mode": "cylindrical"}}}
     seen.ctx.journal.begin_action("x", "mug")
-    assert seen.run(HandClose(seen.ctx, True), **ud)[0] == "missed" and not seen.ctx.preshaped
+    assert seen.run(HandClose(seen.ctx, True), **ud)[0] == "missed" and not seen.trial.grip.preshaped
     for from_person in (True, False):
         with pytest.raises(PortError) as error:
             seen.run(HandClose(seen.ctx, from_person), **ud)
@@ -362,13 +369,13 @@ def test_the_palm_draws_back_once_a_finger_has_opened_by_40_counts(monkeypatch, 
     seen.ctx.hand.state = lambda: HandState(True, positions=now() if clock.now() > 0.1 else closed)
     seen.ctx.hand.preshape = lambda mode, level: Polled(lambda: clock.now() > 0.8, lambda: None)
     seen.ctx.say = lambda code, text: said.append((code, clock.now()))
-    seen.ctx.holding, seen.ctx.shared = "mug", True
+    seen.ctx.holding, seen.trial.grip.shared = "mug", True
     seen.run(LetGo(seen.ctx), grasp={"hand": {"mode": "cylindrical", "level": "low"}})
     ((when, way, speed),) = moved
     assert when == pytest.approx(0.11 if draws else 0.81, abs=0.011)
     assert way == pytest.approx(-0.06 * PALM.axis(0)) and speed == 0.25
     assert [code for code, _ in said] == [Say.YOU_HAVE_IT] and said[0][1] == pytest.approx(0.81, abs=0.011)
-    assert (seen.ctx.holding, seen.ctx.shared) == ("", False)
+    assert (seen.ctx.holding, seen.trial.grip.shared) == ("", False)
 
 
 # --- to the grasp -----------------------------------------------------------------------------------------------------

@@ -114,7 +114,7 @@ def test_it_closes_firmly_only_where_the_persons_hand_was_seen_to_stay_away(monk
     assert asked[-1] == trial.ctx.config.get("hand.tighten.medium")
     reasons = {t.from_state: t.reason for t in trial.ctx.journal.transitions if "tighten" in t.from_state}
     assert "wire speed" in reasons[firm_at], reasons
-    assert trial.ctx.firm == 0
+    assert trial.grip.firm == 0
 
 
 def test_at_home_it_stays_held_gently_beside_a_persons_hand(monkeypatch):
@@ -122,7 +122,7 @@ def test_at_home_it_stays_held_gently_beside_a_persons_hand(monkeypatch):
     track(monkeypatch, lambda state: 0.1 if state.label != "take_weight" else 0.2)
     asked = receive(trial)
     assert set(asked) == {"low", LOWEST} and "tightened" not in trial.result().marks
-    assert trial.ctx.holding == "mug" and trial.ctx.firm == trial.ctx.config.get("hand.tighten.medium")
+    assert trial.ctx.holding == "mug" and trial.grip.firm == trial.ctx.config.get("hand.tighten.medium")
 
 
 @pytest.mark.parametrize(("thumb", "index", "around"), [(249, 249, True), (250, 249, False), (249, 250, False)])

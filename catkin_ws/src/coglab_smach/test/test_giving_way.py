@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from coglab_smach.kinematics.reachability import default_arm
-from coglab_smach.states.where import palm_axis
+from coglab_smach.states.hand_tracking import palm_axis
 from coglab_smach.states.yielding import GivesWay
 from conftest import Trial
 

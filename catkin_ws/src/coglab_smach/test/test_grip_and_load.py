@@ -259,7 +259,7 @@ def test_the_felt_grip_falls_with_the_load_and_comes_back_with_it():
         assert t.ctx.contact.grip() > 1.3 * grips[-1] * firm, "a part of the load has come back"
         t.cell.push(0.0)
         t.clock.sleep(1.5)
-        assert t.ctx.contact.grip() == firm and not t.ctx.shared
+        assert t.ctx.contact.grip() == firm and not t.grip.shared
         t.wait_hub("wait_with_object")
 
     trial = giving(script)

@@ -10,6 +10,7 @@ from coglab_smach.ports.interfaces import Ahead, Located
 from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states import hub, knowledge
 from coglab_smach.states.base import CoglabState
+from coglab_smach.states.hand_tracking import HandoverRegion, unless_withdrawn
 from coglab_smach.states.knowledge import (
     await_offer,
     believed,
@@ -20,7 +21,6 @@ from coglab_smach.states.knowledge import (
     palm_of,
     refused_as,
 )
-from coglab_smach.states.region import HandoverRegion, unless_withdrawn
 from coglab_trials.virtual_clock import using
 from conftest import Trial
 
@@ -213,11 +213,6 @@ def test_a_goal_that_is_predicted_has_to_lie_in_the_region_and_is_watched_furthe
     assert limits["goal_region_high"] == pytest.approx([0.96, 0.60, 0.95])
     assert (limits["goal_retreat"], limits["goal_drop"]) == (0.0, 0.0)
     assert early["watch"] == {"retreat": 0.10, "drop": 0.08, "margin": 0.1}
-
-
-def test_a_region_without_a_configuration_is_what_the_arm_can_reach():
-    region = HandoverRegion(SimpleNamespace(config={}))
-    assert (region.low.tolist(), region.high.tolist()) == ([-1.0, -1.0, -1.0], [1.5, 1.0, 2.0])
 
 
 def test_a_reach_has_the_pace_of_the_timing_and_arrives_slowly():

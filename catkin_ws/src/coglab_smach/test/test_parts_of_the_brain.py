@@ -10,18 +10,16 @@ import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_py.pose import Pose
 from coglab_smach.contact.learning import MotionRecorder
-from coglab_smach.context.config import Config, ConfigError
 from coglab_smach.context.holding import HoldingMemory
 from coglab_smach.context.journal import Failure, Journal, TransitionRecord
 from coglab_smach.context.requests import Requests, command
 from coglab_smach.context.trigger import ask_for
 from coglab_smach.kinematics.reachability import default_arm, home_posture, joint_limits, solve
-from coglab_smach.ports.interfaces import ContactEvent, DmpProgress, Verdict
+from coglab_smach.ports.interfaces import Verdict
 from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states.arm import ConfigureLwr, PtpMotion
 from coglab_smach.states.base import TimeLimit
 from coglab_smach.states.hub import WaitForTrigger
-from coglab_smach.states.reach import WaitStop
 from coglab_trials.virtual_clock import ClockStalled, VirtualClock, VirtualCondition, using
 from conftest import Trial
 from test_node_parts import script
@@ -50,36 +48,6 @@ def test_what_is_held_is_noted_whole_and_read_again(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "publish", lambda to, message: shown.append((to, message.data)))
     module.Memory(str(path), warnings.append).note("ball")
     assert json.loads(path.read_text()) == {"object_id": "ball"} and shown == [(("coglab/holding", True), "ball")]
-
-
-def test_a_value_is_that_of_its_dotted_name_or_the_default():
-    config = Config({"a": {"b": {"c": 1}}, "d": 0})
-    assert config.get("a.b.c") == 1 and config.get("d") == 0 and config.get("a.b.x", 5) == 5
-    assert config.get("a.b.c.d", 7) == 7, "below a number is nothing"
-    for name in ("x", "a.x", "a.b.c.d"):
-        with pytest.raises(ConfigError, match=f"configuration: '{name}' is missing"):
-            config.get(name)
-    config.set("a.b.c", 2)
-    config.set("e", 3)
-    assert (config.get("a.b.c"), config.get("e"), config.get("d")) == (2, 3, 0)
-    timed = Config({"timing": "t", "timings": {"t": {"d": 9}}, "d": 0})
-    assert timed.get("d") == 9
-    timed.set("timing", "u")
-    assert timed.get("d") == 0
-
-
-def test_a_file_is_read_again_when_it_has_changed_and_lost_it_stays_in_force(tmp_path):
-    path = tmp_path / "c.yaml"
-    path.write_text("hand: {open_speed: 1}\n")
-    config = Config.load(str(path))
-    path.write_text("hand: {open_speed: 2}\n")
-    os.utime(path, ns=(7, 7))
-    assert config.get("hand.open_speed") == 2
-    path.write_text("hand: {open_speed: 3}\n")
-    os.utime(path, ns=(7, 7))
-    assert config.get("hand.open_speed") == 2, "as old as before"
-    path.unlink()
-    assert config.get("hand.open_speed") == 2
 
 
 # --- triggers and the journal -----------------------------------------------------------------------------------------
@@ -188,10 +156,10 @@ def test_what_states_are_for_in_each_action(trial):
 def test_what_was_taken_from_the_board_is_held_as_its_grasp_says_and_named_again_it_is_the_same(trial):
     def walk(t):
         t.wait_hub("wait_without_object")
-        t.ctx.firm = 140
+        t.grip.firm = 140
         t.start("take")
         t.wait_hub("wait_with_object")
-        assert t.ctx.firm == 0 and not t.ctx.shared
+        assert t.grip.firm == 0 and not t.grip.shared
         t.start("put", "mug")
         t.wait_hub("wait_without_object")
 
@@ -278,49 +246,6 @@ def test_the_go_ahead_is_waited_for_an_hour_unless_it_is_given_beforehand():
     assert trial.clock.now() == pytest.approx(3600.0, abs=0.1) and trial.ctx.requests.hub() == ""
     state = WaitForTrigger(Trial().ctx)
     assert ran(Trial(), state)[0] == "succeeded" and state.reason == "auto_trigger is set"
-
-
-class Reaching:
-    """A WaitStop on an arm whose progress the test says; its pauses and their reasons."""
-
-    def __init__(self, progress, doubted=False):
-        self.trial, self.paused = Trial(), []
-        self.state = WaitStop(self.trial.ctx, "contact")
-        self.state._deadline = 1e9
-        self.trial.ctx.arm.dmp_progress = lambda: progress
-        self.trial.ctx.arm.motion_allowed = lambda: Verdict(True)
-        self.state._watched = SimpleNamespace(
-            predicted=True, doubted=lambda: doubted, doubt=lambda: (1, "doubt"), goal_now=lambda: self.goal
-        )
-        self.goal = {"frame": "f", "offset": [0.0, 0.0, 0.0], "primitive": "p", "approach": [0.0, 0.0, 0.1]}
-        self.state._pause = lambda early, code, why: self.paused.append((code, why))
-
-
-def test_a_reach_that_paused_has_not_arrived():
-    doubted = Reaching(DmpProgress("running", "", "p", 0.5, 0.2), doubted=True)
-    assert doubted.state._reached() is False and doubted.paused == [(1, "doubt")]
-    left = Reaching(DmpProgress("aborted", "", "p", 0.5, 0.2, ReasonCode.GOAL_LEFT_REGION))
-    assert left.state._reached() is False and left.paused[0][0] == ReasonCode.GOAL_AHEAD_OUTSIDE
-    there = Reaching(DmpProgress("reached"), doubted=True)
-    assert there.state._reached() is True and there.paused == []
-    aborted = Reaching(DmpProgress("aborted", "", "p", 0.5, 0.2, 77))
-    with pytest.raises(TimeLimit) as error:
-        aborted.state._reached()
-    assert (error.value.causes, error.value.code) == (("the controller gave no reason",), 77)
-
-
-def test_going_on_is_given_up_where_nobody_answers_and_not_where_it_is_refused():
-    reaching = Reaching(DmpProgress("reached"))
-    reaching.trial.ctx.arm.execute_dmp = lambda request: Polled(lambda: False, lambda: None)
-    with using(reaching.trial.clock), pytest.raises(TimeLimit):
-        reaching.state._go_on(reaching.goal)
-    assert reaching.trial.clock.now() == pytest.approx(3.0, abs=0.02)
-    reaching.trial.ctx.arm.execute_dmp = lambda request: Ready(error=PortError("too far"))
-    with using(reaching.trial.clock):
-        reaching.state._go_on(reaching.goal)
-        assert reaching.state.reason == "too far"
-    assert reaching.state._found(ContactEvent(True, "s", 2.0, "touched")) == "succeeded"
-    assert reaching.state.reason == "touched"
 
 
 # --- a recorder, a descent and a clock --------------------------------------------------------------------------------

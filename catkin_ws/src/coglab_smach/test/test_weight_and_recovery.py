@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode, Say
 from coglab_py.pose import Pose
-from coglab_smach.context.hand_track import HandTrack
 from coglab_smach.machines import recovery
 from coglab_smach.machines.recovery import SecureHand, WhatIsHeld
 from coglab_smach.ports.interfaces import ContactEvent, HandState, Verdict
@@ -14,6 +13,8 @@ from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states import arm, weight
 from coglab_smach.states.arm import HomeRobot
 from coglab_smach.states.base import TimeLimit
+from coglab_smach.states.grip import Grip
+from coglab_smach.states.hand_tracking import HandTrack
 from coglab_smach.states.weight import TakeWeight
 from coglab_trials.virtual_clock import using
 from conftest import Trial
@@ -285,15 +286,14 @@ def test_fingers_that_begin_to_close_on_the_way_have_a_second_to_stand(monkeypat
     state, opened, clock = SecureHand(trial.ctx), [], trial.clock
     state._deadline = 1e9
     monkeypatch.setattr(recovery, "from_palm", lambda s, track, *_: 0.51)
-    trial.ctx.hand_track = seen_all_the_way()
-    trial.ctx.closing, trial.ctx.closing_on, trial.ctx.closing_firm, trial.ctx.shared = Ready(), "mug", 140, True
+    grip = Grip("mug", 0.31, 140, shared=True, closing=Ready(), hand=seen_all_the_way())
     trial.ctx.hand.state = lambda: HandState(True, holding=clock.now() >= caught)
     trial.ctx.hand.open = lambda speed: opened.append(speed) or Ready()
     trial.ctx.perception.locate_object = lambda *_: Ready(error=PortError("not seen"))
     with using(clock):
-        assert state.run(None) == "succeeded"
-    assert (opened, trial.ctx.holding) == (([400], "") if opens else ([], "mug")) and not trial.ctx.shared
-    assert trial.ctx.firm == (0 if opens else 140) and trial.ctx.closing is None
+        assert state.run(SimpleNamespace(grip=grip)) == "succeeded"
+    assert (opened, trial.ctx.holding) == (([400], "") if opens else ([], "mug")) and not grip.shared
+    assert grip.firm == (0 if opens else 140) and grip.closing is None
 
 
 @pytest.mark.parametrize(
@@ -312,13 +312,12 @@ def test_who_holds_what_fingers_have_caught_gets_it_back(monkeypatch, away, hold
     state = SecureHand(trial.ctx)
     monkeypatch.setattr(weight, "person_holds", lambda s, settings: asked.append(settings) or holds)
     monkeypatch.setattr(weight, "from_palm", lambda s, track, *_: away)
-    trial.ctx.shared_mass, trial.ctx.hand_track = 0.31, seen_all_the_way()
     monkeypatch.setattr(recovery, "from_palm", lambda s, track, *_: away)
-    trial.ctx.closing, trial.ctx.closing_on, trial.ctx.shared = Ready(), "mug", True
+    grip = state._grip = Grip("mug", 0.31, shared=True, closing=Ready(), hand=seen_all_the_way())
     trial.ctx.hand.state = lambda: HandState(True, holding=True)
     with using(trial.clock):
         state._closed_on_the_way()
-    assert trial.ctx.holding == held and trial.ctx.shared == (away is None or away < 0.5)
+    assert trial.ctx.holding == held and grip.shared == (away is None or away < 0.5)
     assert asked == ([{"mass": 0.31, "load_share": 0.5}] if away == 0.29 else [])
 
 
@@ -329,11 +328,11 @@ def test_a_hand_that_has_just_started_has_two_seconds_to_be_empty(empty_after, h
     state._deadline = 1e9
     trial.ctx.hand.state = lambda: HandState(True, holding=clock.now() < empty_after)
     with using(clock):
-        assert state.run(None) == hub
+        assert state.run(SimpleNamespace(grip=Grip())) == hub
     assert clock.now() == pytest.approx(took, abs=0.11)
     trial.ctx.hand.state = lambda: HandState(False)
     with using(clock):
-        assert state.run(None) == hub, "a hand that does not answer changes nothing"
+        assert state.run(SimpleNamespace(grip=Grip())) == hub, "a hand that does not answer changes nothing"
     assert state.reason.startswith("the hand does not tell")
 
 

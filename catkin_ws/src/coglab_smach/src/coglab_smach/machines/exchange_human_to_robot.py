@@ -22,7 +22,7 @@ def build_exchange_human_to_robot(ctx: Context) -> CoglabMachine:
     A hand that has closed on nothing opens to its preshape, and the arm comes once more; one that has closed on an edge
     opens, goes to the grasp from where it is, and closes again."""
     machine = CoglabMachine(
-        ctx, "exchange_human_to_robot", ACTION_OUTCOMES, input_keys=["object_id"], output_keys=SHARED
+        ctx, "exchange_human_to_robot", ACTION_OUTCOMES, input_keys=["object_id"], output_keys=SHARED, io_keys=["grip"]
     )
     machine.is_action = True
     with machine:

@@ -10,6 +10,7 @@ from coglab_msgs.msg import ReasonCode
 from coglab_smach.context.context import Context
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.pending import Pending, PortError
+from coglab_smach.states.grip import Grip
 from coglab_smach.states.hand import AT_END
 
 NEAR, FARTHER = 0.20, 0.15
@@ -33,8 +34,8 @@ class HeldObject:
     they closed do not feel what slides out of them.
     """
 
-    def __init__(self, ctx: Context, object_id: str) -> None:
-        self._ctx, self._object_id = ctx, object_id
+    def __init__(self, ctx: Context, object_id: str, grip: Grip) -> None:
+        self._ctx, self._object_id, self._grip = ctx, object_id, grip
         self._sight: Pending | None = None
         self._above = 0.0
         """m of the object over the palm"""
@@ -90,7 +91,8 @@ class HeldObject:
         return self._kept_at >= since + SETTLES
 
     def _lost(self, why: str) -> None:
-        self._ctx.holding, self._ctx.shared = "", False
+        self._ctx.holding = ""
+        self._grip.release()
         raise PortError(f"'{self._object_id}' has left the hand on the way", (why,), ReasonCode.OBJECT_NOT_SEEN)
 
     def _distance(self) -> float | None:

@@ -82,7 +82,7 @@ def _joint_way(ctx: Context, here: Sequence[float], by: np.ndarray, speed: float
 
 def _await(ctx: Context, pending: Pending) -> str:
     """Why the call did not succeed; empty if it did."""
-    limit = float(ctx.config.get("motion.end_timeout", 3.0))
+    limit = ctx.config.number("motion.end_timeout")
     begin = ctx.clock.now()
     while not pending.done():
         if ctx.clock.now() - begin >= (SILENCE if ctx.arm.joint_positions() is None else limit):

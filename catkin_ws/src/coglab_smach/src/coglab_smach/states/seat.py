@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from coglab_smach.context.awaited import ARM
 from coglab_smach.context.context import Context
+from coglab_smach.context.wait_reasons import ARM
 from coglab_smach.ports.pending import Pending
 from coglab_smach.states.base import CoglabState, TimeLimit
+from coglab_smach.states.hand_tracking import way_to_grasp
 from coglab_smach.states.motion import shift, shift_time
-from coglab_smach.states.where import way_to_grasp
 
 FARTHEST, LEAST = 0.05, 0.005
 """m, most that the palm goes; and a shorter way is not begun"""

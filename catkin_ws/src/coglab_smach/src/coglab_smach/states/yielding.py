@@ -6,8 +6,8 @@ import numpy as np
 
 from coglab_smach.context.context import Context
 from coglab_smach.ports.pending import Pending
+from coglab_smach.states.hand_tracking import palm_at, palm_axis
 from coglab_smach.states.motion import shift
-from coglab_smach.states.where import palm_at, palm_axis
 
 LEAST_WAY = 0.005
 """m, a shorter way is not begun"""
@@ -33,8 +33,8 @@ class GivesWay:
         self._since: float | None = None
         """s, since when somebody pulls"""
 
-    def _number(self, name: str, default: float) -> float:
-        return float(self._ctx.config.get(f"pull.{name}", default))
+    def _number(self, name: str) -> float:
+        return self._ctx.config.number(f"pull.{name}")
 
     def pull(self) -> np.ndarray:
         """N, base frame, horizontal; nothing where nothing is known."""
@@ -68,11 +68,11 @@ class GivesWay:
         size = float(np.linalg.norm(pull))
         if self._from is not None:
             assert self._motion is not None
-            if size < self._number("ends", 3.0) or self._motion.done():
+            if size < self._number("ends") or self._motion.done():
                 self._end("the pull is over")
             return
-        self._since = None if size <= self._number("begins", 6.5) else now if self._since is None else self._since
-        if self._since is None or now - self._since < self._number("time", 0.05):
+        self._since = None if size <= self._number("begins") else now if self._since is None else self._since
+        if self._since is None or now - self._since < self._number("time"):
             return
         way = self._way(pull / size)
         if way is None:
@@ -82,13 +82,13 @@ class GivesWay:
                 self._end("somebody pulls")
             return
         self._from = palm_at(self._ctx)
-        self._motion = shift(self._ctx, way, self._number("speed", 0.2)) if self._from is not None else None
+        self._motion = shift(self._ctx, way, self._number("speed")) if self._from is not None else None
         self._from = self._from if self._motion is not None else None
         self._ctx.journal.mark("gave_way")
 
     def _way(self, direction: np.ndarray) -> np.ndarray | None:
         """m that the palm may still go there; None where it has gone far enough."""
-        most = self._number("way", 0.05)
+        most = self._number("way")
         there = self._went + most * direction
         way = there * min(1.0, most / max(float(np.linalg.norm(there)), 1e-9)) - self._went
         return way if float(np.linalg.norm(way)) > LEAST_WAY else None
