@@ -16,7 +16,6 @@ setup(
                     "context",
                     "states",
                     "machines",
-                    "simulated",
                     "ros",
                 )
             ),

@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 from coglab_objects.database import ObjectDatabase, objects_folder
 from coglab_py.packages import package_path
-from coglab_smach.clocks.virtual_clock import VirtualClock, using
 from coglab_smach.context.config import Config
 from coglab_smach.machines import build_master
-from coglab_smach.simulated.ports import simulated_context
+from coglab_trials.scripted.ports import simulated_context
+from coglab_trials.virtual_clock import VirtualClock, using
 
 SHARE = Path(__file__).resolve().parent.parent
 LIBRARY = str(package_path("coglab_controllers", "config", "primitives.xml"))

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode, Say
 from coglab_py.pose import Pose, about_z
-from coglab_smach.clocks.virtual_clock import using
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.interfaces import HandState, Located
 from coglab_smach.ports.pending import Polled, PortError, Ready
@@ -24,6 +23,7 @@ from coglab_smach.states.hand_tracking import (
 )
 from coglab_smach.states.held_object import HeldObject
 from coglab_smach.states.yield_to_pull import YieldToPull
+from coglab_trials.virtual_clock import using
 from conftest import Trial
 
 HERE = (0.0, 0.5, 0.0, 1.0, 0.0, 0.5, 0.0)

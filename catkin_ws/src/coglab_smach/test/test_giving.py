@@ -8,7 +8,6 @@ import pytest
 from coglab_contact.load import SAME, LeavingLoad
 from coglab_msgs.msg import ReasonCode, Say
 from coglab_py.pose import Pose
-from coglab_sim.conditions import Conditions
 from coglab_smach.context.config import Config
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.interfaces import HandState, Located
@@ -16,11 +15,12 @@ from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states import give
 from coglab_smach.states.grip import Grip
 from coglab_smach.states.held_object import FARTHER, LOST_TIME, NEAR, HeldObject
+from coglab_trials.conditions import Conditions
+from coglab_trials.trial import VirtualTrial
 from conftest import SHARE, Trial
 from ih2_hand.emulator.hand import GRASP_CURRENT
 from ih2_hand.emulator.motor import STALL_CURRENT
 from ih2_hand.wire_choices import WIRE
-from virtual_trial import VirtualTrial
 
 RECEIVE, GIVE = "exchange_human_to_robot", "exchange_robot_to_human"
 WEIGHT = 0.31 * 9.81

@@ -5,13 +5,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from coglab_smach.clocks.virtual_clock import using
 from coglab_smach.ports.interfaces import DmpProgress, HandState
 from coglab_smach.ports.pending import Polled, Ready
 from coglab_smach.states import give
 from coglab_smach.states.give import GiveLoad, WaitTaker
 from coglab_smach.states.hand import closes_gently, firm_speed, gentle
 from coglab_smach.states.loosening_grip import LooseningGrip
+from coglab_trials.virtual_clock import using
 from conftest import Trial
 
 RECEIVE, GIVE = "exchange_human_to_robot", "exchange_robot_to_human"

@@ -5,12 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode, Say
-from coglab_smach.clocks.virtual_clock import using
 from coglab_smach.ports.interfaces import Located, Verdict
 from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states import hand, weight
 from coglab_smach.states.base import TimeLimit
 from coglab_smach.states.hand_tracking import HandTrack
+from coglab_trials.virtual_clock import using
 from conftest import Trial
 from test_weight_and_recovery import RECEIVE, Lifted
 

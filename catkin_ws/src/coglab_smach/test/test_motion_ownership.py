@@ -3,7 +3,7 @@ begins, and recovery goes nowhere with an object that a person may hold."""
 
 from types import SimpleNamespace
 
-import coglab_smach.simulated.arm_model as model
+import coglab_trials.scripted.arm_model as model
 import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_smach.context.journal import Journal

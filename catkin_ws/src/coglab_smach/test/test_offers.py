@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_py.pose import Pose
-from coglab_smach.clocks.virtual_clock import using
 from coglab_smach.ports.interfaces import Ahead, Located
 from coglab_smach.ports.pending import PortError, Ready
 from coglab_smach.states import hub
@@ -21,6 +20,7 @@ from coglab_smach.states.knowledge import (
     paced,
     palm_of,
 )
+from coglab_trials.virtual_clock import using
 from conftest import Trial
 
 GOAL = {"frame": "", "offset": [0.0, 0.0, 0.0], "orientation": [0.0, 0.0, 0.0, 1.0], "primitive": "p", "dmp_ratio": 2.0}

@@ -8,7 +8,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
-from coglab_smach.clocks.virtual_clock import using
 from coglab_smach.context.holding import HoldingMemory
 from coglab_smach.context.requests import Requests, command
 from coglab_smach.context.trigger import ask_for
@@ -16,6 +15,7 @@ from coglab_smach.ports.interfaces import Verdict
 from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states.arm import ConfigureLwr, PtpMotion
 from coglab_smach.states.base import TimeLimit
+from coglab_trials.virtual_clock import using
 from conftest import Trial
 from test_master_node import script
 

@@ -5,7 +5,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
-from coglab_smach.clocks.virtual_clock import using
 from coglab_smach.context.config import Config
 from coglab_smach.ports.interfaces import Ahead, ContactEvent, DmpProgress, Located, Verdict
 from coglab_smach.ports.pending import PortError, Ready
@@ -14,6 +13,7 @@ from coglab_smach.states.base import TimeLimit
 from coglab_smach.states.hand_tracking import SWAPPED
 from coglab_smach.states.monitor import MonitorDmp
 from coglab_smach.states.reach import PersonsGrip, ReachWatch, WaitContact, dmp_request, start, target_of
+from coglab_trials.virtual_clock import using
 from conftest import Trial
 
 LOW, HIGH = [-1.0, -1.0, -1.0], [2.0, 1.0, 2.0]

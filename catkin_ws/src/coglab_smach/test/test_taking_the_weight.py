@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode, Say
 from coglab_py.pose import Pose
-from coglab_smach.clocks.virtual_clock import using
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.pending import Polled, Ready
 from coglab_smach.states import regrasp, weight
 from coglab_smach.states.hand import AT_END, stopped_by_object
+from coglab_trials.virtual_clock import using
 from conftest import Trial
 
 RECEIVE = "exchange_human_to_robot"

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 import smach
 from coglab_msgs.msg import ReasonCode
-from coglab_smach.clocks.virtual_clock import using
 from coglab_smach.context.config import ConfigError
 from coglab_smach.kinematics.motion_time import MotionLimits
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.pending import Pending, PortError, Ready
 from coglab_smach.states.base import CoglabState, require_all
 from coglab_smach.states.motion import await_rest, end_motion, rise, shift, shift_time
+from coglab_trials.virtual_clock import using
 from conftest import Trial
 
 NEVER = lambda: False  # noqa: E731

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode, Say
 from coglab_py.pose import Pose
-from coglab_smach.clocks.virtual_clock import using
 from coglab_smach.machines import recovery
 from coglab_smach.machines.recovery import SecureHand, WhatIsHeld
 from coglab_smach.ports.interfaces import ContactEvent, HandState, Verdict
@@ -16,6 +15,7 @@ from coglab_smach.states.base import TimeLimit
 from coglab_smach.states.grip import Grip
 from coglab_smach.states.hand_tracking import HandTrack
 from coglab_smach.states.weight import TakeWeight
+from coglab_trials.virtual_clock import using
 from conftest import Trial
 from test_giving import giving
 

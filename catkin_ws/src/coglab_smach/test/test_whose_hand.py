@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_py.pose import Pose
-from coglab_smach.clocks.virtual_clock import using
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states import reach, weight
 from coglab_smach.states.hand_tracking import HandTrack
 from coglab_smach.states.weight import person_holds
+from coglab_trials.virtual_clock import using
 from conftest import Trial
 from test_giving import WEIGHT, giving
 from test_weight_and_recovery import Lifted
