@@ -8,20 +8,17 @@ import numpy as np
 import pytest
 from coglab_contact.detector import ContactDetector, DetectorSettings
 from coglab_contact.evidence import (
-    FUSED,
     MOMENTUM,
     SIGHT,
     Evidence,
     Fingers,
     InPalm,
     Touch,
-    name_of,
     probability,
     together,
 )
 from coglab_contact.fused_detector import IN_MOTION, LIFT, RELEASE, FusedDetector
-from coglab_contact.load import Felt, GripAndLoad, LeavingLoad
-from coglab_contact.load import together as one_share
+from coglab_contact.load import GripAndLoad, LeavingLoad
 from coglab_msgs.msg import ReasonCode
 
 
@@ -42,13 +39,6 @@ def test_a_source_at_its_threshold_is_sure_to_99_in_100():
     assert probability(0.0) == pytest.approx(6.08e-4, rel=1e-2) and probability(50.0) == 1.0
     two = [Evidence(name, 0.0, 1.0, 0.6) for name in (MOMENTUM, SIGHT)]
     assert together(two) == pytest.approx(1.0 - (1.0 - 0.4490) ** 2, abs=1e-3) and together([]) == 0.0
-
-
-def test_a_source_that_is_more_likely_than_not_is_named_beside_the_surest():
-    sure = Evidence(MOMENTUM, 0.0, 1.0, 1.2)
-    for margin, name in ((0.7, FUSED), (0.62, FUSED), (0.61, MOMENTUM), (0.3, MOMENTUM)):
-        assert name_of([sure, Evidence(SIGHT, 0.0, 1.0, margin)]) == name
-    assert name_of([Evidence(SIGHT, 0.0, 1.0, 0.1)]) == FUSED, "nobody alone says so"
 
 
 @pytest.mark.parametrize(
@@ -135,22 +125,6 @@ def test_a_finger_that_stops_before_its_target_is_a_contact_and_stands_for_itsel
 
 def held(**rest):
     return GripAndLoad(lambda q: np.eye(3), **rest)
-
-
-@pytest.mark.parametrize(("gap", "goes_on"), [(0.099, True), (0.101, False), (-0.01, False)])
-def test_touch_begins_anew_after_a_tenth_of_a_second(gap, goes_on):
-    touch = held()
-    touch.feed(0.0, [[0.0, 0.0, -2.0]], 0.0, None)
-    assert (touch.load(0.099) is not None) and touch.load(0.101) is None and touch.load(-0.101) is None
-    touch.feed(gap, [[0.0, 0.0, -1.0]], 0.0, None)
-    assert (touch.load(gap) != pytest.approx(1.0, abs=1e-6)) == goes_on
-    touch.feed(gap + 0.001, [[0.0, 0.0, -5.0]] * 2, 0.0, None)
-    assert touch.load(gap + 0.001) == pytest.approx(10.0), "other sensors begin anew, too"
-
-
-def test_torques_and_touch_that_lie_two_deviations_apart():
-    assert one_share(0.5, 0.1, Felt(0.31, 0.1)) == pytest.approx(0.405), "each counts"
-    assert one_share(0.5, 0.1, Felt(0.29, 0.1)) == 0.29 and one_share(0.29, 0.1, Felt(0.5, 0.1)) == 0.29
 
 
 @pytest.mark.parametrize(("differs", "share"), [(0.49, 0.0), (-0.49, 0.0), (0.51, 0.51), (-0.51, -0.51)])

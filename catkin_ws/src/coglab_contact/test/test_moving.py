@@ -17,10 +17,8 @@ from coglab_contact.momentum_observer import MomentumObserver
 from coglab_contact.motion_thresholds import (
     FEATURES,
     Change,
-    Offset,
     ThresholdError,
     Thresholds,
-    explained,
     largest_confirmed,
     learn,
     limit_of,
@@ -161,17 +159,6 @@ def test_a_mass_that_was_told_is_no_contact_and_an_untold_one_is():
             if event is not None:
                 break
         assert (event is None) == told
-
-
-def test_the_load_that_was_felt_is_carried_in_the_model():
-    arm, detector = Arm(begin=99.0, sigma=0.02), fused()
-    feed(detector, arm, 0.0, 1.0)
-    detector.arm("contact", 1.0, 5.0)
-    feed(detector, arm, 1.0, 1.5)
-    detector.arm("load", 1.5, 5.0, mass=0.5)
-    event, _ = feed(detector, arm, 1.5, 3.0, lambda t: (0.0, 0.0, -0.5 * 9.81 if t > 2.0 else 0.0))
-    assert event is not None and event.code == ReasonCode.LOAD_CARRIED
-    assert detector.moving.load == 0.5
 
 
 def test_an_object_that_was_there_before_anybody_watched_is_contact():
@@ -355,12 +342,6 @@ def test_gaps_of_50_ms_are_bridged(gap, fresh):
     assert found[0].fresh == fresh and len(found) == (1 if fresh else 3)
 
 
-def test_a_stamp_that_was_there_already_says_nothing_and_breaks_nothing():
-    observer = MomentumObserver(Plain())
-    fed(observer, [0.0, 0.005, 0.010])
-    assert fed(observer, [0.010]) == [None] and not fed(observer, [0.015])[0].fresh
-
-
 @pytest.mark.parametrize(("aside", "told"), [(0.35, True), (-0.35, True), (0.45, False), (-0.45, False), (2.3, True)])
 def test_stamps_beside_the_grid_of_the_measurements(aside, told):
     """Within 0.4 of a period they are of the nearest one; beyond, nobody can say, but the estimate stays."""
@@ -407,16 +388,6 @@ def thresholds(constant=0.04, **rest):
     return Thresholds(variance, 5.0, seven(0.3), 4.0, **rest)
 
 
-def test_a_force_is_counted_in_deviations():
-    force, size = thresholds().force(of([0.4, 0.0, -0.3, 0, 0, 0, 9.0]))
-    assert force == pytest.approx([0.4, 0.0, -0.3], rel=1e-6) and size == pytest.approx(0.5 / 0.2)
-    assert thresholds(1e-9).deviation(np.ones((7, 6))) == pytest.approx(seven(0.01)), "the smallest that is believed"
-    steady, size = thresholds().steady_force(Offset(np.array([0.0, 0.5, 0, 0, 0, 0, 0]), PALM), of(seven(0)).features)
-    assert steady[1] == pytest.approx(0.5) and size == pytest.approx(0.5 / math.hypot(0.3, 0.2))
-    stretched, size = explained(seven(0.2), seven(0.2), np.vstack([PALM[:2], np.zeros(7)]))
-    assert np.all(np.isfinite(stretched)) and size == pytest.approx(math.sqrt(2.0))
-
-
 def test_a_limit_is_exceeded_with_the_chosen_probability():
     rng = np.random.default_rng(5)
     largest = rng.gumbel(3.0, 0.4, 400)
@@ -454,19 +425,6 @@ def test_a_lag_is_learnt_within_10_ms(lag, before, learnt):
     if abs(learnt) < 0.01:
         assert got.variance[:, 0] == pytest.approx(seven(0.04), rel=0.15)
         assert 2.0 < got.limit < 8.0
-
-
-def test_offsets_count_once_twenty_were_seen():
-    with pytest.raises(ThresholdError, match="at least 20 reaches without contact, got 19"):
-        learn(reaches(count=19))
-    rng = np.random.default_rng(4)
-    offsets = [Offset(rng.normal(0.0, 0.1, 7), PALM) for _ in range(20)]
-    few, enough = learn(reaches(), offsets[:19]), learn(reaches(), offsets)
-    assert few.steady == pytest.approx(seven(0.3)) and few.steady_limit == pytest.approx(1.05 * 4.0)
-    assert enough.steady == pytest.approx(np.sqrt(np.mean([o.torque**2 for o in offsets], axis=0)))
-    assert enough.steady_limit != few.steady_limit and 2.0 < enough.steady_limit < 8.0
-    usual = learn(reaches()).limit
-    assert learn(reaches(), alarm_share=1e-4).limit > usual == learn(reaches(), alarm_share=2e-3).limit
 
 
 BAD = {
@@ -510,41 +468,6 @@ def test_a_push_at_rest_is_forgotten_as_fast_at_every_period(period):
     moved.feed((0.0, 0.0, -8.0), int(1.0 / period))
     moved.feed((0.0, 0.0, 0.0), int(0.5 / period))
     assert -contact.before_motion()[2] == pytest.approx(8.0 * np.exp(-0.5 / 0.25), abs=0.25)
-
-
-def test_a_force_is_told_30_ms_ahead_of_how_it_grows():
-    moved = Moved()
-    moved.contact.observer.lag = 0.0
-    assert moved.contact.force_since(np.zeros(7)) is None
-    moved.feed((2.0, 0.0, 0.0), 50)
-    assert moved.contact.force_since(np.zeros(7)) == pytest.approx([2.0, 0.0, 0.0])
-    assert moved.contact.force_since(seven(0.5))[:2] == pytest.approx([1.5, -0.5])
-    grown = [moved.feed((4.0, 0.0, 0.0)).residual.torque[0] for _ in range(6)]
-    # 20 ms are two samples and a half.
-    ahead = grown[5] + 0.03 * (grown[5] - grown[3]) / (2 * STEP)
-    assert moved.contact.force_since(np.zeros(7))[0] == pytest.approx(ahead)
-
-
-def test_what_was_there_before_is_told_of_an_empty_hand_alone():
-    moved = Moved()
-    moved.contact.observer.lag = 0.0
-    moved.feed((0.0, 1.0, 0.0), samples=60)
-    assert moved.contact.steady() is None, "it has not moved"
-    moved.feed((0.0, 3.0, 0.0), 80, by=0.1 * STEP)
-    steady = moved.contact.steady()
-    # Joints go with 0.1 rad/s, of which these thresholds know nothing.
-    assert steady.margin == pytest.approx(2.0 / math.hypot(0.3, 0.2) / 4.0, rel=0.02)
-    assert steady.until - steady.stamp == pytest.approx(0.03)
-    assert moved.contact.offset().torque[1] == pytest.approx(2.0, rel=0.02)
-    assert moved.contact.offset_of_motion() is None
-    moved.feed((0.0, 3.0, 0.0), 60)
-    assert moved.contact.offset_of_motion().torque[1] == pytest.approx(2.0, rel=0.02)
-    moved.contact.load = 0.1
-    assert moved.contact.steady() is None
-    moved.contact.set_payload(0.4)
-    assert moved.arm.payloads == [(0.4, (0.0, 0.0, 0.0))] and moved.contact.load == 0.4
-    assert moved.contact.change is None and not moved.contact.still() and moved.contact.before_motion() is None
-    assert moved.contact.evidence() is None and moved.contact.force_since(np.zeros(7)) is None
 
 
 @pytest.mark.parametrize(("samples", "speed", "kept"), [(40, 0.11, 1), (39, 0.11, 0), (60, 0.09, 0)])

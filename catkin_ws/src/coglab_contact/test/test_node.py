@@ -19,7 +19,7 @@ from coglab_msgs.msg import FingertipForces, HandStatus, ReasonCode
 from coglab_msgs.srv import ArmContactRequest, LearnMotionRequest
 from coglab_py.pace import Pace
 from coglab_py.pose import Pose
-from geometry_msgs.msg import Point, Quaternion, TransformStamped
+from geometry_msgs.msg import Quaternion, TransformStamped
 from sensor_msgs.msg import JointState
 
 SCRIPT = Path(__file__).resolve().parents[1] / "scripts" / "contact_detector_node.py"
@@ -112,18 +112,6 @@ def test_velocities_are_those_of_the_message_or_of_two_positions(node):
     assert node.detector.fed == [
         ("feed_measured", 4.0, [6.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.0], [6, 5, 4, 3, 2, 1, 0], None)
     ]
-
-
-def test_forces_are_told_a_hundred_times_a_second_at_most(node):
-    node.detector.pull = np.array([1.0, 2.0, 3.0])
-    for stamp in (1.0, 1.005, 1.0085, 1.0095, 1.02, 0.5):
-        node.on_joints(joints(stamp, effort=ZERO))
-    forces = [message for to, message in node.sent if to == "force"]
-    assert [round(f.header.stamp.to_sec(), 4) for f in forces] == [1.0, 1.0095, 1.02, 0.5]
-    assert (forces[0].vector.y, forces[0].header.frame_id) == (2.0, "world")
-    node.detector.pull = None
-    node.on_joints(joints(9.0, effort=ZERO))
-    assert len(node.sent) == 4
 
 
 def test_torques_count_once_the_joints_are_known(node):
@@ -219,20 +207,6 @@ def test_arming(node):
     assert node.on_arm(wrong).reason_code == ReasonCode.INVALID_ARGUMENT
 
 
-@pytest.mark.parametrize(
-    ("place", "turn", "good"),
-    [
-        (0.0, (0.0, 0.0, 0.0, 1.009), True),
-        (0.0, (0.0, 0.0, 0.0, 1.011), False),
-        (0.0, (0.0, 0.0, 0.0, 0.989), False),
-        (math.nan, (0.0, 0.0, 0.0, 1.0), False),
-        (0.0, (math.inf, 0.0, 0.0, 1.0), False),
-    ],
-)
-def test_a_pose_has_a_finite_place_and_a_unit_quaternion(node, place, turn, good):
-    assert (node.pose_of(Point(place, 1.0, 2.0), Quaternion(*turn)) is not None) == good
-
-
 @pytest.mark.parametrize(("age", "told"), [(0.14, True), (0.16, False), (-0.16, False)])
 def test_a_sight_of_the_object_tells_for_15_hundredths_of_a_second(node, age, told):
     q = np.array([0.0, 0.5, 0.0, 1.0, 0.0, 0.5, 0.0])
@@ -258,14 +232,6 @@ def test_a_sight_of_the_object_tells_for_15_hundredths_of_a_second(node, age, to
     node.buffer.lookup_transform = lambda *a: (_ for _ in ()).throw(tf2_ros.TransformException("none"))
     node.look_at_object()
     assert node.detector.fed == []
-
-
-def test_what_learning_answers(node):
-    assert node.on_learn(None).success and node.on_learn(None).message == "learning"
-    node.detector.still.learn = lambda: (_ for _ in ()).throw(ValueError("moves"))
-    assert node.on_learn(None).reason_code == ReasonCode.NODE_SILENT
-    node.heard = time.monotonic()
-    assert node.on_learn(None).reason_code == ReasonCode.BUSY
 
 
 BEGIN, END = LearnMotionRequest(gather=True), LearnMotionRequest(gather=False)
@@ -299,13 +265,6 @@ def test_a_file_that_cannot_be_is_refused_before_anything_is_gathered(node, tmp_
     success, code, sentence = answered(node, BEGIN)
     assert (success, code, node.recorder) == (False, ReasonCode.BAD_FILE, None)
     assert words in sentence and str(tmp_path) in sentence and "\n" not in sentence
-
-
-def test_a_refusal_leaves_what_is_being_gathered(node, tmp_path):
-    answered(node, BEGIN)
-    gathering, node.learnt_file = node.recorder, str(tmp_path)
-    assert answered(node, BEGIN)[1] == ReasonCode.BAD_FILE
-    assert node.recorder is gathering
 
 
 def test_what_was_gathered_outlives_a_file_that_was_not_written(node, tmp_path):

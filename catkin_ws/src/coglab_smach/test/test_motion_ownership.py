@@ -1,15 +1,13 @@
 """Who starts a motion ends it: whatever fails, runs out of time or is preempted, the arm stands before the next state
 begins, and recovery goes nowhere with an object that a person may hold."""
 
-from types import SimpleNamespace
 
 import coglab_trials.scripted.arm_model as model
 import pytest
 from coglab_msgs.msg import ReasonCode
-from coglab_smach.context.journal import Journal
 from coglab_smach.kinematics.manager_limits import read_limits
 from coglab_smach.kinematics.motion_time import ptp_time
-from coglab_smach.ports.pending import Polled, PortError, Ready
+from coglab_smach.ports.pending import PortError
 from coglab_smach.states import weight
 from conftest import Trial
 from motion_watch import MotionWatch
@@ -39,30 +37,6 @@ def watched(script, prepare=lambda t: None, **overrides):
     trial.run(scripted)
     assert watch.failures > 0 and watch.moved == []
     return trial
-
-
-@pytest.mark.parametrize("name", ["move_ptp", "execute_dmp", "switch_dmp"])
-@pytest.mark.parametrize("answer", ["refused", "late refusal", "taken", "under way"])
-def test_the_watch_ends_with_a_motion_that_was_taken_and_with_no_other(name, answer):
-    refusal, over, speed = Ready(error=PortError("the arm is blocked")), [], [0.0]
-    pending = {
-        "refused": refusal,
-        "late refusal": Polled(lambda: bool(over), refusal.result),
-        "taken": Ready(),
-        "under way": Polled(lambda: False, lambda: None),
-    }[answer]
-    arm = SimpleNamespace(**dict.fromkeys(("move_ptp", "execute_dmp", "switch_dmp"), lambda *a: pending))
-    journal = Journal(lambda: 0.0)
-    watch = MotionWatch(SimpleNamespace(journal=journal, arm=arm), lambda: speed)
-    journal.transition("/master/take", "reach", "failed", "recover", "it did not work")
-    journal.entered("/master/take/recover/end_motion")
-    getattr(arm, name)()
-    watch.look()
-    over.append(True)
-    watch.look()
-    speed[0] = 1.0
-    watch.look()
-    assert bool(watch.moved) == ("refus" in answer)
 
 
 def test_a_motion_beyond_its_time_limit_is_ended_before_recovery_begins(monkeypatch):

@@ -5,7 +5,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
-from coglab_py.pose import Pose
 from coglab_smach.ports.interfaces import Ahead, Located
 from coglab_smach.ports.pending import PortError, Ready
 from coglab_smach.states import hub
@@ -16,7 +15,6 @@ from coglab_smach.states.knowledge import (
     believed,
     first_reachable,
     locate,
-    off_the_board,
     paced,
     palm_of,
 )
@@ -172,13 +170,6 @@ def test_a_goal_may_not_leave_the_region_nor_go_back_by_10_cm_nor_fall_by_8():
     assert hand["limits"]["goal_drop"] == 0.0 and "watch" in hand and hand["primitive"] == "p"
 
 
-def test_what_was_held_still_outside_may_go_no_farther_than_that_counts():
-    for outside in ((0.93, 0.0, 0.4), (0.6, -0.55, 0.4)):
-        limits = unless_withdrawn(Offers().ctx, {**GOAL, "frame": "object_mug", "place": outside})["limits"]
-        assert limits["goal_region_low"] == pytest.approx([0.35, -0.60, -0.05])
-        assert limits["goal_region_high"] == pytest.approx([0.96, 0.60, 0.95])
-
-
 def test_a_goal_that_is_predicted_has_to_lie_in_the_region_and_is_watched_further_by_the_state():
     early = unless_withdrawn(Offers().ctx, {**GOAL, "frame": "object_mug_ahead", "place": INSIDE}, 0.1)
     limits = early["limits"]
@@ -204,48 +195,6 @@ def test_the_first_goal_with_a_posture_is_taken_where_it_is_checked():
     assert palm_of(seen, goals[2]).position == pytest.approx([1.6, 0.0, 0.4])
     offers.ctx.config.set("handover.check_reach", False)
     assert first_reachable(offers.ctx, seen, goals)["offset"][0] == 0.1
-
-
-@pytest.mark.parametrize(("answer", "raised"), [(0.0, 0.0), (0.02, 0.02), (None, None)])
-def test_a_goal_at_the_board_is_raised_in_the_boards_own_frame(answer, raised):
-    board = (0.5, 0.0, 0.1)
-    offers, asked = Offers(lambda t: board), []
-
-    def ask(at, palm, room, most):
-        asked.append((palm.position, room, most))
-        return (0.05, None) if answer is None else (answer, Pose(palm.position + [0, 0, answer], palm.orientation))
-
-    offers.ctx.raised = ask
-    goal = {**GOAL, "offset": [0.0, 0.0, 0.2]}
-    with using(offers.trial.clock):
-        if answer is None:
-            with pytest.raises(PortError) as error:
-                off_the_board(offers.state, goal)
-            assert "would have to rise by at least 50 mm to keep 10 mm off it, expected at most 30 mm" in str(
-                error.value
-            )
-        else:
-            assert off_the_board(offers.state, goal)["offset"] == pytest.approx([0.0, 0.0, 0.2 + raised])
-            assert offers.state.reason == ("" if raised == 0.0 else "raised by 20.0 mm, off the board")
-    assert asked[0][0] == pytest.approx([0.5, 0.0, 0.3]) and asked[0][1:] == (0.01, 0.03)
-    assert offers.asked[0] == "board"
-
-
-def test_goals_of_the_board_keep_12_mm_clear_and_come_along_the_approach_axis():
-    trial, found = Trial(), {}
-
-    def script(t):
-        t.wait_hub("wait_without_object")
-        execute = t.ctx.arm.execute_dmp
-        t.ctx.arm.execute_dmp = lambda request: found.setdefault(request.primitive_id, request) and execute(request)
-        for action, hub_after in (("take", "wait_with_object"), ("put", "wait_without_object")):
-            t.start(action)
-            t.wait_hub(hub_after)
-
-    trial.run(script)
-    assert found["take_board"].goal_approach == pytest.approx([0.0, 0.05, 0.0])
-    assert list(found["put_board"].goal_approach) == [0.0] * 3 and found["put_board"].arrival_speed == 0.0
-    assert found["take_board"].orientation_control and found["take_board"].dmp_ratio == 1.0
 
 
 # --- hubs -------------------------------------------------------------------------------------------------------------
