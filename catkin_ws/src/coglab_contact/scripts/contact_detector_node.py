@@ -46,12 +46,9 @@ from geometry_msgs.msg import Vector3, Vector3Stamped
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
-FORCE_PERIOD = 0.009
-"""s between two messages of ~force, at least"""
-OLDEST_SIGHT = 0.15
-"""s, older sights of an object do not tell whether it is in the palm"""
-SIGNAL = 0.01
-"""s between two messages on ~signal at least"""
+FORCE_PERIOD = 0.009  # s between two messages of ~force, at least
+OLDEST_SIGHT = 0.15  # s, older sights of an object do not tell whether it is in the palm
+SIGNAL = 0.01  # s between two messages on ~signal at least
 
 
 def made_at(message: JointState) -> float | None:

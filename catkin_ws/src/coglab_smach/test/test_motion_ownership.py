@@ -1,7 +1,6 @@
 """Who starts a motion ends it: whatever fails, runs out of time or is preempted, the arm stands before the next state
 begins, and recovery goes nowhere with an object that a person may hold."""
 
-
 import coglab_trials.scripted.arm_model as model
 import pytest
 from coglab_msgs.msg import ReasonCode

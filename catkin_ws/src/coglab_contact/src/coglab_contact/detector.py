@@ -21,8 +21,7 @@ from coglab_msgs.msg import ReasonCode
 
 from coglab_contact.evidence import ContactEvent
 
-JOLT = 0.02
-"""rad that a joint moves at most when somebody pushes an arm that rests, or lets go of it"""
+JOLT = 0.02  # rad that a joint moves at most when somebody pushes an arm that rests, or lets go of it
 REMEMBERED = 0.25
 """s over which what is felt at rest is averaged, whatever the period: so long a push on the resting arm is not
 forgotten"""
@@ -31,12 +30,9 @@ Joints = Sequence[float] | np.ndarray
 """seven numbers, one for each joint in wire order"""
 
 GRAVITY = 9.81
-MAD_TO_SIGMA = 1.4826
-"""Standard deviation of normal noise per median absolute deviation."""
-LARGEST = 1e4
-"""Nm, rad, rad/s: no number of an arm is larger"""
-LONGEST_STEP = 1.0
-"""s between two samples that follow each other"""
+MAD_TO_SIGMA = 1.4826  # Standard deviation of normal noise per median absolute deviation
+LARGEST = 1e4  # Nm, rad, rad/s: no number of an arm is larger
+LONGEST_STEP = 1.0  # s between two samples that follow each other
 
 
 @dataclass
@@ -140,8 +136,7 @@ class RestTorque:
         """at the last rest before a motion that was more than a jolt; None: there was none"""
         self._here: np.ndarray | None = None
         self._left: np.ndarray | None = None
-        self._travelled: np.ndarray | None = None
-        """rad, since the rest that was left; None: at rest"""
+        self._travelled: np.ndarray | None = None  # rad, since the rest that was left; None: at rest
 
     def move(self, gap: float, velocity: Sequence[float] | np.ndarray) -> None:
         """The arm moves (rad/s), ``gap`` s after the sample before."""
@@ -177,8 +172,7 @@ class ContactDetector:
         self._history: deque[tuple[float, np.ndarray]] = deque()
         self._rest_differences: deque[np.ndarray] = deque(maxlen=400)
         self._last_stamp: float | None = None
-        self._odd_stamp: float | None = None
-        """of the last sample that did not follow the one before it"""
+        self._odd_stamp: float | None = None  # of the last sample that did not follow the one before it
         self._still_since: float | None = None
         self._rest, self._gap = RestTorque(), 0.0  # the latter in s, between the last two samples
         self._unloaded: np.ndarray | None = None

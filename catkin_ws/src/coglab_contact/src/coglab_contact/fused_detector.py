@@ -39,12 +39,9 @@ IN_MOTION = "contact_in_motion"
 LIFT = "lift"
 RELEASE = "release"
 GRAVITY = 9.81
-SETTLING = 0.10
-"""s after arming over which the residual is averaged that a weight is counted from"""
-CARRIED = 0.06
-"""s for which the weight has to be there"""
-HELD_CENTRE = (0.04, 0.0, 0.0)
-"""m in ih2_palm: about where the fingers hold an object"""
+SETTLING = 0.10  # s after arming over which the residual is averaged that a weight is counted from
+CARRIED = 0.06  # s for which the weight has to be there
+HELD_CENTRE = (0.04, 0.0, 0.0)  # m in ih2_palm: about where the fingers hold an object
 
 
 @dataclass
@@ -79,8 +76,7 @@ class FusedDetector:
         self._lift: _Lift | None = None
         self._leaving: LeavingLoad | None = None
         self._until: float | None = None
-        self._first = False
-        """nothing was looked at yet since arming"""
+        self._first = False  # nothing was looked at yet since arming
         self._evidence: dict[str, Evidence] = {}
         self._mass = 0.0
         self._before_reach: np.ndarray | None = None

@@ -18,27 +18,19 @@ import numpy as np
 
 Joints = Sequence[float] | np.ndarray
 
-SMOOTH = 0.015
-"""s, time constant of the low-pass of each force"""
-USUAL = 0.5
-"""s, time constant of the load that is felt while nobody takes it"""
-NOISE = 3.0
-"""deviations of one component up to which a low-passed force is none"""
-OLDEST = 0.1
-"""s after which touch tells nothing any more; after such a gap it begins anew"""
+SMOOTH = 0.015  # s, time constant of the low-pass of each force
+USUAL = 0.5  # s, time constant of the load that is felt while nobody takes it
+NOISE = 3.0  # deviations of one component up to which a low-passed force is none
+OLDEST = 0.1  # s after which touch tells nothing any more; after such a gap it begins anew
 COVERED = 0.3
 """share of the weight by which the usual load may differ from it; where it is more, contacts miss the sensors"""
-EXACT = 0.1
-"""N, deviation of the felt load of sensors without noise: their place and scale"""
-APART = 2.0
-"""deviations of the torques' load by which touch may differ from it while both are believed"""
+EXACT = 0.1  # N, deviation of the felt load of sensors without noise: their place and scale
+APART = 2.0  # deviations of the torques' load by which touch may differ from it while both are believed
 
 
 GRAVITY = 9.81
-SETTLING = 0.10
-"""s after arming over which the weight is averaged"""
-CONFIRMED = 0.05
-"""s for which the load has to be gone"""
+SETTLING = 0.10  # s after arming over which the weight is averaged
+CONFIRMED = 0.05  # s for which the load has to be gone
 SAME, FAR = 0.5, 0.2
 """N by which the weight that is told in one posture may seem to differ from that in another, and by how much (rad) a
 joint has turned there, at most, where it may: the model is that good"""
@@ -75,11 +67,9 @@ class GripAndLoad:
     def __init__(self, turned: Callable[[Joints], np.ndarray]) -> None:
         """``turned``: position of the joints (rad) to the rotation (3 x 3) from ih2_palm to the base frame."""
         self._turned = turned
-        self._forces: np.ndarray | None = None
-        """n x 3, N on each phalanx and the palm, ih2_palm, low-passed"""
+        self._forces: np.ndarray | None = None  # n x 3, N on each phalanx and the palm, ih2_palm, low-passed
         self._stamp = 0.0
-        self._noise = 0.0
-        """N, deviation of one component as measured"""
+        self._noise = 0.0  # N, deviation of one component as measured
         self._load = 0.0
         self._usual: float | None = None
         self._counted_from: float | None = None
@@ -158,16 +148,11 @@ class LeavingLoad:
         self.share: float | None = None
         """1: all of it; None until enough was seen to count from"""
         self.told = False
-        self._from = carried
-        """N, that the share is counted from"""
-        self._posture: Joints = ()
-        """rad, of the newest sample"""
-        self._counted: Joints | None = None
-        """the posture in which that weight hung on the palm; None: another one"""
-        self._looked: Joints | None = None
-        """the posture in which it was last asked what hangs there"""
-        self._doubt = SAME
-        """N of what is gone that the posture alone may explain"""
+        self._from = carried  # N, that the share is counted from
+        self._posture: Joints = ()  # rad, of the newest sample
+        self._counted: Joints | None = None  # the posture in which that weight hung on the palm; None: another one
+        self._looked: Joints | None = None  # the posture in which it was last asked what hangs there
+        self._doubt = SAME  # N of what is gone that the posture alone may explain
         self._sum, self._count = 0.0, 0
         self._begun = 0.0
         self._since: float | None = None

@@ -21,8 +21,7 @@ import numpy as np
 Joints = Sequence[float] | np.ndarray
 """seven numbers, one for each joint in wire order"""
 
-LONGEST_GAP = 0.05
-"""s between two samples that the observer bridges; after a longer one it begins anew"""
+LONGEST_GAP = 0.05  # s between two samples that the observer bridges; after a longer one it begins anew
 SILENCE = 1.0
 """s without a sample, after which the robot may have begun a new session, whose time does not follow the old one"""
 BESIDE = 0.4

@@ -15,22 +15,17 @@ from coglab_contact.evidence import MOMENTUM, Evidence
 from coglab_contact.momentum_observer import Dynamics, Joints, MomentumObserver, Residual
 from coglab_contact.motion_thresholds import CONFIRM, Change, ChangeOfResidual, Offset, Thresholds, learn
 
-HOLD = 0.03
-"""s for which one sample counts"""
-STILL = 0.02
-"""rad/s; a joint faster than this is motion"""
+HOLD = 0.03  # s for which one sample counts
+STILL = 0.02  # rad/s; a joint faster than this is motion
 SLOW, GENTLE = 0.15, 1.0
 """rad/s and rad/s^2 of the fastest joint"""
-SETTLED = 0.25
-"""s of stillness before the residual is taken as that of a free arm"""
+SETTLED = 0.25  # s of stillness before the residual is taken as that of a free arm
 LEAD, GROWTH = 0.03, 0.02
 """s by which a force is told ahead, about the observer's own delay, and s over which it is seen to grow"""
 
 
-SHORTEST = 40
-"""samples of a motion that counts"""
-LONGEST = 4000
-"""samples of one that is kept; what follows belongs to the next"""
+SHORTEST = 40  # samples of a motion that counts
+LONGEST = 4000  # samples of one that is kept; what follows belongs to the next
 
 
 class MovingContact:
@@ -60,10 +55,8 @@ class MovingContact:
         self._free: np.ndarray | None = None
         """mean residual of the rest before the motion, or of this one while the arm has not moved"""
         self._rest_position, self._rest_stamp = np.zeros(7), 0.0
-        self._free_weight: float | None = None
-        """N on the palm then"""
-        self._growing: deque[tuple[float, np.ndarray]] = deque()
-        """s and Nm: the residuals of the last GROWTH"""
+        self._free_weight: float | None = None  # N on the palm then
+        self._growing: deque[tuple[float, np.ndarray]] = deque()  # s and Nm: the residuals of the last GROWTH
 
     def use(self, thresholds: Thresholds) -> None:
         """These thresholds, and the lag of the torques that was learnt with them, from now on."""

@@ -9,8 +9,7 @@ from typing import NamedTuple
 
 from coglab_msgs.msg import ReasonCode
 
-COMMAND = "./coglab start"
-"""asks the machine for an action"""
+COMMAND = "./coglab start"  # asks the machine for an action
 
 
 def command(*actions: str) -> str:

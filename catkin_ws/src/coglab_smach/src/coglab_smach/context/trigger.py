@@ -8,8 +8,7 @@ from coglab_smach.context.context import Context
 from coglab_smach.context.requests import Answer, command
 from coglab_smach.ports.pending import PortError
 
-DATABASE_WAIT = 2.0
-"""s that a trigger waits for the object database"""
+DATABASE_WAIT = 2.0  # s that a trigger waits for the object database
 
 
 def ask_for(ctx: Context, action: str, object_id: str = "", source: str = "operator") -> Answer:

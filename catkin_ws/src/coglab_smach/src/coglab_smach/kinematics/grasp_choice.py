@@ -16,10 +16,8 @@ from coglab_smach.kinematics.goals import palm_at_grasp
 
 WHOLE_HAND = "cylindrical"
 """mode in which palm and all fingers hold; the others hold with fingertips, and want the object placed exactly"""
-ROOM = 0.12
-"""m between palm and the person's hand from which on they do not meet"""
-CLOSE_ENOUGH = 0.2
-"""cost by which another grasp has to be better before it replaces the one that was chosen"""
+ROOM = 0.12  # m between palm and the person's hand from which on they do not meet
+CLOSE_ENOUGH = 0.2  # cost by which another grasp has to be better before it replaces the one that was chosen
 
 
 def cost(grasp: Mapping[str, Any], seen: Pose, person: np.ndarray | None, start: np.ndarray | None) -> float:

@@ -12,10 +12,8 @@ import numpy as np
 
 from coglab_smach.kinematics.reachability import default_arm
 
-LEVER = 0.4
-"""m: what one joint moves the hand by, per rad, in a bent posture of the arm."""
-HALF_TURN = float(np.pi)
-"""rad: more than this the hand never turns on its way."""
+LEVER = 0.4  # m: what one joint moves the hand by, per rad, in a bent posture of the arm
+HALF_TURN = float(np.pi)  # rad: more than this the hand never turns on its way
 
 
 @dataclass(frozen=True)

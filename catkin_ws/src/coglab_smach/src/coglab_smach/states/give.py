@@ -24,8 +24,7 @@ from coglab_smach.states.reach import WaitForPerson
 from coglab_smach.states.weight import person_holds
 
 GRAVITY = 9.81
-ASTRAY = 0.02
-"""m that the object is from where it is offered, from which on it is brought there"""
+ASTRAY = 0.02  # m that the object is from where it is offered, from which on it is brought there
 BEYOND = 0.06
 """the same before ``give.lower_after``: a person who is nearer comes to it, and would meet an arm that comes, too"""
 PRESSES, LASTS, SINKS = 2.0, 0.3, 3
@@ -135,17 +134,14 @@ class GiveLoad(CoglabState):
         """the way (m) from the object to where the person's hand takes it"""
         self._lowering: Pending | None = None
         self._moving: Pending | None = None
-        self._ending: Pending | None = None
-        """of what moves"""
+        self._ending: Pending | None = None  # of what moves
         self._lower_at = self._look_at = 0.0
         self._brings = self._sinks = 0
         self._pressed_since: float | None = None
-        self._way: np.ndarray | None = None
-        """m, of the last look: from the object to where the person's hand takes it"""
+        self._way: np.ndarray | None = None  # m, of the last look: from the object to where the person's hand takes it
         self._needed = self._slips_at = self._weight = 0.0
         """share of the load; N of grip below which the object slips while the hand carries all of it; N"""
-        self._firm = 0
-        """wire speed of the grip that is as firm as before"""
+        self._firm = 0  # wire speed of the grip that is as firm as before
         self._back_since: float | None = None
 
     def _number(self, name: str) -> float:

@@ -46,10 +46,8 @@ class HandTrack:
         """whether it was seen all the way from the object on; False from a jump on, until it is seen again where it was
         before that"""
         self._newest: Sight | None = None
-        self._last: Sight | None = None
-        """the newest one of that hand"""
-        self._sure: Sight | None = None
-        """the newest one while that was sure"""
+        self._last: Sight | None = None  # the newest one of that hand
+        self._sure: Sight | None = None  # the newest one while that was sure
 
     def follow(self, at: float, place: np.ndarray, at_object: bool = True) -> None:
         """Take a sight of time ``at`` (s); ``at_object``: from there the hand may reach the object."""

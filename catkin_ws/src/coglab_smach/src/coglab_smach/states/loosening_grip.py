@@ -8,8 +8,7 @@ from collections.abc import Callable
 from coglab_smach.ports.interfaces import HandPort
 from coglab_smach.ports.pending import Pending
 
-FINGERS = slice(1, 5)
-"""motors that bend fingers"""
+FINGERS = slice(1, 5)  # motors that bend fingers
 FIRMER, WEAKER = 0.15, 0.3
 """share of the wanted grip force by which it may be more or less without a finger's moving"""
 AHEAD, SEEN_AFTER = 0.04, 0.1

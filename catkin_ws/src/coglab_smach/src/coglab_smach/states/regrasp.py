@@ -16,10 +16,8 @@ from coglab_smach.states.motion import shift, shift_time
 
 FARTHEST, LEAST = 0.05, 0.005
 """m, most that the palm goes; and a shorter way is not begun"""
-SPEED = 0.06
-"""m/s"""
-PUSHES = 6.5
-"""N on the palm from which something is in its way"""
+SPEED = 0.06  # m/s
+PUSHES = 6.5  # N on the palm from which something is in its way
 
 
 class Regrasp(CoglabState):

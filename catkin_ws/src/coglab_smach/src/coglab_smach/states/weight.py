@@ -17,26 +17,21 @@ from coglab_smach.states.motion import await_rest, rise
 from coglab_smach.states.yield_to_pull import LEAST_WAY, YieldToPull
 
 GRAVITY = 9.81
-MOST_RISES = 8
-"""the first one, and those that go on where the weight or somebody's pull has ended one"""
+MOST_RISES = 8  # the first one, and those that go on where the weight or somebody's pull has ended one
 
-FOLLOWS = 0.25
-"""s from one closing of the fingers to the next at least"""
+FOLLOWS = 0.25  # s from one closing of the fingers to the next at least
 UNSEEN = 0.4
 """s from the going of the person's hand on after which an object that nobody sees has stayed in the fingers"""
-WITH_HAND = 0.2
-"""m between the person's hand and an object that they have taken along, at most"""
+WITH_HAND = 0.2  # m between the person's hand and an object that they have taken along, at most
 FALLS, RECENT = 0.4, 0.15
 """s after which what falls is far below where it was lost, and for which it is looked for then; and how old (s) a
 sight may be that tells so"""
 SINKING, SETTLES = 3.0, 0.3
 """s in which the arm has sunk with what the person may hold, or is back; and before and after, for torques at rest"""
-TELLS = 1.0
-"""s in which the contact detector tells the share of the weight, once it is armed"""
+TELLS = 1.0  # s in which the contact detector tells the share of the weight, once it is armed
 LIFTS = 0.8
 """N that a soft hand (35 N/m) lifts more by, where what it holds sinks by 3 cm, less what another posture explains"""
-IN_MOTION = 1.6
-"""N by which the weight that a slow arm tells differs from what it tells at rest, at most"""
+IN_MOTION = 1.6  # N by which the weight that a slow arm tells differs from what it tells at rest, at most
 
 
 def person_holds(state: CoglabState, settings: dict[str, Any]) -> bool | None:
@@ -145,22 +140,16 @@ class TakeWeight(CoglabState):
             io_keys=["grip"],
         )
         self._way: YieldToPull
-        self._top: float | None = None
-        """m, height to which the palm rises"""
+        self._top: float | None = None  # m, height to which the palm rises
         self._rises = 0
         self._told = self._seen_away = False
         self._hand: HandTrack
         self._held: HeldObject
-        self._farther: float | None = None
-        """m from the palm from which on the person's hand has left the object"""
-        self._gone: float | None = None
-        """s, since when it has"""
-        self._on: float | None = None
-        """s, when it rises on with the weight; None: the weight has not come"""
-        self._closing: Pending | None = None
-        """of the fingers, once more"""
-        self._closes = 0.0
-        """s, from when they may do so again"""
+        self._farther: float | None = None  # m from the palm from which on the person's hand has left the object
+        self._gone: float | None = None  # s, since when it has
+        self._on: float | None = None  # s, when it rises on with the weight; None: the weight has not come
+        self._closing: Pending | None = None  # of the fingers, once more
+        self._closes = 0.0  # s, from when they may do so again
 
     def run(self, ud: Any) -> str:
         limit, contact = self.ctx.config.number("hand.load_timeout"), self.ctx.contact
