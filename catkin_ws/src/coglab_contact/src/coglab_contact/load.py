@@ -31,9 +31,8 @@ APART = 2.0  # deviations of the torques' load by which touch may differ from it
 GRAVITY = 9.81
 SETTLING = 0.10  # s after arming over which the weight is averaged
 CONFIRMED = 0.05  # s for which the load has to be gone
-SAME, FAR = 0.5, 0.2
-"""N by which the weight that is told in one posture may seem to differ from that in another, and by how much (rad) a
-joint has turned there, at most, where it may: the model is that good"""
+SAME = 0.5  # N by which the weight may seem to differ between two postures: the error of the model
+FAR = 0.2  # rad that a joint has turned between two such postures
 PART = 1.0 / 3.0
 """of the weight that may seem to have gone or come by that, at most: who takes more has begun to take it"""
 

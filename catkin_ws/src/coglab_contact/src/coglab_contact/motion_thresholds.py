@@ -39,8 +39,8 @@ FEATURES = (
 the moment ago that the residual is compared with, a^2 (rad/s^2, fastest changing joint), and, joint by joint, the
 square of the change (Nm) in what the payload told needs to be carried and accelerated"""
 FLOOR = 1e-4  # Nm^2, smallest variance believed: a noise-free simulation must not alarm on rounding
-RECENT, OLD = 0.10, 0.60
-"""s: the change is counted from the mean between so long ago and so long ago"""
+RECENT = 0.10  # s; the change is counted from the mean of the samples between RECENT
+OLD = 0.60  # s and OLD ago
 LATELY = 0.25  # s: an offset is of the mean between RECENT and so long ago
 MEMORY = 0.025  # s over which speeds and the torque of the load are averaged, about the time constant of the residual
 LEAST = 20  # samples of that mean

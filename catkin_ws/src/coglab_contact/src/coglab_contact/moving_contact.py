@@ -17,11 +17,11 @@ from coglab_contact.motion_thresholds import CONFIRM, Change, ChangeOfResidual, 
 
 HOLD = 0.03  # s for which one sample counts
 STILL = 0.02  # rad/s; a joint faster than this is motion
-SLOW, GENTLE = 0.15, 1.0
-"""rad/s and rad/s^2 of the fastest joint"""
+SLOW = 0.15  # rad/s of the fastest joint
+GENTLE = 1.0  # rad/s^2
 SETTLED = 0.25  # s of stillness before the residual is taken as that of a free arm
-LEAD, GROWTH = 0.03, 0.02
-"""s by which a force is told ahead, about the observer's own delay, and s over which it is seen to grow"""
+LEAD = 0.03  # s by which a force is extrapolated: about the observer's own delay
+GROWTH = 0.02  # s over which its growth is measured
 
 
 SHORTEST = 40  # samples of a motion that counts

@@ -21,8 +21,8 @@ from coglab_smach.ports.interfaces import OLDEST_BELIEF, OLDEST_RECOGNITION, Ahe
 from coglab_smach.ports.pending import Pending, Permit, PortError, Threaded
 from coglab_smach.ros.calls import SERVICE_WAIT, Newest, call, call_now, mapped
 
-OLDEST_SIGNAL, OLDEST_FORCE = 0.3, 0.1
-"""s"""
+OLDEST_SIGNAL = 0.3  # s
+OLDEST_FORCE = 0.1  # s
 DEFAULT_SHARE = 0.5  # of the load, where a request leaves it to the detector
 
 

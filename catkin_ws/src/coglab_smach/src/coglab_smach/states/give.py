@@ -25,13 +25,12 @@ from coglab_smach.states.weight import person_holds
 
 GRAVITY = 9.81
 ASTRAY = 0.02  # m that the object is from where it is offered, from which on it is brought there
-BEYOND = 0.06
-"""the same before ``give.lower_after``: a person who is nearer comes to it, and would meet an arm that comes, too"""
-PRESSES, LASTS, SINKS = 2.0, 0.3, 3
-"""N, or the weight if that is more, by which a hand that has the object presses it down; s after which the arm sinks
-with it, and times at most that it does"""
-BRINGS, LOOKS = 3, 0.3
-"""times at most that it is; s between two looks, between which a hand that waits moves by less than ASTRAY"""
+BEYOND = 0.06  # m, the same before ``give.lower_after``: a hand that is nearer comes to the object by itself
+PRESSES = 2.0  # N, or the weight if that is more: a hand that has the object presses it down
+LASTS = 0.3  # s of pressing after which the arm sinks with the hand
+SINKS = 3  # times at most that the arm sinks
+BRINGS = 3  # times at most that the object is brought to the hand
+LOOKS = 0.3  # s between two looks, between which a hand that waits moves by less than ASTRAY
 
 
 class WaitTaker(WaitForPerson):
@@ -112,13 +111,11 @@ class GiveLoad(CoglabState):
     feels its grip, the force of it falls as the load does, down to ``give.grip_safety`` times what friction needs for
     what the hand still carries, by ``give.ease`` counts at most; else it is ``give.loosen`` counts. When the load comes
     back to the arm, or the object sinks in the hand by ``give.slip`` m, the grip closes again; what has sunk so once is
-    held closed to the end. Where the person's hand
-    waits there, but not at the object, the arm brings it to where that hand takes it, ``give.bring_after`` s after its
-    own arrival and later; a reach toward where a hand would be may have ended before that hesitated. Where nothing has
-    happened for ``give.lower_after`` s the arm sinks by ``give.lower`` m, so that the weight comes to lie in the hand;
-    at once where the hand that has the object presses it down, since it is held too high for them.
-    After the time limit the grip closes and keeps the object. It closes with the lowest force (``give.close_speed``):
-    the person's fingers are there; firmly at home only.
+    held closed to the end. If the person's hand waits near, but not at the object, the arm brings the object to it,
+    from ``give.bring_after`` s after its arrival on: a predicted place may be wrong for a hand that hesitates. If
+    nothing has happened for ``give.lower_after`` s the arm sinks by ``give.lower`` m, so that the weight comes to lie
+    in the hand; at once if the hand that has the object presses it down. After the time limit the grip closes, with the
+    lowest force (``give.close_speed``) since the person's fingers are there, and firmly at home only.
     """
 
     default_time_limit = 20.0

@@ -18,9 +18,9 @@ from coglab_smach.states.yield_to_pull import YieldToPull
 
 LOOSE = 40  # counts of 254 that the fingers have opened when the palm begins to draw back
 AT_END = 250  # counts of 254 from which a finger has closed past the object
-FREE, FREE_FOR, GOES = 0.10, 0.2, 1.0
-"""m that the person's hand is farther than it was, and s for which it is, when none of its fingers is at the object; s
-in which it has to go so far"""
+FREE = 0.10  # m that the person's hand is farther away than it was when none of its fingers is at the object
+FREE_FOR = 0.2  # s for which it has to be
+GOES = 1.0  # s in which it has to go so far
 DRAWING_BACK = 2.0  # s that drawing back may take beyond what limits and speed scale ask for
 
 

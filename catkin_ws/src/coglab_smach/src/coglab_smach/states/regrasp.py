@@ -14,8 +14,8 @@ from coglab_smach.states.base import CoglabState, TimeLimit
 from coglab_smach.states.hand_tracking import way_to_grasp
 from coglab_smach.states.motion import shift, shift_time
 
-FARTHEST, LEAST = 0.05, 0.005
-"""m, most that the palm goes; and a shorter way is not begun"""
+FARTHEST = 0.05  # m that the palm goes at most
+LEAST = 0.005  # m, a shorter way is not begun
 SPEED = 0.06  # m/s
 PUSHES = 6.5  # N on the palm from which something is in its way
 

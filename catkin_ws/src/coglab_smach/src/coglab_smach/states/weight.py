@@ -20,17 +20,14 @@ GRAVITY = 9.81
 MOST_RISES = 8  # the first one, and those that go on where the weight or somebody's pull has ended one
 
 FOLLOWS = 0.25  # s from one closing of the fingers to the next at least
-UNSEEN = 0.4
-"""s from the going of the person's hand on after which an object that nobody sees has stayed in the fingers"""
+UNSEEN = 0.4  # s after the person's hand has gone, when an object that nobody sees has stayed in the fingers
 WITH_HAND = 0.2  # m between the person's hand and an object that they have taken along, at most
-FALLS, RECENT = 0.4, 0.15
-"""s after which what falls is far below where it was lost, and for which it is looked for then; and how old (s) a
-sight may be that tells so"""
-SINKING, SETTLES = 3.0, 0.3
-"""s in which the arm has sunk with what the person may hold, or is back; and before and after, for torques at rest"""
+FALLS = 0.4  # s after which a falling object is far below where it was lost, and for which it is looked for then
+RECENT = 0.15  # s, oldest sight that counts there
+SINKING = 3.0  # s in which the arm has sunk with the object, or is back
+SETTLES = 0.3  # s before and after, for torques at rest
 TELLS = 1.0  # s in which the contact detector tells the share of the weight, once it is armed
-LIFTS = 0.8
-"""N that a soft hand (35 N/m) lifts more by, where what it holds sinks by 3 cm, less what another posture explains"""
+LIFTS = 0.8  # N, least load change that counts as "the person holds it": a soft hand (35 N/m) moved by 3 cm gives 1 N
 IN_MOTION = 1.6  # N by which the weight that a slow arm tells differs from what it tells at rest, at most
 
 
