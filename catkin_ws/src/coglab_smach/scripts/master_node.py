@@ -33,8 +33,7 @@ from coglab_smach.context.context import Context
 from coglab_smach.context.holding import HoldingMemory
 from coglab_smach.context.journal import NOTHING_FAILED, ActionRecord, Journal, TransitionRecord
 from coglab_smach.context.master_state import MasterState, StateWatch
-from coglab_smach.context.requests import command
-from coglab_smach.context.trigger import ask_for
+from coglab_smach.context.requests import ask_for, command
 from coglab_smach.kinematics.board_room import BoardRoom
 from coglab_smach.kinematics.reachability import solve
 from coglab_smach.machines import build_master

@@ -10,10 +10,16 @@ from coglab_py.packages import package_path
 from coglab_py.pose import Pose, about_z
 from coglab_smach.kinematics import board_room, reachability
 from coglab_smach.kinematics.board_room import BoardRoom
-from coglab_smach.kinematics.goals import approach_of, delivery_goal, grasp_goal, palm_at_grasp, place_goal
-from coglab_smach.kinematics.grasp_choice import cost, ranked
-from coglab_smach.kinematics.manager_limits import read_limits
-from coglab_smach.kinematics.motion_time import MotionLimits, hand_path, ptp_time, reach_time
+from coglab_smach.kinematics.goals import (
+    approach_of,
+    cost,
+    delivery_goal,
+    grasp_goal,
+    palm_at_grasp,
+    place_goal,
+    ranked,
+)
+from coglab_smach.kinematics.motion_time import MotionLimits, hand_path, ptp_time, reach_time, read_limits
 from coglab_smach.kinematics.reachability import default_arm, home_posture, solve
 
 GRASP = {

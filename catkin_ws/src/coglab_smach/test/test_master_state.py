@@ -8,8 +8,7 @@ import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_smach.context.journal import Journal, Wait
 from coglab_smach.context.master_state import StateWatch
-from coglab_smach.context.requests import Answer
-from coglab_smach.context.trigger import ask_for
+from coglab_smach.context.requests import Answer, ask_for
 from coglab_smach.ports.pending import PortError
 from conftest import Trial
 

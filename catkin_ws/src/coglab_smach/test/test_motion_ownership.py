@@ -4,8 +4,7 @@ begins, and recovery goes nowhere with an object that a person may hold."""
 import coglab_trials.scripted.arm_model as model
 import pytest
 from coglab_msgs.msg import ReasonCode
-from coglab_smach.kinematics.manager_limits import read_limits
-from coglab_smach.kinematics.motion_time import ptp_time
+from coglab_smach.kinematics.motion_time import ptp_time, read_limits
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states import weight
 from conftest import Trial

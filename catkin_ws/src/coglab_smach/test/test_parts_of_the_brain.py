@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_smach.context.holding import HoldingMemory
-from coglab_smach.context.requests import Requests, command
-from coglab_smach.context.trigger import ask_for
+from coglab_smach.context.requests import Requests, ask_for, command
 from coglab_smach.ports.interfaces import Verdict
 from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states.arm import ConfigureLwr, PtpMotion

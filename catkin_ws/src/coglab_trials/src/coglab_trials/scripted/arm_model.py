@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 from coglab_msgs.msg import ReasonCode
 from coglab_smach.clocks.clock import Clock
-from coglab_smach.kinematics.manager_limits import read_limits
-from coglab_smach.kinematics.motion_time import MotionLimits, ptp_time
+from coglab_smach.kinematics.motion_time import MotionLimits, ptp_time, read_limits
 from coglab_smach.ports.interfaces import DmpProgress, DmpRequest
 from coglab_smach.ports.pending import PortError
 
