@@ -75,7 +75,7 @@ def test_a_grasp_that_older_hands_know_firm_alone_is_not_for_a_persons_hand(monk
     state, seen = knowledge.SetGraspGoal(Trial().ctx), Pose(np.array([0.6, 0.0, 0.4])).to_dict()
     assert {goal["grasp_name"] for goal in state._goals(entry, seen, Trial().grip)} == set(entry["grasps"]) - {"handle"}
     only = {**entry, "grasps": {"handle": entry["grasps"]["handle"]}}
-    assert [goal["grasp_name"] for goal in state._goals(only, seen)] == ["handle"]
+    assert [goal["grasp_name"] for goal in state._goals(only, seen, Trial().grip)] == ["handle"]
 
 
 @pytest.mark.parametrize(
