@@ -202,7 +202,7 @@ def main(where, *files):
     if files:
         print(smach.__file__)
         return pytest.main(["-q", "-p", "no:cacheprovider", *files])
-    from virtual_trial import VirtualTrial
+    from coglab_trials.trial import VirtualTrial
 
     trial, seen = VirtualTrial(seed=0, profile="accustomed", perfect=True), []
     watch_user_data(trial.master, seen)

@@ -6,17 +6,24 @@ import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode, Say
 from coglab_py.pose import Pose, about_z
-from coglab_smach.clocks.virtual_clock import using
-from coglab_smach.context.hand_track import HandTrack
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.interfaces import HandState, Located
 from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states import hand as hands
-from coglab_smach.states import seat, where, yielding
+from coglab_smach.states import hand_tracking, regrasp, yield_to_pull
+from coglab_smach.states.grip import Grip
 from coglab_smach.states.hand import CalibrateHand, HandClose, HandTighten, LetGo
-from coglab_smach.states.held import HeldObject
-from coglab_smach.states.where import off_grasp, palm_at, palm_axis, seen_at, way_to_grasp, way_to_hand
-from coglab_smach.states.yielding import GivesWay
+from coglab_smach.states.hand_tracking import (
+    off_grasp,
+    palm_at,
+    palm_axis,
+    seen_at,
+    way_to_grasp,
+    way_to_hand,
+)
+from coglab_smach.states.held_object import HeldObject
+from coglab_smach.states.yield_to_pull import YieldToPull
+from coglab_trials.virtual_clock import using
 from conftest import Trial
 
 HERE = (0.0, 0.5, 0.0, 1.0, 0.0, 0.5, 0.0)
@@ -46,7 +53,7 @@ class Seen:
         state._deadline = 1e9
         with using(self.trial.clock):
             begin = self.trial.clock.now()
-            outcome = state.run(SimpleNamespace(**ud))
+            outcome = state.run(SimpleNamespace(grip=self.trial.grip, **ud))
             return outcome, self.trial.clock.now() - begin
 
 
@@ -60,7 +67,7 @@ def test_a_sight_tells_for_half_a_second(age, known):
     release = {"pose": {"xyz": [0.0, 0.1, 0.0]}}
     with using(seen.trial.clock):
         assert (seen_at(seen.state, "mug") is not None) == known
-        away = where.hand_from_palm(seen.state)
+        away = hand_tracking.hand_from_palm(seen.state)
         assert away == (pytest.approx(0.3) if known else None)
         way = way_to_grasp(seen.state, goal)
         assert (way is not None) == known and (off_grasp(seen.state, goal) is not None) == known
@@ -72,7 +79,7 @@ def test_a_sight_tells_for_half_a_second(age, known):
         assert (way_to_hand(seen.state, "mug", release) is not None) == known
         assert off_grasp(seen.state, {}) is None
         seen.ctx.arm.joint_positions = lambda: None
-        assert where.hand_from_palm(seen.state) is None and way_to_grasp(seen.state, goal) is None
+        assert hand_tracking.hand_from_palm(seen.state) is None and way_to_grasp(seen.state, goal) is None
         assert palm_at(seen.ctx) is None and palm_axis(seen.ctx) is None
 
 
@@ -110,6 +117,7 @@ class Carried:
         see = lambda *_: Ready(  # noqa: E731
             Located("", "world", (position[0], position[1], position[2] - self.down), IDENTITY, self.age)
         )
+        self.grip = Grip(shared=True)
         self.ctx = SimpleNamespace(
             arm=SimpleNamespace(joint_positions=lambda: HERE),
             hand=SimpleNamespace(state=lambda: self.state),
@@ -118,7 +126,7 @@ class Carried:
             holding="mug",
             shared=True,
         )
-        self.held = HeldObject(self.ctx, "mug")
+        self.held = HeldObject(self.ctx, "mug", self.grip)
 
     def gone_after(self, down, looks=60):
         """s after which it is lost, seen so far away every 10 ms; None: it is not."""
@@ -168,7 +176,7 @@ def test_fingers_at_their_ends_hold_nothing(positions, lost):
         assert error.value.causes == ("the fingers have closed past it",)
     else:
         carried.held.check()
-    assert carried.ctx.holding == ("" if lost else "mug") and carried.ctx.shared is not lost
+    assert carried.ctx.holding == ("" if lost else "mug") and carried.grip.shared is not lost
 
 
 def test_a_hand_says_itself_why_it_holds_nothing():
@@ -199,7 +207,7 @@ def test_an_object_stays_that_a_later_sight_shows_as_far_from_the_palm_as_at_fir
 
 
 class Pulled:
-    """A GivesWay at the palm of a still arm; ``way``: what was asked of the arm (m, base frame; m/s)."""
+    """A YieldToPull at the palm of a still arm; ``way``: what was asked of the arm (m, base frame; m/s)."""
 
     def __init__(self):
         self.trial, self.palm, self.force = Trial(), np.zeros(3), np.zeros(3)
@@ -207,14 +215,14 @@ class Pulled:
         self.moved, self.cancelled, self.done = [], [], False
         ctx.contact.force = lambda: tuple(self.force)
         ctx.arm.cancel_motion = lambda why: self.cancelled.append(why) or Ready()
-        self.way = GivesWay(ctx)
+        self.way = YieldToPull(ctx)
 
     def follow(self, monkeypatch, *newton, seconds=0.0, step=0.01):
         self.force = np.array(newton)
         motion = Polled(lambda: self.done, lambda: None)
-        monkeypatch.setattr(yielding, "palm_at", lambda ctx: self.palm)
-        monkeypatch.setattr(yielding, "palm_axis", lambda ctx: np.array([0.0, 0.0, 1.0]))
-        monkeypatch.setattr(yielding, "shift", lambda ctx, way, speed: self.moved.append((way, speed)) or motion)
+        monkeypatch.setattr(yield_to_pull, "palm_at", lambda ctx: self.palm)
+        monkeypatch.setattr(yield_to_pull, "palm_axis", lambda ctx: np.array([0.0, 0.0, 1.0]))
+        monkeypatch.setattr(yield_to_pull, "shift", lambda ctx, way, speed: self.moved.append((way, speed)) or motion)
         with using(self.trial.clock) as clock:
             for _ in range(round(seconds / step) + 1):
                 self.way.follow()
@@ -270,13 +278,12 @@ def tightened(monkeypatch, away, at_home=False, before=0.1, sure=True, **ud):
     seen, closed, clock = (it := Seen()), [], it.trial.clock
     monkeypatch.setattr(hands, "hand_from_palm", lambda state: away(clock.now()))
     monkeypatch.setattr(hands, "from_palm", lambda state, track, *_: away(clock.now()))
-    seen.ctx.holding, seen.ctx.firm = "mug", 140
-    track = seen.ctx.hand_track = HandTrack()
-    track.is_sure = sure
+    seen.ctx.holding, seen.trial.grip.firm = "mug", 140
+    seen.trial.grip.hand.is_sure = sure
     seen.ctx.hand.close = lambda speed: closed.append(speed) or Polled(lambda: False, lambda: None)
     fields = {} if at_home else {"hand_distance": before, "hand_seen_away": True, **ud}
     outcome, seconds = seen.run(HandTighten(seen.ctx, at_home), **fields)
-    assert outcome == "succeeded" and (seen.ctx.firm == 0) == bool(closed)
+    assert outcome == "succeeded" and (seen.trial.grip.firm == 0) == bool(closed)
     return closed, seconds
 
 
@@ -336,7 +343,7 @@ def test_a_hand_is_given_three_tenths_of_a_second_to_say_that_it_holds(monkeypat
     ud = {"object_id": "mug", "grasp": {"hand": {"mode": "cylindrical", "firm": 140}}}
     seen.ctx.journal.begin_action("x", "mug")
     assert seen.run(HandClose(seen.ctx, True), **ud)[0] == outcome
-    assert (seen.ctx.holding, seen.ctx.shared) == (("mug", True) if outcome == "succeeded" else ("", False))
+    assert (seen.ctx.holding, seen.trial.grip.shared) == (("mug", True) if outcome == "succeeded" else ("", False))
 
 
 def test_a_hand_that_misses_again_says_where_its_motors_are(monkeypatch):
@@ -345,7 +352,7 @@ def test_a_hand_that_misses_again_says_where_its_motors_are(monkeypatch):
     seen.ctx.hand.state = lambda: HandState(True, True, False, False, "slipped", (0, 254, 254, 254, 254))
     ud = {"object_id": "mug", "grasp": {"hand": {"mode": "cylindrical"}}}
     seen.ctx.journal.begin_action("x", "mug")
-    assert seen.run(HandClose(seen.ctx, True), **ud)[0] == "missed" and not seen.ctx.preshaped
+    assert seen.run(HandClose(seen.ctx, True), **ud)[0] == "missed" and not seen.trial.grip.preshaped
     for from_person in (True, False):
         with pytest.raises(PortError) as error:
             seen.run(HandClose(seen.ctx, from_person), **ud)
@@ -362,13 +369,13 @@ def test_the_palm_draws_back_once_a_finger_has_opened_by_40_counts(monkeypatch, 
     seen.ctx.hand.state = lambda: HandState(True, positions=now() if clock.now() > 0.1 else closed)
     seen.ctx.hand.preshape = lambda mode, level: Polled(lambda: clock.now() > 0.8, lambda: None)
     seen.ctx.say = lambda code, text: said.append((code, clock.now()))
-    seen.ctx.holding, seen.ctx.shared = "mug", True
+    seen.ctx.holding, seen.trial.grip.shared = "mug", True
     seen.run(LetGo(seen.ctx), grasp={"hand": {"mode": "cylindrical", "level": "low"}})
     ((when, way, speed),) = moved
     assert when == pytest.approx(0.11 if draws else 0.81, abs=0.011)
     assert way == pytest.approx(-0.06 * PALM.axis(0)) and speed == 0.25
     assert [code for code, _ in said] == [Say.YOU_HAVE_IT] and said[0][1] == pytest.approx(0.81, abs=0.011)
-    assert (seen.ctx.holding, seen.ctx.shared) == ("", False)
+    assert (seen.ctx.holding, seen.trial.grip.shared) == ("", False)
 
 
 # --- to the grasp -----------------------------------------------------------------------------------------------------
@@ -377,9 +384,9 @@ def test_the_palm_draws_back_once_a_finger_has_opened_by_40_counts(monkeypatch, 
 @pytest.mark.parametrize(("off", "goes"), [(0.0049, None), (0.0051, 0.0051), (0.05, 0.05), (0.09, 0.05)])
 def test_a_palm_beside_its_grasp_goes_there_by_5_cm_at_most(monkeypatch, off, goes):
     seen, asked = Seen(), []
-    monkeypatch.setattr(seat, "way_to_grasp", lambda *_: np.array([0.0, 0.0, -off]))
-    monkeypatch.setattr(seat, "shift", lambda ctx, way, speed: asked.append((way, speed)) or Ready())
-    assert seen.run(seat.Seat(seen.ctx), goal={})[0] == "succeeded"
+    monkeypatch.setattr(regrasp, "way_to_grasp", lambda *_: np.array([0.0, 0.0, -off]))
+    monkeypatch.setattr(regrasp, "shift", lambda ctx, way, speed: asked.append((way, speed)) or Ready())
+    assert seen.run(regrasp.Regrasp(seen.ctx), goal={})[0] == "succeeded"
     assert [(-way[2], speed) for way, speed in asked] == ([] if goes is None else [(pytest.approx(goes), 0.06)])
 
 
@@ -390,9 +397,9 @@ IN_THE_WAY, LATE = "something is in the way", "the way to the grasp within 1.7 s
 def test_the_way_to_the_grasp_ends_where_6_5_newton_push_or_in_time(monkeypatch, newton, arrives, why):
     seen, cancelled = Seen(), []
     clock = seen.trial.clock
-    monkeypatch.setattr(seat, "way_to_grasp", lambda *_: np.array([0.0, 0.0, -0.03]))
-    monkeypatch.setattr(seat, "shift", lambda ctx, way, speed: Polled(lambda: clock.now() > arrives, lambda: None))
+    monkeypatch.setattr(regrasp, "way_to_grasp", lambda *_: np.array([0.0, 0.0, -0.03]))
+    monkeypatch.setattr(regrasp, "shift", lambda ctx, way, speed: Polled(lambda: clock.now() > arrives, lambda: None))
     seen.ctx.contact.force = lambda: (0.0, 0.0, newton)
     seen.ctx.arm.cancel_motion = lambda reason: cancelled.append(reason) or Ready()
-    assert seen.run(seat.Seat(seen.ctx), goal={})[0] == "succeeded"
+    assert seen.run(regrasp.Regrasp(seen.ctx), goal={})[0] == "succeeded"
     assert [reason[: len(why)] for reason in cancelled] == [why] * bool(why)

@@ -9,15 +9,15 @@ from coglab_msgs.msg import ReasonCode
 from coglab_objects.database import objects_folder, parse_object
 from coglab_py.packages import package_path
 from coglab_py.pose import Pose
-from coglab_sim.conditions import Conditions
 from coglab_sim.tracker.tracker import PerceptionSettings
-from coglab_sim.virtual_world import BOARD
 from coglab_smach.context.config import Config
 from coglab_smach.kinematics.board_room import BoardRoom
 from coglab_smach.kinematics.goals import place_goal
 from coglab_smach.ports.pending import Polled
+from coglab_trials.conditions import Conditions
+from coglab_trials.trial import VirtualTrial
+from coglab_trials.world import BOARD
 from conftest import SHARE, Trial
-from virtual_trial import VirtualTrial
 
 CONFIG = Config.load(str(SHARE / "config" / "machines.yaml"), {})
 URDF = package_path("lwr_description", "urdf", "lwr_ih2.urdf").read_text(encoding="utf-8")
@@ -30,7 +30,7 @@ LOW = 0.008
 
 @pytest.fixture(scope="module")
 def room():
-    return BoardRoom(URDF, CONFIG.get("postures.board", []))
+    return BoardRoom(URDF, CONFIG.get("postures.board"))
 
 
 def palm_for(object_id, tilt=(0.0, 0.0), low=0.0):

@@ -11,12 +11,12 @@ from coglab_py.pose import Pose
 from coglab_smach.kinematics.reachability import default_arm, joint_limits
 from coglab_smach.ports.interfaces import Ahead, DmpRequest, Recognition, Verdict
 from coglab_smach.ports.pending import PortError
-from coglab_smach.simulated import arm_requests
-from coglab_smach.simulated.arm import SimulatedArm
-from coglab_smach.simulated.arm_model import REACH
-from coglab_smach.simulated.cell import HAND_AT_WORK, SimulatedCell
-from coglab_smach.simulated.contact import SimulatedContact
-from coglab_smach.simulated.ports import SimulatedDatabase, SimulatedHand, SimulatedPerception
+from coglab_trials.scripted import arm_requests
+from coglab_trials.scripted.arm import SimulatedArm
+from coglab_trials.scripted.arm_model import REACH
+from coglab_trials.scripted.cell import HAND_AT_WORK, SimulatedCell
+from coglab_trials.scripted.contact import SimulatedContact
+from coglab_trials.scripted.ports import SimulatedDatabase, SimulatedHand, SimulatedPerception
 from conftest import LIBRARY
 
 DMP = DmpRequest("reach_human", "object_mug", (0.0, -0.04, 0.07))

@@ -226,7 +226,7 @@ def test_fingers_that_have_begun_to_close_open_before_a_reach_that_paused_goes_o
     monkeypatch.setattr(
         reach.ReachWatch,
         "doubted",
-        lambda watch: not waits and trial.ctx.closing is not None and not waits.append(1) or doubted(watch),
+        lambda watch: not waits and trial.grip.closing is not None and not waits.append(1) or doubted(watch),
     )
 
     def script(t):

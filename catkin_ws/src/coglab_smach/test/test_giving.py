@@ -5,21 +5,22 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from coglab_contact.load import SAME, LeavingLoad
 from coglab_msgs.msg import ReasonCode, Say
 from coglab_py.pose import Pose
-from coglab_sim.conditions import Conditions
-from coglab_smach.contact.leaving_load import SAME, LeavingLoad
 from coglab_smach.context.config import Config
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.interfaces import HandState, Located
 from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states import give
-from coglab_smach.states.held import FARTHER, LOST_TIME, NEAR, HeldObject
+from coglab_smach.states.grip import Grip
+from coglab_smach.states.held_object import FARTHER, LOST_TIME, NEAR, HeldObject
+from coglab_trials.conditions import Conditions
+from coglab_trials.trial import VirtualTrial
 from conftest import SHARE, Trial
 from ih2_hand.emulator.hand import GRASP_CURRENT
 from ih2_hand.emulator.motor import STALL_CURRENT
 from ih2_hand.wire_choices import WIRE
-from virtual_trial import VirtualTrial
 
 RECEIVE, GIVE = "exchange_human_to_robot", "exchange_robot_to_human"
 WEIGHT = 0.31 * 9.81
@@ -59,10 +60,10 @@ def test_the_grip_loosens_with_a_part_of_the_load_and_closes_again_when_it_comes
             t.clock.sleep(0.8)
             loose.append(grip - finger(t))
         assert 0 < loose[0] < loose[1] <= 8, loose
-        assert t.ctx.shared, "the arm must not go away with what the person holds too"
+        assert t.grip.shared, "the arm must not go away with what the person holds too"
         t.cell.push(0.0)
         t.clock.sleep(1.5)
-        assert finger(t) == grip and t.cell.called("close") and not t.ctx.shared
+        assert finger(t) == grip and t.cell.called("close") and not t.grip.shared
         t.wait_hub("wait_with_object")
 
     trial = giving(script)
@@ -114,7 +115,7 @@ def test_a_person_who_is_told_that_it_is_over_lets_go_and_goes():
     trial = giving(script)
     result = trial.result()
     assert (result.outcome, result.code) == ("failed_holding", ReasonCode.NOT_RELEASED)
-    assert trial.ctx.holding == "mug" and not trial.ctx.shared
+    assert trial.ctx.holding == "mug" and not trial.grip.shared
     gently, firmly = (trial.ctx.config.get(name) for name in ("give.close_speed", "hand.tighten.medium"))
     assert set(asked[:-1]) == {gently} and asked[-1] == firmly
 
@@ -301,9 +302,9 @@ class Carried:
             perception=SimpleNamespace(locate_object=see),
             clock=SimpleNamespace(now=lambda: self.t),
             holding="mug",
-            shared=True,
         )
-        self.held = HeldObject(self.ctx, "mug")
+        self.grip = Grip(shared=True)
+        self.held = HeldObject(self.ctx, "mug", self.grip)
 
     def look(self, duration=0.1):
         for _ in range(round(30 * duration)):
@@ -330,7 +331,7 @@ def test_an_object_that_is_seen_elsewhere_for_long_enough_is_lost():
     carried.up -= FARTHER
     with pytest.raises(PortError, match="has left the hand") as lost:
         carried.look(2 * LOST_TIME)
-    assert lost.value.code == ReasonCode.OBJECT_NOT_SEEN and carried.ctx.holding == "" and not carried.ctx.shared
+    assert lost.value.code == ReasonCode.OBJECT_NOT_SEEN and carried.ctx.holding == "" and not carried.grip.shared
 
 
 def test_an_object_that_was_lost_before_anybody_asked_is_lost():

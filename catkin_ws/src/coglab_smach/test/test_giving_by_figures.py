@@ -5,13 +5,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from coglab_smach.clocks.virtual_clock import using
 from coglab_smach.ports.interfaces import DmpProgress, HandState
 from coglab_smach.ports.pending import Polled, Ready
 from coglab_smach.states import give
 from coglab_smach.states.give import GiveLoad, WaitTaker
 from coglab_smach.states.hand import closes_gently, firm_speed, gentle
 from coglab_smach.states.loosening_grip import LooseningGrip
+from coglab_trials.virtual_clock import using
 from conftest import Trial
 
 RECEIVE, GIVE = "exchange_human_to_robot", "exchange_robot_to_human"
@@ -137,8 +137,8 @@ class Given:
         state = self.state = GiveLoad(self.trial.ctx)
         state._deadline = 1e9
         note = lambda name: lambda *a: self.did.append((name, *a))  # noqa: E731
-        state._grip = SimpleNamespace(loosened=lambda: 1, tighten=note("tighten"), stand=note("stand"))
-        state._grip.loosen_to, state._grip.ease_to = note("loosen"), self.ease
+        state._fingers = SimpleNamespace(loosened=lambda: 1, tighten=note("tighten"), stand=note("stand"))
+        state._fingers.loosen_to, state._fingers.ease_to = note("loosen"), self.ease
         state._held = SimpleNamespace(sunk=sunk, there=lambda: True)
         state._needed, state._weight, state._firm = 0.6, 5.0, 140
         state._slips_at = 4.0
@@ -167,16 +167,16 @@ class Given:
 def test_the_grip_loosens_from_a_fifth_of_the_weight_to_the_needed_share(monkeypatch, share, did, shared):
     given = Given(monkeypatch)
     given.state._follow(share, 0.2, 0.0)
-    assert given.did == did and given.trial.ctx.shared == shared
+    assert given.did == did and given.state._grip.shared == shared
 
 
 def test_a_load_that_came_back_for_a_tenth_of_a_second_is_held_again(monkeypatch):
     given = Given(monkeypatch)
-    given.trial.ctx.shared = True
+    given.state._grip.shared = True
     for now, closed in ((0.0, False), (0.09, False), (0.11, True)):
         given.state._follow(0.05, 0.2, now)
         assert (("tighten",) in given.did) == closed
-    assert not given.trial.ctx.shared and given.trial.ctx.firm == 140
+    assert not given.state._grip.shared and given.state._grip.firm == 140
     given.did.clear()
     given.state._follow(0.15, 0.2, 0.2)
     given.state._follow(0.05, 0.2, 0.25)
@@ -186,9 +186,9 @@ def test_a_load_that_came_back_for_a_tenth_of_a_second_is_held_again(monkeypatch
 @pytest.mark.parametrize(("loosened", "closes"), [(0, False), (1, True), (None, False)])
 def test_a_grip_that_was_never_loosened_is_not_closed_again(monkeypatch, loosened, closes):
     given = Given(monkeypatch)
-    given.state._grip.loosened = lambda: loosened
+    given.state._fingers.loosened = lambda: loosened
     given.state._keep()
-    assert given.did == [("stand",), *[("tighten",)] * closes] and given.trial.ctx.firm == 140 * closes
+    assert given.did == [("stand",), *[("tighten",)] * closes] and given.state._grip.firm == 140 * closes
 
 
 @pytest.mark.parametrize(("sunk", "closes"), [(0.029, False), (0.031, True)])
@@ -338,8 +338,8 @@ def test_a_goal_leaves_that_is_7_mm_nearer_than_the_delivery_or_goes_away_again(
     state.ctx.arm.dmp_progress = lambda: DmpProgress("running", "", "p", 0.1, went.pop(0) if len(went) > 1 else went[0])
     state.ctx.contact.arm = lambda *a: Ready()
     state.ctx.contact.event = lambda: None
-    state._reached = lambda: trial.clock.now() > 1.0
-    state._await_reach = lambda near: state.wait_for(near, "the end", 9.0)
+    state.arrived = lambda: trial.clock.now() > 1.0
+    state.await_reach = lambda near: state.wait_for(near, "the end", 9.0)
     monkeypatch.setattr(give, "hand_from_palm", lambda s: hand)
     with using(trial.clock):
         why = state._await_taker({}, {"offset": (0.0, 0.06, 0.08)})

@@ -5,12 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode, Say
-from coglab_smach.clocks.virtual_clock import using
-from coglab_smach.context.hand_track import HandTrack
 from coglab_smach.ports.interfaces import Located, Verdict
 from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states import hand, weight
 from coglab_smach.states.base import TimeLimit
+from coglab_smach.states.hand_tracking import HandTrack
+from coglab_trials.virtual_clock import using
 from conftest import Trial
 from test_weight_and_recovery import RECEIVE, Lifted
 
@@ -155,10 +155,10 @@ def test_the_palm_stays_where_no_way_back_is_asked_for_or_the_arm_does_not_say_w
     if not here:
         ctx.arm.joint_positions = lambda: None
     ctx.say = lambda code, text: said.append(code)
-    ctx.holding, ctx.shared = "mug", True
+    ctx.holding, trial.grip.shared = "mug", True
     state = hand.LetGo(ctx)
     state._deadline = 1e9
     with using(trial.clock):
-        outcome = state.run(SimpleNamespace(grasp={"hand": {"mode": "cylindrical", "level": "low"}}))
+        outcome = state.run(SimpleNamespace(grip=trial.grip, grasp={"hand": {"mode": "cylindrical", "level": "low"}}))
     assert (outcome, moved, said) == ("succeeded", [], [Say.YOU_HAVE_IT])
-    assert (ctx.holding, ctx.shared) == ("", False)
+    assert (ctx.holding, trial.grip.shared) == ("", False)

@@ -12,11 +12,11 @@ from coglab_py.packages import package_path
 from coglab_py.pose import Pose
 from coglab_sim.tracker.tracker import Board, PerceptionSettings
 from coglab_sim.tracker.vision import NotSeen, Vision
-from coglab_sim.virtual_world import BOARD
 from coglab_smach.ports.interfaces import Located
 from coglab_smach.ports.pending import Polled, PortError, Ready
-from misbehaviours import GIVE, RECEIVE
-from virtual_trial import VirtualTrial
+from coglab_trials.misbehaviours import GIVE, RECEIVE
+from coglab_trials.trial import VirtualTrial
+from coglab_trials.world import BOARD
 
 NAMES = FrameNames("world", "human_hand", "board", "object_{id}")
 BESIDE, BEHIND = np.array([1.05, 0.45, 0.35]), np.array([1.75, 0.6, 0.35])

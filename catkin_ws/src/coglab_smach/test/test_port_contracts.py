@@ -6,15 +6,15 @@ import pytest
 from coglab_objects.database import ObjectDatabase, objects_folder
 from coglab_perception.belief import Belief
 from coglab_perception.recogniser import Estimate
-from coglab_sim.virtual_world import DT, World
-from coglab_smach.simulated.arm import SimulatedArm
-from coglab_smach.simulated.cell import SimulatedCell
-from coglab_smach.simulated.contact import SimulatedContact
-from coglab_smach.simulated.ports import SimulatedDatabase, SimulatedHand, SimulatedPerception
-from coglab_smach.simulated.virtual_arm import VirtualArm
-from coglab_smach.simulated.world_ports import VirtualContact, VirtualDatabase, VirtualHand, VirtualPerception
+from coglab_trials.scripted.arm import SimulatedArm
+from coglab_trials.scripted.cell import SimulatedCell
+from coglab_trials.scripted.contact import SimulatedContact
+from coglab_trials.scripted.ports import SimulatedDatabase, SimulatedHand, SimulatedPerception
+from coglab_trials.trial import LIBRARY
+from coglab_trials.virtual_arm import VirtualArm
+from coglab_trials.world import DT, World
+from coglab_trials.world_ports import VirtualContact, VirtualDatabase, VirtualHand, VirtualPerception
 from port_contracts import SUITES, Place
-from virtual_trial import LIBRARY
 
 
 class ManualClock:

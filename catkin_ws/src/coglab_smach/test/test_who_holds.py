@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from coglab_smach.clocks.virtual_clock import using
-from coglab_smach.contact.leaving_load import LeavingLoad
+from coglab_contact.load import LeavingLoad
 from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states import weight
 from coglab_smach.states.base import TimeLimit
 from coglab_smach.states.motion import _joint_way
 from coglab_smach.states.weight import person_has_it, person_holds
+from coglab_trials.virtual_clock import using
 from test_weight_and_recovery import Lifted
 
 GIVING = np.array([-0.535, -1.109, 1.799, 1.305, 0.686, -0.385, 1.182])

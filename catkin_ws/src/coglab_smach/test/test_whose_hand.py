@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_py.pose import Pose
-from coglab_smach.clocks.virtual_clock import using
-from coglab_smach.context.hand_track import HandTrack
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.pending import Polled, PortError, Ready
-from coglab_smach.states import reach, reach_watch, weight
+from coglab_smach.states import reach, weight
+from coglab_smach.states.hand_tracking import HandTrack
 from coglab_smach.states.weight import person_holds
+from coglab_trials.virtual_clock import using
 from conftest import Trial
 from test_giving import WEIGHT, giving
 from test_weight_and_recovery import Lifted
@@ -196,13 +196,13 @@ def test_fingers_that_have_caught_something_open_for_no_glimpse_of_it(monkeypatc
     trial, opened = Trial(), []
     tells_late(trial.ctx.hand, trial.clock, 0.1)
     monkeypatch.setattr(reach, "off_grasp", lambda state, goal: 0.02)
-    init = reach_watch.ReachWatch.__init__
+    init = reach.ReachWatch.__init__
 
     def believed(self, *given):
         init(self, *given)
         self._began_on_belief = True
 
-    monkeypatch.setattr(reach_watch.ReachWatch, "__init__", believed)
+    monkeypatch.setattr(reach.ReachWatch, "__init__", believed)
     trial.cell.partner.touch_after, trial.cell.partner.take_after = (1.2 if touched else None), None
     preshape = trial.ctx.hand.preshape
 
@@ -237,7 +237,7 @@ def test_another_hand_does_not_free_what_was_caught_on_the_way(monkeypatch):
         t.cell.arm.end("goal lost", ReasonCode.GOAL_LOST)
 
     result = receive(trial, lambda t: t.ctx.journal.marked("closing_on_the_way"), jumps)
-    assert result.outcome == "stopped" and trial.ctx.shared and not trial.cell.called("open")
+    assert result.outcome == "stopped" and trial.grip.shared and not trial.cell.called("open")
 
 
 def test_another_hand_does_not_send_the_arm_away_with_what_the_taker_holds():
@@ -246,7 +246,7 @@ def test_another_hand_does_not_send_the_arm_away_with_what_the_taker_holds():
         t.clock.sleep(0.5)
         t.cell.push(0.45 * WEIGHT)
         t.clock.sleep(1.0)
-        assert t.ctx.shared
+        assert t.grip.shared
         t.cell.objects["human_hand"] = Pose(palm_of(t) + [0.2, 0.62, 0.0])
         t.wait_hub("stopped")
 
