@@ -15,6 +15,7 @@ ROSLAUNCH_OPTIONS = ("--screen", "--log", "-v", "--dump-params", "--nodes", "--f
 BEHAVIOURS = "coglab_sim/src/coglab_sim/person/participant.py"
 OBJECTS = "coglab_objects/objects"
 LIMITS = "lwr_description/config/joint_limits.yaml"
+CELL = "coglab_sim/include/coglab_sim/parameter_table.inc"
 CONVENTIONS = "lwr_fri_bridge/src/fri/krl_convention.cpp"
 HELP = """usage: ./coglab launch [-p PORT] [ARGUMENT:=VALUE ...] [OPTION of roslaunch ...]
 
@@ -49,6 +50,14 @@ def _object(folder: Path, value: str) -> None:
 def _profiles(sources: Path) -> list[str]:
     names = re.findall(r"^(\w+):\s*$", (sources / LIMITS).read_text(encoding="utf-8"), re.MULTILINE)
     return names
+
+
+def _cell_range(sources: Path, parameter: str) -> tuple[float, float]:
+    """Range of a parameter of the simulated cell."""
+    found = re.search(rf'"{parameter}", (\S+), (\S+),', (sources / CELL).read_text(encoding="utf-8"))
+    if found is None:
+        raise Refused(f"{CELL} holds no {parameter}")
+    return float(found[1]), float(found[2])
 
 
 def _conventions(sources: Path) -> list[str]:
@@ -102,7 +111,7 @@ def _rules(sources: Path, objects: Path) -> dict[str, Callable[[str], object]]:
     rules: dict[str, Callable[[str], object]] = {
         "arm": lambda value: _one_of(["fri", "ideal"], value),
         "seed": seed,
-        "fri_period": lambda value: _number(0.001, 0.1, value),
+        "fri_period": lambda value: _number(*_cell_range(sources, "krc/period"), value),
         "fri_address": _address,
         "fri_port": lambda value: _whole(0, 65535, value),
         "console_port": lambda value: _whole(0, 65535, value),
