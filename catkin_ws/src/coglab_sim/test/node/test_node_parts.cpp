@@ -9,8 +9,8 @@
 #include <string>
 #include <thread>
 
-#include "../nodes/cell_faults.hpp"
-#include "../nodes/cell_messages.hpp"
+#include "cell_faults.hpp"
+#include "cell_messages.hpp"
 
 using namespace coglab_sim;
 
@@ -126,72 +126,6 @@ TEST(Messages, CommandsOfMotorsHaveTheirRanges) {
   EXPECT_EQ(refusalOf(message), "expected speed of 5 motors, got 6");
 }
 
-TEST(Messages, TheTruthIsToldFieldByField) {
-  CellTruth truth;
-  truth.object.position = Vector3d(1, 2, 3);
-  truth.human_hand.position = Vector3d(4, 5, 6);
-  truth.robot_hand.position = Vector3d(7, 8, 9);
-  truth.object_twist = {Vector3d(10, 11, 12), Vector3d(13, 14, 15)};
-  truth.palm_force = Vector3d(16, 17, 18);
-  truth.touch_force = Vector3d(19, 20, 21);
-  truth.human_force = Vector3d(22, 23, 24);
-  truth.hand_closure = 0.25;
-  truth.robot_load_share = 0.5;
-  truth.human_load_share = 0.75;
-  truth.held_by = "both";
-  truth.dropped = true;
-  const auto message = truthMessage(truth, "mug", ros::Time(3.0));
-  EXPECT_EQ(message.header.stamp, ros::Time(3.0));
-  EXPECT_EQ(message.header.frame_id, "world");
-  EXPECT_EQ(message.object_id, "mug");
-  EXPECT_EQ(vectorOf(message.object.position), truth.object.position);
-  EXPECT_EQ(vectorOf(message.human_hand.position), truth.human_hand.position);
-  EXPECT_EQ(vectorOf(message.robot_hand.position), truth.robot_hand.position);
-  EXPECT_EQ(vectorOf(message.object_velocity.linear), truth.object_twist.linear);
-  EXPECT_EQ(vectorOf(message.object_velocity.angular), truth.object_twist.angular);
-  EXPECT_EQ(vectorOf(message.palm_force), truth.palm_force);
-  EXPECT_EQ(vectorOf(message.touch_force), truth.touch_force);
-  EXPECT_EQ(vectorOf(message.human_force), truth.human_force);
-  EXPECT_EQ(message.hand_closure, 0.25);
-  EXPECT_EQ(message.robot_load_share, 0.5);
-  EXPECT_EQ(message.human_load_share, 0.75);
-  EXPECT_EQ(message.held_by, "both");
-  EXPECT_TRUE(message.dropped);
-}
-
-TEST(Messages, MotorsAndTouchInTheOrderOfTheHand) {
-  MotorStates states;
-  for (std::size_t i = 0; i < states.size(); ++i)
-    states[i] = {0.1 * static_cast<double>(i),  1.0,    20.0,
-                 30.0 + static_cast<double>(i), i == 1, i == 2};
-  const auto message = motorsMessage(states, ros::Time(4.0));
-  ASSERT_EQ(message.position.size(), 5U);
-  EXPECT_EQ(message.header.stamp, ros::Time(4.0));
-  for (std::size_t i = 0; i < 5; ++i) {
-    EXPECT_EQ(message.position[i], states[i].position);
-    EXPECT_EQ(message.current[i], states[i].current);
-    EXPECT_EQ(message.effort[i], 20.0);
-    EXPECT_EQ(message.moving[i] != 0, i == 1);
-    EXPECT_EQ(message.locked[i] != 0, i == 2);
-  }
-  plant::Touch touch;
-  for (int i = 0; i < 11; ++i) touch.phalanges.emplace_back(i, 0.0, -i);
-  touch.palm = Vector3d(1, 2, 3);
-  const auto told = touchMessage(touch, plant::builtInHandTable(), ros::Time(5.0));
-  ASSERT_EQ(told.phalanges.size(), 11U);
-  ASSERT_EQ(told.forces.size(), 11U);
-  EXPECT_EQ(told.phalanges[0], "thumb_base");
-  EXPECT_EQ(told.phalanges[10], "little_distal");
-  EXPECT_EQ(told.fingers[0], 0);
-  EXPECT_EQ(told.fingers[3], 1);
-  EXPECT_EQ(told.fingers[10], 4);
-  EXPECT_EQ(told.forces[7].x, 7.0);
-  EXPECT_EQ(told.forces[7].z, -7.0);
-  EXPECT_EQ(vectorOf(told.palm), touch.palm);
-  EXPECT_EQ(told.header.frame_id, "ih2_palm");
-  EXPECT_EQ(told.header.stamp, ros::Time(5.0));
-}
-
 TEST(Faults, AreRefusedByTheirNameAndRange) {
   Running running;
   const auto refusal = [&](const std::string& kind, double value) -> std::string {
@@ -249,33 +183,6 @@ TEST(Faults, ActAndAreUndoneAfterTheirTime) {
   EXPECT_TRUE(
       running.until([](Cell& c) { return c.period() == 0.02 && !c.controller().sends(); }, 1.0));
   EXPECT_TRUE(running.until([](Cell& c) { return c.controller().sends(); }, 2.0));
-}
-
-TEST(Faults, ABlockHoldsUntilItIsUndone) {
-  Running running;
-  RealTimeCell& cell = running.cell;
-  const auto pushedAside = [&](double seconds) {
-    double begin = -1.0, at = 0.0, from = 0.0;
-    cell.apply([&](Cell& c) {
-      begin = c.controller().time();
-      from = c.plant().position()[5];
-    });
-    EXPECT_TRUE(running.until([&](Cell& c) {
-      at = c.plant().position()[5];
-      return c.controller().time() > begin + seconds;
-    }));
-    return std::abs(at - from);
-  };
-  ASSERT_TRUE(running.until([](Cell& c) { return c.controller().power() == 0x7F; }));
-  pushedAside(1.0);
-  cell.setPush({Vector3d(0.0, 0.0, 20.0), Vector3d::Zero()});
-  const double free_way = pushedAside(1.0);
-  cell.setPush({});
-  pushedAside(2.0);
-  injectFault(cell, "block", 1.0, 3.0);
-  cell.setPush({Vector3d(0.0, 0.0, 20.0), Vector3d::Zero()});
-  EXPECT_LT(pushedAside(1.0), 0.2 * free_way);
-  EXPECT_GT(pushedAside(6.0), 0.5 * free_way);
 }
 
 TEST(RealTimeCell, LeavesRecordsMessagesAndASnapshot) {
@@ -339,20 +246,4 @@ TEST(RealTimeCell, TakesItsInputsAndSaysWhyAHandIsNotThere) {
   EXPECT_TRUE(running.until([](Cell& c) {
     return (c.plant().personHand().position - Vector3d(1.0, 0.2, 0.5)).norm() < 0.01;
   }));
-}
-
-TEST(RealTimeCell, WhatIsDueLaterComesInItsTime) {
-  Running running;
-  RealTimeCell& cell = running.cell;
-  ASSERT_TRUE(running.until([&](Cell&) { return cell.snapshot().tick > 5; }));
-  double at[3] = {-1.0, -1.0, -1.0};
-  const double begin = cell.snapshot().truth.time;
-  cell.applyLater(1.0, [&](Cell& c) { at[1] = c.controller().time(); });
-  cell.applyLater(0.5, [&](Cell& c) { at[0] = c.controller().time(); });
-  cell.applyLater(1.0, [&](Cell& c) { at[2] = at[1] < 0.0 ? -2.0 : c.controller().time(); });
-  EXPECT_TRUE(running.until([&](Cell&) { return at[2] != -1.0; }));
-  EXPECT_GE(at[0], begin + 0.5 - 1e-9);
-  EXPECT_LT(at[0], at[1]);
-  EXPECT_GE(at[1], begin + 1.0 - 1e-9);
-  EXPECT_EQ(at[2], at[1]) << "in the order in which they were asked for";
 }

@@ -3,9 +3,7 @@
 #include <array>
 #include <atomic>
 #include <chrono>
-#include <cmath>
 #include <memory>
-#include <numeric>
 #include <string>
 #include <thread>
 #include <utility>
@@ -18,71 +16,12 @@
 
 #include "coglab_sim/cell.hpp"
 #include "coglab_sim/fri_socket.hpp"
-#include "coglab_sim/random.hpp"
 #include "coglab_sim/real_time_cell.hpp"
 
 namespace fri = lwr_fri_bridge::fri;
 using namespace coglab_sim;
 
-TEST(Random, MomentsAndReproducibility) {
-  Random a(7), b(7), c(8);
-  double sum = 0.0, square = 0.0;
-  int equal = 0;
-  constexpr int kDraws = 200000;
-  for (int i = 0; i < kDraws; ++i) {
-    const double value = a.normal();
-    EXPECT_EQ(value, b.normal());
-    equal += value == c.normal() ? 1 : 0;
-    sum += value;
-    square += value * value;
-  }
-  EXPECT_EQ(equal, 0);
-  EXPECT_NEAR(sum / kDraws, 0.0, 0.01);
-  EXPECT_NEAR(square / kDraws, 1.0, 0.02);
-}
-
-TEST(Statistics, WindowLatencyAndJitter) {
-  krc::Parameters parameters;
-  krc::AnswerStatistics statistics(parameters);
-  EXPECT_EQ(statistics.quality(), fri::Quality::Unacceptable);
-  for (int i = 0; i < 100; ++i) statistics.add(true, i % 2 == 0 ? 0.001 : 0.003);
-  EXPECT_EQ(statistics.quality(), fri::Quality::Perfect);
-  EXPECT_NEAR(statistics.latency(), 0.002, 1e-12);
-  EXPECT_NEAR(statistics.jitter(), 0.002, 1e-12);
-  for (int i = 0; i < 2; ++i) statistics.add(false, 0.0);
-  EXPECT_EQ(statistics.quality(), fri::Quality::Ok);
-  EXPECT_EQ(statistics.missCounter(), 2U);
-  for (int i = 0; i < 100; ++i) statistics.add(true, 0.0);
-  EXPECT_EQ(statistics.quality(), fri::Quality::Perfect);
-  EXPECT_EQ(statistics.missCounter(), 2U);
-}
-
-/// The estimate stays aside by the hysteresis after a movement, on the side of the movement.
-TEST(TorqueSensor, TheEstimateKeepsTheSideOfTheLastMovement) {
-  TorqueNoise noise;
-  noise.sigma = noise.bias = 0.0;
-  noise.hysteresis = 0.3;
-  TorqueSensor sensor(noise, 1);
-  const Vector7 ideal = Vector7::LinSpaced(-3.0, 3.0), posture = Vector7::Zero();
-  const Vector7 at_rest = sensor.external(ideal, posture), measured = sensor.measured(ideal);
-  const auto aside = [&] { return Vector7(sensor.external(ideal, posture) - at_rest); };
-  Vector7 velocity = Vector7::Zero();
-  velocity[1] = 0.1;
-  velocity[4] = -0.1;
-  Vector7 expected = Vector7::Zero();
-  expected[1] = 0.3;
-  expected[4] = -0.3;
-  for (int direction : {1, -1}) {
-    for (int i = 0; i < 400; ++i) sensor.advance(direction * velocity, 0.001);
-    EXPECT_LT((aside() - direction * expected).cwiseAbs().maxCoeff(), 1e-3) << direction;
-    for (int i = 0; i < 400; ++i) sensor.advance(Vector7::Zero(), 0.001);
-    EXPECT_LT((aside() - direction * expected).cwiseAbs().maxCoeff(), 1e-3) << "after the stop";
-  }
-  // It reverses over hysteresis_speed: far below that the side changes slowly.
-  sensor.advance(0.01 * noise.hysteresis_speed / 0.1 * velocity, 0.001);
-  EXPECT_LT((aside() + expected).cwiseAbs().maxCoeff(), 0.02);
-  EXPECT_EQ(sensor.measured(ideal), measured);  // the joint torque itself has none
-}
+namespace {
 
 /// A UDP socket on the loopback, which the caller closes, and its port.
 std::pair<int, std::uint16_t> loopbackSocket() {
@@ -95,6 +34,8 @@ std::pair<int, std::uint16_t> loopbackSocket() {
   EXPECT_EQ(getsockname(fd, reinterpret_cast<sockaddr*>(&own), &length), 0);
   return {fd, ntohs(own.sin_port)};
 }
+
+}  // namespace
 
 TEST(FriSocket, SendsReceivesAndSaysWhatIsTooLong) {
   const auto soon = [] { return std::chrono::steady_clock::now() + std::chrono::seconds(5); };

@@ -28,18 +28,6 @@ struct Motors {
 
 }  // namespace
 
-TEST(HandMotors, BeginOpenAndOff) {
-  Motors hand;
-  hand.step(0.0, 100);
-  for (int motor = 0; motor < kMotors; ++motor) {
-    const MotorState& state = hand.motors.state(motor);
-    EXPECT_EQ(state.position, 0.0);
-    EXPECT_EQ(state.current, 0.0);
-    EXPECT_FALSE(state.moving);
-    EXPECT_FALSE(state.locked);
-  }
-}
-
 TEST(HandMotors, WindAtTheirSpeedAndDrawMoreForIt) {
   Motors hand;
   hand.motors.command(2, {0.5, 0.8, 1000.0});
@@ -127,21 +115,6 @@ TEST(HandMotors, LockWhereTheyAreNearlyStoppedAndUnlockByAnotherCommand) {
   }
 }
 
-TEST(HandMotors, AMovementInBetweenBeginsTheWaitingAnew) {
-  Motors hand;
-  hand.motors.command(2, {1.0, 1.0, 240.0});
-  for (int i = 0; i < 5; ++i) {
-    hand.step(45.0, 150);
-    hand.step(0.0, 1);
-  }
-  EXPECT_FALSE(hand.state().locked);
-  hand.step(45.0, 150);
-  hand.motors.set(2, 0.4);
-  hand.motors.command(2, {1.0, 1.0, 240.0});
-  hand.step(45.0, 150);
-  EXPECT_FALSE(hand.state().locked);
-}
-
 TEST(HandMotors, CommandsAndPlacesAreCutToWhatTheyCanBe) {
   Motors hand;
   hand.motors.command(2, {7.0, 1.7, -5.0});
@@ -163,67 +136,6 @@ TEST(HandMotors, CommandsAndPlacesAreCutToWhatTheyCanBe) {
   }
 }
 
-TEST(HandMotors, WhatIsWoundFollowsTheStroke) {
-  Motors hand;
-  const HandTable& table = builtInHandTable();
-  for (int motor = 0; motor < kMotors; ++motor) {
-    const MotorRow& row = table.motors[static_cast<std::size_t>(motor)];
-    EXPECT_EQ(hand.motors.wound(motor), row.open_length);
-    hand.motors.set(motor, 0.5);
-    EXPECT_NEAR(hand.motors.wound(motor), row.open_length + 0.5 * row.stroke, 1e-15);
-  }
-}
-
-TEST(HandTable, TheOneThatIsBuiltIn) {
-  const HandTable& hand = builtInHandTable();
-  EXPECT_EQ(hand.palm, "ih2_base_link");
-  ASSERT_EQ(hand.phalanges.size(), 11U);
-  const int motors[] = {0, 1, 1, 2, 2, 3, 3, 4, 4, 4, 4};
-  const int fingers[] = {0, 0, 0, 1, 1, 2, 2, 3, 3, 4, 4};
-  const double springs[] = {0.04, 0.04, 0.05, 0.04, 0.05, 0.04, 0.05, 0.04, 0.05, 0.04, 0.05};
-  for (std::size_t i = 0; i < 11; ++i) {
-    EXPECT_EQ(hand.phalanges[i].motor, motors[i]) << i;
-    EXPECT_EQ(static_cast<int>(hand.phalanges[i].finger), fingers[i]) << i;
-    EXPECT_EQ(hand.phalanges[i].first, i == 0 || fingers[i] != fingers[i - 1]) << i;
-    EXPECT_EQ(hand.phalanges[i].spring, springs[i]) << i;
-  }
-  const Phalanx& thumb = hand.phalanges[1];
-  EXPECT_EQ(thumb.name, "thumb_proximal");
-  EXPECT_EQ(thumb.pivot, Vector3d(0.0, 0.026, 0.0));
-  EXPECT_EQ(thumb.axis, Vector3d(1.0, 0.0, 0.0));
-  EXPECT_EQ(thumb.along, Vector3d(0.0, 1.0, 0.0));
-  EXPECT_EQ(thumb.lower, -0.349);
-  EXPECT_EQ(thumb.upper, 1.222);
-  EXPECT_EQ(thumb.arm, 0.010);
-  EXPECT_EQ(thumb.length, 0.042);
-  EXPECT_EQ(thumb.radius, 0.009);
-  EXPECT_EQ(thumb.mass, 0.014);
-  EXPECT_NEAR(hand.phalangesMass(), 0.133, 1e-12);
-  const double strokes[] = {0.0192, 0.025482, 0.028795, 0.028795, 0.028795};
-  const double opened[] = {0.0, -0.00349, 0.0, 0.0, 0.0};
-  const double limits[] = {90.0, 90.0, 90.0, 90.0, 180.0};
-  const char* names[] = {"thumb_abduction", "thumb", "index", "middle", "ring_little"};
-  for (std::size_t i = 0; i < 5; ++i) {
-    EXPECT_NEAR(hand.motors[i].stroke, strokes[i], 1e-9) << i;
-    EXPECT_NEAR(hand.motors[i].open_length, opened[i], 1e-12) << i;
-    EXPECT_EQ(hand.motors[i].limit, limits[i]);
-    EXPECT_EQ(hand.motors[i].both_ways, i == 0);
-    EXPECT_EQ(hand.motors[i].name, names[i]);
-  }
-  EXPECT_EQ(hand.sliding, 0.8);
-  EXPECT_EQ(hand.torsional, 0.004);
-  EXPECT_EQ(hand.rolling, 0.0001);
-  EXPECT_EQ(hand.joint_damping, 0.012);
-  EXPECT_EQ(hand.joint_armature, 0.0002);
-  EXPECT_EQ(hand.tendon_stiffness, 5e4);
-  EXPECT_EQ(hand.full_stroke, 1.0);
-  EXPECT_EQ(hand.lock_share, 0.05);
-  EXPECT_EQ(hand.lock_time, 0.2);
-  EXPECT_EQ(hand.free_current, 40.0);
-  EXPECT_EQ(hand.speed_current, 60.0);
-  EXPECT_EQ(hand.stall_current, 400.0);
-}
-
 namespace {
 
 /// A body of 2 kg about the origin.
@@ -234,7 +146,7 @@ FreeBody body() {
   return body;
 }
 
-const HoldFigures kStrong{10.0, 1e6, 1e6};
+const HoldLimits kStrong{10.0, 1e6, 1e6};
 
 Pose at(const Vector3d& position, const Vector3d& turn = Vector3d::Zero()) {
   const double angle = turn.norm();
@@ -277,24 +189,6 @@ TEST(HoldSpring, GainsFollowFromMassInertiaAndBandwidth) {
   EXPECT_LT((half.stacked() - 0.5 * all.stacked()).norm(), 1e-9);
 }
 
-TEST(HoldSpring, APlaceInTheHandTurnsAndMovesWithIt) {
-  HoldSpring hold;
-  hold.engageAt(at({0.2, 0.0, 0.0}));
-  FreeBody held = body();
-  held.center = at({1.0, 2.2, 3.0}, {0.0, 0.0, M_PI / 2});
-  const Twist spin{Vector3d::Zero(), Vector3d(0.0, 0.0, 2.0)};
-  const Wrench wrench =
-      hold.evaluate(at({1.0, 2.0, 3.0}, {0.0, 0.0, M_PI / 2}), spin, held, kStrong, 1.0);
-  // It is where it belongs; the place goes at 2 rad/s x 0.2 m along -x.
-  EXPECT_LT((wrench.force - Vector3d(-2.0 * 10.0 * 2.0 * 0.4, 0.0, 2.0 * 9.81)).norm(), 1e-9);
-  EXPECT_LT((wrench.torque - Vector3d(0.0, 0.0, 20.0 * 0.03 * 2.0)).norm(), 1e-9);
-  // Inertias are those of the body's own axes.
-  held.center.rotation = Quaterniond(Eigen::AngleAxisd(M_PI / 2, Vector3d::UnitX()));
-  const Wrench about =
-      hold.evaluate(at({1.0, 2.0, 3.0}, {M_PI / 2, 0.0, 0.0}), spin, held, kStrong, 1.0);
-  EXPECT_NEAR(about.torque.z(), 20.0 * 0.02 * 2.0, 1e-9);
-}
-
 TEST(HoldSpring, WhatAnotherHoldsIsTakenWithoutItsWeight) {
   HoldSpring hold;
   hold.engageAt(Pose{});
@@ -309,7 +203,7 @@ TEST(HoldSpring, WhatAnotherHoldsIsTakenWithoutItsWeight) {
 TEST(HoldSpring, BeyondItsForceThePlaceFollows) {
   HoldSpring hold;
   hold.engage(Pose{}, Pose{});
-  const HoldFigures weak{10.0, 5.0, 1e6};
+  const HoldLimits weak{10.0, 5.0, 1e6};
   Wrench wrench = hold.evaluate(at({0.1, 0, 0}), {}, body(), weak, 1.0);  // 20 N are asked for
   EXPECT_LT((wrench.force - Vector3d(5.0, 0.0, 0.0)).norm(), 1e-9);
   // Now the spring alone carries what the limit can.
@@ -335,7 +229,7 @@ TEST(HoldSpring, BeyondItsForceThePlaceFollows) {
 TEST(HoldSpring, BeyondItsTorqueTheTurnFollows) {
   HoldSpring hold;
   hold.engage(Pose{}, Pose{});
-  const HoldFigures weak{10.0, 1e6, 0.5};
+  const HoldLimits weak{10.0, 1e6, 0.5};
   Wrench wrench = hold.evaluate(at({0, 0, 0}, {0, 0, 0.4}), {}, body(), weak, 1.0);  // 1.2 Nm
   EXPECT_LT((wrench.torque - Vector3d(0.0, 0.0, 0.5)).norm(), 1e-9);
   wrench = hold.evaluate(at({0, 0, 0}, {0, 0, 0.4}), {}, body(), kStrong, 1.0);

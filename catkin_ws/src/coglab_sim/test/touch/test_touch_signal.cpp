@@ -5,7 +5,7 @@
 #include <numeric>
 #include <string>
 
-#include "../nodes/cell_messages.hpp"
+#include "cell_messages.hpp"
 #include "coglab_controllers/ros/touch_topic.hpp"
 #include "coglab_controllers/testing/virtual_arm.hpp"
 
@@ -13,12 +13,10 @@ using namespace coglab_sim;
 
 namespace {
 
-const std::string kDescription = DESCRIPTION_DIR;
-
 /// The hand closed around the mug, the arm on its brakes.
 plant::Plant grasp() {
   plant::PlantConfig config;
-  config.urdf = kDescription + "/urdf/lwr_ih2.urdf";
+  config.urdf = URDF;
   config.home << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782;
   config.surroundings.board_size.setZero();
   return plant::Plant(config);
@@ -26,8 +24,7 @@ plant::Plant grasp() {
 
 std::shared_ptr<const coglab_controllers::RobotSetup> tactileSetup() {
   using namespace coglab_controllers;
-  return makeRobotSetup(readText(kDescription + "/urdf/lwr_ih2.urdf"),
-                        coglab_rt::loadJointLimits(kDescription + "/config/joint_limits.yaml"),
+  return makeRobotSetup(readText(URDF), coglab_rt::loadJointLimits(LIMITS_FILE),
                         Parameters(YAML::Load("{tactile: true}"), "controller_manager"));
 }
 
