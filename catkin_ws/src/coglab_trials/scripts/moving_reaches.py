@@ -25,8 +25,8 @@ from coglab_py.packages import package_path
 from coglab_py.pose import Pose, about_z
 from coglab_sim.person.reach import Reach
 from coglab_sim.tracker.tracker import PerceptionSettings, Tracker
-from coglab_sim.virtual_world import DT, Hand, Robot, urdf_file
 from coglab_smach.kinematics.reachability import default_arm, solve
+from coglab_trials.world import DT, Hand, Robot, urdf_file
 
 LIBRARY = str(package_path("coglab_controllers", "config", "primitives.xml"))
 OBJECTS = ("mug", "bottle", "ball", "screwdriver", "tea_box")

@@ -13,9 +13,8 @@ from typing import Any
 
 import coglab_controllers as cc
 import numpy as np
-from coglab_smach.contact.learning import MotionRecorder
-from coglab_smach.contact.motion_thresholds import FEATURES, Change, Thresholds, learn
-from coglab_smach.contact.moving_contact import MovingContact
+from coglab_contact.motion_thresholds import FEATURES, Change, Thresholds, learn
+from coglab_contact.moving_contact import MotionRecorder, MovingContact
 from coglab_smach.kinematics.reachability import default_arm, position_jacobian
 from moving_reaches import DT, MovingReach, wrong_urdf
 
