@@ -13,7 +13,6 @@ setup(
                     "clocks",
                     "kinematics",
                     "ports",
-                    "contact",
                     "context",
                     "states",
                     "machines",

@@ -10,7 +10,7 @@ from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.interfaces import HandState, Located
 from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states import hand as hands
-from coglab_smach.states import hand_tracking, seat
+from coglab_smach.states import hand_tracking, regrasp
 from coglab_smach.states.grip import Grip
 from coglab_smach.states.hand import CalibrateHand, HandClose, HandTighten
 from coglab_smach.states.hand_tracking import (
@@ -21,7 +21,7 @@ from coglab_smach.states.hand_tracking import (
     way_to_grasp,
     way_to_hand,
 )
-from coglab_smach.states.held import HeldObject
+from coglab_smach.states.held_object import HeldObject
 from coglab_trials.virtual_clock import using
 from conftest import Trial
 
@@ -270,9 +270,9 @@ IN_THE_WAY, LATE = "something is in the way", "the way to the grasp within 1.7 s
 def test_the_way_to_the_grasp_ends_where_6_5_newton_push_or_in_time(monkeypatch, newton, arrives, why):
     seen, cancelled = Seen(), []
     clock = seen.trial.clock
-    monkeypatch.setattr(seat, "way_to_grasp", lambda *_: np.array([0.0, 0.0, -0.03]))
-    monkeypatch.setattr(seat, "shift", lambda ctx, way, speed: Polled(lambda: clock.now() > arrives, lambda: None))
+    monkeypatch.setattr(regrasp, "way_to_grasp", lambda *_: np.array([0.0, 0.0, -0.03]))
+    monkeypatch.setattr(regrasp, "shift", lambda ctx, way, speed: Polled(lambda: clock.now() > arrives, lambda: None))
     seen.ctx.contact.force = lambda: (0.0, 0.0, newton)
     seen.ctx.arm.cancel_motion = lambda reason: cancelled.append(reason) or Ready()
-    assert seen.run(seat.Seat(seen.ctx), goal={})[0] == "succeeded"
+    assert seen.run(regrasp.Regrasp(seen.ctx), goal={})[0] == "succeeded"
     assert [reason[: len(why)] for reason in cancelled] == [why] * bool(why)

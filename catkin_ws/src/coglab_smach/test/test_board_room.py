@@ -29,7 +29,7 @@ LOW = 0.008
 
 @pytest.fixture(scope="module")
 def room():
-    return BoardRoom(URDF, CONFIG.get("postures.board", []))
+    return BoardRoom(URDF, CONFIG.get("postures.board"))
 
 
 def palm_for(object_id, tilt=(0.0, 0.0), low=0.0):

@@ -13,7 +13,8 @@ RANGED = [row for row in TABLE if row.low is not None]
 
 def nested(name, value):
     """The value as a YAML text of one file."""
-    return "{" + ": {".join(name.split(".")) + f": {value}" + "}" * (name.count(".") + 1)
+    text = str(value) if isinstance(value, int) else f"{value:.7f}"
+    return "{" + ": {".join(name.split(".")) + f": {text}" + "}" * (name.count(".") + 1)
 
 
 @pytest.fixture

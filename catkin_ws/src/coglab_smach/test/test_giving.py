@@ -5,15 +5,15 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from coglab_contact.load import SAME, LeavingLoad
 from coglab_msgs.msg import ReasonCode, Say
 from coglab_py.pose import Pose
-from coglab_smach.contact.leaving_load import SAME, LeavingLoad
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.interfaces import HandState, Located
 from coglab_smach.ports.pending import Polled, Ready
 from coglab_smach.states import give
 from coglab_smach.states.grip import Grip
-from coglab_smach.states.held import HeldObject
+from coglab_smach.states.held_object import HeldObject
 from coglab_trials.conditions import Conditions
 from coglab_trials.trial import VirtualTrial
 from conftest import Trial

@@ -11,9 +11,10 @@ import pytest
 import rospy
 from coglab_msgs.msg import Contact, ContactSignal, HandoverBelief, ReasonCode
 from coglab_msgs.msg import Recognition as RecognitionMessage
+from coglab_py import publish
 from coglab_smach.ports.interfaces import Ahead, ContactEvent, Recognition
 from coglab_smach.ports.pending import Permit, Polled, PortError, Ready, Threaded, ending_motion
-from coglab_smach.ros import calls, ports, publish
+from coglab_smach.ros import calls, ports
 from geometry_msgs.msg import Point, Vector3, Vector3Stamped
 from test_arm_port import Topic, ended
 

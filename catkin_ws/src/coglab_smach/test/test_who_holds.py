@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from coglab_smach.contact.leaving_load import LeavingLoad
+from coglab_contact.load import LeavingLoad
 from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states import weight
 from coglab_smach.states.base import TimeLimit

@@ -14,8 +14,8 @@ from pathlib import Path
 
 TOP = Path(__file__).resolve().parents[5]
 SOURCES = TOP / "catkin_ws" / "src"
-PACKAGES = ("coglab_py", "coglab_objects", "coglab_perception", "coglab_sim", "coglab_smach", "coglab_trials",
-            "coglab_bringup", "coglab_console", "coglab_controllers", "ctrl_more", "ih2_hand",
+PACKAGES = ("coglab_py", "coglab_objects", "coglab_perception", "coglab_contact", "coglab_sim", "coglab_smach",
+            "coglab_trials", "coglab_bringup", "coglab_console", "coglab_controllers", "ctrl_more", "ih2_hand",
             "executive_smach/smach", "executive_smach/smach_ros")  # fmt: skip
 # Packages without types of their own, or whose calls are not typed.
 UNTYPED = {

@@ -12,8 +12,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
-NO_DEFAULT: Any = object()
-"""of a parameter that the file has to set"""
+NO_DEFAULT: Any = object()  # of a parameter that the file has to set
 
 
 @dataclass(frozen=True)

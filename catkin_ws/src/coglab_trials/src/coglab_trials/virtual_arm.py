@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from coglab_msgs.msg import ReasonCode
-from coglab_smach.kinematics.manager_limits import read_limits
-from coglab_smach.kinematics.motion_time import MotionLimits
+from coglab_smach.kinematics.motion_time import MotionLimits, read_limits
 from coglab_smach.ports.interfaces import DmpProgress, DmpRequest, Verdict
 from coglab_smach.ports.pending import Pending, Polled, PortError, Ready, ending_motion
 

@@ -9,15 +9,15 @@ from typing import Any
 
 import coglab_controllers as cc
 import numpy as np
+from coglab_contact.detector import ContactDetector, DetectorSettings
+from coglab_contact.fused_detector import FusedDetector
+from coglab_contact.load import GripAndLoad
+from coglab_contact.motion_thresholds import Thresholds
+from coglab_contact.moving_contact import MovingContact
 from coglab_msgs.msg import ReasonCode
 from coglab_objects.database import ObjectDatabase, ObjectError
 from coglab_py.packages import package_path
 from coglab_py.pose import Pose, length
-from coglab_smach.contact.detector import ContactDetector, DetectorSettings
-from coglab_smach.contact.fused_detector import FusedDetector
-from coglab_smach.contact.grip_and_load import GripAndLoad
-from coglab_smach.contact.motion_thresholds import Thresholds
-from coglab_smach.contact.moving_contact import MovingContact
 from coglab_smach.ports.interfaces import (
     OLDEST_BELIEF,
     OLDEST_RECOGNITION,
@@ -32,7 +32,7 @@ from ih2_hand.reasons import Reason, reason_of
 
 from coglab_trials.world import World
 
-THRESHOLDS = package_path("coglab_smach", "config", "contact_thresholds.yaml")
+THRESHOLDS = package_path("coglab_contact", "config", "contact_thresholds.yaml")
 HAND = "human_hand"
 OLDEST_SIGHT = 0.15
 """s, older sights of an object do not tell whether it is in the palm"""

@@ -18,13 +18,12 @@ from coglab_smach.states.base import CoglabMachine, CoglabState
 from coglab_smach.states.grip import Grip
 from coglab_smach.states.hand import HandTighten
 from coglab_smach.states.hand_tracking import AWAY, from_palm
-from coglab_smach.states.held import LOOK, HeldObject
+from coglab_smach.states.held_object import LOOK, HeldObject
 from coglab_smach.states.motion import end_motion
 from coglab_smach.states.reach import CAUGHT
 from coglab_smach.states.weight import person_has_it, person_holds
 
-LETS_GO = 5.0
-"""s in which a person who is told that it is over lets go of what the robot's fingers hold, too, and goes"""
+LETS_GO = 5.0  # s in which a person who is told that it is over lets go of what the robot's fingers hold, too, and goes
 
 
 def arm_is_blocked(state: CoglabState) -> Verdict:

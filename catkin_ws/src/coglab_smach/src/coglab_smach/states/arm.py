@@ -13,14 +13,11 @@ from coglab_smach.kinematics.motion_time import ptp_time
 from coglab_smach.ports.pending import Polled, PortError
 from coglab_smach.states.base import CoglabState, TimeLimit
 from coglab_smach.states.hand_tracking import person_at, seen_at
-from coglab_smach.states.held import LOOK, HeldObject
+from coglab_smach.states.held_object import LOOK, HeldObject
 
-RESUMES = 3
-"""times that a motion is begun again where the arm did not come to its target, as when a person still holds on"""
-RESUME_AFTER = 1.0
-"""s from such an end to the next try"""
-FELL = 0.5
-"""m below the person's hand in which an object is not in it any more"""
+RESUMES = 3  # times that a motion is begun again that did not reach its target, as when a person still holds on
+RESUME_AFTER = 1.0  # s from such an end to the next try
+FELL = 0.5  # m below the person's hand in which an object is not in it any more
 
 
 class LoadControllers(CoglabState):

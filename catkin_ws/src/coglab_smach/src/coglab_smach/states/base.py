@@ -18,11 +18,9 @@ from coglab_smach.context.requests import command
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.motion import end_motion
 
-POLL_PERIOD = 0.01
-"""s between two looks at a condition: well below the 60 ms in which a contact has to be found."""
+POLL_PERIOD = 0.01  # s between two looks at a condition: well below the 60 ms in which a contact has to be found
 
-RETOLD = 0.2
-"""s by which the end of a wait that is put off moves until it is told again"""
+RETOLD = 0.2  # s by which the end of a wait that is put off moves until it is told again
 
 
 class Interrupted(Exception):
@@ -78,8 +76,7 @@ class CoglabState(smach.State):
         self.targets: Mapping[str, str] = {}
         self.reason = ""
         self._deadline = 0.0
-        self._waits = False
-        """a wait is under way"""
+        self._waits = False  # a wait is under way
 
     def run(self, ud: Any) -> str:
         """Do the work; returns an outcome. ``self.reason`` may hold a sentence for it."""

@@ -17,22 +17,20 @@ from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
 from coglab_smach.states.grip import Grip
 from coglab_smach.states.hand import firm_speed
 from coglab_smach.states.hand_tracking import AWAY, HandLook, HandTrack, from_palm, hand_from_palm, way_to_hand
-from coglab_smach.states.held import HeldObject
+from coglab_smach.states.held_object import HeldObject
 from coglab_smach.states.loosening_grip import LooseningGrip
 from coglab_smach.states.motion import await_rest, rise, shift
 from coglab_smach.states.reach import WaitForPerson
 from coglab_smach.states.weight import person_holds
 
 GRAVITY = 9.81
-ASTRAY = 0.02
-"""m that the object is from where it is offered, from which on it is brought there"""
-BEYOND = 0.06
-"""the same before ``give.lower_after``: a person who is nearer comes to it, and would meet an arm that comes, too"""
-PRESSES, LASTS, SINKS = 2.0, 0.3, 3
-"""N, or the weight if that is more, by which a hand that has the object presses it down; s after which the arm sinks
-with it, and times at most that it does"""
-BRINGS, LOOKS = 3, 0.3
-"""times at most that it is; s between two looks, between which a hand that waits moves by less than ASTRAY"""
+ASTRAY = 0.02  # m that the object is from where it is offered, from which on it is brought there
+BEYOND = 0.06  # m, the same before ``give.lower_after``: a hand that is nearer comes to the object by itself
+PRESSES = 2.0  # N, or the weight if that is more: a hand that has the object presses it down
+LASTS = 0.3  # s of pressing after which the arm sinks with the hand
+SINKS = 3  # times at most that the arm sinks
+BRINGS = 3  # times at most that the object is brought to the hand
+LOOKS = 0.3  # s between two looks, between which a hand that waits moves by less than ASTRAY
 
 
 class WaitTaker(WaitForPerson):
@@ -113,13 +111,11 @@ class GiveLoad(CoglabState):
     feels its grip, the force of it falls as the load does, down to ``give.grip_safety`` times what friction needs for
     what the hand still carries, by ``give.ease`` counts at most; else it is ``give.loosen`` counts. When the load comes
     back to the arm, or the object sinks in the hand by ``give.slip`` m, the grip closes again; what has sunk so once is
-    held closed to the end. Where the person's hand
-    waits there, but not at the object, the arm brings it to where that hand takes it, ``give.bring_after`` s after its
-    own arrival and later; a reach toward where a hand would be may have ended before that hesitated. Where nothing has
-    happened for ``give.lower_after`` s the arm sinks by ``give.lower`` m, so that the weight comes to lie in the hand;
-    at once where the hand that has the object presses it down, since it is held too high for them.
-    After the time limit the grip closes and keeps the object. It closes with the lowest force (``give.close_speed``):
-    the person's fingers are there; firmly at home only.
+    held closed to the end. If the person's hand waits near, but not at the object, the arm brings the object to it,
+    from ``give.bring_after`` s after its arrival on: a predicted place may be wrong for a hand that hesitates. If
+    nothing has happened for ``give.lower_after`` s the arm sinks by ``give.lower`` m, so that the weight comes to lie
+    in the hand; at once if the hand that has the object presses it down. After the time limit the grip closes, with the
+    lowest force (``give.close_speed``) since the person's fingers are there, and firmly at home only.
     """
 
     default_time_limit = 20.0
@@ -135,17 +131,14 @@ class GiveLoad(CoglabState):
         """the way (m) from the object to where the person's hand takes it"""
         self._lowering: Pending | None = None
         self._moving: Pending | None = None
-        self._ending: Pending | None = None
-        """of what moves"""
+        self._ending: Pending | None = None  # of what moves
         self._lower_at = self._look_at = 0.0
         self._brings = self._sinks = 0
         self._pressed_since: float | None = None
-        self._way: np.ndarray | None = None
-        """m, of the last look: from the object to where the person's hand takes it"""
+        self._way: np.ndarray | None = None  # m, of the last look: from the object to where the person's hand takes it
         self._needed = self._slips_at = self._weight = 0.0
         """share of the load; N of grip below which the object slips while the hand carries all of it; N"""
-        self._firm = 0
-        """wire speed of the grip that is as firm as before"""
+        self._firm = 0  # wire speed of the grip that is as firm as before
         self._back_since: float | None = None
 
     def _number(self, name: str) -> float:

@@ -14,17 +14,14 @@ from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
 from coglab_smach.states.hand_tracking import AT_HAND, AWAY, HandLook, HandTrack, from_palm, hand_from_palm, palm_axis
 from coglab_smach.states.motion import shift, shift_time
-from coglab_smach.states.yielding import GivesWay
+from coglab_smach.states.yield_to_pull import YieldToPull
 
-LOOSE = 40
-"""counts of 254 that the fingers have opened when the palm begins to draw back"""
-AT_END = 250
-"""counts of 254 from which a finger has closed past the object"""
-FREE, FREE_FOR, GOES = 0.10, 0.2, 1.0
-"""m that the person's hand is farther than it was, and s for which it is, when none of its fingers is at the object; s
-in which it has to go so far"""
-DRAWING_BACK = 2.0
-"""s that drawing back may take beyond what limits and speed scale ask for"""
+LOOSE = 40  # counts of 254 that the fingers have opened when the palm begins to draw back
+AT_END = 250  # counts of 254 from which a finger has closed past the object
+FREE = 0.10  # m that the person's hand is farther away than it was when none of its fingers is at the object
+FREE_FOR = 0.2  # s for which it has to be
+GOES = 1.0  # s in which it has to go so far
+DRAWING_BACK = 2.0  # s that drawing back may take beyond what limits and speed scale ask for
 
 
 def gentle(grasp: Mapping[str, Any]) -> dict[str, Any]:
@@ -99,7 +96,7 @@ class HandClose(CoglabState):
 
     Outcomes missed and edge, with ``from_person``: the fingers have closed on nothing, or do not stand around it
     (stopped_by_object), for the first time in this action; a person who offers waits, so the arm may try once more.
-    Meanwhile the palm goes along with who pulls (GivesWay).
+    Meanwhile the palm goes along with who pulls (YieldToPull).
     """
 
     default_time_limit = 12.0
@@ -166,7 +163,7 @@ class HandClose(CoglabState):
 
     def _give_way(self, closing: Pending, hand: HandLook) -> None:
         """Until the fingers have closed."""
-        way = GivesWay(self.ctx)
+        way = YieldToPull(self.ctx)
 
         def closed() -> bool:
             way.follow()

@@ -29,7 +29,8 @@ GLANCE = 0.05  # s that a look may take while something else is waited for
 OLDEST = 0.5  # s: an older sight does not show where the hand is
 SWAPPED = 0.2  # s after which a sight beyond JUMP is believed
 LATELY = 0.4  # s of sights that show whether something is held still
-STILL_TIME, STILL = 0.3, 0.025  # s in which something that is held still moves less than so far, m
+STILL = 0.025  # m, more than something moves that is held still
+STILL_TIME = 0.3  # s
 
 Sight = tuple[float, np.ndarray]
 """s, when it was taken, and m"""
@@ -46,10 +47,8 @@ class HandTrack:
         """whether it was seen all the way from the object on; False from a jump on, until it is seen again where it was
         before that"""
         self._newest: Sight | None = None
-        self._last: Sight | None = None
-        """the newest one of that hand"""
-        self._sure: Sight | None = None
-        """the newest one while that was sure"""
+        self._last: Sight | None = None  # the newest one of that hand
+        self._sure: Sight | None = None  # the newest one while that was sure
 
     def follow(self, at: float, place: np.ndarray, at_object: bool = True) -> None:
         """Take a sight of time ``at`` (s); ``at_object``: from there the hand may reach the object."""

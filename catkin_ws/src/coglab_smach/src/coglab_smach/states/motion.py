@@ -11,10 +11,8 @@ from coglab_smach.kinematics.motion_time import ptp_time
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.pending import Pending, PortError
 
-POLL_PERIOD = 0.01
-"""s"""
-SILENCE = 0.5
-"""s that a robot that says nothing is waited for; the request stays in force"""
+POLL_PERIOD = 0.01  # s
+SILENCE = 0.5  # s that a robot that says nothing is waited for; the request stays in force
 
 
 def end_motion(ctx: Context, reason: str) -> str:

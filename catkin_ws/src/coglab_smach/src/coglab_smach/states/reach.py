@@ -265,19 +265,13 @@ class WaitContact(WaitForPerson):
         super().__init__(ctx, ["object_entry", "goal", "grasp"])
         self._phase = Phase.REACH
         self._goal: dict[str, Any] = {}
-        self._hand: dict[str, Any] = {}
-        """of the grasp"""
-        self._contact_settings: dict[str, Any] = {}
-        """of the object's entry, and where it is looked for"""
+        self._hand: dict[str, Any] = {}  # of the grasp
+        self._contact_settings: dict[str, Any] = {}  # of the object's entry, and where it is looked for
         self._bumps = 0
-        self._arrived: float | None = None
-        """s, when the hand was first at its goal"""
-        self._went_on = False
-        """the hand has gone on from there"""
-        self._caught = False
-        """the fingers have closed around something while the arm paused"""
-        self._look: HandLook | None = None
-        """at the person's hand, once the fingers have begun to close"""
+        self._arrived: float | None = None  # s, when the hand was first at its goal
+        self._went_on = False  # the hand has gone on from there
+        self._caught = False  # the fingers have closed around something while the arm paused
+        self._look: HandLook | None = None  # at the person's hand, once the fingers have begun to close
 
     def run(self, ud: Any) -> str:
         entry = ud.object_entry
@@ -529,26 +523,19 @@ class ReachWatch:
         self.predicted = self._began_on_belief = self._frame != goal["frame"]
         """whether the arm goes to where the target will be, and not to where it is seen"""
         self._watch: cc.GoalWatch | None = None
-        self._sure = state.ctx.clock.now()
-        """when it was last believed"""
+        self._sure = state.ctx.clock.now()  # when it was last believed
         self._looked = self._sure - PERIOD
-        self._last: Sight | None = None
-        """s, m: the newest sight that was no jump"""
-        self._from: np.ndarray | None = None
-        """m, the palm when the reach began"""
+        self._last: Sight | None = None  # s, m: the newest sight that was no jump
+        self._from: np.ndarray | None = None  # m, the palm when the reach began
         self._nearest, self._back = np.inf, 0.0
         """m from there to the target's nearest place, and by which it has gone back since"""
-        self._hand: cc.GoalWatch | None = None
-        """of the person's hand, for a hidden object"""
-        self._hand_last: Sight | None = None
-        """as of the target"""
-        self._seen_at = 0.0
-        """s, when the target was seen there"""
+        self._hand: cc.GoalWatch | None = None  # of the person's hand, for a hidden object
+        self._hand_last: Sight | None = None  # as of the target
+        self._seen_at = 0.0  # s, when the target was seen there
         self._region = HandoverRegion(state.ctx, self.may["margin"])
         self._outside: tuple[int, str] | None = None
         """ReasonCode and sentence of an offer or request outside the region"""
-        self._untold: PortError | None = None
-        """why perception cannot tell whose hand is at the target"""
+        self._untold: PortError | None = None  # why perception cannot tell whose hand is at the target
 
     def doubt(self) -> tuple[int, str]:
         """ReasonCode and sentence of the doubt."""

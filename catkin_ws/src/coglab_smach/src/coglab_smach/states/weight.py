@@ -12,31 +12,23 @@ from coglab_smach.context.wait_reasons import PERSON
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.base import CoglabState, TimeLimit
 from coglab_smach.states.hand_tracking import AT_HAND, AWAY, HandTrack, from_palm, hand_name, palm_at, sight_of
-from coglab_smach.states.held import HeldObject
+from coglab_smach.states.held_object import HeldObject
 from coglab_smach.states.motion import await_rest, rise
-from coglab_smach.states.yielding import LEAST_WAY, GivesWay
+from coglab_smach.states.yield_to_pull import LEAST_WAY, YieldToPull
 
 GRAVITY = 9.81
-MOST_RISES = 8
-"""the first one, and those that go on where the weight or somebody's pull has ended one"""
+MOST_RISES = 8  # the first one, and those that go on where the weight or somebody's pull has ended one
 
-FOLLOWS = 0.25
-"""s from one closing of the fingers to the next at least"""
-UNSEEN = 0.4
-"""s from the going of the person's hand on after which an object that nobody sees has stayed in the fingers"""
-WITH_HAND = 0.2
-"""m between the person's hand and an object that they have taken along, at most"""
-FALLS, RECENT = 0.4, 0.15
-"""s after which what falls is far below where it was lost, and for which it is looked for then; and how old (s) a
-sight may be that tells so"""
-SINKING, SETTLES = 3.0, 0.3
-"""s in which the arm has sunk with what the person may hold, or is back; and before and after, for torques at rest"""
-TELLS = 1.0
-"""s in which the contact detector tells the share of the weight, once it is armed"""
-LIFTS = 0.8
-"""N that a soft hand (35 N/m) lifts more by, where what it holds sinks by 3 cm, less what another posture explains"""
-IN_MOTION = 1.6
-"""N by which the weight that a slow arm tells differs from what it tells at rest, at most"""
+FOLLOWS = 0.25  # s from one closing of the fingers to the next at least
+UNSEEN = 0.4  # s after the person's hand has gone, when an object that nobody sees has stayed in the fingers
+WITH_HAND = 0.2  # m between the person's hand and an object that they have taken along, at most
+FALLS = 0.4  # s after which a falling object is far below where it was lost, and for which it is looked for then
+RECENT = 0.15  # s, oldest sight that counts there
+SINKING = 3.0  # s in which the arm has sunk with the object, or is back
+SETTLES = 0.3  # s before and after, for torques at rest
+TELLS = 1.0  # s in which the contact detector tells the share of the weight, once it is armed
+LIFTS = 0.8  # N, least load change that counts as "the person holds it": a soft hand (35 N/m) moved by 3 cm gives 1 N
+IN_MOTION = 1.6  # N by which the weight that a slow arm tells differs from what it tells at rest, at most
 
 
 def person_holds(state: CoglabState, settings: dict[str, Any]) -> bool | None:
@@ -130,7 +122,7 @@ class TakeWeight(CoglabState):
     gentle fingers has taken it back. Where the tracker has lost the hand, or taken another one for it (HandTrack), the
     person may have gone: it is felt whether they hold it. Where that is not sure nothing is opened, and the arm stays.
 
-    The palm goes along with who pulls (GivesWay), and the rise goes on afterwards. The fingers close again and again
+    The palm goes along with who pulls (YieldToPull), and the rise goes on afterwards. The fingers close again and again
     (``give.close_speed``, the lowest force).
     """
 
@@ -144,23 +136,17 @@ class TakeWeight(CoglabState):
             output_keys=["hand_seen_away"],
             io_keys=["grip"],
         )
-        self._way: GivesWay
-        self._top: float | None = None
-        """m, height to which the palm rises"""
+        self._way: YieldToPull
+        self._top: float | None = None  # m, height to which the palm rises
         self._rises = 0
         self._told = self._seen_away = False
         self._hand: HandTrack
         self._held: HeldObject
-        self._farther: float | None = None
-        """m from the palm from which on the person's hand has left the object"""
-        self._gone: float | None = None
-        """s, since when it has"""
-        self._on: float | None = None
-        """s, when it rises on with the weight; None: the weight has not come"""
-        self._closing: Pending | None = None
-        """of the fingers, once more"""
-        self._closes = 0.0
-        """s, from when they may do so again"""
+        self._farther: float | None = None  # m from the palm from which on the person's hand has left the object
+        self._gone: float | None = None  # s, since when it has
+        self._on: float | None = None  # s, when it rises on with the weight; None: the weight has not come
+        self._closing: Pending | None = None  # of the fingers, once more
+        self._closes = 0.0  # s, from when they may do so again
 
     def run(self, ud: Any) -> str:
         limit, contact = self.ctx.config.number("hand.load_timeout"), self.ctx.contact
@@ -172,7 +158,7 @@ class TakeWeight(CoglabState):
             "mass": float(ud.object_entry.get("mass", 0.0)),
             "load_share": self.ctx.config.number("hand.load_share"),
         }
-        self._way, self._rises, self._on, self._told = GivesWay(self.ctx), 0, None, False
+        self._way, self._rises, self._on, self._told = YieldToPull(self.ctx), 0, None, False
         self._seen_away = False
         self._closing, self._closes = None, 0.0
         self.await_pending(contact.arm("lift", limit, settings), "arming of the contact detector", 2.0)

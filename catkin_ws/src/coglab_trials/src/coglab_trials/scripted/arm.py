@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from coglab_msgs.msg import ReasonCode
-from coglab_smach.kinematics.manager_limits import read_limits
-from coglab_smach.kinematics.motion_time import MotionLimits, ptp_time
+from coglab_smach.kinematics.motion_time import MotionLimits, ptp_time, read_limits
 from coglab_smach.ports.interfaces import DmpProgress, DmpRequest, Verdict
 from coglab_smach.ports.pending import Pending, Polled, PortError, ending_motion
 

@@ -13,17 +13,13 @@ from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.grip import Grip
 from coglab_smach.states.hand import AT_END
 
-NEAR, FARTHER = 0.20, 0.15
-"""m between palm and object in which the object counts as carried, and by which it is farther when it is not"""
-LOST_TIME = 0.3
-"""s for which it is seen there"""
-LOOK = 0.8
-"""s for which an arm that stands looks for what its hand may have lost"""
-OLDEST = 0.2
-"""s, older sights do not tell"""
-KEPT, SETTLES = 0.04, 0.1
-"""m by which an object that is held is farther from the palm, or nearer, at most than at first; and s in which one that
-falls has moved by more"""
+NEAR = 0.20  # m between palm and object within which the object counts as carried
+FARTHER = 0.15  # m by which it is farther away when it is not carried
+LOST_TIME = 0.3  # s for which it is seen there
+LOOK = 0.8  # s for which an arm that stands looks for what its hand may have lost
+OLDEST = 0.2  # s, older sights do not tell
+KEPT = 0.04  # m by which the distance of a held object from the palm changes at most
+SETTLES = 0.1  # s in which a falling object moves by more
 
 
 class HeldObject:
@@ -37,8 +33,7 @@ class HeldObject:
     def __init__(self, ctx: Context, object_id: str, grip: Grip) -> None:
         self._ctx, self._object_id, self._grip = ctx, object_id, grip
         self._sight: Pending | None = None
-        self._above = 0.0
-        """m of the object over the palm"""
+        self._above = 0.0  # m of the object over the palm
         self._carried: float | None = None
         self._height = self._before = self._taken = 0.0
         self.sunk = 0.0

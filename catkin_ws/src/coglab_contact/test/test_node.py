@@ -1,37 +1,35 @@
-"""The brain's two nodes and the objects' tool in parts, without a master: what they make of a message, when they
-publish, and what they answer."""
+"""The contact detector node without a ROS master: what it makes of messages, publishes, answers and learns."""
 
 import importlib.util
-import json
 import math
 import threading
 import time
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
 import rospy
 import tf2_ros
-from coglab_msgs.msg import ReasonCode
-from coglab_msgs.srv import ArmContactRequest
-from coglab_objects.database import objects_folder
+from arms import ARM, SHIPPED
+from coglab_contact.motion_thresholds import Thresholds
+from coglab_contact.moving_contact import MotionRecorder, unwritable
+from coglab_msgs.msg import FingertipForces, HandStatus, ReasonCode
+from coglab_msgs.srv import ArmContactRequest, LearnMotionRequest
 from coglab_py.pace import Pace
 from coglab_py.pose import Pose
-from coglab_smach.context.journal import ActionRecord, TransitionRecord
-from coglab_smach.context.master_state import MasterState
-from coglab_smach.kinematics.reachability import default_arm
-from coglab_smach.ports.pending import Polled, PortError, Ready
-from geometry_msgs.msg import Point, Quaternion, TransformStamped
+from geometry_msgs.msg import Quaternion, TransformStamped
 from sensor_msgs.msg import JointState
 
-SCRIPTS = Path(__file__).resolve().parents[1] / "scripts"
+SCRIPT = Path(__file__).resolve().parents[1] / "scripts" / "contact_detector_node.py"
 JOINTS = [f"j{i}" for i in range(7)]
 ZERO = [0.0] * 7
+BEGIN, END = LearnMotionRequest(gather=True), LearnMotionRequest(gather=False)
 
 
-def script(name):
-    spec = importlib.util.spec_from_file_location(name, SCRIPTS / f"{name}.py")
+def script():
+    spec = importlib.util.spec_from_file_location("contact_detector_node", SCRIPT)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -64,23 +62,25 @@ class Detector:
 
 
 @pytest.fixture
-def node(monkeypatch):
-    """The contact detector's node, without ROS; ``sent``: what it publishes, by publisher."""
-    module = script("contact_detector_node")
+def node(monkeypatch, tmp_path):
+    """The node without ROS; ``sent``: what it publishes, by publisher; what it learns are the shipped thresholds."""
+    module = script()
     made = module.ContactDetectorNode.__new__(module.ContactDetectorNode)
     made.pace, made.last_stamp = Pace(), rospy.Time()
     made.joints, made.position, made.velocity, made.joint_stamp = JOINTS, None, None, 0.0
     made.lock, made.last_sample, made.recorder, made.force_stamp = threading.Lock(), None, None, 0.0
     made.detector, made.base, made.grasp, made.shown = Detector(), "world", None, None
     made.heard = -math.inf
-    made.moving = SimpleNamespace(load=0.0, observer=SimpleNamespace(period=0.0))
-    made.torques, made.arm = SimpleNamespace(resolved_name="/lwr/external_torques"), default_arm()
-    made.sent = []
+    made.moving = MagicMock(load=0.0)
+    made.learnt_file = str(tmp_path / "learnt.yaml")
+    monkeypatch.setattr(MotionRecorder, "learn", lambda self: Thresholds.load(SHIPPED))
+    made.torques, made.arm = SimpleNamespace(resolved_name="/lwr/external_torques"), ARM
+    made.sent, made.said = [], []
     for name in ("publisher", "margin", "signal", "force"):
         setattr(made, name, name)
     monkeypatch.setattr(module, "publish", lambda to, message: made.sent.append((to, message)))
     monkeypatch.setattr(rospy, "loginfo", lambda *words: None)
-    monkeypatch.setattr(rospy, "logwarn_throttle", lambda *words: None)
+    monkeypatch.setattr(rospy, "logwarn_throttle", lambda *words: made.said.append(words))
     made.now = 10.0
     monkeypatch.setattr(rospy.Time, "now", staticmethod(lambda: rospy.Time.from_sec(made.now)))
     made.pose_of = module.pose_of
@@ -112,18 +112,6 @@ def test_velocities_are_those_of_the_message_or_of_two_positions(node):
     assert node.detector.fed == [
         ("feed_measured", 4.0, [6.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.0], [6, 5, 4, 3, 2, 1, 0], None)
     ]
-
-
-def test_forces_are_told_a_hundred_times_a_second_at_most(node):
-    node.detector.pull = np.array([1.0, 2.0, 3.0])
-    for stamp in (1.0, 1.005, 1.0085, 1.0095, 1.02, 0.5):
-        node.on_joints(joints(stamp, effort=ZERO))
-    forces = [message for to, message in node.sent if to == "force"]
-    assert [round(f.header.stamp.to_sec(), 4) for f in forces] == [1.0, 1.0095, 1.02, 0.5]
-    assert (forces[0].vector.y, forces[0].header.frame_id) == (2.0, "world")
-    node.detector.pull = None
-    node.on_joints(joints(9.0, effort=ZERO))
-    assert len(node.sent) == 4
 
 
 def test_torques_count_once_the_joints_are_known(node):
@@ -219,24 +207,10 @@ def test_arming(node):
     assert node.on_arm(wrong).reason_code == ReasonCode.INVALID_ARGUMENT
 
 
-@pytest.mark.parametrize(
-    ("place", "turn", "good"),
-    [
-        (0.0, (0.0, 0.0, 0.0, 1.009), True),
-        (0.0, (0.0, 0.0, 0.0, 1.011), False),
-        (0.0, (0.0, 0.0, 0.0, 0.989), False),
-        (math.nan, (0.0, 0.0, 0.0, 1.0), False),
-        (0.0, (math.inf, 0.0, 0.0, 1.0), False),
-    ],
-)
-def test_a_pose_has_a_finite_place_and_a_unit_quaternion(node, place, turn, good):
-    assert (node.pose_of(Point(place, 1.0, 2.0), Quaternion(*turn)) is not None) == good
-
-
 @pytest.mark.parametrize(("age", "told"), [(0.14, True), (0.16, False), (-0.16, False)])
 def test_a_sight_of_the_object_tells_for_15_hundredths_of_a_second(node, age, told):
     q = np.array([0.0, 0.5, 0.0, 1.0, 0.0, 0.5, 0.0])
-    palm = Pose(*default_arm().fk(q))
+    palm = Pose(*ARM.fk(q))
     transform = TransformStamped()
     transform.header.stamp = rospy.Time.from_sec(10.0 - age)
     place = transform.transform.translation
@@ -260,142 +234,98 @@ def test_a_sight_of_the_object_tells_for_15_hundredths_of_a_second(node, age, to
     assert node.detector.fed == []
 
 
-def test_what_learning_answers(node):
-    assert node.on_learn(None).success and node.on_learn(None).message == "learning"
-    node.detector.still.learn = lambda: (_ for _ in ()).throw(ValueError("moves"))
-    assert node.on_learn(None).reason_code == ReasonCode.NODE_SILENT
-    node.heard = time.monotonic()
-    assert node.on_learn(None).reason_code == ReasonCode.BUSY
+BEGIN, END = LearnMotionRequest(gather=True), LearnMotionRequest(gather=False)
 
 
-# --- the master -------------------------------------------------------------------------------------------------------
+def answered(node, request):
+    """(success, code, sentence)"""
+    answer = node.on_learn_motion(request)
+    return answer.success, answer.reason_code, answer.message
 
 
-@pytest.fixture
-def master(monkeypatch, tmp_path):
-    module = script("master_node")
-    made = module.MasterNode.__new__(module.MasterNode)
-    made.sent, made.now = [], 100.0
-    monkeypatch.setattr(module, "publish", lambda to, message: made.sent.append((to, message)))
-    for level in ("loginfo", "logwarn", "logerr"):
-        monkeypatch.setattr(rospy, level, lambda *words, level=level: made.sent.append((level, words)))
-    monkeypatch.setattr(rospy.Time, "now", staticmethod(lambda: rospy.Time.from_sec(50.0)))
-    clock = SimpleNamespace(now=lambda: made.now, sleep=lambda s: setattr(made, "now", made.now + s))
-    made.pressed = []
-    stop = SimpleNamespace(press=made.pressed.append)
-    made.ctx = SimpleNamespace(clock=clock, stop=stop, arm=SimpleNamespace(hold=lambda why: made.hold))
-    made.states, made.transitions, made.results, made.spoken = "states", "transitions", "results", "spoken"
-    made.result_file = str(tmp_path / "results.jsonl")
-    made.stamps = SimpleNamespace(stamp=lambda steady: rospy.Time.from_sec(steady + 1000.0))
-    made.module = module
-    return made
+def test_what_is_learnt_is_written_and_used(node):
+    assert answered(node, BEGIN)[:2] == (True, ReasonCode.NONE)
+    success, code, sentence = answered(node, END)
+    assert (success, code) == (True, ReasonCode.NONE) and node.learnt_file in sentence
+    assert Thresholds.load(Path(node.learnt_file)).limit == Thresholds.load(SHIPPED).limit
+    assert node.moving.use.called and node.recorder is None
+    assert answered(node, END)[1] == ReasonCode.NOTHING_RUNS
 
 
-def test_a_deadline_of_the_steady_clock_is_told_in_the_clock_of_ros(master):
-    for deadline, told in ((0.0, 0.0), (103.5, 53.5), (99.0, 50.001)):
-        master.on_state(MasterState("s", True, ("a", "b"), "mug", "why", 3, "rain", 4, deadline))
-        message = master.sent[-1][1]
-        assert message.deadline.to_sec() == pytest.approx(told, abs=1e-6)
-    assert (message.state, message.in_hub, message.actions, message.object_id) == ("s", True, ["a", "b"], "mug")
-    assert (message.why, message.reason_code, message.waits_for, message.waits_code) == ("why", 3, "rain", 4)
+def test_without_a_file_nothing_is_gathered(node):
+    node.learnt_file = ""
+    success, code, sentence = answered(node, BEGIN)
+    assert (success, code, node.recorder) == (False, ReasonCode.BAD_FILE, None)
+    assert "~learnt_file" in sentence and "contact_learnt_file:=" in sentence
 
 
-def test_stop_is_latched_whatever_the_arm_answers(master):
-    master.hold = Ready("held")
-    answer = master.on_stop(None)
-    assert answer.success and answer.message == "STOP: held; to go on type: ./coglab start reset"
-    master.hold = Polled(lambda: master.now > 101.0, lambda: "held")
-    assert master.on_stop(None).success
-    master.hold, begin = Polled(lambda: False, lambda: None), master.now
-    answer = master.on_stop(None)
-    assert not answer.success and "did not answer within 2 s: use the emergency stop" in answer.message
-    assert master.now - begin == pytest.approx(2.0, abs=0.006)
-    master.hold = Ready(error=PortError("no line"))
-    answer = master.on_stop(None)
-    assert not answer.success and answer.message == "STOP is latched in the machine, but: no line"
-    assert len(master.pressed) == 4
+@pytest.mark.parametrize("place, words", [("", "is a folder"), ("none/learnt.yaml", "is not there")])
+def test_a_file_that_cannot_be_is_refused_before_anything_is_gathered(node, tmp_path, place, words):
+    node.learnt_file = str(tmp_path / place)
+    success, code, sentence = answered(node, BEGIN)
+    assert (success, code, node.recorder) == (False, ReasonCode.BAD_FILE, None)
+    assert words in sentence and str(tmp_path) in sentence and "\n" not in sentence
 
 
-def test_transitions_and_results_are_told_and_written(master):
-    for outcome, level in (
-        ("succeeded", "loginfo"),
-        ("failed", "logwarn"),
-        ("fault", "logwarn"),
-        ("stopped", "logwarn"),
-    ):
-        master.on_transition(TransitionRecord(1.0, "/m", "a", outcome, "b", "why", ("c",), 4))
-        assert master.sent[-1][0] == level
-    told = master.sent[-2][1]
-    assert (told.path, told.from_state, told.outcome, told.to_state) == ("/m", "a", "stopped", "b")
-    assert (told.reason, list(told.causes), told.reason_code) == ("why", ["c"], 4)
-    record = ActionRecord("take", "mug", 1.0, 3.5, "succeeded")
-    master.on_result(record)
-    master.on_result(record)
-    lines = Path(master.result_file).read_text().splitlines()
-    row = json.loads(lines[0])  # beside bags, and beside videos and questionnaires
-    assert (row["started_ros"], row["ended_ros"]) == (1001.0, 1003.5) and row["ended_utc"] > row["started_utc"]
-    assert len(lines) == 2 and row["duration_s"] == 2.5 and master.sent[-1][1].data == lines[0]
-    master.result_file = str(Path(master.result_file).parent)
-    master.on_result(record)
-    assert master.sent[-1][0] == "logerr"
-    master.result_file = ""
-    master.on_result(record)
-    assert master.sent[-1][0] == "results"
-    assert ActionRecord("take", "mug", 1.0).to_dict() == {
-        **{"kind": "take", "object_id": "mug", "outcome": "", "reason": "", "reason_code": 0, "causes": []},
-        **{"started": 1.0, "ended": 0.0, "duration_s": -1.0, "marks": {}},
-    }
+def test_what_was_gathered_outlives_a_file_that_was_not_written(node, tmp_path):
+    """The folder is gone meanwhile: it can be made again, the motions cannot."""
+    node.learnt_file = str(tmp_path / "gone" / "learnt.yaml")
+    (tmp_path / "gone").mkdir()
+    answered(node, BEGIN)
+    gathering = node.recorder
+    (tmp_path / "gone").rmdir()
+    success, code, sentence = answered(node, END)
+    assert (success, code) == (False, ReasonCode.BAD_FILE) and "call again" in sentence
+    assert node.recorder is gathering and not node.moving.use.called
+    (tmp_path / "gone").mkdir()
+    assert answered(node, END)[:2] == (True, ReasonCode.NONE)
 
 
-def test_what_is_held_is_noted_in_one_file_for_each_namespace(master, monkeypatch):
-    read = {"~state_file": ""}
-    monkeypatch.setattr(master.module.parameters, "read", lambda name, kind, default: read[name])
-    monkeypatch.setattr(master.module.rospkg, "get_ros_home", lambda: "/home/ros")
-    for namespace, name in (("/", "coglab_holding.json"), ("/two/arms/", "coglab_holding_two_arms.json")):
-        monkeypatch.setattr(rospy, "get_namespace", lambda namespace=namespace: namespace)
-        assert master.state_file() == f"/home/ros/{name}"
-    read["~state_file"] = "own.json"
-    assert master.state_file() == "own.json"
+def test_a_file_or_folder_that_may_not_be_written(tmp_path, monkeypatch):
+    file = tmp_path / "learnt.yaml"
+    assert unwritable(str(file)) == ""
+    monkeypatch.setattr("os.access", lambda path, mode: False)
+    assert "may not be written" in unwritable(str(file)), "the folder"
+    file.write_text("")
+    assert f"{file} may not be written" in unwritable(str(file))
 
 
-@pytest.mark.parametrize("name", ["master_node", "contact_detector_node"])
-def test_a_node_that_cannot_be_configured_ends_with_status_1(monkeypatch, name):
-    module, said = script(name), []
-    monkeypatch.setattr(rospy, "init_node", lambda name: None)
-    monkeypatch.setattr(rospy, "spin", lambda: said.append("spin"))
+def stamped(message, secs, nsecs=0):
+    """Such a message."""
+    message.header.stamp = rospy.Time()
+    message.header.stamp.secs, message.header.stamp.nsecs = secs, nsecs
+    return message
+
+
+def test_the_last_stamp_is_not_rounded_to_one_beyond_it(node):
+    node.on_torques(stamped(JointState(effort=[0.0] * 7), 2**32 - 1, 999_999_999))
+    assert node.last_sample is None
+
+
+@pytest.mark.parametrize("callback", ["on_joints", "on_torques", "on_hand", "on_touch"])
+@pytest.mark.parametrize("secs, taken", [(2**32 - 1, True), (2**32, False)])
+def test_a_stamp_that_no_message_can_carry_is_refused(node, callback, secs, taken):
+    node.position, node.velocity = ZERO, ZERO
+    message = {
+        "on_joints": JointState(name=JOINTS, position=ZERO, velocity=ZERO, effort=ZERO),
+        "on_torques": JointState(effort=ZERO),
+        "on_hand": HandStatus(),
+        "on_touch": FingertipForces(),
+    }[callback]
+    getattr(node, callback)(stamped(message, secs))
+    assert bool(node.detector.fed) is taken and len(node.said) == (not taken)
+
+
+def test_without_a_robot_description_or_with_a_bad_parameter_it_ends_with_status_1(monkeypatch):
+    module, said = script(), []
+    monkeypatch.setattr(module, "init_node", lambda name: None)
     monkeypatch.setattr(rospy, "logfatal", lambda *words: said.append(words))
-    monkeypatch.setattr(module.parameters, "found_above", lambda name, kind: "<robot/>")
-    kind = module.MasterNode if name == "master_node" else module.ContactDetectorNode
+    monkeypatch.setattr(module.parameters, "found_above", lambda name, kind: None)
+    assert module.main() == 1 and "robot_description" in said[-1][0]
 
     def bad(*_):
         raise module.parameters.ParameterError("no")
 
-    monkeypatch.setattr(kind, "__init__", bad)
-    assert module.main() == 1 and len(said) == 1
-    monkeypatch.setattr(kind, "__init__", lambda *_: None)
-    monkeypatch.setattr(kind, "run", lambda self: None, raising=False)
-    assert module.main() == 0
-    if name == "contact_detector_node":
-        monkeypatch.setattr(module.parameters, "found_above", lambda name, kind: None)
-        assert module.main() == 1 and "robot_description" in said[-1][0]
-
-
-# --- objects ----------------------------------------------------------------------------------------------------------
-
-
-def test_the_objects_tool_tells_by_its_exit_status_how_it_went(monkeypatch, tmp_path, capsys):
-    tool = script("object_tool")
-    run = lambda *words: (monkeypatch.setattr("sys.argv", ["object_tool", *words]), tool.main())[1]  # noqa: E731
-    folder = ("--folder", str(tmp_path))
-    assert run("list") == 0 and "mug" in capsys.readouterr().out
-    assert run(*folder, "new", "no name!") == 2 and not list(tmp_path.iterdir())
-    assert run(*folder, "new", "cup") == 0 and run(*folder, "new", "cup") == 1
-    (tmp_path / "bad.yaml").write_text("id: bad\n")
-    capsys.readouterr()
-    assert run(*folder, "list") == 1 and "bad.yaml" in capsys.readouterr().err
-    monkeypatch.setattr(tool, "reachability_report", lambda entry: [("a line", entry["id"] != "mug")])
-    assert run(*folder, "check") == 1 and "1 problems" in capsys.readouterr().out
-    assert run(*folder, "check", "cup") == 0 and "all fine" in capsys.readouterr().out
-    (tmp_path / "mug.yaml").write_text((objects_folder() / "mug.yaml").read_text())
-    assert run(*folder, "check", "mug") == 1 and "  a line" in capsys.readouterr().out
-    assert run(*folder, "check", "mug", "bad") == 1 and "2 problems" in capsys.readouterr().out
+    monkeypatch.setattr(module.parameters, "found_above", lambda name, kind: "<robot/>")
+    monkeypatch.setattr(module.ContactDetectorNode, "__init__", bad)
+    assert module.main() == 1 and len(said) == 2

@@ -9,11 +9,10 @@ from coglab_smach.ports.pending import Pending
 from coglab_smach.states.hand_tracking import palm_at, palm_axis
 from coglab_smach.states.motion import shift
 
-LEAST_WAY = 0.005
-"""m, a shorter way is not begun"""
+LEAST_WAY = 0.005  # m, a shorter way is not begun
 
 
-class GivesWay:
+class YieldToPull:
     """The one motion of an arm that stands beside a person: what a state wants (``begin``), until somebody pulls; then
     the palm goes along with the pull (``follow``, called again and again), by ``pull.way`` m in all at most.
 
@@ -26,12 +25,9 @@ class GivesWay:
         self._ctx = ctx
         self._motion: Pending | None = None
         self._ending: Pending | None = None
-        self._from: np.ndarray | None = None
-        """m, where the palm was when it began to give way; None while it does not"""
-        self._went = np.zeros(3)
-        """m, by which it has"""
-        self._since: float | None = None
-        """s, since when somebody pulls"""
+        self._from: np.ndarray | None = None  # m, where the palm was when it began to give way; None while it does not
+        self._went = np.zeros(3)  # m, by which it has
+        self._since: float | None = None  # s, since when somebody pulls
 
     def _number(self, name: str) -> float:
         return self._ctx.config.number(f"pull.{name}")

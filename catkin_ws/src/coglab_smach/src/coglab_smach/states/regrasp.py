@@ -14,15 +14,13 @@ from coglab_smach.states.base import CoglabState, TimeLimit
 from coglab_smach.states.hand_tracking import way_to_grasp
 from coglab_smach.states.motion import shift, shift_time
 
-FARTHEST, LEAST = 0.05, 0.005
-"""m, most that the palm goes; and a shorter way is not begun"""
-SPEED = 0.06
-"""m/s"""
-PUSHES = 6.5
-"""N on the palm from which something is in its way"""
+FARTHEST = 0.05  # m that the palm goes at most
+LEAST = 0.005  # m, a shorter way is not begun
+SPEED = 0.06  # m/s
+PUSHES = 6.5  # N on the palm from which something is in its way
 
 
-class Seat(CoglabState):
+class Regrasp(CoglabState):
     """Move the open hand straight to the grasp of the object that a person still holds, as it is seen now and by
     FARTHEST m at most. A reach ends with the first touch, and that may come beside the grasp; another reach would feel
     the same touch at once. The way ends where the hand pushes, or in time. Without a sight of the object nothing moves.

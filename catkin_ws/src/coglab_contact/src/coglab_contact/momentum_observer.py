@@ -21,16 +21,14 @@ import numpy as np
 Joints = Sequence[float] | np.ndarray
 """seven numbers, one for each joint in wire order"""
 
-LONGEST_GAP = 0.05
-"""s between two samples that the observer bridges; after a longer one it begins anew"""
+LONGEST_GAP = 0.05  # s between two samples that the observer bridges; after a longer one it begins anew
 SILENCE = 1.0
 """s without a sample, after which the robot may have begun a new session, whose time does not follow the old one"""
 BESIDE = 0.4
 """periods by which a stamp may lie beside the grid of the measurements; farther away nobody can say how many have
 passed, and one too many or too few would look like a push"""
-JUMP, DOUBTS = 12.0, 2
-"""Nm by which the external torque of one sample differs from the estimate where a stamp may be wrong: such samples are
-left out, but no more of them in a row than this, because what stays is a hit"""
+JUMP = 12.0  # Nm by which one sample differs from the estimate if its stamp may be wrong: it is left out
+DOUBTS = 2  # such samples in a row at most: what stays is a hit
 
 
 class Terms(Protocol):

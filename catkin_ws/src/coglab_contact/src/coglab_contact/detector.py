@@ -19,19 +19,20 @@ from dataclasses import dataclass, field
 import numpy as np
 from coglab_msgs.msg import ReasonCode
 
-from coglab_smach.contact.rest import RestTorque
-from coglab_smach.ports.interfaces import ContactEvent
+from coglab_contact.evidence import ContactEvent
+
+JOLT = 0.02  # rad that a joint moves at most when somebody pushes an arm that rests, or lets go of it
+REMEMBERED = 0.25
+"""s over which what is felt at rest is averaged, whatever the period: so long a push on the resting arm is not
+forgotten"""
 
 Joints = Sequence[float] | np.ndarray
 """seven numbers, one for each joint in wire order"""
 
 GRAVITY = 9.81
-MAD_TO_SIGMA = 1.4826
-"""Standard deviation of normal noise per median absolute deviation."""
-LARGEST = 1e4
-"""Nm, rad, rad/s: no number of an arm is larger"""
-LONGEST_STEP = 1.0
-"""s between two samples that follow each other"""
+MAD_TO_SIGMA = 1.4826  # Standard deviation of normal noise per median absolute deviation
+LARGEST = 1e4  # Nm, rad, rad/s: no number of an arm is larger
+LONGEST_STEP = 1.0  # s between two samples that follow each other
 
 
 @dataclass
@@ -126,6 +127,40 @@ class _Armed:
         self.baseline, self.over = None, 0
 
 
+class RestTorque:
+    """Joint torques (Nm) at rest. Who pushes an arm at rest and lets go of it jolts it; that is no motion, and what it
+    felt between is no rest without a touch."""
+
+    def __init__(self) -> None:
+        self.before_motion: np.ndarray | None = None
+        """at the last rest before a motion that was more than a jolt; None: there was none"""
+        self._here: np.ndarray | None = None
+        self._left: np.ndarray | None = None
+        self._travelled: np.ndarray | None = None  # rad, since the rest that was left; None: at rest
+
+    def move(self, gap: float, velocity: Sequence[float] | np.ndarray) -> None:
+        """The arm moves (rad/s), ``gap`` s after the sample before."""
+        if self._travelled is None:
+            self._left, self._travelled = self._here, np.zeros(7)
+        self._travelled = self._travelled + gap * np.asarray(velocity)
+        if self._left is not None and self.travels:
+            self.before_motion = self._left
+
+    @property
+    def travels(self) -> bool:
+        """Whether it is on a motion that is more than a jolt."""
+        return self._travelled is not None and bool(np.abs(self._travelled).max() > JOLT)
+
+    def stand(self) -> None:
+        """It has just come to a stop."""
+        self._here = self._travelled = None
+
+    def learn(self, torque: np.ndarray, gap: float) -> None:
+        """What it feels now, having stood for a while, ``gap`` s after the sample before."""
+        share = min(1.0, gap / REMEMBERED)
+        self._here = torque if self._here is None else self._here + share * (torque - self._here)
+
+
 class ContactDetector:
     """Feed it every torque sample; it answers with at most one event per arming. Times in s on one clock."""
 
@@ -137,8 +172,7 @@ class ContactDetector:
         self._history: deque[tuple[float, np.ndarray]] = deque()
         self._rest_differences: deque[np.ndarray] = deque(maxlen=400)
         self._last_stamp: float | None = None
-        self._odd_stamp: float | None = None
-        """of the last sample that did not follow the one before it"""
+        self._odd_stamp: float | None = None  # of the last sample that did not follow the one before it
         self._still_since: float | None = None
         self._rest, self._gap = RestTorque(), 0.0  # the latter in s, between the last two samples
         self._unloaded: np.ndarray | None = None

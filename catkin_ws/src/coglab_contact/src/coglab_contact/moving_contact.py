@@ -1,28 +1,31 @@
-"""Contact from the torques of an arm that moves: momentum observer, its change, thresholds that were learnt."""
+"""Contact from the torques of an arm that moves: momentum observer, its change, thresholds, and how to learn them."""
 
 from __future__ import annotations
 
+import os
 from collections import deque
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 from coglab_py.pose import length
 
-from coglab_smach.contact.evidence import MOMENTUM, Evidence
-from coglab_smach.contact.momentum_observer import Dynamics, Joints, MomentumObserver, Residual
-from coglab_smach.contact.motion_thresholds import CONFIRM, Change, ChangeOfResidual, Offset, Thresholds
-from coglab_smach.contact.rest import REMEMBERED
+from coglab_contact.detector import REMEMBERED
+from coglab_contact.evidence import MOMENTUM, Evidence
+from coglab_contact.momentum_observer import Dynamics, Joints, MomentumObserver, Residual
+from coglab_contact.motion_thresholds import CONFIRM, Change, ChangeOfResidual, Offset, Thresholds, learn
 
-HOLD = 0.03
-"""s for which one sample counts"""
-STILL = 0.02
-"""rad/s; a joint faster than this is motion"""
-SLOW, GENTLE = 0.15, 1.0
-"""rad/s and rad/s^2 of the fastest joint"""
-SETTLED = 0.25
-"""s of stillness before the residual is taken as that of a free arm"""
-LEAD, GROWTH = 0.03, 0.02
-"""s by which a force is told ahead, about the observer's own delay, and s over which it is seen to grow"""
+HOLD = 0.03  # s for which one sample counts
+STILL = 0.02  # rad/s; a joint faster than this is motion
+SLOW = 0.15  # rad/s of the fastest joint
+GENTLE = 1.0  # rad/s^2
+SETTLED = 0.25  # s of stillness before the residual is taken as that of a free arm
+LEAD = 0.03  # s by which a force is extrapolated: about the observer's own delay
+GROWTH = 0.02  # s over which its growth is measured
+
+
+SHORTEST = 40  # samples of a motion that counts
+LONGEST = 4000  # samples of one that is kept; what follows belongs to the next
 
 
 class MovingContact:
@@ -52,10 +55,8 @@ class MovingContact:
         self._free: np.ndarray | None = None
         """mean residual of the rest before the motion, or of this one while the arm has not moved"""
         self._rest_position, self._rest_stamp = np.zeros(7), 0.0
-        self._free_weight: float | None = None
-        """N on the palm then"""
-        self._growing: deque[tuple[float, np.ndarray]] = deque()
-        """s and Nm: the residuals of the last GROWTH"""
+        self._free_weight: float | None = None  # N on the palm then
+        self._growing: deque[tuple[float, np.ndarray]] = deque()  # s and Nm: the residuals of the last GROWTH
 
     def use(self, thresholds: Thresholds) -> None:
         """These thresholds, and the lag of the torques that was learnt with them, from now on."""
@@ -180,3 +181,58 @@ class MovingContact:
         message = f"{length(force):.1f} N on the hand, {size:.0f} deviations of the moving arm's"
         stamp = self.change.stamp
         return Evidence(MOMENTUM, stamp, stamp + HOLD, sure / self.thresholds.limit, message)
+
+
+def unwritable(file: str) -> str:
+    """Why what is learnt cannot be written to this file, in a sentence; empty where it can. The file is not touched: an
+    empty one would be read at the next start."""
+    path = Path(file)
+    if path.is_dir():
+        return f"{path} is a folder: name a file in it"
+    if path.exists():
+        return "" if os.access(path, os.W_OK) else f"{path} may not be written"
+    folder = path.absolute().parent
+    if not folder.is_dir():
+        return f"{path} cannot be written, for the folder {folder} is not there: create it"
+    return "" if os.access(folder, os.W_OK) else f"{path} cannot be written, for the folder {folder} may not be written"
+
+
+class MotionRecorder:
+    """Look at a MovingContact after each sample; nobody touches the arm meanwhile."""
+
+    def __init__(self, moving: MovingContact) -> None:
+        self.moving = moving
+        self.reaches: list[list[Change]] = []
+        self.offsets: list[Offset] = []
+        self._reach: list[Change] = []
+        self._stamp = 0.0
+
+    def look(self) -> None:
+        """After each sample of the arm: one motion lasts from rest to rest."""
+        change = self.moving.change
+        if change is None or change.stamp == self._stamp:
+            return
+        self._stamp = change.stamp
+        self._reach.append(change)
+        resting = self.moving.still()
+        if len(self._reach) >= LONGEST or (resting and self._moved()):
+            self.end()
+        elif resting:
+            # Of the rest before a motion its last moment belongs to it: the stop of the one before does not.
+            self._reach = self._reach[-SHORTEST:]
+
+    def _moved(self) -> bool:
+        return max(change.features[0, 1] for change in self._reach) > 0.1
+
+    def end(self) -> None:
+        """The motion is over, or has lasted long enough."""
+        if len(self._reach) >= SHORTEST and self._moved():
+            self.reaches.append(self._reach)
+            offset = self.moving.offset_of_motion()
+            if offset is not None and self.moving.load == 0.0:
+                self.offsets.append(offset)
+        self._reach = []
+
+    def learn(self) -> Thresholds:
+        """From what was gathered. ThresholdError where that is too little."""
+        return learn(self.reaches, self.offsets, lag=self.moving.thresholds.lag)

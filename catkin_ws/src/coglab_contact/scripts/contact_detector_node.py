@@ -4,7 +4,7 @@
 Subscribes lwr/external_torques (effort, Nm), lwr/joint_states (with measured torques as effort), lwr/state (FRI
 period), ih2_hand/hand_status and ih2_hand/fingertip_forces (~tactile_topic; nobody has to publish it); names are
 relative; and tf2 for the object that is reached for. Parameters: perception/frames; private: the fields of
-coglab_smach.contact.detector.DetectorSettings; robot_description is read
+coglab_contact.detector.DetectorSettings; robot_description is read
 for Jacobian and dynamics; ~thresholds_file: of the moving arm, learnt in simulation; ~learnt_file: where
 ~learn_motion writes what this robot's own motions tell, and from where it is read at the next start.
 Publishes at 20 Hz ~margin (std_msgs/Float64) while watching, ~signal (coglab_msgs/ContactSignal) while torques come;
@@ -26,6 +26,11 @@ import coglab_controllers as cc
 import numpy as np
 import rospy
 import tf2_ros
+from coglab_contact.detector import ContactDetector, DetectorSettings
+from coglab_contact.fused_detector import IN_MOTION, LIFT, RELEASE, FusedDetector
+from coglab_contact.load import GripAndLoad
+from coglab_contact.motion_thresholds import ThresholdError, Thresholds
+from coglab_contact.moving_contact import MotionRecorder, MovingContact, unwritable
 from coglab_msgs.msg import Contact, ContactSignal, FingertipForces, HandStatus, LwrState, ReasonCode
 from coglab_msgs.srv import ArmContact, ArmContactResponse, Learn, LearnMotion, LearnMotionResponse, LearnResponse
 from coglab_perception.frames import FrameNames, FramesError
@@ -35,24 +40,15 @@ from coglab_py.alone import init_node
 from coglab_py.pace import Pace
 from coglab_py.packages import package_path
 from coglab_py.pose import Pose
+from coglab_py.publish import can_be_sent, publish
 from coglab_py.yaml_file import YamlError
-from coglab_smach.contact.detector import ContactDetector, DetectorSettings
-from coglab_smach.contact.fused_detector import IN_MOTION, LIFT, RELEASE, FusedDetector
-from coglab_smach.contact.grip_and_load import GripAndLoad
-from coglab_smach.contact.learning import MotionRecorder, unwritable
-from coglab_smach.contact.motion_thresholds import ThresholdError, Thresholds
-from coglab_smach.contact.moving_contact import MovingContact
-from coglab_smach.ros.publish import can_be_sent, publish
 from geometry_msgs.msg import Vector3, Vector3Stamped
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
-FORCE_PERIOD = 0.009
-"""s between two messages of ~force, at least"""
-OLDEST_SIGHT = 0.15
-"""s, older sights of an object do not tell whether it is in the palm"""
-SIGNAL = 0.01
-"""s between two messages on ~signal at least"""
+FORCE_PERIOD = 0.009  # s between two messages of ~force, at least
+OLDEST_SIGHT = 0.15  # s, older sights of an object do not tell whether it is in the palm
+SIGNAL = 0.01  # s between two messages on ~signal at least
 
 
 def made_at(message: JointState) -> float | None:
@@ -125,7 +121,7 @@ class ContactDetectorNode:
 
     def thresholds(self) -> Thresholds:
         """Those that this robot has learnt, else those that come with the package."""
-        shipped = str(package_path("coglab_smach", "config", "contact_thresholds.yaml"))
+        shipped = str(package_path("coglab_contact", "config", "contact_thresholds.yaml"))
         file = Path(parameters.read("~thresholds_file", str, shipped))
         if self.learnt_file and Path(self.learnt_file).is_file():
             file = Path(self.learnt_file)

@@ -25,7 +25,7 @@ import yaml
 from coglab_py.yaml_file import read
 from scipy.optimize import nnls
 
-from coglab_smach.contact.momentum_observer import Residual
+from coglab_contact.momentum_observer import Residual
 
 FEATURES = (
     "constant",
@@ -38,26 +38,18 @@ FEATURES = (
 """what a variance (Nm^2) grows with: 1, v (rad/s, fastest joint, over what the residual remembers), v^2, the same over
 the moment ago that the residual is compared with, a^2 (rad/s^2, fastest changing joint), and, joint by joint, the
 square of the change (Nm) in what the payload told needs to be carried and accelerated"""
-FLOOR = 1e-4
-"""Nm^2, smallest variance believed: a noise-free simulation must not alarm on rounding"""
-RECENT, OLD = 0.10, 0.60
-"""s: the change is counted from the mean between so long ago and so long ago"""
-LATELY = 0.25
-"""s: an offset is of the mean between RECENT and so long ago"""
-MEMORY = 0.025
-"""s over which speeds and the torque of the load are averaged, about the time constant of the residual"""
-LEAST = 20
-"""samples of that mean"""
-CONFIRM = 2
-"""samples in a row over the limit"""
-ALARM_SHARE = 2e-3
-"""probability with which a reach without contact may exceed the limit"""
+FLOOR = 1e-4  # Nm^2, smallest variance believed: a noise-free simulation must not alarm on rounding
+RECENT = 0.10  # s; the change is counted from the mean of the samples between RECENT
+OLD = 0.60  # s and OLD ago
+LATELY = 0.25  # s: an offset is of the mean between RECENT and so long ago
+MEMORY = 0.025  # s over which speeds and the torque of the load are averaged, about the time constant of the residual
+LEAST = 20  # samples of that mean
+CONFIRM = 2  # samples in a row over the limit
+ALARM_SHARE = 2e-3  # probability with which a reach without contact may exceed the limit
 EULER = 0.5772156649015329
 AXES = np.eye(3)
-WEIGHT = np.array([0.0, 0.0, 9.81])
-"""m/s^2 that carrying needs, base frame"""
-LONGEST_LAG = 0.01
-"""s of lag that is believed"""
+WEIGHT = np.array([0.0, 0.0, 9.81])  # m/s^2 that carrying needs, base frame
+LONGEST_LAG = 0.01  # s of lag that is believed
 
 
 class ThresholdError(ValueError):

@@ -17,11 +17,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from coglab_msgs.msg import ReasonCode
 
-from coglab_smach.contact.detector import ContactDetector, Joints, Signal
-from coglab_smach.contact.evidence import (
+from coglab_contact.detector import ContactDetector, Joints, Signal
+from coglab_contact.evidence import (
     DECIDED,
     FUSED,
     MOMENTUM,
+    ContactEvent,
     Evidence,
     Fingers,
     InPalm,
@@ -31,21 +32,16 @@ from coglab_smach.contact.evidence import (
     probability,
     together,
 )
-from coglab_smach.contact.grip_and_load import GripAndLoad
-from coglab_smach.contact.leaving_load import LeavingLoad
-from coglab_smach.contact.moving_contact import MovingContact
-from coglab_smach.ports.interfaces import ContactEvent
+from coglab_contact.load import GripAndLoad, LeavingLoad
+from coglab_contact.moving_contact import MovingContact
 
 IN_MOTION = "contact_in_motion"
 LIFT = "lift"
 RELEASE = "release"
 GRAVITY = 9.81
-SETTLING = 0.10
-"""s after arming over which the residual is averaged that a weight is counted from"""
-CARRIED = 0.06
-"""s for which the weight has to be there"""
-HELD_CENTRE = (0.04, 0.0, 0.0)
-"""m in ih2_palm: about where the fingers hold an object"""
+SETTLING = 0.10  # s after arming over which the residual is averaged that a weight is counted from
+CARRIED = 0.06  # s for which the weight has to be there
+HELD_CENTRE = (0.04, 0.0, 0.0)  # m in ih2_palm: about where the fingers hold an object
 
 
 @dataclass
@@ -80,8 +76,7 @@ class FusedDetector:
         self._lift: _Lift | None = None
         self._leaving: LeavingLoad | None = None
         self._until: float | None = None
-        self._first = False
-        """nothing was looked at yet since arming"""
+        self._first = False  # nothing was looked at yet since arming
         self._evidence: dict[str, Evidence] = {}
         self._mass = 0.0
         self._before_reach: np.ndarray | None = None
@@ -100,12 +95,13 @@ class FusedDetector:
     ) -> None:
         """As ContactDetector.arm, with the modes IN_MOTION and LIFT besides. ValueError says what is wrong with the
         request."""
+        request = (mode, now, timeout, k, joints, mass, load_share)
         if mode in (IN_MOTION, LIFT) and self.moving is None:
             raise ValueError(f"{mode} needs a model of the arm and learnt thresholds, and there are none")
         leaving = None
         if mode == RELEASE and self.moving is not None:
             # Armed too, so that it does not learn what a hand that takes the load does; its own event is not told.
-            self.still.arm(mode, now, timeout, k, joints, mass, load_share)
+            self.still.arm(*request)
             share = load_share if load_share > 0.0 else self.still.settings.load_share
             leaving = LeavingLoad(mass, share, now + timeout, self.moving.weight_before_motion())
             self._lift = None
@@ -116,8 +112,7 @@ class FusedDetector:
             self._lift = _Lift((load_share if load_share > 0.0 else self.still.settings.load_share) * mass * GRAVITY)
         else:
             carries = mode == IN_MOTION and self.moving is not None and self.moving.load > 0.0
-            watched = "contact" if mode == IN_MOTION else mode
-            self.still.arm(watched, now, timeout, k, joints, mass, load_share, carries)
+            self.still.arm("contact" if mode == IN_MOTION else mode, *request[1:], carries)
             self._lift = None
         if mode == IN_MOTION and self.moving is not None:
             self._before_reach = self.moving.before_motion()

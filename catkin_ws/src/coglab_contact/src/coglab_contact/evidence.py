@@ -18,14 +18,26 @@ TACTILE = "tactile"
 FINGERS = "finger_motor"
 SIGHT = "sight"
 FUSED = "fused"
-DECIDED = 0.99
-"""probability from which it is a contact; a source at its threshold reaches it alone"""
-STEEPNESS = 12.0
-"""logits per unit of margin: at 0.8 of its threshold a source says 0.9, at 0.6 even chances"""
-SLOW = 0.03
-"""m/s of the palm below which what is seen in it stays there"""
-SPEAKS_TOO = 0.5
-"""a source that is this sure is named beside the surest one"""
+DECIDED = 0.99  # probability from which it is a contact; a source at its threshold reaches it alone
+STEEPNESS = 12.0  # logits per unit of margin: at 0.8 of its threshold a source says 0.9, at 0.6 even chances
+SLOW = 0.03  # m/s of the palm below which what is seen in it stays there
+SPEAKS_TOO = 0.5  # a source that is this sure is named beside the surest one
+
+
+@dataclass(frozen=True)
+class ContactEvent:
+    """Contact found (contact=True) or load released (False), as coglab_msgs/Contact has it.
+
+    ``margin`` is the signal over its threshold, ``confidence`` the probability that the signal is over its threshold
+    given the noise of the sensor (0..1), ``code`` the ReasonCode of the message.
+    """
+
+    contact: bool
+    source: str
+    margin: float
+    message: str = ""
+    confidence: float = 1.0
+    code: int = 0
 
 
 @dataclass(frozen=True)
