@@ -9,6 +9,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+OPTIONAL = {
+    "browser": "no browser is installed (only needed to test the console)",
+    "viz": "rviz is not installed (only needed where there is a screen)",
+    "docs": "Sphinx is not installed (only needed to build the documentation site)",
+    "film": "nothing is installed to draw pictures without a screen (only needed for ./coglab film)",
+}
+
 
 def package_groups(top: Path) -> dict[str, list[str]]:
     """Groups of debian-packages.txt with their packages."""
@@ -53,10 +60,8 @@ def package_findings(top: Path) -> list[tuple[bool, str]]:
     for group, packages in package_groups(top).items():
         there = installed(packages)
         missing = [package for package in packages if package not in there]
-        if missing and group == "browser":
-            result.append((True, "no browser is installed (only needed to test the console): ./coglab install browser"))
-        elif missing and group == "viz":
-            result.append((True, "rviz is not installed (only needed where there is a screen): ./coglab install viz"))
+        if missing and group in OPTIONAL:
+            result.append((True, f"{OPTIONAL[group]}: ./coglab install {group}"))
         elif missing:
             result.append(
                 (False, f"packages to {group}: missing {' '.join(missing)}; get them: ./coglab install {group}")
