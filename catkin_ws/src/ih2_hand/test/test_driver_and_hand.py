@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from ih2_hand.errors import HandCalibrationError, HandInconsistentError
-from ih2_hand.wire_choices import TABLE, WIRE, as_markdown
+from ih2_hand.wire_choices import TABLE, WIRE
 
 
 def test_postures_are_spaced(make_bench):
@@ -115,10 +115,3 @@ def test_every_wire_choice_is_there_once():
     names = [choice.name for choice in TABLE]
     assert len(set(names)) == len(names)
     assert len(WIRE.resync_filler) == 13 and set(WIRE.resync_filler) == {0x41}
-
-
-def test_readme_shows_the_table_of_wire_choices():
-    from pathlib import Path
-
-    readme = Path(__file__).resolve().parents[1] / "README.md"
-    assert as_markdown() in readme.read_text(encoding="utf-8")
