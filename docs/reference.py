@@ -9,7 +9,6 @@ import re
 import subprocess
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
-from importlib.util import find_spec
 from pathlib import Path
 
 COMMANDS = ("demo", "test", "bench", "launch", "film")  # of ./coglab, those with a --help
@@ -92,8 +91,7 @@ def cell_parameters(_top: Path) -> str:
         return f"{row['low']:g} .. {row['high']:g}" if row["low"] != row["high"] else ""
 
     rows = (
-        (code(r["name"]), code(r["default"]), span(r), r["unit"], r["source"], r["description"])
-        for r in _cell.parameter_table()
+        (code(r["name"]), code(r["default"]), span(r), r["unit"], r["source"], r["text"]) for r in _cell.parameters()
     )
     about = (
         "Private parameters of the node `/coglab_sim/cell`, and names for `coglab_sim._cell.Cell`. Source: `published` "
@@ -195,8 +193,6 @@ PAGES = {
     "wire_choices": wire_choices,
     "console_commands": console_commands,
 }
-if find_spec("coglab_smach.parameters") is None:  # a branch without that table
-    del PAGES["machine_parameters"]
 
 
 def write(top: Path, folder: Path) -> None:
