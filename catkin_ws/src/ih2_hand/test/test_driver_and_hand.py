@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 from ih2_hand.clock import SteppedClock
 from ih2_hand.driver import HandSerialDriver
@@ -17,7 +15,6 @@ from ih2_hand.errors import (
     HandInconsistentError,
     HandPortError,
 )
-from ih2_hand.wire_choices import as_markdown
 
 
 def test_postures_are_spaced(make_bench):
@@ -115,11 +112,6 @@ def test_resting_hand_is_asked_once_for_each_value(bench):
     bench.sent()
     bench.driver.read_motors()
     assert len(bench.sent().split()) == 5 * 6 + 4
-
-
-def test_readme_shows_the_table_of_wire_choices():
-    readme = Path(__file__).resolve().parents[1] / "README.md"
-    assert as_markdown() in readme.read_text(encoding="utf-8")
 
 
 def link_that_loses(count: int) -> VirtualLink:

@@ -50,6 +50,20 @@ def demo_parser(top: Path) -> Parser:
     return parser
 
 
+def film_parser(top: Path) -> Parser:
+    """./coglab film"""
+    parser = Parser(prog="coglab film", description="A moving picture of a handover in both directions.")
+    parser.add_argument("--seed", type=seed, default=7, help="seed of the virtual person and of all noise")
+    parser.add_argument(
+        "--out",
+        type=writable_file,
+        default=top / "docs" / "images" / "handover.gif",
+        metavar="FILE",
+        help="the GIF (default: docs/images/handover.gif)",
+    )
+    return parser
+
+
 def package_folders(sources: Path) -> dict[str, Path]:
     """Folder of each package of the workspace by name."""
     found = {}
@@ -252,6 +266,8 @@ def judge(top: Path, command: str, words: list[str]) -> None:
     """Raises Refused for arguments that the command cannot use."""
     if command == "demo":
         demo_parser(top).parse_args(words)
+    elif command == "film":
+        film_parser(top).parse_args(words)
     elif command == "test":
         test_options(top, words)
     elif command == "bench":

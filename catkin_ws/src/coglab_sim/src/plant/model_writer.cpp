@@ -229,6 +229,7 @@ class Writer {
       // Priority: the friction of a contact is the object's, whatever it touches.
       out_ << " priority=\"1\" friction=\"" << object.friction << ' ' << scene_.hand.torsional
            << ' ' << scene_.hand.rolling << '"';
+      if (round) out_ << " group=\"3\"";  // not drawn: MuJoCo shows groups 0 to 2
       group(who, 4) << "/>\n";
     }
     out_ << "</body>\n";
