@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from coglab_msgs.msg import CellTruth
-from coglab_sim.person.body import arm_of
 from coglab_sim.person.scene import shipped
 from geometry_msgs.msg import Point, Pose, Quaternion
 from node_alone import Alone, script

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from coglab_bringup.launch_arguments import judge_launch
-from coglab_bringup.usage import Parser, Refused, seed, writable_folder
+from coglab_bringup.usage import Parser, Refused, seed, writable_file, writable_folder
 
 HELP_GIVEN = 10
 BUILD_WORDS = ("--upstream-smach", "tests")

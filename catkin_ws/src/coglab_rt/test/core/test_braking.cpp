@@ -233,43 +233,5 @@ TEST(Braking, TheWayToTheBorderIsSmooth) {
   EXPECT_LE(turns, 6);
 }
 
-/// One joint near an end, the others in the middle of their ranges: bit i names it and no other.
-class OneJoint : public ::testing::TestWithParam<int> {
- protected:
-  const int joint_ = GetParam();
-  const JointLimits limits_ = loadJointLimits(LIMITS_FILE);
-  const BrakingGuard guard_{limits_, 0.05};
-  Interpolator interpolator_{limits_};
-};
-
-TEST_P(OneJoint, AloneIsCutAndNamed) {
-  for (const double side : {-1.0, 1.0}) {
-    Vector7 position = Vector7::Zero(), target = Vector7::Constant(0.4 * side);
-    position[joint_] = side * (guard_.upper()[joint_] - 1e-5);
-    interpolator_.reset(position);
-    EXPECT_EQ(guard_.bound(interpolator_, 0.005, target), 1U << joint_);
-    for (int i = 0; i < 7; ++i) {
-      if (i == joint_) {
-        EXPECT_LT(std::abs(target[i]), 0.4);
-      } else {
-        EXPECT_EQ(target[i], 0.4 * side);
-      }
-    }
-  }
-}
-
-INSTANTIATE_TEST_SUITE_P(EachOf, OneJoint, ::testing::Range(0, 7));
-
-TEST(BrakingValues, ATargetBeyondTheSpeedOfAJointIsItsSpeedAndNoCut) {
-  const JointLimits limits = loadJointLimits(LIMITS_FILE);
-  const BrakingGuard guard(limits, 0.0);
-  Interpolator interpolator(limits);
-  for (const double side : {-1.0, 1.0}) {
-    Vector7 target = Vector7::Constant(50.0 * side);
-    EXPECT_EQ(guard.bound(interpolator, 0.005, target), 0U);
-    EXPECT_EQ(target, side * limits.velocity);
-  }
-}
-
 }  // namespace
 }  // namespace coglab_rt

@@ -55,28 +55,6 @@ TEST(Interpolator, ArrivesExactlyAndStays) {
   EXPECT_TRUE(interpolator.standsStill());
 }
 
-TEST(Interpolator, PlanIsConsistentAlongItself) {
-  // Re-planning after a part of the way leads to the same state as following the first plan.
-  std::mt19937 random(5);
-  std::uniform_real_distribution<double> part(-1.0, 1.0);
-  for (int i = 0; i < 20000; ++i) {
-    const double A = 10.0, J = 500.0;
-    const AxisState start{0.0, 2.0 * part(random), A * part(random)};
-    const double target = 2.0 * part(random);
-    const AxisProfile whole = planVelocity(start.velocity, start.acceleration, target, A, J);
-    const double t = whole.totalTime() * std::abs(part(random)), rest = 0.05;
-    const AxisState middle = advance(start, whole, t);
-    const AxisState twice =
-        advance(middle, planVelocity(middle.velocity, middle.acceleration, target, A, J), rest);
-    const AxisState once = advance(start, whole, t + rest);
-    ASSERT_NEAR(twice.position, once.position, 1e-11);
-    ASSERT_NEAR(twice.velocity, once.velocity, 1e-11);
-    // Near the end of a phase the acceleration follows the square root of the rounding of the
-    // velocity.
-    ASSERT_NEAR(twice.acceleration, once.acceleration, 1e-5);
-  }
-}
-
 TEST(Interpolator, AccelerationBeyondTheLimitComesBackFirst) {
   AxisState s{0.0, 0.0, 15.0};
   for (int i = 0; i < 500; ++i) {

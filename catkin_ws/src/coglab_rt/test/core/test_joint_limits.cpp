@@ -144,17 +144,6 @@ TEST_F(Edges, EveryValueComesToItsPlace) {
   EXPECT_EQ(limits.position_margin, 0.02);
 }
 
-TEST_F(Edges, APositionIsAnyFiniteNumberButBelowTheOtherEnd) {
-  EXPECT_EQ(load(with("upper_position: [1,", "upper_position: [-0.5,")).upper_position[0], -0.5);
-  EXPECT_EQ(load(with("upper_position: [1,", "upper_position: [0,")).upper_position[0], 0.0);
-  EXPECT_EQ(load(with("lower_position: [-1,", "lower_position: [0,")).lower_position[0], 0.0);
-  EXPECT_EQ(error(with("lower_position: [-1,", "lower_position: [.inf,")),
-            ":4: default.lower_position[0] = inf: expected a finite number");
-  const std::string order = ": lower_position must be below upper_position";
-  EXPECT_EQ(error(with("lower_position: [-1,", "lower_position: [1,")), ":1: j1" + order);
-  EXPECT_EQ(error(with("-6, -6.2]", "-6, 6.2]")), ":1: j7" + order);
-}
-
 TEST_F(Edges, ValuesInDegreesAreRefused) {
   for (const auto& [field, value] : {std::pair("lower_position: [-1,", "lower_position: [-170,"),
                                      {"upper_position: [1,", "upper_position: [170,"},
@@ -190,23 +179,6 @@ TEST_F(Edges, AFileMayBeWiderThanTheRobotOnlyIfItSaysSo) {
   }
   EXPECT_NE(wider(kTable + "wider_than_robot: perhaps\n").find("true or false"), std::string::npos);
   std::remove(own.c_str());
-}
-
-TEST_F(Edges, MarginAndOvershootGoFromZeroToAHalf) {
-  for (const char* good : {"0", "0.5"}) {
-    const double value = std::stod(good);
-    EXPECT_EQ(load(with("margin: 0.02", std::string("margin: ") + good)).position_margin, value);
-    const JointLimits limits = load(kTable + "servo_overshoot: " + good);
-    EXPECT_DOUBLE_EQ(limits.velocity[6], 7.0 / (1.0 + value));
-  }
-  for (const char* bad : {"-0.001", "0.501", "[0.02]", ".nan", "wide"}) {
-    EXPECT_EQ(error(with("margin: 0.02", std::string("margin: ") + bad)),
-              ":2: position_margin: expected a number from 0 to 0.5 (rad)")
-        << bad;
-    EXPECT_EQ(error(kTable + "servo_overshoot: " + bad),
-              ":10: servo_overshoot: expected a number in 0..0.5")
-        << bad;
-  }
 }
 
 TEST_F(Edges, AProfileOverridesWhatItNamesAndNoMore) {

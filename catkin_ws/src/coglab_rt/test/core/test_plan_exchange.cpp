@@ -81,12 +81,6 @@ TEST(PlanExchange, WithAThreadThatTakesThemEachComesOnceAndInOrder) {
   EXPECT_EQ(alive, 0);
 }
 
-TEST(PlanExchange, AnAcknowledgementWithoutAPlanIsOfNone) {
-  PlanExchange<Plan> plans;
-  plans.acknowledge();
-  EXPECT_EQ(plans.generation(), 0U);
-}
-
 TEST(PlanExchange, APlanThatWasTakenLateIsFreedByTheNextOneThatIsAdopted) {
   {
     PlanExchange<Plan> plans;

@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdio>
 #include <iterator>
 #include <limits>
 #include <random>
@@ -78,21 +77,6 @@ TEST(FixedText, EqualityIsThatOfTheText) {
   other.clear();
   other << "abc";
   EXPECT_EQ(one, other);
-}
-
-TEST(FixedText, NumbersAtTheEdges) {
-  const auto written = [](auto value) { return (FixedText<64>() << value).str(); };
-  EXPECT_EQ(written(0.0), "0.000");
-  EXPECT_EQ(written(0.0004), "0.000");
-  EXPECT_EQ(written(0.0006), "0.001");
-  EXPECT_EQ(written(-0.0996), "-0.100");
-  EXPECT_EQ(written(12.3456), "12.346");
-  EXPECT_EQ(written(0.9996), "1.000");
-  EXPECT_EQ(written(1e15), "1000000000000000.000");
-  EXPECT_EQ(written(1.1e15), ">1e15");
-  EXPECT_EQ(written(-1.1e15), "->1e15");
-  EXPECT_EQ(written(std::uint64_t{0}), "0");
-  EXPECT_EQ(written(std::uint64_t{10}), "10");
 }
 
 }  // namespace

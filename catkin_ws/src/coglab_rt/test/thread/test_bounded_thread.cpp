@@ -2,10 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
-#include <cstdint>
 #include <string>
 #include <system_error>
-#include <utility>
 
 #include <sys/mman.h>
 #include <sys/wait.h>
@@ -45,46 +43,6 @@ TEST(BoundedThread, TheStackBelowTheBodyIsTouchedBeforeItRuns) {
   thread.join();
   EXPECT_GT(looked_at, 300U);
   EXPECT_EQ(present, looked_at);
-}
-
-/// Size of the calling thread's stack as the C library tells it, and its name.
-std::size_t stackSize() {
-  pthread_attr_t attributes;
-  pthread_getattr_np(pthread_self(), &attributes);
-  std::size_t size = 0;
-  pthread_attr_getstacksize(&attributes, &size);
-  pthread_attr_destroy(&attributes);
-  return size;
-}
-
-std::string threadName() {
-  char name[16] = "";
-  pthread_getname_np(pthread_self(), name, sizeof(name));
-  return name;
-}
-
-TEST(BoundedThread, HasTheStackThatIsAskedForAndAtLeast128KiB) {
-  std::size_t size = 0;
-  BoundedThread thread;
-  // Sizes that are no quarter of another test's: the C library would give that one's stack again.
-  for (const auto& [asked, given] : {std::pair<std::size_t, std::size_t>{1, 128 * 1024},
-                                     {128 * 1024, 128 * 1024},
-                                     {132 * 1024, 132 * 1024}}) {
-    thread.start("size", asked, [&size] { size = stackSize(); });
-    thread.join();
-    EXPECT_EQ(size, given) << asked;
-  }
-}
-
-TEST(BoundedThread, IsNamedByTheFirst15Characters) {
-  std::string name;
-  BoundedThread thread;
-  for (const char* asked : {"123456789012345", "1234567890123456789"}) {
-    name.clear();
-    thread.start(asked, 0, [&name] { name = threadName(); });
-    thread.join();
-    EXPECT_EQ(name, "123456789012345");
-  }
 }
 
 TEST(BoundedThread, RunsUntilItIsJoinedAndAnotherStartWaitsForIt) {

@@ -150,15 +150,5 @@ TEST_F(LimitsParameters, AFileIsReadInsteadWhateverTheDescription) {
   EXPECT_NE(text.find("profile 'fast' is missing"), std::string::npos) << text;
 }
 
-TEST_F(LimitsParameters, AMissingPackageAndValuesOfAnotherTypeAreNamed) {
-  EXPECT_EQ(refusal<std::runtime_error>([&] { limits("no_such_package"); }),
-            "package no_such_package is not found; build and source the workspace or set "
-            "/test/limits/file");
-  node_.setParam("limits/profile", 1);
-  EXPECT_EQ(refusal([&] { limits(); }), "parameter /test/limits/profile: expected a name");
-  node_.setParam("limits/file", 1);
-  EXPECT_EQ(refusal([&] { limits(); }), "parameter /test/limits/file: expected a path");
-}
-
 }  // namespace
 }  // namespace coglab_rt

@@ -1,7 +1,8 @@
-/// Requests to the bridge: when each is refused, what an outcome tells, and who waits for what.
+/// Requests to the bridge, and what it shows of itself to other threads.
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <vector>
 
 #include "bridge_cell.hpp"
 
@@ -10,25 +11,11 @@ namespace {
 
 using test::Cell;
 using test::defaultConfig;
+using test::drive;
 using test::runEvent;
 
 OutcomeCode codeOf(Cell& cell, const char* event) {
   return runEvent(cell.bridge, cell.robot, event).code;
-}
-
-TEST(Requests, WhatIsThereAlreadyIsSaid) {
-  Cell cell;
-  cell.run(3);
-  EXPECT_EQ(codeOf(cell, "reset"), OutcomeCode::AlreadyThere);
-  EXPECT_EQ(codeOf(cell, "stop"), OutcomeCode::AlreadyThere);
-  EXPECT_EQ(cell.robot.answer.krl.ints[0], 0);  // nothing was asked of the program
-  EXPECT_EQ(codeOf(cell, "start"), OutcomeCode::Done);
-  cell.run(1);
-  EXPECT_EQ(codeOf(cell, "start"), OutcomeCode::AlreadyThere);
-  EXPECT_EQ(codeOf(cell, "hold"), OutcomeCode::Done);
-  EXPECT_EQ(codeOf(cell, "hold"), OutcomeCode::Done);
-  EXPECT_EQ(codeOf(cell, "reset"), OutcomeCode::Done);
-  EXPECT_EQ(codeOf(cell, "reset"), OutcomeCode::AlreadyThere);
 }
 
 TEST(Requests, NothingBeginsWhileSomethingElseIsInProgress) {
@@ -68,55 +55,6 @@ TEST(Requests, AHoldRefusesStartsAndModes) {
   EXPECT_EQ(cell.bridge.snapshot().mode.strategy, fri::ControlStrategy::JointImpedance);
 }
 
-TEST(Requests, WithoutAControllerThereIsNothingToStartOrStop) {
-  Bridge bridge(defaultConfig());
-  std::int64_t now = 1'000'000'000;
-  const auto code = [&](const char* event) {
-    const std::uint32_t ticket = bridge.submit(event);
-    bridge.idle(now += 10'000'000);
-    return bridge.outcome(ticket).code;
-  };
-  EXPECT_EQ(code("start"), OutcomeCode::Disconnected);
-  EXPECT_EQ(code("stop"), OutcomeCode::Disconnected);
-  EXPECT_EQ(code("joint_impedance"), OutcomeCode::Done);  // the mode of the next start
-  EXPECT_EQ(code("hold"), OutcomeCode::Done);
-  EXPECT_EQ(code("joint_impedance"), OutcomeCode::Held);
-}
-
-TEST(Requests, AnOutcomeTellsWhatWasSeen) {
-  Cell cell;
-  cell.robot.quality = fri::Quality::Ok;
-  cell.start();
-  const std::uint32_t ticket = cell.bridge.submit("joint_impedance");
-  cell.run(1);
-  const Outcome o = cell.bridge.outcome(ticket);
-  EXPECT_EQ(o.ticket, ticket);
-  EXPECT_EQ(o.kind, EventKind::Mode);
-  EXPECT_EQ(o.code, OutcomeCode::InCommandMode);
-  EXPECT_EQ(o.wanted, fri::ControlStrategy::JointImpedance);
-  EXPECT_EQ(o.reported, fri::ControlStrategy::Position);
-  EXPECT_EQ(o.state, fri::FriState::Command);
-  EXPECT_EQ(o.quality, fri::Quality::Ok);
-  EXPECT_EQ(o.convention, fri::KrlConvention::Coglab);
-  EXPECT_EQ(runEvent(cell.bridge, cell.robot, "hold").wanted, fri::ControlStrategy::Position);
-  EXPECT_EQ(cell.bridge.outcome(ticket).code, OutcomeCode::Pending);  // it was fetched
-}
-
-TEST(Requests, TicketsCountFromOneAndSixtyFourOutcomesAreKept) {
-  Bridge bridge(defaultConfig());
-  std::int64_t now = 1'000'000'000;
-  for (std::uint32_t i = 1; i <= 66; ++i) {
-    EXPECT_EQ(bridge.submit("hold"), i);
-    bridge.idle(now += 10'000'000);
-  }
-  EXPECT_EQ(bridge.outcome(1).code, OutcomeCode::Pending);
-  EXPECT_EQ(bridge.outcome(2).code, OutcomeCode::Pending);
-  EXPECT_EQ(bridge.outcome(2).ticket, 2U);
-  EXPECT_EQ(bridge.outcome(3).code, OutcomeCode::Done);
-  EXPECT_EQ(bridge.outcome(66).code, OutcomeCode::Done);
-  EXPECT_EQ(bridge.outcome(99).ticket, 99U);
-}
-
 TEST(Requests, TheFirstOfAFullQueueAreServed) {
   Bridge bridge(defaultConfig());
   for (int i = 0; i < 18; ++i) bridge.submit(i == 16 ? "stop" : "hold");
@@ -146,36 +84,6 @@ TEST(Requests, AStopDoesNotWaitForRestForever) {
   EXPECT_GT(cell.bridge.snapshot().sample.commanded_velocity[0], 0.05);
 }
 
-TEST(Requests, AStopOfAnArmAtRestAsksAtOnce) {
-  Cell cell;
-  cell.start();
-  cell.run(20);
-  cell.bridge.submit("stop");
-  cell.run(1);
-  EXPECT_EQ(cell.robot.answer.krl.ints[0], 2);
-}
-
-/// An idle tick may come at any time, also right after the first datagram.
-TEST(Requests, AnIdleTickAfterTheFirstDatagramGoesOnWithAStart) {
-  Cell cell;
-  cell.robot.obeys = false;
-  const std::uint32_t ticket = cell.bridge.submit("start");
-  cell.run(1);
-  cell.bridge.idle(cell.robot.now());
-  EXPECT_EQ(cell.bridge.outcome(ticket).code, OutcomeCode::Pending);
-  EXPECT_EQ(cell.bridge.snapshot().supervisor, SupervisorState::Starting);
-}
-
-TEST(Requests, AnIdleTickInCommandModeEndsNothing) {
-  Cell cell;
-  cell.start();
-  cell.bridge.idle(cell.robot.now() + 10'000'000);
-  EXPECT_EQ(cell.bridge.snapshot().supervisor, SupervisorState::Command);
-  EXPECT_EQ(cell.bridge.snapshot().fall_backs, 0U);
-  cell.runDriven(60, Vector7::Constant(0.2));
-  EXPECT_NEAR(cell.bridge.snapshot().sample.commanded_velocity[0], 0.2, 1e-9);
-}
-
 /// Silence counts from the last datagram: 0.25 s, or five cycles where they are longer.
 TEST(Requests, SilenceIsToldAfterItsTimeLimit) {
   for (const double period : {0.005, 0.1}) {
@@ -200,6 +108,99 @@ TEST(Requests, SilenceIsToldAfterItsTimeLimit) {
     EXPECT_TRUE(cell.bridge.snapshot().sample.velocity.isZero());
     EXPECT_EQ(cell.bridge.snapshot().session.restarts, 0U);
   }
+}
+
+std::vector<StateView> toldBy(Bridge& bridge) {
+  std::vector<StateView> told;
+  for (StateView view; bridge.nextStateChange(view);) told.push_back(view);
+  return told;
+}
+
+TEST(BridgeView, StatesAreToldOnceEachFromTheBeginningOn) {
+  Cell cell;
+  std::vector<StateView> told = toldBy(cell.bridge);
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0].supervisor, SupervisorState::Disconnected);
+  cell.run(20);
+  told = toldBy(cell.bridge);
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0].supervisor, SupervisorState::Monitor);
+  EXPECT_EQ(told[0].block, MotionBlock::Monitor);
+  EXPECT_EQ(told[0].state, fri::FriState::Monitor);
+  EXPECT_EQ(told[0].quality, fri::Quality::Perfect);
+  EXPECT_EQ(told[0].control, fri::ControlStrategy::Position);
+  EXPECT_EQ(told[0].power, 0x7F);
+  EXPECT_EQ(told[0].blocking_joint, -1);
+  EXPECT_DOUBLE_EQ(told[0].cycle_time, 0.005);
+  cell.bridge.submit("hold");
+  cell.run(20);
+  told = toldBy(cell.bridge);
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_TRUE(told[0].hold_latched);
+  EXPECT_EQ(told[0].supervisor, SupervisorState::Holding);
+}
+
+/// A bridge that meets a controller in command mode speaks its strategy, for the flags may not
+/// change there.
+TEST(BridgeView, TheFlagsOfACommandModeThatWasFoundAreItsStrategys) {
+  for (const auto& [control, flags] :
+       {std::pair{fri::ControlStrategy::JointImpedance, 0x0035U},
+        std::pair{fri::ControlStrategy::CartesianImpedance, 0x3500U}}) {
+    Cell cell;
+    cell.robot.state = fri::FriState::Command;
+    cell.robot.control = control;
+    cell.run(3);
+    EXPECT_EQ(cell.robot.answer.flags, flags);
+    EXPECT_TRUE(runEvent(cell.bridge, cell.robot, "start").success());
+    cell.run(2);
+    EXPECT_EQ(cell.robot.answer.flags, flags);
+    cell.robot.state = fri::FriState::Monitor;
+    cell.run(2);
+    EXPECT_EQ(cell.robot.answer.flags, 0x0001U);
+  }
+  Cell monitor;  // in monitor mode it tells its own, whatever is reported
+  monitor.robot.control = fri::ControlStrategy::JointImpedance;
+  monitor.run(2);
+  EXPECT_EQ(monitor.robot.answer.flags, 0x0001U);
+}
+
+/// Age of a command on both sides of its limit, and at long periods of two and a half cycles.
+TEST(BridgeView, ACommandOfTheFutureOrOfLongPeriodsCountsWithinItsLimit) {
+  const auto follows = [](double period, double age) {
+    Cell cell(period);
+    cell.start();
+    RobotSample sample;
+    cell.bridge.mailboxes().newestSample(sample);
+    const std::int64_t now = cell.robot.now() + std::llround(1e9 * period);
+    cell.bridge.mailboxes().sendVelocity(
+        {Vector7::Constant(0.2), now - std::llround(1e9 * age), sample.motion_epoch});
+    cell.run(1);
+    return !cell.bridge.snapshot().sample.commanded_velocity.isZero();
+  };
+  EXPECT_TRUE(follows(0.005, 0.049));
+  EXPECT_TRUE(follows(0.005, 0.05));  // the limit is still within
+  EXPECT_TRUE(follows(0.005, -0.05));
+  EXPECT_FALSE(follows(0.005, 0.051));
+  EXPECT_TRUE(follows(0.005, -0.049));
+  EXPECT_FALSE(follows(0.005, -0.051));
+  EXPECT_TRUE(follows(0.1, 0.249));
+  EXPECT_FALSE(follows(0.1, 0.251));
+}
+
+/// Quality and drive errors leave command mode in force: no cause of a loss is told for them.
+TEST(BridgeView, PoorQualityIsNoLossOfCommandMode) {
+  Cell cell;
+  cell.start();
+  cell.robot.quality = fri::Quality::Unacceptable;
+  cell.run(3);
+  EXPECT_EQ(cell.bridge.snapshot().fall_backs, 1U);
+  EXPECT_EQ(cell.bridge.snapshot().loss.cause, LossCause::None);
+  Cell anew;
+  anew.start();
+  anew.robot.setCounter(40000);
+  anew.run(30);
+  EXPECT_EQ(anew.bridge.snapshot().fall_backs, 1U);
+  EXPECT_EQ(anew.bridge.snapshot().loss.cause, LossCause::BeganAnew);
 }
 
 }  // namespace

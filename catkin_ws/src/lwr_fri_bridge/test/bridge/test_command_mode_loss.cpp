@@ -76,75 +76,6 @@ TEST(CommandModeLoss, AStalledControllerOnThisComputerIsNamedAndStartedAgainAtRe
   EXPECT_TRUE(cell.reason().empty());
 }
 
-TEST(CommandModeLoss, AMovingArmIsNotStartedAgain) {
-  Watched cell;
-  cell.start();
-  cell.runDriven(200, Vector7::Constant(0.1));
-  cell.stall(0.4);
-  EXPECT_EQ(cell.watch(1000), 0);
-  EXPECT_EQ(cell.bridge.snapshot().supervisor, SupervisorState::Stopped);
-  EXPECT_TRUE(runEvent(cell.bridge, cell.robot, "start").success());
-}
-
-TEST(CommandModeLoss, AnArmThatMovedMeanwhileIsNotStartedAgain) {
-  Watched cell;
-  cell.start();
-  cell.run(200);
-  cell.stall(0.4);
-  cell.robot.blocked = true;  // it does not go back to the set-point
-  cell.robot.setMeasured(cell.robot.measured() + Vector7::Constant(0.003));
-  EXPECT_EQ(cell.watch(1000), 0);
-}
-
-TEST(CommandModeLoss, AControllerThatBeganAnewIsNotStarted) {
-  Watched cell;
-  cell.start();
-  cell.run(200);
-  cell.stall(0.4);
-  cell.robot.clock_offset = -1000.0;  // its clock began anew
-  EXPECT_EQ(cell.watch(1000), 0);
-}
-
-TEST(CommandModeLoss, WhatThePcDidNotCauseIsLeftToTheUser) {
-  {
-    Watched cell;  // elsewhere: a cable
-    cell.bridge.setControllerHere(false);
-    cell.start();
-    cell.run(200);
-    cell.stall(0.4);
-    EXPECT_EQ(cell.bridge.snapshot().loss.cause, LossCause::ControllerSilent);
-    EXPECT_EQ(cell.watch(1000), 0);
-  }
-  {
-    Watched cell;
-    cell.start();
-    cell.run(200);
-    cell.robot.state = fri::FriState::Monitor;
-    EXPECT_EQ(cell.watch(1000), 0);
-    EXPECT_EQ(cell.bridge.snapshot().loss.cause, LossCause::LeftByController);
-    EXPECT_NE(cell.reason().find("by itself"), std::string::npos) << cell.reason();
-  }
-  {
-    Watched cell;
-    cell.start();
-    cell.run(200);
-    cell.robot.power = 0;
-    cell.run(10);
-    cell.robot.power = fri::kAllDrivesOn;
-    EXPECT_EQ(cell.watch(1000), 0);
-    EXPECT_EQ(cell.bridge.snapshot().loss.cause, LossCause::PowerLost);
-  }
-  {
-    Watched cell;
-    cell.start();
-    cell.run(200);
-    for (int i = 0; i < 5; ++i) cell.robot.cycle(cell.bridge, false, true);
-    cell.robot.state = fri::FriState::Monitor;
-    EXPECT_EQ(cell.watch(1000), 0);
-    EXPECT_EQ(cell.bridge.snapshot().loss.cause, LossCause::PacketsLost);
-  }
-}
-
 TEST(CommandModeLoss, ALateFriThreadIsNamedAndStartedAgainAtRest) {
   Watched cell;
   cell.bridge.setControllerHere(false);
@@ -158,26 +89,6 @@ TEST(CommandModeLoss, ALateFriThreadIsNamedAndStartedAgainAtRest) {
   EXPECT_NE(cell.reason().find("ms late with its answers"), std::string::npos) << cell.reason();
   EXPECT_EQ(cell.watch(400), 1);
   EXPECT_EQ(cell.bridge.snapshot().supervisor, SupervisorState::Command);
-}
-
-TEST(CommandModeLoss, HoldAndRepeatedLossesEndTheRestarts) {
-  Watched held;
-  held.start();
-  held.run(200);
-  held.stall(0.4);
-  held.bridge.submit("hold");
-  EXPECT_EQ(held.watch(1000), 0);
-
-  Watched cell;
-  cell.start();
-  int asked = 0;
-  for (int i = 0; i < 6; ++i) {
-    cell.watch(200);
-    cell.stall(0.4);
-    asked += cell.watch(200);
-  }
-  EXPECT_EQ(asked, 3);  // within a minute: then somebody has to look
-  EXPECT_EQ(cell.bridge.snapshot().supervisor, SupervisorState::Stopped);
 }
 
 }  // namespace

@@ -23,61 +23,6 @@ struct Started : Supervisor {
   }
 };
 
-TEST(Supervisor, BeginsWithNothing) {
-  Supervisor fresh;
-  EXPECT_EQ(fresh.state(), SupervisorState::Disconnected);
-  EXPECT_EQ(fresh.block(), MotionBlock::Disconnected);
-  EXPECT_EQ(fresh.epoch(), 0U);
-  EXPECT_EQ(fresh.fallBacks(), 0U);
-  EXPECT_FALSE(fresh.held());
-  EXPECT_FALSE(fresh.starting());
-  EXPECT_FALSE(fresh.stopping());
-  EXPECT_FALSE(fresh.readyForMonitor());
-  SupervisorInput input;
-  fresh.update(input);
-  EXPECT_EQ(fresh.state(), SupervisorState::Disconnected);
-  input.connected = true;
-  fresh.update(input);
-  EXPECT_EQ(fresh.state(), SupervisorState::Monitor);
-  EXPECT_EQ(fresh.block(), MotionBlock::Monitor);
-  EXPECT_EQ(fresh.fallBacks(), 0U);
-  EXPECT_EQ(fresh.epoch(), 0U);
-  EXPECT_FALSE(fresh.readyForMonitor());
-}
-
-TEST(Supervisor, CommandModeThatNobodyAskedForMovesNothing) {
-  Supervisor fresh;
-  fresh.update(ready());
-  EXPECT_EQ(fresh.state(), SupervisorState::Stopped);
-  EXPECT_EQ(fresh.block(), MotionBlock::NotStarted);
-  EXPECT_EQ(fresh.epoch(), 0U);
-}
-
-TEST(Supervisor, AStartAllowsMotionFromItsEndOn) {
-  Supervisor supervisor;
-  supervisor.startBegins();
-  EXPECT_TRUE(supervisor.starting());
-  supervisor.update(ready());
-  EXPECT_EQ(supervisor.state(), SupervisorState::Starting);
-  EXPECT_EQ(supervisor.block(), MotionBlock::NotStarted);
-  supervisor.startEnds(true);
-  EXPECT_FALSE(supervisor.starting());
-  supervisor.update(ready());
-  EXPECT_EQ(supervisor.state(), SupervisorState::Command);
-  EXPECT_EQ(supervisor.block(), MotionBlock::None);
-  EXPECT_EQ(supervisor.epoch(), 1U);
-  supervisor.update(ready());
-  EXPECT_EQ(supervisor.epoch(), 1U);
-  EXPECT_EQ(supervisor.fallBacks(), 0U);
-
-  Supervisor failed;
-  failed.startBegins();
-  failed.startEnds(false);
-  failed.update(ready());
-  EXPECT_EQ(failed.state(), SupervisorState::Stopped);
-  EXPECT_EQ(failed.block(), MotionBlock::NotStarted);
-}
-
 /// Of several reasons the one is told that has to go first.
 TEST(Supervisor, ReasonsCountInTheirOrder) {
   struct Row {
@@ -205,37 +150,6 @@ TEST(Supervisor, AStopBrakesAndEndsWithoutAFallBack) {
   EXPECT_EQ(supervisor.state(), SupervisorState::Monitor);
   supervisor.update(ready());
   EXPECT_EQ(supervisor.block(), MotionBlock::NotStarted);
-}
-
-TEST(Supervisor, AStopEndsAStartAndWhatWasLostBefore) {
-  Supervisor supervisor;
-  supervisor.startBegins();
-  supervisor.stopBegins();
-  EXPECT_FALSE(supervisor.starting());
-  supervisor.stopEnds();
-  Started fallen;
-  SupervisorInput input = ready();
-  input.drive_error = true;
-  fallen.update(input);
-  input = ready();
-  input.command_mode = false;
-  fallen.update(input);
-  EXPECT_EQ(fallen.state(), SupervisorState::Stopped);
-  fallen.stopEnds();
-  fallen.update(input);
-  EXPECT_EQ(fallen.state(), SupervisorState::Monitor);
-  fallen.update(ready());
-  EXPECT_EQ(fallen.block(), MotionBlock::NotStarted);
-}
-
-TEST(Supervisor, StatesHaveTheNamesOfTheMessage) {
-  EXPECT_STREQ(nameOf(SupervisorState::Disconnected), "disconnected");
-  EXPECT_STREQ(nameOf(SupervisorState::Monitor), "monitor");
-  EXPECT_STREQ(nameOf(SupervisorState::Starting), "starting");
-  EXPECT_STREQ(nameOf(SupervisorState::Command), "command");
-  EXPECT_STREQ(nameOf(SupervisorState::Holding), "holding");
-  EXPECT_STREQ(nameOf(SupervisorState::Stopping), "stopping");
-  EXPECT_STREQ(nameOf(SupervisorState::Stopped), "stopped");
 }
 
 }  // namespace

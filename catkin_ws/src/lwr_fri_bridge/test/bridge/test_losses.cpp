@@ -93,49 +93,6 @@ TEST(Losses, BrakingDoesNotBeginAnewAfterALoss) {
   }
 }
 
-/// What is judged as a stop from full speed is one: the joint had its speed when it was held,
-/// whatever was lost before, and on a controller that stands, which never has it, the run says so.
-TEST(Losses, AStopThatIsJudgedBeginsAtFullSpeed) {
-  for (const double period : {0.001, 0.005, 0.020}) {
-    const test::Stop without = LossRun({period, 0.0, false, true, 0}, true).stop();
-    EXPECT_TRUE(without.from_full_speed) << period;
-    EXPECT_GT(without.angle, 0.2) << period;
-    for (const bool bursts : {false, true}) {
-      for (unsigned seed = 0; seed < 4; ++seed) {
-        const test::Stop stop = LossRun({period, 0.10, bursts, true, seed}, true).stop();
-        EXPECT_TRUE(stop.from_full_speed) << period << " " << bursts << " " << seed;
-        EXPECT_GT(stop.angle, 0.9 * without.angle) << period << " " << bursts << " " << seed;
-      }
-    }
-    unsigned slow = 0;
-    for (unsigned seed = 0; seed < 8; ++seed)
-      slow += LossRun({period, 0.10, true, false, seed}, true).stop().from_full_speed ? 0 : 1;
-    EXPECT_GT(slow, 0U) << period;
-  }
-}
-
-/// The figures of the campaign are those of the limits, margin and leash that the arm has always
-/// had: no bound is kept by a smaller range, a slower arm or a wider margin. Only the speed that is
-/// commanded is less, by servo_overshoot, so that the arm as measured keeps the table's.
-TEST(Losses, LimitsMarginAndLeashAreTheOnesOfBeforeLossesWereReckonedWith) {
-  const BridgeConfig config = test::defaultConfig();
-  const double wide = 2.967059728390360, narrow = 2.094395102393195;
-  Vector7 range, velocity;
-  range << wide, narrow, wide, narrow, wide, narrow, wide;
-  velocity << 1.919862177193763, 1.919862177193763, 1.963495408493621, 1.963495408493621,
-      2.268928027592628, 1.963495408493621, 1.963495408493621;
-  EXPECT_TRUE(config.limits.upper_position.isApprox(range, 1e-15));
-  EXPECT_TRUE(config.limits.lower_position.isApprox(-range, 1e-15));
-  EXPECT_TRUE(config.limits.velocity.isApprox(velocity / 1.04, 1e-15));
-  EXPECT_EQ(config.limits.acceleration, Vector7::Constant(10.0));
-  EXPECT_EQ(config.limits.jerk, Vector7::Constant(500.0));
-  EXPECT_EQ(config.position_margin, 0.01);
-  EXPECT_EQ(config.limits.position_margin, 0.01);
-  EXPECT_EQ(config.leash.position, 0.05);
-  EXPECT_EQ(config.leash.impedance, 0.10);
-  EXPECT_EQ(config.leash.load, 10.0);
-}
-
 /// Where the controller stood, the set-point starts from rest; where it went on, at its speed.
 TEST(Losses, AfterAGapTheSetPointGoesOnAsTheControllerDid) {
   for (const bool extrapolates : {true, false}) {

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <stdexcept>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -133,16 +132,6 @@ TEST(OpenKc, AStopIsFriStopAndOtherPhasesAskForNothing) {
   }
 }
 
-TEST(OpenKc, OtherConventionsHaveNoSteps) {
-  for (const KrlConvention convention : kAll) {
-    if (convention == KrlConvention::OpenKc) continue;
-    KrlRequest request;
-    request.phase = KrlPhase::Start;
-    stepRequest(convention, request, UserData{});
-    EXPECT_FALSE(request.asserted) << nameOf(convention);
-  }
-}
-
 /// TO_INT[2] of our own program counts for the request of the moment only, and is bad below zero.
 TEST(KrlConvention, OurProgramsResultsAreThoseOfTheTable) {
   const std::vector<std::pair<int, KrlResult>> results = {
@@ -206,12 +195,6 @@ TEST(KrlConvention, AnUnknownNameIsRefusedWithTheKnownOnes) {
                  "unknown krl_convention 'orocos'; known: coglab, centro_epiaggio, stanford, "
                  "rcprg_tum, rtt_lwr, openkc");
   }
-}
-
-TEST(KrlConvention, TheNumberOfTheLastRequestIsReadFromTheFirstInteger) {
-  MeasurementDatagram m{};
-  for (int i = 0; i < 16; ++i) m.krl.ints[i] = 50 + i;
-  EXPECT_EQ(lastFinished(m), 50);
 }
 
 }  // namespace

@@ -1,7 +1,6 @@
 /// What a controller can have made of the answers that it saw: judged and taken over after a gap.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 
 #include "lwr_fri_bridge/fri/set_point_history.hpp"
@@ -71,15 +70,6 @@ TEST(SetPointHistory, ASetPointLiesBetweenWhereItWasAndWhereTheLastStepHasTakenI
   }
 }
 
-TEST(SetPointHistory, EveryJointIsJudged) {
-  const SetPointHistory history = moved(0, 0.0);
-  for (int joint = 0; joint < 7; ++joint) {
-    for (const double off : {-0.01, 0.01}) {
-      EXPECT_FALSE(history.explains(reported(unit(0, 0.1) + unit(joint, off)))) << joint;
-    }
-  }
-}
-
 TEST(SetPointHistory, WhatIsNotCommandedIsNotJudged) {
   const SetPointHistory history = moved(0, 0.01);
   const MeasurementDatagram off = reported(unit(0, 1.0));
@@ -110,38 +100,6 @@ TEST(SetPointHistory, AnAnswerThatWasNeverSentExplainsNothing) {
   EXPECT_TRUE(history.explains(reported(unit(0, 1.0))));  // nothing is known
 }
 
-TEST(SetPointHistory, MirroredAnswersExplainAnything) {
-  SetPointHistory history;
-  SentSetPoint mirrored = answer(unit(0, 0.1), unit(0, 0.1));
-  mirrored.followed = false;
-  history.record(mirrored);
-  EXPECT_TRUE(history.explains(reported(unit(0, 1.0))));
-  SentSetPoint followed = answer(unit(0, 0.1), unit(0, 0.1));
-  followed.counter = kAnswer + 1;
-  history.record(followed);
-  EXPECT_TRUE(history.explains(reported(unit(0, 1.0))));  // it saw the mirrored one last
-  MeasurementDatagram m = reported(unit(0, 1.0));
-  m.header.reflected = kAnswer + 1;
-  EXPECT_FALSE(history.explains(m));
-}
-
-TEST(SetPointHistory, WithoutAKnownAnswerTheSetPointIsTheReportedOneAtRest) {
-  SetPointHistory none;
-  SetPointHistory mirrored;
-  SentSetPoint sent = answer(unit(0, 0.09), unit(0, 0.1));
-  sent.followed = false;
-  mirrored.record(sent);
-  for (const SetPointHistory& history : {none, mirrored}) {
-    for (const bool fresh : {false, true}) {
-      const SetPointState state = history.afterGap(reported(unit(0, 0.25), 5), fresh);
-      EXPECT_NEAR(state.position[0], 0.25, 1e-7);
-      EXPECT_TRUE(state.velocity.isZero());
-      EXPECT_TRUE(state.acceleration.isZero());
-      EXPECT_TRUE(state.step.isZero());
-    }
-  }
-}
-
 /// More than half the way that the last step would have gone: the controller went on.
 TEST(SetPointHistory, AControllerThatWentOnHasTheSpeedOfTheAnswer) {
   for (const double step : {0.01, -0.01}) {
@@ -159,37 +117,6 @@ TEST(SetPointHistory, AControllerThatWentOnHasTheSpeedOfTheAnswer) {
   }
 }
 
-TEST(SetPointHistory, AStepTooSmallToBeSeenTellsNothing) {
-  const auto speed = [](double step) {
-    return moved(2, step).afterGap(reported(unit(2, 0.1), 4), false).velocity[2];
-  };
-  EXPECT_EQ(speed(0.9e-6), 0.5);  // what it has is kept
-  EXPECT_EQ(speed(-0.9e-6), 0.5);
-  EXPECT_EQ(speed(1.5e-6), 0.0);  // it was seen to stand
-  EXPECT_EQ(speed(-1.5e-6), 0.0);
-}
-
-/// After a restart of the counters the newest answer counts, one cycle ago, on its way.
-TEST(SetPointHistory, AfterARestartTheNewestAnswersWayCounts) {
-  const SetPointHistory history = moved(2, 0.01);
-  const auto speed = [&](double steps, double aside) {
-    MeasurementDatagram m = reported(unit(2, 0.1 + 0.01 * steps) + unit(5, aside));
-    m.header.counter = 9;
-    m.header.reflected = 3;
-    return history.afterGap(m, true).velocity[0];
-  };
-  EXPECT_EQ(speed(1.0, 0.0), 0.5);
-  EXPECT_EQ(speed(0.6, 0.0), 0.5);
-  EXPECT_EQ(speed(0.4, 0.0), 0.0);
-  EXPECT_EQ(speed(30.0, 0.0), 0.5);
-  for (const double sign : {-1.0, 1.0}) {
-    EXPECT_EQ(speed(1.0, sign * 0.9e-3), 0.5);
-    EXPECT_EQ(speed(1.0, sign * 1.1e-3), 0.0);
-  }
-  // Without a restart only the way along the step is looked at.
-  EXPECT_EQ(history.afterGap(reported(unit(2, 0.11) + unit(5, 0.5), 1), false).velocity[0], 0.5);
-}
-
 /// In Cartesian impedance mode the frame tells, for the joint set-point is the arm's.
 TEST(SetPointHistory, InCartesianImpedanceTheFrameTells) {
   const SetPointHistory history = moved(2, 0.01);
@@ -204,46 +131,6 @@ TEST(SetPointHistory, InCartesianImpedanceTheFrameTells) {
       EXPECT_EQ(state.velocity[0], went_on ? 0.5 : 0.0) << value << " " << off;
     }
   }
-}
-
-TEST(SetPointHistory, ABeginningIsWhatTheMeasurementReportsAndHowItMoves) {
-  SetPointHistory history = moved(2, 0.01);
-  SetPointState state;
-  state.position = unit(1, 0.3);
-  state.velocity = Vector7::Constant(0.4);
-  state.acceleration = Vector7::Constant(-1.0);
-  state.step = unit(1, 0.02);
-  MeasurementDatagram m = reported(unit(1, 0.3));
-  m.header.counter = 500;
-  m.header.reflected = 7;
-  history.beginWith(m, state);
-  EXPECT_TRUE(history.explains(m));
-  EXPECT_FALSE(history.explains(reported(unit(2, 0.1))));  // what was sent before is forgotten
-  m.header.counter = 503;  // three cycles later it has gone on or stood
-  EXPECT_TRUE(history.explains(m));
-  jointsToWire(unit(1, 0.36), m.commanded_position);
-  EXPECT_TRUE(history.explains(m));
-  const SetPointState after = history.afterGap(m, false);
-  EXPECT_EQ(after.velocity, state.velocity);
-  EXPECT_EQ(after.acceleration, state.acceleration);
-  EXPECT_NEAR(after.step[1], 0.02, 1e-12);
-  jointsToWire(unit(1, 0.361), m.commanded_position);
-  EXPECT_FALSE(history.explains(m));
-  jointsToWire(unit(1, 0.279), m.commanded_position);  // before its last step
-  EXPECT_FALSE(history.explains(m));
-  m.control = static_cast<std::uint16_t>(ControlStrategy::CartesianImpedance);
-  EXPECT_NEAR(history.afterGap(m, false).position[1], 0.3, 1e-12);  // its frame stood
-}
-
-TEST(SetPointHistory, SixtyFourAnswersAreKept) {
-  SetPointHistory history;
-  for (int i = 0; i < 64; ++i) {
-    SentSetPoint sent = answer(unit(0, 0.1), unit(0, 0.1));
-    sent.counter = static_cast<std::uint16_t>(kAnswer + i);
-    history.record(sent);
-  }
-  EXPECT_TRUE(history.explains(reported(unit(0, 0.1))));
-  EXPECT_FALSE(history.explains(reported(unit(0, 0.2))));
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-/// Every reason and outcome that has words has a number too; refused target velocities add up.
+/// Every reason and outcome that has words has a number too.
 #include <gtest/gtest.h>
 
 #include <set>
@@ -6,7 +6,6 @@
 
 #include <coglab_msgs/ReasonCode.h>
 
-#include "../src/ros/target_topic.hpp"
 #include "coglab_rt/reason.hpp"
 #include "lwr_fri_bridge/ros/reason_codes.hpp"
 
@@ -54,24 +53,6 @@ TEST(ReasonCodes, ALossThatTheComputerCausedIsNamed) {
   EXPECT_EQ(reasonCode(MotionBlock::Held, loss), Code::HELD);
   loss.cause = LossCause::LeftByController;
   EXPECT_EQ(reasonCode(MotionBlock::Monitor, loss), Code::NOT_IN_COMMAND_MODE);
-}
-
-TEST(ReasonCodes, OfOutcomesAreThoseOfTheMessage) {
-  EXPECT_EQ(reasonCode(OutcomeCode::Disconnected), Code::ROBOT_DISCONNECTED);
-  EXPECT_EQ(reasonCode(OutcomeCode::Held), Code::HELD);
-  EXPECT_EQ(reasonCode(OutcomeCode::Busy), Code::BUSY);
-  EXPECT_EQ(reasonCode(OutcomeCode::NoPower), Code::NO_POWER);
-  EXPECT_EQ(reasonCode(OutcomeCode::NotLeft), Code::TIME_LIMIT);
-  EXPECT_EQ(reasonCode(static_cast<OutcomeCode>(200)), Code::UNEXPECTED);
-}
-
-TEST(TargetTopic, RefusalsOfEveryReasonAddUp) {
-  const TargetTopic::Refused none;
-  EXPECT_EQ(none.total(), 0U);
-  EXPECT_EQ(none.invalid | none.stamp | none.old_permission | none.controller_active |
-                none.second_publisher | none.not_allowed,
-            0U);
-  EXPECT_EQ((TargetTopic::Refused{1, 2, 4, 8, 16, 32}.total()), 63U);
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
-/// Datagrams that cannot be true, power, quality and drive errors, and holds that are reset at
-/// once.
+/// Datagrams that cannot be true, power, quality and drive errors, and what the bridge sees of
+/// losses.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -155,6 +155,59 @@ TEST(BridgeFaults, AHoldBrakesEvenIfItIsResetAtOnce) {
   EXPECT_EQ(cell.bridge.snapshot().supervisor, SupervisorState::Command);  // released
   cell.runDriven(60, Vector7::Constant(0.5));
   EXPECT_NEAR(cell.bridge.snapshot().sample.commanded_velocity[0], 0.5, 1e-9);
+}
+
+/// Three in one gap, or a fourth where they fade one after the other.
+TEST(BridgeLosses, SeveralPacketsLostShortlyBeforeAreTheCause) {
+  for (const bool measurements : {false, true}) {
+    for (const int lost : {2, measurements ? 3 : 4}) {
+      Cell cell;
+      cell.start();
+      cell.run(20);
+      for (int i = 0; i < lost; ++i) cell.robot.cycle(cell.bridge, measurements, !measurements);
+      // The last answer before the end arrives: what is counted is what was lost before.
+      cell.robot.state = fri::FriState::Monitor;
+      cell.run(1);
+      EXPECT_EQ(cell.bridge.snapshot().loss.cause,
+                lost < 3 ? LossCause::LeftByController : LossCause::PacketsLost)
+          << measurements << " " << lost;
+    }
+  }
+}
+
+/// The controller's own command moves while it is not commanded: every answer is its set-point.
+TEST(BridgeLosses, TheSetPointOfAControllerThatIsNotCommandedIsMirrored) {
+  for (const bool monitor : {true, false}) {
+    Cell cell;
+    if (!monitor) {
+      cell.robot.state = fri::FriState::Command;
+      cell.robot.power = 0x7E;
+    }
+    cell.run(3);
+    for (int i = 0; i < 20; ++i) {
+      cell.robot.moveOwn(cell.robot.own() + Vector7::Constant(0.002));
+      const Vector7 set_point = cell.robot.setPoint();
+      cell.run(1);
+      for (int j = 0; j < 7; ++j) {
+        ASSERT_FLOAT_EQ(cell.robot.answer.joint_position[j], static_cast<float>(set_point[j]))
+            << monitor << " " << i;
+      }
+    }
+  }
+}
+
+/// Command mode begins at the frame that is reported, not at the one that the joints would have.
+TEST(BridgeLosses, TheFirstCartesianAnswersAreTheReportedFrame) {
+  Cell cell;
+  cell.run(3);
+  ASSERT_TRUE(runEvent(cell.bridge, cell.robot, "cartesian_impedance").success());
+  cell.start();
+  const float reported[12] = {1, 0, 0, 0.6F, 0, 1, 0, 0, 0, 0, 1, 0};
+  for (int i = 0; i < 3; ++i) {
+    cell.run(1);
+    for (int j = 0; j < 12; ++j)
+      EXPECT_NEAR(cell.robot.answer.cartesian_frame[j], reported[j], 1e-6) << i << " " << j;
+  }
 }
 
 }  // namespace

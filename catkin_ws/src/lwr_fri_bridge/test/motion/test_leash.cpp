@@ -1,4 +1,4 @@
-/// The leash joint by joint: when it trips, how it returns, and when it lets go.
+/// The leash: a blocked arm stores no leap; when it trips, how it returns, when it lets go.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -8,6 +8,96 @@
 
 namespace lwr_fri_bridge {
 namespace {
+
+using test::defaultConfig;
+using test::drive;
+using test::SmallController;
+
+struct Blocked {
+  Blocked(const char* mode, double speed) : bridge(defaultConfig()), robot(0.005) {
+    for (int i = 0; i < 3; ++i) robot.cycle(bridge);
+    EXPECT_TRUE(test::runEvent(bridge, robot, mode).success());
+    EXPECT_TRUE(test::runEvent(bridge, robot, "start").success());
+    robot.cycle(bridge);
+    velocity[1] = speed;
+    push(100);
+    robot.blocked = true;
+    blocked_at = robot.measured();
+  }
+  void push(int cycles) {
+    for (int i = 0; i < cycles; ++i) {
+      drive(bridge, robot, velocity);
+      robot.cycle(bridge);
+      ahead = std::max(ahead, (robot.setPoint() - robot.measured()).cwiseAbs().maxCoeff());
+    }
+  }
+  double stored() const { return (robot.setPoint() - robot.measured()).cwiseAbs().maxCoeff(); }
+  Bridge bridge;
+  SmallController robot;
+  Vector7 velocity = Vector7::Zero();
+  Vector7 blocked_at;
+  double ahead = 0.0;
+};
+
+TEST(Leash, RelaxesABlockedArmInEveryMode) {
+  for (const char* mode : {"position", "joint_impedance", "cartesian_impedance"}) {
+    for (const double speed : {0.1, 0.5, 1.5, -1.5}) {
+      Blocked cell(mode, speed);
+      cell.push(1000);  // 5 s against the block
+      const double leash = std::string(mode) == "position" ? 0.05 : 0.10;
+      const double v = std::abs(speed);
+      EXPECT_LE(cell.ahead, leash + 1.1 * coglab_rt::brakingDistance(v, 10.0, 500.0) + 0.01 * v)
+          << mode << speed;
+      EXPECT_LE(cell.stored(), 2e-3) << mode << speed;
+      const Snapshot s = cell.bridge.snapshot();
+      EXPECT_EQ(s.counters.leash_trips, 1U);
+      EXPECT_EQ(s.sample.block, MotionBlock::Leashed);
+      EXPECT_EQ(s.sample.blocking_joint, 1);
+    }
+  }
+}
+
+/// A soft arm sags under what it holds, friction holds it back: no block, it goes on. A stiff one
+/// that lies back as far is blocked.
+TEST(Leash, ASoftArmThatSagsIsNotBlocked) {
+  for (const bool soft : {true, false}) {
+    Bridge bridge(defaultConfig());
+    SmallController robot(0.005);
+    for (int i = 0; i < 3; ++i) robot.cycle(bridge);
+    const std::string mode = soft ? "joint_impedance stiffness 30" : "joint_impedance";
+    ASSERT_TRUE(test::runEvent(bridge, robot, mode).success());
+    ASSERT_TRUE(test::runEvent(bridge, robot, "start").success());
+    robot.blocked = true;  // the measured position is set here
+    Vector7 sag = Vector7::Zero(), velocity = Vector7::Zero();
+    sag[1] = 0.2;  // 6 Nm at 30 Nm/rad
+    velocity[1] = 0.3;
+    const double before = robot.setPoint()[1];
+    for (int i = 0; i < 300; ++i) {
+      robot.setMeasured(robot.setPoint() - sag);
+      drive(bridge, robot, velocity);
+      robot.cycle(bridge);
+    }
+    EXPECT_EQ(bridge.snapshot().counters.leash_trips, soft ? 0U : 1U);
+    EXPECT_EQ(robot.setPoint()[1] > before + 0.3, soft);
+  }
+}
+
+TEST(Leash, AnArmThatIsPushedOrSagsDoesNotDragTheSetPoint) {
+  Bridge bridge(defaultConfig());
+  SmallController robot(0.005);
+  for (int i = 0; i < 3; ++i) robot.cycle(bridge);
+  ASSERT_TRUE(test::runEvent(bridge, robot, "joint_impedance").success());
+  ASSERT_TRUE(test::runEvent(bridge, robot, "start").success());
+  const Vector7 set_point = robot.setPoint();
+  robot.blocked = true;
+  for (int i = 0; i < 400; ++i) {
+    robot.setMeasured(set_point - Vector7::Constant(0.001 * i));
+    drive(bridge, robot, Vector7::Zero());
+    robot.cycle(bridge);
+  }
+  EXPECT_TRUE(robot.setPoint().isApprox(set_point, 1e-7));
+  EXPECT_EQ(bridge.snapshot().counters.leash_trips, 0U);
+}
 
 constexpr double kLeash = 0.05;
 
@@ -122,19 +212,6 @@ TEST(LeashEdges, LetsGoAtHomeWithoutTheOldRequest) {
     EXPECT_FALSE(tied.tick(arm, -outward));
     EXPECT_EQ(tied.leash.joint(), -1);
   }
-}
-
-TEST(LeashEdges, WaitsForEveryJointThatReturns) {
-  Tied tied;
-  const Vector7 arm = unit(1, -0.06) + unit(6, -0.03);
-  ASSERT_TRUE(tied.tick(arm, unit(1, 0.2)));
-  tied.place(unit(1, -0.06));
-  EXPECT_TRUE(tied.tick(arm, Vector7::Zero()));  // the last joint is not home
-  EXPECT_LT(tied.target[6], 0.0);
-  tied.place(arm);
-  EXPECT_TRUE(tied.tick(arm, unit(6, 0.2)));  // its outward motion counts as well
-  EXPECT_TRUE(tied.tick(arm, unit(1, 0.2) - unit(6, 0.2)));
-  EXPECT_FALSE(tied.tick(arm, Vector7::Zero()));
 }
 
 TEST(LeashEdges, LengthsFollowTheRuleForEachJoint) {

@@ -6,8 +6,7 @@
 
 #include <Eigen/Geometry>
 
-#include "lwr_fri_bridge/motion/cartesian_set_point.hpp"
-#include "lwr_fri_bridge/motion/tool_wrench.hpp"
+#include "lwr_fri_bridge/motion/tool_frame.hpp"
 
 namespace lwr_fri_bridge {
 namespace {
@@ -93,18 +92,6 @@ TEST(ToolFrame, TheControllersFrameIsItsCommandMovedByTheOffset) {
   }
 }
 
-TEST(ToolFrame, OneFilledEntryOfTheOffsetsRotationMakesItOne) {
-  for (const int entry : {0, 1, 2, 4, 5, 6, 8, 9, 10}) {
-    fri::MeasurementDatagram m{};
-    toWire(Frame::Identity(), m.commanded_frame);
-    m.commanded_frame_offset[entry] = -0.5F;
-    float frame[fri::kFrameValues];
-    fri::cartesianSetPointOf(m, frame);
-    for (int i = 0; i < 12; ++i)
-      EXPECT_EQ(frame[i], i == entry ? -0.5F : 0.0F) << entry << " " << i;
-  }
-}
-
 /// A measured frame that is no rotation within 1e-3 is not filled: the flange counts.
 TEST(ToolFrame, TheWrenchTurnsByTheMeasuredFrameIfItIsOne) {
   const Vector7 joints = posture(3);
@@ -137,47 +124,6 @@ TEST(ToolFrame, TheWrenchTurnsByTheMeasuredFrameIfItIsOne) {
     toWire(tool, m.measured_frame);
     m.measured_frame[entry] = NAN;
     EXPECT_TRUE(toolWrench(m, false).isApprox(turnedBy(flange(joints)), 1e-6)) << entry;
-  }
-}
-
-TEST(ToolFrame, JointsGoOntoTheWireAndBackInOneOrder) {
-  Vector7 joints;
-  joints << 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7;
-  float wire[fri::kJoints];
-  fri::jointsToWire(joints, wire);
-  for (int i = 0; i < 7; ++i) EXPECT_FLOAT_EQ(wire[i], 0.1F * static_cast<float>(i + 1));
-  EXPECT_TRUE(fri::jointsFromWire(wire).isApprox(joints, 1e-7));
-  const float wrench[fri::kCartesian] = {1, 2, 3, 4, 5, 6};
-  EXPECT_EQ(fri::wrenchFromWire(wrench), (Vector6() << 1, 2, 3, 6, 5, 4).finished());
-  fri::MeasurementDatagram m{};
-  for (int i = 0; i < 7; ++i) {
-    m.commanded_position[i] = static_cast<float>(i);
-    m.commanded_position_offset[i] = 10.0F;
-  }
-  fri::setPointOf(m, wire);
-  for (int i = 0; i < 7; ++i) EXPECT_EQ(wire[i], static_cast<float>(10 + i));
-}
-
-/// Arrays lie one behind the other in a datagram: what fills one leaves the next as it was.
-TEST(ToolFrame, AFieldIsFilledWithoutTouchingTheNext) {
-  const Frame pose = flange(posture(1));
-  fri::MeasurementDatagram m{};
-  toWire(pose, m.commanded_frame);
-  for (const bool offset : {false, true}) {
-    if (offset) toWire(Frame::Identity(), m.commanded_frame_offset);
-    fri::CommandDatagram c{};
-    c.joint_torque[0] = c.cartesian_frame[0] = c.cartesian_damping[0] = 9.0F;
-    fri::jointsToWire(posture(2), c.joint_position);
-    EXPECT_EQ(c.cartesian_frame[0], 9.0F);
-    fri::cartesianSetPointOf(m, c.cartesian_frame);
-    EXPECT_EQ(c.joint_torque[0], 9.0F);
-    CartesianSetPoint set_point;
-    set_point.anchor(posture(1), c.cartesian_frame);
-    set_point.frame(posture(2), c.cartesian_frame);
-    EXPECT_EQ(c.joint_torque[0], 9.0F);
-    fri::wrenchToWire(Vector6::Constant(2.0), c.cartesian_stiffness);
-    EXPECT_EQ(c.cartesian_damping[0], 9.0F);
-    EXPECT_EQ(c.cartesian_stiffness[5], 2.0F);
   }
 }
 

@@ -3,7 +3,6 @@
 
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <random>
 
 #include "lwr_fri_bridge/requests/target_command.hpp"
@@ -93,59 +92,6 @@ TEST(TargetCommand, NamesSortIntoWireOrder) {
   const TargetVerdict verdict = m.judge();
   ASSERT_EQ(verdict.fault, TargetFault::None) << verdict.sentence;
   for (int i = 0; i < 7; ++i) EXPECT_NEAR(verdict.command.velocity[i], 0.7 - 0.1 * i, 1e-12);
-}
-
-/// Both ends of what is followed belong to it.
-TEST(TargetCommand, TheEdgesOfAgeAndPermissionAreFollowed) {
-  Message m;
-  m.age_ns = kLongest;
-  EXPECT_EQ(m.judge().fault, TargetFault::None);
-  EXPECT_EQ(m.judge().command.stamp_ns, kNow - kLongest);
-  EXPECT_EQ(m.judge(7, kNow - kLongest).fault, TargetFault::None);
-  EXPECT_EQ(m.judge(7, kNow - kLongest + 1).fault, TargetFault::Epoch);
-  m.age_ns = kLongest + 1;
-  EXPECT_EQ(m.judge().fault, TargetFault::Stamp);
-  m.age_ns = -1;
-  EXPECT_EQ(m.judge().command.stamp_ns, kNow);
-  EXPECT_EQ(m.judge(7, kNow).fault, TargetFault::None);
-  EXPECT_EQ(m.judge().command.motion_epoch, 7U);  // without one of its own: that of now
-  m.age_ns = 0;
-  m.epoch = "4294967295";
-  EXPECT_EQ(m.judge(4294967295U).fault, TargetFault::None);
-}
-
-TEST(TargetCommand, ARefusalNamesWhatCameAndWhatWasExpected) {
-  const auto sentence = [](auto change) {
-    Message m;
-    change(m);
-    return m.judge(7, kNow - 50 * kMs).sentence;
-  };
-  EXPECT_EQ(sentence([](Message&) {}), "");
-  EXPECT_EQ(sentence([](Message& m) { m.velocities.resize(6); }), "expected 7 velocities, got 6");
-  EXPECT_EQ(sentence([](Message& m) { m.velocities.resize(8); }), "expected 7 velocities, got 8");
-  EXPECT_EQ(sentence([](Message& m) { m.names.assign(6, "lwr_a1"); }),
-            "expected 7 names or none, got 6");
-  EXPECT_EQ(sentence([](Message& m) {
-              m.names = {"lwr_a1", "lwr_a2", "lwr_e1", "lwr_a3", "lwr_a4", "lwr_a5", "hand"};
-            }),
-            "unknown joint 'hand', expected lwr_a1 lwr_a2 lwr_e1 lwr_a3 lwr_a4 lwr_a5 lwr_a6");
-  EXPECT_EQ(sentence([](Message& m) { m.velocities[6] = NAN; }),
-            "a velocity is not finite, or a joint is named twice");
-  EXPECT_EQ(sentence([](Message& m) {
-              m.age_ns = 250 * kMs;
-            }).find("made 0.25 s ago, at most 0.1 s (topic_timeout) is followed; "),
-            0U);
-  EXPECT_EQ(sentence([](Message& m) {
-              m.age_ns = -250 * kMs;
-            }).find("stamped 0.25 s ahead of this computer's clock, at most 0.05 s is taken; "),
-            0U);
-  EXPECT_EQ(sentence([](Message& m) { m.epoch = std::string(40, 'x'); }),
-            "header.frame_id is '" + std::string(32, 'x') +
-                "', expected the motion_epoch of state, or nothing");
-  EXPECT_EQ(sentence([](Message& m) { m.epoch = "6"; }),
-            "made in motion_epoch 6, now it is 7; ask for the motion anew");
-  EXPECT_EQ(sentence([](Message& m) { m.age_ns = 60 * kMs; }),
-            "made before motion was allowed; ask for the motion anew");
 }
 
 /// Whatever comes, what passes was made within the permission, is not too old, and is never newer

@@ -141,36 +141,6 @@ TEST(Configurator, ARefusalOfTheProgramEndsTheStartWithItsReason) {
   EXPECT_EQ(desk.asked(3), 2);  // a request of its own
 }
 
-TEST(Configurator, TheFlagOfAProgramThatOnlyWorksIsWatchedForHalfASecond) {
-  Desk desk(KrlConvention::RcprgTum);
-  desk.start(ControlStrategy::JointImpedance);
-  EXPECT_EQ(desk.codeAt(0.005), OutcomeCode::Pending);
-  EXPECT_EQ(desk.codeAt(3.0), OutcomeCode::Pending);  // it has not begun
-  desk.m.krl.bools = 1;
-  EXPECT_EQ(desk.codeAt(4.0), OutcomeCode::Pending);
-  EXPECT_EQ(desk.codeAt(5.0), OutcomeCode::Pending);
-  desk.m.krl.bools = 0;
-  EXPECT_EQ(desk.codeAt(5.5), OutcomeCode::Pending);
-  EXPECT_EQ(desk.codeAt(5.501), OutcomeCode::ProgramRefused);
-  desk.start(ControlStrategy::JointImpedance);  // what was seen before does not count for it
-  EXPECT_EQ(desk.codeAt(0.005), OutcomeCode::Pending);
-  EXPECT_EQ(desk.codeAt(2.0), OutcomeCode::Pending);
-}
-
-/// A program that tells results is not judged by what it has stopped to show.
-TEST(Configurator, OnlyAProgramThatTellsNothingElseIsJudgedByItsFlag) {
-  Desk desk;
-  desk.start();
-  desk.at(0.005);
-  desk.m.krl.ints[2] = desk.asked(3);  // it works on the request
-  EXPECT_EQ(desk.codeAt(1.0), OutcomeCode::Pending);
-  desk.m.krl.ints[2] = 0;
-  EXPECT_EQ(desk.codeAt(1.6), OutcomeCode::Pending);
-  EXPECT_EQ(desk.codeAt(9.9), OutcomeCode::Pending);
-  desk.enter();
-  EXPECT_EQ(desk.codeAt(9.95), OutcomeCode::Done);
-}
-
 TEST(Configurator, AnotherStrategyALostCommandModeAndSilenceEndAStart) {
   Desk other;
   other.start();
@@ -239,44 +209,6 @@ TEST(Configurator, AStopIsGivenUpAfterItsTimeLimits) {
   }
 }
 
-/// A program that was asked for a start may be just about to enter command mode.
-TEST(Configurator, AStopAfterAnUnfinishedStartWaitsUntilMonitorModeLasts) {
-  Desk desk;
-  desk.start();
-  desk.at(0.005);
-  desk.configurator.abandon(OutcomeCode::Interrupted, desk.seen());
-  EXPECT_EQ(desk.codeAt(0.01), OutcomeCode::Interrupted);
-  desk.stop();
-  EXPECT_EQ(desk.codeAt(0.499), OutcomeCode::Pending);
-  desk.enter();
-  EXPECT_EQ(desk.codeAt(0.6), OutcomeCode::Pending);
-  desk.m.state = static_cast<std::uint16_t>(FriState::Monitor);
-  EXPECT_EQ(desk.codeAt(1.09), OutcomeCode::Pending);
-  EXPECT_EQ(desk.codeAt(1.1001), OutcomeCode::Done);
-}
-
-TEST(Configurator, OnlyAStartInProgressIsAbandoned) {
-  Desk idle;
-  idle.configurator.abandon(OutcomeCode::Interrupted, idle.seen());
-  EXPECT_EQ(idle.codeAt(0.005), OutcomeCode::Pending);
-
-  Desk waiting;  // for the quality: the program knows nothing yet
-  waiting.m.quality = static_cast<std::uint16_t>(Quality::Bad);
-  waiting.start();
-  waiting.at(0.005);
-  waiting.configurator.abandon(OutcomeCode::Interrupted, waiting.seen());
-  EXPECT_EQ(waiting.asked(), 0);
-  EXPECT_EQ(waiting.codeAt(0.01), OutcomeCode::Interrupted);
-  EXPECT_FALSE(waiting.configurator.busy());
-
-  Desk stopping;
-  stopping.enter();
-  stopping.stop();
-  stopping.configurator.abandon(OutcomeCode::Interrupted, stopping.seen());
-  EXPECT_EQ(stopping.codeAt(0.005), OutcomeCode::Pending);
-  EXPECT_TRUE(stopping.configurator.busy());
-}
-
 TEST(Configurator, AFallBackWithdrawsWhatWouldBringCommandModeBack) {
   Desk desk(KrlConvention::Stanford);
   desk.start();
@@ -310,24 +242,36 @@ TEST(Configurator, NumbersGrowFromOneWrapAndAreNotThatOfTheLastRequest) {
   EXPECT_EQ(data.ints[2], 1);
 }
 
-TEST(Configurator, TellsTheToolAndStepsThroughTheCommandsOfAProgram) {
-  EXPECT_EQ(Desk(KrlConvention::RttLwr).asked(3), 4);
-  Desk desk(KrlConvention::OpenKc);
+TEST(Configurator, TheFlagOfAProgramThatOnlyWorksIsWatchedForHalfASecond) {
+  Desk desk(KrlConvention::RcprgTum);
   desk.start(ControlStrategy::JointImpedance);
-  desk.at(0.005);
-  desk.connected = true;
-  desk.at(0.01);
-  EXPECT_EQ(desk.asked(16), 7);
-  desk.m.krl.ints[14] = 7;
+  EXPECT_EQ(desk.codeAt(0.005), OutcomeCode::Pending);
+  EXPECT_EQ(desk.codeAt(3.0), OutcomeCode::Pending);  // it has not begun
   desk.m.krl.bools = 1;
-  desk.at(0.015);
-  EXPECT_EQ(desk.asked(16), 0);
+  EXPECT_EQ(desk.codeAt(4.0), OutcomeCode::Pending);
+  EXPECT_EQ(desk.codeAt(5.0), OutcomeCode::Pending);
   desk.m.krl.bools = 0;
-  desk.at(0.02);
-  EXPECT_EQ(desk.asked(16), 1);
-  desk.stop();  // begins with its own first command, which waits for an answer of its own
+  EXPECT_EQ(desk.codeAt(5.5), OutcomeCode::Pending);
+  EXPECT_EQ(desk.codeAt(5.501), OutcomeCode::ProgramRefused);
+  desk.start(ControlStrategy::JointImpedance);  // what was seen before does not count for it
+  EXPECT_EQ(desk.codeAt(0.005), OutcomeCode::Pending);
+  EXPECT_EQ(desk.codeAt(2.0), OutcomeCode::Pending);
+}
+
+/// A program that was asked for a start may be just about to enter command mode.
+TEST(Configurator, AStopAfterAnUnfinishedStartWaitsUntilMonitorModeLasts) {
+  Desk desk;
+  desk.start();
   desk.at(0.005);
-  EXPECT_EQ(desk.asked(16), 2);
+  desk.configurator.abandon(OutcomeCode::Interrupted, desk.seen());
+  EXPECT_EQ(desk.codeAt(0.01), OutcomeCode::Interrupted);
+  desk.stop();
+  EXPECT_EQ(desk.codeAt(0.499), OutcomeCode::Pending);
+  desk.enter();
+  EXPECT_EQ(desk.codeAt(0.6), OutcomeCode::Pending);
+  desk.m.state = static_cast<std::uint16_t>(FriState::Monitor);
+  EXPECT_EQ(desk.codeAt(1.09), OutcomeCode::Pending);
+  EXPECT_EQ(desk.codeAt(1.1001), OutcomeCode::Done);
 }
 
 }  // namespace
