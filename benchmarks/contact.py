@@ -14,15 +14,14 @@ from collections.abc import Iterator
 
 import coglab_controllers as cc
 import numpy as np
+from coglab_contact.detector import ContactDetector, DetectorSettings
+from coglab_contact.fused_detector import IN_MOTION, FusedDetector
+from coglab_contact.load import GripAndLoad
+from coglab_contact.motion_thresholds import Thresholds
+from coglab_contact.moving_contact import MovingContact
 from coglab_objects.database import objects_folder, read_object
 from coglab_py.packages import package_path
 from coglab_py.pose import Pose
-from coglab_smach.contact.detector import ContactDetector, DetectorSettings
-from coglab_smach.contact.fused_detector import IN_MOTION, FusedDetector
-from coglab_smach.contact.grip_and_load import GripAndLoad
-from coglab_smach.contact.motion_thresholds import Thresholds
-from coglab_smach.contact.moving_contact import MovingContact
-from coglab_smach.contact.trials import ContactTrial, push
 from coglab_smach.kinematics.reachability import default_arm, position_jacobian, solve
 from common import Row, in_parallel, main, median, share, shared_module
 
@@ -123,9 +122,9 @@ def resting(_quick: bool) -> Iterator[Row]:
     q = solve(default_arm(), Pose(np.array([0.78, -0.02, 0.44]), np.array([0.5, 0.5, 0.5, 0.5])))
     posture, delays = (q, position_jacobian(default_arm(), q)), []
     for seed in range(60):
-        trial = ContactTrial(posture, seed, 0.05)
+        trial = shared_module("arms").ContactTrial(posture, seed, 0.05)
         alarmed = trial.rest_and_arm() is not None
-        event, delay = trial.feed(0.2, push((0, 1, 0), 3.0))
+        event, delay = trial.feed(0.2, shared_module("arms").push((0, 1, 0), 3.0))
         delays.append(None if alarmed or event is None else 1e3 * delay)
     yield median("lateral push of 3 N at rest, delay", delays, "ms", "<= 60")
 

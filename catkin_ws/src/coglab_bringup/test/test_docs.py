@@ -1,30 +1,44 @@
-"""The pages of the project: links lead to files and headings that exist, shell blocks parse."""
+"""The pages of the project: links and named files exist, shell blocks parse, Python blocks compile; README's run."""
 
 from __future__ import annotations
 
 import re
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 TOP = Path(__file__).resolve().parents[4]
-PAGES = sorted(
-    [*TOP.glob("*.md"), *TOP.glob("docs/*.md"), *TOP.glob("catkin_ws/src/*/README.md")],
-)
+SOURCES = TOP / "catkin_ws" / "src"
+PAGES = sorted([*TOP.glob("*.md"), *TOP.glob("docs/*.md"), *SOURCES.glob("*/README.md")])
+
+
+def text_of(page: Path) -> str:
+    return page.read_text(encoding="utf-8")
 
 
 def anchors(page: Path) -> set[str]:
     """The anchors of a page's headings, as the usual renderers of Markdown make them."""
-    text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.S)
+    text = re.sub(r"```.*?```", "", text_of(page), flags=re.S)
     titles = re.findall(r"^#+ +(.+?) *$", text, re.M)
     return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+def blocks(page: Path, *kinds: str) -> list[str]:
+    """The blocks of these kinds; unmarked ones that call the project count as shell."""
+    found = re.findall(r"^( *)```(\w*)\n(.*?)^ *```", text_of(page), re.M | re.S)
+    return [
+        re.sub(f"^{indent}", "", text, flags=re.M)
+        for indent, kind, text in found
+        if kind in kinds or ("sh" in kinds and not kind and "./coglab " in text)
+    ]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(TOP)))
 def test_links_exist(page: Path):
     broken = []
-    for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text(encoding="utf-8")):
+    for target in re.findall(r"\]\(([^)\s]+)\)", text_of(page)):
         if target.startswith(("http:", "https:")):
             continue
         name, _, anchor = target.partition("#")
@@ -34,14 +48,25 @@ def test_links_exist(page: Path):
     assert not broken
 
 
-def blocks(page: Path) -> list[str]:
-    """The blocks of a page that hold shell commands: marked sh or bash, or unmarked and calling the project."""
-    found = re.findall(r"^ *```(\w*)\n(.*?)^ *```", page.read_text(encoding="utf-8"), re.M | re.S)
-    return [text for kind, text in found if kind in ("sh", "bash") or (not kind and "./coglab " in text)]
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(TOP)))
+def test_named_files_exist(page: Path):
+    """Files that are named with their path from the top of the checkout; NAME and <...> stand for any."""
+    named = re.findall(r"`((?:catkin_ws/src|docs|docker|benchmarks)/[\w./-]+\.\w+)`", text_of(page))
+    made = ("side_sway", "wrist_damper", "_build", "/cup.yaml", "NAME")  # by the commands on the page
+    missing = [name for name in named if not (TOP / name).exists() and not any(part in name for part in made)]
+    assert not missing
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(TOP)))
-def test_shell_blocks_parse(page: Path):
-    for block in blocks(page):
+def test_blocks_parse(page: Path):
+    for block in blocks(page, "sh", "bash"):
         done = subprocess.run(["bash", "-n"], input=block, text=True, capture_output=True, check=False)
         assert done.returncode == 0, f"{done.stderr}\n{block}"
+    for block in blocks(page, "python"):
+        compile(block, page.name, "exec")
+
+
+@pytest.mark.parametrize("block", blocks(TOP / "README.md", "python"))
+def test_python_of_the_readme_runs(block: str):
+    done = subprocess.run([sys.executable, "-c", block], text=True, capture_output=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr

@@ -108,7 +108,7 @@ def test_an_unknown_group_is_refused_where_python_is_missing_too(tmp_path):
         [tmp_path / "coglab", "install", "run", "vizz"], capture_output=True, text=True, timeout=120, check=False
     )
     assert ended.returncode == 2 and "installed" not in ended.stderr
-    assert "no group named 'vizz'; there are: browser build run test viz" in ended.stderr
+    assert "no group named 'vizz'; there are: browser build docs film run test viz" in ended.stderr
 
 
 @pytest.mark.parametrize("words, part", [("demo --help", "--seed SEED"), ("launch --help", "fri_period:=0.005")])

@@ -9,7 +9,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from coglab_console.desk import commands
 from coglab_console.desk.experiment import Experiment
 from coglab_console.desk.session_file import COLUMNS, session_files
 from coglab_console.web import server
@@ -86,8 +85,3 @@ def test_every_column_and_every_type_of_line_is_described():
 def test_the_limits_are_those_that_are_served():
     assert f"more than {server.MAX_MESSAGE // 1024} KiB" in PAGE and f"nothing for {server.SEND_LIMIT:.0f} s" in PAGE
     assert f"after {server.MAX_BAD_FRAMES} of them" in PAGE and server.MAX_SOCKETS == 4
-
-
-def test_every_command_stands_on_the_page():
-    """`python3 -m coglab_console.desk.commands` prints the table."""
-    assert "\n".join(commands.table()) in PAGE

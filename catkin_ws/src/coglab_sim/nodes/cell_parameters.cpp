@@ -27,7 +27,7 @@ constexpr const char* expected() {
 }
 
 /// Sets a row of the table from the parameter `key` under the node, if it is there: as the type
-/// that the row has.
+/// that the row has. @throws std::invalid_argument naming parameter, value and range.
 void take(CellConfig& config, const ros::NodeHandle& node, const CellParameter& row,
           const std::string& key) {
   if (!node.hasParam(key)) return;
@@ -97,7 +97,7 @@ CellConfig readCellConfig(const ros::NodeHandle& node) {
   const ros::NodeHandle above;
   config.object =
       readObject(node, coglab_rt::readParameter(node, "object/id", config.object.id, "a name"));
-  config.object_pose.position[2] = -config.object.center[2];  // held at the height of its middle
+  config.object_position[2] = -config.object.center[2];  // held at the height of its middle
   for (const CellParameter& row : cellParameters()) {
     if (row.name == "krc/period") take(config, above, row, "fri_period");
     if (row.name == "seed") take(config, above, row, "seed");

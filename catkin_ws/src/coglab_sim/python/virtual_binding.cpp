@@ -140,7 +140,7 @@ PYBIND11_MODULE(_virtual, m) {
            }),
            py::arg("urdf"), py::arg("limits_file"), py::arg("cell") = py::dict(),
            py::arg("manager") = "",
-           "cell: parameters of the cell as in coglab_sim._cell.parameter_table(); manager: YAML "
+           "cell: parameters of the cell as in coglab_sim._cell.parameters(); manager: YAML "
            "as below /controller_manager.")
       .def("tick", &Robot::tick, "One FRI period.")
       .def(
@@ -314,7 +314,6 @@ PYBIND11_MODULE(_virtual, m) {
              result["reason_code"] = progress.reason.number();
              result["phase"] = progress.phase;
              result["remaining_distance"] = progress.remaining_distance;
-             result["remaining_time"] = progress.remaining_time;
              result["remaining_time"] = progress.remaining_time;
              return result;
            })

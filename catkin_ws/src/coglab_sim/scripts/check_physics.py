@@ -13,7 +13,7 @@ import sys
 def complaint() -> str:
     """Why not, with what to do; empty if it can."""
     try:
-        import coglab_sim._plant  # noqa: F401  (linked with what the cell is linked with)
+        import coglab_sim._cell  # noqa: F401  (linked with what the cell is linked with)
     except ImportError as error:
         return (
             f"the simulated cell cannot be loaded ({error}): its library is missing or was not built; "

@@ -19,6 +19,7 @@ from coglab_py import parameters
 from coglab_py.alone import init_node
 from coglab_py.messages import pose_message, pose_of
 from coglab_py.pose import Pose as Frame
+from coglab_sim.person.body import arm_of
 from coglab_sim.plausible import IMPLAUSIBLE, plausible
 from geometry_msgs.msg import Point, Pose, Quaternion, TransformStamped, Vector3
 from scipy.spatial.transform import Rotation
@@ -34,10 +35,6 @@ HAND_SIZE = (0.16, 0.09, 0.03)
 CLOTH, DARK = (0.35, 0.45, 0.60, 1.0), (0.25, 0.27, 0.30, 1.0)
 FLOOR = -0.75
 """m, of the cell"""
-SHOULDER = np.array([1.42, 0.20, 0.50])
-"""m in the world: where the person stands; the shoulder comes forward where the hand is out of reach"""
-UPPER_ARM, FOREARM = 0.33, 0.36
-"""m; the forearm up to the palm"""
 
 
 class TruthMarkers:
@@ -146,19 +143,6 @@ class TruthMarkers:
 def at(point: np.ndarray) -> Pose:
     """A pose that is not turned."""
     return Pose(Point(*point), Quaternion(w=1.0))
-
-
-def arm_of(hand: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Shoulder and elbow (m, world) of an arm whose palm is at `hand`; the elbow hangs down."""
-    away = SHOULDER - hand
-    distance = float(np.linalg.norm(away))
-    reach = min(distance, 0.98 * (UPPER_ARM + FOREARM))
-    axis = away / distance if distance > 1e-6 else np.array([1.0, 0.0, 0.0])
-    shoulder = hand + reach * axis
-    along = (reach**2 + FOREARM**2 - UPPER_ARM**2) / (2.0 * max(reach, 1e-6))  # law of cosines
-    aside = np.sqrt(max(FOREARM**2 - along**2, 0.0))
-    down = np.array([0.0, 0.0, -1.0]) + axis[2] * axis
-    return shoulder, hand + along * axis + aside * down / max(float(np.linalg.norm(down)), 1e-6)
 
 
 def main() -> int:

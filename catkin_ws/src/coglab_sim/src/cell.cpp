@@ -45,7 +45,7 @@ Cell::Cell(const CellConfig& config)
       loss_(config.seed, 2) {
   plant_.setBrakes(true);
   plant_.setArm(config.home);
-  plant_.place(placeOf(config.object_start), config.object_pose);
+  plant_.place(placeOf(config.object_start), {config.object_position, config.object_rotation});
   servos_.observe(plant_.position(), plant_.velocity());
 }
 

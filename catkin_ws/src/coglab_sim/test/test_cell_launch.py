@@ -61,7 +61,7 @@ def test_a_library_that_is_missing_ends_the_launch_before_anything_starts(tmp_pa
     package.mkdir()
     (package / "__init__.py").touch()
     line = "libmujoco.so.2.2.2: cannot open shared object file: No such file or directory"
-    (package / "_plant.py").write_text(f"raise ImportError({line!r})\n")
+    (package / "_cell.py").write_text(f"raise ImportError({line!r})\n")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     with pytest.raises(RLException):
         resolve()

@@ -5,8 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
+from coglab_smach.context.config import Config
 from coglab_smach.ports.interfaces import Located
-from coglab_smach.states import reach, reach_watch
+from coglab_smach.states import reach
 from conftest import Trial
 
 
@@ -64,8 +65,8 @@ def test_what_is_still_at_the_hand_has_not_fallen(monkeypatch, apart, code):
     def pause(duration):
         t[0] += duration
 
-    monkeypatch.setattr(reach_watch, "sight_of", sight)
-    ctx = SimpleNamespace(clock=SimpleNamespace(now=lambda: t[0]), config={})
-    grip = reach_watch.PersonsGrip(SimpleNamespace(ctx=ctx, pause=pause), "mug")
+    monkeypatch.setattr(reach, "sight_of", sight)
+    ctx = SimpleNamespace(clock=SimpleNamespace(now=lambda: t[0]), config=Config({}))
+    grip = reach.PersonsGrip(SimpleNamespace(ctx=ctx, pause=pause), "mug")
     hand[0] = None if apart is None else thing + [0.03, 0.0, apart]
     assert grip.fell_or_withdrawn() == getattr(ReasonCode, code)

@@ -9,7 +9,7 @@
 namespace ctrl_more {
 
 /// Keeps the orientation of a body (pelvis, torso, hand) that carries an IMU: proportional,
-/// integral and damping action on SO(3). See doc/controllers/Attitude.md.
+/// integral and damping action on SO(3).
 class Attitude : public FeedbackController {
  public:
   Description describe() const override;

@@ -8,8 +8,7 @@
 
 namespace ctrl_more {
 
-/// Lets the centre of mass yield to pushes like a mass on a damper and a spring. See
-/// doc/controllers/CompliantStabiliser.md.
+/// Lets the centre of mass yield to pushes like a mass on a damper and a spring.
 class CompliantStabiliser : public FeedbackController {
  public:
   Description describe() const override;

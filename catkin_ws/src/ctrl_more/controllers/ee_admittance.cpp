@@ -10,7 +10,6 @@
 namespace ctrl_more {
 
 /// Lets an end-effector yield to the hand that pushes or pulls it, around whatever motion runs.
-/// See doc/controllers/EeAdmittance.md.
 class EeAdmittance : public FeedbackController {
  public:
   Description describe() const override;

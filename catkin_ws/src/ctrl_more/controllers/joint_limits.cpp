@@ -7,7 +7,7 @@
 
 namespace ctrl_more {
 
-/// Slows joints that approach the ends of their range. See doc/controllers/JointLimits.md.
+/// Slows joints that approach the ends of their range.
 class JointLimits : public FeedbackController {
  public:
   Description describe() const override;

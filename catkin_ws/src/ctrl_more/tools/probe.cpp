@@ -8,7 +8,7 @@
 #include <memory>
 #include <string>
 
-#include "ctrl_more/loading/prototypes.hpp"
+#include "ctrl_more/feedback_controller.hpp"
 #include "loading/probe.hpp"
 
 namespace {

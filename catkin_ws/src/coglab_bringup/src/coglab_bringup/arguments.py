@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from coglab_bringup.launch_arguments import judge_launch
-from coglab_bringup.usage import Parser, Refused, seed, writable_folder
+from coglab_bringup.usage import Parser, Refused, seed, writable_file, writable_folder
 
 HELP_GIVEN = 10
 BUILD_WORDS = ("--upstream-smach", "tests")
@@ -46,6 +46,20 @@ def demo_parser(top: Path) -> Parser:
         help="patient: waits for the robot, seen without noise or delay (default); accustomed: helps it by habit, too; "
         "drawn: as people are, by the seed, and seen by the tracker as it is; not every handover succeeds, least with "
         "drawn people",
+    )
+    return parser
+
+
+def film_parser(top: Path) -> Parser:
+    """./coglab film"""
+    parser = Parser(prog="coglab film", description="A moving picture of a handover in both directions.")
+    parser.add_argument("--seed", type=seed, default=7, help="seed of the virtual person and of all noise")
+    parser.add_argument(
+        "--out",
+        type=writable_file,
+        default=top / "docs" / "images" / "handover.gif",
+        metavar="FILE",
+        help="the GIF (default: docs/images/handover.gif)",
     )
     return parser
 
@@ -252,6 +266,8 @@ def judge(top: Path, command: str, words: list[str]) -> None:
     """Raises Refused for arguments that the command cannot use."""
     if command == "demo":
         demo_parser(top).parse_args(words)
+    elif command == "film":
+        film_parser(top).parse_args(words)
     elif command == "test":
         test_options(top, words)
     elif command == "bench":

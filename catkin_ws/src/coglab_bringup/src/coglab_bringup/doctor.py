@@ -55,6 +55,8 @@ def package_findings(top: Path) -> Iterator[Finding]:
     optional = {
         "browser": "no browser is installed (only needed to test the console)",
         "viz": "rviz is not installed (only needed where there is a screen)",
+        "docs": "Sphinx is not installed (only needed to build the documentation site)",
+        "film": "nothing is installed to draw pictures without a screen (only needed for ./coglab film)",
     }
     for group, packages in package_groups(top).items():
         there = installed(packages)

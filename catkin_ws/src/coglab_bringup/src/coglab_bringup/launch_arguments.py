@@ -15,6 +15,7 @@ ROSLAUNCH_OPTIONS = ("--screen", "--log", "-v", "--dump-params", "--nodes", "--f
 BEHAVIOURS = "coglab_sim/src/coglab_sim/person/participant.py"
 OBJECTS = "coglab_objects/objects"
 LIMITS = "lwr_description/config/joint_limits.yaml"
+CELL = "coglab_sim/include/coglab_sim/parameter_table.inc"
 CONVENTIONS = "lwr_fri_bridge/src/fri/krl_convention.cpp"
 HELP = """usage: ./coglab launch [-p PORT] [ARGUMENT:=VALUE ...] [OPTION of roslaunch ...]
 
@@ -35,6 +36,14 @@ def _behaviours(sources: Path) -> list[str]:
         if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "") == "BEHAVIOURS":
             return list(ast.literal_eval(node.value))
     raise Refused(f"{BEHAVIOURS} holds no BEHAVIOURS")
+
+
+def _cell_range(sources: Path, parameter: str) -> tuple[float, float]:
+    """Range of a parameter of the simulated cell."""
+    found = re.search(rf'"{parameter}", (\S+), (\S+),', (sources / CELL).read_text(encoding="utf-8"))
+    if found is None:
+        raise Refused(f"{CELL} holds no {parameter}")
+    return float(found[1]), float(found[2])
 
 
 def _conventions(sources: Path) -> list[str]:
@@ -101,7 +110,7 @@ def _checks(sources: Path, objects: Path) -> dict[str, Check]:
         **dict.fromkeys(("fri_address", "console_address"), _address),
         "arm": _one_of("fri", "ideal"),
         "seed": seed,
-        "fri_period": _number(0.001, 0.1),
+        "fri_period": _number(*_cell_range(sources, "krc/period")),
         "people": _whole(1, 9),
         "krl_convention": _one_of(*_conventions(sources)),
         "limits_profile": _one_of(*profiles),

@@ -13,6 +13,8 @@
 #include <thread>
 #include <vector>
 
+#include "coglab_rt/clock.hpp"
+
 namespace ctrl_more {
 namespace {
 
@@ -26,12 +28,6 @@ void copyText(std::array<char, N>& to, const char* from) {
 const char* withoutFolders(const char* file) {
   const char* slash = std::strrchr(file, '/');
   return slash ? slash + 1 : file;
-}
-
-std::int64_t steadyNow() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-             std::chrono::steady_clock::now().time_since_epoch())
-      .count();
 }
 
 }  // namespace
@@ -180,7 +176,7 @@ void Logger::log(LogLevel level, const std::string& source, const std::string& t
   if (!wants(level)) return;
   LogRecord record;
   record.level = level;
-  record.time_ns = steadyNow();
+  record.time_ns = coglab_rt::steadyNow();
   record.line = line;
   copyText(record.source, source.c_str());
   copyText(record.file, withoutFolders(file));
@@ -226,7 +222,7 @@ void LogSource::put(LogLevel level, const char* file, int line, const char* text
   if (!logger_ || !logger_->wants(level)) return;
   LogRecord record;
   record.level = level;
-  record.time_ns = steadyNow();
+  record.time_ns = coglab_rt::steadyNow();
   record.cycle = cycle_ ? cycle_->load(std::memory_order_relaxed) : 0;
   record.line = line;
   record.values = count;

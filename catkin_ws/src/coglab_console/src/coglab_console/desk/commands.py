@@ -1,6 +1,6 @@
 """The closed list of commands with a JSON Schema each. What is not here cannot be asked for by a browser.
 
-`python3 -m coglab_console.desk.commands` prints the table of docs/console.md.
+`python3 -m coglab_console.desk.commands` prints the table of them.
 """
 
 from __future__ import annotations

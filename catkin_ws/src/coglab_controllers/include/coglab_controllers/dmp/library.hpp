@@ -41,7 +41,8 @@ class Library {
   static constexpr int kMaxSamples = 20000;  ///< per trajectory
 
   /// Adds all primitives of a file, or none. An id that is already loaded is replaced.
-  /// @return how many the file holds.  @throws LibraryError.
+  /// @return how many the file holds.
+  /// @throws LibraryError if the file cannot be used.
   int load(const std::string& path);
   /// The same from text; `name` stands for the file in messages.
   int parse(const std::string& text, const std::string& name);

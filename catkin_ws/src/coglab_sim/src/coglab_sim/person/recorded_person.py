@@ -15,12 +15,11 @@ from typing import Any
 import numpy as np
 from coglab_py.pose import Pose
 
-from coglab_sim.person.giving import CLOSING
 from coglab_sim.person.participant import Participant
 from coglab_sim.person.recorded_motion import Playback, PlaybackSettings, RecordingError
 from coglab_sim.person.scene import Scene
 from coglab_sim.person.senses import Percept
-from coglab_sim.person.virtual_human import VirtualHuman
+from coglab_sim.person.virtual_human import CLOSING, VirtualHuman
 
 WAYS = ("wait", "no_wait", "leave")
 HAND = "human_hand"

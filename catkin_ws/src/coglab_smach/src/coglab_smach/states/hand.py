@@ -8,24 +8,20 @@ from typing import Any
 from coglab_msgs.msg import ReasonCode, Say
 from ih2_hand.grasps import CLOSING_MOTORS, LEVELS, levels_of
 
-from coglab_smach.context.awaited import ARM, HAND
 from coglab_smach.context.context import Context
-from coglab_smach.context.hand_track import HandTrack
+from coglab_smach.context.wait_reasons import ARM, HAND
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
+from coglab_smach.states.hand_tracking import AT_HAND, AWAY, HandLook, HandTrack, from_palm, hand_from_palm, palm_axis
 from coglab_smach.states.motion import shift, shift_time
-from coglab_smach.states.where import AT_HAND, AWAY, HandLook, from_palm, hand_from_palm, palm_axis
-from coglab_smach.states.yielding import GivesWay
+from coglab_smach.states.yield_to_pull import YieldToPull
 
-LOOSE = 40
-"""counts of 254 that the fingers have opened when the palm begins to draw back"""
-AT_END = 250
-"""counts of 254 from which a finger has closed past the object"""
-FREE, FREE_FOR, GOES = 0.10, 0.2, 1.0
-"""m that the person's hand is farther than it was, and s for which it is, when none of its fingers is at the object; s
-in which it has to go so far"""
-DRAWING_BACK = 2.0
-"""s that drawing back may take beyond what limits and speed scale ask for"""
+LOOSE = 40  # counts of 254 that the fingers have opened when the palm begins to draw back
+AT_END = 250  # counts of 254 from which a finger has closed past the object
+FREE = 0.10  # m that the person's hand is farther away than it was when none of its fingers is at the object
+FREE_FOR = 0.2  # s for which it has to be
+GOES = 1.0  # s in which it has to go so far
+DRAWING_BACK = 2.0  # s that drawing back may take beyond what limits and speed scale ask for
 
 
 def gentle(grasp: Mapping[str, Any]) -> dict[str, Any]:
@@ -45,7 +41,7 @@ def firm_speed(ctx: Context, entry: Mapping[str, Any], grasp_name: str) -> int:
     gentle(), too."""
     own = entry["grasps"][grasp_name]
     level = own["hand"]["level"]
-    return 0 if level == gentle(own)["level"] else int(ctx.config.get(f"hand.tighten.{level}", 200))
+    return 0 if level == gentle(own)["level"] else int(ctx.config.get(f"hand.tighten.{level}"))
 
 
 def stopped_by_object(mode: str, positions: Sequence[int]) -> bool:
@@ -64,17 +60,17 @@ class CalibrateHand(CoglabState):
 
     def run(self, ud: Any) -> str:
         state = self.ctx.hand.state()
-        end = self.ctx.clock.now() + float(self.ctx.config.get("hand.settle_after_start", 2.0))
+        end = self.ctx.clock.now() + self.ctx.config.number("hand.settle_after_start")
         while state.connected and state.holding and self.ctx.clock.now() < end:
             self.pause(0.1)
             state = self.ctx.hand.state()
         if state.connected and state.holding:
             self.reason = "the hand holds an object: not calibrated, because that would open it"
             return "succeeded"
-        if state.calibrated and not bool(self.ctx.config.get("hand.calibrate_always", False)):
+        if state.calibrated and not self.ctx.config.get("hand.calibrate_always"):
             self.reason = "the hand is calibrated already"
             return "succeeded"
-        mode = str(self.ctx.config.get("hand.calibration", "fast"))
+        mode = self.ctx.config.text("hand.calibration")
         self.await_pending(self.ctx.hand.calibrate(mode), f"hand calibration '{mode}'", code=HAND)
         return "succeeded"
 
@@ -85,12 +81,12 @@ class HandPreshape(CoglabState):
     default_time_limit = 6.0
 
     def __init__(self, ctx: Context) -> None:
-        super().__init__(ctx, input_keys=["grasp"])
+        super().__init__(ctx, input_keys=["grasp"], io_keys=["grip"])
 
     def run(self, ud: Any) -> str:
-        hand, self.ctx.preshaped = ud.grasp["hand"], False
+        hand, ud.grip.preshaped = ud.grasp["hand"], False
         self.await_pending(self.ctx.hand.preshape(hand["mode"], hand["level"]), f"preshape '{hand['mode']}'", code=HAND)
-        self.ctx.preshaped = True
+        ud.grip.preshaped = True
         self.ctx.journal.mark("preshaped")
         return "succeeded"
 
@@ -100,7 +96,7 @@ class HandClose(CoglabState):
 
     Outcomes missed and edge, with ``from_person``: the fingers have closed on nothing, or do not stand around it
     (stopped_by_object), for the first time in this action; a person who offers waits, so the arm may try once more.
-    Meanwhile the palm goes along with who pulls (GivesWay).
+    Meanwhile the palm goes along with who pulls (YieldToPull).
     """
 
     default_time_limit = 12.0
@@ -112,6 +108,7 @@ class HandClose(CoglabState):
             outcomes=["succeeded", "missed", "edge"] if from_person else ["succeeded"],
             input_keys=["object_id", "grasp"] if from_person else ["object_id"],
             output_keys=["hand_distance"] if from_person else [],
+            io_keys=["grip"],
         )
         self.from_person = from_person
         self._before: float | None = None
@@ -120,30 +117,31 @@ class HandClose(CoglabState):
     def run(self, ud: Any) -> str:
         self.ctx.journal.mark("closing")
         # From here on the hand may hold: a failure in the middle must not make the recovery drop the object.
-        self.ctx.holding, self.ctx.shared = ud.object_id, self.from_person
-        self.ctx.firm = int(ud.grasp["hand"].get("firm", 0)) if self.from_person else 0
-        closing, self.ctx.closing = self.ctx.closing or self.ctx.hand.close_on_object(), None
+        grip, self.ctx.holding = ud.grip, ud.object_id
+        closing = grip.take_closing() or self.ctx.hand.close_on_object()
+        grip.shared = self.from_person
+        grip.firm = int(ud.grasp["hand"].get("firm", 0)) if self.from_person else 0
         if self.from_person:
-            track = self.ctx.hand_track = self.ctx.hand_track or HandTrack()
             try:
-                ud.hand_distance = self._before = from_palm(self, track)
-                self._give_way(closing, HandLook(self.ctx, track))
+                ud.hand_distance = self._before = from_palm(self, grip.hand)
+                self._give_way(closing, HandLook(self.ctx, grip.hand))
             except (Interrupted, TimeLimit):
                 closing.cancel()
                 raise
         self.await_pending(closing, "closing of the hand", code=HAND)
         self.ctx.journal.mark("closed")
-        end = self.ctx.clock.now() + float(self.ctx.config.get("hand.settle_after_close", 0.3))
+        end = self.ctx.clock.now() + self.ctx.config.number("hand.settle_after_close")
         while not self.ctx.hand.state().holding and self.ctx.clock.now() < end:
             self.pause(0.02)
         state = self.ctx.hand.state()
-        around = not self.from_person or self._around(ud.grasp["hand"]["mode"], state.positions)
+        around = not self.from_person or self._around(ud.grasp["hand"]["mode"], state.positions, grip.hand)
         if state.connected and not (state.holding and around):
-            self.ctx.holding, self.ctx.shared = "", False
+            self.ctx.holding = ""
+            grip.release()
             missed = "the hand holds it by an edge" if state.holding else "the hand closed on nothing"
             if self.from_person and not self.ctx.journal.marked("missed"):
                 self.ctx.journal.mark("missed")
-                self.ctx.preshaped = False
+                grip.preshaped = False
                 self.reason = f"{missed}: once more"
                 return "edge" if state.holding else "missed"
             raise PortError(
@@ -153,19 +151,19 @@ class HandClose(CoglabState):
             )
         return "succeeded"
 
-    def _around(self, mode: str, positions: Sequence[int]) -> bool:
+    def _around(self, mode: str, positions: Sequence[int], hand: HandTrack) -> bool:
         """Whether the fingers stand around the object; or the person has gone, so that opening would let it fall."""
         if stopped_by_object(mode, positions):
             return True
-        let_go = float(self.ctx.config.get("hand.let_go", 0.04))
+        let_go = self.ctx.config.number("hand.let_go")
         gone = AT_HAND if self._before is None else min(AT_HAND, self._before + let_go)
-        away = from_palm(self, self.ctx.hand_track or HandTrack(), 0.3)
+        away = from_palm(self, hand, 0.3)
         # A hand that nobody sees may have gone, too, and so may one for which another one is seen.
         return away is None or away > gone
 
     def _give_way(self, closing: Pending, hand: HandLook) -> None:
         """Until the fingers have closed."""
-        way = GivesWay(self.ctx)
+        way = YieldToPull(self.ctx)
 
         def closed() -> bool:
             way.follow()
@@ -180,7 +178,7 @@ class HandClose(CoglabState):
 
 class HandTighten(CoglabState):
     """Hold what the person has let go of as firmly as the object's entry says: the fingers close from where they are,
-    at the wire speed, and with it the force, of ``hand.tighten`` for the grasp's level (Context.firm).
+    at the wire speed, and with it the force, of ``hand.tighten`` for the grasp's level (Grip.firm).
 
     The arm need not wait until the hand is sure that they stand: they press within ``hand.settle_after_close`` s.
     Nobody's fingers may be there: the person's hand has to be seen all the way until it is FREE m farther than it was,
@@ -190,11 +188,11 @@ class HandTighten(CoglabState):
     default_time_limit = 5.0
 
     def __init__(self, ctx: Context, at_home: bool = False) -> None:
-        super().__init__(ctx, input_keys=[] if at_home else ["hand_distance", "hand_seen_away"])
+        super().__init__(ctx, input_keys=[] if at_home else ["hand_distance", "hand_seen_away"], io_keys=["grip"])
         self.at_home = at_home
 
     def run(self, ud: Any) -> str:
-        speed = self.ctx.firm if self.ctx.holding else 0
+        speed = ud.grip.firm if self.ctx.holding else 0
         if speed == 0:
             self.reason = "nothing is held more gently than its grasp asks for"
             return "succeeded"
@@ -203,26 +201,26 @@ class HandTighten(CoglabState):
             if away is not None and away < AT_HAND:
                 self.reason = f"it stays held gently: the person's hand is {away:.2f} m from the palm"
                 return "succeeded"
-        elif not (ud.hand_seen_away and self._is_free(ud.hand_distance)):
+        elif not (ud.hand_seen_away and self._is_free(ud.hand_distance, ud.grip.hand)):
             self.reason = "the person's hand was not seen to go: at home"
             return "succeeded"
-        closing, end = self.ctx.hand.close(speed), float(self.ctx.config.get("hand.settle_after_close", 0.3))
+        closing, end = self.ctx.hand.close(speed), self.ctx.config.number("hand.settle_after_close")
         # It goes on while the arm does: a STOP ends it then as well (EndMotion).
-        self.ctx.tightening = closing
+        ud.grip.tightening = closing
         end += self.ctx.clock.now()
         while not closing.done() and self.ctx.clock.now() < end:
             self.pause(0.02)
         if closing.done():
             closing.result()
-        self.ctx.firm = 0
+        ud.grip.firm = 0
         self.reason = f"the fingers close to the force of wire speed {speed}"
         self.ctx.journal.mark("tightened")
         return "succeeded"
 
-    def _is_free(self, before: float | None) -> bool:
+    def _is_free(self, before: float | None, hand: HandTrack) -> bool:
         """Whether the person's hand, which was ``before`` m from the palm, is seen away from the object."""
         free, since = AWAY if before is None else before + FREE, None
-        end, hand = self.ctx.clock.now() + GOES, self.ctx.hand_track or HandTrack()
+        end = self.ctx.clock.now() + GOES
         while self.ctx.clock.now() < end:
             if (from_palm(self, hand) or 0.0) <= free or not hand.is_sure:
                 since = None
@@ -239,12 +237,14 @@ class HandOpen(CoglabState):
 
     default_time_limit = 8.0
 
+    def __init__(self, ctx: Context) -> None:
+        super().__init__(ctx, io_keys=["grip"])
+
     def run(self, ud: Any) -> str:
         self.ctx.journal.mark("opening")
-        self.await_pending(
-            self.ctx.hand.open(int(self.ctx.config.get("hand.open_speed", 400))), "opening of the hand", code=HAND
-        )
-        self.ctx.holding, self.ctx.shared = "", False
+        self.await_pending(self.ctx.hand.open(self.ctx.config.get("hand.open_speed")), "opening of the hand", code=HAND)
+        self.ctx.holding = ""
+        ud.grip.release()
         return "succeeded"
 
 
@@ -259,7 +259,7 @@ class LetGo(CoglabState):
     owns_motion = True
 
     def __init__(self, ctx: Context) -> None:
-        super().__init__(ctx, input_keys=["grasp"])
+        super().__init__(ctx, input_keys=["grasp"], io_keys=["grip"])
 
     def run(self, ud: Any) -> str:
         self.ctx.journal.mark("opening")
@@ -273,13 +273,14 @@ class LetGo(CoglabState):
             raise
         if opening.done():
             opening.result()  # fingers that are stuck would drag what the person holds
-        axis, way, limit = palm_axis(self.ctx), float(self.ctx.config.get("give.draw_back", 0.06)), DRAWING_BACK
+        axis, way, limit = palm_axis(self.ctx), self.ctx.config.number("give.draw_back"), DRAWING_BACK
         if axis is not None and way > 0.0:
-            speed = float(self.ctx.config.get("give.draw_back_speed", 0.25))
+            speed = self.ctx.config.number("give.draw_back_speed")
             limit += shift_time(self.ctx, -way * axis, speed)
             back = shift(self.ctx, -way * axis, speed)
         self.await_pending(opening, "opening of the hand", code=HAND)
-        self.ctx.holding, self.ctx.shared = "", False
+        self.ctx.holding = ""
+        ud.grip.release()
         # Not earlier: who is told so goes, and fingers that are half open would keep the object.
         self.ctx.say(Say.YOU_HAVE_IT, "You have it.")
         if back is not None:

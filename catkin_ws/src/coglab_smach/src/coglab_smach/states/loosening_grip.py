@@ -8,13 +8,11 @@ from collections.abc import Callable
 from coglab_smach.ports.interfaces import HandPort
 from coglab_smach.ports.pending import Pending
 
-FINGERS = slice(1, 5)
-"""motors that bend fingers"""
-FIRMER, WEAKER = 0.15, 0.3
-"""share of the wanted grip force by which it may be more or less without a finger's moving"""
-AHEAD, SEEN_AFTER = 0.04, 0.1
-"""s for which the grip goes on as it does after an order to stand, and after which it is seen what that order has left:
-sensors, nodes and the hand's line take some hundredths of a second"""
+FINGERS = slice(1, 5)  # motors that bend fingers
+FIRMER = 0.15  # share of the wanted grip force above which the fingers open
+WEAKER = 0.3  # share below which they close
+AHEAD = 0.04  # s for which the grip goes on after an order to stand: delay of sensors, nodes and the hand's line
+SEEN_AFTER = 0.1  # s after which the effect of that order is seen
 
 
 class LooseningGrip:
