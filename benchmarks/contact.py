@@ -41,7 +41,7 @@ def detector(seed: int) -> FusedDetector:
     def turn(q):
         return Pose(*default_arm().fk(np.asarray(q, dtype=float))).rotation.as_matrix()
 
-    thresholds = Thresholds.load(package_path("coglab_smach", "config", "contact_thresholds.yaml"))
+    thresholds = Thresholds.load(package_path("coglab_contact", "config", "contact_thresholds.yaml"))
     reaches = shared_module("moving_reaches")
     moving = MovingContact(thresholds, cc.ArmDynamics(reaches.wrong_urdf(seed)), jacobian, reaches.DT)
     return FusedDetector(ContactDetector(DetectorSettings(), jacobian), moving, held=GripAndLoad(turn))

@@ -114,7 +114,7 @@ class Recognised(Watch):
         if reaching and not self._was_reaching:
             self.reaches.append([])
         if reaching:
-            place = np.array(self.rig.cell.truth()["human_hand"]["position"])
+            place = np.array(self.world.cell.truth()["human_hand"]["position"])
             speed = float(np.linalg.norm(self.sample.velocity))
             self.reaches[-1].append((speed, place, trial.recogniser.estimate.pattern))
         self._was_reaching = reaching

@@ -107,7 +107,7 @@ class Watch:
     """Watches a VirtualTrial from its beginning."""
 
     def __init__(self, trial: VirtualTrial) -> None:
-        self.trial, self.rig, self.series = trial, trial.rig, Series()
+        self.trial, self.world, self.series = trial, trial.world, Series()
         self.begun: list[int] = []  # index in the series at which each action began
         self.sample: Any = None  # what the person's hand does
         trial.beside = self.look
@@ -115,17 +115,17 @@ class Watch:
 
     def watch_person(self) -> None:
         """Keeps what the person's hand does in each step."""
-        step = self.rig.human.step
+        step = self.world.human.step
 
         def watched(t: float, view: Any) -> Any:
             self.sample = step(t, view)
             return self.sample
 
-        self.rig.human.step = watched
+        self.world.human.step = watched
 
     def look(self, trial: VirtualTrial) -> None:
         """After each period of the world."""
-        robot, cell, series = self.rig.robot, self.rig.cell, self.series
+        robot, cell, series = self.world.robot, self.world.cell, self.series
         if self.sample is None or robot.report["fri_period"] <= 0.0:
             return
         truth = cell.truth()
@@ -143,7 +143,7 @@ class Watch:
 
     def figures(self) -> dict[str, Any]:
         """`directions`: of each action, see `direction`; an action that never began has none."""
-        results = [r for r in self.trial.ctx.journal.results if r.kind in self.trial.begun]
+        results = [r for r in self.trial.results if r.action in self.trial.begun]
         found = []
         for k, begin in enumerate(self.begun):
             ended = results[k].ended if k < len(results) else np.inf
@@ -252,25 +252,25 @@ class OtherWatch(Watch):
             self._replace(True)
 
     def _replace(self, holds: bool) -> None:
-        self.rig.human = self.hand = OtherHand(self.rig.human, self.motion, self._rng, holds)
+        self.world.human = self.hand = OtherHand(self.world.human, self.motion, self._rng, holds)
         self.watch_person()
 
     def walk(self, trial: VirtualTrial) -> None:
         """An object for the robot, if it has to hold one; then the request and the motion, until the machine waits."""
         trial.wait_hub("wait_without_object")
         if self._robot_holds:
-            trial.ctx.requests.submit(RECEIVE, trial.object_id)
-            self._until(trial, lambda: trial.ctx.requests.hub() != "" and self.rig.human.phase == "idle")
-            if trial.ctx.requests.hub() != "wait_with_object":
+            trial.submit(RECEIVE)
+            self._until(trial, lambda: trial.hub != "" and self.world.human.phase == "idle")
+            if trial.hub != "wait_with_object":
                 return
             self._replace(False)
         assert self.hand is not None
-        trial.ctx.requests.submit(GIVE if self._robot_holds else RECEIVE, trial.object_id)
+        trial.submit(GIVE if self._robot_holds else RECEIVE)
         trial.clock.sleep(LISTENS)
-        self.hand.begun, begin = self.rig.t, len(self.series.time)
+        self.hand.begun, begin = self.world.t, len(self.series.time)
         trial.clock.sleep(self.motion.over + CALM)
         self._span = (begin, len(self.series.time))
-        self._until(trial, lambda: trial.ctx.requests.hub() != "")
+        self._until(trial, lambda: trial.hub != "")
 
     def _until(self, trial: VirtualTrial, condition: Callable[[], bool], limit: float = 40.0) -> None:
         end = trial.clock.now() + limit
@@ -308,10 +308,10 @@ def run_trial(job: Job, watch_of: Callable[[VirtualTrial], Watch] = Watch) -> di
     except Exception as error:  # the script's own limit, or the physics has ended
         stuck = f"{type(error).__name__}: {error}"
     if not stuck and trial.last_hub not in ("wait_without_object", "wait_with_object"):
-        stuck = f"the machine waits in '{trial.last_hub}': {trial.ctx.journal.why()}"
+        stuck = f"the machine waits in '{trial.last_hub}': {trial.why()}"
     return {
         "stuck": stuck,
-        "fell": bool(trial.rig.cell.truth()["dropped"]),
+        "fell": bool(trial.world.cell.truth()["dropped"]),
         "speed": trial.clock.now() / (time.process_time() - begin),
         "late": [arrives_late(reach) for reach in trial.reaches if reach.action == RECEIVE],
         **watch.figures(),

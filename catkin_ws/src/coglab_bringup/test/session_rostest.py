@@ -123,7 +123,7 @@ class Session(Handover):
         rospy.Subscriber("/lwr/joint_states", JointState, on_joints, queue_size=50)
         rospy.Subscriber("/rosout", Log, on_log, queue_size=1000)
         self.assertLessEqual({"/robot", "/coglab", "/ih2_hand", "/perception", "/contact_detector"}, set(odd.nodes))
-        odd.send(to_topics=30, to_services=5)
+        odd.send(to_topics=30, to_services=2)
         self.assertEqual((odd.ended, odd.unanswered, thrown), ([], [], []))
         self.assertTrue(joints)
         self.assertLess(np.abs(np.array(joints) - joints[0]).max(), 0.01)
