@@ -135,12 +135,12 @@ class Film:
     def look(self, trial: VirtualTrial) -> None:
         """Keeps a frame if the time has come for one."""
         if not trial.begun:
-            self._next = trial.rig.t + 1.0 / RATE  # the arm goes home before that
+            self._next = trial.world.t + 1.0 / RATE  # the arm goes home before that
             return
-        if trial.rig.t < self._next:
+        if trial.world.t < self._next:
             return
         self._next += 1.0 / RATE
-        self._painter = self._painter or Painter(trial.rig)
+        self._painter = self._painter or Painter(trial.world)
         self.frames.append(self._with_caption(self._painter.frame(), trial))
 
     def _with_caption(self, frame: Image.Image, trial: VirtualTrial) -> Image.Image:
@@ -179,7 +179,7 @@ def main(words: list[str]) -> int:
     trial.beside = film.look
     results = trial.run(*ACTIONS)
     for result in results:
-        print(f"[coglab] {result.kind}: {result.outcome}")
+        print(f"[coglab] {result.action}: {result.outcome}")
     if not film.frames:
         print("[coglab] error: the first action never began, so there is nothing to show", file=sys.stderr)
         return 1
