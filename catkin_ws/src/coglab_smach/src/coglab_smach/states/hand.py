@@ -118,7 +118,7 @@ class HandClose(CoglabState):
         self.ctx.journal.mark("closing")
         # From here on the hand may hold: a failure in the middle must not make the recovery drop the object.
         grip, self.ctx.holding = ud.grip, ud.object_id
-        closing = grip.take_closing() or self.ctx.hand.close_on_object()
+        closing = (grip.take_closing() if self.from_person else None) or self.ctx.hand.close_on_object()
         grip.shared = self.from_person
         grip.firm = int(ud.grasp["hand"].get("firm", 0)) if self.from_person else 0
         if self.from_person:

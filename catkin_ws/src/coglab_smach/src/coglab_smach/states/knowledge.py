@@ -62,12 +62,10 @@ class QueryDatabase(CoglabState):
 
 
 class LocateOnBoard(CoglabState):
-    """Where the object lies on the board, averaged over several sights; the pose in the board frame goes
-    into user data.
+    """Where the object lies on the board, averaged over several sights; user data gets its pose in the board frame.
 
-    The board stands still and so does the object, so the goal of the precise motion must not follow single
-    noisy sights,
-    nor an object that the hand pushes.
+    Board and object stand still, so the goal of the precise motion follows neither single noisy sights nor an object
+    that the hand pushes.
     """
 
     default_time_limit = 12.0
