@@ -125,10 +125,17 @@ class GiveLoad(CoglabState):
         super().__init__(ctx, input_keys=["object_id", "object_entry", "grasp_name", "delivery"], io_keys=["grip"])
         self._grip = Grip()
         self._fingers: LooseningGrip
+        self._needed = self._slips_at = self._weight = 0.0
+        """share of the load; N of grip below which the object slips while the hand carries all of it; N"""
+        self._firm = 0  # wire speed of the grip that is as firm as before
         self._held: HeldObject
         self._hand: HandLook
         self._offer: Callable[[], np.ndarray | None] = lambda: None
         """the way (m) from the object to where the person's hand takes it"""
+        self._reset()
+
+    def _reset(self) -> None:
+        """For each object that is given."""
         self._lowering: Pending | None = None
         self._moving: Pending | None = None
         self._ending: Pending | None = None  # of what moves
@@ -136,9 +143,6 @@ class GiveLoad(CoglabState):
         self._brings = self._sinks = 0
         self._pressed_since: float | None = None
         self._way: np.ndarray | None = None  # m, of the last look: from the object to where the person's hand takes it
-        self._needed = self._slips_at = self._weight = 0.0
-        """share of the load; N of grip below which the object slips while the hand carries all of it; N"""
-        self._firm = 0  # wire speed of the grip that is as firm as before
         self._back_since: float | None = None
 
     def _number(self, name: str) -> float:
@@ -164,8 +168,7 @@ class GiveLoad(CoglabState):
             contact.grip,
         )
         self._firm = firm_speed(self.ctx, entry, ud.grasp_name)
-        self._lowering = self._moving = self._ending = self._back_since = self._pressed_since = None
-        self._brings, self._sinks, self._way = 0, 0, None
+        self._reset()
         self._offer = partial(way_to_hand, self, ud.object_id, ud.delivery)
         self._held = HeldObject(self.ctx, ud.object_id, grip)
         now = self.ctx.clock.now()

@@ -137,11 +137,15 @@ class TakeWeight(CoglabState):
             io_keys=["grip"],
         )
         self._way: YieldToPull
+        self._hand: HandTrack
+        self._held: HeldObject
+        self._reset()
+
+    def _reset(self) -> None:
+        """For each object that is taken over."""
         self._top: float | None = None  # m, height to which the palm rises
         self._rises = 0
         self._told = self._seen_away = False
-        self._hand: HandTrack
-        self._held: HeldObject
         self._farther: float | None = None  # m from the palm from which on the person's hand has left the object
         self._gone: float | None = None  # s, since when it has
         self._on: float | None = None  # s, when it rises on with the weight; None: the weight has not come
@@ -152,15 +156,13 @@ class TakeWeight(CoglabState):
         limit, contact = self.ctx.config.number("hand.load_timeout"), self.ctx.contact
         end = self.ctx.clock.now() + limit
         self._hand, self._held = ud.grip.hand, HeldObject(self.ctx, ud.object_id, ud.grip)
-        self._farther = self._gone = None
+        self._reset()
         self._count_from(ud.hand_distance)
         settings = {
             "mass": float(ud.object_entry.get("mass", 0.0)),
             "load_share": self.ctx.config.number("hand.load_share"),
         }
-        self._way, self._rises, self._on, self._told = YieldToPull(self.ctx), 0, None, False
-        self._seen_away = False
-        self._closing, self._closes = None, 0.0
+        self._way = YieldToPull(self.ctx)
         self.await_pending(contact.arm("lift", limit, settings), "arming of the contact detector", 2.0)
         try:
             self.pause(self.ctx.config.number("hand.lift_after"))
