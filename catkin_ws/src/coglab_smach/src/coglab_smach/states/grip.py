@@ -25,11 +25,11 @@ class Grip:
     """the person may hold the object, too"""
     preshaped: bool = False
     """the fingers have taken the preshape of the grasp"""
-    closing: Pending | None = None
+    closing: Pending | None = field(default=None, repr=False)
     """order to the fingers, given on the last of a reach's way"""
-    tightening: Pending | None = None
+    tightening: Pending | None = field(default=None, repr=False)
     """order to the fingers around an object that the person has let go of"""
-    hand: HandTrack = field(default_factory=HandTrack)
+    hand: HandTrack = field(default_factory=HandTrack, repr=False)
     """the person's hand, while it may hold the object"""
 
     def reach_for(self, object_id: str, mass: float, firm: int) -> None:
