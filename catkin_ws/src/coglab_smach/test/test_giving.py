@@ -9,11 +9,11 @@ from coglab_contact.load import SAME, LeavingLoad
 from coglab_msgs.msg import ReasonCode, Say
 from coglab_py.pose import Pose
 from coglab_smach.context.config import Config
+from coglab_smach.context.grip import Grip
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.interfaces import HandState, Located
 from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states import give
-from coglab_smach.states.grip import Grip
 from coglab_smach.states.held_object import FARTHER, LOST_TIME, NEAR, HeldObject
 from coglab_trials.conditions import Conditions
 from coglab_trials.trial import VirtualTrial

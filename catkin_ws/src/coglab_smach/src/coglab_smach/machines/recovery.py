@@ -8,6 +8,7 @@ from typing import Any
 from coglab_msgs.msg import ReasonCode, Say
 
 from coglab_smach.context.context import Context
+from coglab_smach.context.grip import Grip
 from coglab_smach.context.holding import UNKNOWN
 from coglab_smach.context.requests import command
 from coglab_smach.context.wait_reasons import HAND
@@ -15,7 +16,6 @@ from coglab_smach.ports.interfaces import Verdict
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.arm import HomeRobot
 from coglab_smach.states.base import CoglabMachine, CoglabState
-from coglab_smach.states.grip import Grip
 from coglab_smach.states.hand import HandTighten
 from coglab_smach.states.hand_tracking import AWAY, from_palm
 from coglab_smach.states.held_object import LOOK, HeldObject

@@ -8,9 +8,9 @@ import numpy as np
 from coglab_msgs.msg import ReasonCode
 
 from coglab_smach.context.context import Context
+from coglab_smach.context.grip import Grip
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.pending import Pending, PortError
-from coglab_smach.states.grip import Grip
 from coglab_smach.states.hand import AT_END
 
 NEAR = 0.20  # m between palm and object within which the object counts as carried

@@ -11,12 +11,12 @@ import numpy as np
 from coglab_msgs.msg import ReasonCode
 
 from coglab_smach.context.context import Context
+from coglab_smach.context.grip import Grip
 from coglab_smach.context.wait_reasons import ARM, CONTACT, HAND, PERSON
 from coglab_smach.kinematics.motion_time import reach_time
 from coglab_smach.ports.interfaces import ContactEvent, DmpProgress, DmpRequest
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
-from coglab_smach.states.grip import Grip
 from coglab_smach.states.hand_tracking import (
     GLANCE,
     HandLook,

@@ -5,9 +5,63 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from coglab_smach.ports.interfaces import HandPort
 from coglab_smach.ports.pending import Pending
-from coglab_smach.states.hand_tracking import HandTrack
+
+JUMP = 0.12  # m between two sights that no hand and no falling object covers
+FASTEST = 2.0  # m/s of a hand: for each second for which it was hidden it may be so much farther away
+PLACE = 0.06  # m within which a hand is where it was
+
+Sight = tuple[float, np.ndarray]
+"""s, when it was taken, and m"""
+
+
+class HandTrack:
+    """Follows one hand from sight to sight, where it matters whose hand it is: a hidden hand may be elsewhere when it
+    is seen again, and the tracker may have taken another hand for it."""
+
+    def __init__(self) -> None:
+        self.is_one = True
+        """False from a sight of another hand on, until a sight leads back to where the first one may be"""
+        self.is_sure = False
+        """whether it was seen all the way from the object on; False from a jump on, until it is seen again where it was
+        before that"""
+        self._newest: Sight | None = None
+        self._last: Sight | None = None  # the newest one of that hand
+        self._sure: Sight | None = None  # the newest one while that was sure
+
+    def follow(self, at: float, place: np.ndarray, at_object: bool = True) -> None:
+        """Take a sight of time ``at`` (s); ``at_object``: from there the hand may reach the object."""
+        before, sure = self._newest, self._sure
+        at = at if before is None else max(at, before[0])
+        self._newest = at, place
+        jumped = before is not None and _too_far(before, at, place)
+        if jumped or not self.is_one:
+            # It may go on from where it was sure last, whatever was taken for it in between.
+            self.is_one = any(
+                far(place, each[1]) <= PLACE or (jumped and not _too_far(each, at, place))
+                for each in (self._last, sure)
+                if each is not None
+            )
+        if self.is_one:
+            self._last = at, place
+            if sure is None:
+                self.is_sure = at_object
+            else:
+                self.is_sure = far(place, sure[1]) <= (JUMP if self.is_sure else PLACE)
+            self._sure = self._last if self.is_sure else sure
+
+
+def far(place: np.ndarray, other: np.ndarray) -> float:
+    """Distance."""
+    return float(np.linalg.norm(place - other))
+
+
+def _too_far(before: Sight, at: float, place: np.ndarray) -> bool:
+    """Whether no hand goes from that sight to this one."""
+    return far(place, before[1]) > JUMP + FASTEST * (at - before[0])
 
 
 @dataclass
