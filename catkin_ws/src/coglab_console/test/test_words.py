@@ -10,7 +10,7 @@ from coglab_objects.database import ObjectDatabase, objects_folder
 from coglab_py.packages import package_path
 from coglab_smach.context.config import Config
 from coglab_smach.machines import build_master
-from coglab_trials.scripted.ports import simulated_context
+from coglab_trials.scripted import scripted_context
 from coglab_trials.virtual_clock import VirtualClock, using
 
 LIBRARY = str(package_path("coglab_controllers", "config", "primitives.xml"))
@@ -31,7 +31,7 @@ def the_master():
     """The whole hierarchy of the brain, on simulated ports."""
     clock, database = VirtualClock(), ObjectDatabase(objects_folder())
     config = Config.load(str(package_path("coglab_smach", "config", "machines.yaml")), {"dmp_library": LIBRARY})
-    context, _ = simulated_context(clock, database, config)
+    context, _ = scripted_context(clock, database, config)
     with using(clock):
         return build_master(context)
 

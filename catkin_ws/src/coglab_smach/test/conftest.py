@@ -7,7 +7,7 @@ from coglab_objects.database import ObjectDatabase, objects_folder
 from coglab_py.packages import package_path
 from coglab_smach.context.config import Config
 from coglab_smach.machines import build_master
-from coglab_trials.scripted.ports import simulated_context
+from coglab_trials.scripted import scripted_context
 from coglab_trials.virtual_clock import VirtualClock, using
 
 SHARE = Path(__file__).resolve().parent.parent
@@ -24,7 +24,7 @@ class Trial:
         config = Config.load(
             str(SHARE / "config" / "machines.yaml"), {"auto_trigger": True, "dmp_library": LIBRARY, **overrides}
         )
-        self.ctx, self.cell = simulated_context(self.clock, self.database, config)
+        self.ctx, self.cell = scripted_context(self.clock, self.database, config)
         with using(self.clock):
             self.master = build_master(self.ctx)
         self.error = None

@@ -41,12 +41,6 @@ def test_object_that_is_not_in_the_database():
     assert_recovered_empty(trial, "object 'elephant' is not in the database; it has: ")
 
 
-def test_object_that_is_not_seen():
-    trial = failed_exchange(lambda t: t.cell.faults.not_seen.add("mug"))
-    assert_recovered_empty(trial, "mug")  # in words of the perception node; test_bad_input asks that they are passed on
-    assert trial.result().code == ReasonCode.OBJECT_NOT_SEEN
-
-
 def test_nobody_offers_the_object_and_the_arm_does_not_move():
     trial = failed_exchange(lambda t: t.cell.objects.__setitem__("mug", Pose([1.2, 0.2, 0.1])))
     assert_recovered_empty(trial, "'mug' was not offered within 8 s: it stayed at (1.20, 0.20, 0.10) m")
@@ -79,16 +73,6 @@ def test_who_goes_back_while_the_robot_lets_time_pass_is_not_gone_after():
 def test_no_person_means_no_contact_within_the_limit():
     trial = failed_exchange(lambda t: setattr(t.cell.partner, "touch_after", None))
     assert_recovered_empty(trial, "contact of an object with the hand within 6.0 s expected")
-
-
-def test_goal_lost_half_way():
-    def prepare(t):
-        t.cell.faults.abort_dmp_after, t.cell.faults.abort_reason = 0.6, WORDS
-
-    trial = failed_exchange(prepare)
-    assert_recovered_empty(trial, WORDS)
-    assert trial.ctx.journal.why() == f"wait_stop: the reach was aborted, because {WORDS}"
-    assert trial.result().code == ReasonCode.GOAL_LOST
 
 
 def test_primitive_that_does_not_exist():
@@ -165,12 +149,6 @@ def test_an_object_that_the_person_was_lost_from_is_kept_though_its_weight_was_n
     trial.begun_once = False
     trial.run(script)
     assert trial.result().code == ReasonCode.NOT_RELEASED
-
-
-def test_failed_preshape_ends_the_arm_motion_too():
-    trial = failed_exchange(lambda t: t.cell.faults.refuse.__setitem__("preshape cylindrical", "motor 2 is stuck"))
-    assert_recovered_empty(trial, "motor 2 is stuck")
-    assert not trial.cell.called("close")
 
 
 def test_dead_hand_arm_still_goes_home():
@@ -349,22 +327,3 @@ def test_every_transition_of_a_failure_carries_its_sentence():
     trial = failed_exchange(lambda t: t.cell.faults.not_seen.add("mug"))
     records = [t for t in trial.ctx.journal.transitions if t.outcome in ("failed", "failed_empty")]
     assert records and all("was not seen" in t.reason for t in records)
-
-
-def test_configuration_is_read_again_while_running(tmp_path):
-    from coglab_smach.context.config import Config
-
-    path = tmp_path / "c.yaml"
-    path.write_text("hand: {open_speed: 1}\n")
-    warnings = []
-    config = Config.load(str(path), warn=warnings.append)
-    assert config.get("hand.open_speed") == 1
-    path.write_text("hand: {open_speed: 22}\n")
-    import os
-
-    os.utime(path, ns=(1, 1))
-    assert config.get("hand.open_speed") == 22
-    path.write_text("hand: [\n")
-    os.utime(path, ns=(2, 2))
-    assert config.get("hand.open_speed") == 22
-    assert len(warnings) == 1 and "stay in force" in warnings[0]

@@ -24,12 +24,6 @@ def test_init_loads_configures_and_only_then_calibrates_and_homes(trial):
     assert trial.cell.loaded == {"dmp": "coglab/DmpController", "ptp": "coglab/PtpController"}
 
 
-def test_vision_and_robot_are_initialised_in_parallel(trial):
-    trial.run(lambda t: t.wait_hub("wait_without_object"))
-    times = {what: when for when, what in trial.cell.calls}
-    assert times["init_vision"] == times["load_controller"] - 0.1 or times["init_vision"] <= 0.02
-
-
 def test_calibration_and_home_run_concurrently(trial):
     trial.run(lambda t: t.wait_hub("wait_without_object"))
     times = {what: when for when, what in trial.cell.calls}
@@ -89,36 +83,11 @@ def test_preshape_runs_while_the_arm_moves(trial):
     assert abs(starts["preshape cylindrical"] - starts["switch dmp"]) <= 0.02
 
 
-def test_execute_dmp_only_starts(trial):
-    trial.run(receive)
-    times = {(t.path.rsplit("/", 1)[-1], t.from_state): t.stamp for t in trial.ctx.journal.transitions}
-    assert times[("arm_motion", "execute_dmp")] - times[("arm_motion", "switch_to_dmp")] < 0.1
-    assert times[("arm_motion", "wait_stop")] - times[("arm_motion", "execute_dmp")] > 1.0
-
-
 def test_contact_is_armed_only_after_the_motion_has_ended(trial):
     trial.run(receive)
     assert not trial.ctx.contact.armed_while_moving
     marks = trial.result().marks
     assert marks["motion_reached"] <= marks["contact"]
-
-
-def test_a_contact_that_is_armed_while_the_arm_moves_is_noted_for_good(trial):
-    """So that what is asserted not to have happened would be seen."""
-
-    def script(t):
-        t.wait_hub("wait_without_object")
-        contact, home = t.ctx.contact, t.ctx.config.get("postures.home")
-        t.ctx.arm.move_ptp([home[0] + 0.1, *home[1:]], [0.2] * 7)
-        t.clock.sleep(0.1)
-        assert not t.ctx.arm.standing().ok and not contact.armed_while_moving
-        for _ in range(2):
-            contact.arm("contact", 1.0, {})
-            t.until(lambda: t.ctx.arm.standing().ok)
-            t.clock.sleep(0.05)
-            assert contact.armed_while_moving
-
-    trial.run(script)
 
 
 def test_monitor_switches_the_primitive_once():
@@ -127,13 +96,6 @@ def test_monitor_switches_the_primitive_once():
     trial.run(receive)
     assert trial.cell.called("switch_dmp") == ["switch_dmp reach_human_high"]
     assert any(t.outcome == "switched" for t in trial.ctx.journal.transitions)
-
-
-def test_monitor_keeps_the_primitive_that_fits():
-    trial = Trial(**{"monitor.primitives": {"mid": "reach_human", "high": "reach_human_high"}})
-    trial.cell.partner.pattern = "mid"
-    trial.run(receive)
-    assert trial.cell.called("switch_dmp") == []
 
 
 def test_monitor_waits_until_it_is_sure():

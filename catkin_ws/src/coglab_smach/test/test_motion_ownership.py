@@ -1,7 +1,7 @@
 """Who starts a motion ends it: whatever fails, runs out of time or is preempted, the arm stands before the next state
 begins, and recovery goes nowhere with an object that a person may hold."""
 
-import coglab_trials.scripted.arm_model as model
+import coglab_trials.scripted.arm as model
 import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_smach.kinematics.motion_time import ptp_time, read_limits
@@ -43,7 +43,7 @@ def test_a_motion_beyond_its_time_limit_is_ended_before_recovery_begins(monkeypa
         monkeypatch.setattr(model, "ptp_time", lambda *a: 10.0 * ptp_time(*a))
         t.start("take")
         t.wait_hub("fault", 200.0)  # recovery cannot go home in its time either
-        assert t.cell.arm.standing()
+        assert t.cell.arm.standing().ok
 
     trial = watched(script)
     assert "the motion to posture 'board' within" in trial.result().reason
@@ -57,10 +57,10 @@ def test_a_shut_down_leaves_no_motion_behind(action, moment):
         t.wait_hub("wait_without_object")
         t.start(action)
         t.clock.sleep(moment)
-        assert not t.cell.arm.standing()
+        assert not t.cell.arm.standing().ok
         t.master.request_preempt()
         t.clock.sleep(0.3)
-        assert t.cell.arm.standing()
+        assert t.cell.arm.standing().ok
 
     watched(script)
 
@@ -86,7 +86,7 @@ def test_where_cancelling_fails_the_arm_is_held():
         t.cell.faults.refuse["preshape cylindrical"] = "motor 2 is stuck"
         t.start(RECEIVE)
         t.wait_hub("stopped")
-        assert t.cell.arm.held and t.cell.arm.standing()
+        assert t.cell.arm.held and t.cell.arm.standing().ok
         t.cell.faults.refuse.clear()
         t.start("reset", "")
         t.wait_hub("wait_without_object")
@@ -153,7 +153,7 @@ def test_a_limit_follows_the_limits_of_speed_and_the_speed_scale():
 
     def prepare(t):
         t.cell.arm.limits = t1
-        t.cell.arm.speed_scale = 0.5
+        t.cell.arm.scale = 0.5
 
     trial = Trial()
     prepare(trial)

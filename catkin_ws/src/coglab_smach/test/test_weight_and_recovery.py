@@ -157,7 +157,7 @@ def test_a_hand_half_a_metre_from_the_palm_holds_nothing_any_more(away, goes):
             assert t.clock.now() < end
             given_up = any(r.from_state == "give_load" for r in t.ctx.journal.transitions)
             there = t.cell.pose("mug").position + [0.0, away if given_up else 0.1, 0.0]
-            t.cell._goes = t.cell._goes or (t.clock.now(), there)
+            t.cell.goes = t.cell.goes or (t.clock.now(), there)
             if given_up:
                 t.cell.push(0.0)
             t.clock.sleep(0.05)

@@ -30,7 +30,7 @@ class HandOrders:
         self._level = level
 
     def _told(self, force):
-        truth = self.trial.rig.cell.truth()
+        truth = self.trial.world.cell.truth()
         away = np.linalg.norm(np.array(truth["human_hand"]["position"]) - np.array(truth["object"]["position"]))
         (self.beside if away < REACHES else self.alone).append(force)
 

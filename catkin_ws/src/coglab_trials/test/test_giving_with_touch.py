@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 from coglab_sim.person.receiving import Receiving
-from coglab_trials.conditions import Conditions
-from coglab_trials.trial import VirtualTrial
+from coglab_trials import GIVE, RECEIVE, Conditions, VirtualTrial
 
-RECEIVE, GIVE = "exchange_human_to_robot", "exchange_robot_to_human"
 NOISE = 0.05
 """N, of one component of a touch sensor"""
 
@@ -16,7 +14,7 @@ class Given:
     grip (N), 100 times a second while the load is given; ``last``: N of grip at the end."""
 
     def __init__(self, object_id, seed, **overrides):
-        self.trial = VirtualTrial(seed=seed, conditions=Conditions(object_id=object_id), touch=NOISE, **overrides)
+        self.trial = VirtualTrial(seed, Conditions(object_id=object_id), touch=NOISE, settings=overrides)
         self.rows = []
         self.last, self.trial.beside = 0.0, self._look
         self.results = self.trial.run(RECEIVE, GIVE)
@@ -26,8 +24,8 @@ class Given:
         contact = trial.ctx.contact
         share, grip = contact.share_gone(), contact.grip()
         self.last = self.last if grip is None else grip
-        if trial.rig.ticks % 2 == 0 and None not in (share, grip):
-            self.rows.append((trial.rig.t, share, grip))
+        if trial.world.ticks % 2 == 0 and None not in (share, grip):
+            self.rows.append((trial.world.t, share, grip))
 
 
 @pytest.mark.parametrize(
@@ -75,4 +73,4 @@ def test_a_load_that_comes_back_is_held_again(monkeypatch):
     assert given.last > 0.75 * grip[0], "firmly at home"
     assert share[-1] < 0.1 and t[-1] > t[loose] + 0.5
     assert given.results[-1].outcome == "failed_holding" and given.trial.ctx.holding == "mug"
-    assert not given.trial.rig.truth["dropped"]
+    assert not given.trial.world.truth["dropped"]

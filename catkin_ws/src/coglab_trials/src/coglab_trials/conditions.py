@@ -1,4 +1,4 @@
-"""Under which conditions a trial runs: whose hand, which tracker, which object. And the hardships of the benches."""
+"""Under which conditions a trial runs: whose hand, which tracker, which object; and hardships that can be added."""
 
 from __future__ import annotations
 
@@ -12,10 +12,18 @@ from coglab_sim.tracker.tracker import PerceptionSettings
 
 @dataclass(frozen=True)
 class Conditions:
-    """Of one trial. The default is the world as it is: a drawn person, a tracker as trackers are, the object's file."""
+    """Of one trial. By default a person is drawn, the tracker has the errors of trackers, and the object is as its file
+    says. Example::
+
+        tired = Conditions(person={"reaction_median": 0.6}, object_id="bottle", mass=1.3)
+        sharp = Conditions(profile="accustomed", perception=PerceptionSettings(perfect=True))
+        slow = replace(sharp, behaviour="slow")
+    """
 
     behaviour: str = "normal"
+    """what the person does: coglab_sim.person.participant.BEHAVIOURS, e.g. "slow" or "never_release"."""
     profile: str = "drawn"
+    """who the person is: "drawn" by the seed, "patient" or "accustomed"."""
     person: Mapping[str, Any] = field(default_factory=dict)
     """fields of Participant that are set, whoever was drawn"""
     perception: PerceptionSettings = PerceptionSettings()
@@ -29,7 +37,6 @@ class Conditions:
         return replace(Participant.draw(seed, self.behaviour, self.profile), **self.person)
 
 
-THE_WORLD_AS_IT_IS = Conditions()
 PATIENT = Conditions(profile="patient", perception=PerceptionSettings(perfect=True))
 """Where the physics are judged: a patient person, perfect perception."""
 CONSIDERATE = Conditions(profile="accustomed", perception=PerceptionSettings(perfect=True))
@@ -48,7 +55,7 @@ HARDSHIPS: dict[str, Callable[[Conditions, int], Conditions]] = {
 """Each alone makes the world harder; the seed decides where there are two ways."""
 
 
-def hardship(name: str, seed: int, conditions: Conditions = THE_WORLD_AS_IT_IS) -> Conditions:
+def hardship(name: str, seed: int, conditions: Conditions = Conditions()) -> Conditions:
     """The conditions with one hardship; none for an empty name. ValueError for an unknown one."""
     if not name:
         return conditions

@@ -1,4 +1,4 @@
-"""The arm of the virtual world: the real controller manager and bridge, in virtual time."""
+"""The arm of a World as the machines reach it: the real controller manager and bridge, in virtual time."""
 
 from __future__ import annotations
 
@@ -10,68 +10,42 @@ from coglab_smach.kinematics.motion_time import MotionLimits, read_limits
 from coglab_smach.ports.interfaces import DmpProgress, DmpRequest, Verdict
 from coglab_smach.ports.pending import Pending, Polled, PortError, Ready, ending_motion
 
-from coglab_trials.virtual_node import VirtualNode
+from coglab_trials.world import World
 
 SILENT = "lwr/joint_states is silent"
 
 
-def answered(good: bool, message: str, code: int = 0, value: Any = None) -> Pending:
-    """(success, message) of a controller as a Pending."""
-    return Ready(value) if good else Ready(error=PortError(message, code=code))
-
-
 class VirtualArm:
-    """ArmPort on the virtual world: the real controller manager and bridge. Requests act at once; motions go on until
-    they end, whoever waits."""
+    """ArmPort of a World. Requests act at once; motions go on until they end, whoever waits."""
 
-    def __init__(self, rig: Any) -> None:
-        self.rig, self.robot = rig, rig.robot.virtual
+    def __init__(self, world: World) -> None:
+        self.world, self.robot = world, world.robot.virtual
         self.request: DmpRequest | None = None
-        self.node = VirtualNode()
-        self._limits = read_limits(rig.robot.parameters)
-        self._frozen_since: float | None = None
-
-    def freeze(self) -> None:
-        """The robot node stops as it stands: the robot controller gets no answers any more."""
-        self.node.freeze()
-        self.robot.frozen, self._frozen_since = True, self.rig.t
-
-    def thaw(self) -> None:
-        """It goes on."""
-        self.robot.frozen, self._frozen_since = False, None
-        self.node.thaw()
+        self._limits = read_limits(world.robot.parameters)
 
     def _silent(self, limit: float) -> bool:
-        return self._frozen_since is not None and self.rig.t - self._frozen_since > limit
+        return bool(self.world.robot.silent > limit)
 
     def _answered(self, answer: Sequence[Any], value: Any = None) -> Pending:
-        return answered(answer[0], answer[1], self.robot.reason_code, value)
+        """(success, message) of a controller as a Pending."""
+        return Ready(value) if answer[0] else Ready(error=PortError(answer[1], code=self.robot.reason_code))
 
     def load_controller(self, controller_id: str, controller_type: str) -> Pending:
-        return self.node.ask(lambda: self._load(controller_id, controller_type))
-
-    def _load(self, controller_id: str, controller_type: str) -> Pending:
-        if self.rig.robot.loaded.get(controller_id) == controller_type:
+        if self.world.robot.loaded.get(controller_id) == controller_type:
             return Ready()
         answer = self.robot.load_controller(controller_id, controller_type)
         done = self._answered(answer)
         if answer[0]:
-            self.rig.robot.loaded[controller_id] = controller_type
+            self.world.robot.loaded[controller_id] = controller_type
         if controller_id == "dmp":
             self.robot.set_ik_debug(True)
         return done
 
     def load_dmps(self, filename: str) -> Pending:
-        def load() -> Pending:
-            answer = self.robot.load_dmps(filename)
-            return self._answered(answer, answer[2])
-
-        return self.node.ask(load)
+        answer = self.robot.load_dmps(filename)
+        return self._answered(answer, answer[2])
 
     def lwr_command(self, event: str) -> Pending:
-        return self.node.ask(lambda: self._submit(event))
-
-    def _submit(self, event: str) -> Pending:
         try:
             ticket = self.robot.submit(event)
             outcome: list[tuple[bool, str, int]] = []
@@ -96,27 +70,23 @@ class VirtualArm:
     def motion_allowed(self) -> Verdict:
         if self._silent(1.0):
             return Verdict(False, SILENT, ReasonCode.NODE_SILENT)
-        report = self.rig.robot.report
+        report = self.world.robot.report
         return Verdict(report["motion_allowed"], report["blocked_by"], report["blocked_code"])
 
     def standing(self) -> Verdict:
         if self._silent(1.0):
             return Verdict(False, SILENT, ReasonCode.NODE_SILENT)
-        standing = self.rig.robot.report["standing"]
+        standing = self.world.robot.report["standing"]
         return Verdict(standing, "" if standing else "the set-point moves")
 
     def cancel_motion(self, reason: str) -> Pending:
-        # Never withdrawn: whoever gives up waiting leaves it in force.
-        asked = self.node.ask(lambda: self._cancel(reason))
-        return Polled(asked.done, asked.result)
-
-    def _cancel(self, reason: str) -> Pending:
-        begun = self.rig.t
+        """Never withdrawn: whoever gives up waiting leaves it in force."""
+        begun = self.world.t
         answers: dict[str, dict[str, Any]] = {}
-        orders = {name: self.robot.ask_cancel(name, reason) for name in self.rig.robot.loaded}
+        orders = {name: self.robot.ask_cancel(name, reason) for name in self.world.robot.loaded}
 
         def done() -> bool:
-            waited = self.rig.t - begun
+            waited = self.world.t - begun
             for name, order in orders.items():
                 answer = self.robot.cancel_outcome(order, waited if waited > 2.0 else 0.0)
                 if name not in answers and answer is not None:
@@ -134,17 +104,14 @@ class VirtualArm:
         return self._limits
 
     def speed_scale(self) -> float:
-        return float(self.rig.speed_scale)
+        return float(self.world.speed_scale)
 
     def switch_controller(self, controller_id: str) -> Pending:
-        return self.node.ask(
-            lambda: self._answered(
-                self.robot.switch_controller(controller_id), self.rig.robot.loaded.get(controller_id)
-            )
-        )
+        answer = self.robot.switch_controller(controller_id)
+        return self._answered(answer, self.world.robot.loaded.get(controller_id))
 
     def apply_profile(self, profile: str) -> Pending:
-        return self.node.ask(lambda: self._answered(self.robot.apply_profile(profile)))
+        return self._answered(self.robot.apply_profile(profile))
 
     def profile_settled(self, profile: str) -> Verdict:
         now = self.robot.feedback_status()
@@ -156,13 +123,13 @@ class VirtualArm:
 
     def execute_dmp(self, request: DmpRequest) -> Pending:
         self.request = request
-        self.rig.robot.debug = None
+        self.world.robot.debug = None
         limits = (request.goal_region_low, request.goal_region_high, request.goal_retreat, request.goal_drop)
         fields = (*self._fields(request), request.goal_frame, *limits, request.goal_approach, request.arrival_speed)
-        return ending_motion(self.node.ask(lambda: self._answered(self.robot.execute_dmp(*fields))), self.cancel_motion)
+        return ending_motion(self._answered(self.robot.execute_dmp(*fields)), self.cancel_motion)
 
     def switch_dmp(self, request: DmpRequest) -> Pending:
-        return self.node.ask(lambda: self._answered(self.robot.switch_dmp(*self._fields(request))))
+        return self._answered(self.robot.switch_dmp(*self._fields(request)))
 
     @staticmethod
     def _fields(request: DmpRequest) -> tuple[Any, ...]:
@@ -187,7 +154,7 @@ class VirtualArm:
         )
 
     def move_ptp(self, position: Sequence[float], max_velocity: Sequence[float]) -> Pending:
-        return ending_motion(self.node.ask(lambda: self._add(list(position), list(max_velocity))), self.cancel_motion)
+        return ending_motion(self._add(list(position), list(max_velocity)), self.cancel_motion)
 
     def _add(self, position: list[float], max_velocity: list[float]) -> Pending:
         status, identity, message = self.robot.add_ptp(position, max_velocity)
@@ -207,7 +174,7 @@ class VirtualArm:
         return Polled(done, value)
 
     def _end_of_ptp(self, identity: int) -> list[PortError | None]:
-        robot = self.rig.robot
+        robot = self.world.robot
         end, allowed = robot.ended.get(identity), self.motion_allowed()
         if end is not None and end["executed"]:
             return [None]
@@ -220,7 +187,7 @@ class VirtualArm:
         return [] if allowed.ok else [PortError("the arm does not follow any more", (allowed.why,), allowed.code)]
 
     def joint_positions(self) -> tuple[float, ...] | None:
-        return None if self._silent(0.5) else tuple(self.rig.robot.report["position"])
+        return None if self._silent(0.5) else tuple(self.world.robot.report["position"])
 
     def hold(self, reason: str) -> Pending:
         return self.lwr_command("hold")

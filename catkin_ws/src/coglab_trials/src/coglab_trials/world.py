@@ -1,8 +1,5 @@
 """The whole cell in one process and in virtual time: the robot (KRC stand-in, bridge and controller manager, byte for
-byte in lockstep), the hand emulator behind its driver, virtual human, tracker. One step() is one FRI period.
-
-Tests, trials and benches make their world here, and nowhere else.
-"""
+byte in lockstep), the hand emulator behind its driver, virtual human, tracker."""
 
 from __future__ import annotations
 
@@ -32,7 +29,7 @@ from ih2_hand.memory import HandMemory
 from ih2_hand.progress import Task, Verdict
 from ih2_hand.reasons import Reason
 
-from coglab_trials.conditions import THE_WORLD_AS_IT_IS, Conditions
+from coglab_trials.conditions import Conditions
 
 try:
     import coglab_sim._cell  # noqa: F401  (knows the type of LockstepRobot.cell)
@@ -108,6 +105,8 @@ class Robot:
         self.loaded: dict[str, str] = {}
         self.peak_share = self.measured_share = 0.0
         self.outside = {"commanded": 0, "measured": 0, "over_command": 0}
+        self.silent = 0.0
+        """s for which the robot's process has stood still (``virtual.frozen``)"""
         self.debug: dict[str, Any] | None = None
         self._commanded: list[float] | None = None
 
@@ -132,6 +131,7 @@ class Robot:
     def step(self) -> None:
         """One FRI period; the limits are looked at in how the arm moved and in what it was told."""
         self.virtual.tick()
+        self.silent = self.silent + DT if self.virtual.frozen else 0.0
         self._look_at_arm()
         self.report = report = self.virtual.report()
         if report["fri_period"] <= 0.0:
@@ -148,6 +148,10 @@ class Robot:
             )
         self._commanded = commanded if report["motion_allowed"] else None
         self.outside["commanded"] += outside
+
+    def palm(self) -> Pose:
+        """Pose of the palm in the base frame, by the measured joints."""
+        return Pose(*self.chain.fk(self.report["position"]))
 
     def look_at_motion(self) -> list[dict[str, Any]]:
         """Progress of the DMP and, while it moves, the newest set-point and goal."""
@@ -259,21 +263,42 @@ class Hand(HandMemory):
 
 
 class World:
-    """Everything together. ``seed`` makes person, noise and tracker; ``conditions`` say what they are like.
+    """The simulated cell: robot, hand, an object, a person and a tracker, advanced by ``step()``.
 
-    ``recording`` (settings of recorded_person.open_recorded_hand): the person's hand goes as recorded.
-    ``after_period`` are called at the end of each FRI period, with a robot that is connected.
+    No ROS master, no threads, no real time: the same arguments give the same world, to the last bit. Example::
+
+        world = World(seed=3, conditions=Conditions(object_id="bottle"))
+        world.human.command("give bottle")
+        for _ in range(round(2.0 / DT)):
+            world.step()
+        print(world.t, world.truth["held_by"], world.newest("human_hand"))
+
+    Attributes: ``t`` (s, virtual time); ``truth``: the true state of the cell, a dict of SI units in the base frame;
+    ``human``: the person (``command``, ``hear``, ``phase``); ``robot``: arm, controllers and limits; ``hand``: of the
+    robot; ``cell``: the physics, for pushes and faults; ``sights``: newest Sight by frame; ``blind``: names of
+    frames that the tracker does not see from now on; ``after_period``: functions that are called at the end of each
+    period with a robot that is connected; ``seed`` and ``conditions``, as given.
     """
 
     def __init__(
         self,
         seed: int = 1,
-        conditions: Conditions = THE_WORLD_AS_IT_IS,
+        conditions: Conditions | None = None,
         object_on: str = "human_hand",
         turned: float = 0.0,
         limits: str = LIMITS,
         recording: Mapping[str, Any] | None = None,
     ) -> None:
+        """
+        ``seed``: of person, noise and tracker. ``conditions``: what person, tracker and object are like.
+        ``object_on``: "human_hand", or "world" for the middle of the board. ``turned``: rad, by which the person holds
+        the object turned about the vertical. ``limits``: path of the arm's table of joint limits. ``recording``: the
+        person's hand goes as recorded; settings of coglab_sim.person.recorded_person.open_recorded_hand.
+
+        ObjectError: no such object. RecordingError: the recording cannot be used. ValueError: a value out of range.
+        """
+        conditions = conditions or Conditions()
+        self.seed, self.conditions = seed, conditions
         thing, _ = read_object(objects_folder() / f"{conditions.object_id}.yaml")
         self.object_frame = f"object_{conditions.object_id}"
         scene = Scene.of(thing, conditions.mass, conditions.friction)
@@ -321,7 +346,7 @@ class World:
         return sight.frame, self.t - sight.captured
 
     def step(self) -> None:
-        """One FRI period."""
+        """One FRI period, 5 ms."""
         if self.ticks % 2 == 0:
             self._person_and_tracker()
         self.hand.step(self.t)

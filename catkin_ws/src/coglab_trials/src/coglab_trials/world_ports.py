@@ -1,9 +1,5 @@
-"""The ports of the machines on the virtual world but the arm's (virtual_arm): the hand's driver on its emulator, the
-trackers, the object files, the detector on the torques.
-
-The world is coglab_trials.world.World; it is given, so that nothing here imports the simulation. Behind each port
-stands a node that can be frozen: freeze() and thaw() of the port.
-"""
+"""The ports of the state machines in a World, but for the arm's (virtual_arm): the hand's driver on its emulator, the
+trackers, the object files, the contact detector on the simulated torques."""
 
 from __future__ import annotations
 
@@ -34,7 +30,7 @@ from coglab_smach.ports.interfaces import (
 from coglab_smach.ports.pending import Pending, Polled, PortError, Ready
 from ih2_hand.reasons import Reason, reason_of
 
-from coglab_trials.virtual_node import VirtualNode
+from coglab_trials.world import World
 
 THRESHOLDS = package_path("coglab_contact", "config", "contact_thresholds.yaml")
 HAND = "human_hand"
@@ -45,49 +41,35 @@ OLDEST_SIGHT = 0.15
 class VirtualHand:
     """HandPort on the virtual world's hand, which has the rules of the hand's node."""
 
-    def __init__(self, rig: Any) -> None:
-        self.rig, self.node = rig, VirtualNode()
-
-    def freeze(self) -> None:
-        """The hand's node stops as it stands; the hand itself goes on with what it was told."""
-        self.node.freeze()
-        self.rig.hand.dead = True
-
-    def thaw(self) -> None:
-        """It goes on."""
-        self.rig.hand.dead = False
-        self.node.thaw()
+    def __init__(self, world: World) -> None:
+        self.world = world
 
     def _goal(self, name: str, **fields: Any) -> Pending:
-        return self.node.ask(lambda: self._begin(name, fields))
-
-    def _begin(self, name: str, fields: Mapping[str, Any]) -> Pending:
-        hand = self.rig.hand
+        hand = self.world.hand
         try:
             job = hand.begin(name, **fields)
         except Exception as error:  # whatever refuses it
             return Ready(error=PortError(f"{name} ended ABORTED", (str(error),), reason_of(error)))
 
         def value() -> None:
+            assert job.verdict is not None  # it is done
             if not job.verdict.ok:
                 raise PortError(f"{name} ended without success", (job.verdict.text,), job.verdict.reason)
 
         def cancel() -> None:
-            self.node.ask(lambda: Ready(hand.end(job, "preempted; fingers stopped", Reason.CANCELLED)))
+            hand.end(job, "preempted; fingers stopped", Reason.CANCELLED)
 
-        return Polled(lambda: job.verdict is not None and not self.node.frozen, value, cancel)
+        return Polled(lambda: job.verdict is not None, value, cancel)
 
     def calibrate(self, mode: str) -> Pending:
-        hand, asked = self.rig.hand, self.rig.t
+        hand, asked = self.world.hand, self.world.t
         sent: list[str | None] = []
 
         def done() -> bool:
-            if self.node.frozen:
-                return False
             # After a start the hand counts as holding until a poll has shown it empty: give it 2 s for that.
-            if not sent and (not hand.holding or self.rig.t - asked > 2.0):
+            if not sent and (not hand.holding or self.world.t - asked > 2.0):
                 sent.append(hand.calibrate(mode))
-            return bool(sent) and hand.calibration_over(self.rig.t)
+            return bool(sent) and hand.calibration_over(self.world.t)
 
         def value() -> None:
             if sent[0] is not None:
@@ -110,7 +92,7 @@ class VirtualHand:
         return self._goal("hand_open", speed=speed)
 
     def state(self) -> HandState:
-        hand = self.rig.hand
+        hand = self.world.hand
         if hand.dead:
             return HandState(message="hand_status is silent", event=ReasonCode.NODE_SILENT)
         positions = () if hand.calibrating else hand.positions
@@ -121,57 +103,41 @@ class VirtualPerception:
     """PerceptionPort on the virtual world's trackers; recogniser and belief (BeliefFilter), if given, see what these
     see: each new sight once, as in the recogniser's node."""
 
-    def __init__(self, rig: Any, recogniser: Any = None, belief: Any = None) -> None:
-        self.rig, self.recogniser, self.belief, self.node = rig, recogniser, belief, VirtualNode()
-        self._blind: set[str] = set()
+    def __init__(self, world: World, recogniser: Any = None, belief: Any = None) -> None:
+        self.world, self.recogniser, self.belief = world, recogniser, belief
         self._taken: dict[str, float] = {}
         self._seen = self._believed = -math.inf  # s, when the last sight of the hand came, and the last belief
-        rig.after_period.append(self._believe)
-
-    def freeze(self) -> None:
-        """The perception node stops as it stands, and the frames that it sends."""
-        self.node.freeze()
-        self._blind = set(self.rig.trackers) - self.rig.blind
-        self.rig.blind |= self._blind
-
-    def thaw(self) -> None:
-        """It goes on."""
-        self.rig.blind -= self._blind
-        self.node.thaw()
+        world.after_period.append(self._believe)
 
     def init_vision(self, time_limit: float) -> Pending:
-        return self.node.ask(lambda: Ready("rig"))
+        return Ready("virtual trackers")
 
     def locate_object(self, object_id: str, time_limit: float) -> Pending:
-        return self.node.ask(lambda: self._locate(object_id, time_limit))
-
-    def _locate(self, object_id: str, time_limit: float) -> Pending:
         name = object_id if object_id in ("board", "human_hand") else f"object_{object_id}"
-        end = self.rig.t + time_limit
-        known = name == "board" or name in self.rig.trackers
+        end = self.world.t + time_limit
+        known = name == "board" or name in self.world.trackers
 
         def fresh() -> bool:
-            return known and self.rig.newest(name)[1] < 0.5
+            return known and self.world.newest(name)[1] < 0.5
 
         def value() -> Located:
             if not fresh():
                 raise PortError(f"'{name}' was not seen within {time_limit:.1f} s", code=ReasonCode.OBJECT_NOT_SEEN)
-            frame, age = self.rig.newest(name)
+            frame, age = self.world.newest(name)
+            assert frame is not None  # it is fresh
             x, y, z = frame.position
             qx, qy, qz, qw = frame.orientation
             return Located(name, "world", (x, y, z), (qx, qy, qz, qw), age)
 
-        return Polled(lambda: fresh() or self.rig.t >= end, value)
+        return Polled(lambda: fresh() or self.world.t >= end, value)
 
     def free_places(self, object_id: str, time_limit: float) -> Pending:
-        return self.node.ask(lambda: Ready([Located("", "board", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), 0.0)]))
+        return Ready([Located("", "board", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), 0.0)])
 
     def _believe(self) -> None:
         """Each new sight, objects first; the frames ahead, as the recogniser's node sends them."""
-        if self.node.frozen:
-            return
-        t = self.rig.t
-        for name, sight in sorted(self.rig.sights.items(), reverse=True):
+        t = self.world.t
+        for name, sight in sorted(self.world.sights.items(), reverse=True):
             if sight.captured <= self._taken.get(name, -1.0):
                 continue
             self._taken[name] = sight.captured
@@ -185,18 +151,18 @@ class VirtualPerception:
                 self.belief.see_object(sight.captured, name.removeprefix("object_"), sight.frame.position, t)
                 continue
             end = self.recogniser.pattern_end() if self.recogniser is not None else None
-            seen = self.belief.see_hand(sight.captured, sight.frame.position, t, self.rig.hand.holding, end)
+            seen = self.belief.see_hand(sight.captured, sight.frame.position, t, self.world.hand.holding, end)
             if seen.stamp != sight.captured:
                 continue  # the filter has no use for this sight, and nothing is sent
             self._believed = t
             places = {HAND: seen.hand_place, f"object_{seen.object_id}": seen.place if seen.object_id else None}
             for frame, place in places.items():
-                if place is not None and frame in self.rig.sights:
-                    turned = self.rig.sights[frame].frame.orientation
-                    self.rig.robot.virtual.set_frame(frame + "_ahead", place, turned, t - sight.captured)
+                if place is not None and frame in self.world.sights:
+                    turned = self.world.sights[frame].frame.orientation
+                    self.world.robot.virtual.set_frame(frame + "_ahead", place, turned, t - sight.captured)
 
     def ahead(self) -> Ahead:
-        if self.belief is None or self.node.frozen or self.rig.t - self._believed > OLDEST_BELIEF:
+        if self.belief is None or self.world.t - self._believed > OLDEST_BELIEF:
             return Ahead()
         seen = self.belief.belief
         if seen.place is None:
@@ -207,7 +173,7 @@ class VirtualPerception:
         return Ahead(seen.offer, seen.request, seen.object_id, frame + "_ahead", (x, y, z), deviation)
 
     def recognition(self) -> Recognition:
-        if self.recogniser is None or self.node.frozen or self.rig.t - self._seen > OLDEST_RECOGNITION:
+        if self.recogniser is None or self.world.t - self._seen > OLDEST_RECOGNITION:
             return Recognition()
         seen = self.recogniser.estimate
         return Recognition(seen.pattern, seen.confidence, seen.decided, seen.probabilities)
@@ -217,39 +183,28 @@ class VirtualDatabase:
     """DatabasePort over the real object files."""
 
     def __init__(self, database: ObjectDatabase) -> None:
-        self.database, self.node = database, VirtualNode()
-
-    def freeze(self) -> None:
-        """The database's node stops as it stands."""
-        self.node.freeze()
-
-    def thaw(self) -> None:
-        """It goes on."""
-        self.node.thaw()
+        self.database = database
 
     def get_object(self, object_id: str) -> Pending:
-        return self.node.ask(lambda: self._entry(object_id))
-
-    def _entry(self, object_id: str) -> Pending:
         try:
             return Ready(self.database.get(object_id))
         except ObjectError as error:
             return Ready(error=PortError(str(error), code=ReasonCode.OBJECT_UNKNOWN))
 
     def list_objects(self) -> Pending:
-        return self.node.ask(lambda: Ready(self.database.ids()))
+        return Ready(self.database.ids())
 
 
 class VirtualContact:
     """ContactPort: the detector on the virtual arm's torques, the hand's motors, the trackers and touch."""
 
-    def __init__(self, rig: Any, touch: float | None = None) -> None:
+    def __init__(self, world: World, touch: float | None = None) -> None:
         """``touch``: N, standard deviation of each component of the hand's touch sensors; None: it has none."""
-        self.rig, self._touch = rig, touch
+        self.world, self._touch = world, touch
         self._noise = np.random.default_rng(0)
-        chain = rig.robot.chain
+        chain = world.robot.chain
         jacobian = lambda q: chain.jacobian(np.asarray(q, dtype=float))[:3]  # noqa: E731
-        moving = MovingContact(Thresholds.load(THRESHOLDS), cc.ArmDynamics(rig.robot.urdf), jacobian)
+        moving = MovingContact(Thresholds.load(THRESHOLDS), cc.ArmDynamics(world.robot.urdf), jacobian)
         self.moving = moving
         held = GripAndLoad(lambda q: Pose(*chain.fk(q)).rotation.as_matrix())
         self.detector = FusedDetector(ContactDetector(DetectorSettings(), jacobian), moving, held=held)
@@ -258,21 +213,12 @@ class VirtualContact:
         self._event: ContactEvent | None = None
         self._grasp: tuple[str, Pose] | None = None
         self._polled: Any = None
-        self.node = VirtualNode()
-        rig.after_period.append(self._sense)
-
-    def freeze(self) -> None:
-        """The detector's node stops as it stands."""
-        self.node.freeze()
-
-    def thaw(self) -> None:
-        """It goes on."""
-        self.node.thaw()
+        world.after_period.append(self._sense)
 
     def _sense(self) -> None:
-        if self.node.frozen or self.rig.robot.virtual.frozen:
+        if self.world.robot.virtual.frozen:
             return
-        report, t = self.rig.robot.report, self.rig.t
+        report, t = self.world.robot.report, self.world.t
         velocity, detector = np.asarray(report["measured_velocity"]), self.detector
         self.moving.observer.period = report["fri_period"]
         events = [
@@ -288,46 +234,43 @@ class VirtualContact:
 
     def _sense_hand(self) -> ContactEvent | None:
         """The motors, as often as they are polled; an empty hand carries nothing."""
-        hand = self.rig.hand
+        hand = self.world.hand
         if hand.readings is self._polled or hand.dead:
             return None
         self._polled = hand.readings
         if not hand.holding and self.moving.load > 0.0:
             self.detector.set_payload(0.0)
-        return self.detector.feed_hand(self.rig.t, hand.readings)
+        return self.detector.feed_hand(self.world.t, hand.readings)
 
     def _sense_touch(self) -> ContactEvent | None:
         """Phalanges and palm, of a hand that has touch sensors."""
         if self._touch is None:
             return None
-        forces = np.array(list(self.rig.cell.touch().values()))
+        forces = np.array(list(self.world.cell.touch().values()))
         forces += self._touch * self._noise.standard_normal(forces.shape)
-        return self.detector.feed_touch(self.rig.t, forces.tolist(), self._touch)
+        return self.detector.feed_touch(self.world.t, forces.tolist(), self._touch)
 
     def _sense_object(self, position: Any, velocity: np.ndarray) -> ContactEvent | None:
         """The object as tracked, against the palm."""
         if self._grasp is None:
             return None
         frame, grasp = self._grasp
-        seen, age = self.rig.newest(frame)
+        seen, age = self.world.newest(frame)
         if seen is None or age > OLDEST_SIGHT:
             return None
-        chain = self.rig.robot.chain
+        chain = self.world.robot.chain
         distance, angle = Pose(*chain.fk(position)).distance(seen * grasp)
         speed = length(chain.jacobian(np.asarray(position))[:3] @ velocity)
-        return self.detector.feed_sight(self.rig.t, distance, angle, speed)
+        return self.detector.feed_sight(self.world.t, distance, angle, speed)
 
     def arm(self, mode: str, time_limit: float, settings: Mapping[str, Any]) -> Pending:
         self._event = None
-        return self.node.ask(lambda: self._arm(mode, time_limit, settings))
-
-    def _arm(self, mode: str, time_limit: float, settings: Mapping[str, Any]) -> Pending:
         frame = str(settings.get("frame", ""))
         self._grasp = (frame, Pose.from_dict(settings["grasp"])) if frame else None
         try:
             self.detector.arm(
                 mode,
-                self.rig.t,
+                self.world.t,
                 time_limit,
                 float(settings.get("k", 0.0)),
                 settings.get("joints", ()),
@@ -339,21 +282,17 @@ class VirtualContact:
         return Ready()
 
     def disarm(self) -> None:
-        def act() -> Pending:
-            self.detector.disarm()
-            return Ready()
-
-        self.node.ask(act)
+        self.detector.disarm()
 
     def event(self) -> ContactEvent | None:
         return self._event
 
     def share_gone(self) -> float | None:
-        return None if self.node.frozen else self.detector.share_gone()
+        return self.detector.share_gone()
 
     def force(self) -> tuple[float, float, float] | None:
-        force = None if self.node.frozen else self.detector.force()
+        force = self.detector.force()
         return None if force is None else (float(force[0]), float(force[1]), float(force[2]))
 
     def grip(self) -> float | None:
-        return None if self.node.frozen else self.detector.grip(self.rig.t)
+        return self.detector.grip(self.world.t)
