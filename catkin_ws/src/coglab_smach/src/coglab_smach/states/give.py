@@ -34,15 +34,13 @@ LOOKS = 0.3  # s between two looks, between which a hand that waits moves by les
 
 
 class WaitTaker(WaitForPerson):
-    """The end of a reach toward the person's hand: the arm stands and follows nothing any more, and the contact
-    detector is armed for release.
+    """wait_stop of a reach toward the person's hand. At its end the arm stands, and the contact detector is armed for
+    release.
 
-    The goal is the person's hand, and that now comes to the object: an arm that still followed it would back away, and
-    one that is held would drag the hand along that it follows. So within the last ``give.touch_within`` m, with the
-    hand within ``give.near`` m of the palm, the reach ends with a contact, and when the goal goes away from the arm
-    again by ``give.goal_leaves`` m because the hand is nearer to the palm than at the delivery: a person who waits does
-    not do that, and the rest of the way is theirs. A hand that is farther away is still on its way, and its predicted
-    place is corrected: that is followed.
+    The goal is the person's hand, and it now comes to the object: an arm that still followed it would back away. So
+    within the last ``give.touch_within`` m, with the hand within ``give.near`` m of the palm, the reach ends with a
+    contact, or when the hand is nearer to the palm than at the delivery, so that the goal goes away again by
+    ``give.goal_leaves`` m: the rest of the way is the person's. A hand that is farther away is followed.
     """
 
     def __init__(self, ctx: Context) -> None:
