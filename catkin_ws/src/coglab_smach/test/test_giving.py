@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode, Say
 from coglab_py.pose import Pose
+from coglab_smach.context.grip import Grip
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.interfaces import HandState, Located
 from coglab_smach.ports.pending import Polled, Ready
 from coglab_smach.states import give
-from coglab_smach.states.grip import Grip
 from coglab_smach.states.held_object import HeldObject
 from conftest import Trial
 
