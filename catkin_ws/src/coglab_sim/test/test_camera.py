@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from coglab_py.packages import package_path
 from coglab_sim import _cell
-from conftest import URDF
 
 Camera = pytest.importorskip("coglab_sim._camera", reason="built by ./coglab film alone").Camera
+URDF = str(package_path("lwr_description", "urdf", "lwr_ih2.urdf"))
 RED = (0.9, 0.1, 0.1)
 
 

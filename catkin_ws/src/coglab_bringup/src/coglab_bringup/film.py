@@ -166,7 +166,7 @@ class Film:
         sheet = Image.new("RGB", (SIZE[0], SIZE[1] * len(chosen)))
         for row, frame in enumerate(chosen):
             sheet.paste(frame, (0, row * SIZE[1]))
-        return sheet.quantize(COLOURS, method=Image.Quantize.MAXCOVERAGE)
+        return sheet.quantize(COLOURS, method=Image.Quantize.FASTOCTREE)
 
 
 def quiet(*_: object) -> None:
