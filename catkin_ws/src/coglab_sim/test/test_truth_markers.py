@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 from coglab_msgs.msg import CellTruth
-from coglab_sim.person.body import arm_of
 from coglab_sim.person.scene import shipped
 from geometry_msgs.msg import Point, Pose, Quaternion
 from node_alone import Alone, script
@@ -98,7 +97,7 @@ def test_the_person_from_hand_to_head(shown):
     markers, _ = shown.show(truth())
     assert list(markers) == ["human_hand", "forearm", "upper_arm", "trunk", "legs", "head", "object"]
     skin, cloth, dark = (0.80, 0.58, 0.46, 0.9), (0.35, 0.45, 0.60, 1.0), (0.25, 0.27, 0.30, 1.0)
-    shoulder, elbow = arm_of(np.array(HAND))
+    shoulder, elbow = shown.module.arm_of(np.array(HAND))
     trunk, head = shoulder + [0.06, -0.20, -0.28], shoulder + [0.04, -0.20, 0.24]
     legs = (trunk - [0, 0, 0.2] + [*trunk[:2], -0.75]) / 2
     for name, kind, where, large, shade in (
@@ -133,7 +132,7 @@ SHOULDER = np.array([1.42, 0.20, 0.50])
 @pytest.mark.parametrize("hand", [(1.0, 0.1, 0.3), (0.9, 0.3, 0.6), (1.4, 0.1, 0.2), (0.2, 0.0, 0.4)])
 def test_an_arm_has_its_lengths_and_its_elbow_hangs(shown, hand):
     hand = np.array(hand)
-    shoulder, elbow = arm_of(hand)
+    shoulder, elbow = shown.module.arm_of(hand)
     assert np.linalg.norm(elbow - hand) == pytest.approx(0.36)
     assert np.linalg.norm(shoulder - elbow) == pytest.approx(0.33)
     distance = np.linalg.norm(SHOULDER - hand)
@@ -149,7 +148,7 @@ def test_an_arm_has_its_lengths_and_its_elbow_hangs(shown, hand):
 
 def test_a_hand_at_the_shoulder_has_an_arm_all_the_same(shown):
     for hand in (SHOULDER, SHOULDER + [0.0, 0.0, 0.3], SHOULDER + [1e-7, 0.0, 0.0]):
-        assert np.all(np.isfinite(arm_of(hand.copy())))
+        assert np.all(np.isfinite(shown.module.arm_of(hand.copy())))
 
 
 @pytest.mark.parametrize("name, kind", [("mug", Marker.CYLINDER), ("ball", Marker.SPHERE), ("tea_box", Marker.CUBE)])
