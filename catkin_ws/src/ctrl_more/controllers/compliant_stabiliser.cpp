@@ -8,7 +8,8 @@
 
 namespace ctrl_more {
 
-/// Lets the centre of mass yield to pushes like a mass on a damper and a spring.
+/// Lets the centre of mass yield to pushes like a mass on a damper and a spring. See
+/// doc/controllers/CompliantStabiliser.md.
 class CompliantStabiliser : public FeedbackController {
  public:
   Description describe() const override;

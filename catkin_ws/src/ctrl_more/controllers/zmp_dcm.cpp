@@ -7,7 +7,8 @@
 
 namespace ctrl_more {
 
-/// Stabilises the divergent component of motion by the ZMP, or the ZMP by the centre of mass.
+/// Stabilises the divergent component of motion by the ZMP, or the ZMP by the centre of mass. See
+/// doc/controllers/ZmpDcm.md.
 class ZmpDcm : public FeedbackController {
  public:
   Description describe() const override;
