@@ -120,13 +120,13 @@ class Writer {
     inertial(palm, rest.mass, rest.moment / rest.mass);
   }
 
-  void solids(const Link& link, const Group& group_of, int condim) {
+  void solids(const Link& link, const Group& who, int condim) {
     for (const Solid& solid : link.collisions) {
       out_ << "<geom type=\"" << solid.kind << '"';
       vector("size", solid.size);
       pose(solid.pose);
-      friction(group_of.own == kHand);
-      group(group_of, condim) << "/>\n";
+      friction(who.own == kHand);
+      group(who, condim) << "/>\n";
     }
   }
   void friction(bool hand) {
@@ -221,15 +221,15 @@ class Writer {
     const Vector3d size = cylinder ? Vector3d(half.x(), half.z(), 0.0)
                           : sphere ? Vector3d(half.x(), 0.0, 0.0)
                                    : half;
-    for (const Group& group_of : {kObjectGroup, kSolidGroup}) {
-      const bool round = cylinder && group_of.own == kObject;
+    for (const Group& who : {kObjectGroup, kSolidGroup}) {
+      const bool round = cylinder && who.own == kObject;
       out_ << "<geom type=\"" << (round ? "capsule" : object.shape) << '"';
       vector("size", size);
       vector("pos", object.center);
       // Priority: the friction of a contact is the object's, whatever it touches.
       out_ << " priority=\"1\" friction=\"" << object.friction << ' ' << scene_.hand.torsional
            << ' ' << scene_.hand.rolling << '"';
-      group(group_of, 4) << "/>\n";
+      group(who, 4) << "/>\n";
     }
     out_ << "</body>\n";
   }
