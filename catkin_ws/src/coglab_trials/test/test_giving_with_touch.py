@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from coglab_sim.person.receiving import Receiving
+from coglab_sim.person.virtual_human import VirtualHuman
 from coglab_trials import GIVE, RECEIVE, Conditions, VirtualTrial
 
 NOISE = 0.05
@@ -61,7 +61,7 @@ def test_a_load_that_comes_back_is_held_again(monkeypatch):
         if since > 6.0:
             self._go("releasing", t)
 
-    monkeypatch.setattr(Receiving, "_lifting", half)
+    monkeypatch.setattr(VirtualHuman, "_lifting", half)
     # An arm that sinks would lay the object into their hand after all.
     given = Given("mug", 7000, **{"give.lower_after": 60.0})
     t, share, grip = given.rows.T
