@@ -1,14 +1,19 @@
 """A whole handover in virtual time: person, object, FRI, DMP and point-to-point, in one thread."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from coglab_msgs.msg import Say
+from coglab_msgs.msg import ReasonCode, Say
 from coglab_py.packages import package_path
 from coglab_sim.person.in_cell import move_person, view_of
 from coglab_sim.person.participant import Participant
 from coglab_sim.person.scene import Scene
 from coglab_sim.person.virtual_human import VirtualHuman
-from coglab_trials.world import Robot
+from coglab_smach.ports.interfaces import DmpRequest
+from coglab_smach.ports.pending import PortError
+from coglab_trials.virtual_arm import VirtualArm
+from coglab_trials.world import DT, Robot, World
 
 PRIMITIVES = str(package_path("coglab_controllers", "config", "primitives.xml"))
 GRASP = {"goal_offset": [0.0, -0.065, 0.05], "target_orientation": [0.5, 0.5, 0.5, 0.5]}  # 25 mm before the mug
@@ -162,3 +167,86 @@ def test_frames_are_known_from_when_they_are_told_until_they_are_forgotten():
     assert "frame 'a' is not known" in robot.execute_dmp("reach_human", goal_frame="a")[1]
     with pytest.raises(ValueError, match="no DMP controller is loaded"):
         Robot(3).virtual.dmp_progress()
+
+
+# --- refusals ---------------------------------------------------------------------------------------------------------
+
+REACH = DmpRequest("take_board", "board", [0.0, -0.25, 0.45], dmp_ratio=2.0)
+NAN = float("nan")
+
+
+@pytest.fixture(scope="module")
+def arm():
+    """The port of the arm, ready to move, and a posture near the one it is in."""
+    world = World(1, object_on="world")
+    port = VirtualArm(world)
+
+    def wait(condition, limit=10.0):
+        while not condition():
+            assert (limit := limit - DT) > 0.0
+            world.step()
+
+    for name, kind in (("dmp", "coglab/DmpController"), ("ptp", "coglab/PtpController")):
+        port.load_controller(name, kind).result()
+    port.load_dmps(PRIMITIVES).result()
+    wait(lambda: world.cell.quality == 3)
+    port.lwr_command("position")
+    start = port.lwr_command("start")
+    wait(start.done)
+    start.result()
+    wait(lambda: port.motion_allowed().ok and world.t > 3.0)
+    q = list(port.joint_positions())
+    return port, [*q[:6], q[6] + 0.1]
+
+
+def refused(pending):
+    assert pending.done()
+    with pytest.raises(PortError) as error:
+        pending.result()
+    return error.value.code
+
+
+@pytest.mark.parametrize(
+    "fields, code",
+    [
+        ({"primitive_id": "to_the_moon"}, ReasonCode.UNKNOWN_NAME),
+        ({"goal_frame": "nowhere"}, ReasonCode.UNKNOWN_NAME),
+        ({"goal_frame": ""}, ReasonCode.GOAL_MISSING),
+        ({"goal_offset": [0.0, 0.0, 9.0]}, ReasonCode.GOAL_OUTSIDE_WORKSPACE),
+        ({"goal_offset": [0.0, NAN, 0.4]}, ReasonCode.INVALID_ARGUMENT),
+        ({"dmp_ratio": NAN}, ReasonCode.OUT_OF_RANGE),
+        ({"goal_approach": (0.0, 0.0, 0.5)}, ReasonCode.INVALID_ARGUMENT),
+        ({"arrival_speed": 9.0}, ReasonCode.INVALID_ARGUMENT),
+        ({"goal_drop": -1.0}, ReasonCode.INVALID_ARGUMENT),
+        ({"goal_region_low": (1.0, 0.0, 0.0)}, ReasonCode.INVALID_ARGUMENT),
+        ({"orientation_control": True, "target_orientation": (0.0, 0.0, 0.0, 2.0)}, ReasonCode.INVALID_ARGUMENT),
+    ],
+)
+def test_reaches_that_make_no_sense_are_refused_with_their_code(arm, fields, code):
+    port, _ = arm
+    port.switch_controller("dmp").result()
+    assert refused(port.execute_dmp(replace(REACH, **fields))) == code
+
+
+def test_other_requests_that_make_no_sense_are_refused_with_their_code(arm):
+    port, near = arm
+    assert refused(port.switch_controller("nobody")) == ReasonCode.UNKNOWN_NAME
+    assert refused(port.load_controller("x", "coglab/NoController")) == ReasonCode.UNKNOWN_NAME
+    assert refused(port.load_controller("9 x/", "coglab/DmpController")) == ReasonCode.INVALID_ARGUMENT
+    assert refused(port.load_dmps("/no/such.xml")) == ReasonCode.BAD_FILE
+    assert refused(port.apply_profile("nobody")) == ReasonCode.UNKNOWN_NAME
+    assert refused(port.lwr_command("dance")) == ReasonCode.UNKNOWN_NAME
+    port.switch_controller("dmp").result()
+    assert refused(port.move_ptp(near, [])) == ReasonCode.NOT_ACTIVE
+    assert refused(port.switch_dmp(REACH)) == ReasonCode.NOTHING_RUNS
+    port.switch_controller("ptp").result()
+    assert refused(port.execute_dmp(REACH)) == ReasonCode.NOT_ACTIVE
+    for position, speed, code in (
+        (near[:6], [], ReasonCode.INVALID_ARGUMENT),
+        ([NAN, *near[1:]], [], ReasonCode.INVALID_ARGUMENT),
+        ([3.5, *near[1:]], [], ReasonCode.OUT_OF_RANGE),
+        ([0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0], [], ReasonCode.GOAL_OUTSIDE_WORKSPACE),
+        (near, [9.0, *[0.1] * 6], ReasonCode.OUT_OF_RANGE),
+        (near, [*[0.1] * 6, NAN], ReasonCode.INVALID_ARGUMENT),
+    ):
+        assert refused(port.move_ptp(position, speed)) == code
