@@ -172,55 +172,10 @@ Event parseEvent(const std::string& text, const ControlMode& current) {
   return event;
 }
 
-namespace {
-
-/// Why command mode was not entered or not left, in words; empty for other outcomes.
-std::string whyNotReached(const Outcome& o, const std::string& word, const std::string& seconds) {
-  switch (o.code) {
-    case OutcomeCode::PoorQuality:
-      return std::string("start: quality of the connection is ") + fri::nameOf(o.quality) +
-             " after " + seconds +
-             ", OK or PERFECT is needed; see /diagnostics for latency and losses";
-    case OutcomeCode::NoKrlProgram:
-      return std::string(
-                 "start: the controller shows no sign of the KRL program of krl_convention ") +
-             fri::nameOf(o.convention) +
-             "; start it on the pendant or set krl_convention to the one it runs";
-    case OutcomeCode::ProgramRefused:
-      return word + ": the KRL program refused after " + seconds + ": " + wordsFor(o.result);
-    case OutcomeCode::NotEntered:
-      return std::string("start: still in ") + fri::nameOf(o.state) + " after " + seconds +
-             ", CMD expected; quality " + fri::nameOf(o.quality) +
-             (o.drive_error != 0 ? ", drive errors" : "") +
-             "; read the messages on the pendant, and check that krl_convention (" +
-             fri::nameOf(o.convention) + ") is that of the running program";
-    case OutcomeCode::NoPower: {
-      char power[16];
-      std::snprintf(power, sizeof power, "0x%02X", o.power);
-      return word + ": command mode, but drive power is " + power + " instead of 0x7F after " +
-             seconds + "; press the enabling switch or switch the drives on";
-    }
-    case OutcomeCode::WrongStrategy:
-      return word + ": the controller is in " + fri::nameOf(o.reported) + " instead of " +
-             fri::nameOf(o.wanted) + "; monitor mode was requested";
-    case OutcomeCode::NotLeft:
-      return word + ": still in " + fri::nameOf(o.state) + " after " + seconds +
-             ", MON expected; stop the KRL program on the pendant";
-    default:
-      return {};
-  }
-}
-
-std::string secondsOf(double waited) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.1f s", waited);
-  return text;
-}
-
-}  // namespace
-
 std::string describe(const Outcome& o) {
-  const std::string seconds = secondsOf(o.waited);
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f s", o.waited);
+  const std::string seconds = text;
   const std::string word = wordFor(o.kind);
   switch (o.code) {
     case OutcomeCode::Pending:
@@ -252,11 +207,37 @@ std::string describe(const Outcome& o) {
       return word + ": the robot controller fell silent after " + seconds;
     case OutcomeCode::NotServed:
       return word + ": the FRI thread did not take the request within " + seconds;
-    default: {
-      const std::string why = whyNotReached(o, word, seconds);
-      return why.empty() ? word : why;
+    case OutcomeCode::PoorQuality:
+      return std::string("start: quality of the connection is ") + fri::nameOf(o.quality) +
+             " after " + seconds +
+             ", OK or PERFECT is needed; see /diagnostics for latency and losses";
+    case OutcomeCode::NoKrlProgram:
+      return std::string(
+                 "start: the controller shows no sign of the KRL program of krl_convention ") +
+             fri::nameOf(o.convention) +
+             "; start it on the pendant or set krl_convention to the one it runs";
+    case OutcomeCode::ProgramRefused:
+      return word + ": the KRL program refused after " + seconds + ": " + wordsFor(o.result);
+    case OutcomeCode::NotEntered:
+      return std::string("start: still in ") + fri::nameOf(o.state) + " after " + seconds +
+             ", CMD expected; quality " + fri::nameOf(o.quality) +
+             (o.drive_error != 0 ? ", drive errors" : "") +
+             "; read the messages on the pendant, and check that krl_convention (" +
+             fri::nameOf(o.convention) + ") is that of the running program";
+    case OutcomeCode::NoPower: {
+      char power[16];
+      std::snprintf(power, sizeof power, "0x%02X", o.power);
+      return word + ": command mode, but drive power is " + power + " instead of 0x7F after " +
+             seconds + "; press the enabling switch or switch the drives on";
     }
+    case OutcomeCode::WrongStrategy:
+      return word + ": the controller is in " + fri::nameOf(o.reported) + " instead of " +
+             fri::nameOf(o.wanted) + "; monitor mode was requested";
+    case OutcomeCode::NotLeft:
+      return word + ": still in " + fri::nameOf(o.state) + " after " + seconds +
+             ", MON expected; stop the KRL program on the pendant";
   }
+  return word;
 }
 
 }  // namespace lwr_fri_bridge

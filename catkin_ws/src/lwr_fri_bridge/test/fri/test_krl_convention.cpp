@@ -2,7 +2,6 @@
 /// strategy.
 #include <gtest/gtest.h>
 
-#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -181,19 +180,6 @@ TEST(KrlConvention, AllButOneRunEveryStrategy) {
     EXPECT_EQ(supports(convention, ControlStrategy::Position), !fixed);
     EXPECT_EQ(supports(convention, ControlStrategy::CartesianImpedance), !fixed);
     EXPECT_TRUE(supports(convention, ControlStrategy::JointImpedance));
-  }
-}
-
-TEST(KrlConvention, AnUnknownNameIsRefusedWithTheKnownOnes) {
-  for (const KrlConvention convention : kAll)
-    EXPECT_EQ(krlConventionFromName(nameOf(convention)), convention);
-  try {
-    krlConventionFromName("orocos");
-    ADD_FAILURE() << "accepted";
-  } catch (const std::invalid_argument& error) {
-    EXPECT_STREQ(error.what(),
-                 "unknown krl_convention 'orocos'; known: coglab, centro_epiaggio, stanford, "
-                 "rcprg_tum, rtt_lwr, openkc");
   }
 }
 

@@ -99,58 +99,5 @@ TEST(Supervisor, WhatIsLostNeedsAStartAndIsCounted) {
   EXPECT_EQ(leashed.epoch(), 3U);
 }
 
-TEST(Supervisor, AHoldLatchesAndAReleasedOneLastsUntilTheArmStands) {
-  Started supervisor;
-  supervisor.hold();
-  EXPECT_TRUE(supervisor.held());
-  SupervisorInput moving = ready();
-  moving.stands_still = false;
-  supervisor.update(moving);
-  EXPECT_EQ(supervisor.state(), SupervisorState::Holding);
-  supervisor.update(ready());
-  EXPECT_EQ(supervisor.state(), SupervisorState::Holding);
-  supervisor.reset();
-  EXPECT_FALSE(supervisor.held());
-  supervisor.update(ready());
-  EXPECT_EQ(supervisor.state(), SupervisorState::Command);
-
-  supervisor.hold();
-  supervisor.reset();
-  supervisor.update(moving);
-  EXPECT_EQ(supervisor.block(), MotionBlock::Held);
-  EXPECT_EQ(supervisor.state(), SupervisorState::Holding);
-  supervisor.update(ready());  // it stands in this tick
-  EXPECT_EQ(supervisor.block(), MotionBlock::Held);
-  supervisor.update(ready());
-  EXPECT_EQ(supervisor.block(), MotionBlock::None);
-  EXPECT_EQ(supervisor.state(), SupervisorState::Command);
-}
-
-TEST(Supervisor, AStopBrakesAndEndsWithoutAFallBack) {
-  Started supervisor;
-  supervisor.stopBegins();
-  EXPECT_TRUE(supervisor.stopping());
-  EXPECT_FALSE(supervisor.readyForMonitor());  // it is not known yet whether the arm stands
-  SupervisorInput input = ready();
-  input.stands_still = false;
-  supervisor.update(input);
-  EXPECT_EQ(supervisor.state(), SupervisorState::Stopping);
-  EXPECT_FALSE(supervisor.readyForMonitor());
-  supervisor.update(ready());
-  EXPECT_TRUE(supervisor.readyForMonitor());
-  input.command_mode = false;  // not commanded any more: there is nothing to wait for
-  supervisor.update(input);
-  EXPECT_TRUE(supervisor.readyForMonitor());
-  EXPECT_EQ(supervisor.state(), SupervisorState::Stopping);
-  EXPECT_EQ(supervisor.fallBacks(), 0U);
-  supervisor.stopEnds();
-  EXPECT_FALSE(supervisor.stopping());
-  EXPECT_FALSE(supervisor.readyForMonitor());
-  supervisor.update(input);
-  EXPECT_EQ(supervisor.state(), SupervisorState::Monitor);
-  supervisor.update(ready());
-  EXPECT_EQ(supervisor.block(), MotionBlock::NotStarted);
-}
-
 }  // namespace
 }  // namespace lwr_fri_bridge

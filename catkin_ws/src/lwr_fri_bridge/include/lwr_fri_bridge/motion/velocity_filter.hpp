@@ -29,14 +29,7 @@ class VelocityFilter {
 
   const Vector7& velocity() const { return velocity_; }
 
-  /// Delay of a constant acceleration, s; see above.
-  static double delay(double time_constant, double dt);
-  /// Noise gain, 1/s; see above.
-  static double noiseGain(double time_constant, double dt);
-
  private:
-  static double weight(double time_constant, double dt, std::uint32_t cycles);
-
   double time_constant_;
   bool primed_ = false;
   Vector7 last_ = Vector7::Zero(), velocity_ = Vector7::Zero();
