@@ -76,7 +76,8 @@ class Client {
     config.krc.period = plant::kStep;
     config.object_start = "robot_hand";
     const Quaterniond turn(0.5, -0.5, -0.5, -0.5);
-    config.object_pose = {Vector3d(0.04, 0.0, 0.0) - turn * config.object.center, turn};
+    config.object_position = Vector3d(0.04, 0.0, 0.0) - turn * config.object.center;
+    config.object_rotation = turn;
     return config;
   }
   Cell cell_;
