@@ -13,16 +13,13 @@ setup(
                     "clocks",
                     "kinematics",
                     "ports",
-                    "contact",
                     "context",
                     "states",
                     "machines",
-                    "simulated",
                     "ros",
                 )
             ),
         ],
         package_dir={"": "src"},
-        package_data={"coglab_smach.context": ["machines_schema.json"]},
     )
 )

@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """A session of the whole system: from the person, with all cases of a handover, onto the board, from the board, to the
-person. Then the robot's node is killed while the machine waits: it says so, and can go on."""
+person. Then odd messages come on every topic and service, and the robot's node is killed while the machine waits: it
+says so, and can go on."""
 
 import os
 import re
@@ -11,6 +12,7 @@ import tempfile
 import time
 from pathlib import Path
 
+import numpy as np
 import rospkg
 import rospy
 import rostest
@@ -18,10 +20,14 @@ from coglab_bringup.handover import READY_LIMIT, ask_for, run_handover
 from coglab_bringup.trial_recorder import TrialRecorder
 from coglab_msgs.srv import Start
 from handover_rostest import Handover
+from odd_messages import OddMessages
+from rosgraph_msgs.msg import Log
+from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 
 ORDER = ("put", "take", "exchange_robot_to_human")
+THROWN = ("bad callback", "Error processing request")  # how rospy logs an exception in a callback
 WORKSPACE = Path(rospkg.RosPack().get_path("coglab_bringup")).parents[1]
 
 
@@ -100,8 +106,29 @@ class Session(Handover):
     def test_6_all_that_runs_is_what_the_first_demo_builds(self):
         """Whoever types ./coglab demo first has nothing else of this workspace."""
         loaded = loaded_by_this_session()
-        self.assertLessEqual({"robot_node", "cell_node", "_plant"}, {name.split(".")[0] for name in loaded})
+        self.assertLessEqual(
+            {"robot_node", "cell_node", "libcoglab_sim_plant"}, {name.split(".")[0] for name in loaded}
+        )
         self.assertEqual(loaded - built_for_the_first_demo(), set())
+
+    def test_y_odd_messages_end_no_node_and_do_not_move_the_arm(self):
+        joints, thrown, odd = [], [], OddMessages()
+
+        def on_joints(message):
+            if message._connection_header["callerid"] == "/robot":
+                joints.append(message.position)
+
+        def on_log(message):
+            if message.name in odd.nodes and message.msg.startswith(THROWN):
+                thrown.append(f"{message.name}: {message.msg[:200]}")
+
+        rospy.Subscriber("/lwr/joint_states", JointState, on_joints, queue_size=50)
+        rospy.Subscriber("/rosout", Log, on_log, queue_size=1000)
+        self.assertLessEqual({"/robot", "/coglab", "/ih2_hand", "/perception", "/contact_detector"}, set(odd.nodes))
+        odd.send(to_topics=30, to_services=2)
+        self.assertEqual((odd.ended, odd.unanswered, thrown), ([], [], []))
+        self.assertTrue(joints)
+        self.assertLess(np.abs(np.array(joints) - joints[0]).max(), 0.01)
 
     def test_z_a_killed_robot_node_shows_in_the_hub_and_is_initialised_again(self):
         found = subprocess.run(["rosnode", "info", "/robot"], capture_output=True, text=True, timeout=60, check=True)

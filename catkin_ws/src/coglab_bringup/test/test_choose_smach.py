@@ -71,11 +71,6 @@ ASK = "upstream_smach=$(find_upstream_smach)"
 ALL = ";".join(PACKAGES)
 
 
-def test_ours_unless_upstream_is_asked_for(script):
-    with_smach(script.places / "noetic", *PACKAGES)
-    assert script.run("build").stdout == OURS.format("")
-
-
 def test_asked_for_it_leaves_ours_out_and_finds_the_prefix_that_holds_all_three(script):
     with_smach(script.places / "a", "smach", "smach_ros")
     whole = with_smach(script.places / "b", *PACKAGES)
@@ -95,12 +90,6 @@ def test_later_commands_use_what_was_built_last_and_a_plain_build_goes_back_to_o
     # The names differ: build() then removes what was built with the other one.
     assert script.run("build").stdout == OURS.format(ALL)
     assert '[ "$was_left_out" = "$left_out" ] || rm -rf "$workspace/build" "$workspace/devel"' in function("build")
-
-
-def test_built_with_upstream_that_has_gone_since_a_later_command_says_so(script):
-    script.built_without(ALL)
-    ended = script.run("demo")
-    assert ended.returncode == 1 and "none was found" in ended.stderr
 
 
 def upstream() -> bool:

@@ -153,29 +153,11 @@ def test_doctor_names_a_missing_package_and_the_way_to_it(checkout):
     assert "not built yet; do it: ./coglab build" in ended.stdout
 
 
-def test_doctor_names_a_second_smach(checkout):
-    second = checkout / "catkin_ws/src/somewhere/smach_ros"
-    second.mkdir(parents=True)
-    (second / "package.xml").write_text("<package/>")
-    doctor = TOP / "catkin_ws/src/coglab_bringup/src/coglab_bringup/doctor.py"
-    ended = run("/usr/bin/python3", "-I", doctor, checkout)
-    assert f"a second copy of smach_ros lies in {second}" in ended.stdout and "--upstream-smach" in ended.stdout
-
-
 def test_a_foreign_ros_is_named_and_left_aside():
     ended = run(TOP / "coglab", "help", ROS_PACKAGE_PATH="/opt/ros/noetic/share")
     assert ended.returncode == 0 and "a ROS from /opt/ros is in your environment" in ended.stdout
     ended = run(TOP / "coglab", "doctor", ROS_PACKAGE_PATH="/opt/ros/noetic/share")
     assert "a ROS from /opt/ros is in ROS_PACKAGE_PATH; open a shell without it" in ended.stdout
-
-
-def test_the_environment_of_this_workspace_is_no_foreign_ros():
-    """Built with --upstream-smach, it names the place below /opt/ros where that smach lies."""
-    prefixes = f"{TOP}/catkin_ws/devel:/opt/ros/somewhere"
-    packages = f"{TOP}/catkin_ws/src:/opt/ros/somewhere/share"
-    for command in ("help", "doctor"):
-        ended = run(TOP / "coglab", command, CMAKE_PREFIX_PATH=prefixes, ROS_PACKAGE_PATH=packages)
-        assert "a ROS from /opt/ros" not in ended.stdout
 
 
 def test_pyenv_first_in_path(tmp_path):

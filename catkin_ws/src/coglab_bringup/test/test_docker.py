@@ -106,8 +106,3 @@ def test_without_an_engine_they_say_how_to_get_one(checkout, script):
         (tools / name).symlink_to(shutil.which(name))
     ended = checkout.run(script, path=str(tools))
     assert ended.returncode == 69 and "apt-get install" in ended.stderr and "podman" in ended.stderr
-
-
-def test_the_folder_of_results_is_the_one_of_the_image():
-    text = (TOP / "docker" / "Dockerfile").read_text()
-    assert "WORKDIR /coglab" in text

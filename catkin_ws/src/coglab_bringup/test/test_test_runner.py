@@ -3,26 +3,26 @@
 import os
 import signal
 import sys
-from pathlib import Path
 
 import pytest
 from coglab_bringup import arguments, process_tree, test_runner
 from coglab_bringup.arguments import test_options as options_of_test
-from coglab_bringup.test_runner import FIRST, Program, find_programs, longest_first, report, run
+from coglab_bringup.test_runner import Program, find_programs, longest_first, report, run, unfinished
 from coglab_bringup.usage import Refused
 
 GREEN = (
-    '<testsuites><testsuite><testcase classname="a" name="one"/>'
-    '<testcase name="two"><skipped/></testcase></testsuite></testsuites>'
+    '<testsuites><testsuite><testcase classname="test_x" name="one"/>'
+    '<testcase classname="test_x.Group" name="two"><skipped/></testcase></testsuite></testsuites>'
 )
-RED = '<testsuite><testcase name="bad"><failure message="1 is not 2"/></testcase></testsuite>'
+RED = '<testsuite><testcase classname="test_x" name="bad"><failure message="1 is not 2"/></testcase></testsuite>'
 
-SKIPPED = '<testsuite><testcase name="module"><skipped/></testcase></testsuite>'
+SKIPPED = '<testsuite><testcase classname="" name="test_x"><skipped/></testcase></testsuite>'
 
 
 def program(tmp_path, script: str) -> Program:
     xml = tmp_path / "report.xml"
-    return Program("pkg", "pytest", "test_x.py", [sys.executable, "-c", script.replace("XML", repr(str(xml)))], xml)
+    command = [sys.executable, "-c", script.replace("XML", repr(str(xml)))]
+    return Program("pkg", "pytest", "test_x.py", command, xml, ["test_x.py"])
 
 
 @pytest.mark.parametrize(
@@ -106,6 +106,7 @@ def package_with(top, *files: tuple[str, str]) -> None:
     (package / "test").mkdir(parents=True)
     (package / "package.xml").write_text("<package><name>pkg</name></package>")
     for name, text in files:
+        (package / "test" / name).parent.mkdir(exist_ok=True)
         (package / "test" / name).write_text(text)
 
 
@@ -126,6 +127,52 @@ def test_a_word_names_a_package_a_file_or_a_case(tmp_path):
         with pytest.raises(Refused) as refusal:
             options_of_test(tmp_path, words)
         assert names in str(refusal.value)
+
+
+def test_gtests_of_a_room_are_one_binary(tmp_path):
+    package_with(
+        tmp_path,
+        ("core/test_one.cpp", "TEST(One, Adds) {}\nTEST_F(Two,\n       Subtracts) {}\n"),
+        ("core/test_two.cpp", "TEST_P(Three, Holds) {}\n"),
+        ("core/support.cpp", "int helper() { return 1; }\n"),
+        ("plugins/plugin.cpp", "int plugin() { return 1; }\n"),
+    )
+
+    def chosen(*words):
+        wanted = options_of_test(tmp_path, list(words)).tests
+        return {one.name: one.command[-1] for one in find_programs(tmp_path, tmp_path, sys.executable, wanted)}
+
+    for words in (["pkg"], ["pkg/core"], ["pkg/test_one.cpp", "pkg/core/test_two.cpp"], ["pkg/test_two.cpp", "pkg"]):
+        assert chosen(*words) == {"pkg_test_core": f"--gtest_output=xml:{tmp_path / 'pkg.pkg_test_core.xml'}"}
+    assert chosen("pkg/test_one.cpp") == {"pkg_test_core": "--gtest_filter=One.Adds:Two.Subtracts"}
+    assert chosen("pkg/core/test_two.cpp") == {"pkg_test_core": "--gtest_filter=*Three.Holds/*"}
+    assert chosen("pkg/test_one.cpp::Adds") == {"pkg_test_core": "--gtest_filter=*Adds*"}
+    with pytest.raises(Refused) as refusal:
+        options_of_test(tmp_path, ["pkg/plugins"])
+    assert "core, test_one.cpp, test_two.cpp" in str(refusal.value)
+
+
+def test_pytests_of_a_package_share_a_process_unless_they_are_a_node(tmp_path):
+    cases = "def test_good(): pass\n\ndef test_bad():\n    assert not 'right'\n"
+    dies = "import os\n\ndef test_dies():\n    os.abort()\n"
+    package_with(
+        tmp_path,
+        *(("test_a.py", cases), ("test_b.py", ""), ("test_c.py", dies)),
+        ("test_node.py", "rospy.init_node('x')"),
+    )
+    first, node = find_programs(tmp_path, tmp_path, sys.executable, [])
+    assert (first.files, node.files) == (["test_a.py", "test_b.py", "test_c.py"], ["test_node.py"])
+    run(first, tmp_path / "log", limit=60.0)
+    assert (first.passed, first.failed, first.skipped) == (1, 3, 0), first.failures
+    told = "\n".join(first.failures)
+    assert "test_a.test_bad: " in told and "no case of test_b.py ran" in told
+    assert "test_c.test_dies: " in told and "crashed" in told
+
+
+def test_what_hangs_is_named(tmp_path):
+    log = tmp_path / "log"
+    log.write_text("header\ntest_a.py::test_x \n[gw0] [ 50%] PASSED test_a.py::test_x \ntest_a.py::test_y \n")
+    assert unfinished(log) == ["test_a.py::test_y"]
 
 
 def test_a_named_test_builds_what_it_needs(tmp_path):
@@ -149,8 +196,8 @@ def test_a_named_test_builds_what_it_needs(tmp_path):
 
 def test_what_is_not_the_same_in_each_run_is_listed(tmp_path, monkeypatch, capsys):
     """With two busy processes beside it, that end with the run."""
-    package_with(tmp_path, ("test_a.py", ""), ("test_b.py", ""))
-    ends = iter((1, 0, 1, 1))  # cases passed by each program: test_b is red in the first run
+    package_with(tmp_path, ("a.test", "<launch/>"), ("b.test", "<launch/>"))
+    ends = iter((1, 0, 1, 1))  # cases passed by each program: b is red in the first run
     seen: set[int] = set()
 
     def pretend(program: Program, _log, _limit: float) -> None:
@@ -164,14 +211,20 @@ def test_what_is_not_the_same_in_each_run_is_listed(tmp_path, monkeypatch, capsy
     monkeypatch.setenv("COGLAB_TOP", str(tmp_path))
     assert test_runner.main(["--out", str(tmp_path / "out"), "--repeat", "2", "--load"]) == 1
     told = capsys.readouterr().out
-    assert "DIFFERS pkg test_b.py: one" in told and "failed in run 1\n" in told and "passed in run 2\n" in told
-    assert str(tmp_path / "out" / "run_1" / "logs" / "pkg.test_b.py.log") in told
-    assert "test_a.py: one" not in told
+    assert "DIFFERS pkg b.test: one" in told and "failed in run 1\n" in told and "passed in run 2\n" in told
+    assert str(tmp_path / "out" / "run_1" / "logs" / "pkg.b.log") in told
+    assert "a.test: one" not in told
     assert len(seen) == 2 and not seen & set(process_tree.descendants(os.getpid()))
 
 
-def test_what_takes_longest_begins_first(tmp_path):
-    programs = find_programs(Path(__file__).resolve().parents[4], tmp_path, sys.executable, [])
-    names = [one.name for one in longest_first(programs)]
-    wanted = [name for name in FIRST if name in names]
-    assert wanted and names[: len(wanted)] == wanted
+def test_one_package_alone_has_two_workers_and_begins_first(tmp_path):
+    package_with(tmp_path, ("test_a.py", ""), ("test_b.py", ""), ("c.test", "<launch/>"))
+    other = tmp_path / "catkin_ws" / "src" / "other"
+    (other / "test").mkdir(parents=True)
+    (other / "package.xml").write_text("<package><name>other</name></package>")
+    found = longest_first(find_programs(tmp_path, tmp_path, sys.executable, []))
+    assert [(one.kind, one.slots) for one in found] == [("pytest", 2), ("rostest", 1)]
+    for number in range(4):
+        (other / "test" / f"{number}.test").write_text("<launch/>")
+    found = longest_first(find_programs(tmp_path, tmp_path, sys.executable, []))
+    assert [(one.kind, one.slots) for one in found] == [("pytest", 1)] + 5 * [("rostest", 1)]

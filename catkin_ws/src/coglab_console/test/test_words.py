@@ -8,10 +8,10 @@ from coglab_console.desk.commands import COMMANDS
 from coglab_console.desk.gates import MotionGuard, Standing, reasons
 from coglab_objects.database import ObjectDatabase, objects_folder
 from coglab_py.packages import package_path
-from coglab_smach.clocks.virtual_clock import VirtualClock, using
 from coglab_smach.context.config import Config
 from coglab_smach.machines import build_master
-from coglab_smach.simulated.ports import simulated_context
+from coglab_trials.scripted import scripted_context
+from coglab_trials.virtual_clock import VirtualClock, using
 
 LIBRARY = str(package_path("coglab_controllers", "config", "primitives.xml"))
 HELD = {"object_id": "mug", "actions": ("exchange_robot_to_human", "put")}
@@ -31,7 +31,7 @@ def the_master():
     """The whole hierarchy of the brain, on simulated ports."""
     clock, database = VirtualClock(), ObjectDatabase(objects_folder())
     config = Config.load(str(package_path("coglab_smach", "config", "machines.yaml")), {"dmp_library": LIBRARY})
-    context, _ = simulated_context(clock, database, config)
+    context, _ = scripted_context(clock, database, config)
     with using(clock):
         return build_master(context)
 

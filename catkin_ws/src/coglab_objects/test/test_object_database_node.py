@@ -145,23 +145,6 @@ def test_reading_again_says_by_a_code_whether_all_files_fit(make, tmp_path):
     assert (read.success, read.reason_code) == (False, ReasonCode.BAD_FILE) and "mug.yaml" in read.message
 
 
-def test_three_services_and_a_timer_of_a_second(make):
-    started = make()
-    *services, (period, on_timer, _) = started.begun
-    assert [(name, served) for name, _, served in services] == [
-        ("~get_object", started.node.on_get),
-        ("~list_objects", started.node.on_list),
-        ("~reload", started.node.on_reload),
-    ]
-    assert period == 1.0 and on_timer == started.node.on_timer
-
-
-def test_an_entry_is_answered_as_its_file_has_it(make, tmp_path):
-    got = make().node.on_get(SimpleNamespace(object_id="mug"))
-    assert (got.success, got.reason_code, got.message) == (True, ReasonCode.NONE, "")
-    assert got.yaml == (tmp_path / "mug.yaml").read_text()
-
-
 def test_an_object_that_is_unknown_is_a_code_and_a_sentence(make):
     got = make().node.on_get(SimpleNamespace(object_id="elephant"))
     assert (got.success, got.reason_code, got.yaml) == (False, ReasonCode.OBJECT_UNKNOWN, "")
@@ -179,19 +162,6 @@ def test_a_file_that_is_written_is_read_at_the_next_tick_and_mirrored_once(make)
     assert started.warnings == []
 
 
-def test_the_timer_reads_only_what_has_changed_and_the_service_all(make, monkeypatch):
-    started = make()
-    asked, reload = [], started.node.database.reload
-    monkeypatch.setattr(started.node.database, "reload", lambda only: asked.append(only) or reload(only))
-    started.node.on_timer()
-    assert asked == []
-    (started.folder / "mug.yaml").unlink()
-    started.node.on_timer()
-    assert asked == [True]
-    started.node.on_reload(None)
-    assert asked == [True, False]
-
-
 def test_a_problem_that_comes_back_is_told_again(make):
     started = make()
     path = started.folder / "mug.yaml"
@@ -201,40 +171,3 @@ def test_a_problem_that_comes_back_is_told_again(make):
         started.node.on_reload(None)
         assert len(started.warnings) == told
     assert started.warnings[0][0] == "object database: %s" and "mug.yaml" in started.warnings[0][1]
-
-
-def test_a_master_that_is_away_at_the_start_and_later_again_is_told_each_time(make):
-    started = make(node=False)
-    started.master.down = True
-    node = started.module.ObjectDatabaseNode()
-    node.on_timer()
-    assert node.behind and len(started.warnings) == 1 and node.database.ids() == ["ball", "mug"]
-    assert started.warnings[0][0] == "object database: %s is not up to date: %s"
-    assert started.warnings[0][1] == "~objects"
-    started.master.down = False
-    node.on_timer()
-    calls = started.master.calls
-    node.on_timer()
-    assert not node.behind and started.master.objects() == ["ball", "mug"] and started.master.calls == calls
-    started.master.down = True
-    (started.folder / "mug.yaml").unlink()
-    node.on_timer()
-    assert node.behind and len(started.warnings) == 2
-
-
-def test_errors_of_the_timer_are_told_at_most_every_ten_seconds(make, monkeypatch):
-    started = make()
-    monkeypatch.setattr(started.node.database, "changed", lambda: 1 / 0)
-    started.node.on_timer()
-    assert started.warnings[-1][0] == 10.0
-
-
-def test_the_program_ends_with_1_without_a_folder_and_else_when_ros_ends(make, monkeypatch):
-    started, said = make(node=False), []
-    monkeypatch.setattr(rospy, "init_node", lambda name: said.append(name))
-    monkeypatch.setattr(rospy, "spin", lambda: said.append("spun"))
-    monkeypatch.setattr(rospy, "logfatal", lambda *args: said.append(str(args[1])))
-    assert started.module.main() == 0 and said == ["object_database", "spun"]
-    del started.master.values["~folder"]
-    assert started.module.main() == 1
-    assert said[2:] == ["object_database", "parameter ~folder is missing; expected a text"]

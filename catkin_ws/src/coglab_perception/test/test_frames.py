@@ -59,16 +59,3 @@ def test_bad_files(tmp_path):
         FrameNames.load(str(path))
     with pytest.raises(FramesError, match=r"load coglab_perception/config/frames\.yaml there"):
         FrameNames.from_mapping(None)
-
-
-def test_no_node_of_perception_names_a_frame_itself():
-    """Other names come from the file, so that a lab changes them there and nowhere else."""
-    names = [value for value in yaml.safe_load(FILE.read_text()).values() if value != "world"]
-    for path in [
-        SOURCES / "coglab_perception" / "scripts" / "motion_recogniser_node.py",
-        SOURCES / "coglab_sim" / "scripts" / "perception_stand_in.py",
-        SOURCES / "coglab_sim" / "src" / "coglab_sim" / "tracker" / "vision.py",
-    ]:
-        code = path.read_text(encoding="utf-8")
-        for name in names:
-            assert f'"{name}"' not in code, path

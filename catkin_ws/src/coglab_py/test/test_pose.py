@@ -1,8 +1,13 @@
-"""Poses: composition, inverse, reading and averaging, on seeded random poses and against matrices."""
+"""Poses, and poses from and to geometry_msgs."""
+
+from __future__ import annotations
 
 import numpy as np
 import pytest
-from coglab_py.pose import IDENTITY, Pose, about_z, length, mean_pose, rotation
+from coglab_py.messages import pose_message, pose_of
+from coglab_py.pose import IDENTITY, Pose, about_z, mean_pose, rotation
+from geometry_msgs.msg import Point, Quaternion
+from geometry_msgs.msg import Pose as PoseMessage
 
 RNG = np.random.default_rng(5)
 
@@ -46,22 +51,6 @@ def test_a_pose_of_which_nothing_is_said_is_its_parent():
     assert IDENTITY == (0.0, 0.0, 0.0, 1.0)
     with pytest.raises(AttributeError):
         Pose().position = np.ones(3)
-
-
-def test_a_turn_about_the_vertical_axis_and_a_length():
-    assert about_z(0.6) == pytest.approx([0.0, 0.0, np.sin(0.3), np.cos(0.3)], abs=1e-15)
-    assert length(np.array([2.0, -3.0, 6.0])) == 7.0
-
-
-def test_only_a_quaternion_of_nearly_nothing_has_no_direction():
-    assert rotation([0, 0, 0, 1.5e-9]).as_quat() == pytest.approx(IDENTITY)
-    assert rotation([0, 0, -20, 0]).magnitude() == pytest.approx(np.pi)
-
-
-def test_a_pose_as_plain_lists():
-    pose = Pose(np.array([1, 2, 3]), np.array([0, 0, 1, 0]))
-    assert pose.to_dict() == {"xyz": [1.0, 2.0, 3.0], "quaternion": [0.0, 0.0, 1.0, 0.0]}
-    assert {type(number) for numbers in pose.to_dict().values() for number in numbers} == {float}
 
 
 def test_the_mean_of_two_poses_lies_half_way():
@@ -112,3 +101,17 @@ def test_the_mean_of_noisy_poses_is_near_the_truth_whatever_the_signs_of_their_q
     assert far < 0.003 and angle < 0.004
     with pytest.raises(ValueError):
         mean_pose([])
+
+
+MESSAGE = PoseMessage(Point(1.0, 2.0, 3.0), Quaternion(0.1, 0.3, 0.5, 0.7))
+
+
+def test_a_message_as_a_pose():
+    pose = pose_of(MESSAGE)
+    assert pose.position == pytest.approx([1.0, 2.0, 3.0])
+    assert pose.orientation == pytest.approx([0.1, 0.3, 0.5, 0.7])
+
+
+def test_a_pose_as_a_message():
+    assert pose_message(Pose(np.array([1.0, 2.0, 3.0]), np.array([0.1, 0.3, 0.5, 0.7]))) == MESSAGE
+    assert pose_message(Pose()) == PoseMessage(Point(0.0, 0.0, 0.0), Quaternion(0.0, 0.0, 0.0, 1.0))

@@ -1,4 +1,6 @@
-"""Timers, workers and waits across steps of every clock. No roscore."""
+"""Timers, stamps and waits by the steady clock; time slowed down with the simulated cell."""
+
+from __future__ import annotations
 
 import threading
 import time
@@ -6,6 +8,7 @@ import time
 import pytest
 import rospy
 from coglab_py import steady
+from coglab_py.pace import Slowed
 
 
 @pytest.fixture(autouse=True)
@@ -111,3 +114,14 @@ def test_a_silent_clock_is_a_fault_and_a_set_one_is_told(ros, monkeypatch):
         now[0], wall[0] = now[0] + 0.2, wall[0] + 0.2 + step
         assert not watch.look()
     assert len(ros) == count + 1 and "forward by 60.0 s" in ros[-1]
+
+
+def test_time_passes_by_the_factor_and_never_leaps():
+    time = Slowed()
+    assert time.at(7.0) == 7.0
+    time.change(10.0, 0.5)
+    assert [time.at(clock) for clock in (9.0, 10.0, 12.0)] == [9.0, 10.0, 11.0]
+    time.change(12.0, 0.25)
+    assert [time.at(clock) for clock in (11.0, 12.0, 16.0)] == pytest.approx([10.5, 11.0, 12.0])
+    time.change(16.0, 1.0)
+    assert time.at(17.0) == pytest.approx(13.0)

@@ -5,11 +5,8 @@
 /// /clock if ~publish_clock, fingertip_forces if ~tactile, real_time_factor (std_msgs/Float64,
 /// latched) and, on /diagnostics, whether this computer keeps real time; if not and ~slow_down, the
 /// cell slows. What the cell measures is stamped with the time of its physics step. Serves ~fault,
-/// ~place_object. Parameters: every row of the cell's table under the private namespace; ~speed,
-/// ~fri_host, ~fri_port (0: wait for ~port_parameter, by default lwr/fri_port_bound beside this
-/// namespace), ~port_wait, ~fri_source_port (0: any free one), ~log_file, ~truth_rate,
-/// ~publish_clock, ~tactile, ~rt_priority (SCHED_FIFO of the thread of steps); fri_period and seed
-/// of the parent namespace.
+/// ~place_object. Parameters: every row of parameter_table.inc under the private namespace;
+/// fri_period and seed of the parent namespace.
 #include <fstream>
 #include <memory>
 
@@ -30,10 +27,8 @@
 #include "cell_parameters.hpp"
 #include "coglab_rt/ros/alone.hpp"
 #include "coglab_rt/ros/logger_service.hpp"
-#include "coglab_rt/ros/parameter.hpp"
 #include "coglab_rt/ros/ros_time.hpp"
 #include "coglab_sim/pace.hpp"
-#include "coglab_sim/ranges.hpp"
 #include "coglab_sim/real_time_cell.hpp"
 
 namespace coglab_sim {
@@ -55,15 +50,6 @@ std::uint16_t publishedPort(const std::string& parameter) {
   return static_cast<std::uint16_t>(port);
 }
 
-/// A private parameter within the range of its name. @throws std::invalid_argument naming
-/// parameter, value and range.
-template <typename T>
-T within(const ros::NodeHandle& node, const char* name, T otherwise) {
-  const T value = coglab_rt::readParameter<T>(node, name, otherwise, "a number");
-  requireWithin(rangeOf(name), node.resolveName(name), value);
-  return value;
-}
-
 /// Waits for it. @throws std::runtime_error after `limit` s or at shutdown.
 std::uint16_t waitForPort(const std::string& parameter, double limit) {
   const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(limit);
@@ -82,33 +68,30 @@ class CellNode {
   CellNode()
       : private_("~"),
         config_(readCellConfig(private_)),
-        pace_(within(private_, "speed", 1.0)),
-        slow_down_(flag("slow_down")),
+        settings_(config_.node),
+        pace_(settings_.speed),
         hand_(config_.hand_model.empty() ? plant::builtInHandTable()
                                          : plant::readHandTable(config_.hand_model)) {
-    int port = within(private_, "fri_port", 0);
-    const double speed = pace_.factor();
-    const double rate = within(private_, "truth_rate", 200.0);
-    const int priority = within(private_, "rt_priority", 60);
-    port_parameter_ = portParameter(text("port_parameter", "lwr/fri_port_bound", "a name"));
+    const double speed = pace_.factor(), rate = settings_.truth_rate;
+    const std::string& host = settings_.fri_host;
+    int port = settings_.fri_port;
+    port_parameter_ = portParameter(settings_.port_parameter);
     follow_port_ = port == 0;
-    if (follow_port_) port = waitForPort(port_parameter_, within(private_, "port_wait", 60.0));
-    const auto host = text("fri_host", "127.0.0.1", "an IPv4 address");
-    const int source_port = within(private_, "fri_source_port", 0);
+    if (follow_port_) port = waitForPort(port_parameter_, settings_.port_wait);
     cell_ = std::make_unique<RealTimeCell>(config_, host, static_cast<std::uint16_t>(port), speed,
-                                           static_cast<std::uint16_t>(source_port));
+                                           static_cast<std::uint16_t>(settings_.fri_source_port));
     cell_->setSnapshotInterval(speed / rate);
-    cell_->waitForAnswers(slow_down_);
-    openLog(text("log_file", "", "a path"));
+    cell_->waitForAnswers(settings_.slow_down);
+    openLog(settings_.log_file);
 
     truth_ = node_.advertise<coglab_msgs::CellTruth>("truth/cell", kQueue);
     motor_states_ = node_.advertise<coglab_msgs::MotorStates>("motor_states", 1);
     messages_ = private_.advertise<std_msgs::String>("messages", 50, true);
     factor_ = node_.advertise<std_msgs::Float64>("real_time_factor", 1, true);
     diagnostics_ = node_.advertise<diagnostic_msgs::DiagnosticArray>("/diagnostics", 5);
-    if (flag("tactile"))
+    if (settings_.tactile)
       touch_ = node_.advertise<coglab_msgs::FingertipForces>("fingertip_forces", kQueue);
-    if (flag("publish_clock")) clock_ = node_.advertise<rosgraph_msgs::Clock>("/clock", 1);
+    if (settings_.publish_clock) clock_ = node_.advertise<rosgraph_msgs::Clock>("/clock", 1);
     const auto hints = ros::TransportHints().tcpNoDelay();
     human_ = node_.subscribe<coglab_msgs::HumanHand>(
         "human_hand", 1, [this](const coglab_msgs::HumanHand::ConstPtr& m) { onHuman(*m); },
@@ -135,9 +118,9 @@ class CellNode {
         "real time",
         host.c_str(), port, 1e3 * config_.krc.period, krc::nameOf(config_.krc.convention).c_str(),
         speed);
-    const std::string normal = cell_->start(priority);
+    const std::string normal = cell_->start(settings_.rt_priority);
     if (normal.empty())
-      ROS_INFO("its thread has SCHED_FIFO priority %d", priority);
+      ROS_INFO("its thread has SCHED_FIFO priority %d", settings_.rt_priority);
     else
       ROS_INFO("its thread is a normal one: %s", normal.c_str());
   }
@@ -151,14 +134,6 @@ class CellNode {
   bool failed() const { return failed_; }
 
  private:
-  std::string text(const char* name, const char* otherwise, const char* expected) const {
-    return coglab_rt::readParameter<std::string>(private_, name, otherwise, expected);
-  }
-
-  bool flag(const char* name) const {
-    return coglab_rt::readParameter(private_, name, false, "true or false");
-  }
-
   void openLog(const std::string& path) {
     if (path.empty()) return;
     log_.open(path);
@@ -338,11 +313,11 @@ class CellNode {
 
     const bool before = pace_.busy();
     const double factor = pace_.factor();
-    if (slow_down_ && pace_.update(load) != factor) {
+    if (settings_.slow_down && pace_.update(load) != factor) {
       cell_->setFactor(pace_.factor());
       publishFactor();
     }
-    const bool busy = slow_down_ ? pace_.busy() : load.tooBusy();
+    const bool busy = settings_.slow_down ? pace_.busy() : load.tooBusy();
     const std::string sentence = describe(load, pace_.factor(), busy);
     if (pace_.factor() < factor || (busy && !before)) ROS_WARN("%s", sentence.c_str());
     if (pace_.factor() > factor) ROS_INFO("%s", sentence.c_str());
@@ -385,8 +360,8 @@ class CellNode {
 
   ros::NodeHandle node_, private_;
   CellConfig config_;
+  const NodeParameters& settings_;
   Pace pace_;
-  bool slow_down_;
   plant::HandTable hand_;  // names of the phalanges
   std::unique_ptr<RealTimeCell> cell_;
   std::string port_parameter_;

@@ -27,7 +27,7 @@ constexpr const char* expected() {
 }
 
 /// Sets a row of the table from the parameter `key` under the node, if it is there: as the type
-/// that the row has.
+/// that the row has. @throws std::invalid_argument naming parameter, value and range.
 void take(CellConfig& config, const ros::NodeHandle& node, const CellParameter& row,
           const std::string& key) {
   if (!node.hasParam(key)) return;
@@ -38,7 +38,7 @@ void take(CellConfig& config, const ros::NodeHandle& node, const CellParameter& 
   row.set(config, std::visit(read, row.get(config)));
 }
 
-/// A number that may be what the schema says. @throws std::invalid_argument naming the field.
+/// A number within the range of the schema. @throws std::invalid_argument naming the field.
 double numberOf(const YAML::Node& entry, const std::string& field, const YAML::Node& schema) {
   const auto value = entry.as<double>(std::nan(""));
   if (!std::isfinite(value)) throw std::invalid_argument(field + ": expected a number");
@@ -97,7 +97,7 @@ CellConfig readCellConfig(const ros::NodeHandle& node) {
   const ros::NodeHandle above;
   config.object =
       readObject(node, coglab_rt::readParameter(node, "object/id", config.object.id, "a name"));
-  config.object_pose.position[2] = -config.object.center[2];  // held at the height of its middle
+  config.object_position[2] = -config.object.center[2];  // held at the height of its middle
   for (const CellParameter& row : cellParameters()) {
     if (row.name == "krc/period") take(config, above, row, "fri_period");
     if (row.name == "seed") take(config, above, row, "seed");

@@ -15,7 +15,7 @@ PYBIND11_MODULE(_cell, m) {
       .def(py::init<const std::string&, const py::dict&>(), py::arg("urdf"),
            py::arg("parameters") = py::dict(),
            "urdf: path of the robot description; parameters: names and values as in "
-           "parameter_table().")
+           "parameters(), except those of node_only.")
       .def("step", &PyCell::step, py::arg("answer") = py::none(),
            "Takes the 376 bytes that answer the last measurement (None: no answer), advances one "
            "FRI period and returns "
@@ -93,10 +93,13 @@ PYBIND11_MODULE(_cell, m) {
           py::arg("speed"), py::arg("target"), py::arg("current"),
           "Commands of the five motors of the hand: shares of the full speed and of the stroke (0 "
           "open), counts of current at which they stop.")
-      .def("motors", &PyCell::motors,
-           "Of each motor: position (share of the stroke), current (counts), effort (counts that "
-           "the tension stands for), tension (N), moving, locked.")
-      .def("touch", &PyCell::touch, "Forces on phalanges and palm, N, axes of ih2_palm.")
+      .def(
+          "motors", [](const PyCell& c) { return motorList(c.cell().plant()); },
+          "Of each motor: position (share of the stroke), current (counts), effort (counts that "
+          "the tension stands for), tension (N), moving, locked.")
+      .def(
+          "touch", [](const PyCell& c) { return touchDict(c.cell().plant(), c.cell().touch()); },
+          "Forces on phalanges and palm, N, axes of ih2_palm.")
       .def(
           "set_push",
           [](PyCell& c, const Vector3d& force, const Vector3d& torque) {
@@ -143,26 +146,31 @@ PYBIND11_MODULE(_cell, m) {
           "The operator starts the KRL program anew, with another FRI period, s.")
       .def("acknowledge", [](PyCell& c) { c.cell().controller().acknowledge(); });
 
+  definePlant(m);
+
   m.def(
-      "parameter_table",
+      "parameters",
       [] {
         const CellConfig defaults;
         py::list rows;
         for (const auto& parameter : cellParameters()) {
           py::dict row;
           row["name"] = parameter.name;
-          row["unit"] = parameter.unit;
-          row["source"] = parameter.source;
-          row["description"] = parameter.description;
+          row["default"] = parameter.get(defaults);
           row["low"] = parameter.low;
           row["high"] = parameter.high;
-          row["default"] = parameter.get(defaults);
+          row["unit"] = parameter.unit;
+          row["source"] = parameter.source;
+          row["text"] = parameter.text;
+          row["node_only"] = parameter.node_only;
           rows.append(row);
         }
         return rows;
       },
-      "Every parameter of the cell: name, unit, source (published, ours, set-up), description, "
-      "low and high end of the range of numbers (equal: no number), default.");
+      "Every parameter of the cell: name, default, low and high end of the range of numbers "
+      "(equal: "
+      "no number), unit, source (published, ours, set-up), text, and node_only: whether cell_node "
+      "alone has it.");
 
   m.def(
       "arm_terms",

@@ -1,13 +1,9 @@
-/// Python module coglab_sim._plant: the physics of the cell by itself, one step of at most 1 ms per
-/// call.
-#include <pybind11/eigen.h>
-#include <pybind11/pybind11.h>
-#include <pybind11/stl.h>
+/// Part of the Python module coglab_sim._cell: the physics of the cell by itself, one step of at
+/// most 1 ms per call.
+#include "py_cell.hpp"
 
-#include "coglab_sim/plant/plant.hpp"
+namespace coglab_sim::python {
 
-namespace py = pybind11;
-using namespace coglab_sim;
 using namespace coglab_sim::plant;
 
 namespace {
@@ -22,36 +18,12 @@ py::tuple pair(const Pose& pose) {
   return py::make_tuple(pose.position, Eigen::Vector4d(pose.rotation.coeffs()));
 }
 
-Place placeOf(const std::string& name) {
-  if (name == "human_hand") return Place::PersonHand;
-  if (name == "robot_hand") return Place::RobotHand;
-  if (name == "world") return Place::World;
-  throw std::invalid_argument("unknown placement '" + name +
-                              "'; known: human_hand, robot_hand, world");
-}
-
 Object objectFrom(const py::dict& values) {
-  Object object;
-  for (const auto& [key, value] : values) {
-    const auto name = py::cast<std::string>(key);
-    if (name == "id") {
-      object.id = py::cast<std::string>(value);
-    } else if (name == "mass") {
-      object.mass = py::cast<double>(value);
-    } else if (name == "shape") {
-      object.shape = py::cast<std::string>(value);
-    } else if (name == "size") {
-      object.size = py::cast<Vector3d>(value);
-    } else if (name == "center") {
-      object.center = py::cast<Vector3d>(value);
-    } else if (name == "friction") {
-      object.friction = py::cast<double>(value);
-    } else {
-      throw std::invalid_argument("an object has no '" + name +
-                                  "'; known: id, mass, shape, size, center, friction");
-    }
-  }
-  return object;
+  CellConfig config;
+  for (const auto& [key, value] : values)
+    setCellParameter(config, "object/" + py::cast<std::string>(key),
+                     py::cast<ParameterValue>(value));
+  return config.object;
 }
 
 std::unique_ptr<Plant> makePlant(const std::string& urdf, const Vector7& home,
@@ -88,31 +60,6 @@ py::dict stateOf(const Plant& plant) {
   return result;
 }
 
-py::list motorsOf(const Plant& plant) {
-  py::list motors;
-  for (int i = 0; i < kMotors; ++i) {
-    const MotorState& state = plant.motors().state(i);
-    py::dict motor;
-    motor["position"] = state.position;
-    motor["tension"] = state.tension;
-    motor["current"] = state.current;
-    motor["effort"] = state.effort;
-    motor["moving"] = state.moving;
-    motor["locked"] = state.locked;
-    motors.append(motor);
-  }
-  return motors;
-}
-
-py::dict touchOf(const Plant& plant) {
-  py::dict touch;
-  const auto& table = plant.config().hand.phalanges;
-  for (std::size_t i = 0; i < table.size(); ++i)
-    touch[py::str(table[i].name)] = plant.touch().phalanges[i];
-  touch["palm"] = plant.touch().palm;
-  return touch;
-}
-
 py::dict termsOf(const Plant& plant) {
   const Plant::Terms terms = plant.terms();
   py::dict result;
@@ -136,15 +83,15 @@ py::bytes bytesOf(Plant& plant) {
 
 }  // namespace
 
-PYBIND11_MODULE(_plant, m) {
-  m.doc() =
-      "Arm, hand with fingers, object and the person's hand, by MuJoCo. SI units, "
-      "quaternions x y z w, world axes.";
+void definePlant(py::module_& m) {
   py::class_<Drives>(m, "Drives", "Figures of the arm's drives.")
       .def(py::init<>())
       .def_readwrite("rotor_inertia", &Drives::rotor_inertia)
       .def_readwrite("coulomb_friction", &Drives::coulomb_friction);
-  py::class_<Plant>(m, "Plant", "One step of at most 1 ms per step().")
+  py::class_<Plant>(
+      m, "Plant",
+      "Arm, hand with fingers, object and the person's hand, by MuJoCo; one step of at most 1 ms "
+      "per step().")
       .def(py::init(&makePlant), py::arg("urdf"), py::arg("home") = Vector7(Vector7::Zero()),
            py::arg("object") = py::dict(), py::arg("seed") = 1, py::arg("hand") = "",
            py::arg("board") = true, py::arg("drives") = Drives{},
@@ -219,8 +166,10 @@ PYBIND11_MODULE(_plant, m) {
           [](Plant& plant, int motor, double position) { plant.motors().set(motor, position); },
           py::arg("motor"), py::arg("position"))
       .def("state", &stateOf)
-      .def("motors", &motorsOf)
-      .def("touch", &touchOf, "Forces on phalanges and palm, N, axes of ih2_palm.")
+      .def("motors", [](const Plant& p) { return motorList(p); })
+      .def(
+          "touch", [](const Plant& p) { return touchDict(p, p.touch()); },
+          "Forces on phalanges and palm, N, axes of ih2_palm.")
       .def("terms", &termsOf)
       .def("energy", &Plant::energy)
       .def("bytes", &bytesOf, "Positions and velocities of everything, as bytes.")
@@ -229,3 +178,5 @@ PYBIND11_MODULE(_plant, m) {
       .def_property_readonly("external_torque",
                              [](const Plant& p) { return Vector7(p.externalTorque()); });
 }
+
+}  // namespace coglab_sim::python

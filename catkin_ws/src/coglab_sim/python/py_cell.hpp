@@ -33,6 +33,36 @@ inline CellConfig configFrom(const std::string& urdf, const py::dict& parameters
   return config;
 }
 
+/// What the hand's five motors do.
+inline py::list motorList(const plant::Plant& plant) {
+  py::list list;
+  for (int i = 0; i < plant::kMotors; ++i) {
+    const plant::MotorState& state = plant.motors().state(i);
+    py::dict motor;
+    motor["position"] = state.position;
+    motor["tension"] = state.tension;
+    motor["current"] = state.current;
+    motor["effort"] = state.effort;
+    motor["moving"] = state.moving;
+    motor["locked"] = state.locked;
+    list.append(motor);
+  }
+  return list;
+}
+
+/// Forces by the names of phalanges and palm.
+inline py::dict touchDict(const plant::Plant& plant, const plant::Touch& touch) {
+  const auto& phalanges = plant.config().hand.phalanges;
+  py::dict result;
+  for (std::size_t i = 0; i < touch.phalanges.size(); ++i)
+    result[py::str(phalanges[i].name)] = touch.phalanges[i];
+  result["palm"] = touch.palm;
+  return result;
+}
+
+/// Defines Plant and Drives in the module.
+void definePlant(py::module_& m);
+
 /// Lockstep in Python terms: bytes in, bytes out; None where nothing is sent.
 class PyCell {
  public:
@@ -75,30 +105,6 @@ class PyCell {
     result["set_point"] = t.set_point;
     result["external_torque"] = t.external_torque;
     return result;
-  }
-
-  py::list motors() const {
-    py::list list;
-    for (const plant::MotorState& state : cell_.motors()) {
-      py::dict motor;
-      motor["position"] = state.position;
-      motor["current"] = state.current;
-      motor["effort"] = state.effort;
-      motor["tension"] = state.tension;
-      motor["moving"] = state.moving;
-      motor["locked"] = state.locked;
-      list.append(motor);
-    }
-    return list;
-  }
-
-  py::dict touch() const {
-    const auto& phalanges = cell_.plant().config().hand.phalanges;
-    py::dict touch;
-    for (std::size_t i = 0; i < cell_.touch().phalanges.size(); ++i)
-      touch[py::str(phalanges[i].name)] = cell_.touch().phalanges[i];
-    touch["palm"] = cell_.touch().palm;
-    return touch;
   }
 
   Cell& cell() { return cell_; }

@@ -18,7 +18,7 @@ import rostest
 from coglab_msgs.msg import CellTruth, FingertipForces, HumanHand, MotorCommands, MotorStates, ReasonCode
 from coglab_msgs.srv import InjectFault, PlaceObject
 from coglab_objects.database import ObjectError, objects_folder, read_object
-from geometry_msgs.msg import Point, Pose, Quaternion, Vector3, Wrench
+from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3, Wrench
 from std_msgs.msg import String
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
@@ -175,6 +175,30 @@ class CellNode(unittest.TestCase):
             finally:
                 rospy.delete_param("/coglab_sim/cell/objects")
 
+    def test_3c_what_no_hand_can_do_is_ignored(self) -> None:
+        self.assertTrue(self.place("", "world", Pose(Point(1.5, 1.0, 0.3), Quaternion(0, 0, 0, 1))).success)
+        here, there = (Pose(Point(1.0, y, 0.5), Quaternion(0, 0, 0, 1)) for y in (0.2, 0.4))
+        aside = lambda: abs(self.truth[-1].human_hand.position.y - 0.2)  # noqa: E731
+        self.human.publish(HumanHand(pose=here, grip=1.0, grip_force=20.0))
+        self.assertTrue(wait_for(lambda: aside() < 0.01))
+        for wrong in (
+            {"grip": 1.01},
+            {"grip_force": 1001.0},
+            {"velocity": Twist(linear=Vector3(0, 100.5, 0))},
+            {"velocity": Twist(angular=Vector3(0, 0, 100.5))},
+            {"pose": Pose(there.position, Quaternion(0, 0, 0, 0.9))},
+        ):
+            self.human.publish(HumanHand(**{"pose": there, "grip": 1.0, "grip_force": 20.0} | wrong))
+            ticks = len(self.truth)
+            self.assertTrue(wait_for(lambda ticks=ticks: len(self.truth) > ticks + 20))
+            self.assertLess(aside(), 0.01, wrong)
+        push = rospy.Publisher("/coglab_sim/cell/push", Wrench, queue_size=1, latch=True)
+        before = self.truth[-1].robot_hand.position
+        push.publish(Wrench(force=Vector3(1001, 0, 0)))
+        ticks = len(self.truth)
+        self.assertTrue(wait_for(lambda: len(self.truth) > ticks + 20))
+        self.assertLess(abs(self.truth[-1].robot_hand.position.x - before.x), 0.01)
+
     def test_4_bad_requests_are_refused_with_words(self) -> None:
         answer = self.place("", "moon", Pose(Point(), Quaternion(0, 0, 0, 1)))
         self.assertFalse(answer.success)
@@ -277,6 +301,24 @@ class CellNode(unittest.TestCase):
         )
         self.assertIn("the simulated cell stopped: the simulation diverged at 0.", run.stdout)
         self.assertEqual(run.returncode, 1, run.stdout)
+
+    def test_92_a_cell_that_cannot_begin_says_why(self) -> None:
+        for arguments, words in (
+            (["_port_wait:=0.3", "_port_parameter:=nobody/port"], "port in parameter /nobody/port within 0.3"),
+            (["__ns:=/a/b", "_port_wait:=0.3"], "in parameter /a/lwr/fri_port_bound within 0.3"),
+            (["_fri_port:=9", "_log_file:=/nowhere/at/all.csv"], "log_file /nowhere/at/all.csv cannot be written"),
+            (["_fri_port:=9", "_fri_host:=somewhere"], "FRI host 'somewhere' is not an IPv4 address"),
+        ):
+            run = subprocess.run(
+                [cell_binary(), "__name:=no_cell", *arguments],
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                text=True,
+                timeout=60,
+                check=False,
+            )
+            self.assertEqual(run.returncode, 1)
+            self.assertIn(words, run.stdout)
 
     def test_7_two_robots_in_one_graph(self) -> None:
         """All names are relative: the cell of another namespace finds the bridge of that namespace."""

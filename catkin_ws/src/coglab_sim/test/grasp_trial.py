@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 from coglab_objects.database import cell_parameters, objects_folder, read_object
-from coglab_sim import _plant
+from coglab_sim import _cell
 
 SOURCES = Path(__file__).resolve().parents[2]
 URDF = str(SOURCES / "lwr_description" / "urdf" / "lwr_ih2.urdf")
@@ -82,7 +82,7 @@ class GraspTrial:
         grasped=True,
     ):
         """``grasped``: the fingers close around the object; else they are open as preshaped, and it is elsewhere."""
-        self.plant = plant = _plant.Plant(URDF, HOME, thing, seed=seed, board=False)
+        self.plant = plant = _cell.Plant(URDF, HOME, thing, seed=seed, board=False)
         self.centre = np.array(thing["center"], dtype=float)
         self.current = current
         palm_rotation = plant.state()["palm"][1]

@@ -358,26 +358,3 @@ def test_command_goes_on_from_the_reported_set_point_after_a_gap():
         assert np.abs(wire.commands[-1] - reported - wire.velocity * 0.001).max() < 1e-5
         wire.run(0.05)
     assert wire.cell.fri_state == 2, wire.cell.messages
-
-
-def test_kuka_sample_application():
-    """What KUKA's firstApp does: 1, then 10 once the quality is OK; a real is echoed; -1 ends it."""
-    s = Session(URDF, krc__convention="kuka_sample")
-    ended, moved, start = False, 0.0, None
-    for _ in range(4000):
-        fields = s.tick()
-        if fields is None:
-            continue
-        if fields["ints"][0] == -1:
-            ended = True
-            break
-        s.client.ints[0] = 10 if fields["quality"] >= 2 else 1
-        s.client.reals[0] = fields["reals"][1]
-        if fields["state"] == 2:
-            # The sample follows the controller's own command and adds nothing; then the key switch is turned.
-            start = start or s.cell.time
-            moved = max(moved, np.abs(np.array(fields["offset"])).max())
-            if s.cell.time - start > 1.0:
-                s.cell.leave_command_mode("end of the sample")
-    assert ended and start is not None and moved < 1e-6
-    assert s.client.reals[0] > 0.0

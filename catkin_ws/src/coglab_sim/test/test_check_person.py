@@ -63,18 +63,6 @@ def test_what_can_be_used_is_taken(behaviour, tmp_path):
     assert config.params["/coglab_sim/virtual_human/settings"].value == "usable"
 
 
-def test_a_way_without_a_recording_is_taken():
-    config = resolve("recorded_person:=leave")
-    assert config.params["/coglab_sim/virtual_human/settings"].value == "usable"
-
-
-def test_a_way_that_there_is_not_is_all_that_is_said(tmp_path, capfd):
-    with pytest.raises(RLException):
-        resolve(f"recording:={tmp_path}/nothing.csv", "recorded_person:=stay")
-    said = capfd.readouterr().err
-    assert "there is no 'stay'" in said and said.count("the virtual person cannot begin") == 1
-
-
 def test_plain_roslaunch_ends():
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))

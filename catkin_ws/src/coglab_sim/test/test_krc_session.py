@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from fri_client import COMMAND, JOINT_IMPEDANCE, JOINT_POSITION, MONITOR, parse, set_point
+from fri_client import CARTESIAN_IMPEDANCE, COMMAND, JOINT_IMPEDANCE, JOINT_POSITION, MONITOR, parse, set_point
+from test_object import EXACT
 
 
 def test_first_measurements_look_like_a_controllers(session):
@@ -22,26 +23,6 @@ def test_first_measurements_look_like_a_controllers(session):
     assert times == sorted(times) and len(set(times)) == 3
 
 
-def test_quality_is_earned_over_100_packets(session):
-    s = session()
-    seen = [s.tick()["quality"] for _ in range(101)]
-    changes = {level: seen.index(level) for level in (1, 2, 3)}
-    assert changes == {1: 80, 2: 95, 3: 99}
-    levels = []
-    for _ in range(25):  # without answers it falls again through all levels
-        levels.append(s.tick(answer=False)["quality"])
-    assert sorted(set(levels), reverse=True) == [3, 2, 1, 0]
-    fields = s.tick(answer=False)
-    assert fields["miss_counter"] >= 25
-    assert fields["miss_rate"] == pytest.approx(1.0 - fields["answer_rate"])
-
-
-def test_power_is_the_true_pattern(session):
-    s = session()
-    patterns = {s.tick()["power"] for _ in range(600)}
-    assert patterns == {0, 0x7F}
-
-
 def test_command_mode_follows_and_keeps_the_controllers_own_command(session):
     s = session()
     own = s.command()["commanded"]
@@ -54,19 +35,6 @@ def test_command_mode_follows_and_keeps_the_controllers_own_command(session):
     assert fields["commanded"] == own
     assert np.abs(np.array(set_point(fields)) - target).max() < 1e-6
     assert abs(fields["position"][0] - target[0]) < 2e-3
-
-
-@pytest.mark.parametrize("joint", range(7))
-def test_jump_on_entry_is_an_interpolation_error(session, joint):
-    s = session()
-    fields = s.monitor()
-    wrong = np.array(set_point(fields))
-    wrong[joint] += 2e-4
-    s.client.request(1, 10)
-    s.run(0.5, position=wrong)
-    assert parse(s.measurement)["state"] == MONITOR
-    assert any(text.startswith("FRI interpolation error") for text in s.texts())
-    assert parse(s.measurement)["power"] == 0  # brakes
 
 
 @pytest.mark.parametrize("share, ok", [(0.98, True), (1.20, False)])
@@ -82,42 +50,6 @@ def test_speed_limit_per_joint(session, share, ok):
         assert (fields["state"] == COMMAND) == ok
         if not ok:
             assert any(text.startswith(f"FRI speed limit J{joint + 1}") for text in s.texts())
-
-
-def test_t1_is_slower(session):
-    s = session(krc__mode="T1")
-    target = np.array(set_point(s.command()))
-    target[0] += 0.5 * s.cell.period
-    s.tick(position=target)
-    s.tick(position=target)
-    assert "FRI speed limit J1 (A1)" in s.texts()
-
-
-def test_axis_limits_are_kept(session):
-    home = [0.0, 2.09, 0.0, 0.3, 0.0, 0.3, 0.0]
-    s = session(home=home)
-    target = np.array(set_point(s.command()))
-    for _ in range(5):
-        target[1] += 0.002
-        fields = s.tick(position=target)
-    assert fields["state"] == MONITOR
-    assert "software limit switch A2" in s.texts()
-    assert s.cell.limit_switches == 1
-
-
-def test_an_axis_that_goes_on_by_itself_runs_into_its_limit_switch_too(session):
-    """The last step before answers are missing led to the switch: extrapolation is no way past it."""
-    s = session(home=[0.0, 2.09, 0.0, 0.3, 0.0, 0.3, 0.0])
-    target = np.array(set_point(s.command()))
-    for _ in range(2):
-        target[1] += 0.0018
-        s.tick(position=target)
-    assert s.cell.limit_switches == 0 and parse(s.measurement)["state"] == COMMAND
-    for _ in range(3):
-        s.tick(answer=False)
-    assert s.cell.limit_switches == 1
-    assert parse(s.measurement)["state"] == MONITOR
-    assert s.texts().count("software limit switch A2") == 1
 
 
 def test_a_standing_axis_at_its_end_meets_no_limit_switch(session):
@@ -139,55 +71,6 @@ def test_not_a_number_is_not_followed(session, bad):
     assert fields["state"] == MONITOR
     assert "cmd.jntPos not properly initialized" in s.texts()
     assert np.all(np.isfinite(s.cell.set_point)) and np.abs(s.cell.set_point - before).max() < 0.01
-
-
-def test_flags_may_not_change_in_command_mode(session):
-    s = session()
-    s.command()
-    s.tick(flags=JOINT_IMPEDANCE)
-    assert parse(s.measurement)["state"] == MONITOR
-    assert "cmdFlags changed during cmd mode" in s.texts()
-
-
-def test_flags_must_fit_the_strategy(session):
-    s = session()
-    s.monitor()
-    s.client.flags = JOINT_POSITION
-    s.client.request(1, 20)
-    s.run(0.5)
-    assert parse(s.measurement)["state"] == MONITOR
-    assert "cmdFlags do not fit the control strategy" in s.texts()
-
-
-def test_added_torque_has_to_be_ramped(session):
-    s = session()
-    s.monitor()
-    s.client.torque = [2.0] + [0.0] * 6
-    s.client.flags = JOINT_IMPEDANCE
-    s.client.request(1, 30)
-    s.run(0.5)
-    assert "cmd.addJntTrq not properly initialized" in s.texts()
-
-    s = session()
-    s.command(30)
-    for step in range(1, 11):
-        s.client.torque = [0.5 * step] + [0.0] * 6
-        fields = s.tick()
-    assert fields["state"] == COMMAND
-    s.client.torque = [8.0] + [0.0] * 6
-    assert s.tick()["state"] == MONITOR
-
-
-def test_cartesian_frame_has_to_be_mirrored(session):
-    s = session()
-    fields = s.monitor()
-    frame = list(fields["commanded_frame"])
-    frame[3] += 0.01
-    s.client.frame = frame
-    s.client.flags = 0x3500
-    s.client.request(1, 20)
-    s.run(0.5)
-    assert "cmd.cartPos not properly initialized" in s.texts()
 
 
 def test_strategies_move_the_arm(session):
@@ -223,28 +106,6 @@ def test_periods(session, period):
     assert s.cell.time - before == pytest.approx(period)
 
 
-@pytest.mark.parametrize(
-    "name, value",
-    [
-        ("krc/period", 0.0005),
-        ("krc/period", 0.2),
-        ("krc/quality_ok", 2.0),
-        ("krc/extrapolated_packets", -1),
-        ("krc/nonsense", 1.0),
-        ("krc/convention", "nobody"),
-        ("krc/mode", "T3"),
-        ("home", [0.0] * 6),
-        ("object/mass", -1.0),
-        ("object/shape", "pyramid"),
-        ("krc/krl_poll", float("nan")),
-    ],
-)
-def test_parameters_out_of_range_are_refused_by_name(session, name, value):
-    with pytest.raises(ValueError) as error:
-        session(**{name.replace("/", "__"): value})
-    assert name.split("/")[-1].split("_")[0] in str(error.value)
-
-
 def test_first_counter_of_the_peer_is_free_and_wraps(session):
     s = session()
     s.client.counter = 65500
@@ -270,3 +131,261 @@ def test_same_seed_same_bytes(session):
     first = record(9)
     assert first == record(9)
     assert first != record(10)
+
+
+@pytest.mark.parametrize("lost, ridden", [(1, True), (3, True), (5, True), (6, False), (20, False)])
+def test_losses_are_bridged_by_extrapolation(session, lost, ridden):
+    s = session()
+    target = np.array(set_point(s.command()))
+    step = np.zeros(7)
+    step[0] = 0.002
+    for _ in range(10):
+        target += step
+        s.tick(position=target)
+    for _ in range(lost):
+        fields = s.tick(position=None, answer=False)
+    if ridden:
+        assert fields["state"] == COMMAND
+        assert set_point(fields)[0] == pytest.approx(target[0] + lost * 0.002, abs=1e-5)
+        target[0] = set_point(fields)[0] + 0.002
+        assert s.tick(position=target)["state"] == COMMAND
+    else:
+        fields = s.tick()
+        assert fields["state"] == MONITOR and fields["power"] == 0
+        assert any("successive answers missing" in text for text in s.texts())
+
+
+def test_fall_back_brakes_and_the_program_comes_back(session):
+    s = session()
+    target = np.array(set_point(s.command()))
+    for _ in range(50):
+        target[0] += 0.005
+        s.tick(position=target)
+    assert abs(s.cell.velocity[0]) > 0.5
+    s.cell.leave_command_mode("fault injected")
+    s.run(0.3)
+    assert np.abs(s.cell.velocity).max() == 0.0
+    fields = parse(s.measurement)
+    assert np.abs(np.array(set_point(fields)) - fields["position"]).max() < 1e-6  # nothing to jump to
+    s.client.request(1, 10)
+    s.run(2.0)
+    assert parse(s.measurement)["state"] == COMMAND
+
+
+def test_errors_can_wait_for_an_operator(session):
+    s = session(krc__acknowledge_by_program=False)
+    s.command()
+    s.cell.leave_command_mode("fault injected")
+    s.client.request(1, 10)
+    s.run(4.0)
+    fields = parse(s.measurement)
+    assert fields["state"] == MONITOR and fields["power"] == 0
+    assert fields["ints"][1] == -4 and "acknowledgement required" in s.texts()
+    s.cell.acknowledge()
+    s.client.request(1, 10)
+    s.run(2.0)
+    assert parse(s.measurement)["state"] == COMMAND
+
+
+def test_enabling_switch_takes_power_and_asks_for_a_new_mirror(session):
+    s = session(krc__mode="T2")
+    s.command()
+    s.cell.enabling_switch(False)
+    fields = s.run(0.2)
+    assert fields["state"] == COMMAND and fields["power"] == 0
+    s.cell.enabling_switch(True)
+    assert s.run(0.2)["state"] == COMMAND
+    assert parse(s.measurement)["power"] == 0x7F
+
+    s.cell.enabling_switch(False)
+    s.run(0.2)
+    s.cell.enabling_switch(True)
+    wrong = np.array(set_point(parse(s.measurement))) + 0.003
+    s.run(0.1, position=wrong)
+    assert s.cell.fri_state == MONITOR
+    assert any("interpolation error" in text for text in s.texts())
+
+
+def test_drive_error_switches_everything_off(session):
+    s = session()
+    s.command()
+    s.cell.drive_error(4)
+    fields = s.run(0.05)
+    assert (fields["state"], fields["power"], fields["error"]) == (MONITOR, 0, 1 << 4)
+    s.client.request(1, 10)
+    assert s.run(5.0)["ints"][1] == -4  # no drives
+    s.cell.drive_error(4, False)
+    s.client.request(1, 10)
+    assert s.run(2.0)["state"] == COMMAND
+
+
+def test_silence_sends_nothing_and_does_not_count(session):
+    s = session()
+    fields = s.monitor()
+    s.cell.silence(0.5)
+    sent = s.sent
+    s.run(0.4)
+    assert s.sent == sent
+    later = s.run(1.0)
+    assert later["miss_counter"] <= fields["miss_counter"] + 1
+    assert later["quality"] == 3
+
+
+QUIET = {**EXACT, "arm__coulomb_friction": [0.0] * 7}
+"""no friction: an arm that is pushed goes to where its springs hold it"""
+
+
+def openkc(session, **parameters):
+    s = session(krc__convention="openkc", **QUIET, **parameters)
+    s.monitor()
+    return s
+
+
+def command(s, code):
+    """One command of OpenKC."""
+    s.client.ints[15], s.client.bools = code, 1
+    s.run(0.3)
+    s.client.ints[15], s.client.bools = 0, 0
+    s.run(0.15)
+
+
+def pushed(s, force, torque=(0.0, 0.0, 0.0), seconds=4.0):
+    """Position and frame of the arm before a push and after it."""
+    before = s.tick()
+    s.cell.set_push(list(force), list(torque))
+    return before, s.run(seconds)
+
+
+def yields(before, after):
+    """Joint torque of the push over the way that each joint gives, Nm/rad."""
+    jacobian = np.array(before["jacobian"]).reshape(6, 7)
+    return jacobian, np.array(after["position"]) - np.array(before["position"])
+
+
+def test_joint_stiffness_of_the_controller_counts_where_the_pc_gives_none(session):
+    s = openkc(session)
+    stiffness = [700, 800, 900, 1000, 1100, 1200, 1300]
+    s.client.ints[8:15], s.client.reals[9:16] = stiffness, [1.0] * 7
+    command(s, 5)
+    command(s, 7)
+    s.client.flags = JOINT_POSITION
+    command(s, 1)
+    assert s.cell.fri_state == COMMAND and parse(s.measurement)["control"] == 3
+    force = np.array([6.0, 8.0, -5.0])
+    before, after = pushed(s, force, [1.0, 0.5, -0.8])
+    jacobian, way = yields(before, after)
+    torque = jacobian.T @ [*force, -0.8, 0.5, 1.0]  # the wire's rotation rows are z y x
+    assert way * stiffness == pytest.approx(torque, abs=0.06)
+    assert np.abs(torque).min() > 0.2, "every joint was asked"
+
+
+def test_cartesian_stiffness_of_the_controller_in_the_order_of_krl(session):
+    """INT[10..15]: x y z, then A B C, which turn about z y x."""
+    s = openkc(session)
+    s.client.ints[9:15], s.client.reals[10:16] = [900, 1200, 1500, 90, 120, 150], [1.0] * 6
+    command(s, 4)
+    assert parse(s.measurement)["ints"][15] == 102
+    command(s, 6)
+    s.client.flags = 0x0100
+    command(s, 1)
+    assert s.cell.fri_state == COMMAND and parse(s.measurement)["control"] == 2
+    before, after = pushed(s, [6.0, 8.0, -5.0], [1.0, 0.8, -0.9], 6.0)
+    rotation, moved = (np.array(f["frame"]).reshape(3, 4) for f in (before, after))
+    way = moved[:, 3] - rotation[:, 3]
+    turned = moved[:, :3] @ rotation[:, :3].T
+    turn = np.array([turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]]) / 2
+    assert way * [900, 1200, 1500] == pytest.approx([6.0, 8.0, -5.0], abs=0.1)
+    assert turn * [150, 120, 90] == pytest.approx([1.0, 0.8, -0.9], abs=0.02)
+
+
+def test_values_of_the_pc_count_while_it_gives_them(session):
+    s = session(**QUIET)
+    s.monitor()
+    s.client.flags, s.client.stiffness = JOINT_IMPEDANCE, [500.0] * 7
+    s.client.request(1, 30)
+    assert s.run(0.5)["state"] == COMMAND
+    before, after = pushed(s, [0.0, 8.0, 0.0])
+    jacobian, way = yields(before, after)
+    assert way * 500.0 == pytest.approx(jacobian[1] * 8.0, abs=0.06)
+    s.cell.set_push([0.0, 0.0, 0.0])
+    s.run(2.0)
+    before = s.tick()
+    for step in range(1, 9):
+        s.client.torque = [0.0, 0.5 * step] + [0.0] * 5
+        s.tick()
+    way = np.array(s.run(3.0)["position"]) - before["position"]
+    assert way * 500.0 == pytest.approx([0.0, 4.0, 0.0, 0.0, 0.0, 0.0, 0.0], abs=0.06), "an added torque"
+
+
+def test_a_moving_frame_is_followed_without_lag(session):
+    """The damper is told how fast the frame goes: 50 mm/s at 2000 N/m lag less than a millimetre."""
+    s = session(**QUIET)
+    frame = list(s.command(20)["commanded_frame"])
+    begin = list(frame)
+    for _ in range(200):
+        frame[7] += 0.05 * s.cell.period
+        s.client.frame = list(frame)
+        fields = s.tick()
+    assert fields["state"] == COMMAND
+    assert fields["frame"][7] == pytest.approx(frame[7], abs=0.001)
+    assert fields["commanded_frame"] == pytest.approx(begin), "the controller's own command stays"
+    own = np.array(begin).reshape(3, 4)
+    offset = np.array(fields["frame_offset"]).reshape(3, 4)
+    moved = np.array(frame).reshape(3, 4)
+    assert own[:, :3] @ offset[:, 3] == pytest.approx((moved - own)[:, 3], abs=1e-5)
+    assert offset[:, :3] == pytest.approx(np.eye(3), abs=1e-5)
+
+
+# -- messages, faults, restarts -----------------------------------------------------------------------------------
+
+
+def test_a_program_that_is_started_anew_pauses_and_opens_with_its_period(session):
+    s = session()
+    s.command()
+    for period, pause, words in (
+        (0.0009, 0.5, "krc/period = 0.0009"),
+        (0.11, 0.5, "krc/period"),
+        (0.01, -0.1, "pause"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            s.cell.restart_program(period, pause)
+    assert s.tick()["state"] == COMMAND, "nothing was changed"
+    s.cell.restart_program(0.01)
+    begin = s.cell.time
+    assert s.cell.fri_state == 0 and s.cell.period == 0.01
+    while s.tick() is None:
+        assert s.cell.time < begin + 2.0
+    assert s.cell.time - begin == pytest.approx(0.5, abs=0.021)
+    fields = parse(s.measurement)
+    assert fields["quality"] == 0 and fields["state"] == MONITOR and fields["ints"][15] == 4010
+
+
+@pytest.mark.parametrize("joint", [0, 5])
+def test_full_torque_for_a_while_switches_off_and_names_the_joint(session, joint):
+    ended = []
+    for while_s in (0.05, 0.25):
+        s = session(**EXACT, krc__torque_limit_time=while_s)
+        target = np.array(set_point(s.command()))
+        s.cell.block(True)
+        begin = s.cell.time
+        for _ in range(400):
+            target[joint] += 0.002
+            s.tick(position=target)
+            if s.cell.fri_state == MONITOR:
+                break
+        assert s.texts() == [f"maximum torque exceeded J{joint + 1}"]
+        assert s.cell.set_point == pytest.approx(s.cell.position, abs=1e-4), "nothing to jump to"
+        ended.append(s.cell.time - begin)
+    assert ended[1] - ended[0] == pytest.approx(0.2, abs=0.011)
+
+
+def test_without_a_joint_command_the_joint_set_point_goes_where_the_arm_goes(session):
+    s = session(**QUIET)
+    frame = list(s.command(20)["commanded_frame"])
+    for _ in range(150):
+        frame[3] += 0.0004
+        s.client.frame = list(frame)
+        s.tick(flags=CARTESIAN_IMPEDANCE)
+    # The answer is judged at the beginning of a period, in which the arm moves on a little.
+    assert s.cell.set_point == pytest.approx(s.cell.position, abs=0.003)
+    assert np.abs(np.array(parse(s.measurement)["offset"])).max() > 0.01

@@ -1,7 +1,8 @@
 """The KRL programs: each convention asked exactly as its own PC stack asks (table of exchange arrays)."""
 
+import numpy as np
 import pytest
-from fri_client import COMMAND, JOINT_IMPEDANCE, JOINT_POSITION, MONITOR, parse
+from fri_client import COMMAND, JOINT_IMPEDANCE, JOINT_POSITION, MONITOR, parse, set_point
 
 
 def ints(s):
@@ -28,18 +29,6 @@ def test_coglab_numbers_requests_and_results(session):
     s.client.ints[0:3] = [1, 25, 44]
     s.run(0.2)
     assert ints(s)[0:2] == (44, -1)
-
-
-def test_coglab_says_poor_quality(session):
-    s = session()
-    s.monitor()
-    for packet in range(30000):  # every tenth answer is missing: never PERFECT
-        if packet == 100:
-            s.client.ints[0:3] = [1, 10, 5]
-        s.tick(answer=packet % 10 != 4)
-        if ints(s)[0] == 5:
-            break
-    assert ints(s)[0:2] == (5, -2) and s.cell.fri_state == MONITOR
 
 
 def test_coglab_changes_strategy_by_leaving_command_mode(session):
@@ -105,19 +94,6 @@ def test_a_client_that_waits_for_each_datagram_hears_the_end(session):
             s.client.ints[15], asked = fields["ints"][14], True
         measurement = s.cell.step(s.client.answer(measurement))
     assert fields["ints"][15] == 30
-
-
-def test_how_long_it_sends_after_the_close_is_a_parameter(session):
-    for linger in (0.0, 0.3):
-        s = session(krc__convention="rtt_lwr", krc__close_linger=linger)
-        s.monitor()
-        s.client.ints[0] = 3
-        while s.cell.fri_state != 0:
-            s.tick()
-        sent = 0
-        while s.tick() is not None:
-            sent += 1
-        assert sent * s.cell.period == pytest.approx(linger, abs=2 * s.cell.period)
 
 
 def openkc(s, command):
@@ -219,3 +195,160 @@ def test_nothing_starts_unasked(session, convention):
     s = session(krc__convention=convention)
     s.run(5.0)
     assert s.cell.fri_state == MONITOR
+
+
+def until(s, condition, limit=20.0, **answers):
+    """s until the condition holds of the newest measurement; fails after the limit."""
+    begin = s.cell.time
+    while s.cell.time - begin < limit:
+        s.tick(**answers)
+        if s.measurement is not None and condition():
+            return s.cell.time - begin
+    raise AssertionError(f"not within {limit} s; {ints(s)}, {s.texts()[-3:]}")
+
+
+def test_coglab_a_request_that_was_left_over_is_none(session):
+    """By the run of the program before, which the operator has started anew."""
+    s = session()
+    s.monitor()
+    s.client.ints[0:3] = [1, 10, 9]
+    until(s, lambda: ints(s)[0] == 9, 1.0)
+    assert s.cell.fri_state == COMMAND
+    s.cell.restart_program(0.005, 0.0)
+    s.run(2.0)
+    assert ints(s)[0:3] == (9, 0, 0) and ints(s)[15] == 4010 and s.cell.fri_state == MONITOR
+    s.client.ints[2] = -3
+    s.run(0.3)
+    assert ints(s)[0:3] == (9, 0, 0), "a number is above 0"
+    s.client.ints[2] = 10
+    until(s, lambda: ints(s)[2] == 10, 0.2)  # it works on this one
+    until(s, lambda: ints(s)[0] == 10, 1.0)
+    assert ints(s)[1:3] == (1, 0) and s.cell.fri_state == COMMAND
+
+
+def test_coglab_says_how_a_start_failed_and_waits_no_longer_than_it_says(session):
+    s = session(krc__krl_drive_wait=1.0, krc__krl_quality_wait=2.0)
+    s.monitor()
+    s.cell.drive_error(2)
+    s.client.ints[0:3] = [1, 10, 5]
+    assert until(s, lambda: ints(s)[0] == 5) == pytest.approx(1.1, abs=0.12) and ints(s)[1] == -4
+    s.cell.drive_error(2, False)
+    s.client.ints[2] = 6
+    until(s, lambda: ints(s)[0] == 6)
+    assert ints(s)[1] == 1, "acknowledged by the program, and started"
+    s.client.ints[0:3] = [2, 0, 7]
+    until(s, lambda: ints(s)[0] == 7)
+    for packet in range(120):
+        s.tick(answer=packet % 20 != 0)
+    s.client.ints[0:3] = [1, 10, 8]
+    begin, packet = s.cell.time, 0
+    while ints(s)[0] != 8:
+        s.tick(answer=packet % 20 != 7)
+        packet += 1
+    assert ints(s)[1] == -2 and s.cell.time - begin == pytest.approx(2.1, abs=0.12)
+    s.run(1.0)
+    wrong = np.array(set_point(parse(s.measurement))) + 0.01
+    s.client.ints[2] = 9
+    until(s, lambda: ints(s)[0] == 9, position=wrong)
+    assert ints(s)[1] == -3
+
+
+def test_centro_epiaggio_a_level_has_to_rise(session):
+    s = session(krc__convention="centro_epiaggio")
+    s.client.ints[0:2] = [10, 1]
+    s.monitor()
+    s.run(1.0)
+    assert ints(s)[1] == 10 and s.cell.fri_state == MONITOR, "it was up from the beginning"
+    s.client.ints[1] = 0
+    s.run(0.1)
+    s.client.ints[0:2] = [25, 1]
+    until(s, lambda: ints(s)[1] == 1, 2.0)
+    assert s.cell.fri_state == COMMAND and parse(s.measurement)["control"] == 1, "25 is no strategy: it stays"
+    s.cell.leave_command_mode("fault injected")
+    until(s, lambda: ints(s)[1] == 0, 0.2)
+    s.client.ints[1] = 0
+    s.run(0.1)
+    s.client.ints[0:2] = [10, 1]
+    until(s, lambda: ints(s)[1] == 1, 3.0)
+    assert s.cell.fri_state == COMMAND
+
+
+def rcprg(session):
+    s = session(krc__convention="rcprg_tum")
+    s.client.flags = JOINT_IMPEDANCE
+    s.monitor()
+    return s
+
+
+def test_rcprg_tum_a_request_is_served_once_until_its_flag_is_down(session):
+    s = rcprg(session)
+    s.client.ints[0], s.client.bools = 7, 1
+    s.run(0.5)
+    assert s.texts() == ["fri_start: unknown request 7"] and not to_bool(s, 1)
+    s.client.ints[0] = 1
+    s.run(0.5)
+    assert s.cell.fri_state == MONITOR, "the flag is still up"
+    s.client.bools = 0
+    s.run(0.1)
+    s.client.ints[0], s.client.bools = 1, 1
+    until(s, lambda: s.cell.fri_state == COMMAND, 1.0)
+
+
+def started_openkc(session, **parameters):
+    s = session(krc__convention="openkc", **parameters)
+    s.monitor()
+    return s
+
+
+def command(s, code, acknowledged=True):
+    """One command of OpenKC; the count, its echo and its result."""
+    s.client.ints[15], s.client.bools = code, 1
+    if acknowledged:
+        until(s, lambda: to_bool(s, 1), 2.0)
+    else:
+        s.run(0.3)
+    told = ints(s)[13:16]
+    s.client.ints[15], s.client.bools = 0, 0
+    until(s, lambda: not to_bool(s, 1), 0.3)
+    return told
+
+
+def test_openkc_a_command_is_served_once_until_its_flag_is_down(session):
+    s = started_openkc(session)
+    assert command(s, 1) == (1, 1, 100) and s.cell.fri_state == COMMAND
+    assert command(s, 1) == (2, 1, 100), "in command mode already"
+    s.client.ints[15], s.client.bools = 9, 1
+    s.run(0.3)
+    assert ints(s)[13] == 2 and s.texts() == ["$STIFFNESS.STRATEGY cannot change in command mode"]
+    s.client.bools = 0
+    s.run(0.1)
+    s.client.ints[15], s.client.bools = 2, 1
+    s.run(0.2)
+    assert ints(s)[13:16] == (3, 2, 101) and s.cell.fri_state == MONITOR
+    s.client.ints[15] = 9
+    s.run(0.2)
+    assert ints(s)[13:16] == (3, 2, 101), "the flag is still up"
+    s.client.ints[15], s.client.bools = 0, 0
+    s.run(0.1)
+    assert command(s, 6)[2] == 104 and command(s, 7)[2] == 105 and command(s, 9)[2] == 107
+
+
+# -- KUKA's sample ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "convention, start, taken_back",
+    [
+        ("centro_epiaggio", {0: 10, 1: 1}, {1: 0}),
+        ("stanford", {14: 10, 15: 10}, {15: 0}),
+        ("rtt_lwr", {0: 1, 1: 10}, {0: 0}),
+    ],
+)
+def test_a_start_can_be_given_up(session, convention, start, taken_back):
+    s = session(krc__convention=convention, krc__power_up=2.0)
+    s.run(0.5)
+    for values, seconds in ((start, 1.0), (taken_back, 3.0)):
+        for index, value in values.items():
+            s.client.ints[index] = value
+        s.run(seconds)
+    assert s.cell.fri_state == MONITOR and parse(s.measurement)["power"] == 0x7F

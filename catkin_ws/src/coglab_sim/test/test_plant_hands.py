@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from coglab_sim import _plant
+from coglab_sim import _cell
 from grasp_trial import BOARD_TOP, BOX, DIRECTIONS, HOME, STEP, URDF, G, GraspTrial, objects, product, rotated, run
 from ih2_hand.clock import SteppedClock
 from ih2_hand.emulator.hand import EmulatedHand
@@ -42,7 +42,7 @@ def bent(plant, phalanges):
 def test_relaxed_fingers_give_way():
     """A finger that no tendon pulls is moved by a touch and comes back by its spring: the end of a person's forearm
     comes to the back of the index, presses it 35 mm toward the palm's side, and leaves."""
-    plant = _plant.Plant(URDF, HOME, BOX)
+    plant = _cell.Plant(URDF, HOME, BOX)
     plant.place("world", BOARD_TOP)
     palm, turn = plant.state()["palm"]
     towards = product(turn, [0.0, 0.0, 1.0, 0.0])  # the forearm lies behind its hand, here behind the fingers
@@ -116,7 +116,7 @@ def test_in_the_robots_hand_nothing_but_contact_holds():
 @pytest.mark.parametrize("place", [[0.04, 0.30, 0.0], [0.25, 0.0, 0.05], [-0.12, 0.0, 0.05]])
 def test_out_of_the_fingers_reach_nothing_is_placed_in_the_robots_hand(place):
     """Beside the hand, before it, behind it."""
-    plant = _plant.Plant(URDF, HOME, objects()["mug"], board=False)
+    plant = _cell.Plant(URDF, HOME, objects()["mug"], board=False)
     before = plant.bytes()
     with pytest.raises(ValueError, match="object 'mug' cannot be placed in the robot's hand there: closed around it,"):
         plant.place("robot_hand", place, [-0.5, -0.5, -0.5, 0.5])
@@ -139,7 +139,7 @@ def test_motors_stop_at_contact_and_lock():
     alone.plant.hold(HOME, steps=1600)
     index = alone.plant.motors()[2]
     assert index["locked"] and 0.9 * 0.5 * 90.0 < index["tension"] <= 0.5 * 90.0  # the object gives way a little
-    empty = _plant.Plant(URDF, HOME, BOX)
+    empty = _cell.Plant(URDF, HOME, BOX)
     for motor in range(1, 5):
         empty.command_motor(motor, 1.0)
     empty.hold(HOME, steps=1600)
@@ -159,28 +159,12 @@ def test_touch_is_where_the_object_is():
     assert np.linalg.norm(total) == pytest.approx(objects()["mug"]["mass"] * G, rel=0.05)
 
 
-def test_a_person_carries_and_gives_way_beyond_their_grip():
-    plant = _plant.Plant(URDF, HOME, objects()["mug"])
-    plant.place("human_hand", [-0.08, 0.0, -0.05])
-    hand = np.array([0.9, 0.3, 0.5])
-    for _ in range(600):
-        plant.set_person(hand, grip=1.0)
-        plant.hold(HOME)
-    state = plant.state()
-    assert state["held_by"] == "human" and state["person_share"] == pytest.approx(1.0, abs=0.02)
-    assert np.linalg.norm(state["object"][0] - hand - [-0.08, 0.0, -0.05]) < 0.01
-    for _ in range(600):
-        plant.set_person(hand, grip=0.0)
-        plant.hold(HOME)
-    assert plant.state()["held_by"] in ("none", "floor") and plant.state()["object"][0][2] < 0.0
-
-
 WEIGHT = 0.31 * G
 
 
 def carried(grip_force, weight, seconds=1.5):
     """A mug of ``weight`` N in a person's hand: the state after so long, or when it has fallen."""
-    plant = _plant.Plant(URDF, HOME, {**objects()["mug"], "mass": weight / G}, board=False)
+    plant = _cell.Plant(URDF, HOME, {**objects()["mug"], "mass": weight / G}, board=False)
     plant.set_brakes(True)
     plant.place("human_hand", [-0.08, 0.0, -0.05])
     for _ in range(int(seconds / STEP / 10)):
@@ -219,7 +203,7 @@ def test_the_hand_feels_what_its_own_grip_carries():
 
 def test_a_hand_does_not_feel_its_own_motion_as_a_load():
     """Swung by 2 m/s^2 at 0.5 Hz; what the acceleration alone asks of the grip would be 0.6 N."""
-    plant = _plant.Plant(URDF, HOME, objects()["mug"], board=False)
+    plant = _cell.Plant(URDF, HOME, objects()["mug"], board=False)
     plant.set_brakes(True)
     plant.place("human_hand", [-0.08, 0.0, -0.05])
     rate, felt = np.pi, []
@@ -253,7 +237,7 @@ def test_a_person_who_takes_carries_what_they_lift():
 
 def test_what_a_person_holds_turns_with_the_hand():
     """The grip acts at the object's center of mass, here 10 cm from its own origin, and knows how fast that moves."""
-    plant, here, center = _plant.Plant(URDF, HOME, {**BOX, "center": [0, 0, 0.1]}), np.array([1.0, 0.3, 0.9]), 0.1
+    plant, here, center = _cell.Plant(URDF, HOME, {**BOX, "center": [0, 0, 0.1]}), np.array([1.0, 0.3, 0.9]), 0.1
 
     def in_hand():
         state = plant.state()

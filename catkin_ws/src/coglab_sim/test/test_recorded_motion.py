@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import groupby
+
 import numpy as np
 import pytest
 from coglab_perception.frames import FrameNames
@@ -9,7 +11,9 @@ from coglab_py.pose import Pose, about_z
 from coglab_sim.person.recorded_motion import (
     Playback,
     PlaybackSettings,
+    Recording,
     RecordingError,
+    Track,
     load_recording,
 )
 
@@ -161,15 +165,6 @@ CSV_FAULTS = {
 }
 
 
-@pytest.mark.parametrize("text", CSV_FAULTS)
-def test_bad_csv_files_are_named(tmp_path, text):
-    path = tmp_path / "bad.csv"
-    path.write_text(text)
-    with pytest.raises(RecordingError, match=CSV_FAULTS[text]) as caught:
-        load_recording(str(path))
-    assert str(path) in str(caught.value)
-
-
 class Bomb:
     """Unpickling it would raise."""
 
@@ -224,3 +219,97 @@ def test_a_track_that_jumps_is_refused_unless_allowed(tmp_path) -> None:
     with pytest.raises(RecordingError, match="human_hand.*jumps"):
         Playback.open(PlaybackSettings(file=str(file)))
     assert list(Playback.open(PlaybackSettings(file=str(file), allow_jumps=True)).names) == ["human_hand"]
+
+
+ROWS = "".join(f"{0.5 * i},{i},0,0\n" for i in range(5))
+
+
+@pytest.mark.parametrize(
+    "settings, words",
+    [
+        ({"time_scale": 0.0}, "time_scale must be above 0, got 0.0"),
+        ({"time_scale": -1.0}, "time_scale must be above 0"),
+        ({"time_scale": float("inf")}, "time_scale must be above 0"),
+        ({"end_at": (1.0, 2.0)}, "end_at needs three finite numbers"),
+        ({"end_at": (1.0, 2.0, float("nan"))}, "end_at needs three finite numbers"),
+        ({"wait_distance": 0.0}, "wait_distance must be above 0 m and wait_limit not negative"),
+        ({"wait_limit": -0.1}, "wait_distance must be above 0 m and wait_limit not negative"),
+    ],
+)
+def test_settings_that_cannot_be_used_are_refused(settings, words):
+    with pytest.raises(RecordingError, match=words):
+        PlaybackSettings(**settings)
+    PlaybackSettings(time_scale=0.01, wait_distance=0.01, wait_limit=0.0, end_at=(0.0, 0.0, 0.0))
+    assert PlaybackSettings.from_mapping({"end_at": [1, 2, 3], "at_end": "loop"}).end_at == (1, 2, 3)
+
+
+def in_csv(tmp_path, text):
+    path = tmp_path / "r.csv"
+    path.write_text(text)
+    return str(path)
+
+
+def test_arrays_that_do_not_belong_together_are_refused(tmp_path):
+    path = str(tmp_path / "r.npz")
+    for arrays in (
+        {"t": np.arange(3.0)},
+        {"t": np.zeros((3, 1)), "position": np.zeros((3, 3))},
+        {"t": np.arange(3.0), "position": np.zeros((3, 3)), "orientation": np.zeros((2, 4))},
+        {"t": np.arange(3.0), "position": np.zeros((3, 4))},
+    ):
+        np.savez(path, **arrays)
+        with pytest.raises(RecordingError, match="'t' needs 'position' of shape"):
+            load_recording(path)
+    np.savez(path, **{"a.t": np.arange(2.0), "a.position": np.ones((2, 3)), "other": np.zeros(9)})
+    recording = load_recording(path)
+    assert list(recording.tracks) == ["a"] and recording.tracks["a"].at(0.5).position == pytest.approx(np.ones(3))
+
+
+def test_faults_name_the_sample(tmp_path):
+    quaternion = "t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1,0,0,0,0,0,0,{}\n"
+    for text, words in (
+        ("t,x,y,z\n" + ROWS.replace("1.0,2,0,0", "1.0,2,inf,0"), "sample 3 is not finite"),
+        ("t,x,y,z\n0,0,0,0\n2,0,0,0\n1,0,0,0\n3,0,0,0\n", "time must increase, sample 3 does not"),
+        (quaternion.format(1.06), "sample 2 has a quaternion of length 1.06, expected 1"),
+        (quaternion.format(0.94), "sample 2 has a quaternion of length 0.94"),
+        ("t,x,y,z\n0,1,2,3\n0.5,1,,3\n", r":3: expected numbers for t,x,y,z, got \['0.5', '1', '', '3'\]"),
+        ("t,x,z\n", "missing: y"),
+    ):
+        with pytest.raises(RecordingError, match=words):
+            load_recording(in_csv(tmp_path, text))
+    track = load_recording(in_csv(tmp_path, quaternion.format(1.04))).tracks["human_hand"]
+    assert track.orientations[1] == pytest.approx([0, 0, 0, 1]), "what is nearly one is made one"
+
+
+def line(seconds=4.0, step=0.5):
+    """x is the time."""
+    stamps = np.arange(0.0, seconds + step / 2, step)
+    places = np.column_stack([stamps, 0.1 * stamps, np.zeros(len(stamps))])
+    return Track(stamps, places, np.tile([0.0, 0.0, 0.0, 1.0], (len(stamps), 1)))
+
+
+def playing(**settings):
+    return Playback(Recording({"human_hand": line()}), PlaybackSettings(**settings))
+
+
+def x_at(play, now, robot=None):
+    return play.frames(now, robot)["human_hand"].position[0]
+
+
+def test_time_runs_from_the_first_look_on_and_never_back():
+    play = playing()
+    assert x_at(play, 100.0) == 0.0 and x_at(play, 101.0) == pytest.approx(1.0)
+    assert x_at(play, 100.5) == pytest.approx(1.0) and x_at(play, 101.5) == pytest.approx(2.0)
+    slow = playing(time_scale=4.0)
+    x_at(slow, 0.0)
+    assert x_at(slow, 4.0) == pytest.approx(1.0)
+
+
+def test_without_a_robot_it_waits_and_every_loop_waits_anew():
+    play = playing(wait_at=1.0, wait_limit=2.0, at_end="loop")
+    seen = [x_at(play, 0.25 * i) for i in range(60)]
+    waits = [len(list(same)) for x, same in groupby(seen) if x == 1.0]
+    assert len(waits) >= 2 and waits[0] == waits[1] == 8, "2 s each time"
+    assert playing(wait_at=None).settings.wait_at is None
+    begin = playing(wait_at=0.0, wait_limit=1.0)
+    assert [x_at(begin, t) for t in (0.0, 0.5, 0.9, 1.5)] == pytest.approx([0.0, 0.0, 0.0, 0.6])

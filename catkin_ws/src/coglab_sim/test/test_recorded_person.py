@@ -5,8 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from coglab_msgs.msg import Say
-from coglab_py.pose import Pose, about_z
 from coglab_sim.person.participant import Participant
 from coglab_sim.person.recorded_motion import Playback, PlaybackSettings, Recording, RecordingError, Track
 from coglab_sim.person.recorded_person import RecordedHand, RecordedPerson, open_recorded_hand, scene_of
@@ -52,14 +50,6 @@ def test_a_hand_has_arrived_when_it_is_far_out_and_slow():
     assert slow.arrived == pytest.approx(1.0, abs=0.03), "slower than 5 cm/s"
     never = recorded(np.concatenate([reach(0.0, leaves=False), 0.4 - 0.06 * RATE * np.arange(1, 50)]))
     assert never.arrived == pytest.approx(1.0, abs=0.03), "else where it is farthest out"
-
-
-@pytest.mark.parametrize("share, stops", [(0.55, False), (0.65, True)])
-def test_a_stop_counts_from_60_percent_of_the_way_on(share, stops):
-    x = reach(0.0, leaves=False)
-    at = int(share * len(x))
-    x = np.concatenate([x[:at], np.full(50, x[at]), x[at:], np.full(50, 0.4)])
-    assert recorded(x).arrived == pytest.approx(share if stops else 2.0, abs=0.05)
 
 
 def test_an_object_is_let_go_when_it_leaves_the_hand_or_at_the_end_of_the_rest():
@@ -145,23 +135,6 @@ class Shown:
         return self.t
 
 
-def test_a_recorded_person_gives_and_does_not_take():
-    shown = Shown()
-    assert shown.human.phase == "reacting" and shown.human.participant.behaviour == "normal"
-    assert shown.human.participant.sway == shown.human.participant.tremor == 0.0
-    idle = RecordedPerson(Participant(behaviour="tug"), Scene(), recorded(), "wait")
-    assert idle.participant.behaviour == "normal" and idle.way == "wait" and idle.holds()
-    idle.command("receive mug")
-    assert idle._pending is None
-    idle.hear(0.0, Say.READY_TO_GIVE)
-    idle._understand(5.0)
-    assert idle._pending is None
-    idle.hear(5.0, Say.READY_TO_RECEIVE)
-    idle._understand(9.0)
-    assert idle._pending == "give"
-    assert RecordedPerson(Participant(), Scene(), recorded()).way == "wait"
-
-
 def test_it_begins_at_once_where_the_recording_begins():
     shown = Shown()
     assert shown.human._hand == pytest.approx([0.0, 0.0, 0.4]) and shown.human.rest == pytest.approx([0.0, 0.0, 0.4])
@@ -173,45 +146,9 @@ def test_it_begins_at_once_where_the_recording_begins():
     assert shown.human._velocity == pytest.approx([0.4, 0.0, 0.0]) and not shown.human._spin.any()
 
 
-def test_a_slower_playback_goes_slower():
-    shown = Shown(hand=recorded(time_scale=2.0))
-    shown.step()
-    begin = shown.t
-    for _ in range(50):
-        shown.step()
-    assert shown.human._hand[0] == pytest.approx(0.4 * (shown.t - begin) / 2)
-    assert shown.human._velocity == pytest.approx([0.2, 0.0, 0.0])
-    assert shown.until("waiting") == pytest.approx(2 * shown.hand.arrived, abs=0.05)
-
-
-def test_turns_are_shown_with_their_spin():
-    stamps = RATE * np.arange(100)
-    turns = np.array([about_z(0.5 * t) for t in stamps])
-    hand = Track(stamps, np.column_stack([0.4 * stamps, 0 * stamps, 0 * stamps]), turns)
-    playback = Playback(Recording({"human_hand": hand}), PlaybackSettings(time_scale=2.0))
-    shown = Shown(hand=RecordedHand(playback, None))
-    for _ in range(40):
-        shown.step()
-    assert shown.human._spin == pytest.approx([0.0, 0.0, 0.25], abs=1e-6)
-    seconds = (shown.t - 0.01) / 2
-    assert shown.human._turn.as_rotvec() == pytest.approx([0.0, 0.0, 0.5 * seconds], abs=1e-6)
-
-
-def test_who_waits_does_so_where_the_reach_ends():
-    shown = Shown("wait")
-    assert shown.until("waiting") == pytest.approx(shown.hand.arrived, abs=0.03)
-    assert shown.human._hand[0] == pytest.approx(0.4, abs=0.01)
-
-
 def test_who_does_not_wait_holds_where_it_was_let_go():
     shown = Shown("no_wait", hand=recorded(lets_go=1.5))
     assert shown.until("holding") == pytest.approx(shown.hand.released, abs=0.03) and shown.hand.released > 1.9
-
-
-def test_what_was_felt_during_the_reach_is_what_is_held():
-    shown = Shown("no_wait")
-    shown.until("holding", percept(load=carried(1.0, 0.3), closure=0.2))
-    assert shown.human._held_load == pytest.approx(carried(1.0, 0.3)) and shown.human._closure == 0.2
 
 
 @pytest.mark.parametrize(
@@ -229,26 +166,3 @@ def test_who_leaves_lets_go_of_what_the_robot_has_and_takes_the_rest_away(load, 
     assert ended == pytest.approx(shown.hand.end, abs=0.04) and shown.human._task == "rest"
     assert shown.human._grip == (0.0 if lets_go else 1.0)
     assert shown.human._hand[0] == pytest.approx(0.0, abs=0.02), "it has gone all the same"
-
-
-@pytest.mark.parametrize("closure, closing, closed", [(0.051, 0.09, True), (0.049, 0.09, False), (0.2, 0.11, False)])
-def test_a_hand_counts_as_closed_from_5_percent_on(closure, closing, closed):
-    """With a word and a grip that is felt it is enough for who leaves."""
-    shown = Shown("leave", release_time=0.2)
-    while shown.t < shown.hand.released:
-        shown.step()
-    shown.human._told = Say.I_HAVE_IT
-    for step in range(30):
-        shown.step(percept(load=carried(1.0, 0.0 if step < 2 else 0.5), closure=closure, closing=closing))
-    assert (shown.human._grip < 1.0) is closed
-
-
-def test_fingers_that_have_begun_to_open_go_on():
-    shown = Shown("leave", release_time=0.2)
-    while shown.t < shown.hand.released + 0.02:
-        shown.step()
-    shown.step(percept(load=carried(0.5)))
-    assert shown.human._grip == pytest.approx(0.95)
-    shown.step(percept(load=carried(1.0)))
-    assert shown.human._grip == pytest.approx(0.90)
-    assert isinstance(shown.hand.at(0.0), Pose)

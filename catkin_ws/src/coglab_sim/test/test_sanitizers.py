@@ -23,7 +23,7 @@ def test_requests_against_the_cells_thread(tmp_path):
         *own,
         hand,
         *(SOURCES / "lwr_fri_bridge" / "src" / name for name in BRIDGE),
-        PACKAGE / "test" / "test_cell_core.cpp",
+        PACKAGE / "test" / "cell" / "test_real_time_cell.cpp",
     ]
     flags = [
         "-std=c++17",

@@ -20,21 +20,6 @@ def perceive(person, view, seconds, seed=1):
 QUIET = {"seen_noise": 0.0, "seen_turn": 0.0, "seen_speed": 0.0}
 
 
-def test_everything_seen_comes_late():
-    for seed in range(5):
-        person = Participant.from_mapping({"seed": seed, **QUIET})
-
-        def view(t):
-            moved = Pose(np.array([t, 0.0, 0.0]))
-            return WorldView(moved, t, moved)
-
-        for t, seen in perceive(person, view, 2.0)[40:]:
-            for value in (seen.robot_hand.position[0], seen.hand_closure, seen.object.position[0]):
-                assert person.seeing_delay - 1e-9 <= t - value <= person.seeing_delay + DT + 1e-9
-            assert seen.robot_speed == pytest.approx(1.0, abs=0.03)
-            assert seen.closing_speed == pytest.approx(1.0, abs=0.07)
-
-
 def test_what_is_seen_is_noisy_and_the_noise_is_slow():
     person = Participant.from_mapping({"seed": 2, "seen_noise": 0.004, "seen_turn": 2.0})
     seen = [p for _, p in perceive(person, lambda t: WorldView(), 300.0)]
@@ -44,28 +29,6 @@ def test_what_is_seen_is_noisy_and_the_noise_is_slow():
     assert float(x[30:] @ x[:-30] / (x @ x)) == pytest.approx(np.exp(-1.0), abs=0.12)
     turns = np.degrees([p.robot_hand.rotation.as_rotvec() for p in seen])
     assert turns.std(axis=0) == pytest.approx([2.0] * 3, rel=0.2)
-
-
-def test_a_force_is_felt_late_and_only_from_the_threshold_on():
-    person = Participant.from_mapping({"seed": 3, "felt_threshold": 0.4, "felt_share": 0.0})
-    step = lambda newton: lambda t: WorldView(load=np.array([0.0, newton if t >= 1.0 else 0.0, -3.0]))  # noqa: E731
-    weak = perceive(person, step(0.39), 2.0)
-    assert all(p.load[1] == 0.0 for _, p in weak)
-    strong = perceive(person, step(0.41), 2.0)
-    felt = next(t for t, p in strong if p.load[1] > 0.0)
-    assert felt == pytest.approx(1.0 + person.feeling_delay, abs=DT)
-
-
-def test_a_small_change_of_a_large_force_is_not_noticed():
-    person = Participant.from_mapping({"seed": 3, "felt_threshold": 0.1, "felt_share": 0.08})
-    ramp = perceive(person, lambda t: WorldView(load=np.array([0.0, 0.0, -10.0 - 0.7 * min(t, 1.0)])), 2.0)
-    assert {float(p.load[2]) for _, p in ramp} == {-10.0}
-
-
-def test_a_robot_that_was_never_seen_before_is_not_at_rest():
-    person = Participant.from_mapping({"seed": 3, **QUIET})
-    first = perceive(person, lambda t: WorldView(), 0.3)
-    assert first[0][1].robot_speed > 0.5 and first[-1][1].robot_speed < 0.03
 
 
 def test_the_bend_of_the_fingers_is_seen_as_inexactly_as_their_tips():
@@ -91,3 +54,64 @@ def test_the_view_takes_the_fingers_from_the_plant():
     frame = {"position": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0, 1.0]}
     truth = {"robot_hand": frame, "object": frame, "human_force": [0.0, 0.0, 0.0]}
     assert view_of({**truth, "hand_closure": 0.25}).hand_closure == 0.25
+
+
+STEP = 1 / 64
+BLIND = {"seen_noise": 0.0, "seen_turn": 0.0, "seen_speed": 0.0}
+
+
+class Steady:
+    """In the place of the generator: the same number for ever."""
+
+    def __init__(self, value):
+        self.value = value
+
+    def normal(self, size=None):
+        return self.value if size is None else np.full(size, self.value)
+
+
+def moving(speed, closing=0.0, steps=64, until=99.0):
+    """Percepts of a palm that goes along x; nothing is late."""
+    senses = Senses(Participant(seeing_delay=0.0, feeling_delay=0.0, **BLIND), Steady(0.0))
+    found = []
+    for i in range(steps):
+        t = STEP * i
+        where = min(t, until)
+        view = WorldView(Pose(np.array([speed * where, 0.0, 0.0])), closing * where)
+        found.append(senses.step(t, view))
+    return found
+
+
+def test_a_speed_is_seen_over_the_last_moment():
+    found = moving(0.4, -0.8)
+    assert [p.robot_speed for p in found[:2]] == [1.0, 1.0], "what was never seen before is not at rest"
+    assert [p.closing_speed for p in found[:2]] == [0.0, 0.0]
+    for percept in found[2:]:
+        assert percept.robot_speed == pytest.approx(0.4) and percept.closing_speed == pytest.approx(-0.8)
+    stopped = moving(0.4, until=0.5)
+    speeds = [p.robot_speed for p in stopped[32:40]]
+    # Over the least that is no shorter than 0.05 s: four steps.
+    assert speeds == pytest.approx([0.4, 0.3, 0.2, 0.1, 0.0, 0.0, 0.0, 0.0])
+
+
+def feeling(loads, **changes):
+    senses = Senses(Participant(**BLIND, **{"feeling_delay": 0.0} | changes), Steady(0.0))
+    return [float(senses.step(STEP * i, WorldView(load=np.array([0.0, 0.0, z]))).load[2]) for i, z in enumerate(loads)]
+
+
+def test_a_force_is_felt_as_it_was_until_its_change_is_noticed():
+    threshold = {"felt_threshold": 0.4, "felt_share": 0.0}
+    assert feeling([0.39, 0.41, 0.8, 0.82, 0.1, 0.0], **threshold) == [0.0, 0.41, 0.41, 0.82, 0.1, 0.1]
+    share = {"felt_threshold": 0.1, "felt_share": 0.1}
+    assert feeling([-10.0, -10.9, -11.1, -10.1, -9.9], **share) == [-10.0, -10.0, -11.1, -11.1, -9.9]
+    assert feeling([0.05, -0.09, 0.11], **share) == [0.0, 0.0, 0.11]
+
+
+def test_what_is_felt_comes_later_by_its_own_delay():
+    felt = feeling([0.0, 0.0, 5.0, 5.0, 5.0, 5.0], feeling_delay=2 * STEP, felt_threshold=0.4)
+    assert felt == [0.0, 0.0, 0.0, 0.0, 5.0, 5.0]
+    load = np.array([1.0, 2.0, 3.0])
+    senses = Senses(Participant(feeling_delay=0.0), Steady(0.0))
+    percept = senses.step(0.0, WorldView(load=load))
+    load[0] = 9.0
+    assert percept.load == pytest.approx([1.0, 2.0, 3.0]), "what was felt stays"

@@ -1,9 +1,12 @@
 """The tracker: latency, noise, dropouts, occlusion, swaps and calibration as configured, and none of it when
 perfect."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from coglab_py.pose import Pose
+from coglab_py.pose import Pose, about_z
+from coglab_sim.tracker import tracker as module
 from coglab_sim.tracker.tracker import Board, PerceptionSettings, Tracker
 
 CALIBRATED = {"calibration_offset": 0.0, "calibration_turn_deg": 0.0, "swap_probability": 0.0}
@@ -56,20 +59,6 @@ def test_dropouts_come_in_bursts():
     assert gaps.max() > 0.15 and len(sights) < 0.95 * 60 * 30
 
 
-def test_an_identity_swap_shows_the_nearest_other_thing_and_comes_back():
-    quiet = {"position_noise": (0, 0, 0), "orientation_noise": 0.0, "dropout_start": 0.0}
-    settings = PerceptionSettings(**quiet, **CALIBRATED | {"swap_probability": 0.01})
-    hand, far = Pose(np.array([0.9, 0.0, 0.45])), Pose(np.array([0.4, -0.5, 0.1]))
-    sights = watch(settings, 60.0, others=(far, hand))
-    swapped = [np.allclose(s.frame.position, hand.position) for _, s in sights]
-    right = [np.allclose(s.frame.position, [0.8, 0, 0.4]) for _, s in sights]
-    assert sum(swapped) >= 8 and all(a != b for a, b in zip(swapped, right, strict=True))
-    alone = np.array(
-        [np.linalg.norm(s.frame.position - [0.8, 0, 0.4]) for _, s in watch(settings, 60.0, others=(far,))]
-    )
-    assert alone.max() == pytest.approx(0.08) and np.median(alone) == pytest.approx(0.0, abs=1e-9)
-
-
 def test_occlusion_by_the_robots_hand_comes_in_bursts():
     settings = PerceptionSettings(dropout_start=0.0)
     far = watch(settings, 60.0, robot=Pose(np.array([0.5, 0, 0.4])))
@@ -96,17 +85,6 @@ def test_the_calibration_is_off_by_a_constant_for_all_frames():
     assert np.linalg.norm(np.mean(shifts, axis=0)) < 0.003, "the direction is the seed's"
 
 
-def test_by_default_nothing_is_spared_and_perfect_switches_all_of_it_off():
-    s = PerceptionSettings()
-    assert min(s.latency, s.latency_sigma, s.rate_jitter, *s.position_noise, s.orientation_noise) > 0.0
-    assert min(s.dropout_start, s.occlusion_distance, s.swap_probability, s.calibration_offset) > 0.0
-    assert s.calibration_offset == 0.005 and s.calibration_turn_deg == 1.0
-    perfect = PerceptionSettings(perfect=True, swap_probability=0.5, occlusion_distance=1.0, dropout_start=0.5)
-    robot = Pose(np.array([0.78, 0.0, 0.4]))
-    for t, sight in watch(perfect, 10.0, robot=robot, others=(robot,)):
-        assert sight.captured == t and sight.frame.distance(Pose(np.array([0.8, 0.0, 0.4]))) == (0.0, 0.0)
-
-
 def test_same_seed_same_sights():
     a, b = watch(PerceptionSettings(), 5.0, seed=9), watch(PerceptionSettings(), 5.0, seed=9)
     assert [t for t, _ in a] == [t for t, _ in b]
@@ -120,7 +98,90 @@ def test_settings_are_checked():
         PerceptionSettings(rate=0.0)
 
 
-def test_free_places_are_those_without_an_object():
-    board = Board(Pose(np.array([0.5, -0.5, 0.0])), {"A1": np.zeros(3), "A2": np.array([0.2, 0.0, 0.0])})
-    assert board.free([]) == ["A1", "A2"]
-    assert board.free([np.array([0.52, -0.5, 0.0])]) == ["A2"]
+QUIET = PerceptionSettings(
+    rate_jitter=0.0,
+    latency=0.0,
+    latency_sigma=0.0,
+    position_noise=(0.0, 0.0, 0.0),
+    orientation_noise=0.0,
+    dropout_start=0.0,
+    occlusion_distance=0.0,
+    swap_probability=0.0,
+    calibration_offset=0.0,
+    calibration_turn_deg=0.0,
+)
+"""a tracker without any fault"""
+HERE = Pose(np.array([0.8, 0.0, 0.4]))
+
+
+def captured(settings, times, truth=lambda t: HERE, seed=3, robot=None, others=(), name="object_mug"):
+    tracker, found = Tracker(name, settings, seed), []
+    for t in times:
+        found += [(t, sight) for sight in tracker.step(t, truth(t), robot, others)]
+    return found
+
+
+def test_a_latency_delays_the_delivery_and_not_the_stamp():
+    found = captured(replace(QUIET, rate=8.0, latency=0.0625), np.arange(0.0, 2.0, 0.0625 / 4))
+    assert len(found) == 16 and all(t - sight.captured == 0.0625 for t, sight in found)
+
+
+def test_a_frame_that_was_overtaken_is_not_delivered():
+    settings = replace(QUIET, rate=50.0, latency=0.1, latency_sigma=0.05)
+    found = captured(settings, np.arange(0.0, 20.0, 0.002))
+    stamps = [sight.captured for _, sight in found]
+    assert stamps == sorted(set(stamps)) and 0.3 * 1000 < len(stamps) < 0.9 * 1000
+    delays = np.array([t - sight.captured for t, sight in found])
+    assert delays.min() >= 0.0
+
+
+@pytest.mark.parametrize("away, hidden", [(0.149, True), (0.151, False)])
+def test_the_robots_hand_hides_what_is_near(away, hidden):
+    settings = replace(QUIET, occlusion_distance=0.15, occlusion_start=1.0, occlusion_end=0.0)
+    robot = Pose(HERE.position + [0.0, away, 0.0])
+    times = np.arange(0.0, 1.0, 0.01)
+    assert (captured(settings, times, robot=robot) == []) is hidden
+    assert captured(settings, times) != [], "no robot hides nothing"
+
+
+def swaps(others, **changes):
+    """Positions seen by a tracker that takes something else for it in every frame."""
+    settings = replace(QUIET, rate=8.0, swap_probability=1.0, **changes)
+    found = captured(settings, np.arange(0.0, 2.5, 0.125), others=others)
+    return np.array([sight.frame.position for _, sight in found])
+
+
+def test_a_swap_shows_the_nearest_thing_within_reach():
+    near, nearer = Pose(HERE.position + [0.2, 0.0, 0.0]), Pose(HERE.position + [0.0, 0.1, 0.0])
+    assert swaps((near, nearer)) == pytest.approx(np.tile(nearer.position, (20, 1)))
+    assert swaps((near,)) == pytest.approx(np.tile(near.position, (20, 1)))
+    just, beyond = (Pose(HERE.position + [away, 0.0, 0.0]) for away in (0.249, 0.251))
+    assert swaps((just,)) == pytest.approx(np.tile(just.position, (20, 1)))
+    away = np.linalg.norm(swaps((beyond,)) - HERE.position, axis=1)
+    assert away == pytest.approx([0.08] * 20), "else something at swap_jump from it"
+
+
+def test_a_swap_lasts_four_frames_in_one_place():
+    seen = swaps((), swap_frames=4)
+    steps = np.linalg.norm(np.diff(seen, axis=0), axis=1)
+    assert [i for i, step in enumerate(steps) if step > 1e-9] == [3, 7, 11, 15]
+    once = Tracker("a", replace(QUIET, rate=8.0, swap_probability=1.0, swap_frames=4), 1)
+    far = []
+    for frame in range(8):
+        far.append(len(once.step(0.125 * frame, HERE)) and np.linalg.norm(once.newest.frame.position - HERE.position))
+        once.settings = replace(once.settings, swap_probability=0.0)
+    assert far == pytest.approx([0.08] * 4 + [0.0] * 4)
+    gone = Tracker("a", replace(QUIET, rate=10.0, swap_probability=1.0), 1)
+    gone.step(0.0, HERE, None, (Pose(HERE.position + [0.1, 0.0, 0.0]),))
+    gone.step(0.11, HERE, None, ())
+    assert np.linalg.norm(gone.newest.frame.position - HERE.position) == pytest.approx(0.08), "the thing has left"
+
+
+@pytest.mark.parametrize("away, free", [(0.099, False), (0.101, True)])
+def test_a_place_is_free_10_cm_from_every_object(away, free):
+    board = Board(Pose(np.array([0.5, -0.5, 0.05]), about_z(np.pi / 2)), {"A1": np.array([0.1, 0.0, 0.0])})
+    place = np.array([0.5, -0.4, 0.05])
+    assert (board.free([place + [0.0, 0.0, away]]) == ["A1"]) is free
+    assert board.free([place + [0.0, 0.0, 1.0], place + [away, 0.0, 0.0]]) == (["A1"] if free else [])
+    assert board.free([place + [0.06, 0.0, 0.0]], clearance=0.05) == ["A1"]
+    assert module.Board is Board

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 
@@ -84,14 +85,6 @@ def test_what_is_not_seen_is_said_within_the_limit(limit):
     assert time.monotonic() - began < 60.0
 
 
-def test_an_old_sight_is_no_sight():
-    scene = Scene()
-    scene.see(objects={"object_mug": BESIDE})
-    scene.now += 0.6
-    with pytest.raises(NotSeen, match="in view: nothing"):
-        scene.vision.locate("mug", 0.0)
-
-
 def test_init_vision():
     scene = Scene()
     with pytest.raises(NotSeen, match=r"not visible within 0\.1 s; is the simulated cell"):
@@ -147,21 +140,6 @@ def test_with_a_margin_the_nearer_one_is_the_partner_and_stays_so():
     )
 
 
-def test_partner_choice():
-    choice = PartnerChoice(0.3)
-    assert choice.choose({}, ROBOT) == ""
-    assert choice.choose({"a": FAR}, None) == "a"
-    assert choice.choose({"a": NEAR, "b": BESIDE}, ROBOT) == "a", "was there before"
-    fresh = PartnerChoice(0.3)
-    assert fresh.choose({"a": NEAR, "b": BESIDE}, ROBOT) == "", "two as near: not clear"
-    assert fresh.choose({"a": FAR, "b": BESIDE}, ROBOT) == "b"
-    assert fresh.choose({"a": NEAR, "b": FAR}, ROBOT) == "a", "nearer by more than the margin"
-    assert PartnerChoice(0.0).choose({"a": NEAR, "b": FAR}, ROBOT) == ""
-    for wrong in (-0.1, float("nan")):
-        with pytest.raises(ValueError, match="partner_margin"):
-            PartnerChoice(wrong)
-
-
 def test_a_bystander_who_walks_by_never_becomes_the_partner():
     """500 ticks of a second person crossing 0.4 m behind the partner."""
     rng = np.random.default_rng(4)
@@ -172,3 +150,111 @@ def test_a_bystander_who_walks_by_never_becomes_the_partner():
         for y in np.linspace(-1.0, 1.0, 500):
             crossing = Pose(np.array([0.9 + back, y, 0.4]))
             assert choice.choose({"bystander": crossing, "partner": NEAR}, ROBOT) == "partner"
+
+
+HAND = Pose(np.array([0.9, 0.1, 0.4]))
+
+
+class Seen:
+    """A perfect tracker whose clock the test sets."""
+
+    def __init__(self, margin=0.0):
+        self.now = 10.0
+        board = Board(BOARD, SLOTS)
+        settings = PerceptionSettings(perfect=True)
+        self.vision = Vision(NAMES, settings, board, 3, lambda: self.now, margin)
+
+    def see(self, hands=None, objects=None, robot=ROBOT):
+        self.now += 0.1
+        return self.vision.see({"one": HAND} if hands is None else hands, objects or {}, robot)
+
+
+def refused(call, *arguments):
+    with pytest.raises(NotSeen) as refusal:
+        call(*arguments)
+    return str(refusal.value), refusal.value.code
+
+
+@pytest.mark.parametrize("age, fresh", [(0.49, True), (0.51, False)])
+def test_a_sight_is_fresh_for_half_a_second(age, fresh):
+    seen = Seen()
+    seen.see(objects={"object_mug": HAND})
+    seen.now += age
+    if fresh:
+        name, _, told = seen.vision.locate("mug", 0.0)
+        assert name == "object_mug" and told == pytest.approx(age)
+    else:
+        text, code = refused(seen.vision.locate, "mug", 0.0)
+        assert code == ReasonCode.OBJECT_NOT_SEEN
+        assert text == ("'object_mug' was not seen within 0.0 s; in view: nothing; bring it into view of the tracker")
+
+
+def test_a_stamp_ahead_of_the_clock_is_no_negative_age():
+    seen = Seen()
+    seen.see(objects={"object_mug": HAND})
+    seen.now -= 0.3
+    assert seen.vision.locate("mug", 0.0)[2] == 0.0
+
+
+@pytest.mark.parametrize("away, doubt", [(0.199, True), (0.201, False)])
+def test_of_two_people_nobody_is_the_partner_and_what_they_hold_is_nobodys(away, doubt):
+    seen = Seen()
+    held = Pose(HAND.position + [0.0, 0.0, away])
+    sights = seen.see({"one": HAND, "two": Pose(np.array([2.0, 0.0, 0.4]))}, {"object_mug": held})
+    assert [sight.name for sight in sights] == ["object_mug"] and seen.vision.people == 2
+    sentence = "2 people are in view; one partner is expected: ask the others to step back"
+    assert refused(seen.vision.locate, "human_hand", 0.0) == (sentence, ReasonCode.NOT_PERCEIVED)
+    if doubt:
+        assert refused(seen.vision.locate, "mug", 0.0) == (sentence, ReasonCode.NOT_PERCEIVED)
+    else:
+        assert seen.vision.locate("mug", 0.0)[0] == "object_mug"
+    assert refused(seen.vision.locate, "ball", 0.0)[1] == ReasonCode.OBJECT_NOT_SEEN
+    seen.now += 0.6
+    assert refused(seen.vision.locate, "human_hand", 0.0)[1] == ReasonCode.OBJECT_NOT_SEEN, "long ago"
+
+
+def test_a_swap_shows_another_thing_of_the_same_world():
+    """Each tracker is given what the others see."""
+    seen = Seen()
+    settings = dict.fromkeys(("latency", "latency_sigma", "orientation_noise", "dropout_start"), 0.0)
+    settings |= {"occlusion_distance": 0.0, "calibration_offset": 0.0, "calibration_turn_deg": 0.0}
+    vision = Vision(
+        NAMES,
+        PerceptionSettings(swap_probability=1.0, position_noise=(0.0, 0.0, 0.0), **settings),
+        Board(BOARD, SLOTS),
+        1,
+        lambda: seen.now,
+    )
+    mug = Pose(HAND.position + [0.1, 0.0, 0.0])
+    places = {sight.name: sight.frame.position for sight in vision.see({"one": HAND}, {"object_mug": mug})}
+    assert places["human_hand"] == pytest.approx(mug.position) and places["object_mug"] == pytest.approx(HAND.position)
+
+
+def hands(**distances):
+    """Hands so far from the robot."""
+    return {name: Pose(ROBOT.position + [away, 0.0, 0.0]) for name, away in distances.items()}
+
+
+def test_a_choice_needs_the_margin_and_is_kept_within_it():
+    assert PartnerChoice(0.3).choose(hands(a=0.5, b=0.799), ROBOT) == ""
+    choice = PartnerChoice(0.3)
+    assert choice.choose(hands(a=0.5, b=0.801), ROBOT) == "a"
+    assert choice.choose(hands(a=0.5, b=0.3), ROBOT) == "a", "nearer by less than the margin"
+    assert choice.choose(hands(a=0.7, b=0.41), ROBOT) == "a"
+    assert choice.choose(hands(a=0.71, b=0.4), ROBOT) == "b"
+    assert choice.choose(hands(a=0.71, b=0.4, c=0.5), ROBOT) == "b"
+    assert choice.choose(hands(a=0.4, c=0.5), ROBOT) == "", "b has left, and neither is clear"
+    assert choice.choose(hands(a=0.4, c=0.9, d=0.5), ROBOT) == ""
+    assert PartnerChoice(0.25).choose(hands(a=0.25, b=0.5), ROBOT) == "a", "the margin itself is enough"
+
+
+def test_who_was_chosen_is_forgotten_when_nobody_can_be_told():
+    choice = PartnerChoice(0.3)
+    assert choice.choose(hands(a=0.9), ROBOT) == "a"
+    assert choice.choose(hands(a=0.9, b=0.8), None) == "", "no robot to be near to"
+    assert choice.choose(hands(a=0.9, b=0.8), ROBOT) == ""
+    assert choice.choose(hands(a=0.9), None) == "a" and choice.choose({}, ROBOT) == ""
+    assert choice.choose(hands(a=0.9, b=0.8), ROBOT) == ""
+    for wrong in (-0.01, math.inf, math.nan):
+        with pytest.raises(ValueError, match="partner_margin must be 0 or more metres"):
+            PartnerChoice(wrong)

@@ -25,6 +25,7 @@ from coglab_msgs.msg import Say, Transition
 from coglab_msgs.srv import Start, StartResponse
 from coglab_py import parameters
 from coglab_py.alone import init_node
+from coglab_py.publish import publish
 from coglab_py.steady import ClockWatch, Stamps, exit_status, utc_of, worker
 from coglab_smach.clocks.clock import PacedClock
 from coglab_smach.context.config import Config, ConfigError
@@ -32,8 +33,7 @@ from coglab_smach.context.context import Context
 from coglab_smach.context.holding import HoldingMemory
 from coglab_smach.context.journal import NOTHING_FAILED, ActionRecord, Journal, TransitionRecord
 from coglab_smach.context.master_state import MasterState, StateWatch
-from coglab_smach.context.requests import command
-from coglab_smach.context.trigger import ask_for
+from coglab_smach.context.requests import ask_for, command
 from coglab_smach.kinematics.board_room import BoardRoom
 from coglab_smach.kinematics.reachability import solve
 from coglab_smach.machines import build_master
@@ -41,7 +41,6 @@ from coglab_smach.ros.arm import RosArm
 from coglab_smach.ros.calls import PACE
 from coglab_smach.ros.hand import RosHand
 from coglab_smach.ros.ports import RosContact, RosDatabase, RosPerception
-from coglab_smach.ros.publish import publish
 from std_msgs.msg import String
 from std_srvs.srv import Trigger, TriggerResponse
 

@@ -18,7 +18,6 @@ import rostest
 import yaml
 from coglab_msgs.msg import Contact, ContactSignal, MasterState, ReasonCode, Transition
 from coglab_msgs.srv import ArmContact, GetObject, Learn, LearnMotion, ListObjects, Reload, Start
-from coglab_smach.contact.torque_signal import TorqueSignal
 from coglab_smach.kinematics.reachability import default_arm, home_posture, position_jacobian
 from sensor_msgs.msg import JointState
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
@@ -45,7 +44,7 @@ class Torques(threading.Thread):
         self.over = False
 
     def run(self):
-        arm, signal = default_arm(), TorqueSignal(5)
+        arm, noise = default_arm(), np.random.default_rng(5)
         home = home_posture()
         jacobian = position_jacobian(arm, home)
         applied = np.zeros(3)
@@ -54,7 +53,7 @@ class Torques(threading.Thread):
             stamp = rospy.Time.now()
             state = JointState(name=list(arm.joint_names), position=list(home), velocity=[0.0] * 7)
             state.header.stamp = stamp
-            tau = signal.sample(0.005, jacobian, applied, np.zeros(7))
+            tau = jacobian.T @ applied + noise.normal(0.0, 0.05, 7)
             torque = JointState(name=list(arm.joint_names), effort=list(tau))
             torque.header.stamp = stamp
             self.joints.publish(state)

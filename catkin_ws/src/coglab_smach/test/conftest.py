@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 from coglab_objects.database import ObjectDatabase, objects_folder
 from coglab_py.packages import package_path
-from coglab_smach.clocks.virtual_clock import VirtualClock, using
 from coglab_smach.context.config import Config
 from coglab_smach.machines import build_master
-from coglab_smach.simulated.ports import simulated_context
+from coglab_trials.scripted import scripted_context
+from coglab_trials.virtual_clock import VirtualClock, using
 
 SHARE = Path(__file__).resolve().parent.parent
 LIBRARY = str(package_path("coglab_controllers", "config", "primitives.xml"))
@@ -24,10 +24,15 @@ class Trial:
         config = Config.load(
             str(SHARE / "config" / "machines.yaml"), {"auto_trigger": True, "dmp_library": LIBRARY, **overrides}
         )
-        self.ctx, self.cell = simulated_context(self.clock, self.database, config)
+        self.ctx, self.cell = scripted_context(self.clock, self.database, config)
         with using(self.clock):
             self.master = build_master(self.ctx)
         self.error = None
+
+    @property
+    def grip(self):
+        """What the states of a handover leave for each other."""
+        return self.master.userdata.grip
 
     def run(self, script, limit=600.0):
         """Walk the machine until the script ends; whatever the script raises is raised here."""

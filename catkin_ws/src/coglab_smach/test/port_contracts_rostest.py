@@ -1,156 +1,371 @@
 #!/usr/bin/python3
-"""The contracts of the ports on the real adapters. The suites of different nodes run side by side, to be quick."""
+"""The ports over ROS on the nodes behind them: what they take, refuse and report, and what a frozen node looks like."""
 
 import os
 import signal
 import sys
-import threading
 import time
-import traceback
 import unittest
 import xmlrpc.client
-from contextlib import nullcontext
-from pathlib import Path
+from contextlib import contextmanager
 
+import numpy as np
 import rosgraph
-import rospkg
 import rospy
 import rostest
-from coglab_msgs.msg import HandoverBelief, Recognition
+from coglab_msgs.msg import HandoverBelief, ReasonCode, Recognition
 from coglab_msgs.srv import SetSpeedScale
+from coglab_py.packages import package_path
+from coglab_smach.ports.interfaces import Ahead, DmpRequest
+from coglab_smach.ports.interfaces import Recognition as Recognised
+from coglab_smach.ports.pending import PortError
 from coglab_smach.ros.arm import RosArm
 from coglab_smach.ros.hand import RosHand
 from coglab_smach.ros.ports import RosContact, RosDatabase, RosPerception
 from geometry_msgs.msg import Vector3, Wrench
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-from port_contracts import SUITES, Place
-
-LIMIT = 500.0
-"""s, of the whole"""
-PATIENCE = 20.0
-NODES = {
-    "arm": "/robot",
-    "hand": "/ih2_hand",
-    "perception": "/perception",
-    "database": "/object_database",
-    "contact": "/contact_detector",
-}
-PORTS = {"arm": RosArm, "hand": RosHand, "perception": RosPerception, "database": RosDatabase, "contact": RosContact}
+PATIENCE = 20.0  # how many times as long everything may take: the computer may be busy
+LIBRARY = str(package_path("coglab_controllers", "config", "primitives.xml"))
+REACH = DmpRequest("take_board", "board", [0.0, -0.25, 0.45], dmp_ratio=4.0)
 
 
-def pid_of(node):
-    """Process id of a node."""
+def until(condition, limit=5.0, what="it"):
+    end = time.monotonic() + limit * PATIENCE
+    while not condition():
+        assert time.monotonic() < end, f"{what} did not happen"
+        time.sleep(0.01)
+
+
+def stays(condition, duration):
+    end = time.monotonic() + duration
+    while time.monotonic() < end:
+        assert condition()
+        time.sleep(0.01)
+
+
+def settle(pending, limit=5.0):
+    """The value of a call, which has to come in time."""
+    until(pending.done, limit, "the answer")
+    return pending.result()
+
+
+def refused(pending, code):
+    """The error of a call that must not succeed, with this code."""
+    try:
+        value = settle(pending)
+    except PortError as error:
+        assert error.sentence and error.code == code, f"code {error.code}, expected {code}: {error.sentence}"
+        return error
+    raise AssertionError(f"it succeeded with {value!r}")
+
+
+@contextmanager
+def frozen(node):
+    """Within the block this node's process is stopped."""
     api = rosgraph.Master("/port_contracts").lookupNode(node)
-    return xmlrpc.client.ServerProxy(api).getPid("/port_contracts")[2]
-
-
-class Recogniser:
-    """Tells of a belief in an offer, as the node that recognises intentions does, while it believes in one: with each
-    sight of the hand."""
-
-    def __init__(self):
-        self.offer, self.frozen, self.sees = 0.0, False, True
-        self.publisher = rospy.Publisher("perception/belief", HandoverBelief, queue_size=1)
-        self.patterns = rospy.Publisher("perception/recognition", Recognition, queue_size=1)
-        rospy.Timer(rospy.Duration(0.05), self.tell)
-
-    def believe(self, offer):
-        self.offer = offer
-
-    def show_hand(self, seen):
-        self.sees = seen
-
-    def tell(self, _event):
-        if self.offer > 0.0 and self.sees and not self.frozen:
-            self.patterns.publish(Recognition(pattern="mug", confidence=0.9, decided=True))
-            message = HandoverBelief(offer=self.offer, hand="human_hand", object_id="mug")
-            message.place_covariance[0] = -1.0
-            message.header.stamp = rospy.Time.now()
-            self.publisher.publish(message)
-
-
-def place_of(name, arm_may_freeze, arm_is_used, recogniser):
-    """The real port; the arm's node is frozen only when nobody else needs it, and moves only when nobody else wants it
-    to rest."""
-    pid = pid_of(NODES[name])
-
-    def freeze():
-        if name == "arm":
-            assert arm_may_freeze.wait(LIMIT)
-        os.kill(pid, signal.SIGSTOP)
-        recogniser.frozen = recogniser.frozen or name == "perception"
-
-    def thaw():
+    pid = xmlrpc.client.ServerProxy(api).getPid("/port_contracts")[2]
+    os.kill(pid, signal.SIGSTOP)
+    try:
+        yield
+    finally:
         os.kill(pid, signal.SIGCONT)
-        recogniser.frozen = recogniser.frozen and name != "perception"
-
-    library = rospkg.RosPack().get_path("coglab_controllers") + "/config/primitives.xml"
-    publisher = rospy.Publisher("/coglab_sim/cell/push", Wrench, queue_size=1, latch=True)
-    push = lambda force: publisher.publish(Wrench(force=Vector3(0.0, 0.0, force)))  # noqa: E731
-    arm = RosArm() if name == "contact" else None
-    clock = time.monotonic, time.sleep
-    person = recogniser.believe, recogniser.show_hand
-    scale = rospy.ServiceProxy("/controller_manager/speed_scale", SetSpeedScale)
-    return Place(PORTS[name](), *clock, freeze, thaw, library, push, arm_is_used, arm, *person, PATIENCE, scale)
 
 
-class PortContracts(unittest.TestCase):
-    """One test per port."""
+class WithArm(unittest.TestCase):
+    """A RosArm that may move, with its controllers loaded. Nothing but push() touches the hand."""
+
+    arm = None
 
     @classmethod
     def setUpClass(cls):
-        cls.failures = {name: [] for name in SUITES}
-        cls.ran = dict.fromkeys(SUITES, 0)
-        cls.arm_may_freeze = threading.Event()
-        cls.arm_is_used = threading.Lock()
-        cls.recogniser = Recogniser()
-        waits = (
-            "/lwr/command",
-            "/controller_manager/list_controllers",
-            "/perception/locate_object",
-            "/object_database/get_object",
-            "/contact_detector/arm",
-        )
-        for service in waits:
+        for service in ("/lwr/command", "/controller_manager/list_controllers", "/contact_detector/arm"):
             rospy.wait_for_service(service, 60.0)
-        cls.threads = {name: threading.Thread(target=cls.run_suite, args=(name,), daemon=True) for name in SUITES}
-        for thread in cls.threads.values():
-            thread.start()
+        pushes = rospy.Publisher("/coglab_sim/cell/push", Wrench, queue_size=1, latch=True)
+        cls.push = staticmethod(lambda force: pushes.publish(Wrench(force=Vector3(0.0, 0.0, force))))
+        if WithArm.arm is not None:
+            return
+        arm = WithArm.arm = RosArm()
+        until(lambda: arm.standing().ok, 10.0, "the arm at rest")
+        refused(arm.switch_controller("ptp"), ReasonCode.UNKNOWN_NAME)
+        for name, kind in (("dmp", "coglab/DmpController"), ("ptp", "coglab/PtpController")):
+            settle(arm.load_controller(name, kind), 20.0)
+        assert settle(arm.load_dmps(LIBRARY)) >= 5
+        settle(arm.lwr_command("position"))
+
+    def setUp(self):
+        self.push(0.0)
+        if not self.arm.motion_allowed().ok:
+            settle(self.arm.lwr_command("start"), 20.0)
+        until(lambda: self.arm.motion_allowed().ok, 10.0, "command mode")
+        self.ready("ptp")
+
+    def ready(self, controller):
+        settle(self.arm.switch_controller(controller))
+        until(lambda: self.arm.standing().ok, 3.0, "rest")
+
+    def start_ptp(self, by=0.4):
+        """A slow motion of the last joint that has begun, and its target."""
+        target = list(self.arm.joint_positions())
+        target[6] += by if target[6] < 0.5 else -by
+        motion = self.arm.move_ptp(target, [0.1] * 7)
+        until(lambda: not self.arm.standing().ok, 2.0, "the motion")
+        return motion, target
+
+
+class Motions(WithArm):
+    """RosArm."""
+
+    def stands_before(self, target):
+        until(lambda: self.arm.standing().ok, 2.0, "rest")
+        time.sleep(0.1)
+        place = np.array(self.arm.joint_positions())
+        assert np.max(np.abs(place - target)) > 0.02, "it went to its target all the same"
+        time.sleep(0.3)
+        assert np.max(np.abs(place - self.arm.joint_positions())) < 0.01, "it moved on"
+
+    def test_a_motion_is_executed_to_its_end(self):
+        motion, target = self.start_ptp(0.1)
+        assert not motion.done() and settle(motion) is None
+        assert np.max(np.abs(np.subtract(self.arm.joint_positions(), target))) < 0.03
+
+    def test_cancelling_ends_motions_that_run_and_wait(self):
+        _, target = self.start_ptp()
+        queued = self.arm.move_ptp(target, [])
+        time.sleep(0.5)  # until it is queued
+        settle(self.arm.cancel_motion("the test"), 2.5)
+        assert self.arm.standing().ok, "cancel is answered when the arm stands"
+        refused(queued, ReasonCode.CANCELLED)
+        self.stands_before(target)
+        settle(self.arm.cancel_motion("the test"), 2.5)  # nothing to end is a success, too
+
+    def test_the_handle_and_a_switch_end_a_motion(self):
+        motion, target = self.start_ptp()
+        motion.cancel()
+        refused(motion, ReasonCode.CANCELLED)
+        self.stands_before(target)
+        motion, target = self.start_ptp()
+        assert settle(self.arm.switch_controller("dmp")) == "coglab/DmpController"
+        refused(motion, ReasonCode.SWITCHED)
+        self.stands_before(target)
+
+    def test_a_hold_ends_the_motion_and_latches(self):
+        motion, target = self.start_ptp()
+        settle(self.arm.hold("the test"))
+        until(lambda: self.arm.motion_allowed().code == ReasonCode.HELD, 1.0, "the hold")
+        refused(self.arm.lwr_command("start"), ReasonCode.HELD)
+        until(motion.done)
+        self.stands_before(target)
+        settle(self.arm.lwr_command("reset"))
+        until(lambda: self.arm.motion_allowed().ok, 2.0, "the end of the hold")
+        stays(lambda: self.arm.standing().ok, 0.2)
+
+    def test_a_reach_reports_takes_another_primitive_and_is_cancelled(self):
+        self.ready("dmp")
+        refused(self.arm.execute_dmp(DmpRequest("to_the_moon", "board", REACH.goal_offset)), ReasonCode.UNKNOWN_NAME)
+        refused(self.arm.switch_dmp(REACH), ReasonCode.NOTHING_RUNS)
+        settle(self.arm.execute_dmp(REACH))
+        progress = self.arm.dmp_progress
+        until(lambda: progress().primitive_id == "take_board" and progress().phase < 0.95, 3.0, "news of the motion")
+        assert progress().state == "running" and progress().remaining_distance > 0.05
+        before = progress().phase
+        settle(self.arm.switch_dmp(DmpRequest("put_board", "", REACH.goal_offset, dmp_ratio=4.0)))
+        until(lambda: progress().primitive_id == "put_board", 1.0, "news of the other primitive")
+        assert progress().state == "running" and progress().phase <= before
+        settle(self.arm.cancel_motion("the test"), 2.5)
+        until(lambda: progress().state == "aborted", 1.0, "news of the end")
+        assert progress().code == ReasonCode.CANCELLED
+
+    def test_profiles_of_feedback_are_applied_and_come_with_a_controller(self):
+        self.ready("dmp")
+        until(lambda: self.arm.profile_settled("dmp").ok, 3.0, "the controller's own profile")
+        settle(self.arm.apply_profile("dmp_compliant"))
+        until(lambda: self.arm.profile_settled("dmp_compliant").ok, 3.0, "the profile")
+        refused(self.arm.apply_profile("nobody"), ReasonCode.UNKNOWN_NAME)
+        assert not self.arm.profile_settled("dmp").ok
+
+    def test_limits_and_speed_scale_are_those_of_the_manager(self):
+        limits = self.arm.motion_limits()
+        assert len(limits.velocity) == len(limits.ptp_acceleration) == 7 and min(limits.velocity) > 1.0
+        assert self.arm.speed_scale() == 1.0
+        scale = rospy.ServiceProxy("/controller_manager/speed_scale", SetSpeedScale)
+        try:
+            scale(0.25)
+            until(lambda: self.arm.speed_scale() == 0.25, 2.0, "the speed scale")
+        finally:
+            scale(1.0)
+
+    def test_what_is_given_up_while_the_node_is_frozen_never_acts(self):
+        before = np.array(self.arm.joint_positions())
+        with frozen("/robot"):
+            motion = self.arm.move_ptp([*before[:6], 0.0], [])
+            until(lambda: self.arm.joint_positions() is None, 2.0, "silence")
+            until(lambda: self.arm.motion_allowed().code == ReasonCode.NODE_SILENT, 2.0, "silence")
+            assert not self.arm.standing().ok
+            motion.cancel()
+        until(lambda: self.arm.joint_positions() is not None, 5.0, "the node's return")
+        self.setUp()
+        stays(lambda: np.max(np.abs(before - self.arm.joint_positions())) < 0.05, 0.6)
+
+
+class Contact(WithArm):
+    """RosContact, before the arm has gone anywhere."""
 
     @classmethod
-    def run_suite(cls, name):
-        try:
-            contract = SUITES[name](place_of(name, cls.arm_may_freeze, cls.arm_is_used, cls.recogniser))
-            moves = cls.arm_is_used if name == "arm" else nullcontext()
-            for test in [t for t in vars(SUITES[name]) if t.startswith("test_")]:
-                cls.ran[name] += 1
-                begun = time.monotonic()
-                try:
-                    # The arm's own suite waits for the others before it freezes the arm, without keeping them out.
-                    with nullcontext() if "frozen" in test else moves:
-                        contract.begin()
-                        getattr(contract, test)()
-                except Exception:
-                    cls.failures[name].append(f"{test}:\n{traceback.format_exc()}")
-                time.sleep(0.05)  # for who waits for the arm to rest
-                print(f"{name}: {test}: {time.monotonic() - begun:.1f} s", flush=True)
-        except Exception:
-            cls.failures[name].append(traceback.format_exc())
-        finally:
-            if name == "contact":
-                cls.arm_may_freeze.set()
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.contact = RosContact()
 
-    def judge(self, name):
-        self.threads[name].join(LIMIT)
-        self.assertFalse(self.threads[name].is_alive(), f"the suite of the {name} hangs")
-        self.assertFalse(self.failures[name], "\n".join(self.failures[name]))
-        self.assertGreater(self.ran[name], 2)
+    def tearDown(self):
+        self.push(0.0)
+        self.contact.disarm()
+        time.sleep(1.0)  # what the arm feels while nobody touches it
+
+    def watch(self, mode, **settings):
+        """Armed, and the detector has seen enough of the arm at rest."""
+        settle(self.contact.arm(mode, 20.0, settings))
+        time.sleep(3.0)
+        assert self.contact.event() is None, self.contact.event()
+
+    def happens(self, contact, code):
+        until(lambda: self.contact.event() is not None, 2.0, "the event")
+        event = self.contact.event()
+        assert (event.contact, event.code) == (contact, code), event
+        assert event.margin >= 1.0 and 0.5 <= event.confidence <= 1.0 and event.source, event
+
+    def test_a_touch_a_weight_and_a_release_are_found_once_each(self):
+        refused(self.contact.arm("juggle", 1.0, {}), ReasonCode.INVALID_ARGUMENT)
+        self.watch("contact", k=20.0)
+        self.push(-8.0)
+        self.happens(True, ReasonCode.CONTACT_FOUND)
+        self.push(0.0)
+        stays(lambda: self.contact.event().code == ReasonCode.CONTACT_FOUND, 0.3)
+        self.watch("load", mass=0.8, load_share=0.5)
+        self.push(-8.0)
+        self.happens(True, ReasonCode.LOAD_CARRIED)
+        assert self.contact.share_gone() is None and self.contact.grip() is None, "this hand does not feel"
+        self.watch("release", mass=0.8, load_share=0.5)
+        until(lambda: abs(self.contact.share_gone() or 0.0) < 0.1, 1.0, "the whole load")
+        self.push(0.0)
+        self.happens(False, ReasonCode.LOAD_RELEASED)
+        until(lambda: self.contact.share_gone() > 0.7, 2.0, "the load")
+        self.contact.disarm()
+        assert self.contact.share_gone() is None
+
+    def test_disarmed_it_says_nothing_and_a_frozen_detector_does_not_answer(self):
+        with frozen("/contact_detector"):
+            armed = self.contact.arm("contact", 1.0, {})
+            time.sleep(0.4)
+            assert not armed.done()
+            armed.cancel()
+        self.watch("contact", k=20.0)
+        self.contact.disarm()
+        self.push(-8.0)
+        stays(lambda: self.contact.event() is None, 0.5)
+
+    def test_touch_in_motion_is_found_while_the_arm_moves(self):
+        self.start_ptp(0.8)
+        time.sleep(0.3)
+        settle(self.contact.arm("contact_in_motion", 20.0, {}))
+        stays(lambda: self.contact.event() is None, 0.7)
+        self.push(-15.0)
+        self.happens(True, ReasonCode.CONTACT_FOUND)
+        until(lambda: (self.contact.force() or (0.0, 0.0, 0.0))[2] < -5.0, 2.0, "the force")
+        settle(self.arm.cancel_motion("the test"), 4.0)
 
 
-for port in SUITES:
-    setattr(PortContracts, f"test_{port}", lambda self, port=port: self.judge(port))
+class Hand(unittest.TestCase):
+    """RosHand. The hand is empty and has just started."""
+
+    def test_hand(self):
+        hand = RosHand()
+        until(lambda: hand.state().connected, 15.0, "the hand")
+        if not hand.state().calibrated:
+            refused(hand.preshape("cylindrical", "medium"), ReasonCode.HAND_NOT_CALIBRATED)
+            settle(hand.calibrate("fast"), 12.0)
+        assert hand.state().calibrated and not hand.state().holding
+        refused(hand.calibrate("fast"), ReasonCode.HAND_REFUSED)
+        refused(hand.preshape("fist", "medium"), ReasonCode.UNKNOWN_NAME)
+        refused(hand.open(9999), ReasonCode.OUT_OF_RANGE)
+        finger = lambda: hand.state().positions[2]  # noqa: E731
+
+        settle(hand.preshape("cylindrical", "medium"), 8.0)
+        closing = hand.close_on_object()
+        assert not closing.done()
+        settle(closing, 8.0)
+        until(lambda: finger() > 100, 1.0, "the closed fingers")
+        closed, opening = finger(), hand.open(100)
+        until(lambda: finger() < closed - 10, 2.0, "the loosening")
+        opening.cancel()
+        refused(opening, ReasonCode.CANCELLED)
+        time.sleep(0.4)
+        there = finger()
+        stays(lambda: abs(finger() - there) <= 1, 0.4)
+        closing = hand.close(200)
+        time.sleep(0.05)
+        settle(hand.open(511), 8.0)
+        refused(closing, ReasonCode.SUPERSEDED)
+        until(lambda: finger() < 60 and not hand.state().holding, 2.0, "the open hand")
+
+        with frozen("/ih2_hand"):
+            until(lambda: not hand.state().connected, 2.5, "silence")
+            state = hand.state()
+            assert state.event == ReasonCode.NODE_SILENT and state.positions == () and not state.calibrated
+            opening = hand.open(400)
+            time.sleep(0.3)
+            assert not opening.done()
+            opening.cancel()
+        until(lambda: hand.state().connected, 5.0, "the node's return")
+
+
+class PerceptionAndDatabase(unittest.TestCase):
+    """RosPerception and RosDatabase."""
+
+    def test_perception(self):
+        rospy.wait_for_service("/perception/locate_object", 60.0)
+        perception = RosPerception()
+        assert isinstance(settle(perception.init_vision(5.0), 8.0), str)
+        with frozen("/perception"):
+            sight = perception.locate_object("board", 0.2)
+            time.sleep(0.6)
+            assert not sight.done()
+            sight.cancel()
+        board = settle(perception.locate_object("board", 2.0), 4.0)
+        assert (board.frame, board.parent) == ("board", "world") and np.linalg.norm(board.quaternion) > 0.99
+        assert "elephant" in refused(perception.locate_object("elephant", 0.5), ReasonCode.OBJECT_NOT_SEEN).sentence
+        places = settle(perception.free_places("mug", 2.0), 4.0)
+        assert places and all(place.parent == "board" for place in places)
+
+    def test_an_offer_and_a_pattern_count_while_they_are_published(self):
+        perception = RosPerception()
+        beliefs = rospy.Publisher("perception/belief", HandoverBelief, queue_size=1)
+        patterns = rospy.Publisher("perception/recognition", Recognition, queue_size=1)
+
+        def publish(_event):
+            patterns.publish(Recognition(pattern="mug", confidence=0.9, decided=True))
+            message = HandoverBelief(offer=0.75, hand="human_hand", object_id="mug")
+            message.place_covariance[0] = -1.0
+            message.header.stamp = rospy.Time.now()
+            beliefs.publish(message)
+
+        timer = rospy.Timer(rospy.Duration(0.05), publish)
+        until(lambda: perception.ahead().offer == 0.75 and perception.recognition().decided, 2.0, "the belief")
+        assert perception.ahead().object_id == "mug" and perception.recognition().pattern == "mug"
+        timer.shutdown()
+        until(lambda: perception.ahead() == Ahead() and perception.recognition() == Recognised(), 1.0, "silence")
+
+    def test_database(self):
+        rospy.wait_for_service("/object_database/get_object", 60.0)
+        database = RosDatabase()
+        with frozen("/object_database"):
+            entry, ids = database.get_object("mug"), database.list_objects()
+            time.sleep(0.4)
+            assert not entry.done() and not ids.done()
+            entry.cancel()
+        assert "mug" in settle(ids), "what was not given up is answered in the end"
+        assert settle(database.get_object("mug"))["mass"] == 0.31
+        assert "elephant" in refused(database.get_object("elephant"), ReasonCode.OBJECT_UNKNOWN).sentence
+
 
 if __name__ == "__main__":
     rospy.init_node("port_contracts")
-    rostest.rosrun("coglab_smach", "port_contracts", PortContracts, sys.argv)
+    rostest.rosrun("coglab_smach", "port_contracts", "__main__", sys.argv)

@@ -100,20 +100,6 @@ def test_a_robot_that_was_never_heard_or_not_for_a_second_is_silent(robot, ask):
     assert "has never been published" in verdict().why and verdict().code == ReasonCode.NODE_SILENT
 
 
-@pytest.mark.parametrize(
-    ("said", "verdict"),
-    [
-        ({"reason": "hold", "reason_code": 7}, Verdict(False, "hold", 7)),
-        ({"reason": "", "hold_latched": True}, Verdict(False, "the LWR interface is in state 'held'", ReasonCode.HELD)),
-        ({"reason": "x"}, Verdict(False, "x", ReasonCode.NONE)),
-    ],
-)
-def test_why_motion_is_not_allowed(robot, said, verdict):
-    well = {"motion_allowed": False, "supervisor": "held", "reason_code": 0, "hold_latched": False}
-    robot.say("lwr/state", **{**well, **said})
-    assert robot.port.motion_allowed() == verdict
-
-
 def test_an_arm_that_moves_does_not_stand(robot):
     robot.say("controller_manager/status", **robot.status(standing=False, state="moving"))
     assert robot.port.standing() == Verdict(False, "the arm is moving") and robot.port.speed_scale() == 0.5
@@ -161,41 +147,6 @@ def test_a_profile_is_settled_when_the_others_are_off(robot):
 
 
 # --- what is asked of it ----------------------------------------------------------------------------------------------
-
-
-def test_services_and_how_long_they_are_waited_for(robot):
-    port = robot.port
-    assert port.load_dmps("f.xml").result() == 5 and port.lwr_command("start").result() == "done"
-    assert port.switch_controller("dmp").result() == "T" and port.apply_profile("x").result() is None
-    assert port.switch_dmp(DmpRequest("p", "f", (1.0, 2.0, 3.0))).result() is None
-    port.execute_dmp(DmpRequest("p", "f", (1.0, 2.0, 3.0)))
-    port.move_ptp((0.1,) * 7, [0.2] * 7)
-    assert ended(port.hold("why")).result() == "done"
-    manager = "controller_manager/"
-    assert [(name, wait) for name, wait, _ in robot.asked] == [
-        (manager + "dmp/load_dmps", 20.0),
-        ("lwr/command", 20.0),
-        (manager + "switch_controller", 5.0),
-        (manager + "feedback/apply_profile", 5.0),
-        (manager + "dmp/switch_dmp", 1.0),
-        (manager + "dmp/execute_dmp", 5.0),
-        (manager + "ptp/add_ptp", 5.0),
-        ("lwr/command", 1.0),
-    ]
-    assert robot.asked[6][2] == {"position": [0.1] * 7, "max_vel": [0.2] * 7, "max_acc": []}
-    assert robot.asked[7][2] == {"event": "hold"} and robot.asked[3][2] == {"names": ["x"], "reason": ""}
-
-
-def test_a_plugin_that_is_loaded_is_not_loaded_again_and_the_limits_are_read(robot):
-    loaded = SimpleNamespace(controller_ids=["dmp"], controller_types=["T"])
-    robot.answers["controller_manager/list_controllers"] = loaded
-    ended(robot.port.load_controller("dmp", "T")).result()
-    assert [name for name, _, _ in robot.asked] == ["controller_manager/list_controllers"]
-    assert robot.port.motion_limits().velocity == (0.7,) * 7
-    for other in (("dmp", "U"), ("ptp", "T")):
-        ended(robot.port.load_controller(*other)).result()
-        assert robot.asked[-1][0] == "controller_manager/load_controller"
-        assert robot.asked[-1][2] == {"controller_id": other[0], "controller_type": other[1]}
 
 
 def test_a_request_has_the_fields_of_its_service():

@@ -4,19 +4,25 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from coglab_msgs.msg import ReasonCode, Say
+from coglab_msgs.msg import ReasonCode
 from coglab_py.pose import Pose, about_z
-from coglab_smach.clocks.virtual_clock import using
-from coglab_smach.context.hand_track import HandTrack
+from coglab_smach.context.grip import Grip
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.interfaces import HandState, Located
 from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states import hand as hands
-from coglab_smach.states import seat, where, yielding
-from coglab_smach.states.hand import CalibrateHand, HandClose, HandTighten, LetGo
-from coglab_smach.states.held import HeldObject
-from coglab_smach.states.where import off_grasp, palm_at, palm_axis, seen_at, way_to_grasp, way_to_hand
-from coglab_smach.states.yielding import GivesWay
+from coglab_smach.states import hand_tracking, regrasp
+from coglab_smach.states.hand import CalibrateHand, HandClose, HandTighten
+from coglab_smach.states.hand_tracking import (
+    off_grasp,
+    palm_at,
+    palm_axis,
+    seen_at,
+    way_to_grasp,
+    way_to_hand,
+)
+from coglab_smach.states.held_object import HeldObject
+from coglab_trials.virtual_clock import using
 from conftest import Trial
 
 HERE = (0.0, 0.5, 0.0, 1.0, 0.0, 0.5, 0.0)
@@ -46,7 +52,7 @@ class Seen:
         state._deadline = 1e9
         with using(self.trial.clock):
             begin = self.trial.clock.now()
-            outcome = state.run(SimpleNamespace(**ud))
+            outcome = state.run(SimpleNamespace(grip=self.trial.grip, **ud))
             return outcome, self.trial.clock.now() - begin
 
 
@@ -60,7 +66,7 @@ def test_a_sight_tells_for_half_a_second(age, known):
     release = {"pose": {"xyz": [0.0, 0.1, 0.0]}}
     with using(seen.trial.clock):
         assert (seen_at(seen.state, "mug") is not None) == known
-        away = where.hand_from_palm(seen.state)
+        away = hand_tracking.hand_from_palm(seen.state)
         assert away == (pytest.approx(0.3) if known else None)
         way = way_to_grasp(seen.state, goal)
         assert (way is not None) == known and (off_grasp(seen.state, goal) is not None) == known
@@ -72,13 +78,8 @@ def test_a_sight_tells_for_half_a_second(age, known):
         assert (way_to_hand(seen.state, "mug", release) is not None) == known
         assert off_grasp(seen.state, {}) is None
         seen.ctx.arm.joint_positions = lambda: None
-        assert where.hand_from_palm(seen.state) is None and way_to_grasp(seen.state, goal) is None
+        assert hand_tracking.hand_from_palm(seen.state) is None and way_to_grasp(seen.state, goal) is None
         assert palm_at(seen.ctx) is None and palm_axis(seen.ctx) is None
-
-
-def test_the_palm_looks_along_its_x_axis():
-    seen = Seen()
-    assert palm_axis(seen.ctx) == pytest.approx(PALM.axis(0)) and palm_at(seen.ctx) == pytest.approx(PALM.position)
 
 
 @pytest.mark.parametrize(
@@ -110,6 +111,7 @@ class Carried:
         see = lambda *_: Ready(  # noqa: E731
             Located("", "world", (position[0], position[1], position[2] - self.down), IDENTITY, self.age)
         )
+        self.grip = Grip(shared=True)
         self.ctx = SimpleNamespace(
             arm=SimpleNamespace(joint_positions=lambda: HERE),
             hand=SimpleNamespace(state=lambda: self.state),
@@ -118,7 +120,7 @@ class Carried:
             holding="mug",
             shared=True,
         )
-        self.held = HeldObject(self.ctx, "mug")
+        self.held = HeldObject(self.ctx, "mug", self.grip)
 
     def gone_after(self, down, looks=60):
         """s after which it is lost, seen so far away every 10 ms; None: it is not."""
@@ -143,19 +145,6 @@ def test_an_object_is_lost_that_is_15_cm_farther_for_three_tenths_of_a_second(fi
     assert gone is None or carried.words == f"it is seen {then:.2f} m from the palm"
 
 
-def test_one_that_is_seen_far_away_at_first_was_lost_before():
-    assert (
-        Carried(0.351).gone_after(0.351) == pytest.approx(0.3, abs=0.011) and Carried(0.345).gone_after(0.345) is None
-    )
-
-
-@pytest.mark.parametrize(("age", "told"), [(0.2, True), (0.21, False)])
-def test_sights_of_what_is_carried_tell_for_a_fifth_of_a_second(age, told):
-    carried = Carried(age=age)
-    carried.held.check()
-    assert carried.held.seen_with_the_hand() == told
-
-
 @pytest.mark.parametrize(
     ("positions", "lost"), [((0, 250, 254, 254, 254), True), ((254, 249, 254, 254, 254), False), ((), False)]
 )
@@ -168,7 +157,7 @@ def test_fingers_at_their_ends_hold_nothing(positions, lost):
         assert error.value.causes == ("the fingers have closed past it",)
     else:
         carried.held.check()
-    assert carried.ctx.holding == ("" if lost else "mug") and carried.ctx.shared is not lost
+    assert carried.ctx.holding == ("" if lost else "mug") and carried.grip.shared is not lost
 
 
 def test_a_hand_says_itself_why_it_holds_nothing():
@@ -195,74 +184,7 @@ def test_an_object_stays_that_a_later_sight_shows_as_far_from_the_palm_as_at_fir
     assert carried.held.stays(0.0) == stays
 
 
-# --- giving way -------------------------------------------------------------------------------------------------------
-
-
-class Pulled:
-    """A GivesWay at the palm of a still arm; ``way``: what was asked of the arm (m, base frame; m/s)."""
-
-    def __init__(self):
-        self.trial, self.palm, self.force = Trial(), np.zeros(3), np.zeros(3)
-        ctx = self.trial.ctx
-        self.moved, self.cancelled, self.done = [], [], False
-        ctx.contact.force = lambda: tuple(self.force)
-        ctx.arm.cancel_motion = lambda why: self.cancelled.append(why) or Ready()
-        self.way = GivesWay(ctx)
-
-    def follow(self, monkeypatch, *newton, seconds=0.0, step=0.01):
-        self.force = np.array(newton)
-        motion = Polled(lambda: self.done, lambda: None)
-        monkeypatch.setattr(yielding, "palm_at", lambda ctx: self.palm)
-        monkeypatch.setattr(yielding, "palm_axis", lambda ctx: np.array([0.0, 0.0, 1.0]))
-        monkeypatch.setattr(yielding, "shift", lambda ctx, way, speed: self.moved.append((way, speed)) or motion)
-        with using(self.trial.clock) as clock:
-            for _ in range(round(seconds / step) + 1):
-                self.way.follow()
-                clock.sleep(step)
-
-
-@pytest.mark.parametrize(
-    ("newton", "seconds", "begins"), [(6.4, 0.5, False), (6.6, 0.03, False), (6.6, 0.06, True), (60.0, 0.03, False)]
-)
-def test_a_pull_of_6_5_newton_for_50_ms_is_given_way_to(monkeypatch, newton, seconds, begins):
-    pulled = Pulled()
-    pulled.follow(monkeypatch, 0.0, newton, 0.0, seconds=seconds)
-    assert bool(pulled.moved) == begins
-    if begins:
-        way, speed = pulled.moved[0]
-        assert way == pytest.approx([0.0, 0.05, 0.0]) and speed == 0.2 and len(pulled.moved) == 1
-
-
-@pytest.mark.parametrize(("newton", "ends"), [(3.1, False), (2.9, True)])
-def test_the_palm_stands_again_below_3_newton(monkeypatch, newton, ends):
-    pulled = Pulled()
-    pulled.follow(monkeypatch, 8.0, 0.0, 0.0, seconds=0.1)
-    pulled.follow(monkeypatch, newton, 0.0, 0.0)
-    assert pulled.cancelled == (["the pull is over"] if ends else []) and pulled.way.idle() == ends
-
-
-def test_it_goes_along_by_5_cm_in_all_and_no_shorter_way_than_5_mm_is_begun(monkeypatch):
-    pulled = Pulled()
-    for gone in (0.03, 0.046):
-        pulled.follow(monkeypatch, 0.0, -8.0, 0.0, seconds=0.1)
-        pulled.palm = np.array([0.0, -gone, 0.0])
-        pulled.follow(monkeypatch, 0.0, 0.0, 0.0)
-    assert [way[1] for way, _ in pulled.moved] == pytest.approx([-0.05, -0.02])
-    pulled.follow(monkeypatch, 0.0, -8.0, 0.0, seconds=0.1)
-    assert len(pulled.moved) == 2, "4 mm are left"
-    pulled.follow(monkeypatch, 0.0, 8.0, 0.0, seconds=0.1)
-    assert pulled.moved[2][0] == pytest.approx([0.0, 0.05, 0.0]), "and back"
-
-
-def test_what_the_state_wants_is_ended_before_the_palm_goes_along(monkeypatch):
-    pulled = Pulled()
-    pulled.way.begin(Polled(lambda: False, lambda: None))
-    pulled.follow(monkeypatch, 8.0, 0.0, 0.0, seconds=0.1)
-    assert pulled.cancelled == ["somebody pulls"] and len(pulled.moved) == 1
-    pulled.way.halt("the weight has come")
-    assert pulled.cancelled == ["somebody pulls"], "a palm that gives way goes on"
-    pulled.way.stop()
-    assert pulled.cancelled[1:] == ["nothing is to be given way to any more"]
+# --- when fingers close -----------------------------------------------------------------------------------------------
 
 
 def tightened(monkeypatch, away, at_home=False, before=0.1, sure=True, **ud):
@@ -270,13 +192,12 @@ def tightened(monkeypatch, away, at_home=False, before=0.1, sure=True, **ud):
     seen, closed, clock = (it := Seen()), [], it.trial.clock
     monkeypatch.setattr(hands, "hand_from_palm", lambda state: away(clock.now()))
     monkeypatch.setattr(hands, "from_palm", lambda state, track, *_: away(clock.now()))
-    seen.ctx.holding, seen.ctx.firm = "mug", 140
-    track = seen.ctx.hand_track = HandTrack()
-    track.is_sure = sure
+    seen.ctx.holding, seen.trial.grip.firm = "mug", 140
+    seen.trial.grip.hand.is_sure = sure
     seen.ctx.hand.close = lambda speed: closed.append(speed) or Polled(lambda: False, lambda: None)
     fields = {} if at_home else {"hand_distance": before, "hand_seen_away": True, **ud}
     outcome, seconds = seen.run(HandTighten(seen.ctx, at_home), **fields)
-    assert outcome == "succeeded" and (seen.ctx.firm == 0) == bool(closed)
+    assert outcome == "succeeded" and (seen.trial.grip.firm == 0) == bool(closed)
     return closed, seconds
 
 
@@ -336,51 +257,10 @@ def test_a_hand_is_given_three_tenths_of_a_second_to_say_that_it_holds(monkeypat
     ud = {"object_id": "mug", "grasp": {"hand": {"mode": "cylindrical", "firm": 140}}}
     seen.ctx.journal.begin_action("x", "mug")
     assert seen.run(HandClose(seen.ctx, True), **ud)[0] == outcome
-    assert (seen.ctx.holding, seen.ctx.shared) == (("mug", True) if outcome == "succeeded" else ("", False))
-
-
-def test_a_hand_that_misses_again_says_where_its_motors_are(monkeypatch):
-    seen = Seen(human_hand=(np.array([0.1, 0.0, 0.0]), 0.0))
-    seen.ctx.hand.close_on_object = lambda: Ready()
-    seen.ctx.hand.state = lambda: HandState(True, True, False, False, "slipped", (0, 254, 254, 254, 254))
-    ud = {"object_id": "mug", "grasp": {"hand": {"mode": "cylindrical"}}}
-    seen.ctx.journal.begin_action("x", "mug")
-    assert seen.run(HandClose(seen.ctx, True), **ud)[0] == "missed" and not seen.ctx.preshaped
-    for from_person in (True, False):
-        with pytest.raises(PortError) as error:
-            seen.run(HandClose(seen.ctx, from_person), **ud)
-        assert (error.value.causes, error.value.code) == (("slipped",), ReasonCode.OBJECT_NOT_SEEN)
-        assert error.value.sentence == "the hand closed on nothing: motors at [0, 254, 254, 254, 254] of 254"
-
-
-@pytest.mark.parametrize(("opened", "draws"), [(39, False), (40, True)])
-def test_the_palm_draws_back_once_a_finger_has_opened_by_40_counts(monkeypatch, opened, draws):
-    seen, moved, said = Seen(), [], []
-    clock, closed = seen.trial.clock, (200, 150, 160, 155, 170)
-    monkeypatch.setattr(hands, "shift", lambda ctx, way, speed: moved.append((clock.now(), way, speed)) or Ready())
-    now = lambda: (closed[0] - 150, *(c - opened * (i == 2) for i, c in enumerate(closed[1:])))  # noqa: E731
-    seen.ctx.hand.state = lambda: HandState(True, positions=now() if clock.now() > 0.1 else closed)
-    seen.ctx.hand.preshape = lambda mode, level: Polled(lambda: clock.now() > 0.8, lambda: None)
-    seen.ctx.say = lambda code, text: said.append((code, clock.now()))
-    seen.ctx.holding, seen.ctx.shared = "mug", True
-    seen.run(LetGo(seen.ctx), grasp={"hand": {"mode": "cylindrical", "level": "low"}})
-    ((when, way, speed),) = moved
-    assert when == pytest.approx(0.11 if draws else 0.81, abs=0.011)
-    assert way == pytest.approx(-0.06 * PALM.axis(0)) and speed == 0.25
-    assert [code for code, _ in said] == [Say.YOU_HAVE_IT] and said[0][1] == pytest.approx(0.81, abs=0.011)
-    assert (seen.ctx.holding, seen.ctx.shared) == ("", False)
+    assert (seen.ctx.holding, seen.trial.grip.shared) == (("mug", True) if outcome == "succeeded" else ("", False))
 
 
 # --- to the grasp -----------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("off", "goes"), [(0.0049, None), (0.0051, 0.0051), (0.05, 0.05), (0.09, 0.05)])
-def test_a_palm_beside_its_grasp_goes_there_by_5_cm_at_most(monkeypatch, off, goes):
-    seen, asked = Seen(), []
-    monkeypatch.setattr(seat, "way_to_grasp", lambda *_: np.array([0.0, 0.0, -off]))
-    monkeypatch.setattr(seat, "shift", lambda ctx, way, speed: asked.append((way, speed)) or Ready())
-    assert seen.run(seat.Seat(seen.ctx), goal={})[0] == "succeeded"
-    assert [(-way[2], speed) for way, speed in asked] == ([] if goes is None else [(pytest.approx(goes), 0.06)])
 
 
 IN_THE_WAY, LATE = "something is in the way", "the way to the grasp within 1.7 s"
@@ -390,9 +270,9 @@ IN_THE_WAY, LATE = "something is in the way", "the way to the grasp within 1.7 s
 def test_the_way_to_the_grasp_ends_where_6_5_newton_push_or_in_time(monkeypatch, newton, arrives, why):
     seen, cancelled = Seen(), []
     clock = seen.trial.clock
-    monkeypatch.setattr(seat, "way_to_grasp", lambda *_: np.array([0.0, 0.0, -0.03]))
-    monkeypatch.setattr(seat, "shift", lambda ctx, way, speed: Polled(lambda: clock.now() > arrives, lambda: None))
+    monkeypatch.setattr(regrasp, "way_to_grasp", lambda *_: np.array([0.0, 0.0, -0.03]))
+    monkeypatch.setattr(regrasp, "shift", lambda ctx, way, speed: Polled(lambda: clock.now() > arrives, lambda: None))
     seen.ctx.contact.force = lambda: (0.0, 0.0, newton)
     seen.ctx.arm.cancel_motion = lambda reason: cancelled.append(reason) or Ready()
-    assert seen.run(seat.Seat(seen.ctx), goal={})[0] == "succeeded"
+    assert seen.run(regrasp.Regrasp(seen.ctx), goal={})[0] == "succeeded"
     assert [reason[: len(why)] for reason in cancelled] == [why] * bool(why)

@@ -9,15 +9,14 @@ from coglab_msgs.msg import ReasonCode
 from coglab_objects.database import objects_folder, parse_object
 from coglab_py.packages import package_path
 from coglab_py.pose import Pose
-from coglab_sim.conditions import Conditions
-from coglab_sim.tracker.tracker import PerceptionSettings
-from coglab_sim.virtual_world import BOARD
 from coglab_smach.context.config import Config
 from coglab_smach.kinematics.board_room import BoardRoom
 from coglab_smach.kinematics.goals import place_goal
 from coglab_smach.ports.pending import Polled
+from coglab_trials.conditions import CONSIDERATE
+from coglab_trials.trial import VirtualTrial
+from coglab_trials.world import BOARD, World
 from conftest import SHARE, Trial
-from virtual_trial import VirtualTrial
 
 CONFIG = Config.load(str(SHARE / "config" / "machines.yaml"), {})
 URDF = package_path("lwr_description", "urdf", "lwr_ih2.urdf").read_text(encoding="utf-8")
@@ -30,7 +29,7 @@ LOW = 0.008
 
 @pytest.fixture(scope="module")
 def room():
-    return BoardRoom(URDF, CONFIG.get("postures.board", []))
+    return BoardRoom(URDF, CONFIG.get("postures.board"))
 
 
 def palm_for(object_id, tilt=(0.0, 0.0), low=0.0):
@@ -97,23 +96,22 @@ def seen_otherwise(trial, tilt, low):
 @pytest.mark.parametrize("tilt", [(0.0, -7.0), (7.0, 0.0)])
 def test_an_object_that_is_seen_tilted_and_low_is_taken_without_running_into_the_board(tilt):
     smach.set_loggers(*[lambda *a: None] * 4)
-    trial = VirtualTrial(seed=8001, object_on="world", profile="accustomed", perfect=True)
+    trial = VirtualTrial(world=World(8001, CONSIDERATE, "world"))
     seen_otherwise(trial, tilt, LOW)
     results = trial.run("take")
     assert [r.outcome for r in results] == ["succeeded"], trial.ctx.journal.why()
-    assert trial.last_hub == "wait_with_object" and trial.rig.cell.truth()["held_by"] == "robot"
+    assert trial.last_hub == "wait_with_object" and trial.world.cell.truth()["held_by"] == "robot"
 
 
 def test_a_wide_object_is_taken_along_its_approach_axis_and_not_from_above():
     smach.set_loggers(*[lambda *a: None] * 4)
-    conditions = Conditions(profile="accustomed", perception=PerceptionSettings(perfect=True), object_id="tea_box")
-    trial = VirtualTrial(seed=8001, object_on="world", conditions=conditions)
+    trial = VirtualTrial(world=World(8001, replace(CONSIDERATE, object_id="tea_box"), "world"))
     assert [r.outcome for r in trial.run("take")] == ["succeeded"], trial.ctx.journal.why()
 
 
 def test_an_object_that_lies_is_refused_before_the_arm_goes_down_to_it():
     smach.set_loggers(*[lambda *a: None] * 4)
-    trial = VirtualTrial(seed=8001, object_on="world", profile="accustomed", perfect=True)
+    trial = VirtualTrial(world=World(8001, CONSIDERATE, "world"))
     seen_otherwise(trial, (0.0, -20.0), 0.02)
     (result,) = trial.run("take")
     assert (result.outcome, result.code) == ("failed_empty", ReasonCode.GOAL_AT_BOARD), trial.ctx.journal.why()

@@ -156,7 +156,7 @@ def test_what_fingers_have_caught_on_the_way_is_not_dropped_where_the_person_has
         if person == "at it":
             at_the_palm(t)
         if person == "away":
-            t.cell._goes = t.clock.now(), np.array([2.0, 0.0, 0.4])
+            t.cell.goes = t.clock.now(), np.array([2.0, 0.0, 0.4])
         if person == "not seen":
             t.cell.faults.not_seen.add("human_hand")
         t.cell.arm.end("goal lost", ReasonCode.GOAL_LOST)
@@ -195,28 +195,6 @@ def test_fingers_that_have_opened_to_come_again_hold_nothing_of_the_persons(monk
     assert "bumped" in trial.result().marks and trial.result().code == ReasonCode.GOAL_LOST
 
 
-def test_stop_ends_a_closing_on_the_way(monkeypatch):
-    trial, closing, cancelled = Trial(), [], []
-    monkeypatch.setattr(reach, "off_grasp", lambda state, goal: 0.02)
-    trial.ctx.hand.close_on_object = lambda: (
-        closing.append(Polled(lambda: False, lambda: None, lambda: cancelled.append(trial.clock.now()))) or closing[-1]
-    )
-    trial.cell.partner.touch_after = 1.5
-
-    def script(t):
-        t.wait_hub("wait_without_object")
-        t.start(RECEIVE)
-        end = t.clock.now() + 20.0
-        while not closing and t.clock.now() < end:
-            t.clock.sleep(0.01)
-        assert closing and not cancelled
-        t.ctx.stop.press("by the test")
-        t.wait_hub("stopped")
-        assert cancelled
-
-    trial.run(script)
-
-
 def test_fingers_that_have_begun_to_close_open_before_a_reach_that_paused_goes_on(monkeypatch):
     """With a fist it would push away what the person offers again."""
     trial, waits = Trial(), []
@@ -226,7 +204,7 @@ def test_fingers_that_have_begun_to_close_open_before_a_reach_that_paused_goes_o
     monkeypatch.setattr(
         reach.ReachWatch,
         "doubted",
-        lambda watch: not waits and trial.ctx.closing is not None and not waits.append(1) or doubted(watch),
+        lambda watch: not waits and trial.grip.closing is not None and not waits.append(1) or doubted(watch),
     )
 
     def script(t):

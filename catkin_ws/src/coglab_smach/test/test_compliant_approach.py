@@ -14,11 +14,6 @@ def handover(t):
     t.wait_hub("wait_without_object")
 
 
-def test_no_profile_is_asked_for_by_default(trial):
-    trial.run(handover)
-    assert trial.cell.called("profile") == []
-
-
 def test_profile_is_on_in_the_reach_and_off_before_release_is_armed():
     """Contact is found while the arm still moves, from forces that a yielding arm has too; release in one at rest."""
     trial = Trial(approach_profile="dmp_compliant")

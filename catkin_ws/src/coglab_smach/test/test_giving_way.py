@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from coglab_smach.kinematics.reachability import default_arm
-from coglab_smach.states.where import palm_axis
-from coglab_smach.states.yielding import GivesWay
+from coglab_smach.states.hand_tracking import palm_axis
+from coglab_smach.states.yield_to_pull import YieldToPull
 from conftest import Trial
 
 RECEIVE = "exchange_human_to_robot"
@@ -97,7 +97,7 @@ def test_a_short_jolt_is_no_pull():
 def test_what_hangs_on_the_palm_or_lifts_it_is_no_pull(weight):
     trial = Trial()
     trial.cell.pulled = (4.0, 3.0, weight)
-    pull = GivesWay(trial.ctx).pull()
+    pull = YieldToPull(trial.ctx).pull()
     assert pull[2] == 0.0 and np.linalg.norm(pull) <= 5.0
 
 
@@ -105,9 +105,9 @@ def test_who_presses_into_the_palm_gives_and_does_not_pull():
     trial = Trial()
     outward = palm_axis(trial.ctx)
     trial.cell.pulled = tuple(-12.0 * outward)
-    assert np.linalg.norm(GivesWay(trial.ctx).pull()) < 1e-6
+    assert np.linalg.norm(YieldToPull(trial.ctx).pull()) < 1e-6
     trial.cell.pulled = tuple(12.0 * outward)
-    assert np.linalg.norm(GivesWay(trial.ctx).pull()) == pytest.approx(12.0 * np.linalg.norm(outward[:2]))
+    assert np.linalg.norm(YieldToPull(trial.ctx).pull()) == pytest.approx(12.0 * np.linalg.norm(outward[:2]))
 
 
 def test_nothing_is_given_way_to_where_the_detector_does_not_tell():

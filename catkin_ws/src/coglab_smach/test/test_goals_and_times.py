@@ -10,11 +10,17 @@ from coglab_py.packages import package_path
 from coglab_py.pose import Pose, about_z
 from coglab_smach.kinematics import board_room, reachability
 from coglab_smach.kinematics.board_room import BoardRoom
-from coglab_smach.kinematics.goals import approach_of, delivery_goal, grasp_goal, palm_at_grasp, place_goal
-from coglab_smach.kinematics.grasp_choice import cost, ranked
-from coglab_smach.kinematics.manager_limits import read_limits
-from coglab_smach.kinematics.motion_time import MotionLimits, hand_path, ptp_time, reach_time
-from coglab_smach.kinematics.reachability import default_arm, home_posture, reachability_report, share_reached, solve
+from coglab_smach.kinematics.goals import (
+    approach_of,
+    cost,
+    delivery_goal,
+    grasp_goal,
+    palm_at_grasp,
+    place_goal,
+    ranked,
+)
+from coglab_smach.kinematics.motion_time import MotionLimits, hand_path, ptp_time, reach_time, read_limits
+from coglab_smach.kinematics.reachability import default_arm, home_posture, solve
 
 GRASP = {
     "hand": {"mode": "cylindrical", "level": "low"},
@@ -150,30 +156,6 @@ def test_a_posture_is_within_3_mm_3_degrees_and_the_joints_ranges():
     assert solve(arm, Pose([2.0, 0.0, 0.0], here.orientation)) is None
 
 
-def test_the_region_has_27_places_for_each_turn(monkeypatch):
-    asked = []
-    monkeypatch.setattr(reachability, "solve", lambda arm, target: asked.append(target) or (len(asked) % 3 or None))
-    palm = Pose(np.array([0.0, 0.1, 0.0]))
-    assert share_reached(palm, arm="any") == (54, 81)
-    angles = {round(math.degrees(each.rotation.as_rotvec()[2]), 3) for each in asked}
-    objects = np.array([(each * palm.inverse()).position for each in asked])
-    assert angles == {-20.0, 0.0, 20.0}
-    assert [objects[:, i].min() for i in range(3)] == pytest.approx([0.72, -0.12, 0.28])
-    assert [objects[:, i].max() for i in range(3)] == pytest.approx([0.82, 0.12, 0.45])
-    assert objects.mean(axis=0) == pytest.approx([(0.72 + 0.78 + 0.82) / 3, 0.0, (0.28 + 0.38 + 0.45) / 3])
-    asked.clear()
-    assert share_reached(palm, arm="any", yaws_deg=(0.0,)) == (18, 27)
-
-
-@pytest.mark.parametrize(("reached", "good"), [(18, False), (19, True), (27, True)])
-def test_a_grasp_is_good_that_reaches_seven_tenths_of_the_places(monkeypatch, reached, good):
-    turns = []
-    monkeypatch.setattr(reachability, "share_reached", lambda palm, yaws_deg: turns.append(yaws_deg) or (reached, 27))
-    ((line, ok),) = reachability_report(ENTRY)
-    assert ok == good and turns == [(0.0,)]
-    assert line.startswith(f"grasp 'side': {reached} of 27 places") and ("at least 70%" in line) == (not good)
-
-
 # --- the board --------------------------------------------------------------------------------------------------------
 
 
@@ -197,28 +179,6 @@ def test_the_lowest_point_of_plain_shapes():
     assert solid('<geometry><mesh filename="hand.stl"/></geometry>') is None
 
 
-def test_a_palm_is_raised_five_times_at_most_and_by_no_more_than_allowed(monkeypatch):
-    room = BoardRoom.__new__(BoardRoom)
-    board, palm = Pose(np.array([0.0, 0.0, 0.5])), Pose(np.array([0.3, 0.0, 0.5]))
-    asked = []
-
-    def over(share):
-        """Room of which each rise wins so much."""
-        return lambda board, now: asked.append(now.position[2]) or share * (now.position[2] - palm.position[2])
-
-    monkeypatch.setattr(room, "over", over(0.5), raising=False)
-    lift, raised = room.raised(board, palm, 0.01, 0.1)
-    # 10, 15, 17.5, 18.75 mm: half of what is missing each time, and after the fifth look it is not enough.
-    assert raised is None and lift == pytest.approx(0.019375) and len(asked) == 5
-    monkeypatch.setattr(room, "over", over(0.99), raising=False)
-    lift, raised = room.raised(board, palm, 0.01, 0.1)
-    assert lift == pytest.approx(0.01) and raised.position == pytest.approx([0.3, 0.0, 0.51]), "0.1 mm may be missing"
-    assert room.raised(board, palm, 0.01, 0.0101)[1] is not None and room.raised(board, palm, 0.01, 0.0099)[1] is None
-    monkeypatch.setattr(room, "over", lambda board, now: 0.0101, raising=False)
-    lift, raised = room.raised(board, palm, 0.01, 0.1)
-    assert lift == 0.0 and raised.position == pytest.approx(palm.position)
-
-
 def test_room_is_that_of_the_arm_from_the_elbow_on(monkeypatch):
     """The shoulder stands beside the board and may be below its plane."""
     urdf = package_path("lwr_description", "urdf", "lwr_ih2.urdf").read_text(encoding="utf-8")
@@ -237,8 +197,3 @@ def test_room_is_that_of_the_arm_from_the_elbow_on(monkeypatch):
     monkeypatch.undo()
     upside = Pose(board.position, np.array([1.0, 0.0, 0.0, 0.0]))
     assert room.over(upside, palm) < -1.0, "its z axis is up"
-
-
-def test_nobody_changes_the_home_posture_of_all():
-    with pytest.raises(ValueError, match="read-only"):
-        reachability.home_posture()[0] = 1.0

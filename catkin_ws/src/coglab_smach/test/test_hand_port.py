@@ -115,14 +115,6 @@ def test_a_hand_that_was_never_heard_is_silent(node):
     assert node.port.state() == state
 
 
-def test_what_the_hand_says_is_passed_on(node):
-    node.say(calibrated=True, holding=True, message="slips", event_code=ReasonCode.HAND_REFUSED)
-    positions = (0, 10, 20, 30, 40)
-    assert node.port.state() == HandState(True, True, False, True, "slips", positions, ReasonCode.HAND_REFUSED)
-    node.say(connected=False, calibrating=True)
-    assert node.port.state() == HandState(False, False, True, False, "", positions, 0)
-
-
 def test_what_it_has_said_counts_for_one_second(node):
     node.say(calibrated=True, holding=True)
     node.now += 1.0
@@ -136,25 +128,6 @@ def test_what_it_has_said_counts_for_one_second(node):
 
 
 # --- actions ----------------------------------------------------------------------------------------------------------
-
-
-def test_goals_go_to_their_actions(node):
-    pending = [
-        node.port.preshape("cylindrical", "large"),
-        node.port.close_on_object(),
-        node.port.close(200),
-        node.port.open(300),
-    ]
-    goal = node.client("hand_preshape").goals[0]
-    assert (goal.mode, goal.level) == ("cylindrical", "large")
-    assert len(node.client("hand_preshape_close").goals) == 1
-    assert node.client("hand_close").goals[0].speed == 200 and node.client("hand_open").goals[0].speed == 300
-    assert {client.name for client in node.port._clients.values()} == {
-        f"right_hand/hand_{name}" for name in ("open", "close", "preshape", "preshape_close")
-    }
-    assert not any(call.done() for call in pending)
-    pending[3].cancel()
-    assert [node.client(f"hand_{name}").handles[0].cancelled for name in ("open", "close")] == [1, 0]
 
 
 def test_goal_that_ends_while_it_is_sent_is_done(node):
@@ -239,16 +212,6 @@ def test_a_hand_that_holds_is_given_two_seconds_to_be_empty(node):
     assert not calibration.done() and node.orders == ["fast", "slow"]
 
 
-def test_a_calibration_that_succeeds(node):
-    calibration = asked(node)
-    node.say(0.1, calibrating=True)
-    assert not calibration.done()
-    node.say(6.0, calibrating=True)
-    assert not calibration.done()
-    node.say(0.1, calibrated=True)
-    assert calibration.done() and calibration.result() is None
-
-
 def test_one_that_was_over_before_it_was_seen(node):
     calibration = asked(node)
     node.say(0.5, calibrated=True)
@@ -278,26 +241,12 @@ def test_one_that_the_hand_refuses(node):
         refused(calibration, ReasonCode.HAND_REFUSED)
 
 
-def test_another_event_is_no_refusal(node):
-    calibration = asked(node)
-    node.say(0.4, event_code=ReasonCode.HAND_NOT_CALIBRATED)
-    assert not calibration.done()
-
-
 def test_one_that_hand_status_says_nothing_about(node):
     calibration = asked(node)
     node.say(3.0)
     assert not calibration.done()
     node.say(0.01)
     assert refused(calibration, ReasonCode.NODE_SILENT).causes == ("hand_status says nothing about it",)
-
-
-def test_a_node_that_dies_before_it_begins_to_calibrate(node):
-    calibration = asked(node)
-    node.now += 3.0
-    assert not calibration.done()
-    node.now += 0.01
-    assert refused(calibration, ReasonCode.NODE_SILENT).causes == ("right_hand/hand_status is silent",)
 
 
 def test_a_node_that_dies_while_it_calibrates(node):

@@ -232,14 +232,6 @@ def test_a_note_about_an_object_that_is_gone_is_not_believed(noted):
     assert trial.ctx.holding == ""
 
 
-def test_a_broken_note_is_an_unknown_object(tmp_path):
-    path = tmp_path / "holding.json"
-    path.write_text("{")
-    warnings = []
-    assert HoldingMemory(str(path), warnings.append).recall() == ""
-    assert len(warnings) == 1 and "cannot be read" in warnings[0]
-
-
 def test_an_object_that_was_taken_away_ends_in_the_hub_without():
     trial = Trial()
 

@@ -1,16 +1,14 @@
 """When a person has let go, and when not: who it was, and what became of the object."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
-from coglab_msgs.msg import ReasonCode, Say
-from coglab_smach.clocks.virtual_clock import using
-from coglab_smach.context.hand_track import HandTrack
+from coglab_msgs.msg import ReasonCode
 from coglab_smach.ports.interfaces import Located, Verdict
-from coglab_smach.ports.pending import Polled, PortError, Ready
-from coglab_smach.states import hand, weight
+from coglab_smach.ports.pending import Polled, PortError
+from coglab_smach.states import weight
 from coglab_smach.states.base import TimeLimit
+from coglab_smach.states.hand_tracking import HandTrack
+from coglab_trials.virtual_clock import using
 from conftest import Trial
 from test_weight_and_recovery import RECEIVE, Lifted
 
@@ -144,21 +142,3 @@ def test_what_the_brain_waits_for_is_told_all_the_while_and_no_look_beside_it():
 
     trial.run(script)
     assert set(told) == {"the person's letting go"}, set(told)
-
-
-@pytest.mark.parametrize(("way", "here"), [(0.0, True), (0.06, False)])
-def test_the_palm_stays_where_no_way_back_is_asked_for_or_the_arm_does_not_say_where_it_is(monkeypatch, way, here):
-    trial, moved, said = Trial(), [], []
-    ctx, trial.cell.calibrated = trial.ctx, True
-    monkeypatch.setattr(hand, "shift", lambda *order: moved.append(order) or Ready())
-    ctx.config.set("give.draw_back", way)
-    if not here:
-        ctx.arm.joint_positions = lambda: None
-    ctx.say = lambda code, text: said.append(code)
-    ctx.holding, ctx.shared = "mug", True
-    state = hand.LetGo(ctx)
-    state._deadline = 1e9
-    with using(trial.clock):
-        outcome = state.run(SimpleNamespace(grasp={"hand": {"mode": "cylindrical", "level": "low"}}))
-    assert (outcome, moved, said) == ("succeeded", [], [Say.YOU_HAVE_IT])
-    assert (ctx.holding, ctx.shared) == ("", False)

@@ -5,12 +5,10 @@ import math
 import re
 
 import pytest
-from coglab_msgs.msg import MasterState as Message
 from coglab_msgs.msg import ReasonCode
 from coglab_smach.context.journal import Journal, Wait
-from coglab_smach.context.master_state import MasterState, StateWatch
-from coglab_smach.context.requests import Answer
-from coglab_smach.context.trigger import ask_for
+from coglab_smach.context.master_state import StateWatch
+from coglab_smach.context.requests import Answer, ask_for
 from coglab_smach.ports.pending import PortError
 from conftest import Trial
 
@@ -27,17 +25,6 @@ class Watched(Trial):
 
     def ask(self, action, object_id=""):
         return ask_for(self.ctx, action, object_id)
-
-
-def test_the_fields_are_those_of_the_message():
-    assert set(MasterState.__dataclass_fields__) == set(Message.__slots__) - {"header"}
-
-
-def test_the_newest_is_told_again_for_who_looks_on():
-    trial = Watched()
-    before = list(trial.shown)
-    trial.watch.tell_again()
-    assert trial.shown == [*before, before[-1]]
 
 
 def test_why_is_told_until_the_operator_has_answered():
@@ -153,21 +140,6 @@ def test_a_failure_is_told_until_the_next_success():
     assert failed.to_dict()["reason_code"] == ReasonCode.OBJECT_NOT_SEEN and json.dumps(failed.to_dict())
     codes = {r.code for r in trial.ctx.journal.transitions if r.outcome in ("failed", "failed_empty")}
     assert codes == {ReasonCode.OBJECT_NOT_SEEN}
-
-
-def test_fault_says_how_to_go_on():
-    trial = Watched()
-    trial.cell.faults.refuse["load_dmps"] = "library.xml:3: <weights> has 14 numbers, expected 15"
-
-    def script(t):
-        t.wait_hub("fault")
-        assert t.shown[-1].why.endswith("expected 15; to go on type: ./coglab start initialise")
-        t.cell.faults.refuse.clear()
-        assert t.ask("initialise").ok
-        t.wait_hub("wait_without_object")
-        assert t.shown[-1].why == ""
-
-    trial.run(script)
 
 
 def test_an_object_that_does_not_exist_is_refused_by_name():

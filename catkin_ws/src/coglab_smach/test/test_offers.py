@@ -4,24 +4,21 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from coglab_msgs.msg import ReasonCode, Say
-from coglab_py.pose import Pose
-from coglab_smach.clocks.virtual_clock import using
+from coglab_msgs.msg import ReasonCode
 from coglab_smach.ports.interfaces import Ahead, Located
-from coglab_smach.ports.pending import Polled, PortError, Ready
-from coglab_smach.states import hub, knowledge
+from coglab_smach.ports.pending import PortError, Ready
+from coglab_smach.states import hub
 from coglab_smach.states.base import CoglabState
+from coglab_smach.states.hand_tracking import HandoverRegion, unless_withdrawn
 from coglab_smach.states.knowledge import (
     await_offer,
     believed,
     first_reachable,
     locate,
-    off_the_board,
     paced,
     palm_of,
-    refused_as,
 )
-from coglab_smach.states.region import HandoverRegion, unless_withdrawn
+from coglab_trials.virtual_clock import using
 from conftest import Trial
 
 GOAL = {"frame": "", "offset": [0.0, 0.0, 0.0], "orientation": [0.0, 0.0, 0.0, 1.0], "primitive": "p", "dmp_ratio": 2.0}
@@ -69,17 +66,6 @@ def test_the_region_counts_to_its_walls_and_a_still_object_a_tenth_of_a_metre_be
         assert error.value.code == ReasonCode.OBJECT_NOT_SEEN
         where = ", ".join(f"{v:.2f}" for v in place)
         assert error.value.sentence.startswith(f"'mug' was not offered within 8 s: it stayed at ({where}) m")
-
-
-@pytest.mark.parametrize(("speed", "still"), [(0.05, True), (0.09, False)])
-def test_still_is_what_goes_less_than_25_mm_in_the_last_third_of_a_second(speed, still):
-    offers = Offers(lambda t: (0.9, -0.3 + speed * (t % 4.0), 0.4))
-    if still:
-        assert offers.wait()[1] < 0.4
-    else:
-        with pytest.raises(PortError):
-            offers.wait()
-        assert 8.0 < offers.trial.clock.now() < 8.1
 
 
 def test_an_offer_lasts_for_start_after_from_when_it_is_one():
@@ -170,21 +156,6 @@ def test_a_sight_for_a_goal_is_half_a_second_old_at_most(age, good):
     assert offers.asked == ("mug", 5.0)
 
 
-def test_a_silent_perception_is_waited_for_a_second_longer_than_it_was_asked_to_look():
-    offers = Offers()
-    offers.ctx.perception.locate_object = lambda *_: Polled(lambda: False, lambda: None)
-    with using(offers.trial.clock), pytest.raises(PortError):
-        locate(offers.state, "mug")
-    assert offers.trial.clock.now() == pytest.approx(6.0, abs=0.03)
-
-
-def test_a_refusal_without_a_code_gets_one():
-    for own, told in ((0, ReasonCode.OBJECT_UNKNOWN), (ReasonCode.HELD, ReasonCode.HELD)):
-        with pytest.raises(PortError) as error, refused_as(ReasonCode.OBJECT_UNKNOWN):
-            raise PortError("no", code=own)
-        assert error.value.code == told
-
-
 # --- limits of a reach ------------------------------------------------------------------------------------------------
 
 
@@ -199,13 +170,6 @@ def test_a_goal_may_not_leave_the_region_nor_go_back_by_10_cm_nor_fall_by_8():
     assert hand["limits"]["goal_drop"] == 0.0 and "watch" in hand and hand["primitive"] == "p"
 
 
-def test_what_was_held_still_outside_may_go_no_farther_than_that_counts():
-    for outside in ((0.93, 0.0, 0.4), (0.6, -0.55, 0.4)):
-        limits = unless_withdrawn(Offers().ctx, {**GOAL, "frame": "object_mug", "place": outside})["limits"]
-        assert limits["goal_region_low"] == pytest.approx([0.35, -0.60, -0.05])
-        assert limits["goal_region_high"] == pytest.approx([0.96, 0.60, 0.95])
-
-
 def test_a_goal_that_is_predicted_has_to_lie_in_the_region_and_is_watched_further_by_the_state():
     early = unless_withdrawn(Offers().ctx, {**GOAL, "frame": "object_mug_ahead", "place": INSIDE}, 0.1)
     limits = early["limits"]
@@ -213,11 +177,6 @@ def test_a_goal_that_is_predicted_has_to_lie_in_the_region_and_is_watched_furthe
     assert limits["goal_region_high"] == pytest.approx([0.96, 0.60, 0.95])
     assert (limits["goal_retreat"], limits["goal_drop"]) == (0.0, 0.0)
     assert early["watch"] == {"retreat": 0.10, "drop": 0.08, "margin": 0.1}
-
-
-def test_a_region_without_a_configuration_is_what_the_arm_can_reach():
-    region = HandoverRegion(SimpleNamespace(config={}))
-    assert (region.low.tolist(), region.high.tolist()) == ([-1.0, -1.0, -1.0], [1.5, 1.0, 2.0])
 
 
 def test_a_reach_has_the_pace_of_the_timing_and_arrives_slowly():
@@ -236,81 +195,6 @@ def test_the_first_goal_with_a_posture_is_taken_where_it_is_checked():
     assert palm_of(seen, goals[2]).position == pytest.approx([1.6, 0.0, 0.4])
     offers.ctx.config.set("handover.check_reach", False)
     assert first_reachable(offers.ctx, seen, goals)["offset"][0] == 0.1
-
-
-@pytest.mark.parametrize(("answer", "raised"), [(0.0, 0.0), (0.02, 0.02), (None, None)])
-def test_a_goal_at_the_board_is_raised_in_the_boards_own_frame(answer, raised):
-    board = (0.5, 0.0, 0.1)
-    offers, asked = Offers(lambda t: board), []
-
-    def ask(at, palm, room, most):
-        asked.append((palm.position, room, most))
-        return (0.05, None) if answer is None else (answer, Pose(palm.position + [0, 0, answer], palm.orientation))
-
-    offers.ctx.raised = ask
-    goal = {**GOAL, "offset": [0.0, 0.0, 0.2]}
-    with using(offers.trial.clock):
-        if answer is None:
-            with pytest.raises(PortError) as error:
-                off_the_board(offers.state, goal)
-            assert "would have to rise by at least 50 mm to keep 10 mm off it, expected at most 30 mm" in str(
-                error.value
-            )
-        else:
-            assert off_the_board(offers.state, goal)["offset"] == pytest.approx([0.0, 0.0, 0.2 + raised])
-            assert offers.state.reason == ("" if raised == 0.0 else "raised by 20.0 mm, off the board")
-    assert asked[0][0] == pytest.approx([0.5, 0.0, 0.3]) and asked[0][1:] == (0.01, 0.03)
-    assert offers.asked[0] == "board"
-
-
-def test_sights_of_an_object_on_the_board_are_averaged():
-    offers = Offers(lambda t: (0.5 + 0.01 * round(t / 0.08), 0.0, 0.1))
-    looks, locate_object = [], offers.ctx.perception.locate_object
-    offers.ctx.perception.locate_object = lambda name, limit: looks.append(name) or locate_object(name, limit)
-    state, ud = knowledge.LocateOnBoard(offers.ctx), SimpleNamespace(object_id="mug")
-    state._deadline = 1e9
-    with using(offers.trial.clock):
-        assert state.run(ud) == "succeeded"
-    assert looks == ["board", *["mug"] * 10] and offers.trial.clock.now() == pytest.approx(9 * 0.08)
-    assert ud.located["xyz"] == pytest.approx([0.045, 0.0, 0.0]) and ud.located["frame"] == "object_board"
-
-
-def test_goals_of_the_board_keep_12_mm_clear_and_come_along_the_approach_axis():
-    trial, found = Trial(), {}
-
-    def script(t):
-        t.wait_hub("wait_without_object")
-        execute = t.ctx.arm.execute_dmp
-        t.ctx.arm.execute_dmp = lambda request: found.setdefault(request.primitive_id, request) and execute(request)
-        for action, hub_after in (("take", "wait_with_object"), ("put", "wait_without_object")):
-            t.start(action)
-            t.wait_hub(hub_after)
-
-    trial.run(script)
-    assert found["take_board"].goal_approach == pytest.approx([0.0, 0.05, 0.0])
-    assert list(found["put_board"].goal_approach) == [0.0] * 3 and found["put_board"].arrival_speed == 0.0
-    assert found["take_board"].orientation_control and found["take_board"].dmp_ratio == 1.0
-
-
-def test_what_is_said_to_the_person_before_a_handover():
-    trial, said = Trial(), []
-    trial.ctx.say = lambda code, text: said.append((code, text))
-
-    def script(t):
-        for action, hub_after in (
-            ("exchange_human_to_robot", "wait_with_object"),
-            ("exchange_robot_to_human", "wait_without_object"),
-        ):
-            t.until(t.ctx.requests.hub)
-            t.start(action)
-            t.wait_hub(hub_after)
-
-    trial.run(script)
-    assert [code for code, _ in said] == [Say.READY_TO_RECEIVE, Say.I_HAVE_IT, Say.READY_TO_GIVE, Say.YOU_HAVE_IT]
-    request = trial.master.get_children()["exchange_human_to_robot"].userdata.goal
-    assert request["approach"] == pytest.approx([0.0, 0.05, 0.0]) and request["arrival_speed"] == 0.05
-    assert request["offset"] == pytest.approx([0.0, -0.04, 0.07]), "no standoff"
-    assert request["object"]["frame"] == "object_mug"
 
 
 # --- hubs -------------------------------------------------------------------------------------------------------------
@@ -334,33 +218,3 @@ def test_a_hub_is_left_on_a_belief_of_nine_tenths_that_was_below_a_tenth_before(
     trial.ctx.perception.ahead = lambda: Ahead(0.0, 0.95, "")
     state._watch_partner()
     assert trial.ctx.requests.take() is None, "this hub does not give"
-
-
-@pytest.mark.parametrize(("there", "waited", "end"), [(True, 0.5, None), (True, 0.51, "stopped")])
-def test_an_arm_is_blocked_after_half_a_second(there, waited, end):
-    trial = Trial()
-    state = hub.Hub(trial.ctx, ["take"], False)
-    trial.cell.arm.held = True
-    with using(trial.clock) as clock:
-        assert not state._blocked()
-        clock.sleep(waited)
-        assert state._blocked() == (end is not None)
-        assert end is None or state._code == ReasonCode.HELD
-        trial.cell.arm.held, trial.cell.arm.enabled = False, True
-        assert not state._blocked() and state._blocked_since is None
-
-
-@pytest.mark.parametrize(("waited", "silent"), [(2.0, False), (2.05, True)])
-def test_a_robot_that_says_nothing_for_two_seconds_is_silent(waited, silent):
-    trial = Trial()
-    state = hub.Hub(trial.ctx, ["take"], False)
-    trial.cell.faults.dead.add("arm")
-    with using(trial.clock) as clock:
-        assert not state._blocked()
-        clock.sleep(waited)
-        if not silent:
-            assert not state._blocked()
-            return
-        with pytest.raises(PortError) as error:
-            state._blocked()
-        assert error.value.code == ReasonCode.NODE_SILENT

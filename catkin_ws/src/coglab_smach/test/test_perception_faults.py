@@ -12,11 +12,11 @@ from coglab_py.packages import package_path
 from coglab_py.pose import Pose
 from coglab_sim.tracker.tracker import Board, PerceptionSettings
 from coglab_sim.tracker.vision import NotSeen, Vision
-from coglab_sim.virtual_world import BOARD
 from coglab_smach.ports.interfaces import Located
 from coglab_smach.ports.pending import Polled, PortError, Ready
-from misbehaviours import GIVE, RECEIVE
-from virtual_trial import VirtualTrial
+from coglab_trials import GIVE, RECEIVE, Conditions, VirtualTrial
+from coglab_trials.conditions import CONSIDERATE
+from coglab_trials.world import BOARD
 
 NAMES = FrameNames("world", "human_hand", "board", "object_{id}")
 BESIDE, BEHIND = np.array([1.05, 0.45, 0.35]), np.array([1.75, 0.6, 0.35])
@@ -97,18 +97,18 @@ class VisionPort:
 def two_people(seed, margin, other, **overrides):
     """A trial as shipped whose perception sees the partner and somebody else at ``other(t)``; None: nobody else."""
     recogniser = Recogniser(*load_patterns(PATTERNS))
-    trial = VirtualTrial(seed=seed, profile="accustomed", perfect=True, recogniser=recogniser, **overrides)
+    trial = VirtualTrial(seed, CONSIDERATE, recogniser=recogniser, settings=overrides)
     trial.perception = trial.ctx.perception
     vision = Vision(
         NAMES,
         PerceptionSettings(perfect=True),
         Board(BOARD, {"A1": np.zeros(3)}),
         seed,
-        lambda: trial.rig.t,
+        lambda: trial.world.t,
         margin,
     )
     shared = SharedTracker(vision, other)
-    trial.rig.trackers = {name: shared.of(name) for name in ("object_mug", "human_hand")}
+    trial.world.trackers = {name: shared.of(name) for name in ("object_mug", "human_hand")}
     trial.ctx.perception = VisionPort(trial, vision)
     return trial
 
@@ -129,8 +129,8 @@ def test_the_partner_among_two_is_served_and_served_only(seed):
     trial = two_people(seed, 0.3, lambda t: BEHIND + [0.0, 0.5 * np.sin(0.8 * t), 0.0])
     results = trial.run(RECEIVE, GIVE)
     assert [r.outcome for r in results] == ["succeeded", "succeeded"], [r.reason for r in results]
-    assert trial.rig.cell.truth()["held_by"] == "human"
-    assert trial.rig.robot.limit_violations == 0
+    assert trial.world.cell.truth()["held_by"] == "human"
+    assert trial.world.robot.limit_violations == 0
 
 
 def test_the_other_hand_of_the_person_who_gives_is_nobody_elses():
@@ -138,13 +138,13 @@ def test_the_other_hand_of_the_person_who_gives_is_nobody_elses():
     trial = two_people(1, 0.2, lambda t: np.array([1.35, 0.55, 0.1]))
     results = trial.run(RECEIVE)
     assert results[0].outcome == "succeeded", [results[0].reason, *results[0].causes]
-    assert trial.rig.cell.truth()["held_by"] == "robot"
+    assert trial.world.cell.truth()["held_by"] == "robot"
 
 
 def test_two_hands_of_one_person_that_come_together_are_not_told_apart():
     """The other one comes along 0.15 m beside the hand that gives: nobody can say which gives, and the action ends with
     the sentence, before the arm has closed on either."""
-    trial = two_people(1, 0.2, lambda t: np.asarray(trial.rig.truth["human_hand"]["position"]) + [0.0, 0.15, 0.0])
+    trial = two_people(1, 0.2, lambda t: np.asarray(trial.world.truth["human_hand"]["position"]) + [0.0, 0.15, 0.0])
     results = trial.run(RECEIVE)
     assert results[0].outcome == "failed_empty"
     assert SENTENCE in " ".join([results[0].reason, *results[0].causes])
@@ -163,7 +163,7 @@ def comes_along(found, begun, stays=np.inf, beside=(0.0, 0.15, 0.0)):
             there.append(t)
         if not there or t - there[0] > stays:
             return None
-        return np.asarray(found[0].rig.truth["human_hand"]["position"]) + beside
+        return np.asarray(found[0].world.truth["human_hand"]["position"]) + beside
 
     return at
 
@@ -171,7 +171,7 @@ def comes_along(found, begun, stays=np.inf, beside=(0.0, 0.15, 0.0)):
 def joined(direction, seed=1, margin=0.0, stays=np.inf, beside=(0.0, 0.15, 0.0), **overrides):
     """A trial in which a second hand comes as soon as the arm reaches in this direction."""
     found = []
-    reaches = lambda: found[0]._reach is not None and found[0].begun[-1:] == [direction]  # noqa: E731
+    reaches = lambda: found[0].reach is not None and found[0].begun[-1:] == [direction]  # noqa: E731
     trial = two_people(seed, margin, comes_along(found, reaches, stays, beside), **overrides)
     found.append(trial)
     return trial
@@ -186,8 +186,8 @@ def test_a_reach_on_a_belief_ends_where_a_second_hand_comes_beside_the_first():
     assert trial.reaches[0].request.goal_frame == "object_mug_ahead"
     assert result.code == ReasonCode.NOT_PERCEIVED and SENTENCE in " ".join([result.reason, *result.causes])
     assert result.marks["paused"] < result.marks["motion_started"] + 1.0, "before it was there"
-    assert "contact" not in result.marks and trial.rig.cell.truth()["held_by"] == "human"
-    assert trial.rig.robot.limit_violations == 0
+    assert "contact" not in result.marks and trial.world.cell.truth()["held_by"] == "human"
+    assert trial.world.robot.limit_violations == 0
 
 
 def test_nor_is_anything_given_to_one_of_two():
@@ -197,7 +197,7 @@ def test_nor_is_anything_given_to_one_of_two():
     assert [r.outcome for r in results] == ["succeeded", "failed_holding"], [r.reason for r in results]
     assert results[1].code == ReasonCode.NOT_PERCEIVED and "paused" in results[1].marks
     assert SENTENCE in " ".join([results[1].reason, *results[1].causes])
-    assert trial.rig.cell.truth()["held_by"] == "robot" and trial.last_hub == "wait_with_object"
+    assert trial.world.cell.truth()["held_by"] == "robot" and trial.last_hub == "wait_with_object"
 
 
 @pytest.mark.parametrize("direction", [RECEIVE, GIVE])
@@ -207,7 +207,7 @@ def test_the_reach_goes_on_once_the_second_hand_has_gone(direction):
     results = trial.run(RECEIVE, GIVE)
     assert [r.outcome for r in results] == ["succeeded", "succeeded"], [r.reason for r in results]
     assert ["paused" in r.marks for r in results] == [direction == RECEIVE, direction == GIVE]
-    assert trial.rig.cell.truth()["held_by"] == "human" and trial.rig.robot.limit_violations == 0
+    assert trial.world.cell.truth()["held_by"] == "human" and trial.world.robot.limit_violations == 0
 
 
 @pytest.mark.parametrize("direction", [RECEIVE, GIVE])
@@ -218,7 +218,7 @@ def test_a_second_hand_that_is_taken_for_the_first_misleads_nobody(direction, st
     trial = joined(direction, margin=0.1, stays=stays, beside=(-0.3, 0.3, 0.0))
     results = trial.run(RECEIVE, GIVE)
     assert [r.outcome for r in results] == ["succeeded", "succeeded"], [r.reason for r in results]
-    assert trial.rig.cell.truth()["held_by"] == "human" and trial.rig.robot.limit_violations == 0
+    assert trial.world.cell.truth()["held_by"] == "human" and trial.world.robot.limit_violations == 0
 
 
 def test_a_second_hand_that_comes_beside_the_first_during_the_reach():
@@ -228,12 +228,12 @@ def test_a_second_hand_that_comes_beside_the_first_during_the_reach():
     levels, preshape = set(), trial.ctx.hand.preshape
     trial.ctx.hand.preshape = lambda mode, level: levels.add(level) or preshape(mode, level)
     result = trial.run(RECEIVE)[0]
-    truth = trial.rig.cell.truth()
+    truth = trial.world.cell.truth()
     assert result.outcome == "succeeded" and truth["held_by"] == "robot" and trial.last_hub == "wait_with_object"
     # Whose fingers were at the object is not known: it is held firmly once the arm is at home.
     states = [move.from_state for move in trial.ctx.journal.transitions if move.outcome == "succeeded"]
     assert result.marks["tightened"] > result.ended - 0.5 and "tighten_at_home" in states
-    assert levels == {"low"} and not truth["dropped"] and trial.rig.robot.limit_violations == 0
+    assert levels == {"low"} and not truth["dropped"] and trial.world.robot.limit_violations == 0
 
 
 def test_two_people_as_near_as_each_other_when_the_robot_gives():
@@ -245,7 +245,7 @@ def test_two_people_as_near_as_each_other_when_the_robot_gives():
     assert [r.outcome for r in results] == ["succeeded", "failed_holding"], [r.reason for r in results]
     assert SENTENCE in " ".join([results[1].reason, *results[1].causes])
     assert results[1].code == ReasonCode.NOT_PERCEIVED
-    assert trial.rig.cell.truth()["held_by"] == "robot" and trial.last_hub == "wait_with_object"
+    assert trial.world.cell.truth()["held_by"] == "robot" and trial.last_hub == "wait_with_object"
 
 
 @pytest.mark.parametrize("jump", [0.08, 0.30])
@@ -254,9 +254,9 @@ def test_identity_swaps_neither_mislead_the_arm_nor_go_unsaid(jump):
     settings = PerceptionSettings(swap_probability=0.01, swap_jump=jump)
     good = 0
     for seed in range(3):
-        trial = VirtualTrial(seed=seed, profile="accustomed", perception=settings)
+        trial = VirtualTrial(seed, Conditions(profile="accustomed", perception=settings))
         result = trial.run(RECEIVE)[0]
-        assert trial.rig.robot.limit_violations == 0
+        assert trial.world.robot.limit_violations == 0
         assert result.outcome == "succeeded" or (result.outcome == "failed_empty" and result.reason)
         good += result.outcome == "succeeded"
     assert good >= 2

@@ -11,10 +11,11 @@ import pytest
 import rospy
 from coglab_msgs.msg import Contact, ContactSignal, HandoverBelief, ReasonCode
 from coglab_msgs.msg import Recognition as RecognitionMessage
-from coglab_smach.ports.interfaces import Ahead, ContactEvent, Located, Recognition
-from coglab_smach.ports.pending import Permit, Polled, PortError, Ready, Threaded, ending_motion
-from coglab_smach.ros import calls, ports, publish
-from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3, Vector3Stamped
+from coglab_py import publish
+from coglab_smach.ports.interfaces import Ahead, ContactEvent, Recognition
+from coglab_smach.ports.pending import Permit, PortError, Ready, Threaded
+from coglab_smach.ros import calls, ports
+from geometry_msgs.msg import Point, Vector3, Vector3Stamped
 from test_arm_port import Topic, ended
 
 
@@ -52,27 +53,6 @@ def nodes(monkeypatch):
 # --- perception -------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("limit", "wait"), [(30.0, 20.0), (10.0, 9.0), (1.2, 0.5)])
-def test_a_perception_that_is_not_there_is_said_a_second_before_the_limit(nodes, limit, wait):
-    nodes.answer = SimpleNamespace(message="ready")
-    assert nodes.perception.init_vision(limit).result() == "ready"
-    assert nodes.asked == [("perception/init_vision", wait, {"timeout": limit})]
-
-
-def test_sights_and_free_places(nodes):
-    seen = PoseStamped(pose=Pose(Point(1, 2, 3), Quaternion(0, 0, 0, 1)))
-    seen.header.frame_id = "world"
-    nodes.answer = SimpleNamespace(frame_id="object_mug", pose=seen, age=0.2, places=[seen, seen])
-    found = Located("object_mug", "world", (1, 2, 3), (0, 0, 0, 1), 0.2)
-    assert nodes.perception.locate_object("mug", 0.3).result() == found
-    places = nodes.perception.free_places("mug", 5.0).result()
-    assert places == [Located("", "world", (1, 2, 3), (0, 0, 0, 1), 0.0)] * 2
-    assert nodes.asked == [
-        ("perception/locate_object", 2.0, {"object_id": "mug", "timeout": 0.3}),
-        ("perception/free_places", 2.0, {"object_id": "mug", "timeout": 5.0}),
-    ]
-
-
 @pytest.mark.parametrize(("seconds", "known"), [(0.5, True), (0.51, False)])
 def test_what_is_recognised_counts_for_half_a_second(nodes, seconds, known):
     assert nodes.perception.recognition() == Recognition()
@@ -103,20 +83,6 @@ def test_what_is_believed_counts_for_three_tenths_of_a_second(nodes, seconds, kn
 
 
 # --- database ---------------------------------------------------------------------------------------------------------
-
-
-def test_entries_are_read_and_waited_for_five_seconds(nodes):
-    nodes.answer = SimpleNamespace(yaml="mass: 0.3", object_ids=("a", "b"))
-    assert nodes.database.get_object("mug").result() == {"mass": 0.3}
-    assert nodes.database.list_objects().result() == ["a", "b"]
-    assert [(name, wait) for name, wait, _ in nodes.asked] == [
-        ("object_database/get_object", 5.0),
-        ("object_database/list_objects", 1.0),
-    ]
-    nodes.answer = SimpleNamespace(yaml="mass: [")
-    with pytest.raises(PortError) as error:
-        nodes.database.get_object("mug").result()
-    assert error.value.code == ReasonCode.BAD_FILE and "entry of 'mug'" in error.value.sentence
 
 
 # --- contact ----------------------------------------------------------------------------------------------------------
@@ -217,17 +183,6 @@ def test_forces_count_for_a_tenth_of_a_second_and_the_grip_for_three(nodes):
 # --- calls ------------------------------------------------------------------------------------------------------------
 
 
-def test_a_message_is_as_old_as_it_is_since_it_came(monkeypatch):
-    now, heard = [3.0], []
-    monkeypatch.setattr(calls, "time", SimpleNamespace(monotonic=lambda: now[0]))
-    monkeypatch.setattr(calls.rospy, "Subscriber", lambda topic, kind, take, queue_size: take)
-    newest = calls.Newest("t", None, heard.append)
-    assert newest.age() > 1e8 and newest.message is None
-    newest._take("m")
-    now[0] = 5.5
-    assert newest.age() == 2.5 and newest.message == "m" and heard == ["m"]
-
-
 def test_a_node_that_shuts_down_calls_nobody(monkeypatch):
     monkeypatch.setattr(calls, "service_answers", lambda name: False)
     monkeypatch.setattr(calls.rospy, "is_shutdown", lambda: True)
@@ -262,20 +217,6 @@ def test_a_topic_that_is_closed_while_the_node_ends_is_no_error(monkeypatch, ove
 # --- what takes time --------------------------------------------------------------------------------------------------
 
 
-def test_answers_that_come_later():
-    error = PortError("no", ("because",), 4)
-    assert (error.sentence, error.causes, error.code) == ("no", ("because",), 4) and PortError("no").code == 0
-    assert Ready(3).done() and Ready(3).result() == 3 and Ready().result() is None
-    with pytest.raises(PortError, match="no"):
-        Ready(error=error).result()
-    cancelled = []
-    motion = ending_motion(Polled(lambda: False, lambda: 1, lambda: cancelled.append("call")), cancelled.append)
-    assert not motion.done() and motion.result() == 1
-    motion.cancel()
-    assert cancelled == ["call", "its owner has given up waiting"]
-    Polled(lambda: True, lambda: 1).cancel()
-
-
 def test_a_call_in_a_thread_of_its_own():
     good = ended(Threaded(lambda permit: permit.check() or 5, "it"))
     assert good.result() == 5 and not good.failed()
@@ -293,14 +234,3 @@ def test_a_call_in_a_thread_of_its_own():
     with pytest.raises(PortError) as error:
         permit.check()
     assert error.value.code == ReasonCode.CANCELLED
-
-
-def test_a_call_that_has_not_answered_says_so():
-    go = []
-    slow = Threaded(lambda permit: [time.sleep(0.005) for _ in iter(lambda: bool(go), True)], "it")
-    assert not slow.done() and not slow.failed()
-    with pytest.raises(PortError, match="it has not answered yet") as error:
-        slow.result()
-    assert error.value.code == ReasonCode.TIME_LIMIT
-    go.append(1)
-    ended(slow).result()

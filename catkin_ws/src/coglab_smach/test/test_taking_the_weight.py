@@ -2,16 +2,14 @@
 an object only where it stands around one, and still has it at home."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode, Say
 from coglab_py.pose import Pose
-from coglab_smach.clocks.virtual_clock import using
 from coglab_smach.kinematics.reachability import default_arm
-from coglab_smach.ports.pending import Polled, Ready
-from coglab_smach.states import seat, weight
+from coglab_smach.ports.pending import Polled
+from coglab_smach.states import weight
 from coglab_smach.states.hand import AT_END, stopped_by_object
 from conftest import Trial
 
@@ -154,39 +152,6 @@ def test_what_is_held_by_an_edge_is_grasped_once_more():
     assert again[0] == "preshape cylindrical" and again[-1] == "close", order
     labels = [t.from_state for t in trial.ctx.journal.transitions if t.path.endswith("/exchange_human_to_robot")]
     assert labels[labels.index("open_beside") :][:4] == ["open_beside", "seat", "hand_close", "take_weight"]
-
-
-class Beside:
-    """A still hand, and an object whose grasp is seen ``off`` (m, base frame) from the palm; ``asked``: the ways."""
-
-    def __init__(self, monkeypatch, off, force=(0.0, 0.0, 0.0)):
-        self.trial, self.asked, self.cancelled = Trial(), [], []
-        monkeypatch.setattr(seat, "way_to_grasp", lambda *_: None if off is None else np.array(off))
-        motion = Polled(lambda: bool(self.cancelled) or np.linalg.norm(force) == 0.0, lambda: None)
-        monkeypatch.setattr(seat, "shift", lambda ctx, way, speed: self.asked.append(way) or motion)
-        self.trial.ctx.contact.force = lambda: force
-        self.trial.ctx.arm.cancel_motion = lambda why: self.cancelled.append(why) or Ready()
-        self.state = seat.Seat(self.trial.ctx)
-        with using(self.trial.clock):
-            self.outcome = self.state.run(SimpleNamespace(goal={}))
-
-
-def test_the_palm_goes_to_the_grasp_beside_which_it_was_touched(monkeypatch):
-    beside = Beside(monkeypatch, (0.0, 0.01, -0.02))
-    assert beside.outcome == "succeeded" and np.allclose(beside.asked, [[0.0, 0.01, -0.02]])
-    far = Beside(monkeypatch, (0.0, 0.0, -0.2))
-    assert np.allclose(far.asked, [[0.0, 0.0, -seat.FARTHEST]])
-
-
-@pytest.mark.parametrize("off", [None, (0.0, 0.0, 0.5 * seat.LEAST)])
-def test_without_a_sight_or_a_way_nothing_moves(monkeypatch, off):
-    beside = Beside(monkeypatch, off)
-    assert beside.outcome == "succeeded" and beside.asked == []
-
-
-def test_where_it_pushes_the_way_to_the_grasp_ends(monkeypatch):
-    beside = Beside(monkeypatch, (0.0, 0.0, -0.03), (0.0, 1.2 * seat.PUSHES, 0.0))
-    assert beside.outcome == "succeeded" and len(beside.cancelled) == 1
 
 
 def test_what_is_held_by_an_edge_is_kept_where_the_person_has_gone():

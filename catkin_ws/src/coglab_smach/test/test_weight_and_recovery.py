@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode, Say
 from coglab_py.pose import Pose
-from coglab_smach.clocks.virtual_clock import using
-from coglab_smach.context.hand_track import HandTrack
+from coglab_smach.context.grip import Grip
 from coglab_smach.machines import recovery
 from coglab_smach.machines.recovery import SecureHand, WhatIsHeld
 from coglab_smach.ports.interfaces import ContactEvent, HandState, Verdict
 from coglab_smach.ports.pending import Polled, PortError, Ready
-from coglab_smach.states import arm, weight
-from coglab_smach.states.arm import HomeRobot
+from coglab_smach.states import weight
 from coglab_smach.states.base import TimeLimit
+from coglab_smach.states.hand_tracking import HandTrack
 from coglab_smach.states.weight import TakeWeight
+from coglab_trials.virtual_clock import using
 from conftest import Trial
 from test_giving import giving
 
@@ -96,23 +96,6 @@ def test_every_end_ends_the_closing_of_fingers_that_follow(stop):
     assert cancelled == [60]
 
 
-def test_the_whole_rise_is_3_cm_and_no_shorter_one_than_5_mm_is_begun(monkeypatch):
-    lifted = Lifted(monkeypatch)
-    lifted.state._rise()
-    for z, way in ((0.51, 0.02), (0.524, 0.006)):
-        lifted.z = z
-        lifted.state._rise()
-        assert lifted.rises[-1] == (pytest.approx(way), 0.055)
-    lifted.z = 0.526
-    lifted.state._rise()
-    lifted.z = 0.5
-    lifted.state._rise(0.01)
-    assert lifted.rises[3:] == [(pytest.approx(0.01), 0.055)]
-    for _ in range(9):
-        lifted.state._rise()
-    assert len(lifted.rises) == 8, "times at most"
-
-
 @pytest.mark.parametrize(
     ("away", "farther", "gone"),
     [(0.141, 0.14, True), (0.139, 0.14, False), (0.51, None, True), (0.49, None, False), (None, 0.1, False)],
@@ -122,29 +105,6 @@ def test_a_person_has_let_go_who_is_farther_or_half_a_metre_away(monkeypatch, aw
     lifted.away = away
     lifted.state._farther = farther
     assert bool(lifted.state._has_let_go()) == gone
-
-
-def test_a_rise_goes_on_by_a_centimetre_half_a_second_after_the_weight_has_come(monkeypatch):
-    lifted = Lifted(monkeypatch, carried=True)
-    said = []
-    lifted.ctx.say = lambda code, text: said.append(code)
-    with using(lifted.trial.clock) as clock:
-        for after, rises in ((0.0, 0), (0.49, 0), (0.02, 1), (0.6, 1), (0.1, 2)):
-            clock.sleep(after)
-            lifted.state._farther = 0.5
-            assert not lifted.state._has_let_go()
-            assert lifted.rises == ["the weight has come", *[(pytest.approx(0.01), 0.055)] * rises], after
-    assert said == [Say.I_HAVE_IT]
-
-
-def test_without_a_sight_the_weight_and_the_whole_rise_are_enough(monkeypatch):
-    lifted = Lifted(monkeypatch)
-    lifted.away = None
-    assert not lifted.state._has_let_go() and len(lifted.rises) == 1
-    lifted.event, lifted.busy = ContactEvent(True, "x", 1.0), True
-    assert not lifted.state._has_let_go()
-    lifted.busy = False
-    assert lifted.state._has_let_go()
 
 
 @pytest.mark.parametrize("loaded", [False, True])
@@ -169,18 +129,6 @@ def test_a_person_gets_the_object_back_whose_hand_is_within_30_cm_and_carries_it
     error = lifted.state._not_released("mug", 5.0, TimeLimit("the wait"), {"mass": 0.31})
     assert error.sentence == "the person did not let go of 'mug' within 5 s" and error.code == ReasonCode.NOT_RELEASED
     assert (lifted.ctx.holding == "mug") == keeps and len(error.causes) == 1 + keeps
-
-
-@pytest.mark.parametrize("comes", [True, False])
-def test_who_holds_it_carries_it_when_the_arm_sinks(monkeypatch, comes):
-    lifted = Lifted(monkeypatch)
-    lifted.state._deadline = 1e9
-    lifted.ctx.contact.share_gone = lambda: 1.0 if comes and len(lifted.rises) == 1 else 0.0
-    with using(lifted.trial.clock):
-        assert weight.person_holds(lifted.state, {"mass": 0.31, "load_share": 0.5}) == comes
-    assert lifted.trial.cell.called()[-2:] == ["arm release", "disarm"]
-    # And back, where it was felt.
-    assert lifted.rises == [(-0.03, 0.03)] + [(weight.LEAST_WAY, 0.03)] * comes
 
 
 # --- recovery ---------------------------------------------------------------------------------------------------------
@@ -209,7 +157,7 @@ def test_a_hand_half_a_metre_from_the_palm_holds_nothing_any_more(away, goes):
             assert t.clock.now() < end
             given_up = any(r.from_state == "give_load" for r in t.ctx.journal.transitions)
             there = t.cell.pose("mug").position + [0.0, away if given_up else 0.1, 0.0]
-            t.cell._goes = t.cell._goes or (t.clock.now(), there)
+            t.cell.goes = t.cell.goes or (t.clock.now(), there)
             if given_up:
                 t.cell.push(0.0)
             t.clock.sleep(0.05)
@@ -254,46 +202,20 @@ def test_a_fault_lifts_a_hold_that_is_latched_at_the_robot():
     trial.run(script)
 
 
-@pytest.mark.parametrize(("stays", "took"), [(0.25, 0.25), (9.0, 0.8)])
-def test_an_arm_at_home_looks_for_eight_tenths_of_a_second_for_what_it_may_have_lost(stays, took):
-    trial = Trial()
-    state = HomeRobot(trial.ctx, carries=True)
-    state._held = SimpleNamespace(stays=lambda since: trial.clock.now() >= since + stays)
-    with using(trial.clock):
-        state._see_held()
-    assert trial.clock.now() == pytest.approx(took, abs=0.021)
-
-
-@pytest.mark.parametrize(("thing", "hand", "fell"), [(0.1, 0.59, False), (0.1, 0.61, True), (None, 0.9, False)])
-def test_what_is_half_a_metre_below_the_hand_fell_as_it_was_given(monkeypatch, thing, hand, fell):
-    place = lambda z: None if z is None else np.array([0.6, 0.0, z])  # noqa: E731
-    monkeypatch.setattr(arm, "seen_at", lambda state, name: place(thing))
-    monkeypatch.setattr(arm, "person_at", lambda state: place(hand))
-    state = HomeRobot(Trial().ctx, gave=True)
-    if not fell:
-        state._see_given("mug")
-        return
-    with pytest.raises(PortError) as error:
-        state._see_given("mug")
-    assert error.value.code == ReasonCode.GOAL_FELL
-    assert error.value.causes == ("it is seen 0.51 m below the person's hand",)
-
-
 @pytest.mark.parametrize(("caught", "opens"), [(0.9, False), (1.1, True)])
 def test_fingers_that_begin_to_close_on_the_way_have_a_second_to_stand(monkeypatch, caught, opens):
     trial = Trial()
     state, opened, clock = SecureHand(trial.ctx), [], trial.clock
     state._deadline = 1e9
     monkeypatch.setattr(recovery, "from_palm", lambda s, track, *_: 0.51)
-    trial.ctx.hand_track = seen_all_the_way()
-    trial.ctx.closing, trial.ctx.closing_on, trial.ctx.closing_firm, trial.ctx.shared = Ready(), "mug", 140, True
+    grip = Grip("mug", 0.31, 140, shared=True, closing=Ready(), hand=seen_all_the_way())
     trial.ctx.hand.state = lambda: HandState(True, holding=clock.now() >= caught)
     trial.ctx.hand.open = lambda speed: opened.append(speed) or Ready()
     trial.ctx.perception.locate_object = lambda *_: Ready(error=PortError("not seen"))
     with using(clock):
-        assert state.run(None) == "succeeded"
-    assert (opened, trial.ctx.holding) == (([400], "") if opens else ([], "mug")) and not trial.ctx.shared
-    assert trial.ctx.firm == (0 if opens else 140) and trial.ctx.closing is None
+        assert state.run(SimpleNamespace(grip=grip)) == "succeeded"
+    assert (opened, trial.ctx.holding) == (([400], "") if opens else ([], "mug")) and not grip.shared
+    assert grip.firm == (0 if opens else 140) and grip.closing is None
 
 
 @pytest.mark.parametrize(
@@ -312,13 +234,12 @@ def test_who_holds_what_fingers_have_caught_gets_it_back(monkeypatch, away, hold
     state = SecureHand(trial.ctx)
     monkeypatch.setattr(weight, "person_holds", lambda s, settings: asked.append(settings) or holds)
     monkeypatch.setattr(weight, "from_palm", lambda s, track, *_: away)
-    trial.ctx.shared_mass, trial.ctx.hand_track = 0.31, seen_all_the_way()
     monkeypatch.setattr(recovery, "from_palm", lambda s, track, *_: away)
-    trial.ctx.closing, trial.ctx.closing_on, trial.ctx.shared = Ready(), "mug", True
+    grip = state._grip = Grip("mug", 0.31, shared=True, closing=Ready(), hand=seen_all_the_way())
     trial.ctx.hand.state = lambda: HandState(True, holding=True)
     with using(trial.clock):
         state._closed_on_the_way()
-    assert trial.ctx.holding == held and trial.ctx.shared == (away is None or away < 0.5)
+    assert trial.ctx.holding == held and grip.shared == (away is None or away < 0.5)
     assert asked == ([{"mass": 0.31, "load_share": 0.5}] if away == 0.29 else [])
 
 
@@ -329,11 +250,11 @@ def test_a_hand_that_has_just_started_has_two_seconds_to_be_empty(empty_after, h
     state._deadline = 1e9
     trial.ctx.hand.state = lambda: HandState(True, holding=clock.now() < empty_after)
     with using(clock):
-        assert state.run(None) == hub
+        assert state.run(SimpleNamespace(grip=Grip())) == hub
     assert clock.now() == pytest.approx(took, abs=0.11)
     trial.ctx.hand.state = lambda: HandState(False)
     with using(clock):
-        assert state.run(None) == hub, "a hand that does not answer changes nothing"
+        assert state.run(SimpleNamespace(grip=Grip())) == hub, "a hand that does not answer changes nothing"
     assert state.reason.startswith("the hand does not tell")
 
 

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from coglab_smach.clocks.virtual_clock import using
-from coglab_smach.contact.leaving_load import LeavingLoad
+from coglab_contact.load import LeavingLoad
 from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states import weight
 from coglab_smach.states.base import TimeLimit
 from coglab_smach.states.motion import _joint_way
 from coglab_smach.states.weight import person_has_it, person_holds
+from coglab_trials.virtual_clock import using
 from test_weight_and_recovery import Lifted
 
 GIVING = np.array([-0.535, -1.109, 1.799, 1.305, 0.686, -0.385, 1.182])
@@ -145,31 +145,9 @@ def test_a_person_is_not_pressed_down_for_longer_than_it_takes_to_feel_them(monk
     assert scale.ask(person_holds) is True and scale.ways[1][1] < 0.2 * WAY
 
 
-def test_a_share_that_is_told_late_is_waited_for(monkeypatch):
-    scale, looks = Scale(monkeypatch, 0.31, spring(2.5, 0.0)), []
-    told = scale.share
-    scale.ctx.contact.share_gone = lambda: None if looks.append(1) or len(looks) < 40 else told()
-    assert scale.ask(person_holds) is None and len(looks) > 40, "the sinking itself changes nothing"
-    scale.ctx.contact.share_gone = lambda: None
-    assert scale.ask(person_holds) is None
-
-
 def test_an_arm_that_sinks_no_further_has_felt_nothing(monkeypatch):
     scale = Scale(monkeypatch, 0.31, spring(0.0, 0.0))
     monkeypatch.setattr(weight, "rise", lambda *_: Ready(error=PortError("refused")))
     assert scale.ask(person_holds) is None
     monkeypatch.setattr(weight, "rise", lambda *_: None)
     assert scale.ask(person_holds) is None
-
-
-@pytest.mark.parametrize("holds", [True, False, None])
-@pytest.mark.parametrize("loaded", [True, False])
-@pytest.mark.parametrize("away", [None, 0.29, 0.31, 0.49, 0.51])
-def test_what_nobody_is_seen_at_is_the_robots_where_its_weight_has_come_and_nobody_lifts_it(
-    monkeypatch, away, loaded, holds
-):
-    lifted = Lifted(monkeypatch, carried=loaded)
-    lifted.away = away
-    monkeypatch.setattr(weight, "person_holds", lambda state, settings: holds)
-    seen_off = away == 0.51 or (loaded and away != 0.29)
-    assert lifted.state._is_left({"mass": 0.31, "load_share": 0.5}) == (seen_off and holds is False)

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_py.pose import Pose
-from coglab_smach.clocks.virtual_clock import using
-from coglab_smach.context.hand_track import HandTrack
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.pending import Polled, PortError, Ready
-from coglab_smach.states import reach, reach_watch, weight
+from coglab_smach.states import reach, weight
+from coglab_smach.states.hand_tracking import HandTrack
 from coglab_smach.states.weight import person_holds
+from coglab_trials.virtual_clock import using
 from conftest import Trial
 from test_giving import WEIGHT, giving
 from test_weight_and_recovery import Lifted
@@ -148,7 +148,7 @@ def test_who_has_let_go_before_the_fingers_close_is_not_waited_for(monkeypatch, 
     monkeypatch.setattr(reach, "off_grasp", lambda state, goal: 0.02)
 
     def goes(t):
-        t.cell._goes = t.clock.now(), palm_of(t) + [away, 0.0, 0.0]
+        t.cell.goes = t.clock.now(), palm_of(t) + [away, 0.0, 0.0]
         t.cell.bring = lambda object_id, palm: setattr(t.cell, "at_palm", (object_id, palm))
         t.until(lambda: "arm lift" in t.cell.called())
         t.clock.sleep(0.15)
@@ -156,25 +156,6 @@ def test_who_has_let_go_before_the_fingers_close_is_not_waited_for(monkeypatch, 
 
     result = receive(trial, lambda t: t.ctx.journal.marked("closing_on_the_way"), goes)
     assert result.outcome == "succeeded", result
-
-
-@pytest.mark.parametrize("at", [0.0, 0.02, 0.04])
-def test_stop_ends_the_closing_while_the_person_is_first_looked_at(at):
-    trial, begun, cancelled = Trial(), [], []
-    trial.ctx.hand.close_on_object = lambda: (
-        begun.append(1) or Polled(lambda: False, lambda: None, lambda: cancelled.append(1))
-    )
-
-    def script(t):
-        t.wait_hub("wait_without_object")
-        t.start(RECEIVE)
-        t.until(lambda: begun)
-        t.clock.sleep(at)
-        t.ctx.stop.press("a finger is in it")
-        t.wait_hub("stopped")
-
-    trial.run(script)
-    assert begun and cancelled
 
 
 def tells_late(hand, clock, late):
@@ -196,13 +177,13 @@ def test_fingers_that_have_caught_something_open_for_no_glimpse_of_it(monkeypatc
     trial, opened = Trial(), []
     tells_late(trial.ctx.hand, trial.clock, 0.1)
     monkeypatch.setattr(reach, "off_grasp", lambda state, goal: 0.02)
-    init = reach_watch.ReachWatch.__init__
+    init = reach.ReachWatch.__init__
 
     def believed(self, *given):
         init(self, *given)
         self._began_on_belief = True
 
-    monkeypatch.setattr(reach_watch.ReachWatch, "__init__", believed)
+    monkeypatch.setattr(reach.ReachWatch, "__init__", believed)
     trial.cell.partner.touch_after, trial.cell.partner.take_after = (1.2 if touched else None), None
     preshape = trial.ctx.hand.preshape
 
@@ -215,7 +196,7 @@ def test_fingers_that_have_caught_something_open_for_no_glimpse_of_it(monkeypatc
     def lets_go(t):
         # It stays where it was offered, within the region.
         t.cell.at_palm = ("mug", t.cell.objects["mug"].inverse() * Pose(*default_arm().fk(t.cell.arm.position())))
-        t.cell._goes = t.clock.now(), np.array([1.6, 0.0, 0.4])
+        t.cell.goes = t.clock.now(), np.array([1.6, 0.0, 0.4])
         t.cell.faults.not_seen.add("mug")
         t.clock.sleep(seen_after)
         t.cell.faults.not_seen.discard("mug")
@@ -237,16 +218,16 @@ def test_another_hand_does_not_free_what_was_caught_on_the_way(monkeypatch):
         t.cell.arm.end("goal lost", ReasonCode.GOAL_LOST)
 
     result = receive(trial, lambda t: t.ctx.journal.marked("closing_on_the_way"), jumps)
-    assert result.outcome == "stopped" and trial.ctx.shared and not trial.cell.called("open")
+    assert result.outcome == "stopped" and trial.grip.shared and not trial.cell.called("open")
 
 
 def test_another_hand_does_not_send_the_arm_away_with_what_the_taker_holds():
     def script(t):
-        t.cell._goes = t.clock.now(), palm_of(t) + [0.1, 0.0, 0.0]
+        t.cell.goes = t.clock.now(), palm_of(t) + [0.1, 0.0, 0.0]
         t.clock.sleep(0.5)
         t.cell.push(0.45 * WEIGHT)
         t.clock.sleep(1.0)
-        assert t.ctx.shared
+        assert t.grip.shared
         t.cell.objects["human_hand"] = Pose(palm_of(t) + [0.2, 0.62, 0.0])
         t.wait_hub("stopped")
 
@@ -260,12 +241,12 @@ def test_who_may_hold_a_light_object_is_felt_before_the_arm_goes(hand, holds):
 
     def script(t):
         t.cell.partner.take_after = None
-        t.cell._goes = t.clock.now(), palm_of(t) + [0.1, 0.0, 0.0]
+        t.cell.goes = t.clock.now(), palm_of(t) + [0.1, 0.0, 0.0]
         t.clock.sleep(3.0)
         if hand == "hidden":
             t.cell.faults.not_seen.add("human_hand")
         if hand == "gone":
-            t.cell._goes = t.clock.now(), palm_of(t) + [0.9, 0.0, 0.0]
+            t.cell.goes = t.clock.now(), palm_of(t) + [0.9, 0.0, 0.0]
         t.clock.sleep(3.0)
         t.cell.partner.take_after = 0.5 if holds else None
         t.until(lambda: t.ctx.requests.hub() in ("stopped", "wait_with_object"), 60.0)
@@ -288,18 +269,6 @@ def test_what_cannot_be_felt_is_not_taken_for_nobodys(monkeypatch, trouble):
         monkeypatch.setattr(weight, "rise", lambda *_: motion)
     with using(lifted.trial.clock):
         assert person_holds(lifted.state, {"mass": 0.31, "load_share": 0.5}) is (None if trouble else False)
-
-
-def test_the_sinking_has_as_much_longer_as_the_arm_is_slower(monkeypatch):
-    lifted = Lifted(monkeypatch)
-    lifted.state._deadline, lifted.ctx.contact.share_gone = 1e9, lambda: 0.0
-    lifted.ctx.arm.speed_scale = lambda: 0.2
-    began = lifted.trial.clock.now()
-    monkeypatch.setattr(
-        weight, "rise", lambda *_: Polled(lambda: lifted.trial.clock.now() > began + 10.0, lambda: None)
-    )
-    with using(lifted.trial.clock):
-        assert person_holds(lifted.state, {"mass": 0.31, "load_share": 0.5}) is False
 
 
 @pytest.mark.parametrize("carried", [True, False])
@@ -343,3 +312,34 @@ def test_what_falls_out_beside_the_persons_hand_was_not_taken_back():
 
     result = receive(trial, lambda t: "arm lift" in t.cell.called(), falls)
     assert (result.outcome, result.code) == ("failed_empty", ReasonCode.OBJECT_NOT_SEEN), result
+
+
+@pytest.mark.parametrize("at", [0.0, 0.02, 0.04])
+def test_stop_ends_the_closing_while_the_person_is_first_looked_at(at):
+    trial, begun, cancelled = Trial(), [], []
+    trial.ctx.hand.close_on_object = lambda: (
+        begun.append(1) or Polled(lambda: False, lambda: None, lambda: cancelled.append(1))
+    )
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        t.start(RECEIVE)
+        t.until(lambda: begun)
+        t.clock.sleep(at)
+        t.ctx.stop.press("a finger is in it")
+        t.wait_hub("stopped")
+
+    trial.run(script)
+    assert begun and cancelled
+
+
+def test_the_sinking_has_as_much_longer_as_the_arm_is_slower(monkeypatch):
+    lifted = Lifted(monkeypatch)
+    lifted.state._deadline, lifted.ctx.contact.share_gone = 1e9, lambda: 0.0
+    lifted.ctx.arm.speed_scale = lambda: 0.2
+    began = lifted.trial.clock.now()
+    monkeypatch.setattr(
+        weight, "rise", lambda *_: Polled(lambda: lifted.trial.clock.now() > began + 10.0, lambda: None)
+    )
+    with using(lifted.trial.clock):
+        assert person_holds(lifted.state, {"mass": 0.31, "load_share": 0.5}) is False

@@ -8,8 +8,8 @@
 #include <memory>
 #include <string>
 
-#include "ctrl_more/loading/prototypes.hpp"
-#include "loading/probe.hpp"
+#include "ctrl_more/feedback_controller.hpp"
+#include "loading/library_file.hpp"
 
 namespace {
 

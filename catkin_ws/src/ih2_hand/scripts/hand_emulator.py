@@ -77,8 +77,8 @@ def main() -> int:
     if as_node:
         import rospy
         from coglab_py.alone import init_node
+        from coglab_py.steady import end_quietly
         from ih2_hand.ros.emulator_node import EmulatorNode
-        from ih2_hand.ros.shutdown import end_quietly
 
         init_node("hand_emulator", disable_signals=True)
         end_quietly()

@@ -5,8 +5,8 @@ import sys
 
 import rospy
 from coglab_py.alone import init_node
+from coglab_py.steady import end_quietly
 from ih2_hand.ros.hand_node import HandNode
-from ih2_hand.ros.shutdown import end_quietly
 
 
 def main() -> int:

@@ -45,20 +45,3 @@ def make_bench():
 @pytest.fixture
 def bench(make_bench) -> Bench:
     return make_bench()
-
-
-@pytest.fixture
-def node(monkeypatch, bench):
-    """The hand node without a master, its port leading to the emulated hand."""
-    # Tests without ROS need none.
-    from node_parts import node_without_master
-
-    return node_without_master(monkeypatch, bench)
-
-
-@pytest.fixture
-def connected(node):
-    """The same, connected."""
-    node._connect()
-    assert node.driver is not None
-    return node

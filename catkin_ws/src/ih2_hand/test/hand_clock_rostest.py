@@ -11,7 +11,7 @@ import rospy
 import rostest
 from actionlib_msgs.msg import GoalStatusArray
 from diagnostic_msgs.msg import DiagnosticArray
-from ih2_hand.ros.client import HandClient
+from hand_client import HandClient
 from rosgraph_msgs.msg import Clock
 
 

@@ -14,7 +14,7 @@ import rosnode
 import rospy
 import rostest
 from actionlib import GoalStatus
-from ih2_hand.ros.client import HandClient
+from hand_client import HandClient
 
 SCRIPTS = Path(__file__).resolve().parents[1] / "scripts"
 LIMIT_S = 60.0

@@ -1,10 +1,20 @@
-"""Driver and emulated hand together in virtual time: pacing, calibration, grasps, slips."""
+"""The driver on the emulated hand, in virtual time."""
 
 from __future__ import annotations
 
 import pytest
-from ih2_hand.errors import HandCalibrationError, HandInconsistentError
-from ih2_hand.wire_choices import TABLE, WIRE
+from ih2_hand.clock import SteppedClock
+from ih2_hand.driver import HandSerialDriver
+from ih2_hand.emulator.faults import Faults
+from ih2_hand.emulator.hand import EmulatedHand
+from ih2_hand.emulator.virtual_link import VirtualLink
+from ih2_hand.errors import (
+    HandCalibratingError,
+    HandCalibrationError,
+    HandConnectionLost,
+    HandInconsistentError,
+    HandPortError,
+)
 
 
 def test_postures_are_spaced(make_bench):
@@ -14,10 +24,6 @@ def test_postures_are_spaced(make_bench):
     bench.driver.move_motor(1, 100, True)
     assert bench.hand.counters.too_fast == 0
     assert bench.clock.now >= 20 * 0.003
-
-
-def test_opening_takes_no_longer_than_bringing_the_line_in_step(bench):
-    assert WIRE.resync_wait_s < bench.clock.now < 0.05
 
 
 def test_calibration_polls_until_the_hand_answers(make_bench):
@@ -54,7 +60,6 @@ def test_grasp_holds_an_object(make_bench, dialect):
     for status in bench.driver.get_all_finger_status()[1:]:
         assert (status["mode"], status["target_reached"]) == ("stop", True)
     assert bench.driver.get_finger_force(2) > 0
-    assert bench.driver.grasp_mode == ("cylindrical", "high")
 
 
 def test_read_motors_has_every_field(bench):
@@ -109,9 +114,109 @@ def test_resting_hand_is_asked_once_for_each_value(bench):
     assert len(bench.sent().split()) == 5 * 6 + 4
 
 
-def test_every_wire_choice_is_there_once():
-    ids = {choice.id for choice in TABLE}
-    assert {f"W{number}" for number in range(1, 30)} <= ids
-    names = [choice.name for choice in TABLE]
-    assert len(set(names)) == len(names)
-    assert len(WIRE.resync_filler) == 13 and set(WIRE.resync_filler) == {0x41}
+def link_that_loses(count: int) -> VirtualLink:
+    clock = SteppedClock()
+    hand = EmulatedHand(clock, greeting=True)
+    return VirtualLink(hand, clock, faults=Faults(hand, lose=count))
+
+
+def opened(link: VirtualLink, **options: object) -> HandSerialDriver:
+    return HandSerialDriver(transport=link, clock=link._clock, **options)
+
+
+def test_one_lost_answer_does_not_keep_the_port_from_being_opened():
+    driver = opened(link_that_loses(1))
+    assert driver.get_finger_status(0)["mode"] == "stop" and driver.counters.fillers == 0
+
+
+def test_a_port_on_which_nobody_answers_is_let_go():
+    link = link_that_loses(2)
+    with pytest.raises(HandPortError, match="no hand answers on virtual"):
+        opened(link)
+    assert not link.plugged and bytes(link.sent).endswith(bytes.fromhex("4B 00 4B 00"))
+
+
+def test_a_port_is_closed_with_its_block():
+    link = link_that_loses(0)
+    with opened(link) as driver:
+        assert driver.get_finger_position(1) == 0 and driver.last_byte == 0
+        assert driver.get_finger_status(1)["raw"] == driver.last_byte == 0x08
+        assert link.plugged
+    assert not link.plugged
+    with pytest.raises(HandConnectionLost):
+        driver.get_finger_position(1)
+    with pytest.raises(HandConnectionLost, match="virtual is gone"):
+        link.pending()
+
+
+def test_bytes_that_nobody_asked_for_are_thrown_away_before_a_request(bench):
+    bench.link._input += b"\x55"
+    assert bench.driver.get_finger_status(1)["raw"] == 0x08
+    assert bench.driver.counters.reasons == {"bytes nobody asked for": 1}
+
+
+# -- what is known of a hand at rest ---------------------------------------------------------------
+
+
+def requests(bench, read) -> int:
+    """Bytes that a reading costs."""
+    bench.sent()
+    read()
+    return len(bench.sent().split())
+
+
+def position(bench) -> int:
+    return requests(bench, lambda: bench.driver.get_finger_position(2))
+
+
+def test_a_value_of_a_resting_hand_costs_one_request_and_after_a_command_it_is_confirmed_anew(bench):
+    for _ in range(2):
+        bench.driver.get_all_finger_status()
+        bench.driver.get_finger_position(2)
+    assert bench.driver.line.resting and position(bench) == 2
+    bench.driver.stop_all()
+    assert not bench.driver.line.resting and position(bench) == 6
+
+
+def test_a_hand_rests_when_all_five_motors_have_been_seen_to(bench):
+    for motor in range(4):
+        bench.driver.get_finger_status(motor)
+        assert not bench.driver.line.resting
+    bench.driver.get_finger_status(3)
+    assert not bench.driver.line.resting, "the same one twice"
+    bench.driver.get_finger_status(4)
+    assert bench.driver.line.resting
+    bench.hand.motors[1].drive(100, close=True)
+    bench.driver.get_finger_status(1)
+    assert not bench.driver.line.resting
+
+
+# -- calibration ---------------------------------------------------------------------------------
+
+
+def test_while_it_calibrates_the_driver_says_so_and_refuses(make_bench):
+    bench = make_bench(greeting=False)
+    seen: list[bool] = []
+    answers = bench.driver.line.answers
+
+    def look(frame: bytes, length: int) -> bool:
+        seen.append(bench.driver.calibrating)
+        for request in (lambda: bench.driver.move_motor(1, 100, True), lambda: bench.driver.get_finger_position(1)):
+            with pytest.raises(HandCalibratingError):
+                request()
+        return answers(frame, length)
+
+    bench.driver.line.answers = look
+    assert not bench.driver.calibrating
+    bench.driver.calibration("fast")
+    assert seen and all(seen) and not bench.driver.calibrating
+
+
+def test_a_calibration_has_ended_with_two_answers_in_a_row(make_bench):
+    bench = make_bench(greeting=False)
+    answers = iter([False, True, False, True, True])
+    asked: list[bytes] = []
+    bench.driver.line.answers = lambda frame, length: asked.append(frame) or next(answers)
+    bench.hand.calibration_scale = 0.0
+    bench.driver.calibration("fast")
+    assert asked == [b"\x4b\x02"] * 5 and next(answers, None) is None

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import pytest
 from ih2_hand.clock import SteppedClock
-from ih2_hand.driver import HandSerialDriver, handSerialDriver
-from ih2_hand.errors import NoGraspModeError
+from ih2_hand.driver import HandSerialDriver
 
 RESYNC = "41 " * 13
 
@@ -63,7 +62,6 @@ def connect(answers: dict[str, str] | None = None, dialect: str = "legacy", **op
         ("set_finger_force", (3, 64), "4A 43 00"),
         ("set_finger_force", (1, 254), "4A C1 F8"),
         ("stop_all", (), "41"),
-        ("open_all", (), "4C"),
         ("set_hand_posture", ([0, 30, 254, 200, 100],), "48 00 1E FE C8 64 48"),
         ("set_finger_current", (3, 100), "5F 03 61 00 64 03"),
         ("set_finger_current", (4, 1023), "5F 04 61 03 FF 04"),
@@ -199,14 +197,3 @@ def test_preshape_can_be_left_to_the_hand():
     assert line.frames == []
     driver.grasp_mode_close()
     assert line.frames == ["61"]
-
-
-def test_close_needs_a_grasp_mode():
-    driver, line = connect()
-    with pytest.raises(NoGraspModeError, match="set_grasp_mode first"):
-        driver.grasp_mode_close()
-    assert line.frames == []
-
-
-def test_the_tables_own_class_name():
-    assert handSerialDriver is HandSerialDriver

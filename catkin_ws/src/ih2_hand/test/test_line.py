@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from ih2_hand.clock import SteppedClock
 from ih2_hand.errors import HandConnectionLost, HandInconsistentError, HandTimeoutError
-from ih2_hand.line import ANALOGUE_SLACK, POSITION_SLACK, STATUS_SLACK, HandLine, LineCounters
+from ih2_hand.line import ANALOGUE_SLACK, POSITION_SLACK, STATUS_SLACK, HandLine
 
 ASK = b"\x45\x02"
 FILLER = b"\x41" * 13
@@ -71,16 +71,6 @@ def bench() -> Bench:
 
 
 # -- one request ---------------------------------------------------------------------------------
-
-
-def test_nothing_has_happened_at_first():
-    assert LineCounters() == LineCounters(0, 0, 0, 0, 0, {})
-
-
-def test_a_good_answer_is_one_request(bench):
-    bench.script.answers = ["64"]
-    assert bench.line.request(ASK, 1) == b"\x64" and bench.counted == (1, 0, 0, 0, 0)
-    assert bench.traced == [(">", ASK), ("<", b"\x64")]
 
 
 @pytest.mark.parametrize(
@@ -165,11 +155,6 @@ def test_a_known_value_of_a_resting_hand_needs_one_reading(bench):
     assert bench.value("65", "65", "65") == 101, "what was read on the way is not known"
     bench.line.resynchronise("test")
     assert bench.value("65", "65", "65") == 101
-
-
-def test_ten_bits_are_believed_and_no_more(bench):
-    assert bench.value("03 FF", "03 FF", "03 FF", length=2) == 1023
-    assert bench.value("04 00", "01 F4", "04 00", "01 F4", "01 F4", length=2) == 500
 
 
 @pytest.mark.parametrize(

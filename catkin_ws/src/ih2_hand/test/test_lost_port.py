@@ -14,7 +14,6 @@ from ih2_hand import transport
 from ih2_hand.driver import HandSerialDriver
 from ih2_hand.errors import HandConnectionLost, HandPortError
 from ih2_hand.line import HandLine
-from ih2_hand.reasons import Reason
 from ih2_hand.transport import SerialTransport
 
 
@@ -102,65 +101,3 @@ def test_a_line_that_takes_few_bytes_at_a_time_loses_none(monkeypatch, piece):
     assert far.recv(64) == frame
     near.close()
     far.close()
-
-
-@pytest.fixture
-def node():
-    """A hand node without its topics: what it would tell is kept in `told`."""
-    from ih2_hand.ros import hand_node
-
-    node = hand_node.HandNode.__new__(hand_node.HandNode)
-    node.told = []
-    node.port, node.driver, node.calibrated, node.calibrating = "port", None, False, False
-    node._event = (Reason.NONE, "")
-    node._lost_lock = threading.Lock()
-
-    def event(text, reason=Reason.NONE):
-        node._event = (reason, text)
-        node.told.append((reason, node.calibrated, node.calibrating))
-
-    node.event = event
-    return node
-
-
-def test_whatever_a_port_raises_the_node_tries_again(node):
-    node._open = raise_termios
-    node._connect()
-    node._connect()
-    assert node.told == [(Reason.HAND_LINK_LOST, False, False)] and "termios" not in node.message
-
-
-class Calibrates:
-    """A driver whose calibration ends as it is told."""
-
-    def __init__(self, error=None):
-        self.error = error
-
-    def calibration(self, kind):
-        if self.error:
-            raise self.error
-
-    def close(self):
-        pass
-
-
-@pytest.mark.parametrize(
-    "error, reason",
-    [
-        (None, Reason.HAND_ENDED),
-        (HandConnectionLost("gone"), Reason.HAND_LINK_LOST),
-        (AttributeError("'NoneType' object"), Reason.UNEXPECTED),
-    ],
-)
-def test_a_calibration_ends_however_it_ends(node, error, reason):
-    node.driver, node.calibrating = Calibrates(error), True
-    node._run_calibration(node.driver, "fast")
-    assert not node.calibrating and node.calibrated == (error is None)
-    assert node.told[0][0] is reason
-
-
-def test_a_calibration_of_a_lost_hand_says_nothing_of_the_new_one(node):
-    node.driver, node.calibrating = Calibrates(), True
-    node._run_calibration(Calibrates(), "fast")
-    assert not node.calibrated and not node.calibrating and node.driver is not None
-    assert node.told[0][0] is Reason.HAND_LINK_LOST

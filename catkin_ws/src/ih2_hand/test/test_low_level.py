@@ -70,23 +70,6 @@ def test_a_raw_position_has_seventeen_bits(electronics, command, target):
     assert (electronics.motor.mode, electronics.motor.target) == ("position", target)
 
 
-@pytest.mark.parametrize("zero", [0.0, 30.0])
-def test_raw_positions_count_from_where_zero_was_set(electronics, zero):
-    if zero:
-        electronics.motor.position = zero
-        electronics.ask("23")
-        assert electronics.ask("22") == "00 00 00"
-    electronics.motor.position = zero + 200.0
-    assert int(electronics.ask("22").replace(" ", ""), 16) == 200 * 400
-    electronics.ask("21 01 90")
-    assert electronics.motor.target == zero + 1.0
-
-
-def test_no_raw_position_is_beyond_the_ends(electronics):
-    electronics.ask("31 FF FF")
-    assert electronics.motor.target == 255.0
-
-
 def test_tension_and_current_are_followed_and_read(electronics):
     electronics.hand.set_contacts([255, 255, 100, 255, 255], [20] * 5)
     electronics.ask("41 00 A0")
@@ -108,9 +91,3 @@ def test_closing_to_a_current_goes_on_or_ends_there(electronics, command, mode, 
     electronics.wait(2.0)
     assert electronics.motor.mode == later
     assert electronics.motor.position == pytest.approx(110.0, abs=0.1)
-
-
-def test_a_command_that_nobody_knows_changes_nothing(electronics):
-    before = electronics.ask("70")
-    assert electronics.ask("43") == "" and electronics.ask("7F") == ""
-    assert electronics.ask("70") == before

@@ -116,35 +116,8 @@ def test_what_closes_and_is_broken_off_may_have_caught_something(memory, name):
     assert memory.holding is name.endswith("close")
 
 
-@pytest.mark.parametrize("holding", [True, False])
-def test_a_task_tells_the_grip_it_has_learnt(memory, holding):
-    memory.holding = not holding
-    memory.task_over(ask(memory, "hand_close", speed=100), Verdict("", done=True, ok=True, holding=holding))
-    assert memory.holding is holding
-
-
-@pytest.mark.parametrize("held", [True, False])
-def test_a_preshape_that_ends_well_says_nothing_of_the_grip(memory, held):
-    memory.holding = held
-    preshaped(memory)
-    memory.task_over(ask(memory, "hand_preshape_close"), DONE)
-    assert memory.holding is held
-
-
 def test_the_hand_is_shown_empty_once_and_gripping_at_any_time(memory):
     assert memory.look(OPEN) and not memory.holding
     assert memory.look(OPEN) is False and not memory.holding, "it was known"
     assert not memory.look(GRIPPING) and memory.holding
     assert not memory.look([finger(motor) for motor in range(5)]) and memory.holding, "nothing is shown"
-
-
-def test_why_a_calibration_is_refused(memory):
-    memory.holding = False
-    assert memory.why_not_calibrate(["fast"], None) is None
-    assert "hand_open runs" in memory.why_not_calibrate(["fast", "force"], "hand_open")
-    memory.calibrating = True
-    assert "a calibration runs" in memory.why_not_calibrate(["fast", "force"], None)
-    memory.calibrating, memory.calibrated = False, True
-    assert "calibrated already" in memory.why_not_calibrate(["fast"], None)
-    memory.holding = True
-    assert "may hold an object" in memory.why_not_calibrate(["fast"], None)

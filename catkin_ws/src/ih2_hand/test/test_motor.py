@@ -24,13 +24,6 @@ def at(position: float, number: int = 2, contact: float = 255, stiffness: float 
     return motor
 
 
-def test_a_motor_just_switched_on_stands_and_says_nothing():
-    motor = at(100.0)
-    run(motor, 1.0)
-    assert (motor.status_byte, motor.position, motor.current, motor.tension) == (0x00, 100.0, 0.0, 0)
-    assert Motor(2).status_byte == 0x08 and at(255.0).status_byte == 0x04
-
-
 @pytest.mark.parametrize(("close", "end", "status"), [(True, 255.0, 0x04), (False, 0.0, 0x08)])
 def test_a_driven_motor_ends_at_its_end_sensor(close, end, status):
     motor = at(100.0)
@@ -50,24 +43,6 @@ def test_a_motor_that_is_stopped_keeps_its_place_and_forgets_its_goal(how):
     motor.stop() if how == "stop" else motor.drive(0, close=True)
     run(motor, 1.0)
     assert (motor.position, motor.status_byte, motor.current) == (100.0, 0x00, 0.0)
-
-
-def test_the_current_of_a_free_motor_grows_with_its_speed():
-    for speed in (100, 511):
-        motor = at(100.0)
-        motor.drive(speed, close=True)
-        motor.advance(STEP)
-        assert motor.current == pytest.approx(40.0 + 60.0 * speed / 511)
-
-
-def test_a_finger_goes_no_deeper_than_its_drive_can_press():
-    motor = at(90.0, contact=100.0)
-    motor.drive(128, close=True)
-    run(motor, 2.0)
-    pressed = STALL_CURRENT * 128 / 511
-    assert motor.position == pytest.approx(100.0 + pressed / 20.0, abs=0.01)
-    assert motor.effort == pytest.approx(pressed, abs=0.1) and motor.current == pytest.approx(pressed, abs=0.1)
-    assert motor.tension == int(0.8 * pressed) and motor.status_byte == 0x20
 
 
 @pytest.mark.parametrize("number", range(5))
@@ -99,23 +74,6 @@ def test_too_much_current_must_last_without_a_break():
     assert not motor.over_current
     run(motor, 0.2)
     assert motor.over_current
-
-
-@pytest.mark.parametrize(("position", "status"), [(104.0, 0x51), (96.0, 0x51), (105.0, 0x41), (95.0, 0x41)])
-def test_a_position_counts_as_reached_this_near(position, status):
-    motor = at(position)
-    motor.go_to(100)
-    assert motor.status_byte == status
-    run(motor, 0.2)
-    assert (motor.position, motor.status_byte, motor.current) == (100.0, 0x50, 0.0)
-
-
-def test_a_blocked_posture_keeps_pushing_below_the_trip():
-    motor = at(90.0, contact=100.0)
-    motor.go_to(200)
-    run(motor, 5.0)
-    assert motor.status_byte == 0x40
-    assert motor.position == pytest.approx(132.0) and motor.current == pytest.approx(640.0)
 
 
 @pytest.mark.parametrize(
@@ -153,22 +111,6 @@ def test_tension_is_pulled_to_its_goal():
     assert motor.position == pytest.approx(110.0) and motor.current == pytest.approx(200.0)
 
 
-@pytest.mark.parametrize(("tension", "stiffness", "end"), [(40, 20.0, 102.5), (0, 20.0, 100.0), (160, 1000.0, 100.2)])
-def test_a_lower_tension_gives_way_until_it_is_reached(tension, stiffness, end):
-    motor = at(105.0, contact=100.0, stiffness=stiffness)
-    motor.pull(tension)
-    run(motor, 1.5)
-    assert motor.position == pytest.approx(end)
-    assert motor.status_byte == (0x70 if tension else 0x60), "no tension is nothing to reach"
-
-
-def test_no_tension_is_reached_without_contact():
-    motor = at(0.0)
-    motor.pull(0)
-    run(motor, 0.5)
-    assert motor.position > 100.0 and not motor.reached
-
-
 def test_closing_to_a_current_ends_a_while_after_it_is_reached():
     motor = at(95.0, contact=100.0)
     motor.close_to_current(200, stop_after=True)
@@ -182,48 +124,3 @@ def test_closing_to_a_current_ends_a_while_after_it_is_reached():
     run(motor, 0.02)
     assert (motor.status_byte, motor.current) == (0x10, 0.0)
     assert motor.effort == pytest.approx(200.0), "the grip stays"
-
-
-def test_closing_to_a_current_gives_up_at_the_closed_end():
-    motor = at(200.0)
-    motor.close_to_current(200, stop_after=False)
-    assert motor.status_byte == 0x81
-    run(motor, 1.0)
-    assert motor.status_byte == 0x04
-
-
-def test_what_is_met_at_the_closed_end_counts():
-    motor = at(240.0, contact=250.0, stiffness=40.0)
-    motor.close_to_current(200, stop_after=False)
-    run(motor, 1.0)
-    assert motor.position == 255.0 and motor.status_byte == 0x94, "met and at the end"
-
-
-def test_an_end_sensor_sees_the_end_alone_and_no_reading_is_beyond_it():
-    assert [at(position).status_byte for position in (0.5, 254.5)] == [0x00, 0x00]
-    assert [at(position).position_byte for position in (-5.0, 0.5, 254.5, 300.0)] == [0, 0, 254, 255]
-    motor = at(200.0)
-    motor.go_to(255)
-    run(motor, 0.5)
-    assert (motor.position_byte, motor.status_byte) == (255, 0x54), "no fault, so it does not read as 0"
-
-
-def test_readings_have_ten_and_eight_bits():
-    motor = at(200.0, contact=100.0, stiffness=1000.0)
-    assert motor.tension == 1023 and motor.position_byte == 200
-    motor.position = 99.6
-    assert motor.effort == 0.0 and motor.position_byte == 100
-
-
-def test_a_hard_object_is_held_after_a_fraction_of_a_count():
-    motor = at(95.0, contact=100.0, stiffness=1000.0)
-    motor.close_to_current(200, stop_after=False)
-    run(motor, 0.5)
-    assert motor.position == pytest.approx(100.2) and motor.status_byte == 0x90
-
-
-def test_a_motor_that_is_held_at_its_open_end_draws_nothing():
-    motor = at(0.0, contact=0.0)
-    motor.pull(0)
-    run(motor, 0.1)
-    assert (motor.current, motor.status_byte) == (0.0, 0x68)

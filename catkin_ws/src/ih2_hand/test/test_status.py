@@ -28,19 +28,6 @@ def test_a_status_is_mode_and_flags(raw, mode, flags):
     assert describe_status(raw) == ", ".join([mode, *([flags.replace("_", " ")] if flags else [])])
 
 
-def test_a_motor_that_cannot_be_read_has_no_flags():
-    status = decode_status(1, 0xFF)
-    assert status["com_error"] is True and status["mode"] == "bus_error"
-    flags = ("target_reached", "fully_open", "fully_closed", "over_current", "moving")
-    assert [status[name] for name in flags] == [None] * 5
-    assert describe_status(0xFF) == "bus_error"
-
-
-def test_a_status_may_be_changed_by_who_has_asked_for_it():
-    decode_status(0, 0x50)["mode"] = "changed"
-    assert decode_status(0, 0x50)["mode"] == "position"
-
-
 @pytest.mark.parametrize(
     ("raw", "rests"),
     [

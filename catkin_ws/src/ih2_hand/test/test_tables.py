@@ -49,38 +49,6 @@ def test_table_2_what_the_readings_return(bench):
     assert [status["motor"] for status in statuses] == [0, 1, 2, 3, 4]
 
 
-TABLE_3 = {
-    # action: goal, result and feedback fields; `message` and the codes are ours
-    "hand_open": ("HandOpen", {"speed": "int32"}),
-    "hand_close": ("HandClose", {"speed": "int32"}),
-    "hand_preshape": ("HandPreshape", {"mode": "string", "level": "string"}),
-    "hand_preshape_close": ("HandPreshapeClose", {}),
-}
-
-
-@pytest.mark.parametrize("name", TABLE_3)
-def test_table_3_actions(name):
-    from coglab_msgs import msg as messages
-    from ih2_hand.ros import goals
-
-    stem, goal = TABLE_3[name]
-    assert goals.SPECS[name][0] is getattr(messages, f"{stem}Action")
-
-    def fields(part: str) -> dict[str, str]:
-        kind = getattr(messages, stem + part)
-        return dict(zip(kind.__slots__, kind._slot_types, strict=True))
-
-    assert fields("Goal") == goal
-    assert fields("Result") == {"isOk": "bool", "reason_code": "uint16", "message": "string"}
-    assert fields("Feedback") == {"status": "string", "status_code": "uint16", "positions": "int32[]"}
-
-
-def test_table_3_has_no_other_action():
-    from ih2_hand.ros import goals
-
-    assert sorted(goals.SPECS) == sorted(TABLE_3)
-
-
 def test_reasons_have_the_numbers_of_the_message():
     from coglab_msgs.msg import ReasonCode as codes
 

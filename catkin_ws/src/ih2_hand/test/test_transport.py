@@ -1,22 +1,17 @@
-"""The two ends of a port, byte by byte: what the host reads of it, and what the emulator's pty serves."""
+"""The host's end of a port, byte by byte."""
 
 from __future__ import annotations
 
 import errno
 import os
 import pty
-import select
 import time
 import tty
-from collections.abc import Callable
 from types import SimpleNamespace
 
 import pytest
 import serial
 from ih2_hand import transport
-from ih2_hand.emulator.faults import Faults
-from ih2_hand.emulator.hand import EmulatedHand
-from ih2_hand.emulator.pty_server import PtyServer
 from ih2_hand.errors import HandConnectionLost, HandPortError
 from ih2_hand.transport import SerialTransport
 
@@ -80,14 +75,6 @@ def test_an_end_of_file_is_a_lost_port(far, monkeypatch):
         far.port.read(2, 5.0)
 
 
-def test_time_limits_are_told_to_the_system_in_milliseconds(far, monkeypatch):
-    asked: list[float] = []
-    monkeypatch.setattr(far.port, "_poll", SimpleNamespace(poll=asked.append))
-    far.port.read(1, 0.05)
-    far.port.pending()
-    assert asked == [50.0, 0]
-
-
 def test_forgotten_bytes_are_gone_and_new_ones_come(far):
     far.says(b"\x01\x02\x03")
     far.port.flush_input()
@@ -95,11 +82,6 @@ def test_forgotten_bytes_are_gone_and_new_ones_come(far):
     far.port.flush_input()
     far.says(b"\x04")
     assert far.port.read(1, 5.0) == b"\x04"
-
-
-def test_what_is_written_arrives_whole(far):
-    far.port.write(b"\x44\x02\x64")
-    assert os.read(far.master, 16) == b"\x44\x02\x64"
 
 
 def test_a_port_may_be_closed_twice_and_is_then_lost(far):
@@ -134,161 +116,3 @@ def test_a_port_that_cannot_be_opened_is_told_with_what_to_do(monkeypatch, tmp_p
     monkeypatch.setattr(transport, "serial_ports", lambda: ["/dev/a", "/dev/b"])
     with pytest.raises(HandPortError, match=words.replace("PORT", str(port))):
         SerialTransport(str(port))
-
-
-def test_a_machine_without_serial_devices_says_so(monkeypatch):
-    monkeypatch.setattr(transport, "serial_ports", list)
-    with pytest.raises(HandPortError, match="serial devices here: none"):
-        SerialTransport("/dev/there-is-no-such-port")
-
-
-def test_devices_without_a_driver_are_not_offered(monkeypatch):
-    devices = [("/dev/ttyUSB1", "USB"), ("/dev/ttyS0", "n/a"), ("/dev/ttyACM0", "USB")]
-    found = [SimpleNamespace(device=device, hwid=hwid) for device, hwid in devices]
-    monkeypatch.setattr(transport.list_ports, "comports", lambda: found)
-    assert transport.serial_ports() == ["/dev/ttyACM0", "/dev/ttyUSB1"]
-
-
-@pytest.mark.parametrize(("value", "shown"), [(None, "none"), (0, "0x00"), (0xA5, "0xa5")])
-def test_a_byte_is_shown_in_hex(value, shown):
-    assert transport.format_byte(value) == shown
-
-
-def test_usb_adapters_are_asked_not_to_hold_answers_back():
-    asked: list[bool] = []
-    transport._shorten_latency(SimpleNamespace(set_low_latency_mode=asked.append))
-    transport._shorten_latency(SimpleNamespace())
-    assert asked == [True]
-
-
-# -- the emulator's end --------------------------------------------------------------------------
-
-
-class Served:
-    """A pty whose serving is done here, step by step."""
-
-    def __init__(self, link: str | None = None) -> None:
-        self.ports: list[str] = []
-        self.traced: list[tuple[str, bytes]] = []
-        self.hand = EmulatedHand(greeting=True)
-        self.faults = Faults(self.hand)
-        trace = lambda way, data, _: self.traced.append((way, data))  # noqa: E731
-        self.server = PtyServer(self.hand, self.faults, link, self.ports.append, trace)
-        self.host = os.open(self.server.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-
-    def asks(self, data: bytes, count: int = 0) -> bytes:
-        """Sends, and serves until `count` bytes have come back; a crowded machine may take its time."""
-        os.write(self.host, data)
-        return self.serves_until(lambda came: len(came) >= count)
-
-    def serves_until(self, enough: Callable[[bytes], object]) -> bytes:
-        """What has come back when it is enough."""
-        came, end = self.serves(), time.monotonic() + 60.0
-        while not enough(came):
-            assert time.monotonic() < end, f"it waits for ever, with {came!r}"
-            came += self.serves()
-        return came
-
-    def serves(self) -> bytes:
-        """Serves for a moment, without a sleep; what has come back."""
-        end = time.monotonic() + 0.02
-
-        def ended() -> bool:
-            self.server._wake()
-            return time.monotonic() >= end
-
-        self.server.serve(ended)
-        return os.read(self.host, 100) if select.select([self.host], [], [], 0.0)[0] else b""
-
-
-@pytest.fixture
-def served(tmp_path):
-    served = Served(str(tmp_path / "hand"))
-    yield served
-    os.close(served.host)
-    served.server.shutdown()
-
-
-def test_frames_are_answered_and_traced_in_both_directions(served):
-    assert served.asks(b"\x45\x02\x49\x02", 3) == b"\x00\x00\x00"
-    assert served.traced == [(">", b"\x45\x02\x49\x02"), ("<", b"\x00"), ("<", b"\x00\x00")]
-
-
-def test_a_slow_hand_answers_late_and_in_order(served):
-    served.server.fault("slow 100")
-    begun = time.monotonic()
-    assert served.asks(b"\x45\x02\x4b\x02") == b""
-    assert served.serves_until(lambda came: len(came) == 2) == b"\x00\x08"
-    assert time.monotonic() - begun >= 0.1
-
-
-def test_garbage_comes_without_having_been_asked_for(served):
-    served.server.fault("garbage 4")
-    assert len(served.serves_until(lambda came: len(came) >= 4)) == 4 and served.serves() == b""
-
-
-def test_a_lost_byte_does_not_arrive(served):
-    served.server.fault("lose_in 1")
-    assert served.asks(b"\x45\x45\x02", 1) == b"\x00" and served.traced[0] == (">", b"\x45\x02")
-
-
-def test_a_cable_can_be_pulled_and_plugged_in_again(served, tmp_path):
-    link, first = tmp_path / "hand", served.server.path
-    assert os.readlink(link) == first and served.ports == [first]
-    os.write(served.host, b"\x45")
-    served.serves_until(lambda _: served.hand.parser.waiting)
-    served.server.fault("unplug")
-    served.server.fault("unplug")
-    assert served.server.path == "" and served.ports == [first, ""] and not link.is_symlink()
-    assert served.hand.parser.waiting == b"", "what was cut off is forgotten"
-    served.server.fault("replug")
-    served.server.fault("replug")
-    assert len(served.ports) == 3 and os.readlink(link) == served.server.path == served.ports[2]
-
-
-def test_a_cable_plugs_itself_in_again_after_its_time(served):
-    begun = time.monotonic()
-    served.server.fault("unplug 0.1")
-    assert served.server.path == ""
-    served.serves_until(lambda _: served.server.path)
-    assert time.monotonic() - begun >= 0.1
-
-
-def test_a_link_that_somebody_has_removed_keeps_no_cable_plugged(served, tmp_path):
-    (tmp_path / "hand").unlink()
-    served.server.fault("unplug")
-    assert served.server.path == "" and served.ports[-1] == ""
-
-
-def test_answers_that_were_late_do_not_survive_the_cable(served):
-    served.server.fault("slow 60000")
-    os.write(served.host, b"\x45\x02")
-    served.serves_until(lambda _: served.server._late)
-    served.server.fault("unplug")
-    served.server.fault("replug")
-    assert served.server._late == []
-
-
-def test_the_loop_sleeps_until_something_is_due(served):
-    assert served.server._wait_s() == 1.0
-    served.server._late = [(time.monotonic() + 0.5, b"")]
-    assert 0.3 < served.server._wait_s() <= 0.5
-    served.server._replug_at = time.monotonic() - 1.0
-    assert served.server._wait_s() == 0.0
-    served.server._late, served.server._replug_at = [], None
-
-
-def test_bytes_beyond_a_full_line_are_lost_and_not_waited_for(served, monkeypatch):
-    def full(*_: object) -> int:
-        raise BlockingIOError
-
-    monkeypatch.setattr(os, "write", full)
-    served.server._send(b"\x00")
-    assert served.traced == []
-
-
-def test_a_server_that_has_been_shut_down_serves_no_more(served):
-    served.server.request_shutdown()
-    begun = time.monotonic()
-    served.server.serve()
-    assert time.monotonic() - begun < 60.0

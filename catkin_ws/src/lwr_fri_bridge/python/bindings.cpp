@@ -1,7 +1,7 @@
 /// @file
-/// Python module `lwr_fri_bridge`: the bridge in lockstep, the interpolator, braking and the two
-/// datagrams as dictionaries. Arrays are numpy float64 in wire order; times in ns and s as in the
-/// headers.
+/// Python module `lwr_fri_bridge`: the bridge in lockstep, one axis of the interpolator, and the
+/// two datagrams as dictionaries. Arrays are numpy float64 in wire order; times in ns and s as in
+/// the headers.
 #include <pybind11/eigen.h>
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
@@ -270,34 +270,11 @@ void bindMotionFunctions(py::module_& m) {
       },
       py::arg("velocity"), py::arg("acceleration"), py::arg("target_velocity"),
       py::arg("max_acceleration"), py::arg("max_jerk"));
-  m.def("braking_distance", &coglab_rt::brakingDistance, py::arg("speed"),
-        py::arg("max_acceleration"), py::arg("max_jerk"));
-  m.def("braking_speed", &coglab_rt::brakingSpeed, py::arg("distance"), py::arg("max_acceleration"),
-        py::arg("max_jerk"), py::arg("delay"));
   m.def(
       "flange_pose",
       [](const Vector7& joints) { return Eigen::Matrix4d(flangePose(joints).matrix()); },
       "4x4 pose of the flange in the base frame.", py::arg("joints"));
   m.def("known_events", &knownEvents);
-}
-
-void bindMotion(py::module_& m) {
-  py::class_<Interpolator>(m, "Interpolator", py::module_local())
-      .def(py::init<const JointLimits&>(), py::arg("limits"))
-      .def("reset", &Interpolator::reset, py::arg("position"))
-      .def("resume", &Interpolator::resume, py::arg("position"), py::arg("velocity"),
-           py::arg("acceleration"))
-      .def("step", &Interpolator::step, py::arg("target_velocity"), py::arg("dt"))
-      .def_property_readonly("position", &Interpolator::position)
-      .def_property_readonly("velocity", &Interpolator::velocity)
-      .def_property_readonly("acceleration", &Interpolator::acceleration);
-
-  py::class_<VelocityFilter>(m, "VelocityFilter", py::module_local())
-      .def(py::init<double>(), py::arg("time_constant"))
-      .def("update", &VelocityFilter::update, py::arg("position"), py::arg("cycles"), py::arg("dt"))
-      .def_static("delay", &VelocityFilter::delay, py::arg("time_constant"), py::arg("dt"))
-      .def_static("noise_gain", &VelocityFilter::noiseGain, py::arg("time_constant"),
-                  py::arg("dt"));
 }
 
 void bindBridge(py::module_& m) {
@@ -349,11 +326,9 @@ void bindBridge(py::module_& m) {
 
 PYBIND11_MODULE(lwr_fri_bridge, m) {
   m.doc() =
-      "FRI bridge of the KUKA LWR 4+: interpolator, braking, datagrams, and the bridge in "
-      "lockstep.";
+      "FRI bridge of the KUKA LWR 4+: the bridge in lockstep, datagrams, one axis of its motion.";
   bindDatagrams(m);
   bindLimits(m);
   bindMotionFunctions(m);
-  bindMotion(m);
   bindBridge(m);
 }

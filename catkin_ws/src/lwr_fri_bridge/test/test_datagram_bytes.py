@@ -175,17 +175,6 @@ def test_bridge_reads_joint_order_and_reversed_torques() -> None:
     assert list(sample["tool_wrench"]) == [21, 22, 23, 26, 25, 24]
 
 
-def test_wrench_is_turned_from_the_axes_of_the_base_into_those_of_the_tool() -> None:
-    bridge = lwr_fri_bridge.Bridge(str(LIMITS))
-    turned = [0, -1, 0, 0.5, 1, 0, 0, 0.1, 0, 0, 1, 0.4]  # tool x along base y, tool y along base -x
-    data = monitor_datagram(5, measured_frame=turned, external_wrench=[21, 22, 23, 24, 25, 26])
-    assert bridge.answer(data, 10**9) is not None
-    assert list(bridge.snapshot()["tool_wrench"]) == [22, -21, 23, 25, -26, 24]
-    bridge = lwr_fri_bridge.Bridge(str(LIMITS), wrench_in_tool_axes=True)
-    assert bridge.answer(data, 10**9) is not None
-    assert list(bridge.snapshot()["tool_wrench"]) == [21, 22, 23, 26, 25, 24]
-
-
 def test_bridge_writes_stiffness_with_reversed_rotations() -> None:
     bridge = lwr_fri_bridge.Bridge(
         str(LIMITS),

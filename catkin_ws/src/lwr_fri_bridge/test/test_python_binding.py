@@ -11,27 +11,13 @@ LIMITS = str(pathlib.Path(__file__).parents[2] / "lwr_description" / "config" / 
 IDENTITY = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]
 
 
-@pytest.mark.parametrize(
-    ("name", "told", "bounds"),
-    [
-        ("position_margin", "position_margin", "0..0.5"),
-        ("leash_position", "set_point_leash/position", "0.005..0.5"),
-        ("leash_impedance", "set_point_leash/impedance", "0.005..0.5"),
-        ("leash_load", "set_point_leash/load", "0..70"),
-        ("velocity_filter_time", "velocity_filter_time", "0..0.2"),
-        ("command_timeout", "command_timeout", "0.005..1"),
-        ("topic_timeout", "topic_timeout", "0.005..1"),
-        ("receive_timeout", "receive_timeout", "0.05..5"),
-        ("start_timeout", "start_timeout", "0.5..120"),
-        ("stop_timeout", "stop_timeout", "0.1..30"),
-        ("silent_stop_timeout", "silent_stop_timeout", "0.1..30"),
-        ("tool_number", "tool_number", "0..16"),
-    ],
-)
-def test_a_parameter_goes_where_its_name_says(name: str, told: str, bounds: str) -> None:
-    with pytest.raises(ValueError) as error:
-        lwr_fri_bridge.Bridge(LIMITS, **{name: -7})
-    assert str(error.value) == f"parameter {told} = -7 is outside its range {bounds}"
+def test_a_parameter_out_of_range_is_refused_by_its_name() -> None:
+    leash = {"leash_" + name: "set_point_leash/" + name for name in ("position", "impedance", "load")}
+    times = ("velocity_filter_time", "command_timeout", "topic_timeout", "receive_timeout", "start_timeout")
+    names = ("position_margin", *times, "stop_timeout", "silent_stop_timeout", "tool_number")
+    for name, told in (leash | {name: name for name in names}).items():
+        with pytest.raises(ValueError, match=f"parameter {told} = -7 is outside its range"):
+            lwr_fri_bridge.Bridge(LIMITS, **{name: -7})
 
 
 def test_parameters_that_are_words_and_those_that_are_unknown() -> None:
@@ -118,27 +104,6 @@ def test_a_start_and_a_motion_in_lockstep() -> None:
     assert cell.position[0] > 0.1 + 0.03 and cell.position[6] < 0.1 - 0.015
     assert state["accepted"] == state["sequence"] == cell.counter
     assert state["stamp_ns"] == cell.now and state["cycle_time"] == pytest.approx(0.005)
-    counters = (
-        *("wrong_size", "wrong_id", "implausible", "duplicate", "out_of_order", "lost_measurements", "lost_answers"),
-        *("restarts", "new_periods", "commands_invalid", "commands_old_epoch", "command_timeouts"),
-        *("resumed_after_gap", "position_bounds", "leash_trips", "requests_dropped", "fall_backs"),
-    )
-    assert {name: state[name] for name in counters} == dict.fromkeys(counters, 0)
-
-
-def test_what_is_refused_has_no_answer_and_is_counted_by_its_name() -> None:
-    cell = Controller()
-    cell.cycle()
-    assert cell.bridge.answer(bytes(915), cell.now) is None
-    assert cell.bridge.answer(bytes(916), cell.now) is None
-    good = cell.fields | {"counter": 1, "measured_position": cell.position, "commanded_position": cell.position}
-    assert cell.bridge.answer(lwr_fri_bridge.encode_measurement(good), cell.now) is None
-    assert cell.bridge.answer(lwr_fri_bridge.encode_measurement(good | {"counter": 5000}), cell.now) is None
-    assert cell.bridge.answer(lwr_fri_bridge.encode_measurement(good | {"counter": 2, "state": 0}), cell.now) is None
-    names = ("wrong_size", "wrong_id", "duplicate", "out_of_order", "implausible", "accepted")
-    cell.bridge.idle(cell.now)  # shows what was counted
-    state = cell.bridge.snapshot()
-    assert [state[name] for name in names] == [1] * 6
 
 
 def test_lenient_headers_and_the_tool_are_taken() -> None:
@@ -169,24 +134,3 @@ def test_limits_have_profiles() -> None:
     assert min(full.velocity) > 1.0
     assert list(full.upper_position) == list(-full.lower_position)
     assert lwr_fri_bridge.known_events().startswith("start, hold, reset, stop, position")
-
-
-def test_motion_functions_agree_with_each_other() -> None:
-    distance = lwr_fri_bridge.braking_distance(1.0, 10.0, 500.0)
-    # At constant acceleration 0.05 m, and half the time that the acceleration takes to come, twice.
-    assert distance == pytest.approx(0.5 * 1.0 * (1.0 / 10.0 + 10.0 / 500.0), rel=1e-9)
-    assert lwr_fri_bridge.braking_speed(distance, 10.0, 500.0, 0.0) == pytest.approx(1.0, rel=1e-6)
-    assert lwr_fri_bridge.time_to_velocity(0.0, 0.0, 1.0, 10.0, 500.0) == pytest.approx(0.12)
-    state = lwr_fri_bridge.step_axis(0.0, 0.0, 0.0, 1.0, 10.0, 500.0, 0.12)
-    assert state == pytest.approx((0.06, 1.0, 0.0), abs=1e-9)
-    interpolator = lwr_fri_bridge.Interpolator(lwr_fri_bridge.JointLimits(LIMITS))
-    interpolator.reset([0.5] * 7)
-    assert list(interpolator.position) == [0.5] * 7
-    interpolator.resume([0.1] * 7, [0.2] * 7, [0.0] * 7)
-    interpolator.step([0.2] * 7, 0.005)
-    assert list(interpolator.position) == pytest.approx([0.101] * 7)
-    velocity = lwr_fri_bridge.VelocityFilter(0.0)
-    velocity.update([0.0] * 7, 1, 0.005)
-    assert list(velocity.update([0.01] * 7, 2, 0.005)) == pytest.approx([1.0] * 7)
-    assert lwr_fri_bridge.VelocityFilter.delay(0.0, 0.005) == pytest.approx(0.0025)
-    assert lwr_fri_bridge.VelocityFilter.noise_gain(0.0, 0.005) == pytest.approx(200.0 * 2**0.5)

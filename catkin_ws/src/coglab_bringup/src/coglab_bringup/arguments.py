@@ -21,9 +21,9 @@ from coglab_bringup.launch_arguments import judge_launch
 from coglab_bringup.usage import Parser, Refused, seed, writable_file, writable_folder
 
 HELP_GIVEN = 10
-BUILD_OPTIONS = ("--upstream-smach",)
-BUILD_TARGETS = ("tests",)
+BUILD_WORDS = ("--upstream-smach", "tests")
 TEST_FILES = ("test_*.cpp", "test_*.py", "*.test")  # in the folder test of a package
+GTEST_CASE = re.compile(r"^\s*(TYPED_TEST|TEST_F|TEST_P|TEST)\(\s*(\w+)\s*,\s*(\w+)\s*\)", re.MULTILINE)
 
 
 def demo_parser(top: Path) -> Parser:
@@ -101,11 +101,29 @@ def left_out(top: Path) -> list[str]:
     return found.group(1).split(";") if found else []
 
 
+def cases_in(path: Path) -> list[str]:
+    """The gtests of a C++ file, as --gtest_filter takes them."""
+    forms = {"TEST_P": "*{}.{}/*", "TYPED_TEST": "{}/*.{}"}
+    found = GTEST_CASE.findall(path.read_text(encoding="utf-8"))
+    return [forms.get(macro, "{}.{}").format(suite, name) for macro, suite, name in found]
+
+
+def test_files(test: Path) -> list[Path]:
+    """The test files in a package's folder test and in its rooms: folders whose .cpp files together are one gtest."""
+    files = [path for kind in TEST_FILES for path in sorted(test.glob(kind))]
+    return files + [path for path in sorted(test.glob("*/*.cpp")) if cases_in(path)]
+
+
+def binary_of(package: str, path: Path) -> str:
+    """The gtest that holds this file, which is also its target: of the file itself, or of its room."""
+    return f"{package}_{path.stem}" if path.parent.name == "test" else f"{package}_test_{path.parent.name}"
+
+
 class Wanted(NamedTuple):
-    """Tests that a word of the command line names: PACKAGE, PACKAGE/FILE or PACKAGE/FILE::CASE."""
+    """Tests that a word of the command line names: PACKAGE, PACKAGE/ROOM, PACKAGE/FILE or PACKAGE/FILE::CASE."""
 
     package: str
-    file: str = ""  # in the package's folder test; "": all
+    file: str = ""  # in the package's folder test or in a room of it; "": all
     case: str = ""
 
     @classmethod
@@ -115,14 +133,19 @@ class Wanted(NamedTuple):
         package, _, file = place.rstrip("/").partition("/")
         return cls(package, file.removeprefix("test/"), case)
 
+    def names(self, path: Path) -> bool:
+        """Whether it names this file of its package, or the file's room."""
+        room = "" if path.parent.name == "test" else path.parent.name
+        return self.file in {"", path.name, room, f"{room}/{path.name}"}
+
     def check(self, sources: Path) -> None:
         """Raises Refused, with what there is, if there is no such test."""
         folders = package_folders(sources)
         _named([self.package], folders, "package")
-        test = folders[self.package] / "test"
-        files = sorted(path.name for kind in TEST_FILES for path in test.glob(kind))
-        if self.file:
-            _named([self.file], files, f"test of {self.package}")
+        files = test_files(folders[self.package] / "test")
+        if not any(self.names(path) for path in files) and self.file:
+            rooms = {path.parent.name for path in files} - {"test"}
+            _named([self.file], sorted(rooms.union(path.name for path in files)), f"test of {self.package}")
         if self.case and not self.file.endswith((".cpp", ".py")):
             raise Refused(f"{self.file or self.package} runs as a whole: leave out ::{self.case}")
 
@@ -141,8 +164,9 @@ def test_targets(top: Path, wanted: list[Wanted]) -> list[str]:
     targets = set[str]()
     for one in wanted:
         place = folders[one.package].relative_to(sources)
-        if one.file.endswith(".cpp"):
-            targets.add(f"{place}/CMakeFiles/{one.package}_{one.file.removesuffix('.cpp')}.dir/all")
+        files = [path for path in test_files(folders[one.package] / "test") if one.names(path)]
+        if one.file and all(path.suffix == ".cpp" for path in files):
+            targets |= {f"{place}/CMakeFiles/{binary_of(one.package, path)}.dir/all" for path in files}
             continue
         targets |= {target for target in of_tests if target.startswith(f"{place}/CMakeFiles/")}
         text = "\n".join(path.read_text(encoding="utf-8") for path in (folders[one.package] / "test").glob("*.*"))
@@ -152,12 +176,10 @@ def test_targets(top: Path, wanted: list[Wanted]) -> list[str]:
     return sorted(targets)
 
 
-def find_benches(sources: Path) -> dict[str, list[Path]]:
-    """The files of each bench by its name, from the packages below `sources`."""
-    benches: dict[str, list[Path]] = {}
-    for path in sorted(sources.rglob("bench/bench_*.py")):
-        benches.setdefault(path.stem.removeprefix("bench_"), []).append(path)
-    return benches
+def benchmarks(top: Path) -> list[str]:
+    """Names of the programs of the folder benchmarks."""
+    files = sorted((top / "benchmarks").glob("*.py"))
+    return [path.stem for path in files if '__name__ == "__main__"' in path.read_text() and path.stem != "report"]
 
 
 def _named(names: list[str], known: Iterable[str], what: str) -> None:
@@ -200,27 +222,16 @@ def test_options(top: Path, words: list[str]) -> argparse.Namespace:
 
 def bench_options(top: Path, words: list[str]) -> argparse.Namespace:
     """./coglab bench"""
-    parser = Parser(prog="coglab bench", description="Every figure beside its goal and a peer.")
-    parser.add_argument("names", nargs="*", metavar="NAME", help="default: all")
-    parser.add_argument("--json", type=writable_file, metavar="FILE", help="write the rows as a JSON list")
-    parser.add_argument("--long", action="store_true", help="the campaigns too (hours)")
+    known = benchmarks(top)
+    parser = Parser(prog="coglab bench", description="Measures, beside goals and other programs.")
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"{', '.join(known)}; default: all, without --report")
+    parser.add_argument("--quick", action="store_true", help="few repetitions; prints the rows and keeps none")
+    parser.add_argument("--report", action="store_true", help="writes docs/benchmarks.md from benchmarks/results.csv")
     options = parser.parse_args(words)
-    _named(options.names, find_benches(top / "catkin_ws" / "src"), "bench")
+    _named(options.names, known, "benchmark")
+    if not options.names and not options.report:
+        options.names = known
     return options
-
-
-def _judge_install(top: Path, words: list[str]) -> None:
-    lines = (top / "debian-packages.txt").read_text(encoding="utf-8").splitlines()
-    groups = list(dict.fromkeys(line.split(":")[0] for line in lines if line and not line.startswith("#")))
-    unknown = [word for word in words if word not in groups]
-    if unknown:
-        raise Refused(f"no group named {', '.join(unknown)}; there are: {', '.join(groups)}")
-
-
-def _judge_build(_top: Path, words: list[str]) -> None:
-    unknown = [word for word in words if word not in BUILD_OPTIONS + BUILD_TARGETS]
-    if unknown:
-        raise Refused(f"build takes {', '.join(BUILD_OPTIONS + BUILD_TARGETS)}, not {', '.join(unknown)}")
 
 
 def _judge_shell(top: Path, words: list[str]) -> None:
@@ -231,8 +242,8 @@ def _judge_shell(top: Path, words: list[str]) -> None:
         )
 
 
-def _judge_tool(command: str, verbs: dict[str, int], words: list[str]) -> None:
-    """`verbs`: what may come first, and how many more words it needs at least."""
+def _judge_tool(command: str, words: list[str]) -> None:
+    verbs = TOOLS[command]
     if words[:1] == ["--folder"]:  # of object_tool.py, which may come first
         words = words[2:]
     if not words or words[0] not in verbs:
@@ -242,17 +253,13 @@ def _judge_tool(command: str, verbs: dict[str, int], words: list[str]) -> None:
         raise Refused(f"{command} {words[0]} expects a NAME")
 
 
-def _judge_nothing(command: str, words: list[str]) -> None:
-    if words:
-        raise Refused(f"{command} takes no arguments, got '{' '.join(words)}'")
-
-
 TOOLS = {
     "hand": {"trace": 0},
     "controller": {"new": 1},
     "object": {"new": 1, "check": 0, "list": 0},
     "console": {"picture": 0},
 }
+"""of each command what may come first, and how many more words it needs at least"""
 
 
 def judge(top: Path, command: str, words: list[str]) -> None:
@@ -270,13 +277,16 @@ def judge(top: Path, command: str, words: list[str]) -> None:
     elif command == "shell":
         _judge_shell(top, words)
     elif command == "install":
-        _judge_install(top, words)
+        lines = (top / "debian-packages.txt").read_text(encoding="utf-8").splitlines()
+        _named(words, dict.fromkeys(line.split(":")[0] for line in lines if line and line[0] != "#"), "group")
     elif command == "build":
-        _judge_build(top, words)
+        unknown = [word for word in words if word not in BUILD_WORDS]
+        if unknown:
+            raise Refused(f"build takes {', '.join(BUILD_WORDS)}, not {', '.join(unknown)}")
     elif command in TOOLS:
-        _judge_tool(command, TOOLS[command], words)
-    else:
-        _judge_nothing(command, words)
+        _judge_tool(command, words)
+    elif words:
+        raise Refused(f"{command} takes no arguments, got '{' '.join(words)}'")
 
 
 def main(words: list[str]) -> int:

@@ -16,7 +16,6 @@ from pathlib import Path
 
 from coglab_bringup import process_tree
 from coglab_bringup.arguments import demo_parser
-from coglab_bringup.commit import commit_of
 from coglab_bringup.run_directory import free_port, record_run, run_environment
 from coglab_bringup.usage import Refused
 
@@ -103,6 +102,15 @@ def keep(problems: list[str], folder: Path, name: str, write: Callable[[Path], o
                 file.replace(folder / file.name)
     except OSError as error:
         problems.append(f"{folder / name} could not be written ({error.strerror or error})")
+
+
+def commit_of(top: Path) -> str:
+    """The commit of this checkout; "unknown" outside of one, or without git."""
+    try:
+        command = ["git", "-C", str(top), "rev-parse", "HEAD"]
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
 
 
 def _interrupt(*_signal: object) -> None:

@@ -7,14 +7,10 @@ import shutil
 import socket
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
-OPTIONAL = {
-    "browser": "no browser is installed (only needed to test the console)",
-    "viz": "rviz is not installed (only needed where there is a screen)",
-    "docs": "Sphinx is not installed (only needed to build the documentation site)",
-    "film": "nothing is installed to draw pictures without a screen (only needed for ./coglab film)",
-}
+Finding = tuple[bool, str]  # whether it is fine, and a sentence, with what to do where it is not
 
 
 def package_groups(top: Path) -> dict[str, list[str]]:
@@ -54,89 +50,73 @@ def smach_copies(top: Path) -> list[Path]:
     return sorted(copies)
 
 
-def package_findings(top: Path) -> list[tuple[bool, str]]:
+def package_findings(top: Path) -> Iterator[Finding]:
     """Whether the Debian packages of each group are installed."""
-    result: list[tuple[bool, str]] = []
+    optional = {
+        "browser": "no browser is installed (only needed to test the console)",
+        "viz": "rviz is not installed (only needed where there is a screen)",
+        "docs": "Sphinx is not installed (only needed to build the documentation site)",
+        "film": "nothing is installed to draw pictures without a screen (only needed for ./coglab film)",
+    }
     for group, packages in package_groups(top).items():
         there = installed(packages)
         missing = [package for package in packages if package not in there]
-        if missing and group in OPTIONAL:
-            result.append((True, f"{OPTIONAL[group]}: ./coglab install {group}"))
+        get = f"./coglab install {group}"
+        if missing and group in optional:
+            yield True, f"{optional[group]}: {get}"
         elif missing:
-            result.append(
-                (False, f"packages to {group}: missing {' '.join(missing)}; get them: ./coglab install {group}")
-            )
+            yield False, f"packages to {group}: missing {' '.join(missing)}; get them: {get}"
         else:
-            result.append((True, f"packages to {group}: all {len(packages)} installed"))
-    return result
+            yield True, f"packages to {group}: all {len(packages)} installed"
 
 
-def findings(top: Path) -> list[tuple[bool, str]]:
-    """Each finding: whether it is fine, and a sentence (with what to do where it is not)."""
-    result: list[tuple[bool, str]] = []
+def environment_findings(top: Path) -> Iterator[Finding]:
+    """Other Pythons, other ROS distributions, other copies of smach."""
+    python = shutil.which("python3")
+    if python != "/usr/bin/python3":
+        yield True, f"python3 in your PATH is {python}; ./coglab uses /usr/bin/python3 anyway, as does devel/setup.bash"
+    # The environment of this workspace names /opt/ros itself, where it was built with --upstream-smach.
+    own, names = f"{top}/catkin_ws/", ("ROS_DISTRO", "ROS_ROOT", "CMAKE_PREFIX_PATH", "ROS_PACKAGE_PATH")
+    values = {name: os.environ.get(name, "") for name in names}
+    foreign = [name for name, value in values.items() if "/opt/ros" in value and own not in value]
+    if foreign:
+        what = f"a ROS from /opt/ros is in {', '.join(foreign)}"
+        yield False, f"{what}; open a shell without it and source devel/setup.bash"
+    cache = top / "catkin_ws" / "build" / "CMakeCache.txt"
+    if cache.is_file() and "=smach;smach_msgs;smach_ros" in cache.read_text():
+        yield True, "smach: upstream's, as built with --upstream-smach; ours again: ./coglab build"
+        return
+    for copy in smach_copies(top):
+        what = f"a second copy of {copy.name} lies in {copy}"
+        yield False, f"{what}; remove it, or use it: ./coglab build --upstream-smach"
+
+
+def findings(top: Path) -> Iterator[Finding]:
+    """All of them."""
     system = release()
     fine = system.get("VERSION_CODENAME") in ("bookworm", "trixie")
     name = system.get("PRETTY_NAME", "unknown")
-    result.append((fine, f"release: {name}" + ("" if fine else "; use Debian 12 or 13, or a container: docker/run")))
-    result += package_findings(top)
+    yield fine, f"release: {name}" + ("" if fine else "; use Debian 12 or 13, or a container: docker/run")
+    yield from package_findings(top)
     built = (top / "catkin_ws" / "devel" / "setup.bash").exists()
-    result.append((built, "workspace: built" if built else "workspace: not built yet; do it: ./coglab build"))
-    python = shutil.which("python3")
-    if python != "/usr/bin/python3":
-        result.append(
-            (
-                True,
-                f"python3 in your PATH is {python}; ./coglab uses /usr/bin/python3 anyway, as does devel/setup.bash",
-            )
-        )
-    # The environment of this workspace names /opt/ros itself, where it was built with --upstream-smach.
-    own = f"{top}/catkin_ws/"
-    foreign = [
-        v
-        for v in ("ROS_DISTRO", "ROS_ROOT", "CMAKE_PREFIX_PATH", "ROS_PACKAGE_PATH")
-        if "/opt/ros" in os.environ.get(v, "") and own not in os.environ.get(v, "")
-    ]
-    if foreign:
-        result.append(
-            (
-                False,
-                f"a ROS from /opt/ros is in {', '.join(foreign)}; open a shell without it and source devel/setup.bash",
-            )
-        )
-    cache = top / "catkin_ws" / "build" / "CMakeCache.txt"
-    upstream = cache.is_file() and "=smach;smach_msgs;smach_ros" in cache.read_text()
-    if upstream:
-        result.append((True, "smach: upstream's, as built with --upstream-smach; ours again: ./coglab build"))
-    for copy in [] if upstream else smach_copies(top):
-        result.append(
-            (
-                False,
-                f"a second copy of {copy.name} lies in {copy}; remove it, or use it: ./coglab build --upstream-smach",
-            )
-        )
+    yield built, "workspace: built" if built else "workspace: not built yet; do it: ./coglab build"
+    yield from environment_findings(top)
+    host = socket.gethostname()
     try:
-        socket.getaddrinfo(socket.gethostname(), None)
+        socket.getaddrinfo(host, None)
     except OSError:
-        result.append(
-            (True, f"the host name {socket.gethostname()} does not resolve; harmless, because ROS_IP=127.0.0.1 is set")
-        )
+        yield True, f"the host name {host} does not resolve; harmless, because ROS_IP=127.0.0.1 is set"
     load, cores = os.getloadavg()[0], os.cpu_count() or 1
     if load > cores:
-        result.append(
-            (
-                True,
-                f"this computer is busy: load {load:.1f} on {cores} cores; a simulated cell runs slower than real time "
-                "and answers to a robot may come late: end other programs",
-            )
-        )
+        slow = "a simulated cell runs slower than real time and answers to a robot may come late"
+        yield True, f"this computer is busy: load {load:.1f} on {cores} cores; {slow}: end other programs"
     if shutil.disk_usage(top).free < 2e9:
-        result.append((False, "less than 2 GB free where this folder lies; make room before building"))
-    return result
+        yield False, "less than 2 GB free where this folder lies; make room before building"
 
 
 def main(arguments: list[str]) -> int:
     """Prints the findings; exit status 0 if all are fine."""
-    found = findings(Path(arguments[0]))
+    found = list(findings(Path(arguments[0])))
     for fine, sentence in found:
         print(("ok       " if fine else "MISSING  ") + sentence)
     if all(fine for fine, _ in found):

@@ -1,16 +1,18 @@
 """./coglab test: finds and runs every test of the workspace and counts each case once, from the JUnit files.
 
 Three kinds, found by where they lie in a package:
-  gtest    test/test_THING.cpp, built by the target `tests` as devel/lib/<package>/<package>_test_THING;
-           not built is a failure
-  pytest   test/test_*.py (smach's own packages one level deeper alike)
+  gtest    test/ROOM/*.cpp with a TEST in one of them: one binary, devel/lib/PACKAGE/PACKAGE_test_ROOM;
+           test/test_THING.cpp: a binary of its own, PACKAGE_test_THING. The target `tests` builds them; a binary that
+           is not there is a failure
+  pytest   test/test_*.py: one process per package, with a worker that is replaced if it crashes. A file that calls
+           rospy.init_node has a process of its own, because a process can be one node only
   rostest  test/*.test, each with a ROS master of its own
 Packages that the build left out (./coglab build --upstream-smach) are named and not tested.
-A program without a single case is a failure, too: a test file that tests nothing hides what it was written for.
+A program or a file without a single case is a failure, too.
 
 Two programs run at a time, or one per processor core up to four. None may be red because others run beside it.
 --repeat N runs all of that N times, --load beside two busy processes, and lists each case that did not end alike each
-time.
+time. --long runs the campaigns, too: tests that look for COGLAB_LONG in the environment.
 """
 
 from __future__ import annotations
@@ -24,93 +26,139 @@ import xml.etree.ElementTree as ElementTree
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
+from threading import Semaphore
 
 from coglab_bringup import process_tree
-from coglab_bringup.arguments import TEST_FILES, Wanted, left_out, package_folders, test_options
+from coglab_bringup.arguments import Wanted, binary_of, cases_in, left_out, package_folders, test_files, test_options
 from coglab_bringup.run_directory import free_port, run_environment
 from coglab_bringup.usage import Refused
 
 AT_A_TIME = max(2, min(4, os.cpu_count() or 2))
 BUSY = ("-c", "import os\nparent = os.getppid()\nwhile os.getppid() == parent:\n  sum(range(100000))")
 """a process that uses one core as long as its parent lives"""
-FIRST = (
-    *("console.test", "session.test"),
-    *("test_virtual_trials.py", "test_plain_cmake.py", "test_virtual_bad_input.py", "test_corrupted_streams.py"),
-    *("test_bridge_and_cell.py", "test_new_motion.py", "test_page.py"),
-    *("lwr_node.test", "port_contracts.test", "hand_node.test", "hand_faults.test", "fuzz.test", "topic_goal.test"),
-)
-"""what takes longest begins first: as the last one it would run while nothing is left to run beside it"""
+OWN_NODE = "rospy.init_node("  # in a pytest file: it needs a process of its own
+SLOWEST = 10  # programs and files whose time is printed at the end
 TIME_LIMIT = 1800.0  # s, per test program
 LONG_TIME_LIMIT = 7200.0  # s, with --long
 
 
 @dataclass
 class Program:
-    """One test program and what became of it."""
+    """One test program and its results."""
 
     package: str
     kind: str  # gtest, pytest, rostest
     name: str
     command: list[str]
     junit: Path  # file it writes, or (rostest) folder
+    files: list[str] = field(default_factory=list)  # pytest: each has to have a case
+    slots: int = 1  # of AT_A_TIME
     seconds: float = 0.0
     passed: int = 0
     failed: int = 0
     skipped: int = 0
     failures: list[str] = field(default_factory=list)
     cases: dict[str, str] = field(default_factory=dict)  # passed, failed or skipped, by the name of the case
+    seconds_of: dict[str, float] = field(default_factory=dict)  # pytest: of each file
 
 
 def find_programs(top: Path, results: Path, python: str, wanted: list[Wanted]) -> list[Program]:
     """The test programs wanted; if none is named, of all packages that the build did not leave out."""
     folders = package_folders(top / "catkin_ws" / "src")
-    cases: dict[tuple[str, Path], set[str]] = {}  # "": the whole file
-    for one in wanted or [Wanted(package) for package in folders if package not in left_out(top)]:
-        for kind in TEST_FILES:
-            for path in sorted((folders[one.package] / "test").glob(kind)):
-                if one.file in ("", path.name):
-                    cases.setdefault((one.package, path), set()).add(one.case)
-    library = top / "catkin_ws" / "devel" / "lib"
     programs = []
-    for (package, path), named in cases.items():
-        only = [] if "" in named else sorted(named)
-        xml = results / f"{package}.{path.stem}.xml"
-        if path.suffix == ".cpp":
-            binary = library / package / f"{package}_{path.stem}"
-            xml = results / f"{package}.{binary.name}.xml"
-            command = [str(binary), f"--gtest_output=xml:{xml}"]
-            command += [f"--gtest_filter={':'.join(f'*{case}*' for case in only)}"] if only else []
-            programs.append(Program(package, "gtest", binary.name, command, xml))
-        elif path.suffix == ".py":
-            command = [python, "-m", "pytest", "-q", "-p", "no:cacheprovider", f"--junit-xml={xml}"]
-            command += [f"{path}::{case}" for case in only] or [str(path)]
-            programs.append(Program(package, "pytest", path.name, command, xml))
+    by_package: dict[str, list[Wanted]] = {}
+    for one in wanted or [Wanted(package) for package in folders if package not in left_out(top)]:
+        by_package.setdefault(one.package, []).append(one)
+    for package, words in by_package.items():
+        files = test_files(folders[package] / "test")
+        chosen = {path: {one.case for one in words if one.names(path)} for path in files}
+        chosen = {path: {""} if "" in cases else cases for path, cases in chosen.items() if cases}
+        library = top / "catkin_ws" / "devel" / "lib" / package
+        programs += _gtests(package, library, results, chosen, files)
+        programs += _pytests(package, python, results, chosen)
+        for path in (path for path in chosen if path.suffix == ".test"):
+            xml = results / f"{package}.{path.stem}"
+            programs.append(Program(package, "rostest", path.name, ["rostest", str(path)], xml))
+    for program in programs:
+        if 1 < len(program.files) > sum(len(one.files) or 1 for one in programs) / 2:
+            program.slots = 2  # nearly alone: with one worker the other processor cores would idle
+    return programs
+
+
+def _gtests(
+    package: str, library: Path, results: Path, chosen: dict[Path, set[str]], files: list[Path]
+) -> list[Program]:
+    """One program for each binary that holds a chosen file; with a filter unless all of its files are chosen whole."""
+    filters: dict[str, list[str]] = {}
+    whole: dict[str, bool] = {}
+    for path in (path for path in files if path.suffix == ".cpp"):
+        binary, cases = binary_of(package, path), chosen.get(path, set())
+        whole[binary] = whole.get(binary, True) and "" in cases
+        if cases:
+            names = cases_in(path) if "" in cases else [f"*{case}*" for case in sorted(cases)]
+            filters.setdefault(binary, []).extend(names)
+    programs = []
+    for binary, names in filters.items():
+        xml = results / f"{package}.{binary}.xml"
+        command = [str(library / binary), f"--gtest_output=xml:{xml}"]
+        command += [] if whole[binary] else [f"--gtest_filter={':'.join(names)}"]
+        programs.append(Program(package, "gtest", binary, command, xml))
+    return programs
+
+
+def _pytests(package: str, python: str, results: Path, chosen: dict[Path, set[str]]) -> list[Program]:
+    """One program for all files that can share a process, and one for each of the others."""
+    shared: list[Path] = []
+    groups: list[tuple[str, list[Path]]] = []
+    for path in (path for path in chosen if path.suffix == ".py"):
+        if OWN_NODE in path.read_text(encoding="utf-8"):
+            groups.append((path.name, [path]))
         else:
-            programs.append(Program(package, "rostest", path.name, ["rostest", str(path)], xml.with_suffix("")))
+            shared.append(path)
+    if shared:
+        groups.insert(0, (shared[0].name if len(shared) == 1 else f"{len(shared)} files", shared))
+    programs = []
+    for name, paths in groups:
+        xml = results / f"{package}.{paths[0].stem if len(paths) == 1 else 'pytest'}.xml"
+        command = [python, "-m", "pytest", "-v", "-p", "no:cacheprovider", f"--rootdir={paths[0].parent}"]
+        command += [f"--junit-xml={xml}"]
+        for path in paths:
+            command += [str(path)] if "" in chosen[path] else [f"{path}::{case}" for case in sorted(chosen[path])]
+        programs.append(Program(package, "pytest", name, command, xml, [path.name for path in paths]))
     return programs
 
 
 def count_cases(program: Program, report: Path) -> None:
     """Adds the cases of one JUnit file to the program's counts."""
     for case in ElementTree.parse(report).getroot().iter("testcase"):
-        name = f"{case.get('classname', '')}.{case.get('name', '')}"
-        ended = "passed"
-        if case.find("failure") is not None or case.find("error") is not None:
-            problem = case.find("failure") if case.find("failure") is not None else case.find("error")
-            assert problem is not None
-            program.failed += 1
+        name = f"{case.get('classname', '')}.{case.get('name', '')}".removeprefix(".")
+        file = f"{name.partition('.')[0]}.py" if program.kind == "pytest" else ""
+        if program.cases.get(name) == "failed":
+            continue  # pytest-xdist repeats a case that ended its worker
+        program.seconds_of[file] = program.seconds_of.get(file, 0.0) + float(case.get("time") or 0.0)
+        problem = case.find("failure") if case.find("failure") is not None else case.find("error")
+        if problem is not None:
             ended = "failed"
+            program.failed += 1
             text = (problem.get("message") or problem.text or "").strip().splitlines()
             program.failures.append(f"{name}: {text[0] if text else 'no message'}")
         elif case.find("skipped") is not None or case.get("status") == "notrun":
-            program.skipped += 1
             ended = "skipped"
+            program.skipped += 1
         else:
+            ended = "passed"
             program.passed += 1
         program.cases[name] = ended
 
 
-def count(program: Program, status: int | None) -> None:
+def unfinished(log: Path) -> list[str]:
+    """Tests that a pytest's log says began and does not say ended: `file::test` and `[gw0] [ 5%] PASSED file::test`."""
+    lines = log.read_text(encoding="utf-8", errors="replace").splitlines() if log.exists() else []
+    ended = {words[-1] for words in map(str.split, lines) if len(words) > 1}
+    return [line.strip() for line in lines if "::" in line and line.strip() == line.split()[0] not in ended]
+
+
+def count(program: Program, status: int | None, log: Path) -> None:
     """Reads the program's JUnit files; one without such a file, or that died without a red case, is one failure."""
     if program.kind == "rostest":
         # rosunit-*.xml holds the cases; rostest-*.xml only says whether each test node left such a file
@@ -125,16 +173,19 @@ def count(program: Program, status: int | None) -> None:
         except ElementTree.ParseError as error:
             program.failed += 1
             program.failures.append(f"{report.name}: not readable as JUnit XML ({error})")
-    ended = "was ended at its time limit" if status is None else f"ended with status {status}"
+            return
+    ended = f"ended with status {status}"
+    if status is None:
+        ended = f"was ended at its time limit (running: {', '.join(unfinished(log)) or 'see its log'})"
     all_skipped = program.kind == "pytest" and status == 5 and program.skipped
-    if program.failed or all_skipped:
-        return
-    if status != 0 or not reports:
+    if not program.failed and (not reports or status != 0 and not all_skipped):
         program.failed += 1
         program.failures.append(f"{program.name} {ended} and reported no failed case; see its log")
-    elif not program.passed and not program.skipped:
-        program.failed += 1
-        program.failures.append(f"{program.name} holds no case; write one, or remove the file")
+    elif status is not None:
+        empty = program.files if program.kind == "pytest" else [] if program.cases else [program.name]
+        empty = [name for name in empty if name not in program.seconds_of]
+        program.failed += len(empty)
+        program.failures += [f"no case of {name} ran; write one, or remove the file" for name in empty]
 
 
 def run(program: Program, log: Path, limit: float) -> None:
@@ -150,12 +201,14 @@ def run(program: Program, log: Path, limit: float) -> None:
         return
     # What a script starts in the background ignores SIGINT, and so would all below it: tests of Ctrl-C would be red.
     command = ["env", "--default-signal=INT,QUIT", *program.command]
+    if len(program.files) > 1:
+        command += ["-n", str(program.slots), "--dist", "loadfile"]
     with log.open("w") as output:
         status = process_tree.run(
             command, limit, stdout=output, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, env=environment
         )
     program.seconds = time.monotonic() - began
-    count(program, status)
+    count(program, status, log)
     verdict = "ok" if not program.failed else f"{program.failed} FAILED"
     print(
         f"  {program.package:20s} {program.kind:8s}{program.name:44s}{program.passed:6d} passed "
@@ -165,13 +218,14 @@ def run(program: Program, log: Path, limit: float) -> None:
 
 
 def longest_first(programs: list[Program]) -> list[Program]:
-    """In the order in which they begin."""
-    return sorted(programs, key=lambda one: FIRST.index(one.name) if one.name in FIRST else len(FIRST))
+    """In the order in which they begin: the last ones are short, so that all processor cores end at the same time."""
+    kinds = ("pytest", "rostest", "gtest")
+    return sorted(programs, key=lambda one: (-one.slots, kinds.index(one.kind), -len(one.files)))
 
 
 def log_of(program: Program, results: Path) -> Path:
-    """Where the words of a program go."""
-    return results / "logs" / f"{program.package}.{program.name}.log"
+    """Where a program's output goes."""
+    return results / "logs" / f"{program.junit.name.removesuffix('.xml')}.log"
 
 
 def report_differences(runs: list[list[Program]], out: Path) -> int:
@@ -210,6 +264,13 @@ def report(programs: list[Program], results: Path) -> int:
     by_package: dict[str, float] = {}
     for program in programs:
         by_package[program.package] = by_package.get(program.package, 0.0) + program.seconds
+    times = [
+        (seconds, f"{program.package}/{file or program.name}")
+        for program in programs
+        for file, seconds in (program.seconds_of if len(program.files) > 1 else {"": program.seconds}).items()
+    ]
+    slowest = sorted(times, reverse=True)[:SLOWEST]
+    print("slowest: " + ", ".join(f"{name} {seconds:.0f} s" for seconds, name in slowest))
     print("time per package: " + ", ".join(f"{name} {seconds:.0f} s" for name, seconds in sorted(by_package.items())))
     passed = sum(program.passed for program in programs)
     failed = sum(program.failed for program in programs)
@@ -258,11 +319,23 @@ def run_all(top: Path, results: Path, wanted: list[Wanted], limit: float) -> tup
     programs = find_programs(top, results, python, wanted)
     start = time.monotonic()
 
-    def run_one(program: Program) -> None:
-        run(program, log_of(program, results), limit)
+    free = Semaphore(AT_A_TIME)
+
+    def run_one(program: Program, slots: int) -> None:
+        try:
+            run(program, log_of(program, results), limit)
+        finally:
+            free.release(slots)
 
     with ThreadPoolExecutor(max_workers=AT_A_TIME) as pool:
-        list(pool.map(run_one, longest_first(programs)))
+        started = []
+        for program in longest_first(programs):
+            slots = min(program.slots, AT_A_TIME)
+            for _ in range(slots):
+                free.acquire()
+            started.append(pool.submit(run_one, program, slots))
+        for one in started:
+            one.result()
     print(f"all tests: {time.monotonic() - start:.0f} s; JUnit files and logs: {os.path.relpath(results)}")
     return programs, report(programs, results)
 

@@ -19,7 +19,6 @@ import numpy as np
 from coglab_py.pose import length
 
 from .carried import CarriedObject, CarriedSettings
-from .critically_damped import CriticallyDamped
 from .reach_bank import Prediction, ReachBank, ReachSettings
 from .recogniser import CLOCK_JUMP, PatternEnd
 
@@ -35,6 +34,36 @@ WAITING = 40
 """most sights of an object that wait for one of the hand"""
 BESIDE = 0.02
 """s by which a sight of an object is beside one of the hand"""
+
+
+class CriticallyDamped:
+    """A low-pass filter of second order without overshoot, solved exactly, for samples at any times: two time constants
+    late behind a steady motion, at rest within about five."""
+
+    def __init__(self) -> None:
+        self._value: np.ndarray | None = None
+        self._rate = np.zeros(3)
+        self._stamp = -math.inf
+
+    def forget(self) -> None:
+        """What comes next is where it begins, at rest."""
+        self._value = None
+
+    def step(self, stamp: float, wanted: np.ndarray, time_constant: float) -> np.ndarray:
+        """Where it is at ``stamp`` (s, later than the last one), with ``wanted`` (3,) and poles at 1/``time_constant``
+        (s) since then; 0: what comes in goes out."""
+        gap, self._stamp = stamp - self._stamp, stamp
+        if self._value is None or time_constant <= 0.0:
+            value, self._rate = np.array(wanted, dtype=float), np.zeros(3)
+        else:
+            pole = 1.0 / time_constant
+            left = math.exp(-pole * gap)
+            away = self._value - wanted
+            drift = self._rate + pole * away
+            value = wanted + left * (away + gap * drift)
+            self._rate = left * (self._rate - pole * gap * drift)
+        self._value = value
+        return value
 
 
 @dataclass(frozen=True)

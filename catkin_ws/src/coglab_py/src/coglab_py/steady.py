@@ -217,3 +217,17 @@ class ClockWatch:
         elif not self.fault and steady - self._moved > SILENCE:
             self.fault = f"/clock is silent for {SILENCE:g} s: start what publishes it, or set /use_sim_time to false"
             rospy.logerr(self.fault)
+
+
+def end_quietly() -> None:
+    """A thread that publishes on a topic which rospy has just closed ends without a traceback.
+
+    It holds for threads of libraries, too, such as actionlib's status loop.
+    """
+    report = threading.excepthook
+
+    def hook(arguments: Any) -> None:
+        if not (ending() and issubclass(arguments.exc_type, rospy.ROSException)):
+            report(arguments)
+
+    threading.excepthook = hook

@@ -12,9 +12,22 @@ namespace coglab_rt {
 template <typename T>
 class TripleBuffer {
  public:
+  TripleBuffer() = default;
+  /// @param initial value of every slot, for types whose assignment allocates unless sizes agree
+  explicit TripleBuffer(const T& initial) : slots_{initial, initial, initial} {}
+
   /// Publishes a value (writer thread only).
   void write(const T& value) {
-    slots_[write_] = value;
+    back() = value;
+    publish();
+  }
+
+  /// The slot that publish() makes the newest (writer thread only). It holds an old value.
+  T& back() { return slots_[write_]; }
+  /// Number of that slot, 0 to 2.
+  std::uint8_t backIndex() const { return write_; }
+  /// Publishes back() (writer thread only).
+  void publish() {
     write_ =
         middle_.exchange(static_cast<std::uint8_t>(write_ | kFresh), std::memory_order_acq_rel) &
         kIndex;
@@ -23,11 +36,21 @@ class TripleBuffer {
   /// Copies the newest value (reader thread only). Returns whether it is newer than the last one
   /// read.
   bool read(T& value) {
-    const bool fresh = (middle_.load(std::memory_order_relaxed) & kFresh) != 0;
-    if (fresh) read_ = middle_.exchange(read_, std::memory_order_acq_rel) & kIndex;
-    value = slots_[read_];
+    const bool fresh = take();
+    value = front();
     return fresh;
   }
+
+  /// Makes the newest value the front (reader thread only). Returns whether there was a newer one.
+  bool take() {
+    const bool fresh = (middle_.load(std::memory_order_relaxed) & kFresh) != 0;
+    if (fresh) read_ = middle_.exchange(read_, std::memory_order_acq_rel) & kIndex;
+    return fresh;
+  }
+  /// The value that take() found (reader thread only).
+  const T& front() const { return slots_[read_]; }
+  /// Number of its slot, 0 to 2.
+  std::uint8_t frontIndex() const { return read_; }
 
  private:
   static constexpr std::uint8_t kIndex = 3, kFresh = 4;

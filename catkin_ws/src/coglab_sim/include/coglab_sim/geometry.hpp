@@ -18,6 +18,11 @@ using Eigen::Matrix3d;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
+/// Seven numbers, one per joint in wire order.
+inline Vector7 joints(double a1, double a2, double e1, double a3, double a4, double a5, double a6) {
+  return (Vector7() << a1, a2, e1, a3, a4, a5, a6).finished();
+}
+
 /// Position and orientation of a frame in another one.
 struct Pose {
   Vector3d position = Vector3d::Zero();            ///< m

@@ -1,8 +1,11 @@
 /// @file
-/// The one table of ranges: what the simulated cell can compute with, not what is sensible.
+/// The ranges of parameter_table.inc, by name.
 #pragma once
 
 #include <string>
+#include <type_traits>
+
+#include <Eigen/Core>
 
 namespace coglab_sim {
 
@@ -13,8 +16,8 @@ struct Range {
   bool holds(double value) const { return value >= low && value <= high; }
 };
 
-/// Range of a parameter by its name in cellParameters(), of a parameter of the node, or of a
-/// fault's value (`fault/…`); low == high if it is none of those, or no number.
+/// Range of a parameter of the cell or of cell_node, or of a fault's value (`fault/…`); low == high
+/// if it is none of those, or no number.
 Range rangeOf(const std::string& name);
 
 /// Throws std::invalid_argument "parameter <shown> = <value> is outside its range <low>..<high>"
@@ -22,5 +25,16 @@ Range rangeOf(const std::string& name);
 void requireWithin(const Range& range, const std::string& shown, double value);
 /// The same with the range of that name.
 void requireWithin(const std::string& name, double value);
+
+/// The same for the field of a row: each number of a list; anything that is no number passes.
+template <typename Field>
+void requireFieldWithin(const Range& range, const std::string& name, const Field& field) {
+  if constexpr (std::is_base_of_v<Eigen::MatrixBase<Field>, Field>) {
+    for (Eigen::Index i = 0; i < field.size(); ++i)
+      requireWithin(range, name + "[" + std::to_string(i) + "]", field[i]);
+  } else if constexpr (std::is_arithmetic_v<Field> && !std::is_same_v<Field, bool>) {
+    requireWithin(range, name, static_cast<double>(field));
+  }
+}
 
 }  // namespace coglab_sim

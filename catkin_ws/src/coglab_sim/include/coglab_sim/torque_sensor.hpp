@@ -15,15 +15,10 @@
 
 namespace coglab_sim {
 
-/// All defaults are ours, to be replaced by a recording of a real arm at rest.
+/// Defaults, units and texts are in parameter_table.inc.
 struct TorqueNoise {
-  double sigma = 0.05;             ///< Nm; 0.05 stands for good sensors, 0.15 for bad ones
-  double speed_gain = 7.0;         ///< s/rad, k above; |dq| is the largest joint speed
-  double correlation_time = 0.01;  ///< s
-  double bias = 0.4;               ///< Nm, amplitude of the posture-dependent offset
-  double offset = 0.3;             ///< Nm, largest of the constant offsets of the sensors
-  double hysteresis = 0.1;         ///< Nm
-  double hysteresis_speed = 0.02;  ///< rad/s over which it reverses
+#define TORQUE_NOISE(type, field, value, ...) type field = value;
+#include "coglab_sim/parameter_table.inc"
 };
 
 /// Adds the errors. One instance per arm; the same seed gives the same errors.

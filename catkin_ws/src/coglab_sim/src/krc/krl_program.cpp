@@ -1,4 +1,4 @@
-#include "basic_program.hpp"
+#include "coglab_sim/krc/krl_program.hpp"
 
 #include <array>
 #include <stdexcept>
@@ -12,6 +12,64 @@ namespace {
 
 constexpr std::array<const char*, 7> kNames = {
     "coglab", "centro_epiaggio", "stanford", "rcprg_tum", "rtt_lwr", "openkc", "kuka_sample"};
+
+bool isStrategy(std::int32_t value) { return value == 10 || value == 20 || value == 30; }
+
+/// The part every program shares: open FRI once, open the brakes, wait for a quality, start.
+class StartSequence {
+ public:
+  enum class Outcome { Working, Started, NoDrives, PoorQuality, NotEntered };
+
+  void begin() {
+    waited_ = 0.0;
+    nudged_ = false;
+  }
+
+  /// One poll; `wait` receives the time until the next one. Working until the outcome is known.
+  Outcome poll(KrlInterface& krl, lwr_fri_bridge::fri::Quality needed, double& wait) {
+    wait = krl.parameters().krl_poll;
+    waited_ += wait;
+    if (!krl.drivesReady()) {
+      if (waited_ > krl.parameters().krl_drive_wait) return Outcome::NoDrives;
+      if (!nudged_) krl.nudge();
+      nudged_ = true;
+      return Outcome::Working;
+    }
+    if (krl.quality() < needed)
+      return waited_ > krl.parameters().krl_quality_wait ? Outcome::PoorQuality : Outcome::Working;
+    return krl.friStart(1.0) == lwr_fri_bridge::fri::FriState::Command ? Outcome::Started
+                                                                       : Outcome::NotEntered;
+  }
+
+ private:
+  double waited_ = 0.0;
+  bool nudged_ = false;
+};
+
+/// Opens FRI and the brakes, then does what the convention does.
+class BasicProgram : public KrlProgram {
+ public:
+  double poll(KrlInterface& krl) final {
+    if (!opened_) {
+      krl.friOpen(0.0);
+      krl.nudge();
+      opened_ = true;
+      begin(krl);
+      return krl.parameters().krl_poll;
+    }
+    return run(krl);
+  }
+
+ protected:
+  virtual void begin(KrlInterface&) {}
+  virtual double run(KrlInterface& krl) = 0;
+
+  StartSequence sequence_;
+  bool starting_ = false;
+
+ private:
+  bool opened_ = false;
+};
 
 /// Our own program (lwr_fri_bridge/krl): numbered requests, numbered results.
 class Coglab : public BasicProgram {
@@ -247,6 +305,109 @@ class RttLwr : public BasicProgram {
   bool armed_ = false, ended_ = false;
 };
 
+/// OpenKC, as public clients and emulators of its program speak it: BOOL[1] with a command in
+/// INT[16]; TO_INT[15] echoes it, TO_INT[14] counts, TO_INT[16] is the result, TO_BOOL[1] says so
+/// until the PC has taken BOOL[1] back. Impedances: stiffness in INT, damping in REA.
+class OpenKc : public BasicProgram {
+ protected:
+  double run(KrlInterface& krl) override {
+    double wait = krl.parameters().krl_poll;
+    if (ended_) return wait;
+    if (starting_) {
+      const auto outcome = sequence_.poll(krl, Quality::Unacceptable, wait);
+      if (outcome == StartSequence::Outcome::Working) return wait;
+      starting_ = false;
+      if (outcome == StartSequence::Outcome::Started) acknowledge(krl, kStart, 100);
+      return wait;
+    }
+    if (!krl.frmBool(1)) {
+      krl.setToBool(1, false);
+      served_ = false;
+    } else if (!served_) {
+      served_ = true;
+      serve(krl, krl.frmInt(16));
+    }
+    return wait;
+  }
+
+ private:
+  static constexpr int kStart = 1;
+
+  void acknowledge(KrlInterface& krl, int command, int result) {
+    krl.setToInt(15, command);
+    krl.setToInt(14, ++count_);
+    krl.setToInt(16, result);
+    krl.setToBool(1, true);
+  }
+
+  void switchTo(KrlInterface& krl, int command, int strategy, int result) {
+    if (krl.setKrlStrategy(strategy)) acknowledge(krl, command, result);
+  }
+
+  void setJointImpedance(KrlInterface& krl) {
+    Vector7 stiffness, damping;
+    for (int i = 0; i < 7; ++i) {
+      stiffness[i] = krl.frmInt(9 + i);
+      damping[i] = static_cast<double>(krl.frmReal(10 + i));
+    }
+    krl.setJointImpedance(stiffness, damping);
+  }
+
+  void setCartesianImpedance(KrlInterface& krl) {
+    Vector6 stiffness, damping;
+    for (int i = 0; i < 6; ++i) {
+      const int axis = i < 3 ? i : 8 - i;  // KRL's A B C turn about z y x
+      stiffness[axis] = krl.frmInt(10 + i);
+      damping[axis] = static_cast<double>(krl.frmReal(11 + i));
+    }
+    krl.setCartesianImpedance(stiffness, damping);
+  }
+
+  void serve(KrlInterface& krl, int command) {
+    switch (command) {
+      case kStart:
+        if (krl.state() == FriState::Command) return acknowledge(krl, command, 100);
+        sequence_.begin();
+        starting_ = true;
+        return;
+      case 2:
+        krl.friStop();
+        return acknowledge(krl, command, 101);
+      case 3:
+        count_ = -1;
+        return acknowledge(krl, command, 111);
+      case 4:
+        setCartesianImpedance(krl);
+        return acknowledge(krl, command, 102);
+      case 5:
+        setJointImpedance(krl);
+        return acknowledge(krl, command, 103);
+      case 6:
+        return switchTo(krl, command, 20, 104);
+      case 7:
+        return switchTo(krl, command, 30, 105);
+      case 9:
+        return switchTo(krl, command, 10, 107);
+      case 30:  // without echo, unlike the others
+        if (krl.setKrlStrategy(krl.frmInt(2))) krl.setToBool(1, true);
+        return;
+      case 98:
+        krl.friClose();
+        krl.friOpen(0.0);
+        return;
+      case 99:
+        krl.friClose();
+        ended_ = true;
+        return;
+      default:
+        krl.show("openkc: command " + std::to_string(command) + " is not served by this stand-in");
+    }
+  }
+
+  int count_ = 0;
+  bool served_ = false, ended_ = false;
+};
+
 /// KUKA's own sample application: the PC shows 10 in INT[1] once it is content; one run, then
 /// INT[1] = -1 ends it.
 class KukaSample : public BasicProgram {
@@ -288,7 +449,7 @@ std::unique_ptr<KrlProgram> makeKrlProgram(KrlConvention convention) {
     case KrlConvention::RttLwr:
       return std::make_unique<RttLwr>();
     case KrlConvention::OpenKc:
-      return makeOpenKc();
+      return std::make_unique<OpenKc>();
     case KrlConvention::KukaSample:
       return std::make_unique<KukaSample>();
   }

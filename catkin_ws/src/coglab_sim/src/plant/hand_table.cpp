@@ -6,9 +6,10 @@
 
 #include <yaml-cpp/yaml.h>
 
-#include "built_in_hand.hpp"
-
 namespace coglab_sim::plant {
+
+extern const char* const kBuiltInHand;  // text of config/hand_model.yaml
+
 namespace {
 
 const std::array<const char*, kFingers> kFingerNames = {"thumb", "index", "middle", "ring",

@@ -4,12 +4,13 @@
 #include <stdexcept>
 
 #include "coglab_sim/plant/scene_description.hpp"
+#include "coglab_sim/ranges.hpp"
 #include "robot_description.hpp"
 
 namespace coglab_sim::plant {
 namespace {
 
-// Who collides with whom: one bit per group, and the groups that it meets. Fingers pass through
+// Collision groups: one bit each, and the groups that it meets. Fingers pass through
 // each other and through the palm. The object has two shapes, since a cylinder meets a capsule in
 // one point only: what hands meet is round (a capsule with the cylinder's side), what planes meet
 // is the solid itself.
@@ -293,33 +294,22 @@ class Writer {
   std::ostringstream out_;
 };
 
-[[noreturn]] void refuse(const Object& object, const std::string& what) {
-  throw std::invalid_argument("object '" + object.id + "': " + what);
-}
-
-std::string figure(double value) {
-  std::ostringstream text;
-  text << value;
-  return text.str();
-}
-
 }  // namespace
 
 void checkObject(const Object& object) {
-  if (object.shape.empty()) refuse(object, "has no shape, expected box, cylinder or sphere");
+  const auto refuse = [&](const std::string& what) {
+    throw std::invalid_argument("object '" + object.id + "': " + what);
+  };
   if (object.shape != "box" && object.shape != "cylinder" && object.shape != "sphere")
-    refuse(object, "unknown shape '" + object.shape + "', expected box, cylinder or sphere");
-  if (!(object.mass >= 0.01 && object.mass <= 10.0))
-    refuse(object, "mass is " + figure(object.mass) + " kg, expected 0.01 .. 10");
-  if (!(object.friction >= 0.0 && object.friction <= 2.0))
-    refuse(object, "friction is " + figure(object.friction) + ", expected 0 .. 2");
-  for (int i = 0; i < 3; ++i) {
-    if (!(object.size[i] >= 1e-3 && object.size[i] <= 2.0))
-      refuse(object, "size[" + std::to_string(i) + "] is " + figure(object.size[i]) +
-                         " m, expected 0.001 .. 2");
+    refuse("unknown shape '" + object.shape + "', expected box, cylinder or sphere");
+  try {
+#define OBJECT(type, field, value, name, low, high, ...) \
+  requireFieldWithin({low, high}, name, object.field);
+#include "coglab_sim/parameter_table.inc"
+  } catch (const std::invalid_argument& error) {
+    refuse(error.what());
   }
-  if (!object.center.allFinite() || object.center.norm() > 2.0)
-    refuse(object, "its centre is more than 2 m from its frame");
+  if (object.center.norm() > 2.0) refuse("its centre is more than 2 m from its frame");
 }
 
 Vector3d inertiaOf(const Object& object) {

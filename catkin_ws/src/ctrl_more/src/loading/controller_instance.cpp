@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "ctrl_more/loading/prototypes.hpp"
+#include "ctrl_more/feedback_controller.hpp"
 #include "ctrl_more/log/words.hpp"
 
 namespace ctrl_more {

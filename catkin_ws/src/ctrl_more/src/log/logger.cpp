@@ -5,13 +5,14 @@
 #include <condition_variable>
 #include <cstdio>
 #include <cstring>
-#include <fstream>
 #include <iostream>
 #include <mutex>
 #include <sstream>
 #include <stdexcept>
 #include <thread>
 #include <vector>
+
+#include "coglab_rt/clock.hpp"
 
 namespace ctrl_more {
 namespace {
@@ -26,12 +27,6 @@ void copyText(std::array<char, N>& to, const char* from) {
 const char* withoutFolders(const char* file) {
   const char* slash = std::strrchr(file, '/');
   return slash ? slash + 1 : file;
-}
-
-std::int64_t steadyNow() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-             std::chrono::steady_clock::now().time_since_epoch())
-      .count();
 }
 
 }  // namespace
@@ -78,19 +73,12 @@ std::string LogRecord::toLine() const {
   return out.str();
 }
 
-struct FileLogSink::File {
-  std::ofstream stream;
-};
-
-FileLogSink::FileLogSink(const std::string& path) : file_(std::make_unique<File>()) {
-  file_->stream.open(path, std::ios::app);
-  if (!file_->stream) throw std::runtime_error("cannot open log file " + path + " for appending");
+FileLogSink::FileLogSink(const std::string& path) : stream_(path, std::ios::app) {
+  if (!stream_) throw std::runtime_error("cannot open log file " + path + " for appending");
 }
 
-FileLogSink::~FileLogSink() = default;
-
 void FileLogSink::write(const LogRecord& record) {
-  file_->stream << record.toLine() << '\n' << std::flush;
+  stream_ << record.toLine() << '\n' << std::flush;
 }
 
 void StreamLogSink::write(const LogRecord& record) { out_ << record.toLine() << '\n'; }
@@ -180,7 +168,7 @@ void Logger::log(LogLevel level, const std::string& source, const std::string& t
   if (!wants(level)) return;
   LogRecord record;
   record.level = level;
-  record.time_ns = steadyNow();
+  record.time_ns = coglab_rt::steadyNow();
   record.line = line;
   copyText(record.source, source.c_str());
   copyText(record.file, withoutFolders(file));
@@ -226,7 +214,7 @@ void LogSource::put(LogLevel level, const char* file, int line, const char* text
   if (!logger_ || !logger_->wants(level)) return;
   LogRecord record;
   record.level = level;
-  record.time_ns = steadyNow();
+  record.time_ns = coglab_rt::steadyNow();
   record.cycle = cycle_ ? cycle_->load(std::memory_order_relaxed) : 0;
   record.line = line;
   record.values = count;

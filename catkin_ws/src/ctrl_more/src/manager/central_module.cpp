@@ -1,4 +1,4 @@
-#include "ctrl_more/manager/central_module.hpp"
+#include "ctrl_more/central_module.hpp"
 
 #include <algorithm>
 #include <cmath>

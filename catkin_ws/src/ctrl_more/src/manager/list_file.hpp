@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "ctrl_more/cycle/controller_entry.hpp"
 #include "ctrl_more/description/config_node.hpp"
 #include "ctrl_more/loading/search_path.hpp"
+#include "ctrl_more/manager/controller_status.hpp"
 
 namespace ctrl_more {
 

@@ -1,8 +1,6 @@
 """Packaging, errors and log, states."""
 
 import importlib
-import io
-from contextlib import redirect_stderr, redirect_stdout
 
 import pytest
 import smach
@@ -20,23 +18,6 @@ def test_public_names_and_submodules():
         importlib.import_module(f"smach.{name}")
 
 
-def test_names_that_must_not_exist():
-    assert not hasattr(smach, "SmachError")
-    assert not any(hasattr(smach.StateMachine, name) for name in ("add_next",))
-    assert not hasattr(smach.Sequence, "add_next")
-
-
-def test_public_errors_derive_from_smach_error():
-    for name in ("InvalidTransition", "InvalidState", "InvalidConstruction", "InvalidUserCode"):
-        assert getattr(smach, f"{name}Error").__bases__ == (SmachError,)
-    assert issubclass(SmachError, Exception)
-
-
-def test_creating_an_error_logs_class_and_message(log):
-    smach.InvalidStateError("no such thing")
-    assert log.error == ["InvalidStateError: no such thing"]
-
-
 def test_set_loggers_order_and_lookup_at_call_time():
     got = []
     smach.set_loggers(*[lambda m, level=level: got.append(level) for level in "iwde"])
@@ -45,29 +26,6 @@ def test_set_loggers_order_and_lookup_at_call_time():
     smach.logerr = lambda m: got.append("patched")
     SmachError("x")
     assert got[-1] == "patched"
-
-
-def test_default_loggers_print_with_a_prefix():
-    from smach import log
-
-    module = importlib.util.module_from_spec(log.__spec__)
-    log.__spec__.loader.exec_module(module)
-    for name, level in (
-        ("loginfo", "INFO"),
-        ("logwarn", "WARN"),
-        ("logdebug", "DEBUG"),
-        ("logerr", "ERROR"),
-    ):
-        text = io.StringIO()
-        with redirect_stdout(text), redirect_stderr(text):
-            getattr(module, name)("hello")
-        assert level in text.getvalue() and "hello" in text.getvalue()
-    assert module.is_shutdown() is False
-
-
-def test_set_shutdown_check():
-    smach.set_shutdown_check(lambda: True)
-    assert smach.is_shutdown() is True
 
 
 def test_loggers_that_cannot_be_called_are_refused():
@@ -91,11 +49,6 @@ def test_outcomes_and_keys():
     assert state.get_registered_outcomes() == ("b", "a", "c")
     assert state.get_registered_input_keys() == ("i", "x", "i2", "y")
     assert state.get_registered_output_keys() == ("o", "x", "o2", "y")
-
-
-def test_declared_order_is_stable_better():
-    names = [f"outcome_{i}" for i in range(50)]
-    assert list(smach.State(names).get_registered_outcomes()) == names
 
 
 def test_any_iterable_but_no_lone_string():
@@ -185,19 +138,3 @@ def test_cb_interface_on_a_method_better():
 
     robot = Robot()
     assert robot.cb(3) == (robot, 3) and robot.cb.get_registered_outcomes() == ("a",)
-
-
-def test_cb_interface_of_a_class_or_of_no_method_is_itself_better():
-    class Adds:
-        def __call__(self, a, b):
-            return a + b
-
-    whole = smach.CBInterface(Adds(), ["a"])
-    robot = type("Robot", (), {"cb": whole, "method": smach.CBInterface(lambda self: 1)})
-    assert robot.cb is whole and robot().cb is whole and robot().cb(1, 2) == 3
-    assert robot.method is vars(robot)["method"], "looked at in the class it is not bound"
-
-
-def test_has_smach_interface():
-    assert smach.has_smach_interface(smach.State()) and smach.has_smach_interface(smach.CBInterface(print))
-    assert not smach.has_smach_interface(print) and not smach.has_smach_interface(None)

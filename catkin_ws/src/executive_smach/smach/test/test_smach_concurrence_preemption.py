@@ -118,23 +118,6 @@ def test_a_request_that_a_child_did_not_take_is_carried_on(log):
     assert "deaf" in log.text("error")
 
 
-def test_is_running_better():
-    seen = []
-    both = concurrence(children={"A": Calls(lambda ud: seen.append(both.is_running()))})
-    both.execute()
-    assert seen == [True] and not both.is_running()
-
-
-def test_set_initial_state_better(log):
-    both = concurrence(children={"A": Says("done"), "B": Says("done")})
-    ud = smach.UserData()
-    ud.x = 1
-    both.set_initial_state(["A", "B"], ud)
-    assert both.userdata.x == 1 and log.warn == []
-    both.set_initial_state(["A"], smach.UserData())
-    assert len(log.warn) == 1 and both.get_initial_states() == ["A", "B"]
-
-
 def test_states_and_edges():
     seen = []
     first = threading.Event()
@@ -212,9 +195,3 @@ def test_too_few_threads_is_an_error_and_nothing_runs(monkeypatch):
 def test_pickles():
     both = concurrence(children={"A": Says("done"), "B": Says("done")}, outcome_map=ALL_DONE)
     assert pickle.loads(pickle.dumps(both)).execute() == "done"
-
-
-def test_nested_concurrences():
-    inner = concurrence(children={"A": Says("done"), "B": Says("done")}, outcome_map=ALL_DONE)
-    outer = concurrence(children={"A": inner, "B": Says("done")}, outcome_map=ALL_DONE)
-    assert [outer.execute() for _ in range(20)] == ["done"] * 20

@@ -69,20 +69,6 @@ def test_output_keys_are_not_copied_after_an_error():
     assert "o" not in ud
 
 
-def test_callbacks_get_the_containers_own_user_data_and_arguments():
-    calls = []
-    sm = machine(Says("done"), Says("done"))
-    sm.register_start_cb(lambda ud, states, x: calls.append(("start", ud, states, x)), [1])
-    sm.register_transition_cb(lambda ud, states, x: calls.append(("transition", ud, states, x)), [2])
-    sm.register_termination_cb(lambda ud, states, o, x: calls.append(("end", ud, states, o, x)), cb_args=[3])
-    sm.execute()
-    assert calls == [
-        ("start", sm.userdata, ["S0"], 1),
-        ("transition", sm.userdata, ["S1"], 2),
-        ("end", sm.userdata, ["S1"], "done", 3),
-    ]
-
-
 def test_a_callback_that_raises_is_logged_and_the_others_still_run_better(log):
     calls = []
 
@@ -137,21 +123,6 @@ def test_open_close_and_stack():
         a.close()
 
 
-def test_assert_opened():
-    sm = smach.StateMachine(["done"])
-    with pytest.raises(smach.InvalidConstructionError, match="my words"):
-        sm.assert_opened("my words")
-    with sm:
-        sm.assert_opened("my words")
-        smach.StateMachine.add("A", Says("done"))
-
-
-def test_close_logs_inconsistency_and_does_not_raise(log):
-    with smach.StateMachine(["other"]):
-        smach.StateMachine.add("A", Says("done"))
-    assert "'done'" in log.text("error")
-
-
 def test_opened_again_and_in_itself():
     sm = smach.StateMachine(["done"])
     with sm:
@@ -183,14 +154,6 @@ def test_a_with_block_that_raises_is_closed_better(log):
     other = in_thread(lambda: machine(Says("done")).execute())
     other.join(60.0)
     assert other.result == "done"
-
-
-def test_errors_already_logged_are_not_logged_again(log):
-    with pytest.raises(smach.InvalidStateError):
-        with smach.StateMachine(["done"]):
-            smach.StateMachine.add("A", Says("done"))
-            smach.StateMachine.add("A", Says("done"))
-    assert len(log.error) == 1
 
 
 def test_add_needs_an_open_container_of_its_kind():

@@ -29,17 +29,6 @@ def test_items_iterable_or_function_evaluated_each_time():
     assert got == [1, 2, 3, 4, 3, 4]
 
 
-def test_set_iteritems():
-    got = []
-    each = smach.Iterator(["done"], [], [], exhausted_outcome="done")
-    with each:
-        smach.Iterator.set_iteritems(range(3), "n")
-        state = Calls(lambda ud: got.append(ud.n))
-        assert smach.Iterator.set_contained_state("C", state, loop_outcomes=["done"]) is state
-    assert each.execute() == "done" and got == [0, 1, 2]
-    assert each.get_registered_outcomes() == ("done",)
-
-
 def test_break_outcomes_given_all_others_loop():
     state = Says("a", "b", "stop", registered=["a", "b", "stop"])
     each = iterator(state, range(10), outcomes=["stop"], break_outcomes=["stop"])
@@ -55,12 +44,6 @@ def test_loop_outcomes_given_all_others_break():
 def test_neither_given_breaks_after_the_first_item():
     state = Says("done")
     assert iterator(state, range(10)).execute() == "done" and state.runs == 1
-
-
-def test_final_outcome_map():
-    state = Says("bad", registered=["ok", "bad"])
-    each = iterator(state, range(3), loop_outcomes=["ok"], final_outcome_map={"bad": "failed"})
-    assert each.execute() == "failed"
 
 
 def test_the_child_gets_the_containers_user_data_itself():
@@ -139,13 +122,6 @@ def test_a_child_with_an_unknown_outcome():
         iterator(Says(None, registered=["done"]), [1]).execute()
 
 
-def test_items_that_cannot_be_had():
-    with pytest.raises(smach.InvalidUserCodeError):
-        iterator(Says("done"), lambda: 1 / 0).execute()
-    with pytest.raises(smach.InvalidUserCodeError):
-        iterator(Says("done"), 3).execute()
-
-
 def test_termination_callback_gets_the_label_after_the_output_keys():
     seen, parent = [], smach.UserData()
     each = smach.Iterator(["done"], [], ["o"], [1], exhausted_outcome="done")
@@ -154,11 +130,6 @@ def test_termination_callback_gets_the_label_after_the_output_keys():
         smach.Iterator.set_contained_state("C", state, loop_outcomes=["done"])
     each.register_termination_cb(lambda ud, states, outcome: seen.append((states, outcome, parent.o)))
     assert each.execute(parent) == "done" and seen == [("C", "done", 5)]
-
-
-def test_execute_with_none_and_without_argument():
-    each = iterator(Says("done"), [1])
-    assert each.execute(None) == each.execute() == each.execute(smach.UserData()) == "done"
 
 
 def test_edges_and_states():
@@ -176,15 +147,6 @@ def test_edges_and_states():
     assert each.get_active_states() == [] and each.get_initial_states() == ["CHILD"]
     each.execute()
     assert seen == [(["CHILD"], True)] and each.get_active_states() == [] and not each.is_running()
-
-
-def test_without_contained_state():
-    each = smach.Iterator(["done"], [], [])
-    with pytest.raises(smach.InvalidStateError):
-        each.execute()
-    with pytest.raises(smach.InvalidStateError):
-        each.check_consistency()
-    assert each.get_children() == {} and each.get_internal_edges() == []
 
 
 @pytest.mark.parametrize(
@@ -211,24 +173,6 @@ def test_in_a_machine_and_pickled():
 def test_shutdown_ends_the_iteration_better():
     state = Calls(lambda ud: smach.set_shutdown_check(lambda: True))
     assert iterator(state, range(5), loop_outcomes=["done"]).execute() is None
-
-
-def test_set_initial_state_takes_user_data():
-    each = iterator(Says("done"), [1])
-    ud = smach.UserData()
-    ud.x = 2
-    each.set_initial_state([], ud)
-    assert each.userdata.x == 2
-
-
-def test_the_contained_state_is_found_by_its_label_and_its_edges_by_its_breaks():
-    state = Says("done", registered=["done", "failed", "again"])
-    each = smach.Iterator(["failed"], [], [], [1])
-    with each:
-        smach.Iterator.set_contained_state("EACH", state, break_outcomes=["failed"])
-    assert each["EACH"] is state
-    assert each.get_internal_edges() == [("done", "EACH", "EACH"), ("again", "EACH", "EACH"), ("failed", "EACH", None)]
-    assert smach.Iterator(["failed"], [], []).get_internal_edges() == []
 
 
 def test_a_shutdown_inside_the_state_is_no_transition():

@@ -107,10 +107,6 @@ def test_a_child_whose_request_preempt_raises_is_logged_and_the_request_kept(log
     assert "no preempt here" in log.text("error")
 
 
-def test_there_is_no_built_in_preempted_outcome():
-    assert smach.StateMachine(["done"]).get_registered_outcomes() == ("done",)
-
-
 def test_an_ignored_request_does_not_poison_the_next_run_better():
     state = Ignores("done")
     sm = machine(state)
@@ -141,14 +137,6 @@ def test_a_request_after_a_run_is_for_the_next_run():
     sm.request_preempt()  # a new one
     sm.execute()
     assert state.seen == [False, True]
-
-
-def test_a_request_by_assignment_to_the_private_flag_counts():
-    state = Serves()
-    sm = machine(state)
-    sm._preempt_requested = True
-    assert sm.execute() == "preempted"
-    assert sm.execute() == "done"
 
 
 def test_a_leaf_asked_directly_keeps_no_flag_after_its_run_better():
@@ -183,10 +171,3 @@ def test_flags_are_down_after_an_error_and_the_next_run_is_normal():
     seen = []
     state.function = lambda ud: seen.append(state.preempt_requested())
     assert sm.execute() == "done" and seen == [False] and not sm.preempt_requested()
-
-
-def test_recall_before_the_start():
-    state = Serves()
-    sm = machine(state)
-    sm.request_preempt(), sm.recall_preempt()
-    assert sm.execute() == "done" and state.seen == [False]

@@ -12,10 +12,6 @@ def sequence(*items, outcomes=("done", "failed")):
     return result
 
 
-def test_is_a_state_machine():
-    assert issubclass(smach.Sequence, smach.StateMachine)
-
-
 def test_connects_in_order_and_the_last_falls_through():
     seq = sequence(("A", Says("done"), None), ("B", Says("done"), None), ("C", Says("done"), None))
     assert seq.get_internal_edges() == [("done", "A", "B"), ("done", "B", "C"), ("done", "C", None)]

@@ -19,12 +19,6 @@ def test_first_added_is_initial_and_set_initial_state_wins():
     assert other["A"].runs == 0
 
 
-def test_add_returns_the_state():
-    state = Says("done")
-    with smach.StateMachine(["done"]):
-        assert smach.StateMachine.add("A", state) is state
-
-
 def test_add_refuses_unknown_outcomes_and_taken_labels():
     with smach.StateMachine(["done"]) as sm:
         with pytest.raises(smach.InvalidTransitionError, match="nothing"):
@@ -98,28 +92,6 @@ def test_add_auto_connects_whatever_comes_next():
     assert sm.execute() == "end"
 
 
-def test_add_auto_refuses_unknown_connectors():
-    with smach.StateMachine(["done"]) as sm:
-        with pytest.raises(smach.InvalidStateError, match="nothing"):
-            smach.StateMachine.add_auto("A", Says("done"), ["nothing"])
-        assert sm.get_children() == {}
-
-
-def test_constants_are_written_each_time():
-    seen = []
-    with smach.StateMachine(["done"]) as sm:
-        state = Calls(lambda ud: seen.append(ud.c) or setattr(ud, "c", 0), io_keys=["c"])
-        smach.StateMachine.add("A", state, remapping={"c": "k"}, constants={"k": 7})
-    sm.execute(), sm.execute()
-    assert seen == [7, 7]
-
-
-def test_execute_with_and_without_parent():
-    sm = machine(Says("done"))
-    assert sm.execute() == sm.execute(None) == sm.execute(smach.UserData()) == "done"
-    assert sm.execute(parent_ud=smach.UserData()) == "done"
-
-
 def test_shutdown_between_states_returns_none():
     second = Says("done")
     sm = machine(Calls(lambda ud: smach.set_shutdown_check(lambda: True)), second)
@@ -171,20 +143,6 @@ def test_an_outcome_needs_both_the_state_and_the_machine_to_have_it(registered):
     sm["S0"].register_outcomes(registered)
     with pytest.raises(smach.InvalidTransitionError, match="returned 'late'"):
         sm.execute()
-
-
-def test_add_auto_returns_the_state():
-    state = Says("done")
-    with smach.StateMachine(["done"]):
-        assert smach.StateMachine.add_auto("A", state, ["done"]) is state
-        smach.StateMachine.add("B", Says("done"))
-
-
-def test_an_outcome_registered_after_add_falls_through():
-    state = Says("late", registered=["done"])
-    sm = machine(state, outcomes=["done", "late"])
-    state.register_outcomes(["late"])
-    assert sm.execute() == "late"
 
 
 def test_order_of_callbacks_and_output_keys():

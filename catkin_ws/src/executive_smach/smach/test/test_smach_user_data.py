@@ -32,21 +32,6 @@ def test_hasattr_is_false_better():
     assert not hasattr(smach.UserData(), "x")
 
 
-def test_underscore_names_are_real_attributes():
-    ud = smach.UserData()
-    ud._mine = 1
-    assert ud._mine == 1 and "_mine" not in ud
-    with pytest.raises(AttributeError):
-        ud._other  # noqa: B018
-
-
-def test_update():
-    a, b = smach.UserData(), smach.UserData()
-    a.x, b.x, b.y = 1, 2, 3
-    a.update(b)
-    assert a._data == {"x": 2, "y": 3}
-
-
 def test_no_deletion_length_or_iteration():
     ud = smach.UserData()
     ud.x = 1
@@ -158,12 +143,6 @@ def test_remapper_renames():
     view, ud = view_of(1)
     view.w = 5
     assert ud.outer_w == 5 and "w" not in ud
-
-
-def test_remapper_contains():
-    view, _ = view_of(1)
-    view.w = 2
-    assert "v" in view and "absent" not in view and "w" not in view and "nothing" not in view
 
 
 def test_remapper_gives_the_very_object_without_dict():

@@ -63,10 +63,6 @@ def test_the_text_is_base64_of_a_protocol_2_pickle_of_a_dict():
     assert pickle.loads(raw) == PLAIN  # as a viewer does
 
 
-def test_the_empty_dict():
-    assert decode("gAJ9cQAu") == {} == decode(encode({})) == decode("")
-
-
 class Odd:
     def __repr__(self):
         raise RuntimeError("no repr")
@@ -229,16 +225,6 @@ def test_ten_thousand_damaged_pickles_never_do_more_than_be_refused():
             raw[seed.randrange(len(raw))] = seed.randrange(256)
         try:
             assert type(decode(b64(bytes(raw)))) is dict
-        except InvalidDataError:
-            pass
-    assert fired == []
-
-
-def test_random_bytes():
-    seed = random.Random(12)
-    for _ in range(5_000):
-        try:
-            decode(b64(b"\x80\x02" + seed.randbytes(seed.randint(0, 60)) + b"."))
         except InvalidDataError:
             pass
     assert fired == []

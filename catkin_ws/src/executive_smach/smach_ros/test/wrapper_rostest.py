@@ -15,15 +15,7 @@ from actionlib_msgs.msg import GoalStatus
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from reference_server import ABORT, SUCCEED, UNTIL_CANCELLED
-
-LIMIT = 60.0
-
-
-def wait_for(condition, limit=LIMIT):
-    end = time.monotonic() + limit
-    while time.monotonic() < end and not condition():
-        time.sleep(0.01)
-    return condition()
+from states_support import LIMIT, wait_for
 
 
 def action_state(goal, name="reference", **kwargs):

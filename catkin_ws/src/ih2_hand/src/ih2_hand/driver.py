@@ -95,7 +95,6 @@ class HandSerialDriver:
             )
         self.send_preshape = send_preshape
         self._grasp: bytes | None = None
-        self._grasp_mode: tuple[str, str] | None = None
         self._calibrating = False
         self._resting: set[int] = set()
         self.line = HandLine(transport or SerialTransport(serial_port), clock, read_timeout, trace)
@@ -138,11 +137,6 @@ class HandSerialDriver:
     def calibrating(self) -> bool:
         """Whether a calibration started here runs."""
         return self._calibrating
-
-    @property
-    def grasp_mode(self) -> tuple[str, str] | None:
-        """Mode and force level of the last set_grasp_mode."""
-        return self._grasp_mode
 
     def _check_free(self) -> None:
         if self._calibrating:
@@ -295,10 +289,6 @@ class HandSerialDriver:
         """Move the five motors to positions 0..254; spaced as the hand needs it."""
         self._command(frames.set_hand_posture(_positions(pos)), WIRE.posture_spacing_s)
 
-    def open_all(self) -> None:
-        """Open the flexion motors 1..4 at the hand's own speed (beyond Table 2)."""
-        self._command(bytes((frames.OPEN_ALL,)), WIRE.posture_spacing_s)
-
     def set_grasp_mode(self, mode: str, force_level: str, is_current: bool = True) -> None:
         """Pre-shape the hand for a grasp and remember the grasp for grasp_mode_close (W21).
 
@@ -313,7 +303,6 @@ class HandSerialDriver:
         else:
             self._check_free()
         self._grasp = frames.grasp(self.dialect, mode, force_level, is_current)
-        self._grasp_mode = (mode, force_level)
 
     def grasp_mode_close(self) -> None:
         """Close to the grasp of the last set_grasp_mode; NoGraspModeError if there was none."""

@@ -1,21 +1,31 @@
 #include "lwr_fri_bridge/bridge/bridge.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <iterator>
+#include <thread>
 
 namespace lwr_fri_bridge {
 namespace {
 
-constexpr double kCommandCycles = 2.5;  // FRI cycles that a command lives at least
-
-bool allFinite(const Vector7& v) { return v.allFinite(); }
+constexpr double kCommandCycles = 2.5;     // FRI cycles that a command lives at least
+constexpr double kWaitBeyondLimits = 2.0;  // s that command() waits beyond the request's own limits
+constexpr std::size_t kKeptOutcomes = 64;
 
 double seconds(std::int64_t from_ns, std::int64_t to_ns) {
   return 1e-9 * static_cast<double>(to_ns - from_ns);
 }
 
 }  // namespace
+
+bool StateView::operator==(const StateView& o) const {
+  return supervisor == o.supervisor && block == o.block && hold_latched == o.hold_latched &&
+         blocking_joint == o.blocking_joint && motion_epoch == o.motion_epoch && loss == o.loss &&
+         state == o.state && quality == o.quality && control == o.control && power == o.power &&
+         drive_error == o.drive_error && drive_warning == o.drive_warning &&
+         cycle_time == o.cycle_time;
+}
 
 Bridge::Bridge(const BridgeConfig& config)
     : config_((config.check(), config)),
@@ -161,9 +171,7 @@ void Bridge::serve(const Request& request, const Configurator::Observation& seen
       }
       configurator_.abandon(OutcomeCode::Interrupted, seen);
       supervisor_.stopBegins();
-      stop_ticket_ = request.ticket;
-      stop_began_ns_ = seen.now_ns;
-      monitor_asked_ = false;
+      stop_ = {request.ticket, seen.now_ns, false};
       return;
   }
 }
@@ -205,11 +213,11 @@ void Bridge::runSupervision(const Configurator::Observation& seen, bool fresh_se
 
   // The first half of a stop is the supervisor's (brake), the second the configurator's (monitor
   // mode).
-  const bool brake_too_long = seconds(stop_began_ns_, seen.now_ns) > kBrakeTimeLimit;
-  if (supervisor_.stopping() && !monitor_asked_ &&
+  const bool brake_too_long = seconds(stop_.began_ns, seen.now_ns) > kBrakeTimeLimit;
+  if (supervisor_.stopping() && !stop_.monitor_asked &&
       (supervisor_.readyForMonitor() || brake_too_long)) {
-    monitor_asked_ = true;
-    configurator_.stop(stop_ticket_, seen);
+    stop_.monitor_asked = true;
+    configurator_.stop(stop_.ticket, seen);
   }
 }
 
@@ -233,7 +241,7 @@ void Bridge::mirror(fri::CommandDatagram& answer) {
   interpolator_.reset(fri::jointsFromWire(answer.joint_position));
   leash_.reset();
   following_ = false;
-  command_expired_ = false;
+  target_.expired = false;
   session_.sent(fri::SentSetPoint());
 }
 
@@ -299,36 +307,36 @@ void Bridge::follow(const fri::Reception& reception, fri::CommandDatagram& answe
 Vector7 Bridge::targetVelocity() {
   const VelocitySource source = source_.load(std::memory_order_relaxed);
   const bool from_topic = source == VelocitySource::Topic;
-  if (source != last_source_) valid_command_ = VelocityCommand();  // nothing outlives its source
-  last_source_ = source;
+  if (source != target_.source) target_.command = VelocityCommand();  // nothing outlives its source
+  target_.source = source;
   VelocityCommand command;
   const bool fresh = from_topic ? topic_.read(command) : mailboxes_.takeVelocity(command);
   if (fresh && command.stamp_ns != 0) {
-    if (!allFinite(command.velocity)) {
+    if (!command.velocity.allFinite()) {
       ++counters_.commands_invalid;
     } else if (command.motion_epoch != supervisor_.epoch()) {
       ++counters_.commands_old_epoch;
     } else {
-      valid_command_ = command;
+      target_.command = command;
     }
   }
 
-  const double age = seconds(valid_command_.stamp_ns, sample_.stamp_ns);
+  const double age = seconds(target_.command.stamp_ns, sample_.stamp_ns);
   // With long FRI periods a command is two cycles old before its successor can be there.
   const double limit = std::max(from_topic ? config_.topic_timeout : config_.command_timeout,
                                 kCommandCycles * sample_.cycle_time);
   const bool current =
-      valid_command_.stamp_ns != 0 && valid_command_.motion_epoch == supervisor_.epoch();
+      target_.command.stamp_ns != 0 && target_.command.motion_epoch == supervisor_.epoch();
   const bool expired = current && (age > limit || age < -limit);
-  if (expired && !command_expired_ && !valid_command_.velocity.isZero()) {
+  if (expired && !target_.expired && !target_.command.velocity.isZero()) {
     ++counters_.command_timeouts;
   }
-  command_expired_ = expired;
+  target_.expired = expired;
   // While leashed the target is still looked at, to see when the outward motion is not asked for
   // any more.
   const bool allowed =
       supervisor_.block() == MotionBlock::None || supervisor_.block() == MotionBlock::Leashed;
-  return current && !expired && allowed ? valid_command_.velocity : Vector7::Zero();
+  return current && !expired && allowed ? target_.command.velocity : Vector7::Zero();
 }
 
 void Bridge::fillMode(fri::CommandDatagram& answer) const {
@@ -339,6 +347,119 @@ void Bridge::fillMode(fri::CommandDatagram& answer) const {
   fri::jointsToWire(active_mode_.joint_damping, answer.joint_damping);
   fri::wrenchToWire(active_mode_.cartesian_stiffness, answer.cartesian_stiffness);
   fri::wrenchToWire(active_mode_.cartesian_damping, answer.cartesian_damping);
+}
+
+void Bridge::publish() {
+  sample_.block = supervisor_.block();
+  sample_.motion_epoch = supervisor_.epoch();
+  sample_.blocking_joint = static_cast<std::int8_t>(leash_.joint());
+  mailboxes_.publishSample(sample_);
+
+  Snapshot snapshot;
+  snapshot.supervisor = supervisor_.state();
+  snapshot.block = sample_.block;
+  snapshot.hold_latched = supervisor_.held();
+  snapshot.blocking_joint = sample_.blocking_joint;
+  snapshot.motion_epoch = sample_.motion_epoch;
+  snapshot.loss = loss_;
+  snapshot.state = connected_ ? static_cast<fri::FriState>(measurement_.state) : fri::FriState::Off;
+  snapshot.quality =
+      connected_ ? static_cast<fri::Quality>(measurement_.quality) : fri::Quality::Unacceptable;
+  snapshot.control = static_cast<fri::ControlStrategy>(measurement_.control);
+  snapshot.power = measurement_.power;
+  snapshot.drive_error = measurement_.drive_error;
+  snapshot.drive_warning = measurement_.drive_warning;
+  snapshot.cycle_time = sample_.cycle_time;
+
+  snapshot.sample = sample_;
+  snapshot.permission_since_ns = permission_since_ns_;
+  snapshot.session = session_.counters();
+  snapshot.counters = counters_;
+  snapshot.request_busy = configurator_.busy();
+  snapshot.fall_backs = supervisor_.fallBacks();
+  snapshot.mode = wanted_mode_;
+  snapshot.answer_rate = measurement_.answer_rate;
+  snapshot.latency = measurement_.latency;
+  snapshot.jitter = measurement_.jitter;
+  snapshot.miss_rate = measurement_.miss_rate;
+  snapshot.miss_counter = measurement_.miss_counter;
+  snapshot.safety_scale = measurement_.safety_scale;
+  snapshot.timestamp = measurement_.timestamp;
+  std::copy(std::begin(measurement_.temperature), std::end(measurement_.temperature),
+            snapshot.temperature.begin());
+  snapshot.bounded_joints = bounded_joints_;
+  snapshots_.write(snapshot);
+  const StateView& view = snapshot;
+  if (!(view == last_view_) && changes_.push(view)) last_view_ = view;
+}
+
+// other threads than the FRI thread
+
+std::uint32_t Bridge::submit(const std::string& text) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  collectOutcomes();
+  Snapshot newest;
+  snapshots_.read(newest);
+  Request request;
+  request.event = parseEvent(text, newest.mode);
+  request.ticket = next_ticket_++;
+  if (!requests_.push(request)) {
+    ++requests_dropped_;
+    Outcome dropped;
+    dropped.ticket = request.ticket;
+    dropped.kind = request.event.kind;
+    dropped.code = OutcomeCode::NotServed;
+    ended_[request.ticket] = dropped;
+  }
+  return request.ticket;
+}
+
+void Bridge::collectOutcomes() {
+  Outcome ended;
+  while (outcomes_.pop(ended)) ended_[ended.ticket] = ended;
+  while (ended_.size() > kKeptOutcomes) ended_.erase(ended_.begin());
+}
+
+Outcome Bridge::outcome(std::uint32_t ticket) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  collectOutcomes();
+  const auto found = ended_.find(ticket);
+  if (found == ended_.end()) {
+    Outcome pending;
+    pending.ticket = ticket;
+    return pending;
+  }
+  const Outcome ended = found->second;
+  ended_.erase(found);
+  return ended;
+}
+
+Outcome Bridge::command(const std::string& event) {
+  using Clock = std::chrono::steady_clock;
+  const auto began = Clock::now();
+  const std::uint32_t ticket = submit(event);
+  const double limit =
+      std::max(config_.requests.start_timeout, kBrakeTimeLimit + config_.requests.stop_timeout) +
+      kWaitBeyondLimits;
+  for (;;) {
+    Outcome ended = outcome(ticket);
+    if (ended.code != OutcomeCode::Pending) return ended;
+    const double waited = std::chrono::duration<double>(Clock::now() - began).count();
+    if (waited > limit) {
+      ended.code = OutcomeCode::NotServed;
+      ended.waited = waited;
+      return ended;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+}
+
+Snapshot Bridge::snapshot() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  Snapshot newest;
+  snapshots_.read(newest);
+  newest.counters.requests_dropped = requests_dropped_;
+  return newest;
 }
 
 }  // namespace lwr_fri_bridge

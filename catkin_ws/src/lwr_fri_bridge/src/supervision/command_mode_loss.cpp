@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 namespace lwr_fri_bridge {
 namespace {
@@ -19,28 +18,20 @@ constexpr std::int64_t kOften_ns = 60'000'000'000;  // no more than three restar
 }  // namespace
 
 std::string describe(const CommandModeLoss& loss) {
-  char text[160] = "";
+  const std::string lost = "command mode was lost because ";
+  const std::string time = std::to_string(std::lround(1e3 * loss.seconds)) + " ms";
   switch (loss.cause) {
     case LossCause::None:
       break;
     case LossCause::ComputerLate:
-      std::snprintf(text, sizeof text,
-                    "command mode was lost because this computer was %.0f ms late with its answers "
-                    "(load, or no real-time priority)",
-                    1e3 * loss.seconds);
-      break;
+      return lost + "this computer was " + time +
+             " late with its answers (load, or no real-time priority)";
     case LossCause::ControllerStalled:
-      std::snprintf(text, sizeof text,
-                    "command mode was lost because the robot controller, which runs on this "
-                    "computer, was not run for %.0f ms (load)",
-                    1e3 * loss.seconds);
-      break;
+      return lost + "the robot controller, which runs on this computer, was not run for " + time +
+             " (load)";
     case LossCause::ControllerSilent:
-      std::snprintf(text, sizeof text,
-                    "command mode was lost because the robot controller was silent for %.0f ms "
-                    "(cable, or its program ended)",
-                    1e3 * loss.seconds);
-      break;
+      return lost + "the robot controller was silent for " + time +
+             " (cable, or its program ended)";
     case LossCause::PacketsLost:
       return "command mode was lost after packets had been lost on the way (cable, switch)";
     case LossCause::PowerLost:
@@ -50,7 +41,7 @@ std::string describe(const CommandModeLoss& loss) {
     case LossCause::LeftByController:
       return "the robot controller left command mode by itself; its messages say why";
   }
-  return text;
+  return {};
 }
 
 void CommandModeWatch::tick(double seconds, std::uint32_t lost, double measured_speed,

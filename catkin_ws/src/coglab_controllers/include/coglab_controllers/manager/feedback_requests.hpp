@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "ctrl_more/cycle/controller_status.hpp"
+#include "ctrl_more/manager/controller_status.hpp"
 #include "ctrl_more/states/status.hpp"
 
 namespace coglab_controllers {

@@ -14,17 +14,13 @@
 
 namespace coglab_sim::krc {
 
-/// Figures of the servos. The torque limits are published; the others are ours.
+/// Defaults, units and texts are in parameter_table.inc.
 struct ServoParameters {
-  /// Nm; CentroEPiaggio, FloBaRoID and Gaz et al. 2014 agree on these.
-  Vector7 torque_limit = (Vector7() << 176, 176, 100, 100, 100, 38, 38).finished();
-  double bandwidth = 60.0;            ///< rad/s of the position servo, critically damped
-  double nullspace_stiffness = 20.0;  ///< Nm/rad toward the joint set-point in Cartesian impedance
-  double payload_error = 0.10;        ///< largest share by which the mass of the hand is wrong
-  double inertia_error = 0.05;        ///< largest share by which each inertia is wrong
+#define SERVOS(type, field, value, ...) type field = value;
+#include "coglab_sim/parameter_table.inc"
 };
 
-/// What is asked of the joint servos during one step.
+/// Input of the joint servos for one step.
 struct ServoCommand {
   lwr_fri_bridge::fri::ControlStrategy strategy = lwr_fri_bridge::fri::ControlStrategy::Position;
   Vector7 position = Vector7::Zero();   ///< rad

@@ -16,8 +16,8 @@ struct FreeBody {
   Vector3d inertia = Vector3d::Ones();  ///< diagonal in the body's axes, kg m^2
 };
 
-/// Figures of a hold; ours.
-struct HoldFigures {
+/// How stiff and how strong a hold is.
+struct HoldLimits {
   double bandwidth = 60.0;  ///< rad/s, critically damped
   double force = 40.0;      ///< N, largest
   double torque = 2.0;      ///< Nm, largest
@@ -44,7 +44,7 @@ class HoldSpring {
 
   /// Force and torque on the body about its centre, world axes. `share` 0..1 fades the hold.
   Wrench evaluate(const Pose& hand, const Twist& hand_twist, const FreeBody& body,
-                  const HoldFigures& figures, double share);
+                  const HoldLimits& limits, double share);
 
   bool engaged() const { return engaged_; }
 

@@ -21,30 +21,16 @@ namespace coglab_sim::plant {
 
 constexpr double kStep = 1e-3;  ///< s, longest step
 
-/// Figures of the arm's drives that are not in the robot description.
+/// The arm's drives. Defaults, units and texts are in parameter_table.inc.
 struct Drives {
-  /// kg m^2 at the link; ours, the order that the gear ratios 160/160/160/160/100/160/160 of the
-  /// DLR LWR III suggest.
-  Vector7 rotor_inertia = (Vector7() << 3.0, 3.0, 2.0, 2.0, 0.8, 0.4, 0.4).finished();
-  /// Nm; ours. The viscous part comes from the robot description.
-  Vector7 coulomb_friction = (Vector7() << 0.4, 0.4, 0.25, 0.25, 0.2, 0.1, 0.1).finished();
-  /// Largest share by which each joint's Coulomb friction differs from that, drawn by the seed of
-  /// the cell; ours: friction of robot joints varies by tens of percent with temperature, load and
-  /// wear (Bittencourt and Gunnarsson 2012).
-  double friction_spread = 0.3;
-  double coulomb_speed = 0.01;  ///< rad/s over which Coulomb friction reverses
-  /// Nm of the brakes: twice the motors' limits (CentroEPiaggio, FloBaRoID, Gaz et al. 2014).
-  Vector7 brake_torque = (Vector7() << 352, 352, 200, 200, 200, 76, 76).finished();
-  double block_stiffness = 2e5;  ///< Nm/rad of whatever holds the arm when it is blocked
-  double unknown_load = 0.0;     ///< kg at the palm, hangs on it without inertia
+#define DRIVES(type, field, value, ...) type field = value;
+#include "coglab_sim/parameter_table.inc"
 };
 
-/// Figures of the person's hand; ours.
-struct PersonFigures {
-  HoldFigures arm{40.0, 60.0, 6.0};  ///< holds the hand where the person wants it
-  double grip_bandwidth = 60.0;      ///< rad/s of the grip on the object
-  double grip_lever = 0.04;          ///< m, torque of the grip over its force
-  double reach = 0.06;  ///< m between hand frame and the object's surface at which a grip finds it
+/// The person's hand.
+struct PersonParameters {
+#define PERSON(type, field, value, ...) type field = value;
+#include "coglab_sim/parameter_table.inc"
 };
 
 struct PlantConfig {
@@ -55,7 +41,7 @@ struct PlantConfig {
   Object object;
   Surroundings surroundings;
   Drives drives;
-  PersonFigures person;
+  PersonParameters person;
 };
 
 /// What the person's hand does.
@@ -175,7 +161,7 @@ class Plant {
   };
 
   Twist twistOf(int body) const;
-  void feel(int body, int other, const Vector3d& force, double normal, Pressing& pressing);
+  void addContact(int body, int other, const Vector3d& force, double normal, Pressing& pressing);
   FreeBody freeBody(int body, int velocity) const;
   void put(int position, int velocity, const Pose& pose, const Twist& twist);
   void keepPlaced();
@@ -187,10 +173,10 @@ class Plant {
   void readArm(const Vector7& before, double dt);
   Vector7 pushedTorque() const;
   double blockDamping(int dof) const;
-  void appear(const PersonInput& person);
+  void addPerson(const PersonInput& person);
   State state() const;
-  void acceptOr(const State& before, int body, const char* where);
-  void forget();
+  void acceptOrRestore(const State& before, int body, const char* where);
+  void resetObject();
   void placeInRobotHand(const Pose& in_palm);
   void closeAround(const Pose& in_palm);
   void refuseOverlap(int body, const char* where) const;

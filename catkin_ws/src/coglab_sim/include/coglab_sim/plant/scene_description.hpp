@@ -9,19 +9,13 @@
 
 namespace coglab_sim::plant {
 
-/// The object that is handed over, from the object database. What stands here is that of
-/// coglab_objects/objects/mug.yaml, for programs that have no database; a test compares.
+/// The object that is handed over. Defaults, units and texts are in parameter_table.inc.
 struct Object {
-  std::string id = "mug";
-  double mass = 0.31;                          ///< kg, 0.01 .. 10
-  std::string shape = "cylinder";              ///< box, cylinder (axis z) or sphere
-  Vector3d size = Vector3d(0.08, 0.08, 0.10);  ///< m along x y z of the object frame, 0.001 .. 2
-  /// m, middle of the solid and centre of mass in the object frame.
-  Vector3d center = Vector3d(0.0, 0.0, 0.05);
-  double friction = 0.6;  ///< sliding, against everything, 0 .. 2
+#define OBJECT(type, field, value, ...) type field = value;
+#include "coglab_sim/parameter_table.inc"
 };
 
-/// @throws std::invalid_argument with object, figure, its range and its value.
+/// @throws std::invalid_argument with object, parameter, value and range.
 void checkObject(const Object& object);
 
 /// Diagonal of the inertia of the solid about its middle, kg m^2.
@@ -29,9 +23,8 @@ Vector3d inertiaOf(const Object& object);
 
 /// What stands around the robot.
 struct Surroundings {
-  double floor_height = -0.75;                      ///< m, world z
-  Vector3d board_center{0.45, -0.55, 0.05};         ///< m, middle of the board's upper side
-  Vector3d board_size = Vector3d(0.50, 0.40, 0.0);  ///< m along world x y; 0: no board
+#define SURROUNDINGS(type, field, value, ...) type field = value;
+#include "coglab_sim/parameter_table.inc"
 };
 
 /// Everything that the model is made of.

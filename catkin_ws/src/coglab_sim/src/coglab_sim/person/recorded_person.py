@@ -15,12 +15,11 @@ from typing import Any
 import numpy as np
 from coglab_py.pose import Pose
 
-from coglab_sim.person.giving import CLOSING
 from coglab_sim.person.participant import Participant
 from coglab_sim.person.recorded_motion import Playback, PlaybackSettings, RecordingError
 from coglab_sim.person.scene import Scene
 from coglab_sim.person.senses import Percept
-from coglab_sim.person.virtual_human import VirtualHuman
+from coglab_sim.person.virtual_human import CLOSING, VirtualHuman
 
 WAYS = ("wait", "no_wait", "leave")
 HAND = "human_hand"
@@ -35,7 +34,7 @@ FARTHEST = 0.30
 SHORTEST = 0.10
 """m, of a reach"""
 LEAVES_CLOSED = 0.05
-"""share of their way by which the robot's fingers must have been seen to close for who leaves at the recorded time"""
+"""share of their way that the robot's fingers are seen to close before a person lets go who leaves as recorded"""
 
 
 class RecordedHand:

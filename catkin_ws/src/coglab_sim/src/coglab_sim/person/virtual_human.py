@@ -2,7 +2,7 @@
 
 Phases: idle, reacting, reaching, waiting (hand at the handover point, the robot comes), placing (the object is brought
 gently into the robot's palm; for receiving: the hand closes and lifts), holding, releasing, retreating. The person
-knows of the cell what eyes and hand perceive (senses), and of the robot's intention what it says (coglab_msgs/Say).
+knows the cell through eyes and hand (senses), and the robot's intention through its words (coglab_msgs/Say).
 All frames in world, SI units.
 """
 
@@ -13,32 +13,62 @@ from coglab_msgs.msg import Say
 from coglab_py.pose import Pose, length
 from scipy.spatial.transform import Rotation
 
-from coglab_sim.person.giving import Giving
 from coglab_sim.person.grip import GripForce
-from coglab_sim.person.involuntary import involuntary
 from coglab_sim.person.participant import Participant
-from coglab_sim.person.phases import NEAR, REGRIPS, STILL
 from coglab_sim.person.reach import CorrectedReach, Reach, Turn, duration_for
-from coglab_sim.person.receiving import Receiving
 from coglab_sim.person.scene import HandSample, Scene, WorldView
 from coglab_sim.person.senses import Percept, Senses
 
-REPLAN_PERIOD = 0.10
-"""s between two looks at where the reach should end"""
-CORRECTION_TIME = 0.45
-"""s, a correction on the way takes at least this long"""
-GONE = 0.35
-"""m: a robot's hand that has been near and is then farther away than this has given up"""
-WITHDRAWALS, COMES = 5, 0.25
-"""offers that are taken back by who does that, and m from the object at which the robot's hand makes them do it"""
-LOST, AWAY, LOST_FOR = 0.2, 0.35, 0.3
-"""share of the weight below which the object is felt no more, m from the hand at which it is seen elsewhere, and s for
-both of them after which it is lost"""
+# Seeing and reaching
+NEAR = 0.10  # m, gap below which the robot's hand, or the object in it, counts as arrived
+STILL = 0.02  # m/s below which the robot's hand looks still
+REPLAN_PERIOD = 0.10  # s between two corrections of where the reach ends
+CORRECTION_TIME = 0.45  # s, shortest duration of a correction
+GONE = 0.35  # m, gap at which a robot's hand that has been near counts as gone
+WITHDRAWALS = 5  # trials in which a person with the behaviour `withdraws` takes the offer back
+COMES = 0.25  # m, gap at which they do
+# Giving
+BEYOND = 0.05  # m past the palm as it was seen; there the person stops
+PLACES_WITHIN = 4.0  # s after which placing stops where nothing was felt
+AFTER_TOUCH = 0.02  # m/s with which the object is pressed on from first touch
+RAMP = 0.15  # s in which the hand reaches its speed of placing
+FOLLOW_UP = 0.015  # m, longest way after first touch
+CLOSED = 0.08  # share of their way that the robot's fingers are seen to close before they count as closed
+CLOSING = 0.1  # 1/s of their way below which they look as if they had closed
+TOUCH_PART = 0.7  # what a closed hand whose grip is felt counts; 1 lets go
+TOLD_PART = 0.4  # what the words "I have it" count
+AGAIN = 0.5  # s without enough touch after which a person with that habit presses again
+REGRIPS = 0.10  # s in which fingers that had begun to open close again
+LOOSE = 0.5  # grip at which the fingers stop opening until the person feels who carries
+FEELS = 0.5  # s, longest duration of that
+SINK_SPEED = 0.03  # m/s with which an arm that relaxes sinks meanwhile
+CARRIES = 0.7  # share of the weight below which the robot carries
+# Taking
+THERE = 0.010  # m between hand and object below which the fingers close
+LIFT_SPEED = 0.03  # m/s
+LIFT = 0.03  # m
+MORE_THAN_WEIGHT = 1.2  # share of the expected weight at which the hand rises no further
+OPENED = 0.08  # share of their way that the robot's fingers are seen to open before they count as open
+OPEN_FOR = 0.2  # s for which they have to
+GRASPS_WITHIN = 4.0  # s after which a person who has not come to the object gives up
+# Losing an object
+LOST = 0.2  # share of the weight below which the object is not felt any more
+AWAY = 0.35  # m from the hand at which it is seen elsewhere
+LOST_FOR = 0.3  # s of both after which it is lost
+
 TASKS = {Say.READY_TO_RECEIVE: "give", Say.READY_TO_GIVE: "receive", Say.GIVEN_UP: "rest", Say.PLEASE_STEP_BACK: "rest"}
-"""What a prompt asks of the person."""
+"""what a prompt asks of the person"""
 
 
-class VirtualHuman(Giving, Receiving):
+def involuntary(p: Participant, f: np.ndarray, t: float) -> np.ndarray:
+    """Displacement (m) by sway (0.3-1 Hz) and tremor (8-12 Hz) at time t: sums of sines with the phases ``f`` (3 x 4),
+    bounded and smooth."""
+    sway = np.sin(2 * np.pi * 0.35 * t + f[:, 0]) + 0.5 * np.sin(2 * np.pi * 0.8 * t + f[:, 1])
+    tremor = np.sin(2 * np.pi * 9.1 * t + f[:, 2]) + 0.6 * np.sin(2 * np.pi * 11.3 * t + f[:, 3])
+    return p.sway / 1.5 * sway + p.tremor / 1.6 * tremor
+
+
+class VirtualHuman:
     """Step it with the time and the view; it answers with its hand. Deterministic for a seed and a sequence
     of steps."""
 
@@ -198,7 +228,31 @@ class VirtualHuman(Giving, Receiving):
         in_hand = s.object_in_hand if self._task == "give" else s.taken_in_hand
         return point + s.object_middle - turn.apply(in_hand + s.object_middle), turn
 
-    # -- phases -------------------------------------------------------------------------------------------------
+    def _middle(self) -> np.ndarray:
+        """Where the middle of the object is that the hand holds: the person knows it without looking."""
+        turned = Rotation.from_quat(self.scene.object_turn).apply(self.scene.object_middle)
+        middle: np.ndarray = self._hand + self._turn.apply(self.scene.object_in_hand + turned)
+        return middle
+
+    def _gap(self, palm: Pose, place: Pose) -> float:
+        """m between the robot's palm and the surface of the object at ``place``."""
+        half = self.scene.object_size / 2
+        beyond = np.abs(place.rotation.inv().apply(palm.position - place.position) - self.scene.object_middle) - half
+        return length(np.maximum(beyond, 0.0))
+
+    def _way_to(self, place: Pose) -> float:
+        """m that the object at ``place`` is from where the hand would take it."""
+        return length(place.position - self._turn.apply(self.scene.taken_in_hand) - self._hand)
+
+    def _weight(self) -> float:
+        """N, what the person knows the object to weigh."""
+        return max(1e-3, self.grip_force.expected)
+
+    def _load_share(self, seen: Percept) -> float:
+        """Share of the weight that the person's hand carries as felt."""
+        return float(-seen.load[2]) / self._weight()
+
+    # -- until both are there -----------------------------------------------------------------------------------
 
     def _idle(self, t: float, dt: float, seen: Percept) -> None:
         self._velocity = np.zeros(3)
@@ -232,7 +286,7 @@ class VirtualHuman(Giving, Receiving):
             self._go("waiting", t)
 
     def _withdraws(self, gap: float) -> bool:
-        """Who does that takes the offer back when the robot's hand is seen to come, the first five times."""
+        """With the behaviour `withdraws`: take the offer back as the robot's hand comes, in the first trials."""
         teases = self.participant.behaviour == "withdraws" and self._task == "give" and self.trial <= WITHDRAWALS
         return teases and gap < COMES
 
@@ -280,7 +334,7 @@ class VirtualHuman(Giving, Receiving):
     def _retreating(self, t: float, dt: float, seen: Percept) -> None:
         assert self._reach is not None
         self._follow(t)
-        if self._grip > 0.0:  # who had begun to let go holds on again
+        if self._grip > 0.0:  # fingers that had begun to open close again
             self._grip = min(1.0, self._grip + dt / REGRIPS)
         felt = length(seen.load) > LOST * self._weight()
         if self._grip == 0.0 or felt or length(seen.object.position - self._hand) < AWAY:
@@ -292,3 +346,180 @@ class VirtualHuman(Giving, Receiving):
         if self._reach.over(t):
             self._task = "rest"
             self._go("idle", t)
+
+    # -- giving -------------------------------------------------------------------------------------------------
+
+    def _taken_already(self, seen: Percept, near: bool) -> bool:
+        """While waiting: the robot's hand is seen to close on the object, or is felt to press on it already."""
+        if not near or self.participant.used_to_touch:
+            self._held_load = seen.load
+        self._closure = min(self._closure, seen.hand_closure) if near else seen.hand_closure
+        pressed = length(seen.load - self._held_load) >= self.participant.press
+        return pressed or seen.hand_closure - self._closure > CLOSED
+
+    def _placing(self, t: float, dt: float, seen: Percept) -> None:
+        """Bring the object into the palm, against the palm's outward axis, until it is felt; then press a little."""
+        p = self.participant
+        normal, along = seen.robot_hand.axis(0), seen.robot_hand.axis(2)
+        to_object = self._middle() - seen.robot_hand.position
+        gap = float(to_object @ normal) - self._thickness(normal)
+        pressing = length(seen.load - self._held_load)
+        if self._felt_since is None and pressing > 0.0:
+            self._felt_since, self._travelled = t, 0.0
+        if self._felt_since is not None and p.behaviour == "early_release":
+            self._go("releasing", t)
+            return
+        if self._felt_since is not None and (pressing >= p.press or self._travelled >= FOLLOW_UP):
+            if p.behaviour == "pull_back":
+                self._retreat(t)
+            else:
+                self._go("holding", t)
+            return
+        if self._felt_since is None and (gap < -BEYOND or t - self._since > PLACES_WITHIN):
+            self._go("holding", t)
+            return
+        ramp = min(1.0, (t - self._since) / RAMP)
+        speed = ramp * min(p.place_speed, 2.0 * max(gap, 0.0) + 0.04)
+        self._velocity = -normal * (AFTER_TOUCH if self._felt_since is not None else speed)
+        aside = float(to_object @ along)
+        if self._felt_since is None and abs(aside) > p.aligns_within:
+            self._velocity = self._velocity - ramp * along * float(np.clip(2.0 * aside, -0.05, 0.05))
+        self._hand = self._hand + self._velocity * dt
+        self._travelled += length(self._velocity) * dt
+
+    def _thickness(self, direction: np.ndarray) -> float:
+        """m, half of the object along a direction."""
+        turned = self._turn * Rotation.from_quat(self.scene.object_turn)
+        return float(np.abs(turned.inv().apply(direction)) @ self.scene.object_size) / 2
+
+    def _holding(self, t: float, dt: float, seen: Percept) -> None:
+        """Hold on until load and grip say that the robot has it."""
+        self._velocity = np.zeros(3)
+        p = self.participant
+        self._grip = min(1.0, self._grip + dt / REGRIPS)
+        if self._sunk > 0.0:  # up again, after a try to let go
+            self._sink(SINK_SPEED, dt)
+        closed = seen.hand_closure - self._closure > CLOSED and seen.closing_speed < CLOSING
+        if p.behaviour == "tug" and closed:
+            self._tug(t, dt)
+            return
+        if p.behaviour == "never_release":
+            if t - self._since > p.patience:
+                self._retreat(t)
+            return
+        if not closed and self._lost_touch(t, seen):
+            self._tries += 1
+            self._go("placing", t)
+            return
+        if self._signs(t, seen, closed) < 1.0:
+            self._sure_since = None
+        elif self._sure_since is None:
+            self._sure_since = t
+        if self._sure_since is not None and t - self._sure_since > p.assurance:
+            self._go("releasing", t)
+        elif t - self._since > p.patience:
+            self._retreat(t)
+
+    def _lost_touch(self, t: float, seen: Percept) -> bool:
+        """The robot's open hand has backed away from the object: time to press again, if not tried too often."""
+        touch = length(seen.load - self._held_load)
+        if touch >= 0.5 * self.participant.press or seen.robot_speed >= STILL or seen.closing_speed > CLOSING:
+            self._still_since = None
+        elif self._still_since is None:
+            self._still_since = t
+        away = self._still_since is not None and t - self._still_since > AGAIN
+        return away and self._tries < self.participant.presses_again and self._gap(seen.robot_hand, seen.object) < NEAR
+
+    def _signs(self, t: float, seen: Percept, closed: bool) -> float:
+        """How surely the robot holds; the person lets go from 1 on."""
+        signs = max(0.0, 1.0 - self._load_share(seen)) / self.participant.release_share
+        if not closed:
+            self._felt_since = None
+            return signs
+        if self._felt_since is None:
+            self._felt_since, self._touched = t, self._held_load
+        grip_felt = bool(np.any(seen.load != self._touched)) or t - self._felt_since > self.participant.believes_closed
+        return signs + TOUCH_PART * grip_felt + TOLD_PART * (self._told == Say.I_HAVE_IT)
+
+    def _tug(self, t: float, dt: float) -> None:
+        """Pull to and fro before letting go."""
+        if self._sure_since is None:
+            self._sure_since = t
+        since = t - self._sure_since
+        rate = 2 * np.pi * 1.5
+        self._velocity = np.array([0.012 * rate * np.cos(rate * since), 0.0, 0.0])
+        self._hand = self._hand + self._velocity * dt
+        if since > 3.0 and abs(np.sin(rate * since)) < 0.2:
+            self._go("releasing", t)
+
+    def _releasing(self, t: float, dt: float, seen: Percept) -> None:
+        """Open the grip; halfway a giver waits to feel that the robot carries, else holds on again."""
+        self._velocity = np.zeros(3)
+        p = self.participant
+        careful = self._task == "give" and p.behaviour != "early_release"
+        if careful and self._grip <= LOOSE and not self._checked:
+            self._feel_who_carries(t, dt, seen)
+            return
+        self._grip = max(0.0, self._grip - dt / p.release_time)
+        if self._grip == 0.0:
+            self._retreat(t)
+
+    def _feel_who_carries(self, t: float, dt: float, seen: Percept) -> None:
+        """Less of the weight must be felt. An arm that relaxes sinks a little: what the robot holds does not sink with
+        it."""
+        loosened = self.participant.release_time * (1.0 - LOOSE) + self.participant.feeling_delay
+        self._checked = self._load_share(seen) < CARRIES and t - self._since > loosened
+        if self._checked:
+            return
+        if self.participant.relaxes and self._sunk < SINK_SPEED * FEELS:
+            self._sink(-SINK_SPEED, dt)
+        elif t - self._since > loosened + FEELS:
+            self._go("holding", t)
+
+    def _sink(self, speed: float, dt: float) -> None:
+        self._velocity = np.array([0.0, 0.0, speed])
+        self._hand = self._hand + self._velocity * dt
+        self._sunk -= speed * dt
+
+    # -- taking -------------------------------------------------------------------------------------------------
+
+    def _grasping(self, t: float, dt: float, seen: Percept) -> None:
+        """Close the last way to the object as it is seen, and grip it."""
+        error = seen.object.position - self._turn.apply(self.scene.taken_in_hand) - self._hand
+        distance = length(error)
+        if self._grip == 0.0 and distance > THERE:
+            speed = min(self.participant.place_speed, 4.0 * distance)
+            self._velocity = error / distance * speed
+            self._hand = self._hand + self._velocity * min(dt, distance / speed)
+            if t - self._since > GRASPS_WITHIN:
+                self._retreat(t)
+            return
+        self._velocity = np.zeros(3)
+        self._grip = min(1.0, self._grip + dt / self.participant.grip_time)
+        if self._grip < 1.0:
+            return
+        if self.participant.behaviour in ("early_release", "pull_back"):
+            self._go("releasing", t)
+        else:
+            self._closure = seen.hand_closure
+            self._go("lifting", t)
+
+    def _lifting(self, t: float, dt: float, seen: Percept) -> None:
+        """Take the weight: the hand rises slowly until the robot's hand is seen to open."""
+        opened = self._closure - seen.hand_closure > OPENED or self._told == Say.YOU_HAVE_IT
+        self._velocity = np.zeros(3)
+        if opened:
+            if self._sure_since is None:
+                self._sure_since = t
+            if t - self._sure_since > OPEN_FOR:
+                self.grip_force.has_felt(max(self._weight(), float(-seen.load[2])))
+                self._retreat(t)
+            return
+        p = self.participant
+        limit = 0.0 if p.behaviour == "never_release" else LIFT
+        if self._travelled < limit and self._load_share(seen) < MORE_THAN_WEIGHT:
+            self._velocity = np.array([0.0, 0.0, LIFT_SPEED])
+            self._hand = self._hand + self._velocity * dt
+            self._travelled += LIFT_SPEED * dt
+        if t - self._since > p.patience:
+            self._go("releasing", t)

@@ -1,18 +1,17 @@
-"""Configuration of the machines from one YAML file, checked against machines_schema.json.
+"""Configuration of the machines: what machines.yaml and the node's parameters set, else coglab_smach.parameters.
 
-It is read again whenever the file changes."""
+The file is read again whenever it changes."""
 
 from __future__ import annotations
 
-import json
 import os
 import threading
 from collections.abc import Callable, Mapping
-from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 from coglab_py.yaml_file import Document, YamlError, read
+
+from coglab_smach.parameters import BY_NAME, NO_DEFAULT, schema, unknown
 
 
 class ConfigError(Exception):
@@ -42,8 +41,8 @@ class Config:
 
     _overrides: dict[str, Any] = {}
 
-    def get(self, name: str, default: Any = None) -> Any:
-        """Value of ``a.b.c``; KeyError-like ConfigError if it is absent and no default is given."""
+    def get(self, name: str) -> Any:
+        """Value of ``a.b.c``; ConfigError if neither the file nor the table of parameters has one."""
         if name in self._overrides:
             return self._overrides[name]
         self._reload_if_changed()
@@ -53,11 +52,20 @@ class Config:
         node: Any = self._values
         for part in name.split("."):
             if not isinstance(node, Mapping) or part not in node:
-                if default is None:
+                default = BY_NAME[name].default if name in BY_NAME else NO_DEFAULT
+                if default is NO_DEFAULT:
                     raise ConfigError(f"{self.path or 'configuration'}: '{name}' is missing")
                 return default
             node = node[part]
         return node
+
+    def number(self, name: str) -> float:
+        """The same of a number."""
+        return float(self.get(name))
+
+    def text(self, name: str) -> str:
+        """The same of a text."""
+        return str(self.get(name))
 
     def _timing(self) -> Mapping[str, Any]:
         """Values by dotted name of the timing that is in force; a name that the file does not have changes nothing."""
@@ -105,11 +113,14 @@ def _region_in_order(path: str, handover: Mapping[str, Any]) -> None:
 
 
 def _checked(document: Document) -> dict[str, Any]:
+    values: dict[str, Any] = document.value
     try:
-        document.check(_schema())
+        for way, nearest in unknown(values) if isinstance(values, Mapping) else ():
+            hint = f"; did you mean '{nearest}'?" if nearest else ""
+            raise ConfigError(document.sentence(way, f"there is no such parameter{hint}"))
+        document.check(schema())
     except YamlError as error:
         raise ConfigError(str(error)) from None
-    values: dict[str, Any] = document.value
     return values
 
 
@@ -130,10 +141,3 @@ def _nested(overrides: Mapping[str, Any]) -> dict[str, Any]:
             node = node.setdefault(part, {})
         node[last] = value
     return values
-
-
-@lru_cache(maxsize=1)
-def _schema() -> dict[str, Any]:
-    text = Path(__file__).with_name("machines_schema.json").read_text(encoding="utf-8")
-    schema: dict[str, Any] = json.loads(text)
-    return schema

@@ -10,12 +10,10 @@ from coglab_py.pose import Pose
 
 from coglab_smach.clocks.clock import Clock
 from coglab_smach.context.config import Config
-from coglab_smach.context.hand_track import HandTrack
 from coglab_smach.context.holding import HoldingMemory
 from coglab_smach.context.journal import Journal
 from coglab_smach.context.requests import Requests
 from coglab_smach.ports.interfaces import ArmPort, ContactPort, DatabasePort, HandPort, PerceptionPort
-from coglab_smach.ports.pending import Pending
 
 
 class StopSwitch:
@@ -62,26 +60,6 @@ class Context:
     None where that is more than most (BoardRoom.raised)"""
     say: Callable[[int, str], None] = lambda code, text: None
     """tell the person something: code of coglab_msgs/Say and a sentence"""
-    shared: bool = False
-    """the person may hold the object that is in the robot's fingers: from the closing on an object that is offered
-    until its weight is felt, and from the person's taking of the load until the hand is open"""
-    firm: int = 0
-    """wire speed, and with it the force, with which the fingers are to close on what they hold gently as long as a
-    person's fingers may be between them; 0: they hold it as its grasp says"""
-    preshaped: bool = False
-    """the fingers have taken the preshape of this reach's grasp"""
-    closing: Pending | None = None
-    """of the fingers, begun on the last of a reach's way"""
-    tightening: Pending | None = None
-    """of the fingers around what the person has let go of, firmly"""
-    closing_on: str = ""
-    """id of the object that they close on there"""
-    closing_firm: int = 0
-    """``firm`` of that object"""
-    shared_mass: float = 0.0
-    """kg, of what the robot and the person may both hold"""
-    hand_track: HandTrack | None = None
-    """the hand of the person who gives an object, or takes it, as long as they may hold it, too"""
     _holding: str = ""
 
     def __post_init__(self) -> None:
@@ -96,7 +74,5 @@ class Context:
     def holding(self, object_id: str) -> None:
         if object_id != self._holding:
             self.memory.note(object_id)
-        if not object_id:
-            self.firm = 0
         self._holding = object_id
         self.journal.changed()

@@ -9,8 +9,7 @@ import json
 import os
 from collections.abc import Callable
 
-UNKNOWN = "unknown"
-"""Id of an object that the hand holds though nobody remembers which it is."""
+UNKNOWN = "unknown"  # Id of an object that the hand holds though nobody remembers which it is
 
 
 class HoldingMemory:

@@ -47,8 +47,8 @@ class Failure:
 
 @dataclass(frozen=True)
 class Wait:
-    """What an active state waits for, in words and as a code of ``awaited``, and when (s of the journal's clock) it
-    gives up. ``aside``: of a state that looks on beside the others, for whose end nobody waits."""
+    """What an active state waits for, in words and as a code of ``wait_reasons``, and when it gives up (s of the
+    journal's clock). ``aside``: the state only looks on beside others, and nobody waits for its end."""
 
     what: str = ""
     deadline: float = math.inf

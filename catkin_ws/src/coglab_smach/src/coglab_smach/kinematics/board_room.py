@@ -16,12 +16,9 @@ from coglab_py.pose import Pose
 
 from coglab_smach.kinematics.reachability import solve
 
-FROM_ELBOW = 3
-"""index of the first joint of the arm whose link is looked at"""
-STEPS = 5
-"""times that a palm is raised at most: the posture of the arm changes with it"""
-ENOUGH = 1e-4
-"""m that may be missing after that"""
+FROM_ELBOW = 3  # index of the first joint of the arm whose link is looked at
+STEPS = 5  # times that a palm is raised at most: the posture of the arm changes with it
+ENOUGH = 1e-4  # m that may be missing after that
 
 
 @dataclass(frozen=True)

@@ -5,17 +5,18 @@ Estimates that are meant to be too long rather than too short: they bound a wait
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
+import coglab_controllers as cc
 import numpy as np
+from coglab_py.packages import package_path
 
 from coglab_smach.kinematics.reachability import default_arm
 
-LEVER = 0.4
-"""m: what one joint moves the hand by, per rad, in a bent posture of the arm."""
-HALF_TURN = float(np.pi)
-"""rad: more than this the hand never turns on its way."""
+LEVER = 0.4  # m: what one joint moves the hand by, per rad, in a bent posture of the arm
+HALF_TURN = float(np.pi)  # rad: more than this the hand never turns on its way
 
 
 @dataclass(frozen=True)
@@ -57,3 +58,20 @@ def hand_path(start: Sequence[float], target: Sequence[float], steps: int = 20) 
     line = np.linspace(np.asarray(start, dtype=float), np.asarray(target, dtype=float), steps)
     places = np.array([default_arm().fk(q)[0] for q in line])
     return float(np.sum(np.linalg.norm(np.diff(places, axis=0), axis=1)))
+
+
+def read_limits(parameters: Mapping[str, Any]) -> MotionLimits:
+    """The limits in force, from the parameters below /controller_manager, with the manager's own defaults."""
+    table = str(parameters.get("joint_limits_file") or package_path("lwr_description", "config", "joint_limits.yaml"))
+    limits = cc.load_joint_limits(table, str(parameters.get("joint_limits_profile", "default")))
+    velocity = np.asarray(parameters.get("joint_vel_limit", limits.velocity), dtype=float)
+    acceleration = np.asarray(limits.acceleration, dtype=float)
+    ptp = dict(parameters.get("ptp", {}))
+    speeds = [float(parameters.get(name, 1.0)) for name in ("hand_speed_limit", "elbow_speed_limit")]
+    return MotionLimits(
+        tuple(velocity),
+        tuple(acceleration),
+        tuple(float(ptp.get("default_speed", 0.3)) * velocity),
+        tuple(float(ptp.get("default_acceleration", 0.2)) * acceleration),
+        min((v for v in speeds if v > 0.0), default=float("inf")),
+    )

@@ -20,8 +20,7 @@ from coglab_smach.kinematics.goals import palm_at_grasp
 
 POSITION_TOLERANCE = 0.003
 ANGLE_TOLERANCE = np.radians(3.0)
-REGION = ((0.72, 0.78, 0.82), (-0.12, 0.0, 0.12), (0.28, 0.38, 0.45))
-"""m, base frame: object positions at a handover."""
+REGION = ((0.72, 0.78, 0.82), (-0.12, 0.0, 0.12), (0.28, 0.38, 0.45))  # m, base frame: object positions at a handover
 
 
 @lru_cache(maxsize=1)

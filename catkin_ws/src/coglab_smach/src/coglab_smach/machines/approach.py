@@ -8,7 +8,7 @@ from coglab_smach.states.base import CoglabConcurrence, CoglabMachine, require_a
 from coglab_smach.states.give import WaitTaker
 from coglab_smach.states.hand import HandPreshape
 from coglab_smach.states.monitor import MonitorDmp
-from coglab_smach.states.reach import ExecuteDmp, WaitStop
+from coglab_smach.states.reach import ExecuteDmp, WaitContact, WaitStop
 
 KEYS = ["goal", "grasp", "object_entry", "object_id"]
 TAKER_KEYS = [*KEYS, "delivery"]
@@ -21,12 +21,13 @@ def build_arm_motion(ctx: Context, trigger: str) -> CoglabMachine:
         "arm_motion",
         ["succeeded", "failed", "preempted"],
         input_keys=TAKER_KEYS if trigger == "taker" else KEYS,
+        io_keys=["grip"],
     )
     with machine:
         machine.add_state("switch_to_dmp", SwitchController(ctx, "dmp"), {"succeeded": "execute_dmp"})
         machine.add_state("execute_dmp", ExecuteDmp(ctx), {"succeeded": "wait_stop"})
-        wait_stop = WaitTaker(ctx) if trigger == "taker" else WaitStop(ctx, trigger)
-        machine.add_state("wait_stop", wait_stop, {"succeeded": "succeeded"})
+        wait_stop = {"taker": WaitTaker, "contact": WaitContact, "": WaitStop}[trigger]
+        machine.add_state("wait_stop", wait_stop(ctx), {"succeeded": "succeeded"})
     return machine
 
 
@@ -43,6 +44,7 @@ def build_approach(ctx: Context, label: str, trigger: str, preshape: bool, monit
         decide,
         conclude,
         input_keys=TAKER_KEYS if trigger == "taker" else KEYS,
+        io_keys=["grip"],
     )
     with group:
         group.add_state("arm_motion", build_arm_motion(ctx, trigger))

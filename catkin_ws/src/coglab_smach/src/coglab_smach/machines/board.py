@@ -37,10 +37,9 @@ def build_take(ctx: Context) -> CoglabMachine:
 
     ``take.preshape`` in the configuration: 'before' the precise motion or 'during' it (read when the machine is built).
     """
-    during = str(ctx.config.get("take.preshape", "before")) == "during"
-    machine = CoglabMachine(
-        ctx, "take", ACTION_OUTCOMES, input_keys=["object_id"], output_keys=["object_entry", "grasp", "grasp_name"]
-    )
+    during = ctx.config.text("take.preshape") == "during"
+    outputs = ["object_entry", "grasp", "grasp_name"]
+    machine = CoglabMachine(ctx, "take", ACTION_OUTCOMES, ["object_id"], outputs, io_keys=["grip"])
     machine.is_action = True
     with machine:
         machine.add_state("query_database", QueryDatabase(ctx), to_recovery(succeeded="approach_board"))
@@ -70,7 +69,7 @@ def build_take(ctx: Context) -> CoglabMachine:
 def build_put(ctx: Context) -> CoglabMachine:
     """free place while moving to the board -> precise DMP motion -> open -> home; ends with an empty hand."""
     machine = CoglabMachine(
-        ctx, "put", ACTION_OUTCOMES, input_keys=["object_id", "object_entry", "grasp", "grasp_name"]
+        ctx, "put", ACTION_OUTCOMES, input_keys=["object_id", "object_entry", "grasp", "grasp_name"], io_keys=["grip"]
     )
     machine.is_action = True
     with machine:

@@ -9,7 +9,7 @@ from coglab_smach.states.arm import HomeRobot, SwitchController
 from coglab_smach.states.base import CoglabMachine
 from coglab_smach.states.hand import HandClose, HandPreshape, HandTighten
 from coglab_smach.states.knowledge import QueryDatabase, SetGraspGoal
-from coglab_smach.states.seat import Seat
+from coglab_smach.states.regrasp import Regrasp
 from coglab_smach.states.weight import TakeWeight
 
 SHARED = ["object_entry", "grasp", "grasp_name"]
@@ -22,7 +22,7 @@ def build_exchange_human_to_robot(ctx: Context) -> CoglabMachine:
     A hand that has closed on nothing opens to its preshape, and the arm comes once more; one that has closed on an edge
     opens, goes to the grasp from where it is, and closes again."""
     machine = CoglabMachine(
-        ctx, "exchange_human_to_robot", ACTION_OUTCOMES, input_keys=["object_id"], output_keys=SHARED
+        ctx, "exchange_human_to_robot", ACTION_OUTCOMES, input_keys=["object_id"], output_keys=SHARED, io_keys=["grip"]
     )
     machine.is_action = True
     with machine:
@@ -41,7 +41,7 @@ def build_exchange_human_to_robot(ctx: Context) -> CoglabMachine:
         )
         machine.add_state("open_again", HandPreshape(ctx), to_recovery(succeeded="set_dmp_goal"))
         machine.add_state("open_beside", HandPreshape(ctx), to_recovery(succeeded="seat"))
-        machine.add_state("seat", Seat(ctx), to_recovery(succeeded="hand_close"))
+        machine.add_state("seat", Regrasp(ctx), to_recovery(succeeded="hand_close"))
         machine.add_state("take_weight", TakeWeight(ctx), to_recovery(succeeded="hand_tighten"))
         machine.add_state("hand_tighten", HandTighten(ctx), to_recovery(succeeded="coglab_home_robot"))
         machine.add_state("coglab_home_robot", HomeRobot(ctx, carries=True), to_recovery(succeeded="tighten_at_home"))

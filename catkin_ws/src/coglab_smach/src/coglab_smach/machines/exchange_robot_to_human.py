@@ -20,6 +20,7 @@ def build_exchange_robot_to_human(ctx: Context) -> CoglabMachine:
         ACTION_OUTCOMES,
         input_keys=["object_id", "object_entry", "grasp", "grasp_name"],
         output_keys=["delivery_name", "delivery_pose"],
+        io_keys=["grip"],
     )
     machine.is_action = True
     with machine:

@@ -7,24 +7,23 @@ from typing import Any
 
 from coglab_msgs.msg import ReasonCode, Say
 
-from coglab_smach.context.awaited import HAND
 from coglab_smach.context.context import Context
-from coglab_smach.context.hand_track import HandTrack
+from coglab_smach.context.grip import Grip
 from coglab_smach.context.holding import UNKNOWN
 from coglab_smach.context.requests import command
+from coglab_smach.context.wait_reasons import HAND
 from coglab_smach.ports.interfaces import Verdict
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.arm import HomeRobot
 from coglab_smach.states.base import CoglabMachine, CoglabState
 from coglab_smach.states.hand import HandTighten
-from coglab_smach.states.held import LOOK, HeldObject
+from coglab_smach.states.hand_tracking import AWAY, from_palm
+from coglab_smach.states.held_object import LOOK, HeldObject
 from coglab_smach.states.motion import end_motion
 from coglab_smach.states.reach import CAUGHT
 from coglab_smach.states.weight import person_has_it, person_holds
-from coglab_smach.states.where import AWAY, from_palm
 
-LETS_GO = 5.0
-"""s in which a person who is told that it is over lets go of what the robot's fingers hold, too, and goes"""
+LETS_GO = 5.0  # s in which a person who is told that it is over lets go of what the robot's fingers hold, too, and goes
 
 
 def arm_is_blocked(state: CoglabState) -> Verdict:
@@ -43,13 +42,11 @@ class EndMotion(CoglabState):
     ignores_stop = True
 
     def __init__(self, ctx: Context) -> None:
-        super().__init__(ctx, outcomes=["succeeded", "stopped"])
+        super().__init__(ctx, outcomes=["succeeded", "stopped"], io_keys=["grip"])
 
     def run(self, ud: Any) -> str:
         if self.ctx.stop.pressed():
-            for closing in (self.ctx.closing, self.ctx.tightening):
-                if closing is not None:
-                    closing.cancel()
+            ud.grip.stop()
             self.reason = f"STOP: {self.ctx.stop.reason}; the hand keeps what it holds; to go on {command('reset')}"
             return "stopped"
         self.ctx.contact.disarm()
@@ -69,22 +66,22 @@ class EndMotion(CoglabState):
 
 
 class SecureHand(CoglabState):
-    """Decide what the hand does during recovery: keep holding if it closed on an object, else open. Fingers that a STOP
-    has left half open say that they hold something: what the tracker sees away from the palm is not in them.
+    """Decide what the hand does during recovery: keep holding if it closed on an object, else open. After a STOP a half
+    open hand may report a grip that is none: an object that is seen away from the palm is not held.
 
-    The arm goes nowhere with an object that the person may hold too. They are told that it is over; where their hand is
-    not seen to go within LETS_GO s the outcome is stopped, until the operator has looked and asks for 'reset'
+    The arm does not move with an object that the person may hold, too. They are told that it is over. If their hand is
+    not seen to go within LETS_GO the outcome is stopped, until the operator has looked and asks for 'reset'
     (``operator``: this is the recovery after that).
     """
 
     default_time_limit = 10.0
 
     def __init__(self, ctx: Context, operator: bool = False) -> None:
-        super().__init__(ctx, outcomes=["succeeded", "stopped"])
-        self.operator, self._told = operator, False
+        super().__init__(ctx, outcomes=["succeeded", "stopped"], io_keys=["grip"])
+        self.operator, self._told, self._grip = operator, False, Grip()
 
     def run(self, ud: Any) -> str:
-        self._told = self.operator
+        self._told, self._grip = self.operator, ud.grip
         outcome = self._secure()
         if outcome == "succeeded":
             self._tell()
@@ -100,79 +97,74 @@ class SecureHand(CoglabState):
         self._closed_on_the_way()
         if self.ctx.holding and self.ctx.hand.state().holding:
             self._look_for_it()
-        if self.ctx.holding and self.ctx.shared and not self.operator:
+        if self.ctx.holding and self._grip.shared and not self.operator:
             self._await_letting_go()
-        if self.ctx.holding and (self.operator or not self.ctx.shared):
-            self.ctx.shared = False
+        if self.ctx.holding and (self.operator or not self._grip.shared):
+            self._grip.shared = False
             self.reason = f"the hand keeps '{self.ctx.holding}'"
             return "succeeded"
         if self.ctx.holding:
             return self._stay(f"the person may still hold '{self.ctx.holding}', which is in the robot's fingers")
         try:
             self.await_pending(
-                self.ctx.hand.open(int(self.ctx.config.get("hand.open_speed", 400))),
+                self.ctx.hand.open(self.ctx.config.get("hand.open_speed")),
                 "opening of the empty hand",
                 8.0,
                 code=HAND,
             )
         except PortError as error:
-            if self.ctx.shared:
+            if self._grip.shared:
                 return self._stay(
                     f"the hand could not be opened, and the person may hold what is in it ({error.sentence})"
                 )
             # A dead hand must not keep the arm from going home; what it may hold is unknown, so it is not forced.
             self.reason = f"the hand could not be opened: {error.sentence}"
-        self.ctx.shared = False
+        self._grip.release()
         return "succeeded"
 
     def _closed_on_the_way(self) -> None:
-        """What the fingers have caught on the last of a reach that has failed then. A person who holds it gets it back;
-        one who let go at the first touch has left it to the robot, wherever their hand is."""
-        closing, self.ctx.closing = self.ctx.closing, None
-        if closing is None or not self.ctx.shared or self.ctx.holding:
+        """Fingers that closed on the way of a reach that has failed may have caught the object. A person who holds it
+        gets it back; one who let go at the first touch has left it to the robot, wherever their hand is."""
+        grip = self._grip
+        closing = grip.take_closing()
+        if closing is None or not grip.shared or self.ctx.holding:
             return
         end = self.ctx.clock.now() + CAUGHT
         while not (closing.done() and self.ctx.hand.state().holding) and self.ctx.clock.now() < end:
             self.pause(0.02)
         if not self.ctx.hand.state().holding:
             return
-        if not person_has_it(self, self._track(), self._weighed()):
-            away = from_palm(self, self._track(), 0.3)
-            self.ctx.holding, self.ctx.shared = self.ctx.closing_on, not self._is_away(away)
-            self.ctx.firm = self.ctx.closing_firm
-
-    def _track(self) -> HandTrack:
-        """Of the person's hand, followed from where it may have held the object."""
-        self.ctx.hand_track = self.ctx.hand_track or HandTrack()
-        return self.ctx.hand_track
+        if not person_has_it(self, grip.hand, self._weighed()):
+            away = from_palm(self, grip.hand, 0.3)
+            self.ctx.holding, grip.shared = grip.object_id, not self._is_away(away)
 
     def _is_away(self, away: float | None) -> bool:
         """Whether the person's hand, ``away`` m from the palm, was seen to go so far that it holds nothing there."""
-        return away is not None and away > AWAY and self._track().is_sure
+        return away is not None and away > AWAY and self._grip.hand.is_sure
 
     def _weighed(self) -> dict[str, float]:
         """What to feel for."""
-        return {"mass": self.ctx.shared_mass, "load_share": float(self.ctx.config.get("hand.load_share", 0.5))}
+        return {"mass": self._grip.mass, "load_share": self.ctx.config.number("hand.load_share")}
 
     def _await_letting_go(self) -> None:
-        """Nobody else holds the object, or has taken it along, once the person's hand is seen away from it. Where it
-        was not seen to go another one may be seen there: then it is felt whether they hold it."""
+        """Nobody else holds the object once the person's hand is seen away from it. If the hand was not seen to go it
+        may be another one: then the arm feels whether the person holds the object."""
         self._tell()
         self.allow(LETS_GO + 10.0)
         end, felt = self.ctx.clock.now() + LETS_GO, False
         while self.ctx.clock.now() < end:
-            away = from_palm(self, self._track())
+            away = from_palm(self, self._grip.hand)
             asks = away is not None and away > AWAY and not felt
             if self._is_away(away) or (asks and person_holds(self, self._weighed()) is False):
-                self.ctx.shared = False
+                self._grip.shared = False
                 self._look_for_it()
                 return
             felt = felt or asks
             self.pause(0.05)
 
     def _look_for_it(self) -> None:
-        """Empties the context's hand where the object is seen elsewhere. What nobody sees is where the hand says."""
-        held, end = HeldObject(self.ctx, self.ctx.holding), self.ctx.clock.now() + LOOK
+        """Nothing is held any more if the object is seen elsewhere. If nobody sees it the hand is believed."""
+        held, end = HeldObject(self.ctx, self.ctx.holding, self._grip), self.ctx.clock.now() + LOOK
         try:
             while not held.seen_with_the_hand() and self.ctx.clock.now() < end:
                 held.check()
@@ -196,7 +188,7 @@ class WhatIsHeld(CoglabState):
     default_time_limit = 8.0
 
     def __init__(self, ctx: Context) -> None:
-        super().__init__(ctx, outcomes=["empty", "holding"])
+        super().__init__(ctx, outcomes=["empty", "holding"], io_keys=["grip"])
 
     def run(self, ud: Any) -> str:
         held = self._seen_by_the_hand()
@@ -207,6 +199,7 @@ class WhatIsHeld(CoglabState):
             )
         elif held and not self.ctx.holding:
             self.ctx.holding = self.ctx.memory.recall() or UNKNOWN
+            ud.grip.firm = 0
             self.reason = f"the hand holds an object since before this start: {self.ctx.holding}"
         elif not held and self.ctx.holding:
             self.reason = f"'{self.ctx.holding}' is not in the hand any more"
@@ -216,7 +209,7 @@ class WhatIsHeld(CoglabState):
     def _seen_by_the_hand(self) -> bool | None:
         """Whether the hand's grip says so; None if the hand does not answer. A hand node that has just started counts
         as holding until a poll of the motors has shown it empty: that gets ``hand.settle_after_start``."""
-        end = self.ctx.clock.now() + float(self.ctx.config.get("hand.settle_after_start", 2.0))
+        end = self.ctx.clock.now() + self.ctx.config.number("hand.settle_after_start")
         while True:
             state = self.ctx.hand.state()
             if not state.connected:
@@ -229,7 +222,7 @@ class WhatIsHeld(CoglabState):
 def build_recovery(ctx: Context, operator: bool = False) -> CoglabMachine:
     """Outcomes: empty, holding (arm at home), stopped (STOP is latched, the arm is blocked, or a person may hold
     what is in the hand), fault (arm or controller does not obey). ``operator``: the recovery that a 'reset' begins."""
-    machine = CoglabMachine(ctx, "recover", ["empty", "holding", "stopped", "fault", "preempted"])
+    machine = CoglabMachine(ctx, "recover", ["empty", "holding", "stopped", "fault", "preempted"], io_keys=["grip"])
     failed = {"failed": "check_stop", "preempted": "preempted"}
     with machine:
         machine.add_state("end_motion", EndMotion(ctx), {"succeeded": "secure_hand", "stopped": "stopped", **failed})

@@ -12,6 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
+from coglab_contact.evidence import ContactEvent
+
 from coglab_smach.kinematics.motion_time import MotionLimits
 from coglab_smach.ports.pending import Pending
 
@@ -68,22 +70,6 @@ class Located:
     xyz: tuple[float, float, float]
     quaternion: tuple[float, float, float, float]
     age: float
-
-
-@dataclass(frozen=True)
-class ContactEvent:
-    """Contact found (contact=True) or load released (False), as coglab_msgs/Contact has it.
-
-    ``margin`` is the signal over its threshold, ``confidence`` the probability that the signal is over its threshold
-    given the noise of the sensor (0..1), ``code`` the ReasonCode of the message.
-    """
-
-    contact: bool
-    source: str
-    margin: float
-    message: str = ""
-    confidence: float = 1.0
-    code: int = 0
 
 
 @dataclass(frozen=True)

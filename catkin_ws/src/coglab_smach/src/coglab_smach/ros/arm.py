@@ -34,8 +34,7 @@ from coglab_py import parameters
 from geometry_msgs.msg import Point, Quaternion, Vector3
 from sensor_msgs.msg import JointState
 
-from coglab_smach.kinematics.manager_limits import read_limits
-from coglab_smach.kinematics.motion_time import MotionLimits
+from coglab_smach.kinematics.motion_time import MotionLimits, read_limits
 from coglab_smach.ports.interfaces import DmpProgress, DmpRequest, Verdict
 from coglab_smach.ports.pending import Pending, Permit, Polled, PortError, Threaded, ending_motion
 from coglab_smach.ros.calls import Newest, call, call_now, mapped

@@ -16,10 +16,8 @@ from coglab_py.steady import POLL, service_answers
 
 from coglab_smach.ports.pending import Pending, Permit, Polled, PortError, Threaded
 
-SERVICE_WAIT = 20.0
-"""s to wait for a service to appear: a node may still be starting."""
-PACE = Pace()
-"""By which ages pass; the node gives it the topic of the simulated cell."""
+SERVICE_WAIT = 20.0  # s to wait for a service to appear: a node may still be starting
+PACE = Pace()  # By which ages pass; the node gives it the topic of the simulated cell
 
 
 class Newest:

@@ -28,8 +28,7 @@ from coglab_smach.ports.interfaces import HandState
 from coglab_smach.ports.pending import Pending, Polled, PortError
 from coglab_smach.ros.calls import Newest
 
-SERVER_WAIT = 10.0
-"""s to wait for an action server to appear."""
+SERVER_WAIT = 10.0  # s to wait for an action server to appear
 
 
 class ActionCall(Pending):

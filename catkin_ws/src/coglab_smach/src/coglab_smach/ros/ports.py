@@ -21,10 +21,9 @@ from coglab_smach.ports.interfaces import OLDEST_BELIEF, OLDEST_RECOGNITION, Ahe
 from coglab_smach.ports.pending import Pending, Permit, PortError, Threaded
 from coglab_smach.ros.calls import SERVICE_WAIT, Newest, call, call_now, mapped
 
-OLDEST_SIGNAL, OLDEST_FORCE = 0.3, 0.1
-"""s"""
-DEFAULT_SHARE = 0.5
-"""of the load, where a request leaves it to the detector"""
+OLDEST_SIGNAL = 0.3  # s
+OLDEST_FORCE = 0.1  # s
+DEFAULT_SHARE = 0.5  # of the load, where a request leaves it to the detector
 
 
 class RosPerception:
@@ -111,8 +110,7 @@ class RosContact:
         self._service = service
         self._force = Newest(force, Vector3Stamped)
         self._signal = Newest(signal, ContactSignal)
-        self._needed: float | None = None
-        """share of the load that is armed for; None where another mode is"""
+        self._needed: float | None = None  # share of the load that is armed for; None where another mode is
         self._armed_at = 0.0
         self._event: ContactEvent | None = None
         self._wanted: bool | None = None

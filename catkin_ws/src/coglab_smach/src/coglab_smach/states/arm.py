@@ -7,20 +7,17 @@ from typing import Any
 
 from coglab_msgs.msg import ReasonCode
 
-from coglab_smach.context.awaited import ARM
 from coglab_smach.context.context import Context
+from coglab_smach.context.wait_reasons import ARM
 from coglab_smach.kinematics.motion_time import ptp_time
 from coglab_smach.ports.pending import Polled, PortError
 from coglab_smach.states.base import CoglabState, TimeLimit
-from coglab_smach.states.held import LOOK, HeldObject
-from coglab_smach.states.where import person_at, seen_at
+from coglab_smach.states.hand_tracking import person_at, seen_at
+from coglab_smach.states.held_object import LOOK, HeldObject
 
-RESUMES = 3
-"""times that a motion is begun again where the arm did not come to its target, as when a person still holds on"""
-RESUME_AFTER = 1.0
-"""s from such an end to the next try"""
-FELL = 0.5
-"""m below the person's hand in which an object is not in it any more"""
+RESUMES = 3  # times that a motion is begun again that did not reach its target, as when a person still holds on
+RESUME_AFTER = 1.0  # s from such an end to the next try
+FELL = 0.5  # m below the person's hand in which an object is not in it any more
 
 
 class LoadControllers(CoglabState):
@@ -43,7 +40,7 @@ class LoadDmps(CoglabState):
     default_time_limit = 15.0
 
     def run(self, ud: Any) -> str:
-        filename = str(self.ctx.config.get("dmp_library"))
+        filename = self.ctx.config.text("dmp_library")
         count = self.await_pending(self.ctx.arm.load_dmps(filename), f"loading primitives of {filename}")
         self.reason = f"{count} primitives loaded from {filename}"
         return "succeeded"
@@ -57,7 +54,7 @@ class ConfigureLwr(CoglabState):
     def run(self, ud: Any) -> str:
         while not self.ctx.arm.motion_allowed()[0]:
             try:
-                for command in list(self.ctx.config.get("lwr_commands", ["position", "start"])):
+                for command in list(self.ctx.config.get("lwr_commands")):
                     self.await_pending(self.ctx.arm.lwr_command(command), f"LWR command '{command}'")
                 break
             except TimeLimit:
@@ -107,7 +104,7 @@ class PtpMotion(CoglabState):
 
     def run(self, ud: Any) -> str:
         target = [float(v) for v in self.ctx.config.get(f"postures.{self.posture}")]
-        speed = [float(v) for v in self.ctx.config.get("ptp_velocity", [])]
+        speed = [float(v) for v in self.ctx.config.get("ptp_velocity")]
         arm = self.ctx.arm
         self.await_pending(arm.switch_controller("ptp"), "switching to controller 'ptp'", 5.0)
         look = self._look_after(ud)
@@ -127,10 +124,7 @@ class PtpMotion(CoglabState):
         arm = self.ctx.arm
         here = arm.joint_positions()
         if here is not None:
-            self.allow(
-                float(self.ctx.config.get("ptp_timeout", 5.0))
-                + 1.5 * ptp_time(arm.motion_limits(), here, target, speed)
-            )
+            self.allow(self.ctx.config.number("ptp_timeout") + 1.5 * ptp_time(arm.motion_limits(), here, target, speed))
         motion = arm.move_ptp(target, speed)
         self.await_pending(
             Polled(lambda: bool(look()) or motion.done(), motion.result, motion.cancel),
@@ -145,7 +139,7 @@ class PtpMotion(CoglabState):
 
     def _verify(self, target: list[float]) -> None:
         """The controller says it has arrived: the measured joints must agree (they are allowed 1 s to settle)."""
-        tolerance = float(self.ctx.config.get("ptp_tolerance", 0.03))
+        tolerance = self.ctx.config.number("ptp_tolerance")
 
         def arrived() -> bool:
             measured = self.ctx.arm.joint_positions()
@@ -166,6 +160,8 @@ class HomeRobot(PtpMotion):
         self._held: HeldObject
         if carries or gave:
             self.register_input_keys(["object_id"])
+        if carries:
+            self.register_io_keys(["grip"])
 
     def run(self, ud: Any) -> str:
         outcome = super().run(ud)
@@ -178,7 +174,7 @@ class HomeRobot(PtpMotion):
     def _look_after(self, ud: Any) -> Callable[[], object]:
         if not self.carries:
             return super()._look_after(ud)
-        self._held = HeldObject(self.ctx, ud.object_id)
+        self._held = HeldObject(self.ctx, ud.object_id, ud.grip)
         return self._held.check
 
     def _see_held(self) -> None:

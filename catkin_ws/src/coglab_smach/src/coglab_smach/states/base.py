@@ -10,19 +10,18 @@ from typing import Any
 import smach
 from coglab_msgs.msg import ReasonCode
 
-from coglab_smach.context import awaited
+from coglab_smach.context import wait_reasons
 from coglab_smach.context.config import ConfigError
 from coglab_smach.context.context import Context
+from coglab_smach.context.grip import Grip
 from coglab_smach.context.journal import Failure, Wait
 from coglab_smach.context.requests import command
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.motion import end_motion
 
-POLL_PERIOD = 0.01
-"""s between two looks at a condition: well below the 60 ms in which a contact has to be found."""
+POLL_PERIOD = 0.01  # s between two looks at a condition: well below the 60 ms in which a contact has to be found
 
-RETOLD = 0.2
-"""s by which the end of a wait that is put off moves until it is told again"""
+RETOLD = 0.2  # s by which the end of a wait that is put off moves until it is told again
 
 
 class Interrupted(Exception):
@@ -78,8 +77,7 @@ class CoglabState(smach.State):
         self.targets: Mapping[str, str] = {}
         self.reason = ""
         self._deadline = 0.0
-        self._waits = False
-        """a wait is under way"""
+        self._waits = False  # a wait is under way
 
     def run(self, ud: Any) -> str:
         """Do the work; returns an outcome. ``self.reason`` may hold a sentence for it."""
@@ -149,7 +147,7 @@ class CoglabState(smach.State):
             self._deadline = self.ctx.clock.now() + duration
 
     def _configured_limits(self) -> dict[str, Any]:
-        return dict(self.ctx.config.get("time_limits", {}))
+        return dict(self.ctx.config.get("time_limits"))
 
     def left(self) -> float:
         """Time left before the limit, s."""
@@ -179,10 +177,10 @@ class CoglabState(smach.State):
         what: str,
         limit: float | None = None,
         pace: Callable[[], float] | None = None,
-        code: int = awaited.ANSWER,
+        code: int = wait_reasons.ANSWER,
     ) -> None:
         """Wait until ``condition()``; TimeLimit naming ``what`` after ``limit`` s or at the end of the
-        state's own limit. ``code`` of ``awaited`` tells programs what it is.
+        state's own limit. ``code`` of ``wait_reasons`` tells programs what it is.
 
         With ``pace`` (0..1, such as the speed scale) the limit counts in the time of a motion: it is used up so much
         slower, down to a tenth, and the state's own limit is put off likewise.
@@ -219,7 +217,7 @@ class CoglabState(smach.State):
         what: str,
         limit: float | None = None,
         pace: Callable[[], float] | None = None,
-        code: int = awaited.ANSWER,
+        code: int = wait_reasons.ANSWER,
     ) -> Any:
         """The pending call's value; cancelled if the wait ends otherwise."""
         try:
@@ -248,11 +246,13 @@ class _Placed:
     container: Any | None
     targets: Mapping[str, str]
     is_action: bool
+    userdata: Any
 
     def place(self, ctx: Context, label: str) -> None:
         """Set the name until the container is added to another one."""
         self.ctx, self.label, self.container, self.targets = ctx, label, None, {}
         self.is_action = False
+        self.userdata.grip = Grip()  # that of the container around it, where it has the key
 
     def begin(self, parent_ud: Any) -> Any:
         """Start of a run: an action opens its record in the journal. Returns user data, empty where none is given."""
@@ -307,9 +307,10 @@ class CoglabMachine(_Placed, smach.StateMachine):
         outcomes: Sequence[str],
         input_keys: Sequence[str] = (),
         output_keys: Sequence[str] = (),
+        io_keys: Sequence[str] = (),
     ) -> None:
         smach.StateMachine.__init__(
-            self, outcomes=list(outcomes), input_keys=list(input_keys), output_keys=list(output_keys)
+            self, outcomes=list(outcomes), input_keys=[*input_keys, *io_keys], output_keys=[*output_keys, *io_keys]
         )
         self.place(ctx, label)
 
@@ -341,13 +342,14 @@ class CoglabConcurrence(_Placed, smach.Concurrence):
         conclude: Callable[[Mapping[str, str]], str],
         input_keys: Sequence[str] = (),
         output_keys: Sequence[str] = (),
+        io_keys: Sequence[str] = (),
     ) -> None:
         smach.Concurrence.__init__(
             self,
             outcomes=list(outcomes),
             default_outcome=default_outcome,
-            input_keys=list(input_keys),
-            output_keys=list(output_keys),
+            input_keys=[*input_keys, *io_keys],
+            output_keys=[*output_keys, *io_keys],
             outcome_cb=conclude,
             child_termination_cb=decide,
         )

@@ -8,73 +8,67 @@ from typing import Any
 from coglab_msgs.msg import ReasonCode, Say
 from ih2_hand.grasps import CLOSING_MOTORS, LEVELS, levels_of
 
-from coglab_smach.context.awaited import ARM, HAND
 from coglab_smach.context.context import Context
-from coglab_smach.context.hand_track import HandTrack
+from coglab_smach.context.wait_reasons import ARM, HAND
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
+from coglab_smach.states.hand_tracking import AT_HAND, AWAY, HandLook, HandTrack, from_palm, hand_from_palm, palm_axis
 from coglab_smach.states.motion import shift, shift_time
-from coglab_smach.states.where import AT_HAND, AWAY, HandLook, from_palm, hand_from_palm, palm_axis
-from coglab_smach.states.yielding import GivesWay
+from coglab_smach.states.yield_to_pull import YieldToPull
 
-LOOSE = 40
-"""counts of 254 that the fingers have opened when the palm begins to draw back"""
-AT_END = 250
-"""counts of 254 from which a finger has closed past the object"""
-FREE, FREE_FOR, GOES = 0.10, 0.2, 1.0
-"""m that the person's hand is farther than it was, and s for which it is, when none of its fingers is at the object; s
-in which it has to go so far"""
-DRAWING_BACK = 2.0
-"""s that drawing back may take beyond what limits and speed scale ask for"""
+LOOSE = 40  # counts of 254 that the fingers have opened when the palm begins to draw back
+AT_END = 250  # counts of 254 from which a finger has closed past the object
+FREE = 0.10  # m that the person's hand is farther away than it was when none of its fingers is at the object
+FREE_FOR = 0.2  # s for which it has to be
+GOES = 1.0  # s in which it has to go so far
+DRAWING_BACK = 2.0  # s that drawing back may take beyond what limits and speed scale ask for
 
 
 def gentle(grasp: Mapping[str, Any]) -> dict[str, Any]:
-    """The hand of a grasp as it closes beside a person, whose fingers may be between its own: with the lowest force
-    level that every dialect has for its mode."""
+    """The hand of a grasp with the lowest force level that every dialect has for its mode: a person's fingers may be
+    between the robot's."""
     return {**grasp["hand"], "level": levels_of(grasp["hand"]["mode"], "legacy")[0]}
 
 
 def closes_gently(grasp: Mapping[str, Any]) -> bool:
-    """Whether every hand can close by this grasp with the lowest force level that there is: not in a mode that older
-    hands know firm alone."""
+    """Whether every hand can close by this grasp with the lowest force level: older hands have some modes only firm."""
     return bool(gentle(grasp)["level"] == LEVELS[0])
 
 
 def firm_speed(ctx: Context, entry: Mapping[str, Any], grasp_name: str) -> int:
-    """Wire speed, and with it the force, of closing as firmly as the object's entry says; 0 where that is the level of
-    gentle(), too."""
+    """Wire speed, and with it the force, of closing as firmly as the object's entry asks for; 0 if gentle() does."""
     own = entry["grasps"][grasp_name]
     level = own["hand"]["level"]
-    return 0 if level == gentle(own)["level"] else int(ctx.config.get(f"hand.tighten.{level}", 200))
+    return 0 if level == gentle(own)["level"] else int(ctx.config.get(f"hand.tighten.{level}"))
 
 
 def stopped_by_object(mode: str, positions: Sequence[int]) -> bool:
-    """Whether the closed fingers of a grasp stand around something: the thumb (motor 1), and one finger that opposes it
-    where the mode closes some, have not come to their closed ends. Fingers that alone stand on it hold it by an edge,
-    against the palm, and it falls. Nothing is said of a hand that does not tell ``positions`` (counts of 254)."""
+    """Whether the closed fingers stand around something: the thumb (motor 1), and one finger that opposes it if the
+    mode closes any, have stopped before their closed ends. Otherwise they hold the object by an edge, and it falls.
+    True for a hand that does not report ``positions`` (counts of 254)."""
     standing = [motor for motor in CLOSING_MOTORS[mode] if len(positions) <= motor or positions[motor] < AT_END]
     return 1 in standing and len(standing) >= min(2, len(CLOSING_MOTORS[mode]))
 
 
 class CalibrateHand(CoglabState):
-    """Calibration order to the hand; skipped, with a sentence, if it is calibrated and the configuration
-    does not insist, and always if the hand holds something: calibrating opens the fingers."""
+    """Calibrate the hand. Skipped if it is calibrated already (but see ``hand.calibrate_always``), and always if it
+    holds something: calibrating opens the fingers."""
 
     default_time_limit = 30.0
 
     def run(self, ud: Any) -> str:
         state = self.ctx.hand.state()
-        end = self.ctx.clock.now() + float(self.ctx.config.get("hand.settle_after_start", 2.0))
+        end = self.ctx.clock.now() + self.ctx.config.number("hand.settle_after_start")
         while state.connected and state.holding and self.ctx.clock.now() < end:
             self.pause(0.1)
             state = self.ctx.hand.state()
         if state.connected and state.holding:
             self.reason = "the hand holds an object: not calibrated, because that would open it"
             return "succeeded"
-        if state.calibrated and not bool(self.ctx.config.get("hand.calibrate_always", False)):
+        if state.calibrated and not self.ctx.config.get("hand.calibrate_always"):
             self.reason = "the hand is calibrated already"
             return "succeeded"
-        mode = str(self.ctx.config.get("hand.calibration", "fast"))
+        mode = self.ctx.config.text("hand.calibration")
         self.await_pending(self.ctx.hand.calibrate(mode), f"hand calibration '{mode}'", code=HAND)
         return "succeeded"
 
@@ -85,12 +79,12 @@ class HandPreshape(CoglabState):
     default_time_limit = 6.0
 
     def __init__(self, ctx: Context) -> None:
-        super().__init__(ctx, input_keys=["grasp"])
+        super().__init__(ctx, input_keys=["grasp"], io_keys=["grip"])
 
     def run(self, ud: Any) -> str:
-        hand, self.ctx.preshaped = ud.grasp["hand"], False
+        hand, ud.grip.preshaped = ud.grasp["hand"], False
         self.await_pending(self.ctx.hand.preshape(hand["mode"], hand["level"]), f"preshape '{hand['mode']}'", code=HAND)
-        self.ctx.preshaped = True
+        ud.grip.preshaped = True
         self.ctx.journal.mark("preshaped")
         return "succeeded"
 
@@ -98,9 +92,9 @@ class HandPreshape(CoglabState):
 class HandClose(CoglabState):
     """Close the preshaped hand on the object and make sure that something is in it.
 
-    Outcomes missed and edge, with ``from_person``: the fingers have closed on nothing, or do not stand around it
-    (stopped_by_object), for the first time in this action; a person who offers waits, so the arm may try once more.
-    Meanwhile the palm goes along with who pulls (GivesWay).
+    With ``from_person`` the palm yields to a pull meanwhile. Outcomes missed and edge: the fingers have closed on
+    nothing, or do not stand around it (stopped_by_object), for the first time in this action. The person still waits,
+    so the arm may try once more.
     """
 
     default_time_limit = 12.0
@@ -112,6 +106,7 @@ class HandClose(CoglabState):
             outcomes=["succeeded", "missed", "edge"] if from_person else ["succeeded"],
             input_keys=["object_id", "grasp"] if from_person else ["object_id"],
             output_keys=["hand_distance"] if from_person else [],
+            io_keys=["grip"],
         )
         self.from_person = from_person
         self._before: float | None = None
@@ -120,30 +115,31 @@ class HandClose(CoglabState):
     def run(self, ud: Any) -> str:
         self.ctx.journal.mark("closing")
         # From here on the hand may hold: a failure in the middle must not make the recovery drop the object.
-        self.ctx.holding, self.ctx.shared = ud.object_id, self.from_person
-        self.ctx.firm = int(ud.grasp["hand"].get("firm", 0)) if self.from_person else 0
-        closing, self.ctx.closing = self.ctx.closing or self.ctx.hand.close_on_object(), None
+        grip, self.ctx.holding = ud.grip, ud.object_id
+        closing = (grip.take_closing() if self.from_person else None) or self.ctx.hand.close_on_object()
+        grip.shared = self.from_person
+        grip.firm = int(ud.grasp["hand"].get("firm", 0)) if self.from_person else 0
         if self.from_person:
-            track = self.ctx.hand_track = self.ctx.hand_track or HandTrack()
             try:
-                ud.hand_distance = self._before = from_palm(self, track)
-                self._give_way(closing, HandLook(self.ctx, track))
+                ud.hand_distance = self._before = from_palm(self, grip.hand)
+                self._give_way(closing, HandLook(self.ctx, grip.hand))
             except (Interrupted, TimeLimit):
                 closing.cancel()
                 raise
         self.await_pending(closing, "closing of the hand", code=HAND)
         self.ctx.journal.mark("closed")
-        end = self.ctx.clock.now() + float(self.ctx.config.get("hand.settle_after_close", 0.3))
+        end = self.ctx.clock.now() + self.ctx.config.number("hand.settle_after_close")
         while not self.ctx.hand.state().holding and self.ctx.clock.now() < end:
             self.pause(0.02)
         state = self.ctx.hand.state()
-        around = not self.from_person or self._around(ud.grasp["hand"]["mode"], state.positions)
+        around = not self.from_person or self._around(ud.grasp["hand"]["mode"], state.positions, grip.hand)
         if state.connected and not (state.holding and around):
-            self.ctx.holding, self.ctx.shared = "", False
+            self.ctx.holding = ""
+            grip.release()
             missed = "the hand holds it by an edge" if state.holding else "the hand closed on nothing"
             if self.from_person and not self.ctx.journal.marked("missed"):
                 self.ctx.journal.mark("missed")
-                self.ctx.preshaped = False
+                grip.preshaped = False
                 self.reason = f"{missed}: once more"
                 return "edge" if state.holding else "missed"
             raise PortError(
@@ -153,19 +149,19 @@ class HandClose(CoglabState):
             )
         return "succeeded"
 
-    def _around(self, mode: str, positions: Sequence[int]) -> bool:
+    def _around(self, mode: str, positions: Sequence[int], hand: HandTrack) -> bool:
         """Whether the fingers stand around the object; or the person has gone, so that opening would let it fall."""
         if stopped_by_object(mode, positions):
             return True
-        let_go = float(self.ctx.config.get("hand.let_go", 0.04))
+        let_go = self.ctx.config.number("hand.let_go")
         gone = AT_HAND if self._before is None else min(AT_HAND, self._before + let_go)
-        away = from_palm(self, self.ctx.hand_track or HandTrack(), 0.3)
+        away = from_palm(self, hand, 0.3)
         # A hand that nobody sees may have gone, too, and so may one for which another one is seen.
         return away is None or away > gone
 
     def _give_way(self, closing: Pending, hand: HandLook) -> None:
         """Until the fingers have closed."""
-        way = GivesWay(self.ctx)
+        way = YieldToPull(self.ctx)
 
         def closed() -> bool:
             way.follow()
@@ -179,22 +175,22 @@ class HandClose(CoglabState):
 
 
 class HandTighten(CoglabState):
-    """Hold what the person has let go of as firmly as the object's entry says: the fingers close from where they are,
-    at the wire speed, and with it the force, of ``hand.tighten`` for the grasp's level (Context.firm).
+    """Hold what the person has let go of as firmly as the object's entry asks for: the fingers close from where they
+    are, at the wire speed Grip.firm. The arm does not wait until they stand: they press within
+    ``hand.settle_after_close`` s.
 
-    The arm need not wait until the hand is sure that they stand: they press within ``hand.settle_after_close`` s.
-    Nobody's fingers may be there: the person's hand has to be seen all the way until it is FREE m farther than it was,
-    and so for FREE_FOR s, which no hand that was taken for another is. Where it was not seen to go it is held firmly
-    ``at_home``, if no hand is seen near the palm there."""
+    No person's fingers may be between: the person's hand has to be seen all the way until it is FREE farther away than
+    it was, for FREE_FOR. If it was not seen to go, the object is held firmly ``at_home``, if no hand is seen near the
+    palm there."""
 
     default_time_limit = 5.0
 
     def __init__(self, ctx: Context, at_home: bool = False) -> None:
-        super().__init__(ctx, input_keys=[] if at_home else ["hand_distance", "hand_seen_away"])
+        super().__init__(ctx, input_keys=[] if at_home else ["hand_distance", "hand_seen_away"], io_keys=["grip"])
         self.at_home = at_home
 
     def run(self, ud: Any) -> str:
-        speed = self.ctx.firm if self.ctx.holding else 0
+        speed = ud.grip.firm if self.ctx.holding else 0
         if speed == 0:
             self.reason = "nothing is held more gently than its grasp asks for"
             return "succeeded"
@@ -203,26 +199,26 @@ class HandTighten(CoglabState):
             if away is not None and away < AT_HAND:
                 self.reason = f"it stays held gently: the person's hand is {away:.2f} m from the palm"
                 return "succeeded"
-        elif not (ud.hand_seen_away and self._is_free(ud.hand_distance)):
+        elif not (ud.hand_seen_away and self._is_free(ud.hand_distance, ud.grip.hand)):
             self.reason = "the person's hand was not seen to go: at home"
             return "succeeded"
-        closing, end = self.ctx.hand.close(speed), float(self.ctx.config.get("hand.settle_after_close", 0.3))
+        closing, end = self.ctx.hand.close(speed), self.ctx.config.number("hand.settle_after_close")
         # It goes on while the arm does: a STOP ends it then as well (EndMotion).
-        self.ctx.tightening = closing
+        ud.grip.tightening = closing
         end += self.ctx.clock.now()
         while not closing.done() and self.ctx.clock.now() < end:
             self.pause(0.02)
         if closing.done():
             closing.result()
-        self.ctx.firm = 0
+        ud.grip.firm = 0
         self.reason = f"the fingers close to the force of wire speed {speed}"
         self.ctx.journal.mark("tightened")
         return "succeeded"
 
-    def _is_free(self, before: float | None) -> bool:
+    def _is_free(self, before: float | None, hand: HandTrack) -> bool:
         """Whether the person's hand, which was ``before`` m from the palm, is seen away from the object."""
         free, since = AWAY if before is None else before + FREE, None
-        end, hand = self.ctx.clock.now() + GOES, self.ctx.hand_track or HandTrack()
+        end = self.ctx.clock.now() + GOES
         while self.ctx.clock.now() < end:
             if (from_palm(self, hand) or 0.0) <= free or not hand.is_sure:
                 since = None
@@ -239,27 +235,29 @@ class HandOpen(CoglabState):
 
     default_time_limit = 8.0
 
+    def __init__(self, ctx: Context) -> None:
+        super().__init__(ctx, io_keys=["grip"])
+
     def run(self, ud: Any) -> str:
         self.ctx.journal.mark("opening")
-        self.await_pending(
-            self.ctx.hand.open(int(self.ctx.config.get("hand.open_speed", 400))), "opening of the hand", code=HAND
-        )
-        self.ctx.holding, self.ctx.shared = "", False
+        self.await_pending(self.ctx.hand.open(self.ctx.config.get("hand.open_speed")), "opening of the hand", code=HAND)
+        self.ctx.holding = ""
+        ud.grip.release()
         return "succeeded"
 
 
 class LetGo(CoglabState):
     """Open the hand for the person who has taken the object, and tell them.
 
-    It opens as far as its preshape, in which the object came in, and meanwhile the palm draws back from the object,
-    outward by ``give.draw_back`` m: who has an object goes with it at once, and fingers beside it would tear it away.
+    It opens as far as its preshape, in which the object came in. Meanwhile the palm draws back from the object by
+    ``give.draw_back`` m: a person who has an object goes at once, and fingers beside it would tear it away.
     """
 
     default_time_limit = 8.0
     owns_motion = True
 
     def __init__(self, ctx: Context) -> None:
-        super().__init__(ctx, input_keys=["grasp"])
+        super().__init__(ctx, input_keys=["grasp"], io_keys=["grip"])
 
     def run(self, ud: Any) -> str:
         self.ctx.journal.mark("opening")
@@ -273,13 +271,14 @@ class LetGo(CoglabState):
             raise
         if opening.done():
             opening.result()  # fingers that are stuck would drag what the person holds
-        axis, way, limit = palm_axis(self.ctx), float(self.ctx.config.get("give.draw_back", 0.06)), DRAWING_BACK
+        axis, way, limit = palm_axis(self.ctx), self.ctx.config.number("give.draw_back"), DRAWING_BACK
         if axis is not None and way > 0.0:
-            speed = float(self.ctx.config.get("give.draw_back_speed", 0.25))
+            speed = self.ctx.config.number("give.draw_back_speed")
             limit += shift_time(self.ctx, -way * axis, speed)
             back = shift(self.ctx, -way * axis, speed)
         self.await_pending(opening, "opening of the hand", code=HAND)
-        self.ctx.holding, self.ctx.shared = "", False
+        self.ctx.holding = ""
+        ud.grip.release()
         # Not earlier: who is told so goes, and fingers that are half open would keep the object.
         self.ctx.say(Say.YOU_HAVE_IT, "You have it.")
         if back is not None:

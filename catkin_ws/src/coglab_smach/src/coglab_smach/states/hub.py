@@ -8,10 +8,10 @@ from typing import Any
 
 from coglab_msgs.msg import ReasonCode
 
-from coglab_smach.context.awaited import ARM, OPERATOR
 from coglab_smach.context.context import Context
 from coglab_smach.context.holding import UNKNOWN
 from coglab_smach.context.requests import Request, command
+from coglab_smach.context.wait_reasons import ARM, OPERATOR
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState, Interrupted
 
@@ -25,10 +25,10 @@ class WaitForTrigger(CoglabState):
         self.action = action
 
     def time_limit(self) -> float:
-        return float(self.ctx.config.get("trigger_timeout", 3600.0))
+        return self.ctx.config.number("trigger_timeout")
 
     def run(self, ud: Any) -> str:
-        if bool(self.ctx.config.get("auto_trigger", False)):
+        if self.ctx.config.get("auto_trigger"):
             self.reason = "auto_trigger is set"
             return "succeeded"
         self.ctx.requests.open(self.label, [self.action])
@@ -83,7 +83,7 @@ class Hub(CoglabState):
                 self.ctx.journal.failure(self.reason, (), self._code)
                 return "stopped"
             if not self.with_object:
-                ud.object_id = request.object_id or str(self.ctx.config.get("default_object", "mug"))
+                ud.object_id = request.object_id or self.ctx.config.text("default_object")
                 break
             refusal = self._learn_what_is_held(ud, request)
             if not refusal:
@@ -96,7 +96,7 @@ class Hub(CoglabState):
 
     def _open(self, ud: Any) -> None:
         unknown = self.with_object and ud.object_id == UNKNOWN
-        default = "" if self.with_object else str(self.ctx.config.get("default_object", "mug"))
+        default = "" if self.with_object else self.ctx.config.text("default_object")
         self.ctx.requests.open(self.label, self.actions, unknown, default)
 
     def _await_request(self) -> Request | None:
@@ -128,9 +128,9 @@ class Hub(CoglabState):
             self._blocked_since = now
         waited = now - self._blocked_since
         silent = self.ctx.arm.joint_positions() is None
-        if waited > float(self.ctx.config.get("hub.silent_time", 2.0)) and silent:
+        if waited > self.ctx.config.number("hub.silent_time") and silent:
             raise PortError("the robot is silent", (allowed.why,), ReasonCode.NODE_SILENT)
-        if waited <= float(self.ctx.config.get("hub.blocked_time", 0.5)) or silent:
+        if waited <= self.ctx.config.number("hub.blocked_time") or silent:
             return False
         self._code = allowed.code
         self.reason = f"the arm is blocked: {allowed.why}; when its cause is away, {command('reset')}"
@@ -159,14 +159,14 @@ class Hub(CoglabState):
         """An offer or a request that is believed in is a trigger like the operator's, if this hub has the action for
         it: the same belief with which a reach begins. Only one that began in this hub counts."""
         config = self.ctx.config
-        if not bool(config.get("recognition_trigger.enabled", False)):
+        if not config.get("recognition_trigger.enabled"):
             return
         ahead = self.ctx.perception.ahead()
         name, probability = max(("offer", ahead.offer), ("request", ahead.request), key=lambda each: each[1])
-        if probability < float(config.get("recognition_trigger.belief", 0.9)):
-            self._saw_rest = self._saw_rest or probability < float(config.get("handover.doubt", 0.1))
+        if probability < config.number("recognition_trigger.belief"):
+            self._saw_rest = self._saw_rest or probability < config.number("handover.doubt")
             return
-        action = str(dict(config.get("recognition_trigger.actions", {})).get(name, ""))
+        action = str(config.get("recognition_trigger.actions").get(name, ""))
         if self._saw_rest and action in self.actions:
             what = f" of '{ahead.object_id}'" if ahead.object_id else ""
             self.ctx.requests.submit(action, ahead.object_id, f"belief in an {name}{what} ({probability:.2f})")

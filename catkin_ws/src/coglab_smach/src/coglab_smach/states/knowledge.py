@@ -10,16 +10,22 @@ import numpy as np
 from coglab_msgs.msg import ReasonCode, Say
 from coglab_py.pose import Pose, mean_pose
 
-from coglab_smach.context.awaited import PERSON, SIGHT
 from coglab_smach.context.context import Context
+from coglab_smach.context.grip import Grip
 from coglab_smach.context.journal import Wait
-from coglab_smach.kinematics.goals import approach_of, delivery_goal, grasp_goal, palm_at_grasp, place_goal
-from coglab_smach.kinematics.grasp_choice import ranked
+from coglab_smach.context.wait_reasons import PERSON, SIGHT
+from coglab_smach.kinematics.goals import approach_of, delivery_goal, grasp_goal, palm_at_grasp, place_goal, ranked
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState
 from coglab_smach.states.hand import closes_gently, firm_speed, gentle
-from coglab_smach.states.region import HandoverRegion, ends_outside, unless_withdrawn
-from coglab_smach.states.where import hand_name, palm_at, person_at
+from coglab_smach.states.hand_tracking import (
+    HandoverRegion,
+    ends_outside,
+    hand_name,
+    palm_at,
+    person_at,
+    unless_withdrawn,
+)
 
 Goals = Callable[[Mapping[str, Any]], list[dict[str, Any]]]
 """goals for what was seen, best first"""
@@ -56,12 +62,10 @@ class QueryDatabase(CoglabState):
 
 
 class LocateOnBoard(CoglabState):
-    """Where the object lies on the board, averaged over several sights; the pose in the board frame goes
-    into user data.
+    """Where the object lies on the board, averaged over several sights; user data gets its pose in the board frame.
 
-    The board stands still and so does the object, so the goal of the precise motion must not follow single
-    noisy sights,
-    nor an object that the hand pushes.
+    Board and object stand still, so the goal of the precise motion follows neither single noisy sights nor an object
+    that the hand pushes.
     """
 
     default_time_limit = 12.0
@@ -70,8 +74,8 @@ class LocateOnBoard(CoglabState):
         super().__init__(ctx, input_keys=["object_id"], output_keys=["located"])
 
     def run(self, ud: Any) -> str:
-        board = locate(self, str(self.ctx.config.get("perception.board", "board")))
-        count = int(self.ctx.config.get("take.sights", 10))
+        board = locate(self, self.ctx.config.text("perception.board"))
+        count = self.ctx.config.get("take.sights")
         sights = []
         for i in range(max(1, count)):
             if i:
@@ -94,12 +98,12 @@ def refused_as(code: int) -> Iterator[None]:
 
 def locate(state: CoglabState, target: str) -> dict[str, Any]:
     """Wait for perception to see ``target`` (object id or 'human_hand'); plain dict for user data."""
-    limit = float(state.ctx.config.get("perception.locate_timeout", 5.0))
+    limit = state.ctx.config.number("perception.locate_timeout")
     with refused_as(ReasonCode.OBJECT_NOT_SEEN):
         found = state.await_pending(
             state.ctx.perception.locate_object(target, limit), f"sight of '{target}'", limit + 1.0, code=SIGHT
         )
-    oldest = float(state.ctx.config.get("perception.max_age", 0.5))
+    oldest = state.ctx.config.number("perception.max_age")
     if found.age > oldest:
         raise PortError(
             f"'{target}' was last seen {found.age:.2f} s ago, expected at most {oldest} s",
@@ -125,7 +129,7 @@ def await_offer(state: CoglabState, target: str, goals: Goals, margin: float = 0
     """
     config = state.ctx.config
     region = HandoverRegion(state.ctx, margin)
-    limit = float(config.get("handover.offer_timeout", 8.0))
+    limit = config.number("handover.offer_timeout")
     end = state.ctx.clock.now() + limit
     since: float | None = None
     person = target == hand_name(state.ctx)
@@ -144,7 +148,7 @@ def await_offer(state: CoglabState, target: str, goals: Goals, margin: float = 0
             since = None if goal is None else now if since is None else since
             if goal is not None and since is not None:
                 state.ctx.journal.mark("offered")
-                if now - since >= float(config.get("handover.start_after", 0.0)):
+                if now - since >= config.number("handover.start_after"):
                     return goal
             if now > end and offered and goal is None:
                 raise PortError(*out_of_reach(target, located, candidates[0]), ReasonCode.GOAL_UNREACHABLE)
@@ -164,10 +168,11 @@ def believed(
 ) -> dict[str, Any] | None:
     """Where ``target`` will be at a handover that is believed to have begun: its frame ahead, turned as it is seen now;
     None where nothing is believed yet, or something outside the handover region."""
-    level = float(ctx.config.get("handover.belief", 0.85))
+    level = ctx.config.number("handover.belief")
     if person:
         # A hand that asks carries nothing: its motion alone has to tell it from one that points.
-        level = float(ctx.config.get("handover.belief_request", level))
+        request = ctx.config.get("handover.belief_request")
+        level = level if request is None else float(request)
     ahead = ctx.perception.ahead()
     mine = (ahead.request if person else ahead.offer) >= level and (person or ahead.object_id == target)
     if level <= 0.0 or not (mine and ahead.frame and region.holds(ahead.place)):
@@ -183,7 +188,7 @@ def palm_of(seen: Mapping[str, Any], goal: Mapping[str, Any]) -> Pose:
 def first_reachable(ctx: Context, seen: Mapping[str, Any], goals: list[dict[str, Any]]) -> dict[str, Any] | None:
     """The first of the goals for which the arm has a posture, relative to what was seen; with ``handover.check_reach``
     false the first one."""
-    unchecked = not bool(ctx.config.get("handover.check_reach", True))
+    unchecked = not ctx.config.get("handover.check_reach")
     for goal in goals:
         if unchecked or ctx.reachable(palm_of(seen, goal)):
             return {**goal, "frame": seen["frame"], "place": list(seen["xyz"])}
@@ -202,8 +207,8 @@ def out_of_reach(target: str, seen: Mapping[str, Any], goal: Mapping[str, Any]) 
 def paced(ctx: Context, goal: dict[str, Any]) -> dict[str, Any]:
     """The goal at the pace of a person: ``handover.reach_ratio`` times the object's own dmp_ratio, and slow at last, so
     that a touch is light."""
-    ratio = goal["dmp_ratio"] * float(ctx.config.get("handover.reach_ratio", 1.0))
-    return {**goal, "dmp_ratio": ratio, "arrival_speed": float(ctx.config.get("handover.arrival_speed", 0.0))}
+    ratio = goal["dmp_ratio"] * ctx.config.number("handover.reach_ratio")
+    return {**goal, "dmp_ratio": ratio, "arrival_speed": ctx.config.number("handover.arrival_speed")}
 
 
 class SetGraspGoal(CoglabState):
@@ -217,13 +222,18 @@ class SetGraspGoal(CoglabState):
     default_time_limit = 20.0
 
     def __init__(self, ctx: Context) -> None:
-        super().__init__(ctx, input_keys=["object_id", "object_entry"], output_keys=["goal", "grasp", "grasp_name"])
+        super().__init__(
+            ctx,
+            input_keys=["object_id", "object_entry"],
+            output_keys=["goal", "grasp", "grasp_name"],
+            io_keys=["grip"],
+        )
         self._grasp_name = ""
 
     def run(self, ud: Any) -> str:
         self.ctx.say(Say.READY_TO_RECEIVE, f"Please hand me the object '{ud.object_id}'.")
         entry, self._grasp_name = ud.object_entry, ""
-        goal = await_offer(self, ud.object_id, lambda seen: self._goals(entry, seen))
+        goal = await_offer(self, ud.object_id, lambda seen: self._goals(entry, seen, ud.grip))
         name = goal.pop("grasp_name")
         grasp = entry["grasps"][name]
         hand = {**gentle(grasp), "firm": firm_speed(self.ctx, entry, name)}
@@ -234,7 +244,7 @@ class SetGraspGoal(CoglabState):
         ud.goal = unless_withdrawn(self.ctx, {**goal, "object": grasped})
         return "succeeded"
 
-    def _goals(self, entry: Mapping[str, Any], seen: Mapping[str, Any]) -> list[dict[str, Any]]:
+    def _goals(self, entry: Mapping[str, Any], seen: Mapping[str, Any], grip: Grip) -> list[dict[str, Any]]:
         """One for each grasp, best first, of the object where it was seen."""
         config = self.ctx.config
         names = ranked(entry, Pose.from_dict(seen), person_at(self), palm_at(self.ctx), self._grasp_name)
@@ -242,14 +252,14 @@ class SetGraspGoal(CoglabState):
         names = [name for name in names if closes_gently(entry["grasps"][name])] or names
         if names[0] != self._grasp_name:
             self._grasp_name, hand = names[0], gentle(entry["grasps"][names[0]])
-            self.ctx.preshaped = False
+            grip.preshaped = False
             self.ctx.hand.preshape(hand["mode"], hand["level"])  # awaited in the approach
         goals = []
         for name in names:
             grasp = entry["grasps"][name]
-            standoff = float(config.get("handover.standoff", 0.0))
+            standoff = config.number("handover.standoff")
             goal = paced(self.ctx, grasp_goal(entry, grasp, "", "receive", standoff))
-            approach = approach_of(grasp, float(config.get("handover.approach", 0.08)))
+            approach = approach_of(grasp, config.number("handover.approach"))
             goals.append({**goal, "approach": approach, "grasp_name": name})
         return goals
 
@@ -258,8 +268,8 @@ def off_the_board(state: CoglabState, goal: dict[str, Any]) -> dict[str, Any]:
     """The goal in the board frame, raised so far that hand and forearm stay ``board.room`` m above the board: an object
     that is seen a little tilted or low would lead them into it. PortError where that is more than ``board.lift`` m."""
     config = state.ctx.config
-    board = Pose.from_dict(locate(state, str(config.get("perception.board", "board"))))
-    room, most = float(config.get("board.room", 0.01)), float(config.get("board.lift", 0.03))
+    board = Pose.from_dict(locate(state, config.text("perception.board")))
+    room, most = config.number("board.room"), config.number("board.lift")
     offset = Pose.from_dict({"xyz": goal["offset"], "quaternion": goal["orientation"]})
     lift, palm = state.ctx.raised(board, board * offset, room, most)
     if palm is None:
@@ -285,10 +295,10 @@ class SetTakeGoal(CoglabState):
         super().__init__(ctx, input_keys=["object_entry", "grasp", "located"], output_keys=["goal"])
 
     def run(self, ud: Any) -> str:
-        clearance = float(self.ctx.config.get("take.clearance", 0.012))
+        clearance = self.ctx.config.number("take.clearance")
         goal = off_the_board(self, place_goal(ud.object_entry, ud.grasp, ud.located, "take", clearance))
         # From above, fingers would come down on what is wider than the hand is open there.
-        way = approach_of(ud.grasp, float(self.ctx.config.get("take.approach", 0.05)))
+        way = approach_of(ud.grasp, self.ctx.config.number("take.approach"))
         ud.goal = {**goal, "approach": Pose.from_dict(ud.located).rotation.apply(way).tolist()}
         return "succeeded"
 
@@ -316,7 +326,7 @@ class SetDeliveryGoal(CoglabState):
         ud.delivery_name = name
         ud.delivery = delivery
         goal = paced(self.ctx, delivery_goal(entry, ud.grasp, delivery, ""))
-        margin = float(self.ctx.config.get("handover.hand_margin", 0.10))
+        margin = self.ctx.config.number("handover.hand_margin")
         hand = hand_name(self.ctx)
         # A hand does not fall: one that sinks has come lower, and is followed or has gone back.
         asked = await_offer(self, hand, lambda seen: [goal], margin)
@@ -335,7 +345,7 @@ class FindPlace(CoglabState):
         super().__init__(ctx, input_keys=["object_id"], output_keys=["place"])
 
     def run(self, ud: Any) -> str:
-        limit = float(self.ctx.config.get("perception.locate_timeout", 5.0))
+        limit = self.ctx.config.number("perception.locate_timeout")
         places = self.await_pending(
             self.ctx.perception.free_places(ud.object_id, limit), "a free place on the board", limit + 1.0, code=SIGHT
         )

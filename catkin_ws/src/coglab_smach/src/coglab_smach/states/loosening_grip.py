@@ -8,13 +8,11 @@ from collections.abc import Callable
 from coglab_smach.ports.interfaces import HandPort
 from coglab_smach.ports.pending import Pending
 
-FINGERS = slice(1, 5)
-"""motors that bend fingers"""
-FIRMER, WEAKER = 0.15, 0.3
-"""share of the wanted grip force by which it may be more or less without a finger's moving"""
-AHEAD, SEEN_AFTER = 0.04, 0.1
-"""s for which the grip goes on as it does after an order to stand, and after which it is seen what that order has left:
-sensors, nodes and the hand's line take some hundredths of a second"""
+FINGERS = slice(1, 5)  # motors that bend fingers
+FIRMER = 0.15  # share of the wanted grip force above which the fingers open
+WEAKER = 0.3  # share below which they close
+AHEAD = 0.04  # s for which the grip goes on after an order to stand: delay of sensors, nodes and the hand's line
+SEEN_AFTER = 0.1  # s after which the effect of that order is seen
 
 
 class LooseningGrip:
@@ -29,9 +27,8 @@ class LooseningGrip:
         easing_speed: int = 1,
         force: Callable[[], float | None] = lambda: None,
     ) -> None:
-        """``speed``, ``closing_speed``: 1..511, wire speeds at which they loosen and close; the second one stands for
-        the force with which they hold then. ``force``: N of grip that are felt, None where nothing tells; where it
-        tells, they loosen at ``easing_speed``."""
+        """``speed``, ``closing_speed``, ``easing_speed``: 1..511, wire speeds of loosening, of closing (and with it the
+        force) and of loosening while ``force`` (N of grip that are felt) is not None."""
         self._hand, self._speed, self._closing_speed = hand, speed, closing_speed
         self._easing_speed, self._force = easing_speed, force
         self._closed, self._firm = hand.state().positions, force()
@@ -42,8 +39,7 @@ class LooseningGrip:
         self._closing: Pending | None = None
 
     def loosened(self) -> int | None:
-        """Counts by which the finger that has moved most is more open than in the grip; None where the hand does not
-        tell."""
+        """Counts by which the finger that has moved most is more open than in the grip; None if that is not known."""
         now = self._hand.state().positions
         if not now or not self._closed:
             return None

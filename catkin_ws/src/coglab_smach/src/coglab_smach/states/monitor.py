@@ -5,8 +5,8 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-from coglab_smach.context.awaited import ARM, SIGHT
 from coglab_smach.context.context import Context
+from coglab_smach.context.wait_reasons import ARM, SIGHT
 from coglab_smach.states.base import CoglabState, Interrupted
 from coglab_smach.states.reach import dmp_request
 
@@ -24,10 +24,10 @@ class MonitorDmp(CoglabState):
         super().__init__(ctx, input_keys=["goal"])
 
     def run(self, ud: Any) -> str:
-        if not bool(self.ctx.config.get("monitor.enabled", True)):
+        if not self.ctx.config.get("monitor.enabled"):
             self.wait_for(lambda: False, "the end of the motion", code=ARM)
         running = ud.goal["primitive"]
-        family = dict(self.ctx.config.get("monitor.primitives", {}))
+        family = dict(self.ctx.config.get("monitor.primitives"))
         if running not in family.values():
             family = {}
         switches = 0
@@ -61,5 +61,5 @@ class MonitorDmp(CoglabState):
         if self.ctx.arm.dmp_progress().state not in ("running", "holding"):
             return False
         seen = self.ctx.perception.recognition()
-        sure = seen.decided and seen.confidence >= float(self.ctx.config.get("monitor.confidence", 0.9))
+        sure = seen.decided and seen.confidence >= self.ctx.config.number("monitor.confidence")
         return sure and seen.pattern in family and family[seen.pattern] != running

@@ -11,10 +11,8 @@ from coglab_smach.kinematics.motion_time import ptp_time
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.pending import Pending, PortError
 
-POLL_PERIOD = 0.01
-"""s"""
-SILENCE = 0.5
-"""s that a robot that says nothing is waited for; the request stays in force"""
+POLL_PERIOD = 0.01  # s
+SILENCE = 0.5  # s that a robot that says nothing is waited for; the request stays in force
 
 
 def end_motion(ctx: Context, reason: str) -> str:
@@ -82,7 +80,7 @@ def _joint_way(ctx: Context, here: Sequence[float], by: np.ndarray, speed: float
 
 def _await(ctx: Context, pending: Pending) -> str:
     """Why the call did not succeed; empty if it did."""
-    limit = float(ctx.config.get("motion.end_timeout", 3.0))
+    limit = ctx.config.number("motion.end_timeout")
     begin = ctx.clock.now()
     while not pending.done():
         if ctx.clock.now() - begin >= (SILENCE if ctx.arm.joint_positions() is None else limit):

@@ -1,39 +1,60 @@
-"""States of a reach: starting a DMP, and waiting for its end or for contact."""
+"""A reach: starting the motion, waiting for its end or for an object in the hand, and what ends it for a person."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Callable, Mapping, Sequence
+from enum import Enum
 from typing import Any
 
+import coglab_controllers as cc
 import numpy as np
 from coglab_msgs.msg import ReasonCode
 
-from coglab_smach.context.awaited import ARM, CONTACT, HAND, PERSON
 from coglab_smach.context.context import Context
-from coglab_smach.context.hand_track import HandTrack
+from coglab_smach.context.grip import Grip
+from coglab_smach.context.wait_reasons import ARM, CONTACT, HAND, PERSON
 from coglab_smach.kinematics.motion_time import reach_time
-from coglab_smach.ports.interfaces import ContactEvent, DmpRequest
+from coglab_smach.ports.interfaces import ContactEvent, DmpProgress, DmpRequest
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
+from coglab_smach.states.hand_tracking import (
+    GLANCE,
+    HandLook,
+    HandoverRegion,
+    Sight,
+    anything_believed,
+    ends_outside,
+    hand_name,
+    jumped_from,
+    off_grasp,
+    palm_at,
+    palm_axis,
+    sight_of,
+    sight_or_refusal,
+)
 from coglab_smach.states.motion import shift, shift_time
-from coglab_smach.states.reach_watch import LEFT, LOWERED, OUTSIDE, PersonsGrip, ReachWatch, target_of
-from coglab_smach.states.where import HandLook, off_grasp, palm_axis
 
-BUMPS = 2
-"""touches of something else after which the arm still comes again"""
-DRAWN_BACK, DRAWING_BACK = 0.06, 5.0
-"""m; and s that drawing back may take beyond what limits and speed scale ask for"""
-SEATED = 0.03
-"""m off its grasp at most, for an object that the fingers may close on at a touch"""
-FIRM = 2.5
-"""margin of a touch that is more than brushing past"""
-BETWEEN = 0.01
-"""m off the last of the way, at most, for an object that is seen between the fingers"""
-NEWS = 0.02  # s after which the arm tells of a motion that has begun
-CAUGHT = 1.0
-"""s in which fingers that have begun to close on the way stand"""
-SLIDING = 0.6  # s for which the hand goes on at most, at full speed scale
+BUMPS = 2  # touches of something else after which the arm still comes again
+RETREAT = 0.06  # m that the hand draws back from what it has touched
+RETREAT_SPEED = 0.1  # m/s
+RETREAT_TIMEOUT = 5.0  # s that drawing back may take beyond what limits and speed scale ask for
+SEATED = 0.03  # m from its grasp, at most, at which the fingers may close on an object at a touch
+FIRM = 2.5  # margin of a touch that is more than brushing past
+BETWEEN = 0.01  # m beyond the last of the way within which an object is seen between the fingers
+NEWS = 0.02  # s after which the arm reports a motion that has begun
+CAUGHT = 1.0  # s in which fingers that have begun to close on the way stand
+SLIDING = 0.6  # s for which the hand goes on to the grasp after a touch, at most, at full speed scale
+
+PERIOD = 0.03  # s between two looks at what the reach is for
+DOUBT_TIME = 0.2  # s without belief before a reach pauses; after a gap in what is seen belief is back by then
+BACKWARD = 0.6  # share of the allowed retreat from which on the arm waits to see whether the hand goes back
+SLIPPED = 0.06  # m by which an object that has left the person's hand is lower against it than at first
+TOGETHER = 0.05  # s between a sight of the hand and one of the object that may be compared
+LOOK = 0.4  # s for which hand and object are compared
+
+OUTSIDE = (int(ReasonCode.GOAL_AHEAD_OUTSIDE), "the person's reach seems to end outside the handover region")
+LEFT = (int(ReasonCode.GOAL_LEFT_REGION), "it is outside the handover region")
+LOWERED = "it was lowered with the hand that holds it"
 
 
 def dmp_request(goal: dict[str, Any], primitive: str | None = None, ratio: float | None = None) -> DmpRequest:
@@ -53,9 +74,9 @@ def dmp_request(goal: dict[str, Any], primitive: str | None = None, ratio: float
 
 
 def start(state: CoglabState, request: DmpRequest) -> None:
-    """Start a reach. A tracker that has lost the goal for a moment gets as long as a running motion would give it."""
+    """Start a reach. A goal that the tracker has lost gets ``goal_lost_time``, as in a running motion."""
     ctx = state.ctx
-    end = ctx.clock.now() + float(ctx.config.get("goal_lost_time", 1.0))
+    end = ctx.clock.now() + ctx.config.number("goal_lost_time")
     while True:
         try:
             state.await_pending(ctx.arm.execute_dmp(request), f"start of primitive '{request.primitive_id}'", 3.0)
@@ -66,6 +87,11 @@ def start(state: CoglabState, request: DmpRequest) -> None:
             if error.code != ReasonCode.GOAL_STALE or ctx.clock.now() >= end:
                 raise
         state.pause(0.05)
+
+
+def target_of(goal: Mapping[str, Any]) -> str:
+    """The object that a reach is for, or the person's hand, as perception names it; '' for a place."""
+    return str(goal["frame"]).removesuffix("_ahead").removeprefix("object_")
 
 
 class ExecuteDmp(CoglabState):
@@ -79,7 +105,7 @@ class ExecuteDmp(CoglabState):
 
     def run(self, ud: Any) -> str:
         request = dmp_request(ud.goal)
-        profile = str(self.ctx.config.get("approach_profile", ""))
+        profile = self.ctx.config.text("approach_profile")
         if profile:
             self.await_pending(self.ctx.arm.apply_profile(profile), f"feedback profile '{profile}'", 2.0)
         start(self, request)
@@ -89,261 +115,38 @@ class ExecuteDmp(CoglabState):
 
 
 class WaitStop(CoglabState):
-    """Wait for the end of the reach or, if ``trigger`` asks for it, for the contact trigger.
-
-    trigger: '' (the end of the motion is enough) or 'contact' (an object is in the hand). Contact is watched for from
-    the last ``contact_within`` m of the reach on and ends the motion. The reach may take ``reach_timeout`` beyond what
-    the primitive's duration and the arm's limits ask for.
-    """
+    """wait_stop: wait for the end of the reach. It may take ``reach_timeout`` beyond what the primitive's duration and
+    the arm's limits ask for."""
 
     default_time_limit = 20.0
     owns_motion = True
 
-    def __init__(self, ctx: Context, trigger: str, keys: Sequence[str] = ()) -> None:
-        super().__init__(ctx, input_keys=["object_entry", "goal", "grasp"] if trigger == "contact" else keys)
-        self.trigger = trigger
-        self._left = False
-        """the compliant profile of the approach"""
-        self._watched: ReachWatch | None = None
-        self._grip: PersonsGrip | None = None
-        self._arrived: float | None = None
-        """s, when the hand was first at its place"""
-        self._deeper = False
-        """it has gone on from there"""
-        self._watches = self._caught = False
-        """for a contact; and the fingers have closed around something while the arm paused"""
-        self._looks: HandLook | None = None
-        """at the person's hand, once the fingers have begun to close"""
-        self._hand: dict[str, Any] = {}
-        """of the grasp, as the object's entry has it"""
-
     def run(self, ud: Any) -> str:
-        self._left = self._deeper = self._watches = self._caught = False
-        self.ctx.closing = self.ctx.hand_track = self._looks = self._arrived = None
-        target = target_of(ud.goal) if self.trigger == "contact" else ""
-        self._grip = PersonsGrip(self, target) if target else None
-        self._watched = ReachWatch(self, ud.goal, self._grip) if self.trigger and "watch" in ud.goal else None
-        if self.trigger == "contact":
-            self.ctx.closing_firm = int(ud.grasp["hand"].get("firm", 0))
-            self.ctx.shared_mass = float(ud.object_entry.get("mass", 0.0))
-            self._hand = ud.grasp["hand"]
-            try:
-                return self._await_contact(ud)
-            except Interrupted:
-                # STOP, or an action that is ended: what closes on a person's object stops at once.
-                if self.ctx.closing is not None:
-                    self.ctx.closing.cancel()
-                raise
-        return self._await_end(ud)
-
-    def _await_end(self, ud: Any) -> str:
-        self._await_reach(self._reached)
+        self.await_reach(self.arrived)
         self.ctx.journal.mark("motion_reached")
         return "succeeded"
 
-    def _await_contact(self, ud: Any) -> str:
-        """The object may come into the hand on the way, at its end, or be brought there once the arm waits. What
-        touches the hand while the object is elsewhere is not the object: the arm draws back and comes again."""
-        arm, within = self.ctx.arm, float(self.ctx.config.get("contact_within", 0.12))
-        for left in reversed(range(BUMPS + 1)):
-            self._await_reach(lambda: self._reached() or 0.0 < arm.dmp_progress().remaining_distance < within)
-            self._watch(ud)
-            away, event = off_grasp(self, ud.goal), self.ctx.contact.event()
-            if away is None or away < float(self.ctx.config.get("contact_near", 0.09)):
-                if event is not None and away is not None and away > SEATED and event.margin < FIRM:
-                    self._slide_in(ud)
-                return self._found(event)
-            self.ctx.journal.mark("bumped")
-            if left:
-                self._come_again(ud)
-        raise PortError(
-            f"something touches the hand, and the object is {away:.2f} m from where it would be held",
-            ("something is in the way, or somebody pushes the arm",),
-            ReasonCode.NO_CONTACT,
-        )
+    def arrived(self) -> bool:
+        """Whether the motion has reached its goal; TimeLimit where it has failed."""
+        return self.has_reached(self.ctx.arm.dmp_progress())
 
-    def _come_again(self, ud: Any) -> None:
-        """Draw back against the palm's outward axis with the hand open, and begin the reach anew."""
-        arm = self.ctx.arm
-        self.allow(20.0)
-        # What begins while the arm moves takes its speed along, and brakes less than an arm that is stopped.
-        self.await_pending(arm.cancel_motion("something touches the hand"), "rest of the arm", 3.0, code=ARM)
-        self.await_pending(arm.switch_controller("ptp"), "switching to 'ptp'", 3.0)
-        self._open_again()
-        back = palm_axis(self.ctx)
-        if back is not None:
-            way = (self.ctx, -DRAWN_BACK * back, 0.1)
-            limit, moved = DRAWING_BACK + shift_time(*way), shift(*way)
-            self.allow(limit + 10.0)
-            if moved is not None:
-                try:
-                    self.await_pending(moved, "drawing back", limit, arm.speed_scale, ARM)
-                except PortError as error:
-                    self.reason = error.sentence  # as far as it goes
-        self.await_pending(arm.switch_controller("dmp"), "switching to controller 'dmp'", 3.0)
-        watch = self._watched
-        if watch is None:
-            self._begin_again(ud.goal)
-        elif watch.hopeful():
-            watch.forgive()
-            # Where the object will be is not told any more once the person's reach is over.
-            self._begin_again(watch.goal_now())
-        else:
-            self._pause(watch, *watch.doubt())
+    def has_reached(self, progress: DmpProgress) -> bool:
+        """The same for a progress that was read before."""
+        if progress.state == "aborted":
+            why = progress.reason or "the controller gave no reason"
+            raise TimeLimit("the reach was aborted", (why,), progress.code)
+        if not (blocked := self.ctx.arm.motion_allowed()).ok:
+            raise TimeLimit("the arm does not follow any more", (blocked.why,), blocked.code)
+        return progress.state == "reached"
 
-    def _open_again(self) -> None:
-        """Fingers that have begun to close: with them the arm would come as a fist."""
-        self._caught = False
-        if self.ctx.closing is None:
-            return
-        self.ctx.closing.cancel()
-        self.ctx.closing = self.ctx.hand_track = self._looks = None
-        opening = self.ctx.hand.preshape(self._hand["mode"], self._hand["level"])
-        self.await_pending(opening, "the hand's opening", 5.0, code=HAND)
-        self.ctx.shared = False
-
-    def _begin_again(self, goal: dict[str, Any]) -> None:
-        """Start a reach anew. What lies where no hand may go by now has fallen, or was taken there."""
-        try:
-            start(self, dmp_request(goal))
-            self.pause(NEWS)  # until then the arm tells how the motion before has ended
-        except PortError as error:
-            if error.code != ReasonCode.GOAL_OUTSIDE_WORKSPACE or self._grip is None:
-                raise
-            code = self._grip.fell_or_withdrawn()
-            raise TimeLimit("the reach was given up", (error.sentence,), code) from None
-
-    def _pause(self, watch: ReachWatch, code: int, why: str) -> None:
-        """Nobody seems to offer or ask within the region any more: the arm stands. Who goes on within
-        ``handover.pause`` s is met; else the reach is given up, with this code and reason."""
-        limit = float(self.ctx.config.get("handover.pause", 3.0))
-        self.allow(limit + 8.0)
-        resting = self.ctx.arm.cancel_motion("the arm waits: nobody offers or asks")
-        self.await_pending(resting, "rest of the arm", 3.0, code=ARM)
-        self.ctx.journal.mark("paused")
-        try:
-            self.wait_for(watch.hopeful, "that the person goes on", limit, code=PERSON)
-        except TimeLimit as error:
-            if error.code != ReasonCode.TIME_LIMIT:
-                raise
-            raise TimeLimit("the reach was given up", (why,), code) from None
-        if self._watches and self.ctx.contact.event() is not None:
-            return  # an object has come into the hand that stands
-        self._caught = self._has_caught()
-        if self._caught:
-            return
-        self._open_again()
-        watch.forgive()
-        self._begin_again(watch.goal_now())
-
-    def _has_caught(self) -> bool:
-        """Whether fingers that have begun to close hold something: they open for nobody who is merely seen."""
-        if self.ctx.closing is None:
-            return False
-        end = self.ctx.clock.now() + CAUGHT
-        # The hand tells that it holds something a moment after its order has ended.
-        while not (self.ctx.closing.done() and self.ctx.hand.state().holding) and self.ctx.clock.now() < end:
-            self.pause(NEWS)
-        return self.ctx.hand.state().holding
-
-    def _watch(self, ud: Any) -> None:
-        """Arm the detector and wait for what it finds; where the arm has arrived and feels nothing, it goes on."""
-        settings = self._contact_settings(ud)
-        limit = float(settings.get("timeout", self.ctx.config.get("contact_timeout", 6.0)))
-        self.allow(limit + 5.0)
-        arming = self.ctx.contact.arm("contact_in_motion", limit, settings)
-        self.await_pending(arming, "arming of the contact detector", 2.0)
-        self._watches = True
-        try:
-            self.wait_for(partial(self._happened, ud.goal), "contact of an object with the hand", limit, code=CONTACT)
-        except TimeLimit as error:
-            error.code = error.code if error.code != ReasonCode.TIME_LIMIT else ReasonCode.NO_CONTACT
-            raise
-        finally:
-            self._watches = False
-            self.ctx.contact.disarm()
-
-    def _happened(self, goal: dict[str, Any]) -> bool:
-        if self.ctx.contact.event() is not None or self._caught:
-            return True
-        self._close_on_the_way(goal)
-        if self._looks is not None:
-            self._looks.look()
-        if self._reached():
-            now = self.ctx.clock.now()
-            self._arrived = now if self._arrived is None else self._arrived
-            self.ctx.journal.mark("motion_reached")
-            self._leave_approach_profile()
-            if not self._deeper and now - self._arrived >= float(self.ctx.config.get("handover.feel", 0.3)):
-                self._go_on(goal)
-        return False
-
-    def _close_on_the_way(self, goal: dict[str, Any]) -> None:
-        """The fingers need as long as the last of the way: a person lets go of what is light with the first touch, or
-        with what they take for it. So they begin to close where the object is seen between them."""
-        within = float(self.ctx.config.get("handover.close_within", 0.03))
-        if (
-            self.ctx.closing is not None
-            or not self.ctx.preshaped
-            or not 0.0 < self.ctx.arm.dmp_progress().remaining_distance < within
-        ):
-            return
-        away = off_grasp(self, goal)
-        if away is not None and away < within + BETWEEN:
-            # From here on the person's object may be in the fingers, whatever becomes of the reach.
-            self.ctx.shared, self.ctx.closing_on = True, target_of(goal)
-            self.ctx.closing = self.ctx.hand.close_on_object()
-            self.ctx.hand_track = HandTrack()
-            self._looks = HandLook(self.ctx, self.ctx.hand_track)
-            self.ctx.journal.mark("closing_on_the_way")
-
-    def _go_on(self, goal: dict[str, Any]) -> None:
-        """A tracker's error or a light touch: the hand goes on along the grasp's axis, as slowly as it has come."""
-        self._deeper = True
-        goal = self._watched.goal_now() if self._watched is not None else goal
-        axis = np.array(goal.get("approach", np.zeros(3)))
-        length = float(np.linalg.norm(axis))
-        if length > 0.0:
-            offset = np.array(goal["offset"]) + float(self.ctx.config.get("handover.deeper", 0.02)) / length * axis
-            request = dmp_request({**goal, "offset": offset.tolist(), "approach": np.zeros(3).tolist()})
-            try:
-                self.await_pending(self.ctx.arm.execute_dmp(request), "the last of the way", 3.0)
-                self.ctx.journal.mark("went_on")
-            except TimeLimit:
-                raise
-            except PortError as error:
-                self.reason = error.sentence  # it waits where it is
-
-    def _slide_in(self, ud: Any) -> None:
-        """Fingers touch the object on their way past it: closed there, they would hold it by its edge. The reach goes
-        on until the palm is at its grasp, unless something stands in its way."""
-        contact, settings = self.ctx.contact, self._contact_settings(ud)
-        end = self.ctx.clock.now() + SLIDING / max(0.1, self.ctx.arm.speed_scale())
-        try:
-            while self.ctx.clock.now() < end and not self._reached():
-                away, event = off_grasp(self, ud.goal), contact.event()
-                if away is None or away <= SEATED or (event is not None and event.margin >= FIRM):
-                    return
-                if event is not None:
-                    self.await_pending(contact.arm("contact_in_motion", 1.0, settings), "arming of the detector", 1.0)
-                self.pause(0.02)
-        finally:
-            contact.disarm()
-
-    def _found(self, event: ContactEvent | None) -> str:
-        self.ctx.journal.mark("contact")
-        felt = "the fingers hold it" if event is None else f"contact by {event.source}, margin {event.margin:.1f}"
-        self.reason = (event.message if event is not None else "") or felt
-        return "succeeded"
-
-    def _await_reach(self, near: Callable[[], bool]) -> None:
-        """Until ``near()``. How far and how long it is, the motion itself knows: it tells in its first feedback."""
+    def await_reach(self, near: Callable[[], bool]) -> None:
+        """Wait until ``near()``. The limit comes from the motion's first feedback."""
         arm = self.ctx.arm
         try:
-            self.wait_for(lambda: self._reached() or arm.dmp_progress().primitive_id != "", "news of the reach", 2.0)
-            told = arm.dmp_progress()
-            asked = told.remaining_time + reach_time(arm.motion_limits(), told.remaining_distance)
-            limit = float(self.ctx.config.get("reach_timeout", 6.0)) + asked
+            self.wait_for(lambda: self.arrived() or arm.dmp_progress().primitive_id != "", "news of the reach", 2.0)
+            begun = arm.dmp_progress()
+            asked = begun.remaining_time + reach_time(arm.motion_limits(), begun.remaining_distance)
+            limit = self.ctx.config.number("reach_timeout") + asked
             self.allow(limit + 10.0)
             self.wait_for(near, "the end of the reach", limit, arm.speed_scale, ARM)
         except TimeLimit as error:
@@ -354,12 +157,11 @@ class WaitStop(CoglabState):
             )
             raise
 
-    def _leave_approach_profile(self) -> None:
+    def leave_approach_profile(self) -> None:
         """Back to the rigid profile, and wait until what the compliant one added is gone: contact is found in forces,
-        which an arm that yields to them would not show."""
-        if self._left or not str(self.ctx.config.get("approach_profile", "")):
+        which a compliant arm would not show."""
+        if not self.ctx.config.text("approach_profile"):
             return
-        self._left = True
         self.await_pending(self.ctx.arm.apply_profile("dmp"), "feedback profile 'dmp'", 2.0)
         try:
             self.wait_for(lambda: self.ctx.arm.profile_settled("dmp").ok, "the end of the approach's compliance", 2.0)
@@ -367,34 +169,488 @@ class WaitStop(CoglabState):
             limit.causes = (self.ctx.arm.profile_settled("dmp").why,)
             raise
 
-    def _settings(self, ud: Any) -> dict[str, Any]:
-        """What the object's entry says about contact."""
-        entry = ud.object_entry
-        return {**entry.get("contact", {}), "mass": float(entry.get("mass", 0.0))}
 
-    def _contact_settings(self, ud: Any) -> dict[str, Any]:
-        """The same for an object that comes into the hand, with its grasp, at which it is looked for."""
-        return {**self._settings(ud), **ud.goal.get("object", {})}
+class WaitForPerson(WaitStop):
+    """A reach for what a person offers, or for their hand. While nobody seems to offer or ask any more the arm pauses
+    (PausedForPerson): it stands, goes on with a person who goes on within ``handover.pause`` s, and gives up else."""
 
-    def _reached(self) -> bool:
-        progress, watch = self.ctx.arm.dmp_progress(), self._watched
-        if self._grip is not None:
-            self._grip.look()
-        left = progress.state == "aborted" and progress.code == ReasonCode.GOAL_LEFT_REGION
-        if left and watch is not None:
-            # It may have been believed so for a moment only, or is held still there.
-            self._pause(watch, *(OUTSIDE if watch.predicted else LEFT))
-            return False
+    def __init__(self, ctx: Context, keys: Sequence[str]) -> None:
+        super().__init__(ctx, input_keys=keys, io_keys=["grip"])
+        self._grip = Grip()
+        self._watch: ReachWatch | None = None
+        self._persons_grip: PersonsGrip | None = None
+
+    def watch_person(self, goal: dict[str, Any], target: str = "") -> None:
+        """From now on; ``target``: the object that the person holds."""
+        self._persons_grip = PersonsGrip(self, target) if target else None
+        self._watch = ReachWatch(self, goal, self._persons_grip, self._closes) if "watch" in goal else None
+
+    def has_reached(self, progress: DmpProgress) -> bool:
+        watch, grip = self._watch, self._persons_grip
+        if grip is not None:
+            grip.look()
         if progress.state == "aborted":
-            why, code = progress.reason or "the controller gave no reason", progress.code
-            if code == ReasonCode.GOAL_FELL and self._grip is not None:
-                code = self._grip.fell_or_withdrawn()
-                why = why if code == ReasonCode.GOAL_FELL else LOWERED
-            raise TimeLimit("the reach was aborted", (why,), code)
-        if not (blocked := self.ctx.arm.motion_allowed()).ok:
-            raise TimeLimit("the arm does not follow any more", (blocked.why,), blocked.code)
-        there = progress.state == "reached"
+            if progress.code == ReasonCode.GOAL_LEFT_REGION and watch is not None:
+                # It may have been believed so for a moment only, or is held still there.
+                self._paused_for_person(watch, *(OUTSIDE if watch.predicted else LEFT))
+                return False
+            if progress.code == ReasonCode.GOAL_FELL and grip is not None:
+                code = grip.fell_or_withdrawn()
+                why = progress.reason if code == ReasonCode.GOAL_FELL else LOWERED
+                raise TimeLimit("the reach was aborted", (why or "the controller gave no reason",), code)
+        there = super().has_reached(progress)
         # What falls or is taken back ends the reach at its place, too, but for what the fingers close on.
-        if watch is not None and not (there and self.ctx.closing is not None) and watch.doubted() and not there:
-            self._pause(watch, *watch.doubt())
+        if watch is not None and not (there and self._closes()) and watch.doubted() and not there:
+            self._paused_for_person(watch, *watch.doubt())
         return there
+
+    def _paused_for_person(self, watch: ReachWatch, code: int, why: str) -> None:
+        """Phase PausedForPerson, from any other one. ``code``, ``why``: of giving up."""
+        limit = self.ctx.config.number("handover.pause")
+        self.allow(limit + 8.0)
+        resting = self.ctx.arm.cancel_motion("the arm waits: nobody offers or asks")
+        self.await_pending(resting, "rest of the arm", 3.0, code=ARM)
+        self.ctx.journal.mark("paused")
+        try:
+            self.wait_for(watch.hopeful, "that the person goes on", limit, code=PERSON)
+        except TimeLimit as error:
+            if error.code != ReasonCode.TIME_LIMIT:
+                raise
+            raise TimeLimit("the reach was given up", (why,), code) from None
+        if self._has_it():
+            return
+        self._open_again()
+        watch.forgive()
+        self._begin_again(watch.goal_now())
+
+    def _closes(self) -> bool:
+        """Whether the fingers close on the object."""
+        return False
+
+    def _has_it(self) -> bool:
+        """Whether the object has come into the hand during a pause."""
+        return False
+
+    def _open_again(self) -> None:
+        """Open fingers that have begun to close."""
+
+    def _begin_again(self, goal: dict[str, Any]) -> None:
+        """Start the reach anew. What lies where no hand may go by now has fallen, or was taken there."""
+        try:
+            start(self, dmp_request(goal))
+            self.pause(NEWS)  # until then the arm reports how the motion before has ended
+        except PortError as error:
+            if error.code != ReasonCode.GOAL_OUTSIDE_WORKSPACE or self._persons_grip is None:
+                raise
+            code = self._persons_grip.fell_or_withdrawn()
+            raise TimeLimit("the reach was given up", (error.sentence,), code) from None
+
+
+class Phase(Enum):
+    """What WaitContact does; each phase ends with the next one. It pauses in any of them (WaitForPerson)."""
+
+    REACH = "the hand goes to the object"
+    NEAR_GOAL = "contact is watched for, the fingers may begin to close, and the hand goes on where it feels nothing"
+    TOUCHED = "the hand slides on to the grasp, if it has brushed the object on its way past"
+    BUMPED = "something else was touched: draw back, and come again"
+    HELD = "the object is between the fingers"
+
+
+class WaitContact(WaitForPerson):
+    """Wait until the object that a person offers is in the hand: on the way, at its end, or brought there once the arm
+    waits. Contact is watched for from the last ``contact_within`` m of the reach on. Something that touches the hand
+    while the object is elsewhere is not the object."""
+
+    def __init__(self, ctx: Context) -> None:
+        super().__init__(ctx, ["object_entry", "goal", "grasp"])
+        self._goal: dict[str, Any] = {}
+        self._hand: dict[str, Any] = {}  # of the grasp
+        self._contact_settings: dict[str, Any] = {}  # of the object's entry, and where it is looked for
+        self._reset()
+
+    def _reset(self) -> None:
+        """For each reach."""
+        self._phase = Phase.REACH
+        self._bumps = 0
+        self._arrived: float | None = None  # s, when the hand was first at its goal
+        self._went_on = False  # the hand has gone on from there
+        self._caught = False  # the fingers have closed around something while the arm paused
+        self._look: HandLook | None = None  # at the person's hand, once the fingers have begun to close
+
+    def run(self, ud: Any) -> str:
+        entry = ud.object_entry
+        self._grip, self._goal, self._hand = ud.grip, ud.goal, ud.grasp["hand"]
+        mass = float(entry.get("mass", 0.0))
+        self._contact_settings = {**entry.get("contact", {}), "mass": mass, **ud.goal.get("object", {})}
+        self._reset()
+        target = target_of(ud.goal)
+        self._grip.reach_for(target, mass, int(self._hand.get("firm", 0)))
+        self.watch_person(ud.goal, target)
+        phases = {
+            Phase.REACH: self._reach,
+            Phase.NEAR_GOAL: self._near_goal,
+            Phase.TOUCHED: self._touched,
+            Phase.BUMPED: self._bumped,
+        }
+        try:
+            while self._phase is not Phase.HELD:
+                self._phase = phases[self._phase]()
+        except Interrupted:
+            # STOP, or an action that is ended: what closes on a person's object stops at once.
+            self._grip.stop()
+            raise
+        return "succeeded"
+
+    def _reach(self) -> Phase:
+        within = self.ctx.config.number("contact_within")
+        self.await_reach(lambda: self.arrived() or self._is_within(within))
+        return Phase.NEAR_GOAL
+
+    def _is_within(self, distance: float) -> bool:
+        return 0.0 < self.ctx.arm.dmp_progress().remaining_distance < distance
+
+    def _near_goal(self) -> Phase:
+        settings = self._contact_settings
+        limit = float(settings.get("timeout", self.ctx.config.get("contact_timeout")))
+        self.allow(limit + 5.0)
+        arming = self.ctx.contact.arm("contact_in_motion", limit, settings)
+        self.await_pending(arming, "arming of the contact detector", 2.0)
+        try:
+            self.wait_for(self._feels_something, "contact of an object with the hand", limit, code=CONTACT)
+        except TimeLimit as error:
+            error.code = error.code if error.code != ReasonCode.TIME_LIMIT else ReasonCode.NO_CONTACT
+            raise
+        finally:
+            self.ctx.contact.disarm()
+        return Phase.TOUCHED
+
+    def _feels_something(self) -> bool:
+        if self.ctx.contact.event() is not None or self._caught:
+            return True
+        self._close_on_the_way()
+        if self._look is not None:
+            self._look.look()
+        if self.arrived():
+            now = self.ctx.clock.now()
+            if self._arrived is None:
+                self._arrived = now
+                self.ctx.journal.mark("motion_reached")
+                self.leave_approach_profile()
+            if not self._went_on and now - self._arrived >= self.ctx.config.number("handover.feel"):
+                self._go_on()
+        return False
+
+    def _close_on_the_way(self) -> None:
+        """The fingers need as long as the last of the way, and a person lets go of a light object at the first touch.
+        So they begin to close where the object is seen between them."""
+        grip, within = self._grip, self.ctx.config.number("handover.close_within")
+        if grip.closing is not None or not grip.preshaped or not self._is_within(within):
+            return
+        away = off_grasp(self, self._goal)
+        if away is not None and away < within + BETWEEN:
+            grip.close(self.ctx.hand)
+            self._look = HandLook(self.ctx, grip.hand)
+            self.ctx.journal.mark("closing_on_the_way")
+
+    def _go_on(self) -> None:
+        """Nothing is felt at the goal: a tracker's error, or a light touch. The hand goes on along the grasp's axis."""
+        self._went_on = True
+        goal = self._watch.goal_now() if self._watch is not None else self._goal
+        axis = np.array(goal.get("approach", np.zeros(3)))
+        length = float(np.linalg.norm(axis))
+        if length > 0.0:
+            offset = np.array(goal["offset"]) + self.ctx.config.number("handover.deeper") / length * axis
+            request = dmp_request({**goal, "offset": offset.tolist(), "approach": np.zeros(3).tolist()})
+            try:
+                self.await_pending(self.ctx.arm.execute_dmp(request), "the last of the way", 3.0)
+                self.ctx.journal.mark("went_on")
+            except TimeLimit:
+                raise
+            except PortError as error:
+                self.reason = error.sentence  # it waits where it is
+
+    def _touched(self) -> Phase:
+        away, event = off_grasp(self, self._goal), self.ctx.contact.event()
+        if away is not None and away >= self.ctx.config.number("contact_near"):
+            self.ctx.journal.mark("bumped")
+            if self._bumps == BUMPS:
+                raise PortError(
+                    f"something touches the hand, and the object is {away:.2f} m from where it would be held",
+                    ("something is in the way, or somebody pushes the arm",),
+                    ReasonCode.NO_CONTACT,
+                )
+            return Phase.BUMPED
+        if event is not None and away is not None and away > SEATED and event.margin < FIRM:
+            self._slide_in()
+        self._tell(event)
+        return Phase.HELD
+
+    def _tell(self, event: ContactEvent | None) -> None:
+        self.ctx.journal.mark("contact")
+        felt = "the fingers hold it" if event is None else f"contact by {event.source}, margin {event.margin:.1f}"
+        self.reason = (event.message if event is not None else "") or felt
+
+    def _slide_in(self) -> None:
+        """Fingers that close on an object as they brush past would hold it by its edge. The reach goes on until the
+        palm is at its grasp, unless something stands in its way."""
+        contact = self.ctx.contact
+        end = self.ctx.clock.now() + SLIDING / max(0.1, self.ctx.arm.speed_scale())
+        try:
+            while self.ctx.clock.now() < end and not self.arrived():
+                away, event = off_grasp(self, self._goal), contact.event()
+                if away is None or away <= SEATED or (event is not None and event.margin >= FIRM):
+                    return
+                if event is not None:
+                    arming = contact.arm("contact_in_motion", 1.0, self._contact_settings)
+                    self.await_pending(arming, "arming of the detector", 1.0)
+                self.pause(0.02)
+        finally:
+            contact.disarm()
+
+    def _bumped(self) -> Phase:
+        """Draw back against the palm's outward axis with the hand open, and begin the reach anew."""
+        arm = self.ctx.arm
+        self._bumps += 1
+        self.allow(20.0)
+        # What begins while the arm moves takes its speed along, and brakes less than an arm that is stopped.
+        self.await_pending(arm.cancel_motion("something touches the hand"), "rest of the arm", 3.0, code=ARM)
+        self.await_pending(arm.switch_controller("ptp"), "switching to 'ptp'", 3.0)
+        self._open_again()
+        outward = palm_axis(self.ctx)
+        if outward is not None:
+            limit = RETREAT_TIMEOUT + shift_time(self.ctx, -RETREAT * outward, RETREAT_SPEED)
+            self.allow(limit + 10.0)
+            motion = shift(self.ctx, -RETREAT * outward, RETREAT_SPEED)
+            if motion is not None:
+                try:
+                    self.await_pending(motion, "drawing back", limit, arm.speed_scale, ARM)
+                except PortError as error:
+                    self.reason = error.sentence  # as far as it goes
+        self.await_pending(arm.switch_controller("dmp"), "switching to controller 'dmp'", 3.0)
+        watch = self._watch
+        if watch is None:
+            self._begin_again(self._goal)
+        elif watch.hopeful():
+            watch.forgive()
+            # The prediction ends with the person's reach.
+            self._begin_again(watch.goal_now())
+        else:
+            self._paused_for_person(watch, *watch.doubt())
+        return Phase.REACH
+
+    def _closes(self) -> bool:
+        return self._grip.closing is not None
+
+    def _has_it(self) -> bool:
+        if self._phase is Phase.NEAR_GOAL and self.ctx.contact.event() is not None:
+            return True  # an object has come into the hand that stands
+        self._caught = self._has_caught()
+        return self._caught
+
+    def _has_caught(self) -> bool:
+        """Whether fingers that have begun to close hold something: they do not open for somebody who is merely seen."""
+        closing, hand = self._grip.closing, self.ctx.hand
+        if closing is None:
+            return False
+        end = self.ctx.clock.now() + CAUGHT
+        # The hand reports that it holds something a moment after its order has ended.
+        while not (closing.done() and hand.state().holding) and self.ctx.clock.now() < end:
+            self.pause(NEWS)
+        return hand.state().holding
+
+    def _open_again(self) -> None:
+        """Fingers that have begun to close would come as a fist."""
+        self._caught = False
+        closing, self._look = self._grip.take_closing(), None
+        if closing is None:
+            return
+        closing.cancel()
+        opening = self.ctx.hand.preshape(self._hand["mode"], self._hand["level"])
+        self.await_pending(opening, "the hand's opening", 5.0, code=HAND)
+        self._grip.shared = False
+
+
+class PersonsGrip:
+    """Tells an object that falls from one that is lowered fast: by whether the person's hand is still at it."""
+
+    def __init__(self, state: CoglabState, target: str) -> None:
+        self._state, self._target = state, target
+        self._at_first: float | None = None
+        self.look()
+
+    def look(self) -> None:
+        """Measure how far they are apart before anything falls, once they are seen together."""
+        if self._at_first is None:
+            self._at_first = self._apart()
+
+    def _apart(self) -> float | None:
+        """m from the object up to the person's hand; None unless both sights are TOGETHER: a fast hand would seem apart
+        from what it holds."""
+        at, thing = sight_of(self._state, hand_name(self._state.ctx)), sight_of(self._state, self._target)
+        if at is None or thing is None or abs(at.age - thing.age) > TOGETHER:
+            return None
+        return float(at.xyz[2] - thing.xyz[2])
+
+    def fell_or_withdrawn(self) -> int:
+        """ReasonCode of an object that has gone down. If it fell it is soon far below the hand; if it is lowered it may
+        seem so for a sight or two."""
+        clock, found = self._state.ctx.clock, []
+        end = clock.now() + LOOK
+        while clock.now() < end:
+            apart = self._apart()
+            found += [] if apart is None else [apart]
+            self._state.pause(PERIOD)
+        if self._at_first is None or not found or float(np.median(found)) > self._at_first + SLIPPED:
+            return int(ReasonCode.GOAL_FELL)
+        return int(ReasonCode.GOAL_WITHDRAWN)
+
+
+class ReachWatch:
+    """Watches the target of a reach, an offered object or the person's hand: it may not go back nor fall (cc.GoalWatch,
+    as in the controller, but over several motions), it has to be, or to be predicted, in the handover region, and
+    somebody has to go on offering it."""
+
+    def __init__(
+        self,
+        state: CoglabState,
+        goal: Mapping[str, Any],
+        grip: PersonsGrip | None,
+        closes: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """``grip``: the person's, on the target; ``closes``: whether the robot's fingers close on it."""
+        self.state, self.goal, self.limits, self.may = state, goal, goal["limits"], goal["watch"]
+        self._closes = closes
+        self.target, self._grip = target_of(goal), grip
+        self._frame = str(goal["frame"]).removesuffix("_ahead")
+        self.predicted = self._began_on_belief = self._frame != goal["frame"]
+        """whether the arm goes to where the target will be, and not to where it is seen"""
+        self._watch: cc.GoalWatch | None = None
+        self._sure = state.ctx.clock.now()  # when it was last believed
+        self._looked = self._sure - PERIOD
+        self._last: Sight | None = None  # s, m: the newest sight that was no jump
+        self._from: np.ndarray | None = None  # m, the palm when the reach began
+        self._nearest, self._back = np.inf, 0.0
+        """m from there to the target's nearest place, and by which it has gone back since"""
+        self._hand: cc.GoalWatch | None = None  # of the person's hand, for a hidden object
+        self._hand_last: Sight | None = None  # as of the target
+        self._seen_at = 0.0  # s, when the target was seen there
+        self._region = HandoverRegion(state.ctx, self.may["margin"])
+        self._outside: tuple[int, str] | None = None
+        """ReasonCode and sentence of an offer or request outside the region"""
+        self._untold: PortError | None = None  # why perception cannot tell whose hand is at the target
+
+    def doubt(self) -> tuple[int, str]:
+        """ReasonCode and sentence of the doubt."""
+        if self._outside is not None:
+            return self._outside
+        if self._untold is not None:
+            return int(ReasonCode.NOT_PERCEIVED), self._untold.sentence
+        return int(ReasonCode.GOAL_WITHDRAWN), "the person does not offer or ask any more"
+
+    def doubted(self) -> bool:
+        """Whether nobody has offered or asked for DOUBT_TIME, or the target goes back. TimeLimit, which ends the reach,
+        where it went back too far, or fell."""
+        now = self.state.ctx.clock.now()
+        if now - self._looked >= PERIOD and self.hopeful():
+            self._sure = now
+        return now - self._sure > DOUBT_TIME or self._goes_back()
+
+    def _goes_back(self) -> bool:
+        return self._back > BACKWARD * self.may["retreat"] > 0.0
+
+    def hopeful(self) -> bool:
+        """Whether somebody offers or asks now, within the region: it is believed, or seen. TimeLimit as doubted()."""
+        ctx = self.state.ctx
+        now = ctx.clock.now()
+        passed, self._looked = max(0.0, now - self._looked), now
+        place = self._look()
+        if place is not None:
+            self._follow(place, passed)
+        self._follow_hand(passed, hidden=place is None)
+        held = place is not None and self._region.offers(self._seen_at, place, moving=False)
+        if self._goes_back() and held:
+            # It is offered there: by as much less may it go back from now on.
+            self._nearest, self._back = self._nearest + self._back, 0.0
+        if self._goes_back():
+            return False
+        hope, outside = anything_believed(ctx), ends_outside(ctx, self._region, self._frame)
+        # Who passes through the region on the way out of it offers nothing there.
+        offered = held or (place is not None and not outside and self._region.holds(place))
+        if not offered and not outside:
+            # What is hidden may have been taken back where nothing but a belief spoke for it.
+            hidden = place is None and (hope or not self._began_on_belief)
+            ahead = self._began_on_belief and hope and ctx.perception.ahead().frame == self.goal["frame"]
+            offered = hidden or ahead
+        self._outside = None
+        if not offered and place is not None:
+            self._outside = OUTSIDE if outside else None if self._region.holds(place) else LEFT
+        elif outside:
+            self._outside = OUTSIDE
+        return offered
+
+    def goal_now(self) -> dict[str, Any]:
+        """The goal: where the target will be as long as that is believed, else where it is seen."""
+        ahead = self.state.ctx.perception.ahead()
+        self.predicted = ahead.frame == self.goal["frame"] and self._region.holds(ahead.place)
+        if self.predicted:
+            return dict(self.goal)
+        watched = {"goal_retreat": self.may["retreat"], "goal_drop": self.may["drop"]}
+        limits = self.limits if self._last is None else self._region.limits(self._last[1])
+        return {**self.goal, "frame": self._frame, "limits": {**limits, **watched}}
+
+    def forgive(self) -> None:
+        """The doubt is over."""
+        self._sure = self.state.ctx.clock.now()
+
+    def _look(self) -> np.ndarray | None:
+        """m, where the target is seen; None where it is not: a hand that goes back may hide it."""
+        seen = sight_or_refusal(self.state, self.target, GLANCE)
+        self._untold = None
+        if isinstance(seen, PortError):
+            self._untold = seen if seen.code == ReasonCode.NOT_PERCEIVED else None
+            return None
+        if seen is None:
+            return None
+        self._seen_at = self.state.ctx.clock.now() - seen.age
+        return np.array(seen.xyz)
+
+    def _follow_hand(self, passed: float, hidden: bool) -> None:
+        """A hand that takes an object back may hide it. A hand that leaves what the fingers close on has let go."""
+        if self._grip is None or self._from is None:
+            return
+        seen = sight_of(self.state, hand_name(self.state.ctx), GLANCE)
+        if seen is None:
+            return
+        place = np.array(seen.xyz)
+        jumped, self._hand_last = jumped_from(self._hand_last, self.state.ctx.clock.now(), place)
+        if jumped:
+            return
+        if self._hand is None:
+            nowhere = np.zeros(3)
+            self._hand = cc.GoalWatch(nowhere, nowhere, self.may["retreat"], 0.0, self._from, place)
+        code, sentence = self._hand.update(passed, place)
+        if code and hidden and not self._closes():
+            raise TimeLimit(f"the reach was given up: {sentence}, as the hand that hides it", (), code)
+
+    def _follow(self, place: np.ndarray, passed: float) -> None:
+        jumped, self._last = jumped_from(self._last, self.state.ctx.clock.now(), place)
+        if jumped:
+            return
+        if self._watch is None or self._from is None:
+            palm = self._from = palm_at(self.state.ctx)
+            if palm is not None:
+                nowhere = np.zeros(3)
+                self._watch = cc.GoalWatch(nowhere, nowhere, self.may["retreat"], self.may["drop"], palm, place)
+            return
+        distance = float(np.linalg.norm(place - self._from))
+        self._nearest = min(self._nearest, distance)
+        self._back = distance - self._nearest
+        code, sentence = self._watch.update(passed, place)
+        if code == ReasonCode.GOAL_FELL and self._grip is not None:
+            # The arm goes no further while it is found out.
+            resting = self.state.ctx.arm.cancel_motion(sentence)
+            self.state.await_pending(resting, "rest of the arm", 3.0, code=ARM)
+            code = self._grip.fell_or_withdrawn()
+            sentence = sentence if code == ReasonCode.GOAL_FELL else LOWERED
+        if code:
+            raise TimeLimit(f"the reach was given up: {sentence}", (), code)

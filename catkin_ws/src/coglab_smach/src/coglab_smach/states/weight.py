@@ -7,46 +7,36 @@ from typing import Any
 
 from coglab_msgs.msg import ReasonCode, Say
 
-from coglab_smach.context.awaited import PERSON
 from coglab_smach.context.context import Context
-from coglab_smach.context.hand_track import HandTrack
+from coglab_smach.context.wait_reasons import PERSON
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.base import CoglabState, TimeLimit
-from coglab_smach.states.held import HeldObject
+from coglab_smach.states.hand_tracking import AT_HAND, AWAY, HandTrack, from_palm, hand_name, palm_at, sight_of
+from coglab_smach.states.held_object import HeldObject
 from coglab_smach.states.motion import await_rest, rise
-from coglab_smach.states.where import AT_HAND, AWAY, from_palm, hand_name, palm_at, sight_of
-from coglab_smach.states.yielding import LEAST_WAY, GivesWay
+from coglab_smach.states.yield_to_pull import LEAST_WAY, YieldToPull
 
 GRAVITY = 9.81
-MOST_RISES = 8
-"""the first one, and those that go on where the weight or somebody's pull has ended one"""
+MOST_RISES = 8  # the first one, and those that go on where the weight or somebody's pull has ended one
 
-FOLLOWS = 0.25
-"""s from one closing of the fingers to the next at least"""
-UNSEEN = 0.4
-"""s from the going of the person's hand on after which an object that nobody sees has stayed in the fingers"""
-WITH_HAND = 0.2
-"""m between the person's hand and an object that they have taken along, at most"""
-FALLS, RECENT = 0.4, 0.15
-"""s after which what falls is far below where it was lost, and for which it is looked for then; and how old (s) a
-sight may be that tells so"""
-SINKING, SETTLES = 3.0, 0.3
-"""s in which the arm has sunk with what the person may hold, or is back; and before and after, for torques at rest"""
-TELLS = 1.0
-"""s in which the contact detector tells the share of the weight, once it is armed"""
-LIFTS = 0.8
-"""N that a soft hand (35 N/m) lifts more by, where what it holds sinks by 3 cm, less what another posture explains"""
-IN_MOTION = 1.6
-"""N by which the weight that a slow arm tells differs from what it tells at rest, at most"""
+FOLLOWS = 0.25  # s from one closing of the fingers to the next at least
+UNSEEN = 0.4  # s after the person's hand has gone, when an object that nobody sees has stayed in the fingers
+WITH_HAND = 0.2  # m between the person's hand and an object that they have taken along, at most
+FALLS = 0.4  # s after which a falling object is far below where it was lost, and for which it is looked for then
+RECENT = 0.15  # s, oldest sight that counts there
+SINKING = 3.0  # s in which the arm has sunk with the object, or is back
+SETTLES = 0.3  # s before and after, for torques at rest
+TELLS = 1.0  # s in which the contact detector tells the share of the weight, once it is armed
+LIFTS = 0.8  # N, least load change that counts as "the person holds it": a soft hand (35 N/m) moved by 3 cm gives 1 N
+IN_MOTION = 1.6  # N by which the weight that a slow arm tells differs from what it tells at rest, at most
 
 
 def person_holds(state: CoglabState, settings: dict[str, Any]) -> bool | None:
-    """Whether the person does: the palm carries less where the arm has sunk with the object, by as much as it rises at
-    most, and carries it again where the arm is back. A hand that merely is there takes no weight, and a pull that has
-    ended gives none back; what had gone before may have been such a pull, or a hand that goes along. None where it is
-    not sure, or cannot be felt. ``settings``: mass (kg) and load_share of the object. Only with controller 'ptp', and
-    an arm that comes to rest."""
-    contact, lift = state.ctx.contact, float(state.ctx.config.get("hand.lift", 0.03))
+    """True if the person holds the object. At rest the torque signal is too weak for light objects, so the arm sinks
+    with it and rises again: a person who holds it takes weight below and gives it back above, a hand that is merely
+    there or a pull that has ended does not. None if it is not sure, or cannot be felt. ``settings``: mass (kg) and
+    load_share of the object. Only with controller 'ptp'."""
+    contact, lift = state.ctx.contact, state.ctx.config.number("hand.lift")
     state.allow(2.0 * SINKING + 16.0)
     await_rest(state.ctx, state.check)
     try:
@@ -69,10 +59,10 @@ def person_holds(state: CoglabState, settings: dict[str, Any]) -> bool | None:
 
 
 def _shifts(state: CoglabState, up: float, enough: float = math.inf) -> bool:
-    """Rise by ``up`` m, sink if negative, until ``enough`` of the weight has gone, and come to rest. Whether the arm
-    has gone the whole way. PortError where it does not."""
+    """Rise by ``up`` m (sink if negative) until ``enough`` of the weight has gone, and come to rest. Whether the arm
+    has gone the whole way; PortError if it does not move."""
     ctx = state.ctx
-    motion = rise(ctx, up, float(ctx.config.get("give.lower_speed", 0.03)))
+    motion = rise(ctx, up, ctx.config.number("give.lower_speed"))
     if motion is None:
         raise PortError("the posture of the arm is not known")
     done = motion.done
@@ -93,7 +83,7 @@ def _shifts(state: CoglabState, up: float, enough: float = math.inf) -> bool:
 
 
 def person_has_it(state: CoglabState, track: HandTrack, settings: dict[str, Any]) -> bool:
-    """Whether the person holds the object (person_holds), and their hand is there before and after."""
+    """The same, with the person's hand at the object before and after."""
 
     def at_hand() -> bool:
         away = from_palm(state, track, 0.3)
@@ -103,77 +93,78 @@ def person_has_it(state: CoglabState, track: HandTrack, settings: dict[str, Any]
 
 
 def _share_at_rest(state: CoglabState) -> float:
-    """Share of the weight that has gone from a palm that rests. TimeLimit where the detector does not tell it."""
-    told: list[float] = []
+    """Share of the weight that has gone from a resting palm. TimeLimit if the detector does not report it."""
+    shares: list[float] = []
 
-    def tells() -> bool:
+    def has_come() -> bool:
         share = state.ctx.contact.share_gone()
-        told.extend([] if share is None else [share])
-        return bool(told)
+        shares.extend([] if share is None else [share])
+        return bool(shares)
 
     state.pause(SETTLES)
-    state.wait_for(tells, "the share of the weight that the contact detector tells", TELLS)
-    return told[0]
+    state.wait_for(has_come, "the share of the weight that the contact detector tells", TELLS)
+    return shares[0]
 
 
 class TakeWeight(CoglabState):
-    """Lift what the hand has closed on until the person's hand has left it, by ``hand.lift`` m at most and at
-    ``hand.lift_speed`` m/s. A person who does not let go gets the object back, where they hold it in truth.
+    """Lift the object until the person's hand has left it, by ``hand.lift`` m at most. A person who does not let go
+    gets the object back if they really hold it.
 
-    The weight that comes is measured (``hand.load_share`` of the object's), and the rise stands then: the person feels
-    that it is carried, is told so, and an arm that went on would draw gentle fingers along what is still held. But the
-    weight is counted from the closing of the fingers, when a person often still presses the object up or down: where
-    they hold on for ``hand.lift_pause`` s all the same, the arm rises on by ``hand.lift_step`` m, again and again.
-    ``hand_distance``: m, of the person's hand from the palm before the fingers closed; None where no tracker saw it.
-    Where it was not at the object, the hand counts from where it is seen there first. While it is seen nowhere the
-    weight has to have come by the end of the whole rise; and it has to have come, too, where the hand was hidden on its
-    way, since another one may be seen now. A hand that goes has let go where the object stays: who pulls it out of
-    gentle fingers has taken it back. Where the tracker has lost the hand, or taken another one for it (HandTrack), the
-    person may have gone: it is felt whether they hold it. Where that is not sure nothing is opened, and the arm stays.
+    The rise stops when ``hand.load_share`` of the weight has come: the person feels that, is told so, and an arm that
+    went on would draw gentle fingers along the object. But the weight is counted from the closing of the fingers, when
+    a person often still presses: if they hold on for ``hand.lift_pause`` s the arm rises on by ``hand.lift_step`` m,
+    again and again.
 
-    The palm goes along with who pulls (GivesWay), and the rise goes on afterwards. The fingers close again and again
-    (``give.close_speed``, the lowest force).
+    The person has let go when their hand has gone from where it held the object (``hand_distance``, m from the palm
+    before the fingers closed, or where it is seen at the object first) and the object has stayed. If the hand is seen
+    nowhere, the weight has to have come by the end of the rise; if it was hidden on its way, the weight has to have
+    come, too, since another hand may be seen now. At the time limit, if the hand may have gone, the arm feels whether
+    the person holds the object. If that is not sure, nothing is opened and the arm stays.
+
+    The palm yields to a pull (YieldToPull), and the rise goes on afterwards. The fingers close again and again with the
+    lowest force (``give.close_speed``).
     """
 
     default_time_limit = 16.0
     owns_motion = True
 
     def __init__(self, ctx: Context) -> None:
-        super().__init__(ctx, input_keys=["object_id", "object_entry", "hand_distance"], output_keys=["hand_seen_away"])
-        self._way: GivesWay
-        self._top: float | None = None
-        """m, height to which the palm rises"""
-        self._rises = 0
-        self._told = self._seen_away = False
+        super().__init__(
+            ctx,
+            input_keys=["object_id", "object_entry", "hand_distance"],
+            output_keys=["hand_seen_away"],
+            io_keys=["grip"],
+        )
+        self._way: YieldToPull
         self._hand: HandTrack
         self._held: HeldObject
-        self._farther: float | None = None
-        """m from the palm from which on the person's hand has left the object"""
-        self._gone: float | None = None
-        """s, since when it has"""
-        self._on: float | None = None
-        """s, when it rises on with the weight; None: the weight has not come"""
-        self._closing: Pending | None = None
-        """of the fingers, once more"""
-        self._closes = 0.0
-        """s, from when they may do so again"""
+        self._reset()
+
+    def _reset(self) -> None:
+        """For each object that is taken over."""
+        self._top: float | None = None  # m, height to which the palm rises
+        self._rises = 0
+        self._told = self._seen_away = False
+        self._farther: float | None = None  # m from the palm from which on the person's hand has left the object
+        self._gone: float | None = None  # s, since when it has
+        self._on: float | None = None  # s, when it rises on with the weight; None: the weight has not come
+        self._closing: Pending | None = None  # of the fingers, once more
+        self._closes = 0.0  # s, from when they may do so again
 
     def run(self, ud: Any) -> str:
-        limit, contact = float(self.ctx.config.get("hand.load_timeout", 5.0)), self.ctx.contact
+        limit, contact = self.ctx.config.number("hand.load_timeout"), self.ctx.contact
         end = self.ctx.clock.now() + limit
-        self._hand, self._held = self.ctx.hand_track or HandTrack(), HeldObject(self.ctx, ud.object_id)
-        self._farther = self._gone = None
+        self._hand, self._held = ud.grip.hand, HeldObject(self.ctx, ud.object_id, ud.grip)
+        self._reset()
         self._count_from(ud.hand_distance)
         settings = {
             "mass": float(ud.object_entry.get("mass", 0.0)),
-            "load_share": float(self.ctx.config.get("hand.load_share", 0.5)),
+            "load_share": self.ctx.config.number("hand.load_share"),
         }
-        self._way, self._rises, self._on, self._told = GivesWay(self.ctx), 0, None, False
-        self._seen_away = False
-        self._closing, self._closes = None, 0.0
+        self._way = YieldToPull(self.ctx)
         self.await_pending(contact.arm("lift", limit, settings), "arming of the contact detector", 2.0)
         try:
-            self.pause(float(self.ctx.config.get("hand.lift_after", 0.1)))
+            self.pause(self.ctx.config.number("hand.lift_after"))
             self._rise()
             self.wait_for(self._has_let_go, "the person's letting go", end - self.ctx.clock.now(), code=PERSON)
         except TimeLimit as error:
@@ -190,16 +181,16 @@ class TakeWeight(CoglabState):
                 self._closing.cancel()
         event = contact.event()
         self.reason = event.message if event is not None else "the person's hand has left it"
-        self.ctx.shared, ud.hand_seen_away = False, self._seen_away
+        ud.grip.shared, ud.hand_seen_away = False, self._seen_away
         self._tell()
         self.ctx.journal.mark("released")
         return "succeeded"
 
     def _count_from(self, distance: float | None) -> None:
-        """The person's hand was seen so far from the palm (m). One that is not at the object has left it already, or is
-        another one: it says nothing."""
+        """The person's hand was seen so far from the palm (m). A hand that is not at the object does not count: it has
+        left already, or is another one."""
         if distance is not None and distance <= AT_HAND:
-            self._farther = distance + float(self.ctx.config.get("hand.let_go", 0.04))
+            self._farther = distance + self.ctx.config.number("hand.let_go")
 
     def _has_let_go(self) -> bool:
         """Whether the person has; meanwhile rise until the weight has come, or give way."""
@@ -229,8 +220,8 @@ class TakeWeight(CoglabState):
         return False
 
     def _has_gone(self, away: float | None, carried: bool) -> bool:
-        """Whether the person's hand, ``away`` m from the palm, has left the object, and the object has stayed. A hand
-        that was not seen all the way may be another one: then its weight has to be ``carried``, too."""
+        """Whether the person's hand, ``away`` m from the palm, has left the object, and the object has stayed. If the
+        hand was not seen all the way the weight has to be ``carried``, too."""
         gone = away is not None and away > (AWAY if self._farther is None else self._farther)
         if away is None or not gone or not (carried or self._hand.is_sure):
             self._gone = None
@@ -247,19 +238,18 @@ class TakeWeight(CoglabState):
         now = self.ctx.clock.now()
         if self._on is None:
             self._way.halt("the weight has come")
-            self._on = now + float(self.ctx.config.get("hand.lift_pause", 0.5))
+            self._on = now + self.ctx.config.number("hand.lift_pause")
         elif now >= self._on and self._way.idle():
-            step, speed = (float(self.ctx.config.get(f"hand.{name}", 0.01)) for name in ("lift_step", "lift_speed"))
-            self._on = now + step / speed + float(self.ctx.config.get("hand.lift_pause", 0.5))
+            step, speed = (self.ctx.config.number(f"hand.{name}") for name in ("lift_step", "lift_speed"))
+            self._on = now + step / speed + self.ctx.config.number("hand.lift_pause")
             self._rise(step)
 
     def _follow(self) -> None:
-        """Again and again, with the lowest force: what the person holds less and less shifts between the fingers, and
-        those that stand where they closed would lose it."""
+        """Close again and again with the lowest force: as the person lets go the object shifts between the fingers."""
         now = self.ctx.clock.now()
         if now >= self._closes and (self._closing is None or self._closing.done()):
             self._closes = now + FOLLOWS
-            self._closing = self.ctx.hand.close(int(self.ctx.config.get("give.close_speed", 60)))
+            self._closing = self.ctx.hand.close(self.ctx.config.get("give.close_speed"))
 
     def _tell(self) -> None:
         """Once: the robot carries the object."""
@@ -268,12 +258,12 @@ class TakeWeight(CoglabState):
             self.ctx.say(Say.I_HAVE_IT, "I have it.")
 
     def _rise(self, most: float = math.inf) -> None:
-        """Up to where the rise that began first was to end, by ``most`` m; nothing where the palm is there."""
-        palm, speed = palm_at(self.ctx), float(self.ctx.config.get("hand.lift_speed", 0.03))
+        """Up to the end of the first rise, by ``most`` m."""
+        palm, speed = palm_at(self.ctx), self.ctx.config.number("hand.lift_speed")
         if palm is None or self._rises >= MOST_RISES:
             return
         if self._rises == 0:
-            self._top = float(palm[2]) + float(self.ctx.config.get("hand.lift", 0.03))
+            self._top = float(palm[2]) + self.ctx.config.number("hand.lift")
         assert self._top is not None
         left = min(most, self._top - float(palm[2]))
         if left > LEAST_WAY:
@@ -281,7 +271,7 @@ class TakeWeight(CoglabState):
             self._way.begin(rise(self.ctx, left, speed))
 
     def _taken_back(self, object_id: str, error: PortError) -> PortError:
-        """The failure, where the object has left the hand with the person's."""
+        """The failure; "taken back" if the object has gone with the person's hand."""
         if error.code == ReasonCode.OBJECT_NOT_SEEN and not self.ctx.holding:
             self._way.stop()
             self.pause(FALLS)
@@ -297,14 +287,14 @@ class TakeWeight(CoglabState):
         return error
 
     def _is_left(self, settings: dict[str, Any]) -> bool:
-        """Whether a hand is seen far from the object, or none at it while the weight has come, and nobody holds it."""
+        """Whether a hand is seen far from the object, or none while the weight has come, and nobody holds it."""
         self._way.stop()
         away, loaded = from_palm(self, self._hand, 0.3), self.ctx.contact.event() is not None
         gone = loaded if away is None else away > (AT_HAND if loaded else AWAY)
         return gone and person_holds(self, settings) is False
 
     def _not_released(self, object_id: str, limit: float, error: TimeLimit, settings: dict[str, Any]) -> PortError:
-        """The failure, and who has the object then: the person who holds it, else the robot, which opens nothing."""
+        """The failure. A person who holds the object gets it; else the robot keeps it."""
         causes: tuple[str, ...] = (error.sentence,)
         loaded, away = self.ctx.journal.marked("loaded"), from_palm(self, self._hand)
         if person_has_it(self, self._hand, settings):

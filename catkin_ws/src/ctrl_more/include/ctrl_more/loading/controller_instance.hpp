@@ -3,7 +3,7 @@
 #include <memory>
 #include <string>
 
-#include "ctrl_more/controller/feedback_controller.hpp"
+#include "ctrl_more/feedback_controller.hpp"
 #include "ctrl_more/loading/plugin_library.hpp"
 
 namespace ctrl_more {

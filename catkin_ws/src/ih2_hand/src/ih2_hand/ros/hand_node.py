@@ -36,7 +36,7 @@ from ih2_hand.reasons import NEUTRAL, Reason, reason_of
 from ih2_hand.ros.diagnostics import Diagnostics
 from ih2_hand.ros.goals import GoalQueue
 from ih2_hand.ros.messages import joint_state, motor_status
-from ih2_hand.ros.tracing import TracePublisher
+from ih2_hand.trace import Tracer
 from ih2_hand.wire_choices import WIRE
 
 ONLY_DEVICE = "(the only serial device)"
@@ -53,6 +53,26 @@ CONTRADICTIONS = 3
 
 STOP_CHECKS = 5
 """Rounds in which the stop service looks whether the motors stand."""
+
+
+class TracePublisher:
+    """Publishes every serial frame on `~trace`, as `trace.Tracer` writes it, while the topic has a subscriber."""
+
+    def __init__(self) -> None:
+        self._publisher = rospy.Publisher("~trace", String, queue_size=1000)
+        self._lock = threading.Lock()
+        self._tracer: Tracer | None = None
+
+    def hook(self, direction: str, data: bytes) -> None:
+        """For `HandSerialDriver(trace=...)`."""
+        if not self._publisher.get_num_connections():
+            self._tracer = None
+            return
+        with self._lock:
+            tracer = self._tracer or Tracer()
+            self._tracer = tracer
+            for line in tracer.feed(direction, data, time.time()):
+                self._publisher.publish(String(line))
 
 
 class HandNode(HandMemory):

@@ -15,9 +15,8 @@
 #include "lwr_fri_bridge/bridge/bridge_config.hpp"
 #include "lwr_fri_bridge/bridge/snapshot.hpp"
 #include "lwr_fri_bridge/fri/session.hpp"
-#include "lwr_fri_bridge/motion/cartesian_set_point.hpp"
 #include "lwr_fri_bridge/motion/set_point_leash.hpp"
-#include "lwr_fri_bridge/motion/tool_wrench.hpp"
+#include "lwr_fri_bridge/motion/tool_frame.hpp"
 #include "lwr_fri_bridge/motion/velocity_filter.hpp"
 
 namespace lwr_fri_bridge {
@@ -43,9 +42,9 @@ class Bridge {
   bool answer(const std::uint8_t* datagram, std::size_t size, std::int64_t now_ns,
               fri::CommandDatagram& answer);
 
-  /// The two halves of answer(), for who wants to send in between: compute() fills the answer,
-  /// publish() then shows the tick to the other threads. publish() only after a compute() that
-  /// returned true.
+  /// answer() in two halves, so that the caller can send the datagram between them: compute() fills
+  /// the answer, publish() then shows the tick to the other threads. publish() only after a
+  /// compute() that returned true.
   bool compute(const std::uint8_t* datagram, std::size_t size, std::int64_t now_ns,
                fri::CommandDatagram& answer);
   void publish();
@@ -103,6 +102,18 @@ class Bridge {
     std::uint32_t ticket = 0;
     Event event;
   };
+  /// A stop in progress: first the arm brakes, then monitor mode is requested.
+  struct PendingStop {
+    std::uint32_t ticket = 0;
+    std::int64_t began_ns = 0;
+    bool monitor_asked = false;
+  };
+  /// The newest valid target velocity, where it came from, and whether it is too old.
+  struct Target {
+    VelocityCommand command;
+    VelocitySource source = VelocitySource::ControlThread;
+    bool expired = false;
+  };
   void serveRequests(const Configurator::Observation& seen);
   void serve(const Request& request, const Configurator::Observation& seen);
   void finish(const Request& request, OutcomeCode code);
@@ -137,17 +148,13 @@ class Bridge {
   CommandModeWatch watch_;
   CommandModeLoss loss_;
   BridgeCounters counters_;
-  VelocityCommand valid_command_;
+  Target target_;
+  PendingStop stop_;
   std::int64_t last_receive_ns_ = 0;
-  std::int64_t stop_began_ns_ = 0;
   std::int64_t permission_since_ns_ = 0;
-  std::uint32_t stop_ticket_ = 0;
   unsigned bounded_joints_ = 0;
   bool connected_ = false;
   bool following_ = false;  // the last answer came from the interpolator
-  bool monitor_asked_ = false;
-  bool command_expired_ = false;
-  VelocitySource last_source_ = VelocitySource::ControlThread;
   StateView last_view_;
 
   // to and from the FRI thread

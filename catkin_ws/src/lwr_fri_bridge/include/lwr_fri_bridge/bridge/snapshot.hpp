@@ -24,31 +24,7 @@ struct BridgeCounters {
   std::uint64_t requests_dropped = 0;  ///< events that found the request queue full
 };
 
-/// Everything there is to show, copied at the end of each tick.
-struct Snapshot {
-  RobotSample sample;
-  std::int64_t permission_since_ns = 0;  ///< when sample.motion_epoch began
-  fri::SessionCounters session;
-  BridgeCounters counters;
-  SupervisorState supervisor = SupervisorState::Disconnected;
-  bool hold_latched = false;
-  bool request_busy = false;
-  std::uint32_t fall_backs = 0;
-  CommandModeLoss loss;  ///< of command mode since the last start
-  fri::FriState state = fri::FriState::Off;
-  fri::Quality quality = fri::Quality::Unacceptable;
-  fri::ControlStrategy control = fri::ControlStrategy::Other;  ///< as the controller reports it
-  ControlMode mode;                                            ///< for the next start
-  std::uint16_t power = 0, drive_error = 0, drive_warning = 0;
-  float answer_rate = 0, latency = 0, jitter = 0, miss_rate = 0, safety_scale = 0,
-        timestamp = 0;  ///< of the controller
-  std::uint32_t miss_counter = 0;
-  std::array<float, 7> temperature{};  ///< degree Celsius
-  unsigned bounded_joints =
-      0;  ///< joints bounded by braking distance in this tick, bit i for joint i
-};
-
-/// The part of a Snapshot whose changes are worth telling (topic `state`).
+/// The part of a Snapshot whose changes are published on the topic `state`.
 struct StateView {
   SupervisorState supervisor = SupervisorState::Disconnected;
   MotionBlock block = MotionBlock::Disconnected;
@@ -58,11 +34,28 @@ struct StateView {
   CommandModeLoss loss;            ///< of command mode since the last start
   fri::FriState state = fri::FriState::Off;
   fri::Quality quality = fri::Quality::Unacceptable;
-  fri::ControlStrategy control = fri::ControlStrategy::Other;
+  fri::ControlStrategy control = fri::ControlStrategy::Other;  ///< as the controller reports it
   std::uint16_t power = 0, drive_error = 0, drive_warning = 0;
   double cycle_time = 0.0;  ///< s
 
   bool operator==(const StateView& other) const;
+};
+
+/// Everything there is to show, copied at the end of each tick.
+struct Snapshot : StateView {
+  RobotSample sample;
+  std::int64_t permission_since_ns = 0;  ///< when sample.motion_epoch began
+  fri::SessionCounters session;
+  BridgeCounters counters;
+  bool request_busy = false;
+  std::uint32_t fall_backs = 0;
+  ControlMode mode;  ///< for the next start
+  float answer_rate = 0, latency = 0, jitter = 0, miss_rate = 0, safety_scale = 0,
+        timestamp = 0;  ///< of the controller
+  std::uint32_t miss_counter = 0;
+  std::array<float, 7> temperature{};  ///< degree Celsius
+  unsigned bounded_joints =
+      0;  ///< joints bounded by braking distance in this tick, bit i for joint i
 };
 
 }  // namespace lwr_fri_bridge

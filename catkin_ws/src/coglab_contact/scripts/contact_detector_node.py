@@ -1,0 +1,395 @@
+#!/usr/bin/python3
+"""The node /contact_detector: torques, fingers and touch -> coglab/contact, armed by ~arm (coglab_msgs/ArmContact).
+
+Subscribes lwr/external_torques (effort, Nm), lwr/joint_states (with measured torques as effort), lwr/state (FRI
+period), ih2_hand/hand_status and ih2_hand/fingertip_forces (~tactile_topic; nobody has to publish it); names are
+relative; and tf2 for the object that is reached for. Parameters: perception/frames; private: the fields of
+coglab_contact.detector.DetectorSettings; robot_description is read
+for Jacobian and dynamics; ~thresholds_file: of the moving arm, learnt in simulation; ~learnt_file: where
+~learn_motion writes what this robot's own motions tell, and from where it is read at the next start.
+Publishes at 20 Hz ~margin (std_msgs/Float64) while watching, ~signal (coglab_msgs/ContactSignal) while torques come;
+both at 100 Hz while a load is given by a hand that has touch; with the samples of the joints, at 100 Hz at most,
+~force (geometry_msgs/Vector3Stamped, base frame): N that pull or push at the palm beyond what did before the last reach
+that was watched.
+Services: ~learn (Learn), the noise at rest anew; ~learn_motion (LearnMotion), true: gather motions
+without contact, false: learn from them.
+"""
+
+import dataclasses
+import math
+import sys
+import threading
+import time
+from pathlib import Path
+
+import coglab_controllers as cc
+import numpy as np
+import rospy
+import tf2_ros
+from coglab_contact.detector import ContactDetector, DetectorSettings
+from coglab_contact.fused_detector import IN_MOTION, LIFT, RELEASE, FusedDetector
+from coglab_contact.load import GripAndLoad
+from coglab_contact.motion_thresholds import ThresholdError, Thresholds
+from coglab_contact.moving_contact import MotionRecorder, MovingContact, unwritable
+from coglab_msgs.msg import Contact, ContactSignal, FingertipForces, HandStatus, LwrState, ReasonCode
+from coglab_msgs.srv import ArmContact, ArmContactResponse, Learn, LearnMotion, LearnMotionResponse, LearnResponse
+from coglab_perception.frames import FrameNames, FramesError
+from coglab_perception.tf_listener import TfListener
+from coglab_py import parameters, steady
+from coglab_py.alone import init_node
+from coglab_py.pace import Pace
+from coglab_py.packages import package_path
+from coglab_py.pose import Pose
+from coglab_py.publish import can_be_sent, publish
+from coglab_py.yaml_file import YamlError
+from geometry_msgs.msg import Vector3, Vector3Stamped
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
+
+FORCE_PERIOD = 0.009  # s between two messages of ~force, at least
+OLDEST_SIGHT = 0.15  # s, older sights of an object do not tell whether it is in the palm
+SIGNAL = 0.01  # s between two messages on ~signal at least
+
+
+def made_at(message: JointState) -> float | None:
+    """s on the robot controller's clock, which the bridge writes as ns into frame_id; None from another driver."""
+    text = message.header.frame_id
+    return 1e-9 * int(text) if text.isdecimal() else None
+
+
+def pose_of(place, turn) -> Pose | None:
+    """Of a message's point and quaternion; None where they are no pose."""
+    p, q = np.array([place.x, place.y, place.z]), np.array([turn.x, turn.y, turn.z, turn.w])
+    if not (np.all(np.isfinite(p)) and np.all(np.isfinite(q)) and abs(float(np.linalg.norm(q)) - 1.0) < 0.01):
+        return None
+    return Pose(p, q)
+
+
+class ContactDetectorNode:
+    """Thin node over FusedDetector."""
+
+    def __init__(self, urdf: str) -> None:
+        settings = DetectorSettings()
+        for field in dataclasses.fields(settings):
+            default = getattr(settings, field.name)
+            if isinstance(default, tuple):
+                value = tuple(parameters.numbers(f"~{field.name}", default, len(default)))
+            else:
+                value = parameters.read(f"~{field.name}", type(default), default)
+            setattr(settings, field.name, value)
+        self.arm = cc.Chain(urdf)
+        self.joints = tuple(self.arm.joint_names)
+        jacobian = lambda q: self.arm.jacobian(np.asarray(q, dtype=float))[:3]  # noqa: E731
+        self.learnt_file = parameters.read("~learnt_file", str, "")
+        self.moving = MovingContact(self.thresholds(), cc.ArmDynamics(urdf), jacobian)
+        held = GripAndLoad(lambda q: Pose(*self.arm.fk(np.asarray(q, dtype=float))).rotation.as_matrix())
+        self.detector = FusedDetector(ContactDetector(settings, jacobian), self.moving, held=held)
+        self.recorder: MotionRecorder | None = None
+        self.lock = threading.Lock()
+        self.position: list[float] | None = None
+        self.velocity: list[float] | None = None
+        self.joint_stamp = 0.0
+        self.pace = Pace().follow()  # stamps are told as time passes in the cell
+        self.last_sample: float | None = None  # of torques, paced
+        self.last_stamp = rospy.Time()
+        self.heard = -math.inf  # monotonic s, when it came
+        self.publisher = rospy.Publisher("coglab/contact", Contact, queue_size=10)
+        self.margin = rospy.Publisher("~margin", Float64, queue_size=1)
+        self.signal = rospy.Publisher("~signal", ContactSignal, queue_size=1)
+        self.force = rospy.Publisher("~force", Vector3Stamped, queue_size=1, tcp_nodelay=True)
+        self.force_stamp = 0.0
+        frames = FrameNames.from_mapping(
+            parameters.read("perception/frames", dict, {}), rospy.resolve_name("perception/frames")
+        )
+        self.base = frames.world
+        self.buffer = tf2_ros.Buffer(rospy.Duration(2.0))
+        self.listener = TfListener(self.buffer, self.base)
+        self.grasp: tuple[str, Pose] | None = None  # the object that is reached for, and the palm in its frame
+        self.shown: float | None = None  # stamp of the sample that ~signal was published for
+        rospy.Subscriber("lwr/joint_states", JointState, self.on_joints, queue_size=20, tcp_nodelay=True)
+        rospy.Subscriber("lwr/state", LwrState, self.on_state, queue_size=1)
+        rospy.Subscriber("ih2_hand/hand_status", HandStatus, self.on_hand, queue_size=1)
+        tactile = parameters.read("~tactile_topic", str, "ih2_hand/fingertip_forces")
+        rospy.Subscriber(tactile, FingertipForces, self.on_touch, queue_size=5, tcp_nodelay=True)
+        self.torques = rospy.Subscriber(
+            "lwr/external_torques", JointState, self.on_torques, queue_size=20, tcp_nodelay=True
+        )
+        rospy.Service("~arm", ArmContact, self.on_arm)
+        rospy.Service("~learn", Learn, self.on_learn)
+        rospy.Service("~learn_motion", LearnMotion, self.on_learn_motion)
+        steady.SteadyTimer(0.05, self.on_timer, "signal")
+
+    def thresholds(self) -> Thresholds:
+        """Those that this robot has learnt, else those that come with the package."""
+        shipped = str(package_path("coglab_contact", "config", "contact_thresholds.yaml"))
+        file = Path(parameters.read("~thresholds_file", str, shipped))
+        if self.learnt_file and Path(self.learnt_file).is_file():
+            file = Path(self.learnt_file)
+        return Thresholds.load(file)
+
+    def refuses(self, message: JointState | HandStatus | FingertipForces) -> bool:
+        """Whether the stamp of a message cannot be passed on with what it leads to; said."""
+        if can_be_sent(message.header.stamp):
+            return False
+        rospy.logwarn_throttle(5.0, f"contact detector: {message._type} refused: no message can carry its stamp")
+        return True
+
+    def on_state(self, message: LwrState) -> None:
+        """The FRI period: stamps of reception jitter, the robot's measurements do not."""
+        with self.lock:
+            self.moving.observer.period = message.cycle_time
+
+    def on_joints(self, message: JointState) -> None:
+        """Positions, velocities and torques in wire order; velocities are differentiated where the message has
+        none."""
+        index = {name: i for i, name in enumerate(message.name)}
+        if any(name not in index for name in self.joints) or len(message.position) != len(message.name):
+            return
+        if self.refuses(message):
+            return
+        order = [index[name] for name in self.joints]
+        position = [message.position[i] for i in order]
+        stamp = self.pace.of(message.header.stamp.to_sec())
+        if len(message.velocity) == len(message.name):
+            velocity = [message.velocity[i] for i in order]
+        elif self.position is not None and stamp > self.joint_stamp:
+            velocity = [(a - b) / (stamp - self.joint_stamp) for a, b in zip(position, self.position, strict=False)]
+        else:
+            velocity = None
+        self.position, self.velocity, self.joint_stamp = position, velocity, stamp
+        if len(message.effort) != len(message.name):
+            return
+        with self.lock:
+            event = self.detector.feed_measured(stamp, position, [message.effort[i] for i in order], made_at(message))
+            if self.recorder is not None:
+                self.recorder.look()
+            force = self.detector.force() if abs(stamp - self.force_stamp) >= FORCE_PERIOD else None
+        self.publish_event(event, message.header.stamp)
+        if force is not None:
+            self.force_stamp = stamp
+            out = Vector3Stamped(vector=Vector3(*force))
+            out.header.stamp, out.header.frame_id = message.header.stamp, self.base
+            publish(self.force, out)
+
+    def on_hand(self, message: HandStatus) -> None:
+        """Fingers; an empty hand carries nothing."""
+        if self.refuses(message):
+            return
+        with self.lock:
+            self.detector.holds = message.connected and message.holding
+            if message.connected and not message.holding and self.moving.load > 0.0:
+                self.detector.set_payload(0.0)
+            event = self.detector.feed_hand(self.pace.of(message.header.stamp.to_sec()), message.motors)
+        self.publish_event(event, message.header.stamp)
+
+    def on_touch(self, message: FingertipForces) -> None:
+        """Forces on fingers and palm."""
+        if self.refuses(message):
+            return
+        forces = [(force.x, force.y, force.z) for force in [*message.forces, message.palm]]
+        with self.lock:
+            event = self.detector.feed_touch(self.pace.of(message.header.stamp.to_sec()), forces, message.deviation)
+            giving = self.detector.share_gone() is not None
+        self.publish_event(event, message.header.stamp)
+        if giving:  # fingers follow this signal
+            self.publish_signal()
+
+    def on_torques(self, message: JointState) -> None:
+        """Each torque sample goes through the detector; an event is published at once."""
+        if len(message.effort) != 7 or self.position is None or self.velocity is None or self.refuses(message):
+            return
+        with self.lock:
+            self.last_stamp = message.header.stamp
+            stamp = self.last_sample = self.pace.of(message.header.stamp.to_sec())
+            self.heard = time.monotonic()
+            event = self.detector.feed(stamp, message.effort, self.position, self.velocity)
+        self.publish_event(event, message.header.stamp)
+
+    def publish_event(self, event, stamp) -> None:
+        """Tell it, if there is one; ``stamp``: of the sample that decided."""
+        if event is None:
+            return
+        out = Contact(
+            source=event.source,
+            contact=event.contact,
+            margin=event.margin,
+            confidence=event.confidence,
+            reason_code=event.code,
+            message=event.message,
+        )
+        out.header.stamp = stamp
+        publish(self.publisher, out)
+        rospy.loginfo("contact detector: %s", event.message)
+
+    def silent(self) -> bool:
+        """Whether no torques have come for a second."""
+        return (time.monotonic() - self.heard) * self.pace.factor > 1.0
+
+    def on_arm(self, request):
+        """Arm or disarm."""
+        with self.lock:
+            if request.mode == "off":
+                self.detector.disarm()
+                self.grasp = None
+                return ArmContactResponse(success=True, message="off")
+            now = self.last_sample
+            if now is None or self.silent():
+                slowed = f" (the simulated cell runs at {self.pace.factor:g} of real time)"
+                return ArmContactResponse(
+                    False,
+                    ReasonCode.NODE_SILENT,
+                    f"no joint torques on {self.torques.resolved_name} for 1.0 s. The robot node sends them with every "
+                    "FRI datagram: it is not running, the robot is not connected, or this computer is overloaded"
+                    f"{slowed if self.pace.factor < 1.0 else ''}. See ./coglab doctor",
+                )
+            try:
+                self.grasp = self.grasp_of(request)
+                self.detector.arm(
+                    request.mode, now, request.timeout, request.k, request.joints, request.mass, request.load_share
+                )
+            except ValueError as error:
+                return ArmContactResponse(False, ReasonCode.INVALID_ARGUMENT, str(error))
+        when = "now" if request.mode in (IN_MOTION, LIFT, RELEASE) else "once the arm is still"
+        return ArmContactResponse(
+            True, ReasonCode.NONE, f"watching for {request.mode} for {request.timeout:.1f} s, {when}"
+        )
+
+    @staticmethod
+    def grasp_of(request) -> tuple[str, Pose] | None:
+        """The object of a request; ValueError where the pose is none."""
+        if not request.frame:
+            return None
+        p, q = request.grasp.position, request.grasp.orientation
+        grasp = pose_of(p, q)
+        if grasp is None:
+            raise ValueError(
+                f"grasp: expected a finite place and a unit quaternion, got ({p.x:g}, {p.y:g}, {p.z:g}) m and "
+                f"({q.x:g}, {q.y:g}, {q.z:g}, {q.w:g})"
+            )
+        return request.frame, grasp
+
+    def look_at_object(self) -> None:
+        """Where the palm is at the object that is reached for, as tracked."""
+        with self.lock:
+            grasp, position, velocity = self.grasp, self.position, self.velocity
+        if grasp is None or position is None or velocity is None:
+            return
+        try:
+            transform = self.buffer.lookup_transform(self.base, grasp[0], rospy.Time(0))
+        except tf2_ros.TransformException:
+            return
+        if abs((rospy.Time.now() - transform.header.stamp).to_sec()) > OLDEST_SIGHT:
+            return
+        seen = pose_of(transform.transform.translation, transform.transform.rotation)
+        if seen is None:
+            return
+        distance, angle = Pose(*self.arm.fk(np.asarray(position))).distance(seen * grasp[1])
+        speed = float(np.linalg.norm(self.arm.jacobian(np.asarray(position))[:3] @ np.asarray(velocity)))
+        now = rospy.Time.now()
+        with self.lock:
+            event = self.detector.feed_sight(self.pace.of(now.to_sec()), distance, angle, speed)
+        self.publish_event(event, now)
+
+    def on_learn_motion(self, request):
+        """True: begin to gather motions without contact, if there is a file to write. False: end it, learn, write the
+        file and use it from now on."""
+        with self.lock:
+            if request.gather:
+                why = self.no_file()
+                if why:
+                    return LearnMotionResponse(False, ReasonCode.BAD_FILE, why)
+                self.recorder = MotionRecorder(self.moving)
+                return LearnMotionResponse(
+                    True, ReasonCode.NONE, "gathering: let the arm reach, with and without objects in the hand"
+                )
+            recorder, self.recorder = self.recorder, None
+            if recorder is None:
+                return LearnMotionResponse(
+                    False, ReasonCode.NOTHING_RUNS, "nothing was gathered: call with gather true first"
+                )
+            reaches = len(recorder.reaches)
+        # Minutes of samples take seconds to learn from: meanwhile the detector goes on.
+        try:
+            thresholds = recorder.learn()
+            thresholds.save(Path(self.learnt_file))
+        except ThresholdError as error:
+            return LearnMotionResponse(False, ReasonCode.OUT_OF_RANGE, str(error))
+        except OSError as error:
+            with self.lock:
+                # A disk can be mended, the motions would have to be made anew.
+                self.recorder = self.recorder or recorder
+            return LearnMotionResponse(
+                False, ReasonCode.BAD_FILE, f"{error}; what was gathered is kept: call again with gather false"
+            )
+        with self.lock:
+            self.moving.use(thresholds)
+        return LearnMotionResponse(
+            True, ReasonCode.NONE, f"learnt from {reaches} motions, written to {self.learnt_file}"
+        )
+
+    def no_file(self) -> str:
+        """Why what is learnt could not be written, so that minutes of gathering would be in vain; else empty."""
+        if not self.learnt_file:
+            return "parameter ~learnt_file says where to write, and is not set: start with contact_learnt_file:=FILE"
+        return unwritable(self.learnt_file)
+
+    def on_learn(self, _request):
+        """Noise at rest."""
+        with self.lock:
+            try:
+                return LearnResponse(True, ReasonCode.NONE, self.detector.still.learn())
+            except ValueError as error:
+                return LearnResponse(False, ReasonCode.NODE_SILENT if self.silent() else ReasonCode.BUSY, str(error))
+
+    def on_timer(self) -> None:
+        """The object as seen; live margin and signal."""
+        self.look_at_object()
+        self.publish_signal()
+
+    def publish_signal(self) -> None:
+        """What the detector sees, once for a sample of torques, and at most every SIGNAL s."""
+        with self.lock:
+            before, stamp, sent = self.shown, self.last_sample, self.last_stamp
+            if before is not None and stamp is not None and 0.0 < stamp - before < SIGNAL:
+                return
+            self.shown = stamp
+            seen, settings = self.detector.look(), self.detector.still.settings
+            grip = None if stamp is None else self.detector.grip(stamp)
+        if seen.state == "watching":
+            publish(self.margin, Float64(seen.margin))
+        if stamp is None or stamp == before:
+            return
+        message = ContactSignal(
+            state=seen.state,
+            mode=seen.mode,
+            change=list(seen.change),
+            threshold=list(seen.threshold),
+            watched=list(seen.watched),
+            window=settings.window,
+            k=seen.k,
+            margin=seen.margin,
+            grip=math.nan if grip is None else grip,
+            rest_samples=seen.rest_samples,
+            learnt=seen.rest_samples >= settings.learn_samples,
+        )
+        message.header.stamp = sent
+        publish(self.signal, message)
+
+
+def main() -> int:
+    """Entry point."""
+    init_node("contact_detector")
+    urdf = parameters.found_above("robot_description", str)
+    if urdf is None:
+        rospy.logfatal("contact_detector: parameter robot_description is missing; load lwr_description's URDF")
+        return 1
+    try:
+        ContactDetectorNode(urdf)
+    except (parameters.ParameterError, FramesError, ThresholdError, YamlError, OSError) as error:
+        rospy.logfatal("contact_detector: %s", error)
+        return 1
+    return steady.spin()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""Contact, load and release, from torques, fingers, touch and sight."""

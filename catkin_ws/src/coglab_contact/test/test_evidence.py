@@ -1,0 +1,272 @@
+"""Evidence of contact, grip and load: each source at its edges, and when all of it together decides."""
+
+import math
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from coglab_contact.detector import ContactDetector, DetectorSettings
+from coglab_contact.evidence import (
+    MOMENTUM,
+    SIGHT,
+    Evidence,
+    Fingers,
+    InPalm,
+    Touch,
+    probability,
+    together,
+)
+from coglab_contact.fused_detector import IN_MOTION, LIFT, RELEASE, FusedDetector
+from coglab_contact.load import GripAndLoad, LeavingLoad
+from coglab_msgs.msg import ReasonCode
+
+
+@dataclass
+class Motor:
+    """As MotorStatus."""
+
+    position: int = 40
+    current: int = 0
+    force: int = 5
+    moving: bool = False
+    target_reached: bool = False
+    over_current: bool = False
+
+
+def test_a_source_at_its_threshold_is_sure_to_99_in_100():
+    assert [probability(m) for m in (1.0, 0.8, 0.6)] == pytest.approx([0.99, 0.8998, 0.4490], abs=1e-3)
+    assert probability(0.0) == pytest.approx(6.08e-4, rel=1e-2) and probability(50.0) == 1.0
+    two = [Evidence(name, 0.0, 1.0, 0.6) for name in (MOMENTUM, SIGHT)]
+    assert together(two) == pytest.approx(1.0 - (1.0 - 0.4490) ** 2, abs=1e-3) and together([]) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("newton", "deviation", "margin"),
+    [(0.5, 0.0, 1.0), (0.25, 0.0, 0.5), (0.6, 0.1, 1.0), (0.6, 0.05, 1.2), (0.5, -1.0, 1.0), (0.5, math.nan, 1.0)],
+)
+def test_touch_counts_from_half_a_newton_or_six_deviations(newton, deviation, margin):
+    touch, forces = Touch(), [[0.0, 0.0, 0.0], [0.6 * newton, 0.0, -0.8 * newton]]
+    assert touch.feed(1.0, forces, deviation).margin == 0.0, "one sample is none"
+    second = touch.feed(1.01, forces, deviation)
+    assert second.margin == pytest.approx(margin) and second.until == pytest.approx(1.06)
+    assert second.message == f"{newton:.1f} N on the hand's touch sensors"
+    assert touch.feed(1.02, [[0.1, 0.0, 0.0]]).margin == pytest.approx(0.2), "the smaller one of two in a row"
+    touch.reset()
+    assert touch.feed(1.03, forces).margin == 0.0
+    for nothing in ([], [[math.nan, 0.0, 0.0]], [[math.inf, 0.0, 0.0]]):
+        assert touch.feed(1.04, nothing) is None
+    assert touch.feed(math.nan, forces) is None
+
+
+@pytest.mark.parametrize(
+    ("distance", "degrees", "speed", "seen"),
+    [
+        (0.0149, 19.9, 0.0299, True),
+        (0.0151, 0.0, 0.0, False),
+        (0.0, 20.1, 0.0, False),
+        (0.0, 0.0, 0.031, False),
+    ],
+)
+def test_an_object_is_seen_in_the_palm(distance, degrees, speed, seen):
+    palm = InPalm()
+    found = [palm.feed(0.03 * k, distance, math.radians(degrees), speed) for k in range(6)]
+    assert [each.margin for each in found] == [0.0] * 4 + [1.0 if seen else 0.0] * 2, "for 0.12 s"
+    assert found[5].until == pytest.approx(0.15 + 0.12)
+    assert palm.feed(0.05, distance, 0.0, 0.0).margin == 0.0, "a clock that was set begins anew"
+    for bad in range(4):
+        assert palm.feed(*[math.nan if k == bad else 1.0 for k in range(4)]) is None
+
+
+@pytest.mark.parametrize(
+    ("change", "margin", "word"),
+    [
+        ({"position": 48}, 1.0, "moved"),
+        ({"position": 36}, 0.5, "moved"),
+        ({"force": 25}, 1.0, "is strained"),
+        ({"force": 15}, 0.5, "is strained"),
+        ({"force": -9}, 0.25, "is strained"),
+        ({"current": 59}, 0.0, ""),
+    ],
+)
+def test_what_a_standing_motor_shows(change, margin, word):
+    """8 counts of way, 20 of tension; of a current nothing with the first status."""
+    fingers = Fingers()
+    first = fingers.feed(2.0, [Motor(), Motor()])
+    assert first.margin == 0.0 and first.until == pytest.approx(2.4)
+    shown = fingers.feed(2.1, [Motor(), Motor(**change)])
+    assert shown.margin == pytest.approx(margin)
+    assert shown.message == (f"motor 1 of the hand stands and {word}" if word else "")
+    assert fingers.feed(2.2, []) is None
+
+
+def test_a_current_of_60_counts_that_stays_counts():
+    for current, margin in ((59, 0.0), (60, 1.0), (90, 1.5)):
+        fingers = Fingers()
+        fingers.feed(0.0, [Motor(current=10)])
+        assert fingers.feed(0.1, [Motor(current=10 + current)]).margin == 0.0
+        assert fingers.feed(0.2, [Motor(current=10 + current)]).margin == pytest.approx(margin)
+        assert fingers.feed(0.3, [Motor(current=10)]).margin == 0.0
+        assert fingers.feed(0.4, [Motor(current=10 + current)]).margin == 0.0, "it has gone meanwhile"
+
+
+def test_a_finger_that_stops_before_its_target_is_a_contact_and_stands_for_itself_then():
+    fingers = Fingers()
+    fingers.feed(0.0, [Motor(moving=True)])
+    stopped = fingers.feed(0.1, [Motor(position=90, over_current=True)])
+    assert stopped.margin == pytest.approx(1.2)
+    assert stopped.message == "motor 0 of the hand stopped before its target"
+    assert fingers.feed(0.2, [Motor(position=90, over_current=True)]).margin == 0.0, "said once"
+    for end in ({"target_reached": True, "over_current": True}, {"over_current": False}):
+        fingers = Fingers()
+        fingers.feed(0.0, [Motor(moving=True)])
+        assert fingers.feed(0.1, [Motor(position=90, **end)]).margin == 0.0
+
+
+def held(**rest):
+    return GripAndLoad(lambda q: np.eye(3), **rest)
+
+
+@pytest.mark.parametrize(("differs", "share"), [(0.49, 0.0), (-0.49, 0.0), (0.51, 0.51), (-0.51, -0.51)])
+def test_half_a_newton_between_postures_is_the_models_error(differs, share):
+    load = LeavingLoad(0.5, 0.5, 100.0, 5.0)
+    for k in range(30):
+        load.feed(0.005 * k, 5.0 - differs, True, False)
+    assert load.share * load.weight == pytest.approx(share)
+
+
+def test_a_share_has_to_be_gone_for_50_ms_and_a_fresh_estimate_begins_anew():
+    load = LeavingLoad(1.0, 0.5, 100.0, 9.81)
+    said = [load.feed(0.01 * k, 4.9, False, False) for k in range(12)]
+    assert said.index(True) == 5 and sum(said) == 1
+    load = LeavingLoad(1.0, 0.5, 100.0, 9.81)
+    for k in range(4):
+        assert not load.feed(0.01 * k, 4.9, False, False)
+    assert not load.feed(0.04, None, False, False), "nothing tells"
+    assert not any(load.feed(0.05 + 0.01 * k, 4.9, False, False) for k in range(5))
+    assert load.feed(0.101, 4.9, False, False)
+    load.feed(0.2, None, False, True)
+    assert load.share is None, "nothing is known of the gap"
+    for k in range(25):
+        load.feed(0.21 + 0.005 * k, 3.0, True, False)
+    assert load.share == pytest.approx((9.81 - 3.0) / 9.81), "what somebody carried before it is theirs"
+
+
+class Moving:
+    """In the place of the moving arm's model: tells what the test says."""
+
+    def __init__(self):
+        self.load, self.hangs, self.fresh, self.change = 0.0, 0.0, False, object()
+        self.residual = self.told = self.before = None
+        self.payloads = []
+
+    def feed(self, stamp, position, torque, made=None):
+        self.residual = SimpleNamespace(torque=np.full(7, self.hangs), position=np.zeros(7), fresh=self.fresh)
+
+    def weight_since(self, before):
+        return float(self.hangs - before[0])
+
+    def weight(self, residual, position):
+        return self.hangs
+
+    def set_payload(self, mass, centre):
+        self.load = mass
+        self.payloads.append((mass, tuple(centre)))
+
+    weight_before_motion = before_motion = lambda self: self.before
+    slow = still = lambda self: True
+    steady = lambda self: None  # noqa: E731
+    evidence = lambda self: self.told  # noqa: E731
+    force_since = lambda self, before: np.full(3, self.hangs) - before[:3]  # noqa: E731
+
+
+def fused():
+    moving = Moving()
+    return FusedDetector(ContactDetector(DetectorSettings(), lambda q: np.zeros((3, 7))), moving), moving
+
+
+def measured(detector, begin, end, step=0.01):
+    """Fed so long; (event, its time)."""
+    for k in range(round((end - begin) / step)):
+        event = detector.feed_measured(begin + step * k, np.zeros(7), np.zeros(7))
+        if event is not None:
+            return event, begin + step * k
+    return None, end
+
+
+def test_a_lift_is_counted_from_a_tenth_of_a_second_and_has_to_last_60_ms():
+    detector, moving = fused()
+    moving.hangs = 1.0
+    detector.arm(LIFT, 0.0, 5.0, mass=0.8)
+    assert measured(detector, 0.0, 0.2)[0] is None
+    needed = 0.5 * 0.8 * 9.81
+    moving.hangs = 1.0 + 0.99 * needed
+    assert measured(detector, 0.2, 0.5)[0] is None
+    moving.hangs = 1.0 + 1.01 * needed
+    assert measured(detector, 0.5, 0.55)[0] is None
+    event, when = measured(detector, 0.55, 1.0)
+    assert when == pytest.approx(0.56) and event.contact and event.code == ReasonCode.LOAD_CARRIED
+    assert event.margin == pytest.approx(1.01) and event.confidence == pytest.approx(probability(1.01))
+    assert moving.payloads == [(0.8, (0.04, 0.0, 0.0))], "carried where the fingers hold it"
+    assert detector.state() == "off"
+
+
+@pytest.mark.parametrize("mode", [LIFT, IN_MOTION, RELEASE])
+def test_an_arming_ends_with_its_time(mode):
+    detector, moving = fused()
+    moving.before = np.zeros(7) if mode != RELEASE else 0.0
+    detector.arm(mode, 0.0, 1.0, mass=0.5)
+    moving.told = Evidence(MOMENTUM, 0.0, 9.0, 0.1)
+    measured(detector, 0.0, 0.995)
+    assert detector.state() == "watching"
+    measured(detector, 1.01, 1.05)
+    assert detector.state() != "watching"
+    moving.told = Evidence(MOMENTUM, 0.0, 9.0, 2.0)
+    assert measured(detector, 1.05, 1.2)[0] is None
+
+
+@pytest.mark.parametrize("jump", [-100.0, 1.5])
+def test_a_clock_that_was_set_leaves_an_arming_its_time(jump):
+    detector, moving = fused()
+    detector.arm(IN_MOTION, 0.0, 1.0)
+    moving.told = Evidence(MOMENTUM, 0.0, 1e6, 0.5)
+    measured(detector, 0.0, 0.5)
+    measured(detector, 0.5 + jump, 0.95 + jump)
+    assert detector.state() == "watching"
+    measured(detector, 1.05 + jump, 1.1 + jump)
+    assert detector.state() != "watching"
+
+
+def test_a_force_is_told_against_the_rest_before_the_reach():
+    detector, moving = fused()
+    moving.change = None
+    detector.arm(IN_MOTION, 0.0, 1.0)
+    assert detector.state() == "waiting", "too little of a past"
+    detector, moving = fused()
+    assert detector.force() is None
+    moving.before, moving.hangs = np.full(7, 0.5), 2.0
+    detector.arm("contact", 0.0, 1.0)
+    assert detector.force() is None
+    detector.arm(IN_MOTION, 0.0, 1.0)
+    assert detector.force() == pytest.approx([1.5] * 3)
+    detector.disarm()
+    assert detector.force() == pytest.approx([1.5] * 3), "whether somebody watches or not"
+
+
+def test_a_release_tells_its_share_and_its_margin():
+    detector, moving = fused()
+    moving.hangs = moving.before = 0.5 * 9.81
+    detector.arm(RELEASE, 0.0, 5.0, mass=0.5, load_share=0.8)
+    assert detector.state() == "waiting" and detector.share_gone() is None
+    measured(detector, 0.0, 0.2)
+    assert detector.state() == "watching" and detector.share_gone() == pytest.approx(0.0)
+    moving.hangs = 0.6 * 0.5 * 9.81
+    assert measured(detector, 0.2, 0.5)[0] is None
+    seen = detector.look()
+    assert (seen.mode, seen.state) == (RELEASE, "watching") and seen.margin == pytest.approx(0.5)
+    assert detector.margin == pytest.approx(0.5)
+    moving.hangs = 0.1 * 0.5 * 9.81
+    event, when = measured(detector, 0.5, 1.0)
+    assert when == pytest.approx(0.55) and not event.contact and event.source == MOMENTUM
+    assert event.message == f"{0.9 * 0.5 * 9.81:.1f} N of the load are gone (needed {0.8 * 0.5 * 9.81:.1f} N)"
+    assert detector.share_gone() == pytest.approx(0.9), "told until the watch ends"

@@ -1,0 +1,331 @@
+"""The contact detector node without a ROS master: what it makes of messages, publishes, answers and learns."""
+
+import importlib.util
+import math
+import threading
+import time
+from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import MagicMock
+
+import numpy as np
+import pytest
+import rospy
+import tf2_ros
+from arms import ARM, SHIPPED
+from coglab_contact.motion_thresholds import Thresholds
+from coglab_contact.moving_contact import MotionRecorder, unwritable
+from coglab_msgs.msg import FingertipForces, HandStatus, ReasonCode
+from coglab_msgs.srv import ArmContactRequest, LearnMotionRequest
+from coglab_py.pace import Pace
+from coglab_py.pose import Pose
+from geometry_msgs.msg import Quaternion, TransformStamped
+from sensor_msgs.msg import JointState
+
+SCRIPT = Path(__file__).resolve().parents[1] / "scripts" / "contact_detector_node.py"
+JOINTS = [f"j{i}" for i in range(7)]
+ZERO = [0.0] * 7
+BEGIN, END = LearnMotionRequest(gather=True), LearnMotionRequest(gather=False)
+
+
+def script():
+    spec = importlib.util.spec_from_file_location("contact_detector_node", SCRIPT)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+class Detector:
+    """In the place of the FusedDetector: keeps what it is fed with."""
+
+    def __init__(self):
+        self.fed, self.holds, self.payload, self.armed = [], False, None, None
+        self.seen = SimpleNamespace(state="watching", mode="contact", change=ZERO, threshold=ZERO, watched=[True] * 7)
+        self.seen.k, self.seen.margin, self.seen.rest_samples = 6.0, 0.4, 99
+        settings = SimpleNamespace(window=0.04, learn_samples=100)
+        self.still = SimpleNamespace(settings=settings, learn=lambda: "learning")
+        self.pull, self.gone, self.event = None, None, None
+        self.share_gone, self.force, self.look = lambda: self.gone, lambda: self.pull, lambda: self.seen
+        self.grip = lambda now: 3.0 if now > 5.0 else None
+        self.disarm = lambda: self.fed.append("disarm")
+        self.set_payload = lambda mass: setattr(self, "payload", mass)
+
+    def __getattr__(self, name):
+        if not name.startswith("feed"):
+            raise AttributeError(name)
+        return lambda *what: self.fed.append((name, *what)) or self.event
+
+    def arm(self, *request):
+        if request[0] == "juggle":
+            raise ValueError("mode is none")
+        self.armed = request
+
+
+@pytest.fixture
+def node(monkeypatch, tmp_path):
+    """The node without ROS; ``sent``: what it publishes, by publisher; what it learns are the shipped thresholds."""
+    module = script()
+    made = module.ContactDetectorNode.__new__(module.ContactDetectorNode)
+    made.pace, made.last_stamp = Pace(), rospy.Time()
+    made.joints, made.position, made.velocity, made.joint_stamp = JOINTS, None, None, 0.0
+    made.lock, made.last_sample, made.recorder, made.force_stamp = threading.Lock(), None, None, 0.0
+    made.detector, made.base, made.grasp, made.shown = Detector(), "world", None, None
+    made.heard = -math.inf
+    made.moving = MagicMock(load=0.0)
+    made.learnt_file = str(tmp_path / "learnt.yaml")
+    monkeypatch.setattr(MotionRecorder, "learn", lambda self: Thresholds.load(SHIPPED))
+    made.torques, made.arm = SimpleNamespace(resolved_name="/lwr/external_torques"), ARM
+    made.sent, made.said = [], []
+    for name in ("publisher", "margin", "signal", "force"):
+        setattr(made, name, name)
+    monkeypatch.setattr(module, "publish", lambda to, message: made.sent.append((to, message)))
+    monkeypatch.setattr(rospy, "loginfo", lambda *words: None)
+    monkeypatch.setattr(rospy, "logwarn_throttle", lambda *words: made.said.append(words))
+    made.now = 10.0
+    monkeypatch.setattr(rospy.Time, "now", staticmethod(lambda: rospy.Time.from_sec(made.now)))
+    made.pose_of = module.pose_of
+    return made
+
+
+def joints(stamp, position=0.0, velocity=(), effort=(), names=JOINTS):
+    message = JointState(name=names, position=[position] * len(names), velocity=list(velocity), effort=list(effort))
+    message.header.stamp = rospy.Time.from_sec(stamp)
+    return message
+
+
+def test_velocities_are_those_of_the_message_or_of_two_positions(node):
+    node.on_joints(joints(1.0, 0.1))
+    assert node.velocity is None and node.position == [0.1] * 7
+    node.on_joints(joints(1.5, 0.2))
+    assert node.velocity == pytest.approx([0.2] * 7)
+    node.on_joints(joints(1.5, 0.3))
+    assert node.velocity is None, "no time has passed"
+    node.on_joints(joints(2.0, 0.3, velocity=[0.5] * 7))
+    assert node.velocity == [0.5] * 7 and node.detector.fed == []
+    for bad in (joints(3.0, 9.0, names=JOINTS[1:]), JointState(name=JOINTS, position=[9.0] * 6)):
+        node.on_joints(bad)
+        assert node.position == [0.3] * 7
+    mixed = joints(4.0, names=[*JOINTS[::-1], "more"])
+    mixed.position = [*[float(k) for k in range(7)], 99.0]
+    mixed.effort = mixed.position
+    node.on_joints(mixed)
+    assert node.detector.fed == [
+        ("feed_measured", 4.0, [6.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.0], [6, 5, 4, 3, 2, 1, 0], None)
+    ]
+
+
+def test_torques_count_once_the_joints_are_known(node):
+    node.on_torques(joints(1.0, effort=ZERO))
+    node.position = ZERO
+    node.on_torques(joints(1.0, effort=ZERO))
+    assert node.detector.fed == [] and node.last_sample is None
+    node.velocity = ZERO
+    node.on_torques(joints(1.0, effort=[0.0] * 6))
+    assert node.last_sample is None
+    event = SimpleNamespace(source="s", contact=True, margin=2.0, confidence=0.75, code=5, message="m")
+    node.detector.event = event
+    node.on_torques(joints(1.0, effort=ZERO))
+    ((to, told),) = node.sent
+    assert (to, told.source, told.contact, told.margin, told.confidence) == ("publisher", "s", True, 2.0, 0.75)
+    assert (told.reason_code, told.message, told.header.stamp.to_sec()) == (5, "m", 1.0) and node.last_sample == 1.0
+
+
+@pytest.mark.parametrize(
+    ("connected", "holding", "load", "holds", "payload"),
+    [
+        (True, True, 0.3, True, None),
+        (True, False, 0.3, False, 0.0),
+        (True, False, 0.0, False, None),
+        (False, False, 0.3, False, None),
+        (False, True, 0.3, False, None),
+    ],
+)
+def test_an_empty_hand_carries_nothing(node, connected, holding, load, holds, payload):
+    node.moving.load = load
+    message = SimpleNamespace(connected=connected, holding=holding, motors=["m"], header=joints(1.0).header, _type="x")
+    node.on_hand(message)
+    assert (node.detector.holds, node.detector.payload) == (holds, payload)
+    assert node.detector.fed == [("feed_hand", 1.0, ["m"])]
+
+
+def test_touch_of_fingers_and_palm_and_the_signal_that_fingers_follow(node):
+    at = lambda x: SimpleNamespace(x=x, y=0.0, z=1.0)  # noqa: E731
+    message = SimpleNamespace(forces=[at(1.0), at(2.0)], palm=at(3.0), deviation=0.05, header=joints(1.0).header)
+    node.on_touch(message)
+    assert node.detector.fed == [("feed_touch", 1.0, [(1.0, 0.0, 1.0), (2.0, 0.0, 1.0), (3.0, 0.0, 1.0)], 0.05)]
+    assert node.sent == []
+    node.detector.gone, node.last_sample = 0.0, 1.0
+    node.on_touch(message)
+    assert [to for to, _ in node.sent] == ["margin", "signal"]
+    node.on_state(SimpleNamespace(cycle_time=0.005))
+    assert node.moving.observer.period == 0.005
+
+
+def test_a_signal_is_told_once_for_a_sample_and_every_ten_milliseconds_at_most(node):
+    node.publish_signal()
+    assert [to for to, _ in node.sent] == ["margin"], "no torques have come"
+    for stamp in (6.0, 6.0, 6.005, 6.011):
+        node.last_sample, node.last_stamp = stamp, rospy.Time.from_sec(stamp)
+        node.publish_signal()
+    signals = [message for to, message in node.sent if to == "signal"]
+    assert [round(s.header.stamp.to_sec(), 3) for s in signals] == [6.0, 6.011]
+    assert (signals[0].margin, signals[0].window, signals[0].k, signals[0].grip) == (0.4, 0.04, 6.0, 3.0)
+    assert signals[0].rest_samples == 99 and not signals[0].learnt
+    node.detector.seen.rest_samples, node.detector.seen.state, node.last_sample = 100, "off", 3.0
+    before = len([to for to, _ in node.sent if to == "margin"])
+    node.publish_signal()
+    assert node.sent[-1][1].learnt and math.isnan(node.sent[-1][1].grip)
+    assert len([to for to, _ in node.sent if to == "margin"]) == before, "it does not watch"
+
+
+def request(mode="contact", **fields):
+    message = ArmContactRequest(mode=mode, timeout=6.0, k=1.0, joints=[2], mass=0.3, load_share=0.4, **fields)
+    message.grasp.orientation.w = 1.0
+    return message
+
+
+def test_arming(node):
+    assert node.silent()
+    refused = node.on_arm(request())
+    assert (refused.success, refused.reason_code) == (False, ReasonCode.NODE_SILENT)
+    node.last_sample = 9.5
+    for age, silent in ((1.1, True), (0.0, False)):  # by the steady clock: that of the stamps may be set
+        node.heard = time.monotonic() - age
+        assert node.silent() == silent, age
+        assert node.on_arm(request()).success is not silent
+    for mode, when in (("contact", "once the arm is still"), ("load", "once the arm is still"), ("lift", "now")):
+        assert node.on_arm(request(mode)).message == f"watching for {mode} for 6.0 s, {when}"
+    assert node.detector.armed[:3] == ("lift", 9.5, 6.0) and list(node.detector.armed[4]) == [2]
+    assert [round(v, 3) for v in (node.detector.armed[3], *node.detector.armed[5:])] == [1.0, 0.3, 0.4]
+    bad = node.on_arm(request("juggle"))
+    assert (bad.success, bad.reason_code, bad.message) == (False, ReasonCode.INVALID_ARGUMENT, "mode is none")
+    assert node.on_arm(request(frame="object_mug")).success and node.grasp[0] == "object_mug"
+    off = node.on_arm(request("off"))
+    assert (off.success, off.message, node.grasp, node.detector.fed) == (True, "off", None, ["disarm"])
+    wrong = request(frame="object_mug")
+    wrong.grasp.orientation.w = 2.0
+    assert node.on_arm(wrong).reason_code == ReasonCode.INVALID_ARGUMENT
+
+
+@pytest.mark.parametrize(("age", "told"), [(0.14, True), (0.16, False), (-0.16, False)])
+def test_a_sight_of_the_object_tells_for_15_hundredths_of_a_second(node, age, told):
+    q = np.array([0.0, 0.5, 0.0, 1.0, 0.0, 0.5, 0.0])
+    palm = Pose(*ARM.fk(q))
+    transform = TransformStamped()
+    transform.header.stamp = rospy.Time.from_sec(10.0 - age)
+    place = transform.transform.translation
+    place.x, place.y, place.z = palm.position + [0.0, 0.03, 0.0]
+    transform.transform.rotation = Quaternion(*palm.orientation)
+    node.buffer = SimpleNamespace(lookup_transform=lambda base, frame, at: transform)
+    node.look_at_object()
+    node.grasp = ("object_mug", Pose())
+    node.look_at_object()
+    assert node.detector.fed == [], "the joints are not known yet"
+    node.position, node.velocity = list(q), [0.1, *[0.0] * 6]
+    node.look_at_object()
+    assert bool(node.detector.fed) == told
+    if told:
+        name, stamp, distance, angle, speed = node.detector.fed[0]
+        assert (name, stamp) == ("feed_sight", 10.0) and distance == pytest.approx(0.03) and angle < 1e-6
+        assert speed == pytest.approx(0.1 * np.hypot(*palm.position[:2]), rel=1e-3)
+    node.detector.fed.clear()
+    node.buffer.lookup_transform = lambda *a: (_ for _ in ()).throw(tf2_ros.TransformException("none"))
+    node.look_at_object()
+    assert node.detector.fed == []
+
+
+BEGIN, END = LearnMotionRequest(gather=True), LearnMotionRequest(gather=False)
+
+
+def answered(node, request):
+    """(success, code, sentence)"""
+    answer = node.on_learn_motion(request)
+    return answer.success, answer.reason_code, answer.message
+
+
+def test_what_is_learnt_is_written_and_used(node):
+    assert answered(node, BEGIN)[:2] == (True, ReasonCode.NONE)
+    success, code, sentence = answered(node, END)
+    assert (success, code) == (True, ReasonCode.NONE) and node.learnt_file in sentence
+    assert Thresholds.load(Path(node.learnt_file)).limit == Thresholds.load(SHIPPED).limit
+    assert node.moving.use.called and node.recorder is None
+    assert answered(node, END)[1] == ReasonCode.NOTHING_RUNS
+
+
+def test_without_a_file_nothing_is_gathered(node):
+    node.learnt_file = ""
+    success, code, sentence = answered(node, BEGIN)
+    assert (success, code, node.recorder) == (False, ReasonCode.BAD_FILE, None)
+    assert "~learnt_file" in sentence and "contact_learnt_file:=" in sentence
+
+
+@pytest.mark.parametrize("place, words", [("", "is a folder"), ("none/learnt.yaml", "is not there")])
+def test_a_file_that_cannot_be_is_refused_before_anything_is_gathered(node, tmp_path, place, words):
+    node.learnt_file = str(tmp_path / place)
+    success, code, sentence = answered(node, BEGIN)
+    assert (success, code, node.recorder) == (False, ReasonCode.BAD_FILE, None)
+    assert words in sentence and str(tmp_path) in sentence and "\n" not in sentence
+
+
+def test_what_was_gathered_outlives_a_file_that_was_not_written(node, tmp_path):
+    """The folder is gone meanwhile: it can be made again, the motions cannot."""
+    node.learnt_file = str(tmp_path / "gone" / "learnt.yaml")
+    (tmp_path / "gone").mkdir()
+    answered(node, BEGIN)
+    gathering = node.recorder
+    (tmp_path / "gone").rmdir()
+    success, code, sentence = answered(node, END)
+    assert (success, code) == (False, ReasonCode.BAD_FILE) and "call again" in sentence
+    assert node.recorder is gathering and not node.moving.use.called
+    (tmp_path / "gone").mkdir()
+    assert answered(node, END)[:2] == (True, ReasonCode.NONE)
+
+
+def test_a_file_or_folder_that_may_not_be_written(tmp_path, monkeypatch):
+    file = tmp_path / "learnt.yaml"
+    assert unwritable(str(file)) == ""
+    monkeypatch.setattr("os.access", lambda path, mode: False)
+    assert "may not be written" in unwritable(str(file)), "the folder"
+    file.write_text("")
+    assert f"{file} may not be written" in unwritable(str(file))
+
+
+def stamped(message, secs, nsecs=0):
+    """Such a message."""
+    message.header.stamp = rospy.Time()
+    message.header.stamp.secs, message.header.stamp.nsecs = secs, nsecs
+    return message
+
+
+def test_the_last_stamp_is_not_rounded_to_one_beyond_it(node):
+    node.on_torques(stamped(JointState(effort=[0.0] * 7), 2**32 - 1, 999_999_999))
+    assert node.last_sample is None
+
+
+@pytest.mark.parametrize("callback", ["on_joints", "on_torques", "on_hand", "on_touch"])
+@pytest.mark.parametrize("secs, taken", [(2**32 - 1, True), (2**32, False)])
+def test_a_stamp_that_no_message_can_carry_is_refused(node, callback, secs, taken):
+    node.position, node.velocity = ZERO, ZERO
+    message = {
+        "on_joints": JointState(name=JOINTS, position=ZERO, velocity=ZERO, effort=ZERO),
+        "on_torques": JointState(effort=ZERO),
+        "on_hand": HandStatus(),
+        "on_touch": FingertipForces(),
+    }[callback]
+    getattr(node, callback)(stamped(message, secs))
+    assert bool(node.detector.fed) is taken and len(node.said) == (not taken)
+
+
+def test_without_a_robot_description_or_with_a_bad_parameter_it_ends_with_status_1(monkeypatch):
+    module, said = script(), []
+    monkeypatch.setattr(module, "init_node", lambda name: None)
+    monkeypatch.setattr(rospy, "logfatal", lambda *words: said.append(words))
+    monkeypatch.setattr(module.parameters, "found_above", lambda name, kind: None)
+    assert module.main() == 1 and "robot_description" in said[-1][0]
+
+    def bad(*_):
+        raise module.parameters.ParameterError("no")
+
+    monkeypatch.setattr(module.parameters, "found_above", lambda name, kind: "<robot/>")
+    monkeypatch.setattr(module.ContactDetectorNode, "__init__", bad)
+    assert module.main() == 1 and len(said) == 2

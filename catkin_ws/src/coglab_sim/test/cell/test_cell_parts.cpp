@@ -1,0 +1,207 @@
+/// The small parts of the cell by themselves: its pace, random numbers, geometry, statistics,
+/// torque sensors.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "coglab_sim/cell.hpp"
+#include "coglab_sim/pace.hpp"
+#include "coglab_sim/random.hpp"
+
+namespace fri = lwr_fri_bridge::fri;
+using namespace coglab_sim;
+
+namespace {
+
+constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
+
+TEST(Pace, IsHalvedWhileTheComputerIsTooBusyAndComesBackCarefully) {
+  ComputerLoad busy, calm;
+  busy.late_steps = 0.6;
+  calm.late_steps = 0.1;
+  const auto secondsUntil = [](Pace& pace, const ComputerLoad& load, double factor) {
+    int seconds = 0;
+    while (pace.factor() != factor && seconds < 100) ++seconds, pace.update(load);
+    return seconds;
+  };
+  Pace pace(1.0);
+  EXPECT_LE(secondsUntil(pace, busy, 0.5), 3);
+  EXPECT_LE(secondsUntil(pace, busy, 0.25), 3);
+  for (int i = 0; i < 20; ++i) pace.update(busy);
+  EXPECT_EQ(pace.factor(), 0.25) << "not slower than a quarter";
+  EXPECT_TRUE(pace.busy());
+  const int first = secondsUntil(pace, calm, 0.5);
+  EXPECT_LE(secondsUntil(pace, busy, 0.25), 3);
+  EXPECT_GT(secondsUntil(pace, calm, 0.5), first) << "more careful after it was too early";
+  secondsUntil(pace, calm, 1.0);
+  EXPECT_EQ(pace.factor(), 1.0);
+  EXPECT_FALSE(pace.busy());
+
+  Pace fast(2.0);
+  for (int i = 0; i < 10; ++i) fast.update(busy);
+  EXPECT_EQ(fast.factor(), 2.0);
+}
+
+}  // namespace
+
+TEST(Random, MomentsAndReproducibility) {
+  Random a(7), b(7), c(8);
+  double sum = 0.0, square = 0.0;
+  int equal = 0;
+  constexpr int kDraws = 200000;
+  for (int i = 0; i < kDraws; ++i) {
+    const double value = a.normal();
+    EXPECT_EQ(value, b.normal());
+    equal += value == c.normal() ? 1 : 0;
+    sum += value;
+    square += value * value;
+  }
+  EXPECT_EQ(equal, 0);
+  EXPECT_NEAR(sum / kDraws, 0.0, 0.01);
+  EXPECT_NEAR(square / kDraws, 1.0, 0.02);
+}
+
+/// The estimate stays aside by the hysteresis after a movement, on the side of the movement.
+TEST(TorqueSensor, TheEstimateKeepsTheSideOfTheLastMovement) {
+  TorqueNoise noise;
+  noise.sigma = noise.bias = 0.0;
+  noise.hysteresis = 0.3;
+  TorqueSensor sensor(noise, 1);
+  const Vector7 ideal = Vector7::LinSpaced(-3.0, 3.0), posture = Vector7::Zero();
+  const Vector7 at_rest = sensor.external(ideal, posture), measured = sensor.measured(ideal);
+  const auto aside = [&] { return Vector7(sensor.external(ideal, posture) - at_rest); };
+  Vector7 velocity = Vector7::Zero();
+  velocity[1] = 0.1;
+  velocity[4] = -0.1;
+  Vector7 expected = Vector7::Zero();
+  expected[1] = 0.3;
+  expected[4] = -0.3;
+  for (int direction : {1, -1}) {
+    for (int i = 0; i < 400; ++i) sensor.advance(direction * velocity, 0.001);
+    EXPECT_LT((aside() - direction * expected).cwiseAbs().maxCoeff(), 1e-3) << direction;
+    for (int i = 0; i < 400; ++i) sensor.advance(Vector7::Zero(), 0.001);
+    EXPECT_LT((aside() - direction * expected).cwiseAbs().maxCoeff(), 1e-3) << "after the stop";
+  }
+  // It reverses over hysteresis_speed: far below that the side changes slowly.
+  sensor.advance(0.01 * noise.hysteresis_speed / 0.1 * velocity, 0.001);
+  EXPECT_LT((aside() + expected).cwiseAbs().maxCoeff(), 0.02);
+  EXPECT_EQ(sensor.measured(ideal), measured);  // the joint torque itself has none
+}
+
+/// The published reference: pcg32 with seed 42 and stream 54.
+TEST(Random, IsThePublishedGenerator) {
+  Random random(42, 54);
+  for (const std::uint32_t expected :
+       {0xa15c02b7U, 0x7b47f409U, 0xba1d3330U, 0x83d2f293U, 0xbfa4784bU, 0xcbed606eU})
+    EXPECT_EQ(random.next(), expected);
+  Random uniform(42, 54);
+  EXPECT_DOUBLE_EQ(uniform.uniform(), 0xa15c02b7U / 4294967296.0);
+  EXPECT_NE(Random(7).next(), Random(7, 1).next());
+  Random plain(7), same(7, 0);
+  EXPECT_EQ(plain.next(), same.next());
+}
+
+TEST(Geometry, PosesAndTwists) {
+  const Pose turned{Vector3d(1, 2, 3), Quaterniond(Eigen::AngleAxisd(M_PI / 2, Vector3d::UnitZ()))};
+  EXPECT_LT((turned * Vector3d(1, 0, 0) - Vector3d(1, 3, 3)).norm(), 1e-12);
+  const Pose both = turned * Pose{Vector3d(0, 1, 0), turned.rotation};
+  EXPECT_LT((both.position - Vector3d(0, 2, 3)).norm(), 1e-12);
+  EXPECT_NEAR(std::abs(both.rotation.z()), 1.0, 1e-12);
+  const Pose back = turned.inverse() * turned;
+  EXPECT_LT(back.position.norm(), 1e-12);
+  EXPECT_NEAR(std::abs(back.rotation.w()), 1.0, 1e-12);
+  EXPECT_LT((turned.inverse() * Vector3d(1, 3, 3) - Vector3d(1, 0, 0)).norm(), 1e-12);
+  const Twist twist{Vector3d(1, 0, 0), Vector3d(0, 0, 2)};
+  EXPECT_EQ(twist.at(Vector3d(0, 3, 0)), Vector3d(-5, 0, 0));
+  Wrench wrench;
+  wrench.add(Vector3d(0, 1, 0), Vector3d(2, 0, 0));
+  wrench.add(Vector3d(0, 1, 0), Vector3d(2, 0, 0));
+  EXPECT_EQ(wrench.stacked(), (Vector6() << 0, 2, 0, 0, 0, 4).finished());
+}
+
+TEST(Geometry, TheShortWayFromOneRotationToAnother) {
+  const Quaterniond none = Quaterniond::Identity();
+  for (const double angle : {-3.1, -1.0, 0.0, 1e-7, 0.3, 3.1}) {
+    const Vector3d axis = Vector3d(1, 2, -2) / 3.0;
+    const Quaterniond turn(Eigen::AngleAxisd(angle, axis));
+    EXPECT_LT((rotationBetween(none, turn) - angle * axis).norm(), 1e-9) << angle;
+    Quaterniond same;
+    same.coeffs() = -turn.coeffs();
+    EXPECT_LT((rotationBetween(none, same) - angle * axis).norm(), 1e-9) << angle;
+    EXPECT_LT((rotationBetween(turn, none) + angle * axis).norm(), 1e-9) << angle;
+  }
+  const Quaterniond long_way(Eigen::AngleAxisd(4.0, Vector3d::UnitX()));
+  EXPECT_NEAR(rotationBetween(none, long_way).x(), 4.0 - 2.0 * M_PI, 1e-12);
+  EXPECT_EQ(rotationBetween(none, none).norm(), 0.0);
+}
+
+TEST(TorqueSensor, NoiseGrowsWithTheFastestJointAndIsCorrelated) {
+  TorqueNoise noise;
+  noise.bias = noise.offset = noise.hysteresis = 0.0;
+  const Vector7 none = Vector7::Zero();
+  for (const double speed : {0.0, 1.0}) {
+    TorqueSensor sensor(noise, 5);
+    Vector7 velocity = Vector7::Zero();
+    velocity[4] = -speed;
+    double measured = 0.0, external = 0.0, product = 0.0, apart = 0.0;
+    Vector7 before = none;
+    constexpr int kSteps = 40000;
+    for (int i = 0; i < kSteps; ++i) {
+      sensor.advance(velocity, 0.005);
+      const Vector7 now = sensor.measured(none), estimate = sensor.external(none, none);
+      measured += now.squaredNorm() / 7.0;
+      external += estimate.squaredNorm() / 7.0;
+      product += now.dot(before) / 7.0;
+      apart += now.dot(estimate) / 7.0;
+      before = now;
+    }
+    const double sigma = 0.05 * (1.0 + 7.0 * speed);
+    EXPECT_NEAR(std::sqrt(measured / kSteps), sigma, 0.03 * sigma);
+    EXPECT_NEAR(std::sqrt(external / kSteps), sigma, 0.03 * sigma);
+    EXPECT_NEAR(product / measured, std::exp(-0.5), 0.02);
+    EXPECT_NEAR(apart / measured, 0.0, 0.02);
+  }
+}
+
+TEST(TorqueSensor, TheOffsetOfTheEstimateDependsOnThePosture) {
+  TorqueNoise noise;
+  noise.sigma = noise.offset = noise.hysteresis = 0.0;
+  double largest = 0.0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const TorqueSensor sensor(noise, seed);
+    for (int joint = 0; joint < 7; ++joint) {
+      Vector7 posture = Vector7::Zero();
+      double lowest = 1.0, highest = -1.0, from = kNoNumber, crossings = 0.0;
+      for (int i = 0; i <= 4000; ++i) {
+        posture[joint] = 0.02 * i;
+        const double bias = sensor.external(Vector7::Zero(), posture)[joint];
+        lowest = std::min(lowest, bias);
+        highest = std::max(highest, bias);
+        if (from * bias < 0.0) ++crossings;
+        from = bias;
+      }
+      EXPECT_NEAR(highest, 0.4, 1e-3);
+      EXPECT_NEAR(lowest, -0.4, 1e-3);
+      // A sine of 0.5 to 1.5 rad per rad.
+      EXPECT_GE(crossings, 80.0 * 0.5 / M_PI - 1.0);
+      EXPECT_LE(crossings, 80.0 * 1.5 / M_PI + 1.0);
+      largest = std::max(largest, crossings);
+    }
+    EXPECT_EQ(sensor.measured(Vector7::Zero()).norm(), 0.0);
+  }
+  EXPECT_GT(largest, 80.0 * 1.3 / M_PI);
+}
+
+TEST(TorqueSensor, OffsetsAreAddedToTheSensorAndTakenFromTheEstimate) {
+  TorqueNoise noise;
+  noise.sigma = noise.bias = noise.hysteresis = 0.0;
+  const TorqueSensor sensor(noise, 9);
+  const Vector7 ideal = Vector7::LinSpaced(-3.0, 3.0), posture = Vector7::Ones();
+  const Vector7 offset = sensor.measured(ideal) - ideal;
+  EXPECT_LT((sensor.external(ideal, posture) - ideal + offset).norm(), 1e-12);
+  EXPECT_LT(offset.minCoeff(), 0.0);
+  EXPECT_GT(offset.maxCoeff(), 0.0);
+}

@@ -1,1 +1,0 @@
-"""Contact, load and release from joint torques."""

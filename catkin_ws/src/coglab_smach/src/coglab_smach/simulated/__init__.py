@@ -1,1 +1,0 @@
-"""Ports without ROS: a kinematic cell in which the machines run in virtual time."""

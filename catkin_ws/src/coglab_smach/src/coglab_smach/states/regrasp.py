@@ -1,0 +1,67 @@
+"""A palm that has met an object beside its grasp goes to it before the fingers close again."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from coglab_smach.context.context import Context
+from coglab_smach.context.wait_reasons import ARM
+from coglab_smach.ports.pending import Pending
+from coglab_smach.states.base import CoglabState, TimeLimit
+from coglab_smach.states.hand_tracking import way_to_grasp
+from coglab_smach.states.motion import shift, shift_time
+
+FARTHEST = 0.05  # m that the palm goes at most
+LEAST = 0.005  # m, a shorter way is not begun
+SPEED = 0.06  # m/s
+PUSHES = 6.5  # N on the palm from which something is in its way
+
+
+class Regrasp(CoglabState):
+    """Move the open hand straight to the grasp of the object that a person still holds, as it is seen now, by FARTHEST
+    at most. A reach ends with the first touch, which may come beside the grasp, and another reach would feel the same
+    touch at once. The way ends where the hand pushes, or in time. Without a sight of the object nothing moves.
+    """
+
+    default_time_limit = 6.0
+    owns_motion = True
+
+    def __init__(self, ctx: Context) -> None:
+        super().__init__(ctx, input_keys=["goal"])
+
+    def run(self, ud: Any) -> str:
+        way = way_to_grasp(self, ud.goal)
+        length = 0.0 if way is None else float(np.linalg.norm(way))
+        if way is None or length < LEAST:
+            self.reason = "the object is not seen" if way is None else "the palm is at its grasp"
+            return "succeeded"
+        way = way * min(1.0, FARTHEST / length)
+        limit = shift_time(self.ctx, way, SPEED) + 1.0
+        self.allow(limit + 3.0)
+        motion = shift(self.ctx, way, SPEED)
+        if motion is not None:
+            over = partial(self._over, motion)
+            try:
+                self.wait_for(over, "the way to the grasp", limit, self.ctx.arm.speed_scale, ARM)
+            except TimeLimit as error:
+                # Held up by something that yields as the palm comes: the fingers can close here, too.
+                self.reason = error.sentence
+            self._end(motion)
+        return "succeeded"
+
+    def _over(self, motion: Pending) -> bool:
+        return motion.done() or self._pushes()
+
+    def _pushes(self) -> bool:
+        force = self.ctx.contact.force()
+        return force is not None and float(np.linalg.norm(force)) > PUSHES
+
+    def _end(self, motion: Pending) -> None:
+        if motion.done():
+            motion.result()
+        else:
+            self.reason = self.reason or "something is in the way"
+            self.await_pending(self.ctx.arm.cancel_motion(self.reason), "end of the way to the grasp", 2.0)

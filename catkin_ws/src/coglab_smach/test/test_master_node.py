@@ -1,0 +1,140 @@
+"""The master node and the objects' tool without a ROS master: what they publish and answer."""
+
+import importlib.util
+import json
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+import rospy
+from coglab_objects.database import objects_folder
+from coglab_smach.context.journal import ActionRecord, TransitionRecord
+from coglab_smach.context.master_state import MasterState
+from coglab_smach.ports.pending import Polled, PortError, Ready
+
+SCRIPTS = Path(__file__).resolve().parents[1] / "scripts"
+
+
+def script(name):
+    spec = importlib.util.spec_from_file_location(name, SCRIPTS / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def master(monkeypatch, tmp_path):
+    module = script("master_node")
+    made = module.MasterNode.__new__(module.MasterNode)
+    made.sent, made.now = [], 100.0
+    monkeypatch.setattr(module, "publish", lambda to, message: made.sent.append((to, message)))
+    for level in ("loginfo", "logwarn", "logerr"):
+        monkeypatch.setattr(rospy, level, lambda *words, level=level: made.sent.append((level, words)))
+    monkeypatch.setattr(rospy.Time, "now", staticmethod(lambda: rospy.Time.from_sec(50.0)))
+    clock = SimpleNamespace(now=lambda: made.now, sleep=lambda s: setattr(made, "now", made.now + s))
+    made.pressed = []
+    stop = SimpleNamespace(press=made.pressed.append)
+    made.ctx = SimpleNamespace(clock=clock, stop=stop, arm=SimpleNamespace(hold=lambda why: made.hold))
+    made.states, made.transitions, made.results, made.spoken = "states", "transitions", "results", "spoken"
+    made.result_file = str(tmp_path / "results.jsonl")
+    made.stamps = SimpleNamespace(stamp=lambda steady: rospy.Time.from_sec(steady + 1000.0))
+    made.module = module
+    return made
+
+
+def test_a_deadline_of_the_steady_clock_is_told_in_the_clock_of_ros(master):
+    for deadline, told in ((0.0, 0.0), (103.5, 53.5), (99.0, 50.001)):
+        master.on_state(MasterState("s", True, ("a", "b"), "mug", "why", 3, "rain", 4, deadline))
+        message = master.sent[-1][1]
+        assert message.deadline.to_sec() == pytest.approx(told, abs=1e-6)
+    assert (message.state, message.in_hub, message.actions, message.object_id) == ("s", True, ["a", "b"], "mug")
+    assert (message.why, message.reason_code, message.waits_for, message.waits_code) == ("why", 3, "rain", 4)
+
+
+def test_stop_is_latched_whatever_the_arm_answers(master):
+    master.hold = Ready("held")
+    answer = master.on_stop(None)
+    assert answer.success and answer.message == "STOP: held; to go on type: ./coglab start reset"
+    master.hold = Polled(lambda: master.now > 101.0, lambda: "held")
+    assert master.on_stop(None).success
+    master.hold, begin = Polled(lambda: False, lambda: None), master.now
+    answer = master.on_stop(None)
+    assert not answer.success and "did not answer within 2 s: use the emergency stop" in answer.message
+    assert master.now - begin == pytest.approx(2.0, abs=0.006)
+    master.hold = Ready(error=PortError("no line"))
+    answer = master.on_stop(None)
+    assert not answer.success and answer.message == "STOP is latched in the machine, but: no line"
+    assert len(master.pressed) == 4
+
+
+def test_transitions_and_results_are_told_and_written(master):
+    for outcome, level in (
+        ("succeeded", "loginfo"),
+        ("failed", "logwarn"),
+        ("fault", "logwarn"),
+        ("stopped", "logwarn"),
+    ):
+        master.on_transition(TransitionRecord(1.0, "/m", "a", outcome, "b", "why", ("c",), 4))
+        assert master.sent[-1][0] == level
+    told = master.sent[-2][1]
+    assert (told.path, told.from_state, told.outcome, told.to_state) == ("/m", "a", "stopped", "b")
+    assert (told.reason, list(told.causes), told.reason_code) == ("why", ["c"], 4)
+    record = ActionRecord("take", "mug", 1.0, 3.5, "succeeded")
+    master.on_result(record)
+    master.on_result(record)
+    lines = Path(master.result_file).read_text().splitlines()
+    row = json.loads(lines[0])  # beside bags, and beside videos and questionnaires
+    assert (row["started_ros"], row["ended_ros"]) == (1001.0, 1003.5) and row["ended_utc"] > row["started_utc"]
+    assert len(lines) == 2 and row["duration_s"] == 2.5 and master.sent[-1][1].data == lines[0]
+    master.result_file = str(Path(master.result_file).parent)
+    master.on_result(record)
+    assert master.sent[-1][0] == "logerr"
+    master.result_file = ""
+    master.on_result(record)
+    assert master.sent[-1][0] == "results"
+    assert ActionRecord("take", "mug", 1.0).to_dict() == {
+        **{"kind": "take", "object_id": "mug", "outcome": "", "reason": "", "reason_code": 0, "causes": []},
+        **{"started": 1.0, "ended": 0.0, "duration_s": -1.0, "marks": {}},
+    }
+
+
+def test_what_is_held_is_noted_in_one_file_for_each_namespace(master, monkeypatch):
+    read = {"~state_file": ""}
+    monkeypatch.setattr(master.module.parameters, "read", lambda name, kind, default: read[name])
+    monkeypatch.setattr(master.module.rospkg, "get_ros_home", lambda: "/home/ros")
+    for namespace, name in (("/", "coglab_holding.json"), ("/two/arms/", "coglab_holding_two_arms.json")):
+        monkeypatch.setattr(rospy, "get_namespace", lambda namespace=namespace: namespace)
+        assert master.state_file() == f"/home/ros/{name}"
+    read["~state_file"] = "own.json"
+    assert master.state_file() == "own.json"
+
+
+def test_a_node_that_cannot_be_configured_ends_with_status_1(monkeypatch):
+    module, said = script("master_node"), []
+    monkeypatch.setattr(rospy, "init_node", lambda name: None)
+    monkeypatch.setattr(rospy, "logfatal", lambda *words: said.append(words))
+    monkeypatch.setattr(module.parameters, "found_above", lambda name, kind: "<robot/>")
+
+    def bad(*_):
+        raise module.parameters.ParameterError("no")
+
+    monkeypatch.setattr(module.MasterNode, "__init__", bad)
+    assert module.main() == 1 and len(said) == 1
+
+
+def test_the_objects_tool_tells_by_its_exit_status_how_it_went(monkeypatch, tmp_path, capsys):
+    tool = script("object_tool")
+    run = lambda *words: (monkeypatch.setattr("sys.argv", ["object_tool", *words]), tool.main())[1]  # noqa: E731
+    folder = ("--folder", str(tmp_path))
+    assert run("list") == 0 and "mug" in capsys.readouterr().out
+    assert run(*folder, "new", "no name!") == 2 and not list(tmp_path.iterdir())
+    assert run(*folder, "new", "cup") == 0 and run(*folder, "new", "cup") == 1
+    (tmp_path / "bad.yaml").write_text("id: bad\n")
+    capsys.readouterr()
+    assert run(*folder, "list") == 1 and "bad.yaml" in capsys.readouterr().err
+    monkeypatch.setattr(tool, "reachability_report", lambda entry: [("a line", entry["id"] != "mug")])
+    assert run(*folder, "check") == 1 and "1 problems" in capsys.readouterr().out
+    assert run(*folder, "check", "cup") == 0 and "all fine" in capsys.readouterr().out
+    (tmp_path / "mug.yaml").write_text((objects_folder() / "mug.yaml").read_text())
+    assert run(*folder, "check", "mug") == 1 and "  a line" in capsys.readouterr().out
+    assert run(*folder, "check", "mug", "bad") == 1 and "2 problems" in capsys.readouterr().out

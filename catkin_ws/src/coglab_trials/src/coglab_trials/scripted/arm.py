@@ -1,0 +1,289 @@
+"""The scripted arm: seven joints that follow minimum-jerk profiles and brake at constant deceleration.
+
+A motion goes on until its end, whoever waits for it. It ends before only by cancelling, a switch, a hold, an abort or
+the loss of command mode, and then the arm brakes. Times in s on the cell's clock, angles in rad.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from coglab_msgs.msg import ReasonCode
+from coglab_smach.kinematics.motion_time import MotionLimits, ptp_time, read_limits
+from coglab_smach.ports.interfaces import DmpProgress, DmpRequest, Verdict
+from coglab_smach.ports.pending import Pending, Polled, PortError, ending_motion
+
+if TYPE_CHECKING:
+    from coglab_trials.scripted.cell import ScriptedCell
+
+REACH = np.array([0.9, -0.5, 0.3, -0.4, 0.5, -0.6, 0.4])
+"""rad, what a reach adds to the posture it starts from; and back, from where it has ended"""
+REACH_LENGTH = 0.45  # m
+SILENT = Verdict(False, "/lwr/state is silent", ReasonCode.NODE_SILENT)
+
+
+class ScriptedArm:
+    """ArmPort of a ScriptedCell."""
+
+    def __init__(self, cell: ScriptedCell) -> None:
+        self._cell = cell
+        self.limits: MotionLimits = read_limits({})
+        self.scale = 1.0
+        """speed scale"""
+        self.reach_time = 1.3
+        self.active = ""
+        self.enabled = self.held = False
+        self.profile, self.profile_since = "", 0.0
+        self.request: DmpRequest | None = None
+        self.dmp = self._heard = DmpProgress()
+        self.motion_started: float | None = None
+        """when the DMP motion began that runs now or has ended last; None: none since the last switch"""
+        self._start = self._end = np.full(7, 0.3)
+        self._t0 = self._duration = 0.0
+        self._braking = self._reached_out = False
+        self._queue: list[tuple[object, np.ndarray, Sequence[float]]] = []
+        """point-to-point motions that run (the first) or wait: identity, target, speeds"""
+        self._ended: dict[object, PortError | None] = {}
+
+    # ---- where it is
+
+    def _share(self) -> tuple[float, float]:
+        """(share of the way that is covered, its rate in 1/s) now."""
+        s = (self._cell.clock.now() - self._t0) / self._duration if self._duration > 0.0 else 1.0
+        if s >= 1.0:
+            return 1.0, 0.0
+        if self._braking:
+            return 2.0 * s - s * s, 2.0 * (1.0 - s) / self._duration
+        return s**3 * (10.0 - 15.0 * s + 6.0 * s * s), 30.0 * s * s * (1.0 - s) ** 2 / self._duration
+
+    def position(self) -> tuple[float, ...]:
+        """True joint positions, rad."""
+        share = self._share()[0]
+        return tuple(map(float, self._end if share >= 1.0 else self._start + share * (self._end - self._start)))
+
+    def velocity(self) -> np.ndarray:
+        """True joint velocities, rad/s."""
+        return self._share()[1] * (self._end - self._start)
+
+    def _go(self, target: np.ndarray, duration: float) -> None:
+        self._start, self._end = np.array(self.position()), np.asarray(target, dtype=float)
+        self._t0, self._duration, self._braking = self._cell.clock.now(), duration / max(self.scale, 1e-3), False
+
+    def _brake(self) -> None:
+        velocity = self.velocity()
+        if self._braking or not np.any(velocity):
+            return
+        duration = float(np.max(np.abs(velocity) / np.asarray(self.limits.acceleration)))
+        here = np.array(self.position())
+        self._start, self._end = here, here + 0.5 * duration * velocity
+        self._t0, self._duration, self._braking = self._cell.clock.now(), duration, True
+
+    # ---- what moves it
+
+    def follow(self) -> None:
+        """What has happened since the last look: a motion at its end, a block, an abort."""
+        if "arm" in self._cell.faults.dead:
+            self.enabled = False  # without answers the robot controller brakes and leaves command mode
+        why, code = self._blocked()
+        if code:
+            self.end(f"the robot stopped the motion: {why}", code)
+        over = self._cell.clock.now() >= self._t0 + self._duration
+        if self._queue and over:
+            self._ended[self._queue.pop(0)[0]] = None
+            self._begin_ptp()
+        if self.dmp.state == "running":
+            self._follow_dmp(over)
+
+    def _follow_dmp(self, over: bool) -> None:
+        faults = self._cell.faults
+        assert self.motion_started is not None and self.request is not None
+        if faults.abort_dmp_after and self._cell.clock.now() - self.motion_started >= faults.abort_dmp_after:
+            self.end(faults.abort_reason, ReasonCode.GOAL_LOST)
+            return
+        left = 1.0 - self._share()[0]
+        self.dmp = DmpProgress(
+            "reached" if over else "running",
+            primitive_id=self.request.primitive_id,
+            phase=left,
+            remaining_distance=REACH_LENGTH * left,
+            remaining_time=left * self.reach_time * self.request.dmp_ratio,
+        )
+        self._reached_out = self._reached_out or over
+
+    def _blocked(self) -> tuple[str, int]:
+        """Why the arm may not move, and its code; 0 if it may."""
+        if self._cell.faults.arm_disabled:
+            return self._cell.faults.arm_disabled, ReasonCode.NOT_IN_COMMAND_MODE
+        if self.held:
+            return "hold is latched; reset first", ReasonCode.HELD
+        return ("", 0) if self.enabled else ("command mode was not asked for", ReasonCode.NOT_STARTED)
+
+    def end(self, reason: str, code: int) -> None:
+        """End what runs and what waits; the arm brakes."""
+        for identity, _, _ in self._queue:
+            self._ended[identity] = PortError("the point-to-point motion ended before its target", (reason,), code)
+        self._queue = []
+        if self.dmp.state == "running":
+            self.dmp = replace(self.dmp, state="aborted", reason=reason, code=code, remaining_time=0.0)
+        self._brake()
+
+    def _require(self, controller_id: str) -> None:
+        """PortError where this controller may not move the arm now."""
+        if self.active != controller_id:
+            raise PortError(f"refused: '{self.active}' is the active controller", code=ReasonCode.NOT_ACTIVE)
+        why, code = self._blocked()
+        if code:
+            raise PortError(f"refused: {why}", code=code)
+
+    # ---- ArmPort
+
+    def _ask(self, method: str, after: float, act: Callable[[], Any]) -> Pending:
+        return self._cell.answer("arm", method, after, act)
+
+    def load_controller(self, controller_id: str, controller_type: str) -> Pending:
+        return self._ask("load_controller", 0.1, lambda: self._cell.loaded.update({controller_id: controller_type}))
+
+    def load_dmps(self, filename: str) -> Pending:
+        return self._ask("load_dmps", 0.1, lambda: 5)
+
+    def lwr_command(self, event: str) -> Pending:
+        def act() -> str:
+            if event == "start" and self.held:
+                raise PortError("'start' refused: hold is latched; send reset first", code=ReasonCode.HELD)
+            self.enabled = event == "start" or (self.enabled and event != "stop")
+            self.held = event == "hold" or (self.held and event != "reset")
+            return event
+
+        return self._ask(f"lwr {event}", 0.05, act)
+
+    def hold(self, reason: str) -> Pending:
+        return self.lwr_command("hold")
+
+    def _silent(self) -> bool:
+        self._cell.advance()
+        return "arm" in self._cell.faults.dead
+
+    def motion_allowed(self) -> Verdict:
+        if self._silent():
+            return SILENT
+        why, code = self._blocked()
+        return Verdict(not code, why, code)
+
+    def standing(self) -> Verdict:
+        if self._silent():
+            return SILENT
+        standing = not np.any(self.velocity())
+        return Verdict(standing, "" if standing else "the arm moves")
+
+    def cancel_motion(self, reason: str) -> Pending:
+        asked = self._ask("cancel", 0.02, lambda: self.end(reason, ReasonCode.CANCELLED))
+        # Never withdrawn: whoever gives up waiting leaves it in force.
+        return Polled(lambda: asked.done() and self.standing().ok, asked.result)
+
+    def motion_limits(self) -> MotionLimits:
+        return self.limits
+
+    def speed_scale(self) -> float:
+        return self.scale
+
+    def switch_controller(self, controller_id: str) -> Pending:
+        def act() -> str:
+            if controller_id not in self._cell.loaded:
+                raise PortError(f"controller '{controller_id}' is not loaded", code=ReasonCode.UNKNOWN_NAME)
+            if controller_id != self.active:
+                self.end("ended by a switch to another controller", ReasonCode.SWITCHED)
+                self.motion_started = None
+            self.active = controller_id
+            self._begin_profile(controller_id)  # the profile of the controller's name comes with it
+            return self._cell.loaded[controller_id]
+
+        return self._ask(f"switch {controller_id}", 0.02, act)
+
+    def apply_profile(self, profile: str) -> Pending:
+        return self._ask(f"profile {profile}", 0.01, lambda: self._begin_profile(profile))
+
+    def _begin_profile(self, profile: str) -> None:
+        self.profile, self.profile_since = profile, self._cell.clock.now()
+
+    def fading(self) -> bool:
+        """Whether a correction of the profile before is not gone."""
+        return self._cell.clock.now() - self.profile_since < self._cell.fade_time
+
+    def profile_settled(self, profile: str) -> Verdict:
+        if self.profile != profile:
+            return Verdict(False, f"profile '{self.profile}' is in force")
+        return Verdict(False, "ee_admittance is stopping") if self.fading() else Verdict(True)
+
+    def execute_dmp(self, request: DmpRequest) -> Pending:
+        """A reach out from where the arm is, or back if it is out already."""
+
+        def act() -> None:
+            self._require("dmp")
+            way = -REACH if self._reached_out else REACH
+            # 1.875: peak over mean velocity of a minimum-jerk profile.
+            slow = 1.875 * float(np.max(np.abs(way) / np.asarray(self.limits.velocity)))
+            asked = self.reach_time * request.dmp_ratio
+            self.request, self.motion_started = request, self._cell.clock.now()
+            self.dmp = DmpProgress("running", "", request.primitive_id, 1.0, REACH_LENGTH, remaining_time=asked)
+            self._go(np.array(self.position()) + way, max(asked, slow))
+            self._reached_out = False
+
+        return ending_motion(self._ask("execute_dmp", 0.02, act), self.cancel_motion)
+
+    def switch_dmp(self, request: DmpRequest) -> Pending:
+        def act() -> None:
+            if self.dmp.state != "running":
+                raise PortError("switch_dmp refused: no motion runs", code=ReasonCode.NOTHING_RUNS)
+            self.request = request
+
+        return self._ask(f"switch_dmp {request.primitive_id}", 0.02, act)
+
+    def dmp_progress(self) -> DmpProgress:
+        if not self._silent():
+            self._heard = self.dmp
+        return self._heard
+
+    def move_ptp(self, position: Sequence[float], max_velocity: Sequence[float]) -> Pending:
+        motion = object()
+
+        def act() -> None:
+            self._require("ptp")
+            self._queue.append((motion, np.asarray(position, dtype=float), max_velocity))
+            if len(self._queue) == 1:
+                self._begin_ptp()
+
+        added = self._ask("move_ptp", 0.02, act)
+        ended: list[PortError | None] = []
+
+        def done() -> bool:
+            if not ended and added.done():
+                ended.extend(self._end_of_ptp(motion, added))
+            return bool(ended)
+
+        def value() -> None:
+            if ended[0] is not None:
+                raise ended[0]
+
+        return ending_motion(Polled(done, value, added.cancel), self.cancel_motion)
+
+    def _begin_ptp(self) -> None:
+        if self._queue:
+            _, target, max_velocity = self._queue[0]
+            self._go(target, ptp_time(self.limits, self.position(), list(target), max_velocity))
+            self._reached_out = False
+
+    def _end_of_ptp(self, motion: object, added: Pending) -> list[PortError | None]:
+        try:
+            added.result()
+        except PortError as error:
+            return [error]
+        if motion in self._ended:
+            return [self._ended[motion]]
+        allowed = self.motion_allowed()
+        return [] if allowed.ok else [PortError("the arm does not follow any more", (allowed.why,), allowed.code)]
+
+    def joint_positions(self) -> tuple[float, ...] | None:
+        return None if self._silent() else self.position()

@@ -1,0 +1,333 @@
+"""Whole trials in virtual time: the state machines of coglab_smach in a World, and what came of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from coglab_objects.database import ObjectDatabase, objects_folder
+from coglab_perception.belief import BeliefFilter
+from coglab_py.packages import package_path
+from coglab_py.pose import Pose
+from coglab_sim.person.in_cell import pose_of_truth
+from coglab_smach.context.config import Config
+from coglab_smach.context.context import Context
+from coglab_smach.context.journal import ActionRecord, Journal, TransitionRecord
+from coglab_smach.kinematics.board_room import BoardRoom
+from coglab_smach.kinematics.reachability import default_arm, solve
+from coglab_smach.machines import build_master
+
+from coglab_trials.conditions import Conditions
+from coglab_trials.virtual_arm import VirtualArm
+from coglab_trials.virtual_clock import VirtualClock, using
+from coglab_trials.world import BOARD, DT, World
+from coglab_trials.world_ports import VirtualContact, VirtualDatabase, VirtualHand, VirtualPerception
+
+RECEIVE, GIVE = "exchange_human_to_robot", "exchange_robot_to_human"
+MACHINES = str(package_path("coglab_smach", "config", "machines.yaml"))
+LIBRARY = str(package_path("coglab_controllers", "config", "primitives.xml"))
+TOUCH = 0.3  # N on the robot's hand, all in all, from which something touches it
+
+
+@dataclass(frozen=True)
+class TrialResult:
+    """How one action of a trial ended. Times in s of virtual time since the trial began."""
+
+    action: str
+    object_id: str
+    outcome: str
+    """"succeeded"; "failed_empty" or "failed_holding", by what the hand is left with; "stopped" or "fault" where the
+    robot needs help before it can go on"""
+    code: int
+    """coglab_msgs/ReasonCode of the reason; 0 after success"""
+    reason: str
+    """a sentence; empty after success"""
+    causes: tuple[str, ...]
+    """what is behind it, nearest first"""
+    started: float
+    ended: float
+    marks: Mapping[str, float]
+    """when what happened: "contact", "closing", ..."""
+
+    @classmethod
+    def of(cls, record: ActionRecord) -> TrialResult:
+        """From the record in the journal of the state machines."""
+        r = record
+        return cls(r.kind, r.object_id, r.outcome, r.code, r.reason, r.causes, r.started, r.ended, dict(r.marks))
+
+
+class VirtualTrial:
+    """The robot's state machines in a World of their own: asks for actions and tells how they ended.
+
+    Example::
+
+        trial = VirtualTrial(seed=7, conditions=Conditions(object_id="bottle"))
+        for result in trial.run("exchange_human_to_robot", "exchange_robot_to_human"):
+            print(result.action, result.outcome, f"{result.ended - result.started:.1f} s", result.reason)
+        print(trial.world.truth["held_by"], [reach.touched for reach in trial.reaches])
+
+    The same arguments give the same trial, to the last bit. A trial runs once.
+
+    Attributes: ``world``; ``clock`` (virtual time, s); ``hub``, ``results``, ``why()``: what the machines say;
+    ``begun``: actions that were accepted; ``reach``: the Reach under way, or None; ``reaches``: those that are over;
+    ``said``: (s, code of coglab_msgs/Say) of what the person was told; ``beside``: called with the trial after
+    each period, to look and to interfere; ``ctx``: the Context of the machines, for tests of the machines
+    themselves.
+    """
+
+    def __init__(
+        self,
+        seed: int = 1,
+        conditions: Conditions | None = None,
+        *,
+        world: World | None = None,
+        settings: Mapping[str, Any] | None = None,
+        recogniser: Any = None,
+        touch: float | None = None,
+    ) -> None:
+        """
+        ``seed``, ``conditions``: of the world. ``world``: one that was made already, instead of these.
+        ``settings``: dotted names of machines.yaml with their values, e.g. ``{"handover.reach_ratio": 2.0}``.
+        ``recogniser``: a coglab_perception Recogniser that sees what the tracker sees; None: movements are not
+        recognised. ``touch``: standard deviation (N) of the hand's touch sensors; None: the hand has none.
+
+        ValueError: seed or conditions beside a world. ObjectError: no such object. ConfigError: a setting that does
+        not exist, or is out of range. ImportError: the simulation was not built.
+        """
+        if world is not None and conditions is not None:
+            raise ValueError("give a world, or seed and conditions, not both: a world has its own")
+        self.world = world or World(seed, conditions)
+        self.recogniser, self.object_id = recogniser, self.world.conditions.object_id
+        self.clock = VirtualClock()
+        database = ObjectDatabase(objects_folder())
+        database.reload()
+        config = Config.load(MACHINES, {"auto_trigger": True, "dmp_library": LIBRARY, **(settings or {})})
+        self.arm, self.contact = VirtualArm(self.world), VirtualContact(self.world, touch)
+        self.ctx = Context(
+            clock=self.clock,
+            arm=self.arm,
+            hand=VirtualHand(self.world),
+            perception=VirtualPerception(self.world, recogniser, BeliefFilter()),
+            database=VirtualDatabase(database),
+            contact=self.contact,
+            config=config,
+            journal=Journal(self.clock.now),
+            reachable=lambda pose: solve(default_arm(), pose) is not None,
+            raised=BoardRoom(self.world.robot.urdf, config.get("postures.board")).raised,
+            say=self._say,
+        )
+        self.ctx.journal.listen(self._on_transition)
+        with using(self.clock):
+            self.master = build_master(self.ctx)
+        self.beside: Callable[[VirtualTrial], None] = lambda trial: None
+        self.reach: Reach | None = None
+        self.reaches: list[Reach] = []
+        self.begun: list[str] = []
+        self.said: list[tuple[float, int]] = []
+        self.last_hub = ""
+        """the hub in which the machines waited when the trial ended; empty: in none"""
+        self._over = False
+        self._failure: Exception | None = None
+
+    def run(
+        self, *actions: str, limit: float = 60.0, script: Callable[[VirtualTrial], None] | None = None
+    ) -> list[TrialResult]:
+        """Initialise the robot, then carry out ``actions`` one after the other, until one fails.
+
+        ``actions``: "exchange_human_to_robot", "exchange_robot_to_human", "take", "put". ``limit``: s of virtual time
+        for each. ``script(trial)`` instead of actions: a function that calls ``wait_hub``, ``ask_for`` and
+        ``clock.sleep``. Returns the results of all actions but the initialisation.
+
+        TimeoutError: an action does not end within the limit. RuntimeError: the trial has run already. Whatever the
+        script raises.
+        """
+        if self._over:
+            raise RuntimeError("a trial runs once: make another one with the same seed")
+        with using(self.clock):
+            self.clock.start_thread(self._run_world, "world")
+            walk = script or (lambda trial: trial.ask_for(*actions, limit=limit))
+            self.clock.start_thread(lambda: self._run_script(walk), "script")
+            self.master.execute()
+            self._over = True
+        self._end_reach()  # of a machine that was stopped in it
+        if self._failure is not None:
+            raise self._failure
+        return self.results
+
+    @property
+    def results(self) -> list[TrialResult]:
+        """Of the actions that have ended, without the initialisation."""
+        return [TrialResult.of(r) for r in self.ctx.journal.results if r.kind != "coglab_init_system"]
+
+    @property
+    def hub(self) -> str:
+        """Label of the state that waits for an action: "wait_without_object", "wait_with_object", "stopped", "fault".
+        Empty while an action runs."""
+        return self.ctx.requests.hub()
+
+    def why(self) -> str:
+        """Why the last action did not succeed, as the operator is told: a sentence."""
+        return self.ctx.journal.why()
+
+    def submit(self, action: str, object_id: str | None = None) -> bool:
+        """Ask the hub for an action, or for "reset"; whether it was accepted. Does not wait."""
+        accepted: bool = self.ctx.requests.submit(action, self.object_id if object_id is None else object_id)[0]
+        return accepted
+
+    def wait_hub(self, label: str, limit: float = 60.0) -> None:
+        """Within a script: wait until this hub is open. TimeoutError after ``limit`` s."""
+        end = self.clock.now() + limit
+        while self.hub != label:
+            if self.clock.now() >= end:
+                raise TimeoutError(f"hub '{label}' was not reached within {limit:g} s: {self._last()}")
+            self.clock.sleep(0.05)
+
+    def ask_for(self, *actions: str, limit: float = 60.0) -> None:
+        """Within a script: the actions one after the other, each in its hub, until one fails. TimeoutError after
+        ``limit`` s for one of them."""
+        for action in actions:
+            end = self.clock.now() + limit
+            while self.hub == "" and self.clock.now() < end:
+                self.clock.sleep(0.1)
+            if not self.submit(action):
+                return  # the action before it failed, so that this hub does not take it
+            self.begun.append(action)
+            before = len(self.ctx.journal.results)
+            while len(self.ctx.journal.results) == before:
+                if self.clock.now() > end:
+                    raise TimeoutError(f"'{action}' has not ended within {limit:g} s: {self._last()}")
+                self.clock.sleep(0.05)
+            # The person's hand comes back before the next action.
+            while self.world.human.phase != "idle" and self.clock.now() < end:
+                self.clock.sleep(0.1)
+            end = self.clock.now() + 10.0
+            while self.hub == "" and self.clock.now() < end:
+                self.clock.sleep(0.05)
+
+    def _last(self) -> str:
+        transitions = self.ctx.journal.transitions
+        return transitions[-1].sentence() if transitions else "nothing has happened yet"
+
+    def _run_world(self) -> None:
+        try:
+            while not self._over:
+                self.world.step()
+                if self.reach is not None:
+                    self.reach.look()
+                self.beside(self)
+                self.clock.sleep(DT)
+        except Exception as error:
+            self._failure = error
+            self.master.request_preempt()
+
+    def _run_script(self, walk: Callable[[VirtualTrial], None]) -> None:
+        try:
+            walk(self)
+        except Exception as error:
+            self._failure = error
+        finally:
+            self.last_hub = self.hub
+            self.master.request_preempt()
+
+    def _say(self, code: int, text: str) -> None:
+        """The person hears it."""
+        self.said.append((self.clock.now(), code))
+        self.world.human.hear(self.world.t, code)
+
+    def _on_transition(self, record: TransitionRecord) -> None:
+        """Begins and ends the records of reaches."""
+        if record.from_state == "execute_dmp" and record.outcome == "succeeded":
+            self._end_reach()
+            self.reach = Reach(self.world, self.arm.request, self.contact, self.begun[-1] if self.begun else "")
+        if record.from_state == "wait_stop" and self.reach is not None:
+            self.reach.leave(record.outcome == "succeeded")
+        giving = self.begun[-1:] == [GIVE] and record.outcome == "succeeded"
+        if record.from_state == "give_load" or (record.from_state == "wait_stop" and not giving):
+            self._end_reach()
+
+    def _end_reach(self) -> None:
+        """Keep the record of the reach that is over, if one is."""
+        if self.reach is not None:
+            self.reach.end()
+            self.reaches.append(self.reach)
+            self.reach = None
+
+
+class Reach:
+    """What one reach of the arm did. Times in s of the world's time, None for what never happened.
+
+    ``action``, ``request`` (DmpRequest); ``begin``; ``path``: (s, palm, goal in use) per cycle, positions in m;
+    ``reached``: when the motion was at its goal; ``over``: when the machine left the wait for it; ``met``: it left it
+    with success, which without standing still is a touch or a person who has come; ``stood``: the arm stood still at
+    the end. Neither ``stood`` nor ``met``: unfinished.
+
+    Distances (m, rad) of the palm once the arm stands still, or else at the end: ``to_goal``: from the goal as the
+    motion has estimated it; ``to_sight``: from the newest single sight; ``to_truth``: from where the grasp really is.
+
+    ``touched``: when something first touched the robot's hand; ``found``: when contact was found; ``moving``,
+    ``moving_when_found``: whether the arm moved then.
+    """
+
+    def __init__(self, world: World, request: Any, contact: VirtualContact, action: str) -> None:
+        self._world, self._contact = world, contact
+        self.request, self.action = request, action
+        self.begin = world.t
+        self.path: list[tuple[float, Sequence[float], Sequence[float]]] = []
+        self.reached: float | None = None
+        self.over: float | None = None
+        self.stood = self.met = False
+        self.to_goal: tuple[float, float] | None = None
+        self.to_sight: tuple[float, float] | None = None
+        self.to_truth: tuple[float, float] | None = None
+        self.touched: float | None = None
+        self.found: float | None = None
+        self.moving = self.moving_when_found = False
+
+    @property
+    def false_alarm(self) -> bool:
+        """Contact was found before anything had touched the hand."""
+        return self.found is not None and (self.touched is None or self.found < self.touched)
+
+    def look(self) -> None:
+        """After each period of the world."""
+        robot, t = self._world.robot, self._world.t
+        for record in robot.look_at_motion():
+            self.path.append((record["time"], record["measured"][0], record["goal"][0]))
+        if self.reached is None and robot.progress["motion"] == "reached":
+            self.reached = t
+        # Measured when the detector begins to watch an arm that stands still and nobody has touched yet.
+        contact = self._contact
+        watching = contact.detector.state() == "watching" and (contact.moving.still() or self.action != GIVE)
+        if not self.stood and self.reached is not None and watching:
+            self.stood = True
+            self._measure()
+        if self.touched is None and np.linalg.norm(sum(self._world.cell.touch().values())) > TOUCH:
+            self.touched, self.moving = t, not robot.report["standing"]
+        if self.found is None and self._contact.event() is not None:
+            self.found, self.moving_when_found = t, not robot.report["standing"]
+
+    def leave(self, succeeded: bool) -> None:
+        """Nobody waits for its end any more; what comes then, such as the giving of the load, is no part of it."""
+        self.over, self.met = self._world.t, succeeded
+        if self.reached is None:
+            self._measure()
+
+    def end(self) -> None:
+        """The reach is over: one that never stood still is measured where it is, unless it was when it was left."""
+        if not self.stood and (self.over is None or self.reached is not None):
+            self._measure()
+
+    def _measure(self) -> None:
+        world, request, debug = self._world, self.request, self._world.robot.debug
+        palm = world.robot.palm()
+        goal = Pose(np.asarray(request.goal_offset, dtype=float), np.asarray(request.target_orientation))
+        if debug is not None:
+            position, orientation = map(np.asarray, debug["goal"])
+            self.to_goal = palm.distance(Pose(position, orientation))
+        frame = request.goal_frame.removesuffix("_ahead")
+        seen, _ = world.newest(frame)
+        truth = pose_of_truth(world.truth["human_hand" if frame == "human_hand" else "object"])
+        self.to_sight = None if seen is None else palm.distance(seen * goal)
+        self.to_truth = palm.distance((BOARD if request.goal_frame == "board" else truth) * goal)

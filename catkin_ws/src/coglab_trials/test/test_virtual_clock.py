@@ -1,0 +1,151 @@
+"""The clock in which waiting costs no time, and machines that run by it."""
+
+import threading
+
+import pytest
+import smach
+from coglab_trials.virtual_clock import ClockStalled, VirtualClock, VirtualCondition, using
+
+
+class Waits(smach.State):
+    """Waits in steps of 0.1 s, and ends early if asked."""
+
+    def __init__(self, clock, seconds):
+        smach.State.__init__(self, ["done", "preempted"])
+        self.clock, self.seconds = clock, seconds
+
+    def execute(self, ud):
+        end = self.clock.now() + self.seconds
+        while self.clock.now() < end - 1e-9:
+            if self.preempt_requested():
+                self.service_preempt()
+                return "preempted"
+            self.clock.sleep(0.1)
+        return "done"
+
+
+def both(clock, *seconds):
+    everywhere = {f"C{i}": "done" for i in range(len(seconds))}
+    result = smach.Concurrence(["done", "preempted"], "preempted", outcome_map={"done": everywhere})
+    with result:
+        for i, s in enumerate(seconds):
+            smach.Concurrence.add(f"C{i}", Waits(clock, s))
+    return result
+
+
+def test_an_hour_of_concurrent_machines_costs_nothing():
+    with using(VirtualClock()) as clock:
+        assert both(clock, 10.0, 3600.0, 0.0).execute() == "done"
+        assert clock.now() == pytest.approx(3600.0, abs=0.11)  # steps of 0.1 s, summed up
+    assert smach.concurrence.threading is threading
+
+
+def test_a_request_at_a_moment_of_virtual_time():
+    with using(VirtualClock()) as clock:
+        machine = both(clock, 10.0, 50.0)
+        caller = clock.start_thread(lambda: (clock.sleep(20.05), machine.request_preempt()), "caller")
+        assert machine.execute() == "preempted"
+        assert clock.now() == pytest.approx(20.1, abs=1e-6)
+        caller.join(5)
+
+
+def test_runs_are_the_same_each_time():
+    def run():
+        order = []
+        clock = VirtualClock()
+
+        def work(name, step):
+            for _ in range(30):
+                clock.sleep(step)
+                order.append((name, round(clock.now(), 9)))
+
+        with clock.attached():
+            threads = [clock.start_thread(lambda n=n: work(n, 0.1 * (n % 3 + 1)), f"w{n}") for n in range(6)]
+            clock.sleep(20.0)
+            order.append("end")
+        [t.join(10) for t in threads]
+        return order
+
+    first = run()
+    assert len(first) == 181 and all(run() == first for _ in range(5))
+
+
+def test_events_wake_at_once_and_time_out():
+    with using(VirtualClock()) as clock:
+        event = clock.event()
+        assert event.wait(0) is False and event.wait(2.0) is False and clock.now() == 2.0
+        clock.start_thread(lambda: (clock.sleep(1.0), event.set()), "setter")
+        assert event.wait(60.0) is True and clock.now() == 3.0
+        assert event.is_set() and event.wait() is True
+        event.clear()
+        assert not event.is_set()
+
+
+def test_a_condition_wakes_those_it_is_told_to_and_times_out():
+    with using(VirtualClock()) as clock:
+        condition, woken = VirtualCondition(clock), []
+
+        def wait(name):
+            with condition:
+                woken.append((name, condition.wait(30.0), clock.now()))
+
+        def notify():
+            clock.sleep(1.0)
+            with condition:
+                condition.notify()
+            clock.sleep(1.0)
+            with condition:
+                condition.notify_all()
+
+        for name in "abc":
+            clock.start_thread(lambda n=name: wait(n), name)
+        clock.start_thread(notify, "notify")
+        clock.sleep(5.0)
+        assert woken == [("a", True, 1.0), ("b", True, 2.0), ("c", True, 2.0)]
+        with condition:
+            assert condition.wait(4.0) is False and clock.now() == 9.0
+
+
+def test_an_outside_thread_can_set_an_event():
+    clock = VirtualClock()
+    event, seen = clock.event(), []
+
+    def wait():
+        with clock.attached():
+            seen.append(event.wait())
+
+    waiter = threading.Thread(target=wait)
+    waiter.start()
+    event.set()
+    waiter.join(5)
+    assert seen == [True]
+
+
+def test_deadlock_is_an_error_and_no_hang():
+    clock = VirtualClock(stall_limit=0.2)
+    with pytest.raises(ClockStalled, match="MainThread"), clock.attached():
+        clock.event().wait()
+    with clock.attached():
+        clock.sleep(1.0)
+    assert clock.now() == 1.0
+
+
+def test_a_member_that_does_not_wait_through_the_clock_is_named():
+    clock = VirtualClock(stall_limit=0.2)
+    stuck = threading.Event()
+    thread = clock.start_thread(lambda: stuck.wait(10), "stubborn")
+    with pytest.raises(ClockStalled, match="stubborn is running"):
+        clock.sleep(1.0)
+    stuck.set()
+    thread.join(5)
+
+
+def test_a_member_that_raises_gives_its_turn_away():
+    with using(VirtualClock()) as clock:
+        hook, threading.excepthook = threading.excepthook, lambda args: None
+        try:
+            clock.start_thread(lambda: 1 / 0, "broken")
+            clock.sleep(1.0)
+        finally:
+            threading.excepthook = hook
+        assert clock.now() == 1.0

@@ -1,0 +1,268 @@
+"""The world in one process: what it is made of, what tracker and person are shown, the hand's tasks in it, and the
+limits of the arm as they are counted."""
+
+import dataclasses
+import importlib
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from coglab_objects.database import ObjectError
+from coglab_py.pose import Pose
+from coglab_sim.person.in_cell import pose_of_truth
+from coglab_sim.person.scene import shipped
+from coglab_sim.tracker.tracker import PerceptionSettings
+from coglab_trials import Conditions, World
+from coglab_trials.conditions import CAREFUL, CONSIDERATE, HARDSHIPS, PATIENT, hardship
+from coglab_trials.world import BOARD, DT, Robot
+from ih2_hand.reasons import Reason
+
+
+def stepped(world, seconds):
+    for _ in range(round(seconds / DT)):
+        world.step()
+    return world
+
+
+# --- what it is made of -----------------------------------------------------------------------------------------------
+
+
+def test_conditions_reach_person_plant_and_tracker():
+    conditions = replace(CONSIDERATE, object_id="bottle", mass=1.3, friction=0.7, person={"trust": 0.2})
+    world = World(4, conditions)
+    assert world.human.participant.trust == 0.2 and world.human.participant.seed == 4 and world.human.holds()
+    assert world.object_frame == "object_bottle" and world.trackers["human_hand"].settings.perfect
+    assert world.scene.object_mass == pytest.approx(1.3 * shipped("bottle")["mass"])
+    with pytest.raises(ObjectError):
+        World(4, Conditions(object_id="elephant"))
+
+
+def test_an_object_on_the_board_lies_in_its_middle():
+    world = World(2, CONSIDERATE, "world")
+    assert not world.human.holds()
+    assert world.cell.truth()["object"]["position"] == pytest.approx([0.45, -0.55, 0.052], abs=1e-6)
+
+
+def test_hardships_change_one_thing_each():
+    plain = Conditions()
+    assert hardship("", 1) == plain
+    for name in HARDSHIPS:
+        for seed in (1, 2):
+            changed = [
+                f.name
+                for f in dataclasses.fields(plain)
+                if getattr(hardship(name, seed), f.name) != getattr(plain, f.name)
+            ]
+            assert len(changed) == 1, name
+    assert hardship("mass +-30 %", 1).mass == 1.3 and hardship("mass +-30 %", 2).mass == 0.7
+    with pytest.raises(ValueError, match="none of"):
+        hardship("rain", 1)
+    assert CAREFUL.participant(3) != plain.participant(3)
+
+
+@pytest.mark.parametrize("module", ["coglab_sim._cell", "coglab_sim._virtual"])
+def test_a_library_that_is_missing_is_named_with_what_to_do(monkeypatch, module):
+    monkeypatch.setitem(sys.modules, module, None)
+    monkeypatch.delitem(sys.modules, "coglab_trials.world", raising=False)
+    with pytest.raises(ImportError, match=rf"cannot be loaded \(.*{module}.*\): .*run ./coglab build.* libmujoco-dev"):
+        importlib.import_module("coglab_trials.world")
+
+
+# --- what is seen -----------------------------------------------------------------------------------------------------
+
+
+def test_the_tracker_sees_the_hand_where_it_is():
+    """An arm is compliant: on the way, the hand is not where the person wants it."""
+    world = World(2, CONSIDERATE)
+    world.human.command("give mug")
+    true, wanted, apart = {}, {}, []
+    step = world.human.step
+
+    def remember(t, view):
+        sample = step(t, view)
+        wanted[t] = sample.frame
+        return sample
+
+    world.human.step = remember
+    for _ in range(round(2.5 / DT)):
+        t = world.t
+        if world.ticks % 2 == 0:
+            true[t] = pose_of_truth(world.cell.truth()["human_hand"])
+        world.step()
+        sight = world.sights["human_hand"]
+        assert sight.frame.distance(true[sight.captured]) == pytest.approx((0.0, 0.0), abs=1e-9)
+        apart.append(sight.frame.distance(wanted[sight.captured])[0])
+    assert max(apart) > 0.002
+
+
+def test_the_board_is_off_as_much_as_everything_that_the_tracker_sees():
+    only_bias = PerceptionSettings(
+        position_noise=(0, 0, 0), orientation_noise=0.0, dropout_start=0.0, occlusion_distance=0.0, swap_probability=0.0
+    )
+    world = stepped(World(4, replace(CONSIDERATE, perception=only_bias), "world"), 0.3)
+    board, age = world.newest("board")
+    assert age == 0.0 and board.distance(BOARD)[0] > 0.001
+    assert np.degrees(board.distance(BOARD)[1]) == pytest.approx(1.0)
+    lies = BOARD.inverse() * pose_of_truth(world.truth["object"])
+    seen = board.inverse() * world.sights["object_mug"].frame
+    assert seen.distance(lies) == pytest.approx((0.0, 0.0), abs=1e-4)
+
+
+def test_what_is_seen_has_an_age_and_a_blind_tracker_sees_nothing():
+    world = World(2, CONSIDERATE)
+    assert world.newest("object_mug")[0] is None
+    stepped(world, 0.2)
+    seen, age = world.newest("object_mug")
+    assert seen.distance(Pose(np.array([1.22, 0.2, 0.1])))[0] < 0.02 and 0.0 <= age <= 0.05
+    world.blind.add("object_mug")
+    stepped(world, 0.5)
+    assert world.newest("object_mug")[1] == pytest.approx(age + 0.5) and world.newest("human_hand")[1] <= 0.05
+
+
+def test_the_closure_that_is_seen_is_that_of_the_fingers_joints():
+    """Not of the motors: a tendon that is let go gives way before its finger does."""
+    robot = Robot(3, object__start="world", object__position=[1.5, 1.0, 0.0])
+    cell = robot.cell  # only a view
+
+    def after(target, seconds):
+        cell.set_motors([1.0] * 5, [0.0, 0.0, target, target, target], [1000.0] * 5)
+        shown = []
+        for _ in range(round(seconds / cell.period)):
+            cell.step(None)
+            motors = np.mean([motor["position"] for motor in cell.motors()[2:]])
+            shown.append((cell.truth()["hand_closure"], motors))
+        return shown
+
+    assert after(0.0, 2.0)[-1][0] == pytest.approx(0.0, abs=0.03)
+    closing = after(1.0, 2.0)
+    assert closing[-1][0] == pytest.approx(1.0, abs=0.03)
+    assert max(b[0] - a[0] for a, b in zip(closing, closing[1:], strict=False)) < 0.05
+    opening = after(0.0, 2.0)
+    assert opening[-1][0] == pytest.approx(0.0, abs=0.05)
+    assert max(abs(seen - motors) for seen, motors in closing + opening) > 0.005, "fingers, not motors"
+
+
+# --- the hand ---------------------------------------------------------------------------------------------------------
+
+
+def calibrated():
+    """A world whose hand has calibrated; the object lies elsewhere."""
+    world = World(3, PATIENT, "world")
+    assert world.hand.calibrate("fast force") is None
+    with pytest.raises(Exception, match="the hand calibrates"):
+        world.hand.begin("hand_open", speed=255)
+    begun = world.t
+    while not world.hand.calibration_over(world.t):
+        world.step()
+        assert world.t < begun + 5.0
+    assert world.t - begun > 0.5, "it takes its time in the world, too"
+    return world
+
+
+def finished(world, job):
+    for _ in range(round(10.0 / DT)):
+        if job.verdict is not None:
+            return job.verdict
+        world.step()
+    raise AssertionError("the task does not end")
+
+
+def test_the_hand_preshapes_closes_on_nothing_and_opens():
+    world = calibrated()
+    assert world.hand.calibrate("fast") and world.hand.reason == Reason.HAND_REFUSED, "only by force"
+    assert finished(world, world.hand.begin("hand_preshape", mode="cylindrical", level="medium")).ok
+    assert finished(world, world.hand.begin("hand_close", speed=255)).done
+    assert min(world.hand.positions[2:]) > 200 and world.cell.truth()["hand_closure"] > 0.8
+    assert finished(world, world.hand.begin("hand_open", speed=255)).ok and max(world.hand.positions[2:]) < 20
+
+
+def test_a_new_goal_ends_the_one_that_runs():
+    world = calibrated()
+    first = world.hand.begin("hand_close", speed=50)
+    stepped(world, 0.2)
+    second = world.hand.begin("hand_open", speed=255)
+    assert first.verdict.reason == Reason.SUPERSEDED and world.hand.job is second
+    world.hand.end(first, "late", Reason.CANCELLED)
+    assert world.hand.job is second, "one that has ended stays as it is"
+    world.hand.end(second, "enough", Reason.CANCELLED)
+    before = world.cell.truth()["hand_closure"]
+    assert stepped(world, 0.3).cell.truth()["hand_closure"] == pytest.approx(before, abs=0.05), "the fingers stop"
+
+
+# --- limits -----------------------------------------------------------------------------------------------------------
+
+
+class Arm:
+    """In the place of LockstepRobot: it goes as it is told here, whatever was commanded."""
+
+    def __init__(self):
+        self.cell, self.frozen = self, False
+        self.position, self.fastest, self.commanded = np.zeros(7), np.zeros(7), np.zeros(7)
+        self.connected = self.allowed = True
+
+    def tick(self):
+        pass
+
+    def report(self):
+        return {
+            "fri_period": DT if self.connected else 0.0,
+            "commanded_position": self.commanded,
+            "motion_allowed": self.allowed,
+        }
+
+
+@pytest.fixture
+def robot():
+    robot = Robot(1)
+    robot.virtual = robot.cell = Arm()
+    robot.step()
+    robot.outside = dict.fromkeys(robot.outside, 0)
+    return robot
+
+
+def test_a_joint_that_moves_too_fast_is_counted_whatever_was_commanded(robot):
+    arm = robot.virtual
+    # rad/s, as published: the KRC's file rsidef7.dat, the same in the robot description.
+    limit = np.radians([110.0, 110.0, 112.5, 112.5, 130.0, 112.5, 112.5])
+    for joint in range(7):
+        arm.fastest = np.eye(7)[joint] * limit * 0.9999
+        robot.step()
+        assert robot.outside == {"commanded": 0, "measured": joint, "over_command": 2 * joint + 1}
+        arm.fastest = np.eye(7)[joint] * limit * 1.0001
+        robot.step()
+        assert robot.outside == {"commanded": 0, "measured": joint + 1, "over_command": 2 * joint + 2}
+    assert robot.limit_violations == 7 and robot.measured_share > 1.0 and robot.peak_share == 0.0
+    arm.fastest = np.zeros(7)
+    arm.position = np.array(robot.limits.upper_position) + np.eye(7)[3] * 1e-6
+    robot.step()
+    assert robot.outside["measured"] == 8, "beyond its range"
+
+
+def test_what_is_commanded_too_fast_or_too_far_is_counted_though_the_arm_stands(robot):
+    arm = robot.virtual
+
+    def command(joint, speed):
+        arm.commanded = arm.commanded + np.eye(7)[joint] * speed * DT
+        robot.step()
+        return robot.outside["commanded"]
+
+    for joint in range(7):
+        limit = robot.limits.velocity[joint]
+        assert command(joint, -limit - 4e-4) == joint, "rounding to float32 adds so much"
+        assert command(joint, limit + 6e-4) == joint + 1
+    arm.allowed = False
+    assert command(3, 50.0) == 7
+    arm.allowed = True
+    assert command(3, 50.0) == 7, "nothing to compare with after a stop"
+    assert command(3, 50.0) == 8
+    for end, beyond in ((robot.limits.upper_position, 1e-9), (robot.limits.lower_position, -1e-9)):
+        for joint in range(7):
+            counted = robot.outside["commanded"]
+            arm.allowed = False
+            arm.commanded = np.array(end)
+            assert command(joint, 0.0) == counted
+            arm.commanded = np.array(end) + beyond * np.eye(7)[joint]
+            assert command(joint, 0.0) == counted + 1
+    arm.connected = False
+    assert command(0, 0.0) == counted + 1, "nobody is connected"

@@ -1,0 +1,137 @@
+/// What a controller can have made of the answers that it saw: judged and taken over after a gap.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "lwr_fri_bridge/fri/set_point_history.hpp"
+
+namespace lwr_fri_bridge::fri {
+namespace {
+
+constexpr std::uint16_t kAnswer = 40, kMeasured = 200;
+
+/// A measurement of command mode `missed` cycles after the one that took the answer kAnswer, with
+/// the set-point `position`.
+MeasurementDatagram reported(const Vector7& position, int missed = 0) {
+  MeasurementDatagram m{};
+  m.header.counter = static_cast<std::uint16_t>(kMeasured + 1 + missed);
+  m.header.reflected = kAnswer;
+  m.state = static_cast<std::uint16_t>(FriState::Command);
+  m.control = static_cast<std::uint16_t>(ControlStrategy::Position);
+  m.power = 0x7F;
+  jointsToWire(position, m.commanded_position);
+  for (int i = 0; i < 3; ++i) m.commanded_frame[5 * i] = 1.0F;
+  return m;
+}
+
+Vector7 unit(int joint, double value) {
+  Vector7 v = Vector7::Zero();
+  v[joint] = value;
+  return v;
+}
+
+SentSetPoint answer(const Vector7& from, const Vector7& position) {
+  SentSetPoint sent;
+  sent.counter = kAnswer;
+  sent.measurement = kMeasured;
+  sent.valid = sent.followed = true;
+  sent.from = from;
+  sent.position = position;
+  sent.velocity = Vector7::Constant(0.5);
+  sent.acceleration = Vector7::Constant(-2.0);
+  for (int i = 0; i < 3; ++i) sent.frame[5 * i] = 1.0F;
+  return sent;
+}
+
+/// A history whose newest answer moved one joint by `step` to 0.1 rad.
+SetPointHistory moved(int joint, double step) {
+  SetPointHistory history;
+  history.record(answer(unit(joint, 0.1 - step), unit(joint, 0.1)));
+  return history;
+}
+
+TEST(SetPointHistory, ASetPointLiesBetweenWhereItWasAndWhereTheLastStepHasTakenIt) {
+  for (const int joint : {0, 6}) {
+    for (const double step : {0.01, -0.01}) {
+      const SetPointHistory history = moved(joint, step);
+      const double sign = step > 0.0 ? 1.0 : -1.0;
+      for (const int missed : {0, 1, 5}) {
+        const auto explained = [&](double beyond_low, double beyond_high) {
+          const double at = beyond_high > -1.0 ? 0.1 + missed * step + sign * beyond_high
+                                               : 0.1 - step - sign * beyond_low;
+          return history.explains(reported(unit(joint, at), missed));
+        };
+        EXPECT_TRUE(explained(0.0, 9e-5)) << missed;
+        EXPECT_FALSE(explained(0.0, 1.1e-4)) << missed;
+        EXPECT_TRUE(explained(9e-5, -2.0)) << missed;
+        EXPECT_FALSE(explained(1.1e-4, -2.0)) << missed;
+      }
+    }
+  }
+}
+
+TEST(SetPointHistory, WhatIsNotCommandedIsNotJudged) {
+  const SetPointHistory history = moved(0, 0.01);
+  const MeasurementDatagram off = reported(unit(0, 1.0));
+  ASSERT_FALSE(history.explains(off));
+  MeasurementDatagram m = off;
+  m.state = static_cast<std::uint16_t>(FriState::Monitor);
+  EXPECT_TRUE(history.explains(m));
+  m = off;
+  m.power = 0x3F;
+  EXPECT_TRUE(history.explains(m));
+  m = off;
+  m.control = static_cast<std::uint16_t>(ControlStrategy::CartesianImpedance);
+  EXPECT_TRUE(history.explains(m));  // there the joint set-point is the arm's
+  m = off;
+  m.control = static_cast<std::uint16_t>(ControlStrategy::JointImpedance);
+  EXPECT_FALSE(history.explains(m));
+}
+
+TEST(SetPointHistory, AnAnswerThatWasNeverSentExplainsNothing) {
+  SetPointHistory history = moved(0, 0.01);
+  for (const int reflected : {0, 39, 41, 40 + 64, 40 - 64}) {
+    MeasurementDatagram m = reported(unit(0, 0.1));
+    ASSERT_TRUE(history.explains(m));
+    m.header.reflected = static_cast<std::uint16_t>(reflected);
+    EXPECT_FALSE(history.explains(m)) << reflected;
+  }
+  history.forget();
+  EXPECT_TRUE(history.explains(reported(unit(0, 1.0))));  // nothing is known
+}
+
+/// More than half the way that the last step would have gone: the controller went on.
+TEST(SetPointHistory, AControllerThatWentOnHasTheSpeedOfTheAnswer) {
+  for (const double step : {0.01, -0.01}) {
+    const SetPointHistory history = moved(2, step);
+    for (const auto& [steps, went_on] : {std::pair{4.0, true}, std::pair{2.1, true},
+                                         std::pair{1.9, false}, std::pair{0.0, false}}) {
+      const Vector7 at = unit(2, 0.1 + steps * step);
+      const SetPointState state = history.afterGap(reported(at, 4), false);
+      EXPECT_NEAR(state.position[2], at[2], 1e-7);
+      EXPECT_EQ(state.velocity, Vector7::Constant(went_on ? 0.5 : 0.0)) << steps;
+      EXPECT_EQ(state.acceleration, Vector7::Constant(went_on ? -2.0 : 0.0)) << steps;
+      EXPECT_NEAR(state.step[2], went_on ? step : 0.0, 1e-12) << steps;
+      EXPECT_NEAR(state.step[3], 0.0, 1e-12);
+    }
+  }
+}
+
+/// In Cartesian impedance mode the frame tells, for the joint set-point is the arm's.
+TEST(SetPointHistory, InCartesianImpedanceTheFrameTells) {
+  const SetPointHistory history = moved(2, 0.01);
+  for (int value = 0; value < 12; ++value) {
+    for (const float off : {0.9e-5F, -0.9e-5F, 1.3e-5F, -1.3e-5F}) {
+      MeasurementDatagram m = reported(unit(2, 0.7), 4);
+      m.control = static_cast<std::uint16_t>(ControlStrategy::CartesianImpedance);
+      m.commanded_frame[value] += off;
+      const bool went_on = std::abs(off) > 1e-5F;
+      const SetPointState state = history.afterGap(m, false);
+      EXPECT_NEAR(state.position[2], went_on ? 0.14 : 0.1, 1e-12) << value << " " << off;
+      EXPECT_EQ(state.velocity[0], went_on ? 0.5 : 0.0) << value << " " << off;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace lwr_fri_bridge::fri

@@ -1,0 +1,59 @@
+/// Every reason and outcome that has words has a number too.
+#include <gtest/gtest.h>
+
+#include <set>
+#include <string>
+
+#include <coglab_msgs/ReasonCode.h>
+
+#include "coglab_rt/reason.hpp"
+#include "lwr_fri_bridge/ros/reason_codes.hpp"
+
+namespace lwr_fri_bridge {
+namespace {
+
+using Code = coglab_msgs::ReasonCode;
+
+TEST(ReasonCodes, EveryMotionBlockHasOneOfItsOwn) {
+  std::set<std::uint16_t> seen;
+  for (int i = 0; i < 256; ++i) {
+    const auto block = static_cast<MotionBlock>(i);
+    if (std::string(describe(block)) == "?") continue;  // no value of the enum
+    const std::uint16_t code = reasonCode(block);
+    EXPECT_NE(code, Code::UNEXPECTED) << describe(block);
+    EXPECT_EQ(code == Code::NONE, block == MotionBlock::None) << describe(block);
+    EXPECT_TRUE(seen.insert(code).second) << describe(block);
+    EXPECT_EQ(coglab_rt::motionBlockOf(code), block) << describe(block);
+  }
+  EXPECT_GE(seen.size(), 8U);
+  EXPECT_EQ(coglab_rt::motionBlockOf(Code::COMPUTER_LATE), MotionBlock::NotStarted);
+}
+
+TEST(ReasonCodes, EveryOutcomeHasOne) {
+  int values = 0;
+  for (int i = 0; i < 256; ++i) {
+    Outcome outcome;
+    outcome.kind = EventKind::Start;
+    outcome.code = static_cast<OutcomeCode>(i);
+    if (describe(outcome) == "start") continue;  // no words: no value of the enum
+    ++values;
+    const std::uint16_t code = reasonCode(outcome.code);
+    EXPECT_NE(code, Code::UNEXPECTED) << describe(outcome);
+    EXPECT_EQ(code == Code::NONE, outcome.success() || outcome.code == OutcomeCode::Pending)
+        << describe(outcome);
+  }
+  EXPECT_GE(values, 18);
+}
+
+TEST(ReasonCodes, ALossThatTheComputerCausedIsNamed) {
+  CommandModeLoss loss;
+  loss.cause = LossCause::ComputerLate;
+  EXPECT_EQ(reasonCode(MotionBlock::Monitor, loss), Code::COMPUTER_LATE);
+  EXPECT_EQ(reasonCode(MotionBlock::NotStarted, loss), Code::COMPUTER_LATE);
+  EXPECT_EQ(reasonCode(MotionBlock::Held, loss), Code::HELD);
+  loss.cause = LossCause::LeftByController;
+  EXPECT_EQ(reasonCode(MotionBlock::Monitor, loss), Code::NOT_IN_COMMAND_MODE);
+}
+
+}  // namespace
+}  // namespace lwr_fri_bridge
