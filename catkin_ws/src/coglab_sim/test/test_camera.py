@@ -30,7 +30,7 @@ def test_the_object_is_seen_where_it_is():
 
 def test_added_solids_are_in_one_picture_only():
     camera = looking_at_the_object()
-    camera.add("sphere", [0.1, 0.0, 0.0], [0.8, -0.2, 0.45], [0.0, 0.0, 0.0, 1.0], (0.1, 0.1, 0.9))
+    camera.add("sphere", [0.1, 0.0, 0.0], [0.8, 0.2, 0.45], [0.0, 0.0, 0.0, 1.0], (0.1, 0.1, 0.9))
     with_sphere, without = camera.draw().copy(), camera.draw()
     assert with_sphere[60, 80, 2] > with_sphere[60, 80, 0] and without[60, 80, 0] > without[60, 80, 2]
     assert np.isfinite(camera.depth()).all()

@@ -16,7 +16,7 @@ import numpy as np
 import smach
 from coglab_sim._camera import Camera
 from coglab_sim.person.body import arm_of
-from coglab_trials.trial import VirtualTrial
+from coglab_trials import GIVE, RECEIVE, VirtualTrial, World
 from coglab_trials.world import BOARD
 from PIL import Image, ImageDraw, ImageFont
 from scipy.spatial.transform import Rotation
@@ -24,14 +24,10 @@ from scipy.spatial.transform import Rotation
 from coglab_bringup.arguments import film_parser
 from coglab_bringup.usage import Refused
 
-ACTIONS = ("exchange_human_to_robot", "exchange_robot_to_human")
-CAPTIONS = {
-    "exchange_human_to_robot": "The robot takes the mug from the person",
-    "exchange_robot_to_human": "The robot gives it back",
-}
+CAPTIONS = {RECEIVE: "The robot takes the mug from the person", GIVE: "The robot gives it back"}
 SIZE = (560, 380)  # pixels
 RATE = 12.0  # frames per second of virtual time
-COLOURS = 128  # of the palette; fewer make a smaller file
+COLOURS = 96  # of the palette; fewer make a smaller file
 LARGEST = 3e6  # bytes
 
 LOOK_AT, DISTANCE, AZIMUTH, ELEVATION = [0.74, 0.0, 0.39], 1.5, -84.0, -12.0  # m, degrees
@@ -45,15 +41,15 @@ UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 class Painter:
     """Draws the world of one trial; made in the thread that steps it, as the camera has to be."""
 
-    def __init__(self, rig: Any, size: tuple[int, int] = SIZE) -> None:
-        self.rig = rig
-        self.camera = camera = Camera(rig.cell, *size)
+    def __init__(self, world: World, size: tuple[int, int] = SIZE) -> None:
+        self.world = world
+        self.camera = camera = Camera(world.cell, *size)
         camera.look(LOOK_AT, DISTANCE, AZIMUTH, ELEVATION)
         camera.set_colour("world", FLOOR)
         camera.set_colour("lwr_base_link", GREY)
         for number in range(1, 8):
             camera.set_colour(f"lwr_link_{number}", ORANGE if number < 7 else GREY)
-        for body in ("ih2_base_link", *(name for name in rig.cell.touch() if name != "palm")):
+        for body in ("ih2_base_link", *(name for name in world.cell.touch() if name != "palm")):
             camera.set_colour(body, DARK)
         camera.set_colour("object", RED)
         camera.set_colour("person_hand", SKIN, 0.0)  # drawn as a whole arm instead
@@ -61,8 +57,8 @@ class Painter:
 
     def frame(self) -> Image.Image:
         """The picture now."""
-        truth = self.rig.cell.truth()
-        for origin in self.rig.robot.chain.joint_origins(truth["position"])[1:]:
+        truth = self.world.cell.truth()
+        for origin in self.world.robot.chain.joint_origins(truth["position"])[1:]:
             self.camera.add("sphere", [0.073, 0.0, 0.0], origin, UPRIGHT, GREY)
         self.camera.add("cylinder", [0.13, 0.37, 0.0], [0.0, 0.0, -0.37], UPRIGHT, GREY)
         self.camera.add("box", [0.252, 0.202, 0.022], BOARD.position - [0.0, 0.0, 0.02], UPRIGHT, WOOD)
@@ -186,8 +182,8 @@ def main(words: list[str]) -> int:
     trial.beside = film.look
     print(f"[coglab] drawing a handover in both directions, seed {options.seed}: about a minute", flush=True)
     try:
-        results = trial.run(*ACTIONS)
-    except (AssertionError, RuntimeError) as error:  # a machine that is stuck; no pictures without a screen
+        results = trial.run(RECEIVE, GIVE)
+    except (TimeoutError, RuntimeError) as error:  # a machine that is stuck; no pictures without a screen
         print(f"[coglab] error: {error}", file=sys.stderr)
         return 1
     for result in results:
