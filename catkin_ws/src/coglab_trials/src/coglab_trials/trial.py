@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import logging
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import smach
 from coglab_objects.database import ObjectDatabase, objects_folder
 from coglab_perception.belief import BeliefFilter
 from coglab_py.packages import package_path
@@ -29,6 +32,18 @@ RECEIVE, GIVE = "exchange_human_to_robot", "exchange_robot_to_human"
 MACHINES = str(package_path("coglab_smach", "config", "machines.yaml"))
 LIBRARY = str(package_path("coglab_controllers", "config", "primitives.xml"))
 TOUCH = 0.3  # N on the robot's hand, all in all, from which something touches it
+LOG = logging.getLogger("coglab_trials")
+
+
+@contextmanager
+def _engine_logs() -> Iterator[None]:
+    """Inside the block the engine logs to ``coglab_trials``, transitions as debug messages, which are not shown."""
+    before = smach.loginfo, smach.logwarn, smach.logdebug, smach.logerr
+    smach.set_loggers(LOG.debug, LOG.warning, LOG.debug, LOG.error)
+    try:
+        yield
+    finally:
+        smach.set_loggers(*before)
 
 
 @dataclass(frozen=True)
@@ -68,7 +83,8 @@ class VirtualTrial:
             print(result.action, result.outcome, f"{result.ended - result.started:.1f} s", result.reason)
         print(trial.world.truth["held_by"], [reach.touched for reach in trial.reaches])
 
-    The same arguments give the same trial, to the last bit. A trial runs once.
+    The same arguments give the same trial, to the last bit. A trial runs once. Transitions of the machines are logged
+    as debug messages of the logger ``coglab_trials``.
 
     Attributes: ``world``; ``clock`` (virtual time, s); ``hub``, ``results``, ``why()``: what the machines say;
     ``begun``: actions that were accepted; ``reach``: the Reach under way, or None; ``reaches``: those that are over;
@@ -145,7 +161,7 @@ class VirtualTrial:
         """
         if self._over:
             raise RuntimeError("a trial runs once: make another one with the same seed")
-        with using(self.clock):
+        with using(self.clock), _engine_logs():
             self.clock.start_thread(self._run_world, "world")
             walk = script or (lambda trial: trial.ask_for(*actions, limit=limit))
             self.clock.start_thread(lambda: self._run_script(walk), "script")
