@@ -129,7 +129,7 @@ std::vector<ResolvedRobotUse> FeedbackController::getUsedRobotStates() const {
 }
 
 GainValues FeedbackController::presentGains() const {
-  if (owner_) return owner_->getGains(name_);
+  if (ControllerOwner* owner = owner_) return owner->getGains(name_);
   return gains_.specs().empty() ? GainValues(describe().gains) : gains_;
 }
 
@@ -138,39 +138,41 @@ std::map<std::string, std::vector<double>> FeedbackController::getGains() const 
 }
 
 Status FeedbackController::enable() {
-  if (owner_) return owner_->apply(Change().enable(name_));
+  if (ControllerOwner* owner = owner_) return owner->apply(Change().enable(name_));
   alone_enabled_ = true;
   return {};
 }
 
 Status FeedbackController::disable() {
-  if (owner_) return owner_->apply(Change().disable(name_));
+  if (ControllerOwner* owner = owner_) return owner->apply(Change().disable(name_));
   alone_enabled_ = false;
   return {};
 }
 
 Status FeedbackController::pause() {
-  if (owner_) return owner_->apply(Change().pause(name_));
+  if (ControllerOwner* owner = owner_) return owner->apply(Change().pause(name_));
   alone_paused_ = true;
   return {};
 }
 
 Status FeedbackController::resume() {
-  if (owner_) return owner_->apply(Change().resume(name_));
+  if (ControllerOwner* owner = owner_) return owner->apply(Change().resume(name_));
   alone_paused_ = false;
   return {};
 }
 
 bool FeedbackController::isEnabled() const {
-  return owner_ ? owner_->isEnabled(name_) : alone_enabled_;
+  const ControllerOwner* owner = owner_;
+  return owner ? owner->isEnabled(name_) : alone_enabled_;
 }
 
 bool FeedbackController::isPaused() const {
-  return owner_ ? owner_->isPaused(name_) : alone_paused_;
+  const ControllerOwner* owner = owner_;
+  return owner ? owner->isPaused(name_) : alone_paused_;
 }
 
 Status FeedbackController::loadGains(const std::string& file) {
-  if (owner_) return owner_->apply(Change().gainFile(name_, file));
+  if (ControllerOwner* owner = owner_) return owner->apply(Change().gainFile(name_, file));
   try {
     gains_ = readControllerConfig(describe(), ConfigNode::fromFile(file)).gains;
     return {};
@@ -180,7 +182,7 @@ Status FeedbackController::loadGains(const std::string& file) {
 }
 
 Status FeedbackController::setGains(const std::map<std::string, std::vector<double>>& gains) {
-  if (owner_) return owner_->apply(Change().gains(name_, gains));
+  if (ControllerOwner* owner = owner_) return owner->apply(Change().gains(name_, gains));
   GainValues values = presentGains();
   for (const auto& entry : gains) {
     const Status status = values.set(entry.first, entry.second);

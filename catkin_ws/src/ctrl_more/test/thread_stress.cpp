@@ -1,6 +1,10 @@
 // Services against the cycle, for ThreadSanitizer: built and run by test_thread_sanitizer.py with
 // the core's sources. Argument: seconds. No gtest, so that everything in it is instrumented.
+#include <pthread.h>
+#include <time.h>
+
 #include <atomic>
+#include <cerrno>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -12,6 +16,20 @@
 #include <vector>
 
 #include "ctrl_more/feedback_controllers_manager.hpp"
+
+// ThreadSanitizer of GCC 12 does not know this function, which timed locks call.
+extern "C" int pthread_mutex_clocklock(pthread_mutex_t* mutex, clockid_t clock,
+                                       const timespec* end) noexcept {
+  while (pthread_mutex_trylock(mutex) != 0) {
+    timespec now{};
+    clock_gettime(clock, &now);
+    if (now.tv_sec > end->tv_sec || (now.tv_sec == end->tv_sec && now.tv_nsec >= end->tv_nsec)) {
+      return ETIMEDOUT;
+    }
+    std::this_thread::sleep_for(std::chrono::microseconds(50));
+  }
+  return 0;
+}
 
 namespace {
 

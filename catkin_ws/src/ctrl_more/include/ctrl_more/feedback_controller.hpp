@@ -3,6 +3,7 @@
 /// @file
 /// For the author of a controller: the base class and its registration.
 
+#include <atomic>
 #include <map>
 #include <ostream>
 #include <string>
@@ -169,7 +170,7 @@ class FeedbackController {
   std::string name_;
   GainValues gains_;
   LogSource log_;
-  ControllerOwner* owner_ = nullptr;
+  std::atomic<ControllerOwner*> owner_{nullptr};  // questions may come while it is (un)loaded
   bool alone_enabled_ = false;
   bool alone_paused_ = false;
   bool initialized_ = false;

@@ -7,23 +7,12 @@
 namespace ctrl_more {
 
 const char* nameOf(StopPolicy policy) {
-  switch (policy) {
-    case StopPolicy::ByKind:
-      return "by kind";
-    case StopPolicy::Hold:
-      return "hold";
-    case StopPolicy::Fade:
-      return "fade";
-    case StopPolicy::Zero:
-      return "zero";
-  }
-  return "";
+  static const char* const names[] = {"by kind", "hold", "fade", "zero"};
+  return names[static_cast<int>(policy)];
 }
 
 RobotSignalUse& Description::measured(const std::string& role) {
-  RobotSignalUse use;
-  use.role = role;
-  robot_signals.push_back(use);
+  robot_signals.emplace_back().role = role;
   return robot_signals.back();
 }
 
@@ -34,11 +23,10 @@ RobotSignalUse& Description::estimated(const std::string& role) {
 }
 
 ControlSignalUse& Description::reads(ControlContainer container, const std::string& role) {
-  ControlSignalUse use;
+  ControlSignalUse& use = control_signals.emplace_back();
   use.container = container;
   use.role = role;
-  control_signals.push_back(use);
-  return control_signals.back();
+  return use;
 }
 
 ControlSignalUse& Description::modifies(ControlContainer container, const std::string& role) {
@@ -48,34 +36,28 @@ ControlSignalUse& Description::modifies(ControlContainer container, const std::s
 }
 
 GainSpec& Description::gain(const std::string& name, double initial) {
-  GainSpec spec;
+  GainSpec& spec = gains.emplace_back();
   spec.name = name;
   spec.initial = {initial};
-  gains.push_back(spec);
-  return gains.back();
+  return spec;
 }
 
 SettingSpec& Description::setting(const std::string& name, const std::string& initial) {
-  SettingSpec spec;
+  SettingSpec& spec = settings.emplace_back();
   spec.name = name;
   spec.initial_text = initial;
-  settings.push_back(spec);
-  return settings.back();
+  return spec;
 }
 
 SettingSpec& Description::setting(const std::string& name, const std::vector<double>& initial) {
-  SettingSpec spec;
-  spec.name = name;
+  SettingSpec& spec = setting(name, "");
   spec.kind = SettingSpec::Kind::Numbers;
   spec.initial = initial;
-  settings.push_back(spec);
-  return settings.back();
+  return spec;
 }
 
 StateSpec& Description::state(const std::string& name) {
-  StateSpec spec;
-  spec.name = name;
-  states.push_back(spec);
+  states.emplace_back().name = name;
   return states.back();
 }
 

@@ -32,17 +32,8 @@ const char* withoutFolders(const char* file) {
 }  // namespace
 
 const char* nameOf(LogLevel level) {
-  switch (level) {
-    case LogLevel::Debug:
-      return "DEBUG";
-    case LogLevel::Info:
-      return "INFO";
-    case LogLevel::Warning:
-      return "WARN";
-    case LogLevel::Error:
-      return "ERROR";
-  }
-  return "";
+  static const char* const names[] = {"DEBUG", "INFO", "WARN", "ERROR"};
+  return names[static_cast<int>(level)];
 }
 
 std::string LogRecord::message() const {

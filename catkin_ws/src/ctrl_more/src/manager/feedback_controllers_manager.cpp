@@ -601,7 +601,12 @@ void FeedbackControllersManager::plot(const std::string& name, std::ostream& out
 }
 
 void FeedbackControllersManager::plotAll(std::ostream& out) const {
-  for (const std::string& name : getExecutionOrder()) plot(name, out);
+  for (const std::string& name : getExecutionOrder()) {
+    try {
+      plot(name, out);
+    } catch (const std::invalid_argument&) {  // unloaded meanwhile
+    }
+  }
 }
 
 }  // namespace ctrl_more
