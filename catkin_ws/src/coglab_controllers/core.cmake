@@ -8,22 +8,16 @@ find_library(COGLAB_TINYXML2_LIBRARY tinyxml2 REQUIRED)
 find_package(pybind11 REQUIRED)
 
 add_library(coglab_controllers_core
-  src/dmp/canonical_system.cpp
   src/dmp/cartesian_motion.cpp
   src/dmp/dmp.cpp
+  src/dmp/dmp_request.cpp
   src/dmp/learning.cpp
   src/dmp/library.cpp
   src/dmp/library_xml.cpp
-  src/dmp/motion_end.cpp
   src/dmp/orientation_curve.cpp
   src/dmp/primitive.cpp
-  src/dmp/roll_out.cpp
-  src/dmp/transformation_system.cpp
-  src/goal/goal_estimator.cpp
-  src/goal/goal_watch.cpp
-  src/goal/goal_gate.cpp
-  src/goal/goal_jitter.cpp
-  src/goal/goal_relay.cpp
+  src/goal/goal_filter.cpp
+  src/goal/goal_limits.cpp
   src/ik/second_task.cpp
   src/ik/two_task_ik.cpp
   src/kinematics/chain.cpp
@@ -63,14 +57,16 @@ install(FILES src/coglab_controllers/_core.pyi src/coglab_controllers/py.typed
   DESTINATION ${CATKIN_PACKAGE_PYTHON_DESTINATION})
 install(FILES config/primitives.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/config)
 
+# Each folder of test/ is one binary. test_allocation counts the calls of malloc.
 if(CATKIN_ENABLE_TESTING)
-  foreach(thing allocation cartesian_motion dmp goal_estimator goals_and_ends ik kinematics learning library
-      limits ptp slow_arrival)
-    catkin_add_gtest(coglab_controllers_test_${thing} test/test_${thing}.cpp)
-    if(TARGET coglab_controllers_test_${thing})
-      target_link_libraries(coglab_controllers_test_${thing} coglab_controllers_core yaml-cpp gtest_main gtest)
-      target_include_directories(coglab_controllers_test_${thing} PRIVATE ${coglab_rt_INCLUDE_DIRS})
-      target_compile_definitions(coglab_controllers_test_${thing} PRIVATE
+  foreach(room allocation dmp kinematics)
+    file(GLOB sources CONFIGURE_DEPENDS test/${room}/*.cpp)
+    catkin_add_gtest(coglab_controllers_test_${room} ${sources})
+    if(TARGET coglab_controllers_test_${room})
+      set_target_properties(coglab_controllers_test_${room} PROPERTIES UNITY_BUILD OFF)
+      target_link_libraries(coglab_controllers_test_${room} coglab_controllers_core yaml-cpp gtest_main gtest)
+      target_include_directories(coglab_controllers_test_${room} PRIVATE ${coglab_rt_INCLUDE_DIRS} test)
+      target_compile_definitions(coglab_controllers_test_${room} PRIVATE
         COGLAB_PACKAGE_DIR="${CMAKE_CURRENT_SOURCE_DIR}")
     endif()
   endforeach()

@@ -1,4 +1,4 @@
-"""A ROS master for tests that are no rostests."""
+"""What tests of nodes share that are no rostests: a ROS master, and where the nodes are."""
 
 from __future__ import annotations
 
@@ -8,10 +8,26 @@ import subprocess
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
+import pytest
 import rosgraph
 
 LIMIT = 120.0  # s, to begin and to end
+
+
+def built(*parts: str) -> Path:
+    """A file below a prefix of the sourced workspace."""
+    for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(":"):
+        path = Path(prefix).joinpath(*parts)
+        if prefix and path.exists():
+            return path
+    pytest.fail("coglab_controllers is not built, or its workspace not sourced: ./coglab build, then ./coglab test")
+
+
+def node_path(name: str) -> str:
+    """Path of a node of this package in the sourced workspace."""
+    return str(built("lib", "coglab_controllers", name))
 
 
 @contextmanager

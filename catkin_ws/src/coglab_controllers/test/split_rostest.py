@@ -82,18 +82,6 @@ class Split(unittest.TestCase):
         self.assertFalse(refused.success)
         self.assertIn("active is 'ptp'", refused.message)
 
-    def test_4_lost_goal_aborts(self) -> None:
-        robot = self.robot
-        robot.switch("dmp")
-        robot.see_hand(GOAL)
-        wait_until(lambda: robot.execute(dmp_ratio=6.0).success, "execute_dmp")
-        wait_until(lambda: robot.feedback.state == "running", "running")
-        robot.see_hand(None)
-        wait_until(lambda: robot.feedback.state == "aborted", "aborted")
-        self.assertEqual(robot.feedback.reason_code, ReasonCode.GOAL_LOST)
-        self.assertIn("lost", robot.feedback.reason)
-        wait_until(lambda: max(abs(v) for v in robot.joints.velocity) < 0.01, "standing still")
-
     def test_5_cancel_ends_a_motion_and_its_queue_and_answers_when_the_arm_stands(self) -> None:
         robot = self.robot
         robot.switch("ptp")

@@ -3,36 +3,14 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import coglab_controllers as cc
 import numpy as np
 import pytest
 
-PACKAGE = Path(__file__).resolve().parent.parent
-URDF = PACKAGE.parent / "lwr_description" / "urdf" / "lwr_ih2.urdf"
-LIMITS = PACKAGE.parent / "lwr_description" / "config" / "joint_limits.yaml"
 HOME = np.array([0.1, 0.6, -0.2, -1.3, 0.3, 0.9, 0.2])
-ZERO, ONE, UNIT = np.zeros(7), np.ones(7), [0.0, 0.0, 0.0, 1.0]
 AXES = np.eye(7)
 EVERYWHERE = {"box_min": [-9] * 3, "box_max": [9] * 3, "base_radius": 0.0, "max_stretch": 1.0}
-
-
-@pytest.fixture(scope="module")
-def chain() -> cc.Chain:
-    return cc.Chain(URDF.read_text())
-
-
-@pytest.fixture(scope="module")
-def limits() -> cc.JointLimits:
-    return cc.load_joint_limits(str(LIMITS))
-
-
-@pytest.fixture(scope="module")
-def reach() -> cc.Primitive:
-    times = np.linspace(0.0, 1.2, 61)
-    u = times / 1.2
-    return cc.learn("reach", [(times, np.outer(u**3 * (10 - 15 * u + 6 * u**2), [0.5, 0.0, 0.1]))])
 
 
 def stopping_speed(room: float, acceleration: float, lag: float) -> float:
@@ -69,16 +47,6 @@ def test_a_joint_near_its_stop_gets_that_speed_and_the_others_their_share(chain,
         np.testing.assert_allclose(result.velocity, allowed * request, rtol=1e-9)
 
 
-def test_the_fastest_joint_is_scaled_to_its_limit_and_named(chain, limits) -> None:
-    guard = guard_of(chain, limits, hand_speed=0.0, elbow_speed=0.0)
-    for joint in range(7):
-        result = guard.limit(chain, HOME, 2.0 * limits.velocity[joint] * AXES[joint])
-        assert (result.reason, result.joint, result.border) == ("joint speed limit", joint, "inside the workspace")
-        assert result.scale == pytest.approx(0.5, rel=1e-9)
-    free = guard.limit(chain, HOME, 0.01 * ONE)
-    assert (free.reason, free.joint, free.scale) == ("not limited", -1, 1.0)
-
-
 def elbow_speed(chain: cc.Chain, q: np.ndarray, velocity: np.ndarray) -> float:
     """Of the origin of the fourth of seven joints, by a difference."""
     h = 1e-6
@@ -104,16 +72,6 @@ def test_a_part_of_each_cartesian_speed_limit_is_kept_back(chain, limits, limit:
     assert elbow_speed(chain, HOME, swing) > 0.3, "or the elbow's limit shows nothing"
 
 
-def test_a_guard_that_is_told_nothing_has_the_documented_limits(chain, limits) -> None:
-    plain = cc.Guard(chain, limits)
-    told = cc.Guard(chain, limits, cc.WorkspaceParameters(), 1.0, 1.0, 0.01, 0.015)
-    rng = np.random.default_rng(4)
-    for _ in range(200):
-        q, request = rng.uniform(-1.5, 1.5, 7), rng.uniform(-2.0, 2.0, 7)
-        one, other = plain.limit(chain, q, request), told.limit(chain, q, request)
-        assert (one.scale, one.reason) == (other.scale, other.reason)
-
-
 @pytest.mark.parametrize("axis", [0, 1, 2])
 @pytest.mark.parametrize("upper", [False, True])
 def test_a_side_of_the_box_is_approached_with_two_metres_per_second_squared(chain, limits, axis, upper) -> None:
@@ -132,55 +90,6 @@ def test_a_side_of_the_box_is_approached_with_two_metres_per_second_squared(chai
     )
     assert result.scale == pytest.approx(stopping_speed(0.02, 2.0, 0.015) / 0.7, rel=1e-9)
     assert guard.limit(chain, HOME, -request).scale == 1.0, "away from it nothing is held up"
-
-
-def test_sphere_and_stretch_are_approached_as_the_box_is(chain, limits) -> None:
-    place = chain.fk(HOME)[0]
-    centre = place - [0.3, 0.0, 0.0]
-    sphere = {**EVERYWHERE, "base_centre": centre, "base_radius": 0.28}
-    inward = np.linalg.pinv(chain.jacobian(HOME)[:3]) @ np.array([-0.7, 0.0, 0.0])
-    guard = guard_of(chain, limits, sphere, hand_speed=0.0, elbow_speed=0.0)
-    result = guard.limit(chain, HOME, inward)
-    assert result.border == "sphere around the base" and result.joint == -1
-    assert result.scale == pytest.approx(stopping_speed(0.02, 2.0, 0.015) / 0.7, rel=1e-9)
-    assert guard.limit(chain, HOME, -inward).scale == 1.0
-    q = np.where(AXES[3] > 0, -0.5, HOME)
-
-    def stretch(angle: float) -> float:
-        origins = chain.joint_origins(np.where(AXES[3] > 0, angle, q))
-        return float(np.linalg.norm(origins[5] - origins[1]))
-
-    share = (stretch(-0.5) + 0.004) / chain.reach
-    rate = (stretch(-0.5 + 1e-6) - stretch(-0.5 - 1e-6)) / 2e-6
-    guard = guard_of(chain, limits, {**EVERYWHERE, "max_stretch": share}, hand_speed=0.0, elbow_speed=0.0)
-    result = guard.limit(chain, q, 1.5 * AXES[3])
-    assert result.border == "arm fully stretched" and result.joint == -1
-    assert result.scale == pytest.approx(stopping_speed(0.004, 2.0, 0.015) / (1.5 * rate), rel=1e-5)
-    assert guard.limit(chain, q, -1.5 * AXES[3]).scale == 1.0
-
-
-def test_a_joint_at_its_stop_asks_for_next_to_nothing_below_a_thousandth_of_the_fastest(chain, limits) -> None:
-    guard = guard_of(chain, limits, hand_speed=0.0, elbow_speed=0.0)
-    q = np.where(AXES[3] > 0, limits.upper_position[3], HOME)
-    for fastest, outward, passes in (
-        (1.0, 0.9e-3, True),
-        (1.0, 1.1e-3, False),
-        (1e-4, 0.9e-5, True),
-        (1e-4, 1.1e-5, False),
-    ):
-        result = guard.limit(chain, q, fastest * AXES[0] + outward * AXES[3])
-        assert result.scale == (1.0 if passes else 0.0), (fastest, outward)
-        np.testing.assert_array_equal(result.velocity, fastest * AXES[0] if passes else ZERO)
-
-
-def test_only_rounding_along_a_border_is_let_pass(chain, limits) -> None:
-    """A hand beyond the border that goes along it is not held up by a micrometre per second outward."""
-    place = chain.fk(HOME)[0]
-    box = {**EVERYWHERE, "box_max": [9.0, 9.0, place[2] - 0.01]}
-    guard = guard_of(chain, limits, box, hand_speed=0.0, elbow_speed=0.0)
-    inverse = np.linalg.pinv(chain.jacobian(HOME)[:3])
-    for outward, passes in ((0.5e-6, True), (2e-6, False)):
-        assert guard.limit(chain, HOME, inverse @ np.array([0.1, 0.0, outward])).scale == (1.0 if passes else 0.0)
 
 
 def test_the_workspace_takes_its_faces_and_projects_to_what_is_allowed() -> None:
@@ -211,17 +120,6 @@ def test_the_workspace_takes_its_faces_and_projects_to_what_is_allowed() -> None
     np.testing.assert_allclose(workspace.project([0.0, 0.0, 0.2]), [0.25, 0.0, 0.2], atol=1e-8)
     everywhere = cc.Workspace(cc.WorkspaceParameters(base_radius=0.0))
     np.testing.assert_array_equal(everywhere.project([0.0, 0.0, 0.2]), [0.0, 0.0, 0.2])
-
-
-@pytest.mark.parametrize("centre, low", [([0.1, 0.05, 0.2], -1.2), ([0.1, 0.05, 0.2], 0.0), ([0.2, 0.05, 0.2], 0.06)])
-def test_below_the_middle_of_the_base_a_goal_goes_aside_no_farther_than_the_radius(centre, low) -> None:
-    """Straight out of the sphere leads out of the box there; beside the base the box may end, too."""
-    for box in ([low, -1.2, 0.0], [-1.2, low - 0.15, 0.0]):
-        workspace = cc.Workspace(cc.WorkspaceParameters(box, base_centre=centre))
-        for below in (0.0, 0.1):
-            projected = workspace.project([centre[0], centre[1], -below])
-            assert workspace.contains(projected), projected
-            assert np.linalg.norm(projected - [centre[0], centre[1], 0.0]) <= 0.25 + 1e-6
 
 
 def test_the_governor_rises_by_two_and_falls_by_ten_per_second_and_follows_limits_at_once() -> None:
@@ -269,35 +167,3 @@ def test_singular_values_of_a_stretched_arm_are_damped_below_ten_millimetres(cha
         result = ik.solve(chain, q, reference)
         assert result.smallest_singular_value_position == pytest.approx(sigma[2], abs=1e-12)
         np.testing.assert_allclose(result.velocity, vt.T @ (inverse * (u.T @ asked)), atol=1e-9)
-
-
-def test_the_second_task_shrinks_no_more_than_it_must(chain) -> None:
-    rng, seen = np.random.default_rng(7), {"share": 0, "least": 0}
-    limit = np.array([1.92, 1.92, 1.96, 1.96, 2.27, 1.96, 1.96])
-    ik = cc.TwoTaskIk(velocity_limit=limit)
-    for _ in range(600):
-        q = rng.uniform(-1.8, 1.8, 7)
-        reference = cc.CartesianReference(*chain.fk(q), rng.normal(scale=0.7, size=3), rng.normal(scale=1.5, size=3))
-        result = ik.solve(chain, q, reference)
-        share, scale = result.second_task_scale, result.scale
-        if not 1e-3 < share < 1.0 - 1e-9:
-            continue
-        first, second = result.position_velocity / scale, result.rotation_velocity / (scale * share)
-        worst = [float((np.abs(first + a * second) / limit).max()) for a in np.linspace(0.0, 1.0, 401)]
-        if scale > 1.0 - 1e-9:  # inside the limits, and a little more would not be
-            assert (np.abs(first + share * second) / limit).max() == pytest.approx(1.0, abs=1e-9)
-            assert all(w > 1.0 for a, w in zip(np.linspace(0.0, 1.0, 401), worst, strict=True) if a > share + 1e-9)
-            seen["share"] += 1
-        else:  # nothing is inside: the translation is slowed as little as possible
-            assert 1.0 / scale <= min(worst) + 1e-6
-            seen["least"] += 1
-    assert seen["share"] > 30 and seen["least"] > 5, seen
-
-
-def test_without_a_step_the_jacobian_is_that_of_the_measured_joints(chain) -> None:
-    reference, ik = cc.CartesianReference(*chain.fk(HOME), [0.1, 0.0, 0.05]), cc.TwoTaskIk()
-    still = ik.solve(chain, HOME, reference)
-    np.testing.assert_array_equal(ik.solve(chain, HOME, reference, velocity=ONE).velocity, still.velocity)
-    moving = ik.solve(chain, HOME, reference, velocity=ONE, dt=0.02)
-    np.testing.assert_allclose(chain.jacobian(HOME + 0.01 * ONE)[:3] @ moving.velocity, [0.1, 0.0, 0.05], atol=1e-12)
-    assert (still.second_task_scale, still.scale, still.rotation_rejected) == (1.0, 1.0, False)

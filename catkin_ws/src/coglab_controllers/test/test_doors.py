@@ -32,18 +32,6 @@ def test_plugins_know_no_ros_and_goals_know_no_plugin() -> None:
         assert "plugins" not in found[door], door
 
 
-def test_the_neutral_side_names_no_joint_of_an_arm() -> None:
-    """Names of joints come from the table of joint limits and the robot description."""
-    roots = (PACKAGE / "include", PACKAGE / "src", SOURCES / "coglab_rt" / "include")
-    found = [
-        f"{path.name}: {literal}"
-        for root in roots
-        for path in sorted(root.rglob("*.[hc]pp"))
-        for literal in re.findall(r'"[^"\n]*\blwr_[ae]\d[^"\n]*"', path.read_text(encoding="utf-8"))
-    ]
-    assert not found, found
-
-
 def test_no_two_doors_include_each_other() -> None:
     found = includes()
     pairs = {tuple(sorted((a, b))) for a in found for b in found[a] if a != b and a in found.get(b, set())}
@@ -76,7 +64,7 @@ def dataclass_fields(path: Path, name: str) -> list[str]:
 def test_a_dmp_request_has_one_shape_from_the_brain_to_the_plugin() -> None:
     execute, switch = ros_request("ExecuteDmp"), ros_request("SwitchDmp")
     limits = ["goal_region_low", "goal_region_high", "goal_retreat", "goal_drop"]
-    request = [limits if name == "goal_limits" else [name] for name in struct("plugins/dmp_request.hpp", "DmpRequest")]
+    request = [limits if name == "goal_limits" else [name] for name in struct("dmp/dmp_request.hpp", "DmpRequest")]
     assert sum(request, []) == execute
     arrival = ["goal_approach", "arrival_speed"]
     own_of_execute = {"initial_state", "initial_position", "initial_velocity", "goal_frame", *arrival, *limits}
@@ -93,12 +81,7 @@ def test_a_ptp_request_has_one_shape() -> None:
 
 
 def test_a_request_for_a_motion_of_ones_own_has_one_shape() -> None:
-    assert struct("motion/authored_controller.hpp", "MotionRequestByName") == ros_request("StartMotion")
-
-
-def test_the_shortest_example_is_short() -> None:
-    for path in (PACKAGE / "examples" / "motions" / "circle.cpp", PACKAGE / "template" / "src" / "@name@.cpp.in"):
-        assert len(path.read_text(encoding="utf-8").splitlines()) <= 60, path
+    assert struct("motion/custom_motion_controller.hpp", "MotionRequestByName") == ros_request("StartMotion")
 
 
 def files_and_includes(folder: str) -> dict[Path, list[str]]:
@@ -124,16 +107,6 @@ def test_robot_node_alone_knows_the_back_end_by_fri() -> None:
         for folder in ("include", "src")
         for path, names in files_and_includes(folder).items()
         if any(name.startswith("lwr_fri_bridge/") for name in names)
-    }
-    assert knows == {ROBOT_NODE}
-
-
-def test_robot_node_alone_knows_the_ideal_arm() -> None:
-    knows = {
-        path
-        for folder in ("include", "src")
-        for path, names in files_and_includes(folder).items()
-        if any(name.startswith("coglab_controllers/ideal/") for name in names) and "ideal" not in path.parts
     }
     assert knows == {ROBOT_NODE}
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
 import sys
@@ -17,20 +16,11 @@ import rospy
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from coglab_msgs.msg import DmpGoal
 from geometry_msgs.msg import TransformStamped
-from own_master import own_master
+from own_master import node_path, own_master
 from robot_fixture import wait_until
 from tf2_msgs.msg import TFMessage
 
 TOPIC = "/controller_manager/dmp/dmp_goal"
-
-
-def helper() -> str:
-    """Path of the node in the sourced workspace."""
-    for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(":"):
-        path = Path(prefix) / "lib" / "coglab_controllers" / "goal_helper_node"
-        if path.is_file():
-            return str(path)
-    pytest.fail("goal_helper_node is not built, or its workspace not sourced: ./coglab build, then ./coglab test")
 
 
 class Tracker:
@@ -64,7 +54,7 @@ class Tracker:
 def running(hear: str = TOPIC, **parameters: object) -> Iterator[tuple[Tracker, subprocess.Popen]]:
     for name, value in parameters.items():
         rospy.set_param(f"/goal_helper/{name}", value)
-    node = subprocess.Popen([helper()], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    node = subprocess.Popen([node_path("goal_helper_node")], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         tracker = Tracker(hear)
         yield tracker, node
@@ -136,15 +126,11 @@ def test_a_static_frame_is_told_at_once_and_then_once_a_second_where_it_is_asked
 def test_a_parameter_that_cannot_be_used_ends_the_start_and_is_named(name: str, value: object, expected: str) -> None:
     rospy.set_param(f"/goal_helper/{name}", value)
     try:
-        ended = subprocess.run([helper()], timeout=60.0, check=False, stderr=subprocess.PIPE, text=True)
+        ended = subprocess.run(
+            [node_path("goal_helper_node")], timeout=60.0, check=False, stderr=subprocess.PIPE, text=True
+        )
     finally:
         rospy.delete_param(f"/goal_helper/{name}")
     assert ended.returncode == 1
     told = f"parameter goal_helper/{name}: expected {expected}"
     assert ended.stderr.count(told) == 1, ended.stderr
-
-
-def test_the_ends_of_the_range_of_rates_are_taken() -> None:
-    for rate in (0.1, 1000.0):
-        with running(rate=rate) as (_, node):
-            assert node.poll() is None

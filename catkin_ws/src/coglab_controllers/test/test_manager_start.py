@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
 import sys
@@ -14,20 +13,11 @@ import pytest
 import rosgraph
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from own_master import own_master
+from own_master import node_path, own_master
 
 SOURCES = Path(__file__).resolve().parents[2]
 URDF = SOURCES / "lwr_description" / "urdf" / "lwr_ih2.urdf"
 SERVICE = "/controller_manager/list_controllers"
-
-
-def binary() -> str:
-    """Path of the node in the sourced workspace."""
-    for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(":"):
-        path = Path(prefix) / "lib" / "coglab_controllers" / "controller_manager_node"
-        if path.is_file():
-            return str(path)
-    pytest.fail("controller_manager_node is not built: source the setup file of the workspace after ./coglab build")
 
 
 @pytest.fixture(scope="module")
@@ -46,14 +36,16 @@ def clean(master: rosgraph.Master) -> None:
 
 def refused() -> str:
     """What a start that fails says; it ends with 1."""
-    ended = subprocess.run([binary()], capture_output=True, text=True, timeout=60)
+    ended = subprocess.run([node_path("controller_manager_node")], capture_output=True, text=True, timeout=60)
     assert ended.returncode == 1, ended.stderr[-2000:]
     return ended.stderr
 
 
 def started(master: rosgraph.Master, end: signal.Signals = signal.SIGINT) -> str:
     """What a start that succeeds says; the node is then asked to end, and ends with 0."""
-    node = subprocess.Popen([binary()], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    node = subprocess.Popen(
+        [node_path("controller_manager_node")], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    )
     try:
         limit = time.monotonic() + 60.0
         while SERVICE not in [name for name, _ in master.getSystemState()[2]]:
@@ -89,13 +81,6 @@ def test_a_file_that_is_not_there_ends_the_start_and_is_named(
     assert len(told) == 1 and words in told[0], told
 
 
-def test_a_model_of_the_parameters_counts_before_the_packages_own(master: rosgraph.Master) -> None:
-    master.setParam("/robot_description", "<robot/>")
-    assert "URDF" in refused()
-    master.setParam("/controller_manager", {"urdf_file": str(URDF)})
-    assert "feedback controllers" not in started(master), "the file counts before the parameter"
-
-
 def test_without_a_model_it_starts_with_the_packages_own_and_ends_by_either_signal(master: rosgraph.Master) -> None:
     master.setParam("/lwr", {"rt_priority": 0})
     master.setParam("/controller_manager", {"priority": 0})
@@ -119,15 +104,3 @@ def test_a_feedback_file_is_looked_for_where_it_says(master: rosgraph.Master, na
     assert ("coglab_controllers/config" in told) == (name == "nowhere.yaml"), "a whole path is one"
     words = "controller_manager: priority 3 is kept to 2, below that of the arm's thread (lwr/rt_priority)"
     assert words in told
-
-
-def test_a_priority_below_the_arms_thread_is_taken(master: rosgraph.Master) -> None:
-    master.setParam("/lwr", {"rt_priority": 4})
-    master.setParam("/controller_manager", {"priority": 3, "feedback_file": ""})
-    told = started(master)
-    assert "is kept to" not in told and "feedback controllers" not in told
-
-
-def test_the_arms_thread_has_a_priority_of_eighty_unless_it_is_told(master: rosgraph.Master) -> None:
-    master.setParam("/controller_manager", {"priority": 80})
-    assert "priority 80 is kept to 79," in started(master)

@@ -13,22 +13,8 @@ import pytest
 PACKAGE = Path(__file__).resolve().parent.parent
 URDF = PACKAGE.parent / "lwr_description" / "urdf" / "lwr_ih2.urdf"
 HOME = np.array([0.1, 0.6, -0.2, -1.3, 0.3, 0.9, 0.2])
-ZERO, ONE, UNIT = np.zeros(7), np.ones(7), [0.0, 0.0, 0.0, 1.0]
+ZERO, ONE = np.zeros(7), np.ones(7)
 CYCLE = 0.005
-
-
-@pytest.fixture(scope="module")
-def chain() -> cc.Chain:
-    return cc.Chain(URDF.read_text())
-
-
-@pytest.fixture(scope="module")
-def reach() -> cc.Primitive:
-    times = np.linspace(0.0, 1.2, 121)
-    u = times / 1.2
-    return cc.learn(
-        "reach", [(times, np.outer(u**3 * (10 - 15 * u + 6 * u**2), [0.5, 0.0, 0.1]))], mapping="similarity"
-    )
 
 
 @pytest.mark.parametrize("joint", [0, 3, 6])
@@ -74,59 +60,9 @@ def test_a_motion_that_begins_too_fast_brakes_first_and_one_that_overshoots_come
     assert only.at(0.1)[0][6] == HOME[6]
 
 
-def test_a_goal_that_moves_moves_faster_on_a_slowed_clock(reach: cc.Primitive) -> None:
-    """But for a clock that nearly stands: below a tenth nobody runs after the goal."""
-    goal, speed = np.array([0.5, 0.1, 0.0]), np.array([0.0, 0.1, 0.05])
-    for rate, seen in ((0.5, 2.0), (0.1, 10.0), (0.05, 10.0)):
-        slow, plain = cc.Dmp(reach, [0] * 3, goal), cc.Dmp(reach, [0] * 3, goal)
-        for i in range(100):
-            now = goal + 0.002 * i * speed
-            slow.step(0.005 / rate, now, speed, rate)
-            plain.step(0.005, now, seen * speed)
-        np.testing.assert_allclose(slow.position, plain.position, atol=1e-12)
-        np.testing.assert_allclose(slow.velocity, plain.velocity, atol=1e-11)
-
-
-def test_a_running_primitive_tells_its_clock_and_its_acceleration(reach: cc.Primitive) -> None:
-    dmp = cc.Dmp(reach, [0] * 3, [0.5, 0, 0.1], ratio=2.0)
-    assert (dmp.tau, dmp.phase, dmp.progress, dmp.remaining_time) == pytest.approx((2.4, 1.0, 0.0, 2.4))
-    for i in range(1, 241):
-        dmp.step(CYCLE, [0.5, 0, 0.1])
-        assert dmp.progress == pytest.approx(i * CYCLE / 2.4, abs=1e-9)
-        if i % 40 == 0:
-            h = 1e-5
-            before = dmp.velocity
-            dmp.step(h, [0.5, 0, 0.1])
-            np.testing.assert_allclose((dmp.velocity - before) / h, dmp.acceleration, atol=2e-3)
-            dmp = replay(reach, i)
-    assert dmp.phase == pytest.approx(0.1, abs=1e-9) and dmp.remaining_time == pytest.approx(1.2, abs=1e-9)
-    dmp.set_ratio(1.0)
-    assert dmp.tau == pytest.approx(1.2)
-    for _ in range(400):
-        dmp.step(CYCLE, [0.5, 0, 0.1])
-    assert (dmp.progress, dmp.remaining_time) == (1.0, 0.0)
-    times, positions, _ = cc.Dmp(reach, [0] * 3, [0.5, 0, 0.1]).roll_out([0.5, 0, 0.1], 0.1)
-    np.testing.assert_allclose(times, np.arange(21) * 0.005, atol=1e-15)
-    np.testing.assert_array_equal(positions[0], [0, 0, 0])
-
-
-def replay(reach: cc.Primitive, steps: int) -> cc.Dmp:
-    dmp = cc.Dmp(reach, [0] * 3, [0.5, 0, 0.1], ratio=2.0)
-    for _ in range(steps):
-        dmp.step(CYCLE, [0.5, 0, 0.1])
-    return dmp
-
-
-def test_long_cycles_are_integrated_as_exactly_as_short_ones(reach: cc.Primitive) -> None:
-    fine = cc.Dmp(reach, [0] * 3, [0.5, 0.1, 0.1]).roll_out([0.5, 0.1, 0.1], 1.0, 1e-4)[1][-1]
-    for dt, within in ((0.005, 2e-8), (0.05, 2e-6), (1.0, 2e-6)):
-        coarse = cc.Dmp(reach, [0] * 3, [0.5, 0.1, 0.1]).roll_out([0.5, 0.1, 0.1], 1.0, dt)[1][-1]
-        assert np.linalg.norm(coarse - fine) < within, (dt, np.linalg.norm(coarse - fine))
-
-
 def test_the_estimate_after_a_step_is_that_of_three_equal_poles_at_sixty_milliseconds() -> None:
     for constant in (None, 0.06, 0.2):
-        estimator = cc.GoalEstimator() if constant is None else cc.GoalEstimator(constant)
+        estimator = cc.GoalFilter() if constant is None else cc.GoalFilter(constant)
         k, x = 1.0 / (constant or 0.06), 0.01
         estimator.reset([1.0, 0.0, 0.0])
         for i in range(1, 200):
@@ -137,96 +73,14 @@ def test_the_estimate_after_a_step_is_that_of_three_equal_poles_at_sixty_millise
             way = x * (1.0 - (1.0 + t + 0.5 * t * t) * math.exp(-t))
             assert position[0] == pytest.approx(1.0 + way + 3.0 / k * rate, abs=1e-12)
     # What is farther than 0.15 m pulls as if it were there, and g' is 0.15 m/s at most.
-    near, far = cc.GoalEstimator(0.5), cc.GoalEstimator(0.5)
+    near, far = cc.GoalFilter(0.5), cc.GoalFilter(0.5)
     for _ in range(10):
         at_limit, beyond = near.update(CYCLE, [0.15, 0, 0])[0], far.update(CYCLE, [7.0, 0, 0])[0]
     assert beyond[0] == pytest.approx(at_limit[0], rel=0.05)
-    quick = cc.GoalEstimator()
+    quick = cc.GoalFilter()
     assert max(quick.update(CYCLE, [0.1, 0.1, 0.0])[1][0] for _ in range(40)) == pytest.approx(0.15 / math.sqrt(2.0))
     still = np.array(quick.position)
     np.testing.assert_array_equal(quick.update(0.0, [5.0, 0, 0])[0], still)
-
-
-def watch_of(retreat: float = 0.0, drop: float = 0.0, region: tuple = ([0.0] * 3, [0.0] * 3)) -> cc.GoalWatch:
-    return cc.GoalWatch(region[0], region[1], retreat, drop, [-0.5, 0.0, 0.0], [0.5, 0.0, 0.0])
-
-
-def test_a_goal_may_go_back_by_its_retreat_from_where_it_was_nearest() -> None:
-    watch = watch_of(retreat=0.1)
-    assert watch.update(CYCLE, [0.59, 0, 0]) == (0, "")
-    assert watch.update(CYCLE, [0.2, 0, 0]) == (0, "")
-    assert watch.update(CYCLE, [0.29, 0, 0]) == (0, "")
-    code, words = watch.update(CYCLE, [0.3101, 0, 0])
-    assert code != 0 and "went back by 0.11" in words
-    assert watch_of().update(CYCLE, [9.0, 0, 0]) == (0, "")
-
-
-def test_a_goal_may_sink_by_its_drop_below_its_average_of_150_milliseconds() -> None:
-    watch = watch_of(drop=0.08)
-    assert watch.update(CYCLE, [0.5, 0, -0.0799]) == (0, "")
-    height = (1.0 - math.exp(-CYCLE / 0.15)) * -0.0799
-    assert watch.update(CYCLE, [0.5, 0, height - 0.0799]) == (0, "")
-    height += (1.0 - math.exp(-CYCLE / 0.15)) * (height - 0.0799 - height)
-    code, words = watch.update(CYCLE, [0.5, 0, height - 0.0801])
-    assert code != 0 and "falls" in words and "0.08" in words
-    rising = watch_of(drop=0.08)
-    assert rising.update(CYCLE, [0.5, 0, 0.9]) == (0, "")
-
-
-def test_a_goal_leaves_its_region_where_it_goes_out_of_it_once_it_was_inside() -> None:
-    region = ([0.4, -0.3, 0.0], [0.6, 0.3, 0.8])
-    for axis in range(3):
-        for side, sign in zip(region, (-1.0, 1.0), strict=True):
-            point = np.where(np.arange(3) == axis, side[axis] + sign * 1e-6, [0.5, 0.0, 0.1])
-            watch = watch_of(region=region)
-            assert watch.update(CYCLE, point) == (0, ""), "it was never inside"
-            assert watch.update(CYCLE, [0.5, 0, 0.1]) == (0, "")
-            code, words = watch.update(CYCLE, point)
-            assert code != 0 and "left its region" in words
-    near = watch_of(region=region)
-    for point in ([0.5, 0, 0.1], [0.6, 0, 0.1], [0.4, 0, 0.1], [0.5, 0.3, 0.8], [0.5, -0.3, 0.0]):
-        assert near.update(CYCLE, point) == (0, "")
-
-
-def test_a_curve_stays_at_its_ends_and_its_target_may_move() -> None:
-    turn = cc.exp_rotation([0.0, 0.0, 1.0])
-    curve = cc.OrientationCurve(UNIT, turn)
-    for progress, expected in ((-1.0, UNIT), (0.0, UNIT), (1.0, turn), (2.0, turn)):
-        np.testing.assert_allclose(curve.at(progress), expected, atol=1e-12)
-    curve.set_target(cc.exp_rotation([0.0, 0.5, 0.0]))
-    np.testing.assert_allclose(curve.at(1.0), cc.exp_rotation([0.0, 0.5, 0.0]), atol=1e-12)
-    led = cc.OrientationCurve(UNIT, UNIT, 2.0, [0.0, 0.0, 0.4])
-    np.testing.assert_allclose(cc.rotation_between(UNIT, led.at(1e-5)) / 2e-5, [0, 0, 0.4], atol=1e-4)
-
-
-def test_a_motion_tells_what_it_does(reach: cc.Primitive) -> None:
-    motion = cc.CartesianMotion()
-    assert (motion.phase, motion.event, motion.remaining_distance, motion.remaining_time) == ("idle", "", 0.0, 0.0)
-    goal = np.array([0.4, 0.1, 0.0])
-    motion.switch_to(reach, goal, UNIT)
-    assert motion.phase == "idle", "there is nothing to switch"
-    motion.start(reach, [0.1, 0.2, 0.0], UNIT, goal, UNIT, orientation_control=False)
-    assert motion.remaining_distance == pytest.approx(math.hypot(0.3, 0.1)) and motion.remaining_time == pytest.approx(
-        1.2
-    )
-    assert not motion.step(CYCLE, goal, UNIT).orientation_control
-    np.testing.assert_allclose(motion.goal, goal, atol=1e-12)
-    still = motion.position
-    motion.step(0.0, goal, UNIT)
-    np.testing.assert_array_equal(motion.position, still)
-    seen = [(motion.step(CYCLE, goal, UNIT), motion.event, motion.phase)[1:] for _ in range(400)]
-    assert seen.count(("ended", "ended")) == 1 and seen[-1] == ("", "ended") and motion.remaining_time == 0.0
-    away = goal + [0.0, 0.05, 0.0]
-    events = [(motion.step(CYCLE, away, UNIT), motion.event)[1] for _ in range(50)]
-    assert events.index("follows_again") == 39, "0.2 s outside its ball"
-    motion.stop()
-    assert motion.phase == "idle" and not motion.step(CYCLE, goal, UNIT).velocity.any()
-    standard, told = cc.CartesianMotion(), cc.CartesianMotion(0.06)
-    for one in (standard, told):
-        one.start(reach, [0] * 3, UNIT, goal, UNIT)
-    for i in range(60):
-        moved = goal + [0.0, 0.0005 * i, 0.0]
-        np.testing.assert_array_equal(standard.step(CYCLE, moved).velocity, told.step(CYCLE, moved).velocity)
 
 
 class Links:

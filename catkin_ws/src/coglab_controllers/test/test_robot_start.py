@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import socket
 import subprocess
 import sys
@@ -15,21 +14,12 @@ import rosgraph
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "lwr_fri_bridge" / "test"))
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from own_master import own_master
+from own_master import node_path, own_master
 from udp_controller import UdpController
 
 SOURCES = Path(__file__).resolve().parents[2]
 LIMIT = 60.0  # s
 MORE = 1.0  # s that a busy port may take beyond a start that ends for a parameter
-
-
-def robot_binary() -> str:
-    """Path of the node in the sourced workspace."""
-    for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(":"):
-        path = Path(prefix) / "lib" / "coglab_controllers" / "robot_node"
-        if path.is_file():
-            return str(path)
-    pytest.fail("robot_node is not built, or its workspace not sourced: ./coglab build, then ./coglab test")
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +37,12 @@ def failed_start(master: rosgraph.Master, **parameters: object) -> tuple[float, 
         master.setParam("/" + name.replace("__", "/"), value)
     began = time.monotonic()
     ended = subprocess.run(
-        [robot_binary()], text=True, timeout=LIMIT, check=False, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+        [node_path("robot_node")],
+        text=True,
+        timeout=LIMIT,
+        check=False,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
     )
     assert ended.returncode == 1, (ended.returncode, ended.stdout[-3000:])
     return time.monotonic() - began, [line for line in ended.stdout.splitlines() if line.strip()]

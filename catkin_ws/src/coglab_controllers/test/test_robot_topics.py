@@ -4,7 +4,6 @@ stamps, sizes and numbers, ends nothing, moves nothing and stops no motion."""
 from __future__ import annotations
 
 import math
-import os
 import random
 import subprocess
 import sys
@@ -20,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 from coglab_msgs.msg import FinishedPtp, LwrState, ReasonCode, UnfinishedPtp
 from coglab_msgs.srv import AddPtp, AddPtpRequest, AddPtpResponse, LoadController, SwitchController
 from geometry_msgs.msg import WrenchStamped
-from own_master import own_master
+from own_master import node_path, own_master
 from robot_fixture import HOME, JOINTS, wait_until
 from sensor_msgs.msg import JointState
 
@@ -29,15 +28,6 @@ PERIOD = 0.01  # s
 SPEED = 0.2  # rad/s, of the motion; limits_profile:=t1 allows 0.24
 NOT_FINITE = (math.nan, math.inf, -math.inf)
 EXTREME_STAMPS = ((0, 0), (0, 1), (1, 0), (2**32 - 1, 999_999_999), (2**32 - 1, 2**32 - 1), (2**31, 0), (0, 2**32 - 1))
-
-
-def manager_binary() -> str:
-    """Path of the node in the sourced workspace."""
-    for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(":"):
-        path = Path(prefix) / "lib" / "coglab_controllers" / "controller_manager_node"
-        if path.is_file():
-            return str(path)
-    pytest.fail("controller_manager_node is not built: source the setup file of the workspace after ./coglab build")
 
 
 class TopicArm:
@@ -139,7 +129,7 @@ def system() -> Iterator[tuple[TopicArm, subprocess.Popen]]:
         master.setParam("/lwr", {"rt_priority": 0})
         master.setParam("/controller_manager", {"cycle_time": PERIOD, "joint_limits_profile": "t1"})
         rospy.init_node("topic_arm", disable_signals=True)
-        node = subprocess.Popen([manager_binary()])
+        node = subprocess.Popen([node_path("controller_manager_node")])
         try:
             arm = TopicArm()
             rospy.wait_for_service("controller_manager/load_controller", 20.0)
@@ -198,7 +188,7 @@ def test_a_motion_beside_it_reaches_its_end_all_the_limits(system):
 
 def test_a_start_that_fails_says_why_and_ends_with_1(system):
     """As every program here whose settings cannot be used; roslaunch shows the number."""
-    command = [manager_binary(), "__name:=another_manager", "_arm_namespace:=7"]
+    command = [node_path("controller_manager_node"), "__name:=another_manager", "_arm_namespace:=7"]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert ended.returncode == 1, ended.stderr
     assert "another_manager/arm_namespace" in ended.stderr and "expected a name" in ended.stderr

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import subprocess
 import sys
 import time
@@ -16,21 +15,12 @@ import rospy
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from coglab_msgs.msg import ControllerStatus, FinishedPtp, LwrState, ReasonCode
 from coglab_msgs.srv import AddPtp
-from own_master import own_master
+from own_master import node_path, own_master
 from robot_fixture import HOME, JOINTS, wait_until
 from sensor_msgs.msg import JointState
 
 SOURCES = Path(__file__).resolve().parents[2]
 PERIOD = 0.02  # s between two joint states, at least
-
-
-def binary() -> str:
-    """Path of the node in the sourced workspace."""
-    for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(":"):
-        path = Path(prefix) / "lib" / "coglab_controllers" / "controller_manager_node"
-        if path.is_file():
-            return str(path)
-    pytest.fail("controller_manager_node is not built: source the setup file of the workspace after ./coglab build")
 
 
 class Arm:
@@ -84,7 +74,9 @@ def arm() -> Iterator[Arm]:
         manager = {"cycle_time": 0.0005, "overrun_time": 5.0, "load": {"ptp": "coglab/PtpController"}, "active": "ptp"}
         master.setParam("/controller_manager", manager)
         rospy.init_node("split_inputs", disable_signals=True)
-        node = subprocess.Popen([binary()], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        node = subprocess.Popen(
+            [node_path("controller_manager_node")], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
         try:
             told = Arm()
             wait_until(lambda: told.state.get_num_connections() > 0, "the node")

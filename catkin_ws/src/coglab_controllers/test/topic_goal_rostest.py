@@ -13,12 +13,11 @@ import rostest
 from coglab_msgs.msg import DmpGoal, FeedbackStatus, IkDebug, PredictedPath, ReasonCode
 from coglab_msgs.srv import (
     AddPtpRequest,
-    ExecuteDmpRequest,
     PredictDmpRequest,
     SwitchDmpRequest,
 )
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import Point, Pose, Vector3
+from geometry_msgs.msg import Pose
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
@@ -118,27 +117,6 @@ class TopicGoal(FeedbackOnRos):
         self.assertEqual({m.state for m in told}, {"running", "reached"})
         answer = robot.dmp("switch_dmp", SwitchDmpRequest(primitive_id="reach_human", dmp_ratio=1.0))
         self.assertTrue(answer.success or answer.reason_code == ReasonCode.NOTHING_RUNS, answer.message)
-
-    def test_3c_a_given_initial_state_comes_through(self) -> None:
-        robot = self.robot
-        robot.see_hand(GOAL)
-        wait_until(lambda: abs(self.goals[-1].goal.x - GOAL[0]) < 1e-6, "the helper's goal")
-        far, near = Point(ASIDE[0], ASIDE[1] + 0.3, ASIDE[2] + 0.02), Point(ASIDE[0], ASIDE[1], ASIDE[2] + 0.02)
-        answer = robot.execute(goal_frame="", initial_state=ExecuteDmpRequest.GIVEN, initial_position=far)
-        self.assertEqual((answer.success, answer.reason_code), (False, ReasonCode.OUT_OF_RANGE))
-        self.assertRegex(answer.message, r"initial_position is 0\.(29|30|31)")
-        fast = Vector3(0.0, 0.0, 2.5)
-        answer = robot.execute(
-            goal_frame="", initial_state=ExecuteDmpRequest.GIVEN, initial_position=near, initial_velocity=fast
-        )
-        self.assertEqual((answer.success, answer.reason_code), (False, ReasonCode.OUT_OF_RANGE))
-        self.assertIn("initial_velocity is 2.5", answer.message)
-        slow = Vector3(0.0, 0.1, 0.0)
-        answer = robot.execute(
-            goal_frame="", initial_state=ExecuteDmpRequest.GIVEN, initial_position=near, initial_velocity=slow
-        )
-        self.assertTrue(answer.success, answer.message)
-        wait_until(lambda: robot.feedback.state == "reached", "reached")
 
     def test_4_refusals(self) -> None:
         robot = self.robot

@@ -2,7 +2,7 @@
 // began.
 #include <cmath>
 
-#include "coglab_controllers/motion/authored_controller.hpp"
+#include "coglab_controllers/motion/custom_motion_controller.hpp"
 
 namespace {
 

@@ -13,8 +13,8 @@ from coglab_controllers._core import (
     Chain,
     Dmp,
     DynamicTerms,
-    GoalEstimator,
-    GoalWatch,
+    GoalFilter,
+    GoalLimits,
     GoalWeight,
     Guard,
     GuardResult,
@@ -38,6 +38,8 @@ from coglab_controllers._core import (
     rotation_between,
 )
 
+GoalWatch = GoalLimits  # its name until 0.3
+
 __all__ = [
     "MAX_BASIS",
     "ArmDynamics",
@@ -46,8 +48,8 @@ __all__ = [
     "Chain",
     "Dmp",
     "DynamicTerms",
-    "GoalEstimator",
-    "GoalWatch",
+    "GoalFilter",
+    "GoalLimits",
     "GoalWeight",
     "Guard",
     "GuardResult",

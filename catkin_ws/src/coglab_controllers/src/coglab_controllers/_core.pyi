@@ -224,7 +224,7 @@ class CartesianMotion:
     def remaining_time(self) -> float:
         """s."""
 
-class GoalEstimator:
+class GoalFilter:
     """Third-order tracker of a goal with ramp compensation."""
 
     def __init__(self, time_constant: float = 0.06, max_innovation: float = 0.15) -> None: ...
@@ -236,7 +236,7 @@ class GoalEstimator:
     @property
     def velocity(self) -> Array: ...
 
-class GoalWatch:
+class GoalLimits:
     """When a goal that moves is no goal any more: it left its region, went back, or fell. All in m, one frame."""
 
     def __init__(

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
+#include <string>
 
 #include "coglab_controllers/kinematics/rotation.hpp"
 
@@ -21,26 +23,55 @@ double drawnBack(double progress) noexcept {
   return 1.0 - p * p * p * (10.0 + p * (6.0 * p - 15.0));
 }
 
+// Of a roll-out.
+constexpr double kStep = 0.01;     // s of the motion's own time; longer in a long motion, so
+constexpr double kSteps = 400.0;   // that a duration costs so many steps at most
+constexpr double kThere = 1e-3;    // m from the goal at which a motion that has ended is drawn to
+constexpr double kLongest = 3.0;   // durations after which a motion is left as it is
+constexpr double kShortest = 2.0;  // s, the least time to come to rest
+
+/// Every n-th entry, so that at most kPathPoints steps are left, and the last one.
+TimedPath thinned(const TimedPath& path) {
+  const std::size_t count = path.times.size();
+  if (count <= kPathPoints + 1) return path;
+  TimedPath kept;
+  const std::size_t last = count - 1;
+  for (std::size_t i = 0; i <= kPathPoints; ++i) {
+    const std::size_t at = i * last / kPathPoints;
+    kept.times.push_back(path.times[at]);
+    kept.poses.push_back(path.poses[at]);
+  }
+  return kept;
+}
+
 }  // namespace
 
-CartesianMotion::CartesianMotion(const GoalEstimatorParameters& estimator,
-                                 const MotionEndParameters& end)
-    : goal_estimator_(estimator), orientation_estimator_(estimator), end_(end) {}
+CartesianMotion::CartesianMotion(const GoalFilterParameters& filter, const MotionEndParameters& end)
+    : end_(end), filter_(filter) {
+  const auto require = [](const char* name, double value) {
+    if (std::isfinite(value) && value > 0.0) return;
+    throw std::invalid_argument(std::string(name) + ": expected a positive number, got " +
+                                std::to_string(value));
+  };
+  require("end_phase", end.phase);
+  require("end_speed", end.speed);
+  require("end_turning", end.turning);
+  require("end_distance", end.distance);
+  require("follow_distance", end.follow_distance);
+  require("follow_time", end.follow_time);
+}
 
-void CartesianMotion::start(const CartesianMotionPlan& plan, const Pose& pose,
-                            const Vector3& velocity, const Vector3& angular_velocity,
-                            const Pose& goal, const Vector3& approach) noexcept {
-  goal_estimator_.reset(goal.position);
-  orientation_estimator_.reset(goal.orientation);
-  jitter_.reset();
-  turning_jitter_.reset();
-  seen_ = goal;
-  end_.reset();
+void CartesianMotion::start(const DmpPlan& plan, const Pose& pose, const Vector3& velocity,
+                            const Vector3& angular_velocity, const Pose& goal,
+                            const Vector3& approach) noexcept {
+  filter_.begin(goal);
+  away_ = 0.0;
   drawn_ = 1.0;
   arrival_speed_ = plan.arrival_speed;
   predicted_ = plan.predicted;
   arrival_rate_ = 1.0;
-  dmp_.start(plan.system, pose.position, velocity, goal.position - approach, plan.ratio);
+  dmp_ = plan.dmp;
+  dmp_.start(pose.position, velocity, goal.position - approach, plan.ratio);
   orientation_ = pose.orientation.normalized();
   curve_.start(orientation_, angular_velocity, goal.orientation, dmp_.tau());
   curve_begin_ = 0.0;
@@ -49,34 +80,23 @@ void CartesianMotion::start(const CartesianMotionPlan& plan, const Pose& pose,
   goal_ = goal.position;
   remaining_distance_ = (goal.position - pose.position).norm();
   phase_ = Phase::Running;
-  event_ = MotionEnd::Event::None;
+  event_ = Event::None;
   settled_ = false;
 }
 
-void CartesianMotion::switchTo(const CartesianMotionPlan& plan, const Pose& goal) noexcept {
+void CartesianMotion::switchTo(const DmpPlan& plan, const Pose& goal) noexcept {
   if (phase_ == Phase::Idle) return;
-  dmp_.switchTo(plan.system, goal.position, plan.ratio);
+  dmp_.switchTo(plan.dmp, goal.position, plan.ratio);
   curve_begin_ = std::min(dmp_.progress(), 0.95);
   // The curve runs on the clock of the DMP, which may be slowed.
   const Vector3 angular_velocity =
       reference_.angular_velocity / std::max(rate_ * arrival_rate_, 0.1);
-  orientation_estimator_.reset(goal.orientation);
+  filter_.restAt(goal.orientation);
   curve_.start(orientation_, angular_velocity, goal.orientation, (1.0 - curve_begin_) * dmp_.tau());
   reference_.orientation_control = plan.orientation_control;
-  end_.reset();
+  away_ = 0.0;
   phase_ = Phase::Running;
   settled_ = false;
-}
-
-void CartesianMotion::watchNoise(double dt, const Pose& goal) noexcept {
-  if (goal.position == seen_.position && goal.orientation.coeffs() == seen_.orientation.coeffs()) {
-    jitter_.wait(dt);
-    turning_jitter_.wait(dt);
-    return;
-  }
-  jitter_.see(dt, goal.position - seen_.position);
-  turning_jitter_.see(dt, rotationBetween(seen_.orientation, goal.orientation));
-  seen_ = goal;
 }
 
 /// By how much the clock has to be slowed for the set-point to come to the goal no faster than it
@@ -92,29 +112,25 @@ double CartesianMotion::arrivalRate(const Vector3& goal) const noexcept {
 
 const CartesianReference& CartesianMotion::step(double dt, const Pose& goal, double rate,
                                                 const Vector3& approach) noexcept {
-  event_ = MotionEnd::Event::None;
+  event_ = Event::None;
   if (phase_ == Phase::Idle || !(dt > 0.0)) return reference_;
   rate_ = rate;
-  watchNoise(dt, goal);
+  filter_.measureNoise(dt, goal);
   const Vector3 before = dmp_.state().position;
   Vector3 goal_velocity = Vector3::Zero();
-  if (end_.latched()) {
-    goal_ = end_.latchedGoal();
+  if (phase_ == Phase::Ended) {
     arrival_rate_ = arrivalRate(goal_);
   } else {
-    // g and g' at the beginning of the cycle go into eq. (1); the estimator then follows to its
-    // end.
-    goal_ = goal_estimator_.position();
-    goal_velocity = goal_estimator_.velocity();
-    if (!goal_estimator_.enabled()) goal_ = goal.position;
+    // g and g' at the beginning of the cycle go into eq. (1); the filter then follows to its end.
+    goal_ = filter_.enabled() ? filter_.position() : goal.position;
+    goal_velocity = filter_.velocity();
     arrival_rate_ = arrivalRate(goal_);
     const double drawn = drawnBack(dmp_.progress());
     goal_ -= drawn * approach;
     goal_velocity += (drawn_ - drawn) / dt * approach;
     drawn_ = drawn;
-    goal_estimator_.update(dt, goal.position, jitter_.share(), predicted_);
-    orientation_estimator_.update(dt, goal.orientation, turning_jitter_.share());
-    curve_.setTarget(orientation_estimator_.orientation());
+    filter_.update(dt, goal, predicted_);
+    curve_.setTarget(filter_.orientation());
   }
   if (!settled_) dmp_.step(dt, goal_, goal_velocity, rate * arrival_rate_);
   const DmpState& state = dmp_.state();
@@ -132,15 +148,7 @@ const CartesianReference& CartesianMotion::step(double dt, const Pose& goal, dou
   const double clock = std::max(rate * arrival_rate_, 1e-3);
   const double turning =
       reference_.orientation_control ? reference_.angular_velocity.norm() / clock : 0.0;
-  event_ = end_.update(dt, state.phase, reference_.velocity.norm() / clock, turning, state.position,
-                       goal_, goal.position);
-  if (event_ == MotionEnd::Event::Ended) phase_ = Phase::Ended;
-  if (event_ == MotionEnd::Event::FollowsAgain) {
-    phase_ = Phase::Running;
-    settled_ = false;
-    goal_estimator_.reset(goal_);
-    orientation_estimator_.reset(orientation_);
-  }
+  event_ = watchEnd(dt, reference_.velocity.norm() / clock, turning, goal.position);
   if (phase_ == Phase::Ended && state.velocity.norm() < kRestSpeed &&
       (state.position - goal_).norm() < kRestDistance && curve_progress >= 1.0) {
     settled_ = true;
@@ -148,9 +156,33 @@ const CartesianReference& CartesianMotion::step(double dt, const Pose& goal, dou
   return reference_;
 }
 
+/// Latches the goal when the motion has arrived, and follows one again that goes away for good.
+CartesianMotion::Event CartesianMotion::watchEnd(double dt, double speed, double turning,
+                                                 const Vector3& received) noexcept {
+  if (phase_ != Phase::Ended) {
+    const DmpState& state = dmp_.state();
+    if (state.phase >= end_.phase || speed >= end_.speed || turning >= end_.turning ||
+        (state.position - goal_).norm() >= end_.distance ||
+        (goal_ - received).norm() >= end_.follow_distance) {
+      return Event::None;
+    }
+    away_ = 0.0;
+    phase_ = Phase::Ended;
+    return Event::Ended;
+  }
+  away_ = (received - goal_).norm() > end_.follow_distance ? away_ + dt : 0.0;
+  if (away_ < end_.follow_time) return Event::None;
+  away_ = 0.0;
+  phase_ = Phase::Running;
+  settled_ = false;
+  filter_.restAt(goal_);
+  filter_.restAt(orientation_);
+  return Event::FollowsAgain;
+}
+
 void CartesianMotion::endAt(const Pose& pose) noexcept {
   dmp_.endAt(pose.position);
-  end_.latch(pose.position);
+  away_ = 0.0;
   goal_ = pose.position;
   orientation_ = pose.orientation.normalized();
   reference_.pose = {pose.position, orientation_};
@@ -167,6 +199,24 @@ void CartesianMotion::stop() noexcept {
   reference_.pose.orientation = orientation_;
   reference_.velocity.setZero();
   reference_.angular_velocity.setZero();
+}
+
+TimedPath CartesianMotion::rollOut(const Pose& goal, double rate, const Vector3& approach) const {
+  TimedPath path;
+  CartesianMotion motion = *this;
+  if (motion.phase() == CartesianMotion::Phase::Idle) return path;
+  const double clock = std::clamp(rate, kSlowestClock, 1.0);
+  const double step = std::max(kStep, motion.dmp().tau() / kSteps);
+  const double dt = step / clock;
+  const double longest = kLongest * motion.dmp().tau() + kShortest;
+  for (double own = 0.0; own < longest; own += step) {
+    path.poses.push_back(
+        motion.step(dt, goal, clock, approach).pose);  // the set-point before the step
+    path.times.push_back(own / clock);
+    const bool ended = motion.phase() == CartesianMotion::Phase::Ended;
+    if (ended && (motion.dmp().state().position - motion.goal()).norm() < kThere) break;
+  }
+  return thinned(path);
 }
 
 }  // namespace coglab_controllers

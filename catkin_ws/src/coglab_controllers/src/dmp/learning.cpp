@@ -331,9 +331,8 @@ Primitive learn(const std::string& id, const std::vector<Trajectory>& demonstrat
 
 Eigen::Matrix3Xd reproduce(const Primitive& primitive, const std::vector<double>& times,
                            double dt) {
-  Dmp dmp;
-  dmp.start(TransformationSystem(primitive), primitive.start, primitive.start_velocity,
-            primitive.goal, 1.0);
+  Dmp dmp(primitive);
+  dmp.start(primitive.start, primitive.start_velocity, primitive.goal, 1.0);
   Eigen::Matrix3Xd result(3, static_cast<Eigen::Index>(times.size()));
   const double begin = times.empty() ? 0.0 : times.front();
   double now = 0.0;

@@ -31,6 +31,18 @@ double logistic(double x) { return 1.0 / (1.0 + std::exp(x)); }
 
 }  // namespace
 
+CanonicalSystem::CanonicalSystem(double alpha) : alpha_(alpha) {
+  if (!(alpha > 0.0 && alpha <= 50.0)) fail("alpha", "0 < alpha <= 50", alpha);
+}
+
+double CanonicalSystem::advance(double s, double dt, double tau) const noexcept {
+  return s * std::exp(-alpha_ * dt / tau);
+}
+
+double CanonicalSystem::timeAt(double s, double tau) const noexcept {
+  return -std::log(s) * tau / alpha_;
+}
+
 double GoalWeight::operator()(double s) const noexcept {
   if (kind == Kind::Linear) return 1.0 - s;
   const double at_start = logistic(steepness * (1.0 - centre)),

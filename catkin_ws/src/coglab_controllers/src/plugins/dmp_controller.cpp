@@ -13,35 +13,13 @@ namespace coglab_controllers {
 
 namespace {
 
-constexpr double kFastestStart = 2.0;     // m/s
-constexpr double kSlowestArrival = 0.02;  // m/s
-constexpr double kLongestApproach = 0.3;  // m
-constexpr double kOnBorder = 1e-3;        // m that a path may be outside of the workspace
+constexpr double kFastestStart = 2.0;  // m/s
+constexpr double kOnBorder = 1e-3;     // m that a path may be outside of the workspace
 
 std::string text(const Vector3& v) {
   std::ostringstream out;
   out << "(" << v.x() << ", " << v.y() << ", " << v.z() << ") m";
   return out.str();
-}
-
-/// Refuses a target orientation that is none. Sets whether the hand keeps the one it has.
-Answer readOrientation(const DmpRequest& request, HandGoal& hand) {
-  const Eigen::Vector4d& q = request.target_orientation;
-  hand.keep_orientation = true;
-  if (!request.orientation_control) return {};
-  if (!q.allFinite())
-    return Answer::invalid("target_orientation holds a number that is not finite");
-  if (q.isZero(0.0)) return {};
-  const Quaternion orientation(q[3], q[0], q[1], q[2]);
-  if (!isUnit(orientation)) {
-    std::ostringstream out;
-    out << "target_orientation has norm " << q.norm()
-        << "; expected a unit quaternion x y z w, or all zero to keep the present orientation";
-    return Answer::invalid(out.str());
-  }
-  hand.orientation = orientation.normalized();
-  hand.keep_orientation = false;
-  return {};
 }
 
 RunnerPolicy dmpPolicy() {
@@ -74,7 +52,7 @@ void DmpController::configure(const MotionSetup& setup) {
   max_initial_distance_ = parameters.number("max_initial_distance", 0.1, 0.0, 1.0);
   max_scale_ = parameters.number("max_scale", max_scale_, 1.0, 1000.0);
   arrive_distance_ = parameters.number("arrive_distance", arrive_distance_, 1e-4, 0.5);
-  goals_.configure(dmp_frame_, readGoalGate(parameters), *setup.host);
+  goals_.configure(dmp_frame_, readGoalLimits(parameters), *setup.host);
   MotionRunner<DmpPlan>::configure(setup);
   MotionConfiguration configuration(setup);
   imagined_.configure(configuration);
@@ -128,7 +106,7 @@ Answer DmpController::ask(const DmpRequest& request, bool execute) {
   const MotionRequest begun = setup().host->beginRequest(id());
   if (!begun.welcome.success) return begun.welcome;
   DmpPlan plan;
-  Answer checked = check(request, execute, plan);
+  Answer checked = makePlan(request, execute, plan);
   if (checked.success && execute) {
     PredictedPath path;
     checked = rollOutPlan(plan, false, path);
@@ -143,13 +121,13 @@ bool DmpController::readPath(PredictedPath& path) {
   DmpSnapshot now;
   if (!snapshots_.read(now)) return false;
   path = {now.stamp_ns, now.primitive.str(),
-          rollOut(now.motion, now.goal, now.motion.rate(), now.approach)};
+          now.motion.rollOut(now.goal, now.motion.rate(), now.approach)};
   return true;
 }
 
 Answer DmpController::predict(const DmpRequest& request, PredictedPath& path) {
   DmpPlan plan;
-  const Answer checked = check(request, true, plan);
+  const Answer checked = makePlan(request, true, plan);
   return checked.success ? rollOutPlan(plan, true, path) : checked;
 }
 
@@ -173,7 +151,7 @@ Answer DmpController::rollOutPlan(const DmpPlan& plan, bool at_rest, PredictedPa
       scaledTooFar(plan, begun.motion.dmp().startPosition(), begun.goal.position);
   if (!too_far.empty()) return Answer::refusal(too_far);
   path = {begun.stamp_ns, plan.primitive.str(),
-          rollOut(begun.motion, begun.goal, 1.0, begun.approach)};
+          begun.motion.rollOut(begun.goal, 1.0, begun.approach)};
   const Answer checked = checkPath(plan, arm.tool.position, path.path);
   if (!checked.success) path = {};
   return checked;
@@ -182,7 +160,7 @@ Answer DmpController::rollOutPlan(const DmpPlan& plan, bool at_rest, PredictedPa
 /// Why a demonstration is too small for this way; empty: it is not.
 Reason DmpController::scaledTooFar(const DmpPlan& plan, const Vector3& start,
                                    const Vector3& goal) const {
-  const double shown = plan.motion.system.demonstratedLine().norm(), way = (goal - start).norm();
+  const double shown = plan.dmp.demonstratedLine().norm(), way = (goal - start).norm();
   if (shown < kShortestLine || way <= max_scale_ * shown) return {};
   return Reason(ReasonCode::OutOfRange, "the goal is ")
          << way << " m away, " << way / shown << " times as far as the " << shown
@@ -214,12 +192,35 @@ Answer DmpController::checkPath(const DmpPlan& plan, const Vector3& hand,
   return {};
 }
 
-Answer DmpController::check(const DmpRequest& request, bool execute, DmpPlan& plan) {
+/// Checks a request and builds the plan of it.
+Answer DmpController::makePlan(const DmpRequest& request, bool execute, DmpPlan& plan) {
+  try {
+    const std::lock_guard<std::mutex> lock(library_mutex_);
+    plan.dmp = Dmp(library_.at(request.primitive_id));
+  } catch (const std::exception& error) {
+    return Answer::refusal(ReasonCode::UnknownName, error.what());
+  }
+  Answer checked = check(request, execute);
+  if (!checked.success) return checked;
   plan.execute = execute;
-  Answer checked = checkPrimitive(request, plan);
-  if (checked.success) checked = readOrientation(request, plan.hand);
-  if (checked.success && execute) checked = checkStart(request, plan);
-  if (checked.success && dmp_frame_ != base_frame_) {
+  plan.primitive << request.primitive_id.c_str();
+  plan.ratio = request.dmp_ratio;
+  plan.orientation_control = request.orientation_control;
+  plan.arrival_speed = request.arrival_speed;
+  plan.predicted = !predicted_.empty() && endsWith(request.goal_frame, predicted_);
+  plan.approach = request.goal_approach;
+  plan.offset = request.goal_offset;
+  plan.in_goal_frame = !request.goal_frame.empty();
+  plan.goal_limits = request.goal_limits;
+  const Eigen::Vector4d& q = request.target_orientation;
+  plan.keep_orientation = !request.orientation_control || q.isZero(0.0);
+  if (!plan.keep_orientation) plan.orientation = Quaternion(q[3], q[0], q[1], q[2]).normalized();
+  plan.given = execute && request.initial_state == DmpRequest::kGiven;
+  if (plan.given) {
+    plan.initial_position = request.initial_position;
+    plan.initial_velocity = request.initial_velocity;
+  }
+  if (dmp_frame_ != base_frame_) {
     checked = goals_.transform(base_frame_, dmp_frame_, "dmp_frame_name", plan.base_from_dmp);
   }
   if (checked.success && execute) checked = goals_.first(request.goal_frame, plan.goal);
@@ -227,67 +228,13 @@ Answer DmpController::check(const DmpRequest& request, bool execute, DmpPlan& pl
   return checked;
 }
 
-Answer DmpController::checkPrimitive(const DmpRequest& request, DmpPlan& plan) const {
-  try {
-    const std::lock_guard<std::mutex> lock(library_mutex_);
-    plan.motion.system = TransformationSystem(library_.at(request.primitive_id));
-  } catch (const std::exception& error) {
-    return Answer::refusal(ReasonCode::UnknownName, error.what());
-  }
-  plan.primitive << request.primitive_id.c_str();
-  try {
-    requireRatio(request.dmp_ratio);
-  } catch (const std::exception& error) {
-    return Answer::refusal(ReasonCode::OutOfRange, error.what());
-  }
-  plan.motion.ratio = request.dmp_ratio;
-  plan.motion.orientation_control = request.orientation_control;
-  if (!request.goal_offset.allFinite()) {
-    return Answer::invalid("goal_offset holds a number that is not finite");
-  }
-  if (!request.goal_approach.allFinite() || request.goal_approach.norm() > kLongestApproach) {
-    return Answer::invalid("goal_approach " + text(request.goal_approach) +
-                           " is not finite or longer than 0.3 m");
-  }
-  if (request.arrival_speed != 0.0 &&
-      !(request.arrival_speed >= kSlowestArrival && request.arrival_speed <= kFastestArrival)) {
-    return Answer::invalid("arrival_speed is " + std::to_string(request.arrival_speed) +
-                           " m/s; expected 0 (as the primitive has it) or 0.02 to 0.45 m/s");
-  }
-  plan.motion.arrival_speed = request.arrival_speed;
-  plan.motion.predicted = !predicted_.empty() && endsWith(request.goal_frame, predicted_);
-  plan.hand.approach = request.goal_approach;
-  plan.hand.offset = request.goal_offset;
-  plan.hand.in_goal_frame = !request.goal_frame.empty();
-  plan.goal_limits = request.goal_limits;
-  const char* wrong = plan.goal_limits.wrong();
-  return *wrong == '\0' ? Answer() : Answer::invalid(wrong);
-}
-
-Answer DmpController::checkStart(const DmpRequest& request, DmpPlan& plan) const {
-  if (request.initial_state != DmpRequest::kCurrent &&
-      request.initial_state != DmpRequest::kGiven) {
-    return Answer::invalid("initial_state " + std::to_string(request.initial_state) +
-                           " is unknown; expected CURRENT=0 or GIVEN=1");
-  }
-  plan.given = request.initial_state == DmpRequest::kGiven;
-  if (!plan.given) return {};
-  if (!request.initial_position.allFinite() || !request.initial_velocity.allFinite()) {
-    return Answer::invalid(
-        "initial_position or initial_velocity holds a number that is not finite");
-  }
-  plan.initial_position = request.initial_position;
-  plan.initial_velocity = request.initial_velocity;
-  return {};
-}
-
 /// Whether the goal is where the hand can be, and a given start where it is.
 Answer DmpController::checkReach(const DmpPlan& plan) const {
   const Workspace& workspace = setup().robot->workspace;
   const Pose& to_base = plan.base_from_dmp;
-  const Vector3 goal = to_base.position + to_base.orientation * plan.hand.at(plan.goal).position;
+  const Vector3 goal = to_base.position + to_base.orientation * plan.handAt(plan.goal).position;
   const double outside = (workspace.project(goal) - goal).norm();
-  const double margin = plan.hand.in_goal_frame ? reach_margin_ : 0.0;
+  const double margin = plan.in_goal_frame ? reach_margin_ : 0.0;
   if (outside > margin + 1e-9) {
     return Answer::refusal(
         ReasonCode::GoalOutsideWorkspace,

@@ -26,21 +26,19 @@ Pose operator*(const Pose& a, const Pose& b) {
   return {a.position + a.orientation * b.position, (a.orientation * b.orientation).normalized()};
 }
 
-GoalEstimatorParameters readEstimator(const Parameters& parameters) {
-  GoalEstimatorParameters estimator;
-  estimator.time_constant =
-      parameters.number("goal_time_constant", estimator.time_constant, 0.0, 2.0);
-  estimator.noisy_time_constant =
-      parameters.number("noisy_goal_time_constant", estimator.noisy_time_constant, 0.005, 2.0);
-  estimator.noisy_turning_time_constant = parameters.number(
-      "noisy_goal_turning_time_constant", estimator.noisy_turning_time_constant, 0.005, 2.0);
-  estimator.noisy_speed = parameters.number("noisy_goal_speed", estimator.noisy_speed, 0.0, 1.0);
-  estimator.predicted_speed =
-      parameters.number("predicted_goal_speed", estimator.predicted_speed, 0.0, 1.0);
-  estimator.max_speed = parameters.number("goal_max_speed", estimator.max_speed, 0.01, 10.0);
-  estimator.noisy_turning =
-      parameters.number("noisy_goal_turning", estimator.noisy_turning, 0.0, 10.0);
-  return estimator;
+GoalFilterParameters readFilter(const Parameters& parameters) {
+  GoalFilterParameters filter;
+  filter.time_constant = parameters.number("goal_time_constant", filter.time_constant, 0.0, 2.0);
+  filter.noisy_time_constant =
+      parameters.number("noisy_goal_time_constant", filter.noisy_time_constant, 0.005, 2.0);
+  filter.noisy_turning_time_constant = parameters.number(
+      "noisy_goal_turning_time_constant", filter.noisy_turning_time_constant, 0.005, 2.0);
+  filter.noisy_speed = parameters.number("noisy_goal_speed", filter.noisy_speed, 0.0, 1.0);
+  filter.predicted_speed =
+      parameters.number("predicted_goal_speed", filter.predicted_speed, 0.0, 1.0);
+  filter.max_speed = parameters.number("goal_max_speed", filter.max_speed, 0.01, 10.0);
+  filter.noisy_turning = parameters.number("noisy_goal_turning", filter.noisy_turning, 0.0, 10.0);
+  return filter;
 }
 
 MotionEndParameters readEnd(const Parameters& parameters) {
@@ -56,63 +54,49 @@ MotionEndParameters readEnd(const Parameters& parameters) {
 
 }  // namespace
 
-Pose HandGoal::at(const GoalObservation& goal) const noexcept {
-  if (!in_goal_frame) return {goal.position + offset, orientation};
-  Pose pose;
-  pose.position = goal.position + goal.orientation * offset;
-  pose.orientation = keep_orientation ? orientation : (goal.orientation * orientation).normalized();
-  return pose;
-}
-
-Vector3 HandGoal::approachAt(const GoalObservation& goal) const noexcept {
-  return in_goal_frame ? Vector3(goal.orientation * approach) : approach;
-}
-
 void DmpCycle::configure(MotionConfiguration& configuration) {
   const Parameters& parameters = configuration.parameters;
   robot_ = configuration.setup.robot;
   finish_distance_ = parameters.number("goal_finish_distance", finish_distance_, 0.0, 1.0);
   arrive_distance_ = parameters.number("arrive_distance", arrive_distance_, 1e-4, 0.5);
   arrival_.configure(parameters);
-  frame_gate_ = readGoalGate(parameters);
+  frame_limits_ = readGoalLimits(parameters);
   // A goal on dmp_goal is meant as it is, also when it is far from the last one.
-  topic_gate_ = frame_gate_;
-  topic_gate_.max_age = parameters.number("goal_timeout", 0.0, 0.0, 3600.0);
-  topic_gate_.max_jump = std::numeric_limits<double>::infinity();
-  motion_ = CartesianMotion(readEstimator(parameters), readEnd(parameters));
+  topic_limits_ = frame_limits_;
+  topic_limits_.max_age = parameters.number("goal_timeout", 0.0, 0.0, 3600.0);
+  topic_limits_.max_jump = std::numeric_limits<double>::infinity();
+  motion_ = CartesianMotion(readFilter(parameters), readEnd(parameters));
 }
 
 // ---- begin and end
 // -------------------------------------------------------------------------------
 
 void DmpCycle::start(const MotionStart<DmpPlan>& start) {
-  const DmpPlan& plan = start.request;
-  base_from_dmp_ = plan.base_from_dmp;
-  dmp_from_base_ = inverse(plan.base_from_dmp);
-  primitive_ = plan.primitive;
+  dmp_from_base_ = inverse(start.request.base_from_dmp);
   reason_.clear();
-  if (plan.execute) {
+  if (start.request.execute) {
     execute(start);
   } else {
-    substitute(plan);
+    substitute(start.request);
   }
   stage_ = DmpStage::Travel;
 }
 
+/// switch_dmp: the goal, its owner and the approach are kept.
 void DmpCycle::substitute(const DmpPlan& plan) {
-  const HandGoal before = hand_;
-  hand_ = plan.hand;
-  hand_.in_goal_frame = before.in_goal_frame;
-  hand_.approach = before.approach;
-  if (plan.hand.keep_orientation) hand_.orientation = before.orientation;
+  plan_.primitive = plan.primitive;
+  plan_.base_from_dmp = plan.base_from_dmp;
+  plan_.offset = plan.offset;
+  plan_.keep_orientation = plan.keep_orientation;
+  if (!plan.keep_orientation) plan_.orientation = plan.orientation;
   bool projected = false;
-  motion_.switchTo(plan.motion, inWorkspace(hand_.at(gate_.goal()), projected));
+  motion_.switchTo(plan, inWorkspace(plan_.handAt(limits_.goal()), projected));
 }
 
 void DmpCycle::execute(const MotionStart<DmpPlan>& start) {
   // Where the motion begins: on the set-point of the motion it replaces, else on the commanded
   // state.
-  const DmpPlan& plan = start.request;
+  plan_ = start.request;
   const Quaternion& turn = dmp_from_base_.orientation;
   Pose pose = dmp_from_base_ * start.from.pose;
   Vector3 velocity = turn * start.from.velocity;
@@ -122,20 +106,17 @@ void DmpCycle::execute(const MotionStart<DmpPlan>& start) {
     velocity = motion_.velocity();
     angular = reference_.angular_velocity / std::max(start.input.time_scale, 0.1);
   }
-  if (plan.given) {
-    pose.position = plan.initial_position;
-    velocity = plan.initial_velocity;
+  if (plan_.given) {
+    pose.position = plan_.initial_position;
+    velocity = plan_.initial_velocity;
   }
-  hand_ = plan.hand;
-  if (hand_.keep_orientation) hand_.orientation = pose.orientation;
-  request_ = plan.goal.request;
-  gate_ = GoalGate(plan.hand.in_goal_frame ? frame_gate_ : topic_gate_);
-  gate_.reset(plan.goal);
-  watch_.begin(plan.goal_limits, pose.position, plan.goal.position);
-  goal_ = inWorkspace(hand_.at(plan.goal), projected_);
-  motion_.start(plan.motion, pose, velocity, angular, goal_, hand_.approachAt(plan.goal));
+  if (plan_.keep_orientation) plan_.orientation = pose.orientation;
+  limits_ = GoalLimits(plan_.in_goal_frame ? frame_limits_ : topic_limits_);
+  limits_.begin(plan_.goal, pose.position, plan_.goal_limits);
+  goal_ = inWorkspace(plan_.handAt(plan_.goal), projected_);
+  motion_.start(plan_, pose, velocity, angular, goal_, plan_.approachAt(plan_.goal));
   reference_.pose = pose;
-  jumps_ = plan.given;
+  jumps_ = plan_.given;
 }
 
 void DmpCycle::stop() noexcept {
@@ -162,7 +143,8 @@ MotionState DmpCycle::state() const {
     case DmpStage::Rest:
       return MotionState::Idle;
     case DmpStage::Travel:
-      return gate_.state() == GoalGate::State::Fresh ? MotionState::Running : MotionState::Holding;
+      return limits_.state() == GoalLimits::State::Fresh ? MotionState::Running
+                                                         : MotionState::Holding;
     case DmpStage::Arrive:
       return MotionState::Running;
     case DmpStage::Settle:
@@ -178,7 +160,7 @@ MotionState DmpCycle::state() const {
 // ------------------------------------------------------------------------------------
 
 Pose DmpCycle::inWorkspace(const Pose& hand_in_dmp, bool& projected) const {
-  const Pose hand = base_from_dmp_ * hand_in_dmp;
+  const Pose hand = plan_.base_from_dmp * hand_in_dmp;
   const Vector3 allowed = robot_->workspace.project(hand.position);
   projected = (allowed - hand.position).squaredNorm() > 1e-12;
   if (!projected) return hand_in_dmp;
@@ -188,16 +170,16 @@ Pose DmpCycle::inWorkspace(const Pose& hand_in_dmp, bool& projected) const {
 void DmpCycle::watchGoal(const CycleInput& input) {
   GoalObservation newest;
   goals_.read(newest);
-  const bool mine = newest.request == request_;
-  gate_.update(input.robot.stamp_ns, mine ? newest : gate_.goal());
-  const Pose wanted = hand_.at(gate_.goal());
+  const bool mine = newest.request == plan_.goal.request;
+  limits_.update(input.robot.stamp_ns, mine ? newest : limits_.goal());
+  const Pose wanted = plan_.handAt(limits_.goal());
   goal_ = inWorkspace(wanted, projected_);
   const Vector3 hand = (dmp_from_base_ * input.chain.tool).position;
   // After the end the motion stands at the goal it latched; newer sights differ from it by their
   // noise.
   const bool travels = stage_ == DmpStage::Travel;
   remaining_distance_ = ((travels ? wanted.position : motion_.goal()) - hand).norm();
-  const Reason away = watch_.update(input.dt, gate_.goal().position);
+  const Reason away = limits_.checkBounds(input.dt);
   if (!travels) return;
   if (away.empty()) {
     judgeGoal();
@@ -209,33 +191,33 @@ void DmpCycle::watchGoal(const CycleInput& input) {
 void DmpCycle::judgeGoal() {
   const double ahead = goals_.ahead();
   reason_.clear();
-  switch (gate_.state()) {
-    case GoalGate::State::Unsettled:  // never of a motion, which begins with a goal
-    case GoalGate::State::Fresh:
+  switch (limits_.state()) {
+    case GoalLimits::State::Unsettled:  // never of a motion, which begins with a goal
+    case GoalLimits::State::Fresh:
       if (projected_) {
         reason_ = Reason(ReasonCode::GoalOutsideWorkspace, "the goal is outside the workspace (")
                   << describe(robot_->workspace.violated(
-                         (base_from_dmp_ * hand_.at(gate_.goal())).position))
+                         (plan_.base_from_dmp * plan_.handAt(limits_.goal())).position))
                   << "): the motion goes to the border";
       }
       break;
-    case GoalGate::State::Old:
+    case GoalLimits::State::Old:
       reason_ = Reason(ReasonCode::GoalStale, "the newest goal is ")
-                << gate_.age() << " s old: the last one is held";
+                << limits_.age() << " s old: the last one is held";
       if (ahead > 0.0) {
         reason_ << "; newer ones are refused: stamped " << ahead << " s ahead of the clock";
       }
       break;
-    case GoalGate::State::Jumped:
+    case GoalLimits::State::Jumped:
       reason_ = Reason(ReasonCode::GoalJumped, "the goal jumped by ")
-                << gate_.jump() << " m: the last one is held until frames agree";
+                << limits_.jump() << " m: the last one is held until frames agree";
       break;
-    case GoalGate::State::Lost:
+    case GoalLimits::State::Lost:
       if (remaining_distance_ < finish_distance_) {
         reason_ = Reason(ReasonCode::GoalStale, "the goal is lost: finishing on the held one");
       } else {
         giveUp(Reason(ReasonCode::GoalLost, "the goal is lost for ")
-               << gate_.age() << " s with " << remaining_distance_ << " m to go; "
+               << limits_.age() << " s with " << remaining_distance_ << " m to go; "
                << (ahead > 0.0 ? "newer ones are stamped ahead of the clock: synchronise the clocks"
                                : "check what publishes it"));
       }
@@ -251,7 +233,7 @@ void DmpCycle::computeReference(const MotionCycle& cycle, MotionReference& refer
   watchGoal(cycle.input);
   if (stage_ == DmpStage::GivenUp) return;
   reference_ =
-      motion_.step(cycle.input.dt, goal_, cycle.input.time_scale, hand_.approachAt(gate_.goal()));
+      motion_.step(cycle.input.dt, goal_, cycle.input.time_scale, plan_.approachAt(limits_.goal()));
   followEnd(cycle);
   if (loopClosed()) write(reference, cycle.input.dt);
 }
@@ -265,15 +247,15 @@ void DmpCycle::comeToRest(const IkResult& last) {
 
 void DmpCycle::followEnd(const MotionCycle& cycle) {
   switch (motion_.event()) {
-    case MotionEnd::Event::Ended:
+    case CartesianMotion::Event::Ended:
       stage_ = DmpStage::Arrive;
       reason_.clear();
       arrival_.begin();
       break;
-    case MotionEnd::Event::FollowsAgain:
+    case CartesianMotion::Event::FollowsAgain:
       stage_ = DmpStage::Travel;
       break;
-    case MotionEnd::Event::None:
+    case CartesianMotion::Event::None:
       break;
   }
   if (stage_ != DmpStage::Arrive) return;
@@ -293,9 +275,9 @@ void DmpCycle::followEnd(const MotionCycle& cycle) {
 }
 
 void DmpCycle::write(MotionReference& reference, double dt) {
-  const Quaternion& turn = base_from_dmp_.orientation;
+  const Quaternion& turn = plan_.base_from_dmp.orientation;
   in_base_ = reference_;
-  in_base_.pose = base_from_dmp_ * reference_.pose;
+  in_base_.pose = plan_.base_from_dmp * reference_.pose;
   in_base_.velocity = turn * reference_.velocity;
   in_base_.angular_velocity = turn * reference_.angular_velocity;
   reference.cartesian(in_base_);
@@ -313,7 +295,7 @@ DmpProgress DmpCycle::progress(std::int64_t stamp_ns, MotionState state,
                                const Reason& reason) const {
   DmpProgress now;
   now.stamp_ns = stamp_ns;
-  now.primitive = primitive_;
+  now.primitive = plan_.primitive;
   now.state = state;
   now.reason = reason;
   now.phase = motion_.dmp().state().phase;
@@ -327,8 +309,8 @@ IkDebugRecord DmpCycle::debug(const CycleInput& input, const IkResult& ik) const
   IkDebugRecord now;
   now.stamp_ns = input.robot.stamp_ns;
   now.phase = motion_.dmp().state().phase;
-  now.goal = base_from_dmp_.position + base_from_dmp_.orientation * motion_.goal();
-  now.goal_orientation = base_from_dmp_.orientation * motion_.goalOrientation();
+  now.goal = plan_.base_from_dmp.position + plan_.base_from_dmp.orientation * motion_.goal();
+  now.goal_orientation = plan_.base_from_dmp.orientation * motion_.goalOrientation();
   now.set_point = in_base_.pose;
   now.velocity = in_base_.velocity;
   now.angular_velocity = in_base_.angular_velocity;

@@ -60,8 +60,7 @@ void bindPrimitive(py::module_& module) {
           "validate", [](const Primitive& p) { validate(p); },
           "Raises ValueError naming the field that is wrong.")
       .def(
-          "moving_point",
-          [](const Primitive& p, double s) { return TransformationSystem(p).movingPoint(s); },
+          "moving_point", [](const Primitive& p, double s) { return Dmp(p).movingPoint(s); },
           py::arg("s"), "phi(s) of eq. (5), m, (3,)");
 }
 
@@ -102,9 +101,9 @@ void bindStepping(py::module_& module) {
       .def(py::init([](const Primitive& primitive, const Vector3& position, const Vector3& goal,
                        const Vector3& velocity, double ratio) {
              requireRatio(ratio);
-             Dmp dmp;
-             dmp.start(TransformationSystem(primitive), requireFinite(position, "position"),
-                       requireFinite(velocity, "velocity"), requireFinite(goal, "goal"), ratio);
+             Dmp dmp(primitive);
+             dmp.start(requireFinite(position, "position"), requireFinite(velocity, "velocity"),
+                       requireFinite(goal, "goal"), ratio);
              return dmp;
            }),
            py::arg("primitive"), py::arg("position"), py::arg("goal"),
@@ -113,7 +112,7 @@ void bindStepping(py::module_& module) {
           "switch_to",
           [](Dmp& dmp, const Primitive& primitive, const Vector3& goal, double ratio) {
             requireRatio(ratio);
-            dmp.switchTo(TransformationSystem(primitive), requireFinite(goal, "goal"), ratio);
+            dmp.switchTo(Dmp(primitive), requireFinite(goal, "goal"), ratio);
           },
           py::arg("primitive"), py::arg("goal"), py::arg("ratio") = 1.0,
           "Another primitive in mid-motion; phase, position and velocity are kept.")

@@ -1,6 +1,5 @@
 #include "bindings.hpp"
 #include "coglab_controllers/dmp/cartesian_motion.hpp"
-#include "coglab_controllers/goal/goal_watch.hpp"
 #include "coglab_controllers/ptp/ptp_trajectory.hpp"
 
 namespace coglab_controllers::python {
@@ -16,9 +15,9 @@ Pose toPose(const Vector3& position, const QuaternionArray& orientation, const c
   return {requireFinite(position, name), toQuaternion(orientation, name)};
 }
 
-CartesianMotionPlan toPlan(const Primitive& primitive, double ratio, bool orientation_control) {
+DmpPlan toPlan(const Primitive& primitive, double ratio, bool orientation_control) {
   requireRatio(ratio);
-  return {TransformationSystem(primitive), ratio, orientation_control};
+  return {Dmp(primitive), ratio, orientation_control};
 }
 
 void bindCartesianMotion(py::module_& module) {
@@ -45,13 +44,13 @@ void bindCartesianMotion(py::module_& module) {
 
   const QuaternionArray none(0.0, 0.0, 0.0, 1.0);
   py::class_<CartesianMotion>(module, "CartesianMotion",
-                              "Estimator, DMP, orientation curve and end of motion.")
+                              "Goal filter, DMP, orientation curve and end of motion.")
       .def(py::init([](double goal_time_constant) {
-             GoalEstimatorParameters parameters;
+             GoalFilterParameters parameters;
              parameters.time_constant = goal_time_constant;
              return CartesianMotion(parameters);
            }),
-           py::arg("goal_time_constant") = GoalEstimatorParameters().time_constant)
+           py::arg("goal_time_constant") = GoalFilterParameters().time_constant)
       .def(
           "start",
           [](CartesianMotion& motion, const Primitive& primitive, const Vector3& position,
@@ -98,9 +97,9 @@ void bindCartesianMotion(py::module_& module) {
       .def_property_readonly("event",
                              [](const CartesianMotion& motion) {
                                switch (motion.event()) {
-                                 case MotionEnd::Event::Ended:
+                                 case CartesianMotion::Event::Ended:
                                    return "ended";
-                                 case MotionEnd::Event::FollowsAgain:
+                                 case CartesianMotion::Event::FollowsAgain:
                                    return "follows_again";
                                  default:
                                    return "";
@@ -117,53 +116,61 @@ void bindCartesianMotion(py::module_& module) {
       .def_property_readonly("remaining_time", &CartesianMotion::remainingTime);
 }
 
-void bindEstimators(py::module_& module) {
-  py::class_<GoalEstimator>(module, "GoalEstimator",
-                            "Third-order tracker of a goal with ramp compensation.")
+void bindGoals(py::module_& module) {
+  py::class_<GoalFilter>(module, "GoalFilter",
+                         "Third-order tracker of a goal with ramp compensation.")
       .def(py::init([](double time_constant, double max_innovation) {
-             GoalEstimatorParameters parameters;
+             GoalFilterParameters parameters;
              parameters.time_constant = time_constant;
              parameters.max_innovation = max_innovation;
-             return GoalEstimator(parameters);
+             return GoalFilter(parameters);
            }),
-           py::arg("time_constant") = GoalEstimatorParameters().time_constant,
-           py::arg("max_innovation") = GoalEstimatorParameters().max_innovation)
+           py::arg("time_constant") = GoalFilterParameters().time_constant,
+           py::arg("max_innovation") = GoalFilterParameters().max_innovation)
       .def(
           "reset",
-          [](GoalEstimator& e, const Vector3& goal) { e.reset(requireFinite(goal, "goal")); },
+          [](GoalFilter& f, const Vector3& goal) {
+            f.begin({requireFinite(goal, "goal"), Quaternion::Identity()});
+          },
           py::arg("goal"))
       .def(
           "update",
-          [](GoalEstimator& e, double dt, const Vector3& goal) {
-            e.update(requireStep(dt), requireFinite(goal, "goal"));
-            return py::make_tuple(e.position(), e.velocity());
+          [](GoalFilter& f, double dt, const Vector3& goal) {
+            const Pose seen{requireFinite(goal, "goal"), Quaternion::Identity()};
+            f.measureNoise(requireStep(dt), seen);
+            f.update(dt, seen);
+            return py::make_tuple(f.position(), f.velocity());
           },
           py::arg("dt"), py::arg("goal"), "Returns g (m) and g' (m/s).")
-      .def_property_readonly("position", &GoalEstimator::position)
-      .def_property_readonly("velocity", &GoalEstimator::velocity);
+      .def_property_readonly("position", &GoalFilter::position)
+      .def_property_readonly("velocity", &GoalFilter::velocity);
 
-  py::class_<GoalWatch>(
-      module, "GoalWatch",
-      "When a goal that moves is no goal any more: left its region, went back, fell.")
+  py::class_<GoalLimits>(
+      module, "GoalLimits",
+      "When a goal that moves ends the motion: left its region, went back, fell.")
       .def(py::init([](const Vector3& region_low, const Vector3& region_high, double retreat,
                        double drop, const Vector3& hand, const Vector3& goal) {
-             const GoalLimits limits{region_low, region_high, retreat, drop};
-             if (*limits.wrong() != 0) throw std::invalid_argument(limits.wrong());
-             GoalWatch watch;
-             watch.begin(limits, requireFinite(hand, "hand"), requireFinite(goal, "goal"));
-             return watch;
+             const GoalBounds bounds{region_low, region_high, retreat, drop};
+             if (*bounds.wrong() != 0) throw std::invalid_argument(bounds.wrong());
+             GoalObservation first;
+             first.position = requireFinite(goal, "goal");
+             GoalLimits limits;
+             limits.begin(first, requireFinite(hand, "hand"), bounds);
+             return limits;
            }),
            py::arg("region_low"), py::arg("region_high"), py::arg("retreat"), py::arg("drop"),
            py::arg("hand"), py::arg("goal"))
       .def(
           "update",
-          [](GoalWatch& watch, double dt, const Vector3& goal) {
-            const Reason reason = watch.update(requireStep(dt), requireFinite(goal, "goal"));
+          [](GoalLimits& limits, double dt, const Vector3& goal) {
+            const Reason reason = limits.checkBounds(requireStep(dt), requireFinite(goal, "goal"));
             return py::make_tuple(static_cast<int>(reason.number()), reason.str());
           },
           py::arg("dt"), py::arg("goal"),
           "Returns (ReasonCode, sentence); (0, '') while it may go on.");
+}
 
+void bindOrientationCurve(py::module_& module) {
   py::class_<OrientationCurve>(module, "OrientationCurve",
                                "Quaternion Bezier curve between two orientations.")
       .def(py::init([](const QuaternionArray& start, const QuaternionArray& target, double duration,
@@ -212,7 +219,8 @@ void bindPtp(py::module_& module) {
 
 void bindMotion(py::module_& module) {
   bindCartesianMotion(module);
-  bindEstimators(module);
+  bindGoals(module);
+  bindOrientationCurve(module);
   bindPtp(module);
 }
 

@@ -11,7 +11,7 @@
 #include "coglab_controllers/plugins/dmp_controller.hpp"
 #include "coglab_controllers/ros/motion_controller_ros.hpp"
 #include "coglab_controllers/ros/path_topic.hpp"
-#include "coglab_controllers/ros/tf_goal_source.hpp"
+#include "coglab_controllers/ros/tf_listener.hpp"
 #include "coglab_msgs/DmpFeedback.h"
 #include "coglab_msgs/DmpGoal.h"
 #include "coglab_msgs/ExecuteDmp.h"

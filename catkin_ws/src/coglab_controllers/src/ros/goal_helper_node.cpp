@@ -7,10 +7,9 @@
 #include <ros/ros.h>
 #include <tf2/buffer_core.h>
 
-#include "coglab_controllers/goal/goal_relay.hpp"
 #include "coglab_controllers/kinematics/rotation.hpp"
 #include "coglab_controllers/manager/parameters.hpp"
-#include "coglab_controllers/ros/tf_goal_source.hpp"
+#include "coglab_controllers/ros/tf_listener.hpp"
 #include "coglab_msgs/DmpGoal.h"
 #include "coglab_rt/ros/alone.hpp"
 #include "coglab_rt/ros/logger_service.hpp"
@@ -18,9 +17,12 @@
 
 namespace coglab_controllers {
 
+constexpr std::int64_t kStaticPeriod_ns = 1'000'000'000;
+
 /// Publishes the position of a frame whenever a new transform has come, stamped with its time of
-/// capture. What is from the future or not finite is not published, and of the rest what GoalRelay
-/// lets pass.
+/// capture. The DMP plug-in takes a goal on dmp_goal as it is, so only goals are published that a
+/// motion would believe (GoalLimits): nothing from the future, old, or far from the frames before
+/// it, and at first nothing until frames agree. A static frame is published once a second.
 class GoalHelper {
  public:
   /// @param node of the topic's name, which is relative to it  @param own the node's parameters
@@ -58,11 +60,15 @@ class GoalHelper {
       ROS_WARN_THROTTLE(5.0, "no goal: the transform of '%s' is not finite", frame_.c_str());
       return;
     }
-    if (!relay_.see(steadyNow(), seen)) {
-      tellWhyNot();
+    const std::int64_t now = steadyNow();
+    if (limits_.update(now, seen) != GoalLimits::State::Fresh) {
+      warn();
       return;
     }
-    const GoalObservation& goal = relay_.goal();
+    const GoalObservation& goal = limits_.goal();
+    if (isPublished(goal, now)) return;
+    published_goal_ = goal;
+    published_ns_ = now;
     const Vector3 position = goal.position + goal.orientation * offset_;
     coglab_msgs::DmpGoal message;
     message.header.stamp.fromNSec(static_cast<std::uint64_t>(goal.frame_ns));
@@ -73,27 +79,33 @@ class GoalHelper {
     goal_.publish(message);
   }
 
-  void tellWhyNot() {
-    const GoalGate& gate = relay_.gate();
-    switch (gate.state()) {
-      case GoalGate::State::Fresh:
-        return;  // told already
-      case GoalGate::State::Unsettled:
-        ROS_WARN_THROTTLE(5.0, "no goal yet: too few transforms of '%s' agree", frame_.c_str());
-        return;
-      default:
-        ROS_WARN_THROTTLE(5.0,
-                          "no goal: the newest transform of '%s' is %.3f s old and %.3f m away "
-                          "from the last goal",
-                          frame_.c_str(), gate.age(), gate.jump());
+  bool isPublished(const GoalObservation& goal, std::int64_t now) const {
+    if (published_ns_ == 0 || goal.frame_ns != published_goal_.frame_ns ||
+        goal.clock_steps != published_goal_.clock_steps) {
+      return false;
     }
+    // A static frame has no stamp: it is published again and again, as captured now.
+    return goal.frame_ns != 0 || now - published_ns_ < kStaticPeriod_ns;
+  }
+
+  void warn() const {
+    if (limits_.state() == GoalLimits::State::Unsettled) {
+      ROS_WARN_THROTTLE(5.0, "no goal yet: too few transforms of '%s' agree", frame_.c_str());
+      return;
+    }
+    ROS_WARN_THROTTLE(5.0,
+                      "no goal: the newest transform of '%s' is %.3f s old and %.3f m away from "
+                      "the last goal",
+                      frame_.c_str(), limits_.age(), limits_.jump());
   }
 
   ros::NodeHandle node_;
   tf2::BufferCore buffer_;
   TfListener listener_;
   TfGoalSource source_{buffer_, listener_};
-  GoalRelay relay_;
+  GoalLimits limits_;
+  GoalObservation published_goal_;
+  std::int64_t published_ns_ = 0;  // when; 0: none was
   ros::Publisher goal_;
   std::string frame_, dmp_frame_;
   Vector3 offset_ = Vector3::Zero();

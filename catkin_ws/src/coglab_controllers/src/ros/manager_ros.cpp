@@ -7,7 +7,7 @@
 #include <exception>
 #include <utility>
 
-#include "coglab_controllers/ros/authored_controller_ros.hpp"
+#include "coglab_controllers/ros/custom_motion_controller_ros.hpp"
 #include "coglab_controllers/ros/ros_parameters.hpp"
 #include "coglab_msgs/ControllerStatus.h"
 #include "coglab_rt/ros/parameter.hpp"
@@ -133,8 +133,8 @@ Answer ManagerRos::load(const std::string& id, const std::string& type) {
     side->id = id;
     if (maker.ros != nullptr) {
       side->ros.reset(maker.ros());
-    } else if (dynamic_cast<AuthoredController*>(&controller) != nullptr) {
-      side->ros = std::make_unique<AuthoredControllerRos>();
+    } else if (dynamic_cast<CustomMotionController*>(&controller) != nullptr) {
+      side->ros = std::make_unique<CustomMotionControllerRos>();
     } else {
       return;
     }

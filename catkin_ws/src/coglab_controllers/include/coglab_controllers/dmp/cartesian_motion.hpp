@@ -1,36 +1,43 @@
 /// @file
-/// A whole Cartesian motion: estimator, DMP, orientation curve and end of the motion in the order
+/// A whole Cartesian motion: goal filter, DMP, orientation curve and end of the motion in the order
 /// of the control cycle.
 #pragma once
 
-#include "coglab_controllers/dmp/dmp.hpp"
-#include "coglab_controllers/dmp/motion_end.hpp"
+#include <vector>
+
+#include "coglab_controllers/dmp/dmp_request.hpp"
 #include "coglab_controllers/dmp/orientation_curve.hpp"
-#include "coglab_controllers/goal/goal_estimator.hpp"
-#include "coglab_controllers/goal/goal_jitter.hpp"
+#include "coglab_controllers/goal/goal_filter.hpp"
 
 namespace coglab_controllers {
 
-/// What execute_dmp asks for, checked and complete; built outside the cycle, copied into it.
-struct CartesianMotionPlan {
-  TransformationSystem system;
-  double ratio = 1.0;  ///< dmp_ratio
-  bool orientation_control = true;
-  /// m/s at which the hand comes to the goal at last; 0: as the primitive has it.
-  /// Within kSlowWay of the goal it is not faster, before that only so much that it brakes by
-  /// kGentleBraking until there; the clock of the primitive is slowed for that, its path stays.
-  double arrival_speed = 0.0;
-  /// The goal tells where something will come to rest. It moves because the prediction changes,
-  /// which is not followed like a goal that moves; see GoalEstimatorParameters::predicted_speed.
-  bool predicted = false;
+/// When a motion is over, and when a goal that moves afterwards is followed again.
+struct MotionEndParameters {
+  double phase = 0.012;  ///< the phase must be below this (0.01 is reached with the duration over),
+  double speed = 0.02;   ///< m/s, the set-point move slower than this,
+  double turning = 0.2;  ///< rad/s, and turn slower than this,
+  double distance = 0.005;         ///< m, and be closer to the goal than this
+  double follow_distance = 0.030;  ///< m: a goal that leaves this ball around the latched one …
+  double follow_time = 0.2;        ///< s: … for this long is followed again
 };
+
+/// Poses of the end-effector in order of time, and when it is there.
+struct TimedPath {
+  std::vector<double> times;  ///< s from now, growing, one for each pose
+  std::vector<Pose> poses;    ///< m and unit quaternions
+};
+inline constexpr int kPathPoints = 40;  ///< a path has at most one pose more
+
+/// The least speed of a clock that a prediction reckons with: one that stands has no end.
+inline constexpr double kSlowestClock = 0.1;
 
 inline constexpr double kSlowWay = 0.02;         ///< m
 inline constexpr double kGentleBraking = 0.6;    ///< m/s^2
 inline constexpr double kFastestArrival = 0.45;  ///< m/s, on all of the way
 
-/// Runs a primitive towards a goal pose that may move. This is all the DMP plug-in does between its
-/// mailboxes and the IK; the Python module runs the same code. No allocation, no throw.
+/// Runs a primitive towards a goal pose that may move. When it has arrived the goal is latched, so
+/// that a noisy goal does not move an arm that stands. The Python module runs the same code. No
+/// allocation, no throw but in the constructor and in rollOut().
 class CartesianMotion {
  public:
   enum class Phase {
@@ -39,20 +46,22 @@ class CartesianMotion {
     Ended     ///< arrived; the goal is latched and the set-point rests
   };
 
-  /// @throws std::invalid_argument as the constructors of the estimators and MotionEnd.
-  CartesianMotion(const GoalEstimatorParameters& estimator = {},
-                  const MotionEndParameters& end = {});
+  enum class Event { None, Ended, FollowsAgain };
+
+  /// @throws std::invalid_argument as the constructor of GoalFilter, or naming the parameter of the
+  /// end that is not finite and positive.
+  CartesianMotion(const GoalFilterParameters& filter = {}, const MotionEndParameters& end = {});
 
   /// Begins at phase 1 from the given pose and velocity (execute_dmp).
   /// @param goal hand pose to reach, offset and target orientation already applied, goal as
   /// received now.  @param approach as of step().
-  void start(const CartesianMotionPlan& plan, const Pose& pose, const Vector3& velocity,
+  void start(const DmpPlan& plan, const Pose& pose, const Vector3& velocity,
              const Vector3& angular_velocity, const Pose& goal,
              const Vector3& approach = Vector3::Zero()) noexcept;
 
   /// Another primitive or ratio (switch_dmp): phase, position and velocity are kept, and the
   /// orientation curve goes on from where it is.
-  void switchTo(const CartesianMotionPlan& plan, const Pose& goal) noexcept;
+  void switchTo(const DmpPlan& plan, const Pose& goal) noexcept;
 
   /// One cycle.
   /// @param goal as received, sample-and-hold.  @param rate 0..1 slows the clock (speed_scale), see
@@ -70,17 +79,23 @@ class CartesianMotion {
   /// Ends the motion where it is; the set-point rests at the present one.
   void stop() noexcept;
 
+  /// The set-points from where the motion is to its end, at most kPathPoints + 1, the first of them
+  /// now; none if it is idle. Allocates: not for the control cycle.
+  /// @param goal as received, taken to stay where it is
+  /// @param rate 0..1 of the clock, taken to stay as well, kSlowestClock at least
+  /// @param approach as of step()
+  TimedPath rollOut(const Pose& goal, double rate = 1.0,
+                    const Vector3& approach = Vector3::Zero()) const;
+
   Phase phase() const noexcept { return phase_; }
   /// Of the last step.
-  MotionEnd::Event event() const noexcept { return event_; }
+  Event event() const noexcept { return event_; }
   const Dmp& dmp() const noexcept { return dmp_; }
   const CartesianReference& reference() const noexcept { return reference_; }
   /// Goal position as used in eq. (1), m: the estimate, or the latched goal after the end.
   const Vector3& goal() const noexcept { return goal_; }
   /// Target orientation as estimated; it does not matter without orientation control.
-  const Quaternion& goalOrientation() const noexcept {
-    return orientation_estimator_.orientation();
-  }
+  const Quaternion& goalOrientation() const noexcept { return filter_.orientation(); }
   /// Of the clock, 0..1, in the last step.
   double rate() const noexcept { return rate_; }
   /// Of the set-point, m/s, on the clock of speed_scale: slowed for a slow arrival alone.
@@ -93,20 +108,18 @@ class CartesianMotion {
   }
 
  private:
-  void watchNoise(double dt, const Pose& goal) noexcept;
   double arrivalRate(const Vector3& goal) const noexcept;
+  Event watchEnd(double dt, double speed, double turning, const Vector3& received) noexcept;
 
-  GoalEstimator goal_estimator_;
-  OrientationEstimator orientation_estimator_;
+  MotionEndParameters end_;
+  GoalFilter filter_;
   Dmp dmp_;
   OrientationCurve curve_;
-  MotionEnd end_;
   CartesianReference reference_;
   Phase phase_ = Phase::Idle;
-  MotionEnd::Event event_ = MotionEnd::Event::None;
-  GoalJitter jitter_{0.03}, turning_jitter_{0.3};
-  Pose seen_;  // the goal as received in the last step
+  Event event_ = Event::None;
   Vector3 goal_ = Vector3::Zero();
+  double away_ = 0.0;  // s that the goal has been outside the ball around the latched one
   Quaternion orientation_ = Quaternion::Identity();  // set-point at the end of the last step
   double curve_begin_ = 0.0;                         // progress of the DMP at which the curve began
   double remaining_distance_ = 0.0;

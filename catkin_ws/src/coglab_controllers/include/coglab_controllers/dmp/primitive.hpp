@@ -8,10 +8,29 @@
 
 #include <Eigen/Core>
 
-#include "coglab_controllers/dmp/canonical_system.hpp"
 #include "coglab_controllers/kinematics/types.hpp"
 
 namespace coglab_controllers {
+
+/// The clock of a motion, eq. (3): tau * s' = -alpha * s. The phase s falls from 1 at the start of
+/// a motion towards 0. Solved exactly, so that the step size does not matter.
+class CanonicalSystem {
+ public:
+  /// ln(100): the phase is 0.01 when the duration of the demonstration is over.
+  static constexpr double kDefaultAlpha = 4.605170185988091;
+
+  /// @param alpha rate, dimensionless.  @throws std::invalid_argument unless 0 < alpha <= 50.
+  explicit CanonicalSystem(double alpha = kDefaultAlpha);
+
+  double alpha() const noexcept { return alpha_; }
+  /// Phase after `dt` seconds at time constant `tau` (s).
+  double advance(double s, double dt, double tau) const noexcept;
+  /// Seconds after the start at which the phase is s (s > 0).
+  double timeAt(double s, double tau) const noexcept;
+
+ private:
+  double alpha_;
+};
 
 /// Largest number of basis functions of a primitive; the control cycle holds them in fixed-size
 /// arrays.

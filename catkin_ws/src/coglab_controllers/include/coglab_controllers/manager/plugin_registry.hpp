@@ -27,7 +27,7 @@ struct MotionMaker {
 /// one is raised when classes or meanings change. Static, so that a library keeps its own.
 static inline constexpr ctrl_more::Abi motionAbi() {
   return ctrl_more::abiOf<MotionController, MotionSetup, CycleInput, References, MotionRequest,
-                          RobotSample, RobotSetup, Reason>(2);
+                          RobotSample, RobotSetup, Reason>(3);
 }
 
 /// The types that libraries have registered; a name that is known is refused. Any thread.
@@ -38,7 +38,9 @@ class MotionTypes : public ctrl_more::PluginTypesOf<MotionMaker> {
   /// Registers a type; returns false, and remembers the refusal, if the name is known or the
   /// library was compiled with other headers.
   bool insert(const std::string& type, const MotionMaker& maker,
-              const ctrl_more::Abi& abi = motionAbi());
+              const ctrl_more::Abi& abi = motionAbi()) {
+    return add(type, maker, abi);
+  }
 
  private:
   MotionTypes();

@@ -3,7 +3,9 @@
 /// for all. Where it stands in the control cycle: docs/architecture.md.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <utility>
@@ -105,14 +107,12 @@ class MotionRunner : public MotionController {
   double time() const { return time_; }          ///< control thread; s, of the motion's own
 
  private:
-  struct Entry {
+  /// One request on its way into the cycle, and there.
+  struct Plan {
     int id = -1;
     Request request;
-  };
-  struct Plan {
     RequestStamp stamp;
     bool queue = false;
-    Entry entry;
     int status = MotionAnswer::kRejected;  ///< written by the cycle
     Reason refusal;                        ///< written by the cycle
   };
@@ -137,8 +137,8 @@ class MotionRunner : public MotionController {
   RunnerStage stage_ = RunnerStage::Rest;
   MotionState state_ = MotionState::Idle;
   Reason reason_;
-  Entry current_, next_;      // the motion under way, and the one that begins
-  std::vector<Entry> queue_;  // a ring; its size is fixed by configure()
+  Plan current_, next_;      // the motion under way, and the one that begins
+  std::vector<Plan> queue_;  // a ring; its size is fixed by configure()
   std::size_t first_ = 0;
   int queued_ = 0, unfinished_ = 0;
   double time_ = 0.0;
@@ -148,6 +148,239 @@ class MotionRunner : public MotionController {
   EventRing<EndedMotion, 256> ends_;
 };
 
-}  // namespace coglab_controllers
+template <typename Request>
+void MotionRunner<Request>::configure(const MotionSetup& setup) {
+  setup_ = setup;
+  const Parameters parameters(setup.parameters, setup.id);
+  loop_.configure(setup);
+  arrival_.configure(parameters);
+  if (policy_.longest_queue > 0) {
+    const int most = policy_.longest_queue;
+    const int length = parameters.whole("max_queue", std::min(16, most), 0, most);
+    queue_.resize(static_cast<std::size_t>(length));
+  }
+  MotionConfiguration configuration(setup_);
+  motion_->configure(configuration);
+  arguments_ = configuration.arguments();
+  if (std::function<void()> wait = setup.host->cycleWait()) plans_.setWait(wait);
+}
 
-#include "coglab_controllers/motion/motion_runner_impl.hpp"
+template <typename Request>
+MotionAnswer MotionRunner<Request>::offer(const MotionRequest& begun, const Request& request,
+                                          bool queue) {
+  auto plan = std::make_unique<Plan>();
+  plan->stamp = begun.stamp;
+  plan->queue = queue;
+  plan->id = next_id_;
+  plan->request = request;
+  MotionAnswer answer;
+  const PlanOutcome outcome =
+      plans_.offer(std::move(plan), setup_.host->planTimeout(), [&answer](const Plan& adopted) {
+        if (!adopted.refusal.empty())
+          answer = MotionAnswer::rejected(Answer::refusal(adopted.refusal));
+        answer.status = adopted.status;
+      });
+  if (outcome == PlanOutcome::Withdrawn) {
+    return MotionAnswer::rejected(
+        Answer::refusal(ReasonCode::NotAdopted, setup_.host->notAdopted(outcome)));
+  }
+  if (outcome == PlanOutcome::Taken) {
+    answer.status = MotionAnswer::kQueued;
+    answer.message = setup_.host->notAdopted(outcome);
+  }
+  if (answer.status != MotionAnswer::kRejected) answer.id = next_id_++;
+  return answer;
+}
+
+// ---- the control thread
+// --------------------------------------------------------------------------
+
+template <typename Request>
+void MotionRunner<Request>::start(const CycleInput& input) {
+  stage_ = RunnerStage::Rest;
+  state_ = MotionState::Idle;
+  reason_.clear();
+  queued_ = 0;
+  motion_->stop();
+  loop_.open();
+  stamp_ns_ = input.robot.stamp_ns;
+  report(stamp_ns_);
+}
+
+template <typename Request>
+void MotionRunner<Request>::stop() {
+  if (stage_ != RunnerStage::Rest && state_ != MotionState::Reached) {
+    giveUp(Reason(ReasonCode::Switched, "ended by a switch to another controller"));
+  } else {
+    stage_ = RunnerStage::Rest;
+    motion_->stop();
+  }
+  if (state_ == MotionState::Reached) state_ = MotionState::Idle;
+  report(stamp_ns_);
+}
+
+template <typename Request>
+void MotionRunner<Request>::abort(const Reason& reason) {
+  giveUp(reason);
+}
+
+template <typename Request>
+void MotionRunner<Request>::adopt(const CycleInput& input) {
+  Plan* const plan = plans_.take();
+  if (plan == nullptr) return;
+  plan->refusal = voidReason(plan->stamp, input);
+  if (plan->refusal.empty()) plan->refusal = unwelcome(plan->request);
+  if (plan->refusal.empty()) place(*plan);
+  plans_.acknowledge();
+}
+
+template <typename Request>
+void MotionRunner<Request>::place(Plan& plan) {
+  if (plan.queue && stage_ != RunnerStage::Rest) {
+    if (static_cast<std::size_t>(queued_) == queue_.size()) {
+      plan.refusal = Reason(ReasonCode::QueueFull, "the queue is full: ")
+                     << static_cast<std::uint64_t>(queued_) << " motions wait (max_queue "
+                     << static_cast<std::uint64_t>(queue_.size()) << "); wait for the end of one";
+      return;
+    }
+    queue_[(first_ + static_cast<std::size_t>(queued_++)) % queue_.size()] = plan;
+    plan.status = MotionAnswer::kQueued;
+    return;
+  }
+  if (stage_ != RunnerStage::Rest) {
+    const Reason why(ReasonCode::Superseded, "a newer motion took its place");
+    Reason told;
+    tell(stage_ == RunnerStage::Moving ? current_.id : next_.id, why, told);
+    endQueued(why, told);
+  }
+  // It begins with the next joint state: in a cycle without one, the commanded state is that of
+  // the last.
+  next_ = plan;
+  stage_ = stage_ == RunnerStage::Rest || stage_ == RunnerStage::Starting ? RunnerStage::Starting
+                                                                          : RunnerStage::Replacing;
+  state_ = MotionState::Running;
+  reason_.clear();
+  plan.status = MotionAnswer::kStarted;
+}
+
+template <typename Request>
+void MotionRunner<Request>::begin(const CycleInput& input, bool at_rest) {
+  current_ = next_;
+  stage_ = RunnerStage::Moving;
+  state_ = MotionState::Running;
+  reason_.clear();
+  time_ = 0.0;
+  arrival_.begin();
+  const SetPoint from = loop_.setPoint(input, at_rest);
+  motion_->start({current_.request, from, input});
+}
+
+/// The reference has come to its end; the motion has when the arm is there too.
+template <typename Request>
+void MotionRunner<Request>::arrive(const CycleInput& input) {
+  switch (arrival_.update(input.dt, loop_.error(input), loop_.allowedError())) {
+    case Arrival::State::Waiting:
+      return;
+    case Arrival::State::Stuck:
+      giveUp(loop_.stuck(input));
+      return;
+    case Arrival::State::There:
+      reach(input);
+      return;
+  }
+}
+
+template <typename Request>
+void MotionRunner<Request>::reach(const CycleInput& input) {
+  ends_.push({current_.id, true, {}});
+  if (queued_ > 0) {
+    next_ = queue_[first_];
+    first_ = (first_ + 1) % queue_.size();
+    --queued_;
+    begin(input, true);
+    return;
+  }
+  stage_ = RunnerStage::Rest;
+  state_ = MotionState::Reached;
+}
+
+template <typename Request>
+bool MotionRunner<Request>::endIfThere(const CycleInput& input) {
+  if (stage_ != RunnerStage::Moving || !motion_->endIfThere(input)) return false;
+  if (policy_.open_end) {
+    follow();
+  } else {
+    reach(input);
+  }
+  return true;
+}
+
+template <typename Request>
+void MotionRunner<Request>::computeReference(const CycleInput& input, References& references) {
+  stamp_ns_ = input.robot.stamp_ns;
+  const bool waits = stage_ == RunnerStage::Starting || stage_ == RunnerStage::Replacing;
+  if (waits && input.motion_allowed) begin(input, false);
+  if (stage_ == RunnerStage::Moving && !policy_.open_end &&
+      motion_->state() == MotionState::Reached) {
+    arrive(input);
+  }
+  MotionReference reference(input.dt);
+  if (stage_ == RunnerStage::Moving) {
+    const double next = time_ + input.dt * input.time_scale;
+    motion_->computeReference({time_, next, input, loop_.ik()}, reference);
+    time_ = next;
+    follow();
+    if (stage_ != RunnerStage::Moving) reference.rest();
+  }
+  loop_.write(input, reference, references);
+}
+
+/// Takes over what the motion says of itself.
+template <typename Request>
+void MotionRunner<Request>::follow() {
+  const MotionState state = motion_->state();
+  if (state == MotionState::Aborted) {
+    giveUp(motion_->reason());
+    return;
+  }
+  const bool ends_here = state == MotionState::Reached && !policy_.open_end;
+  state_ = ends_here ? MotionState::Running : state;
+  const Reason& reason = motion_->reason();
+  if (!reason.empty() || !reason_.empty()) reason_ = reason;
+}
+
+template <typename Request>
+void MotionRunner<Request>::tell(int id, const Reason& why, Reason& told) {
+  ends_.push({id, false, why});
+  if (policy_.id_name == nullptr) return;
+  if (unfinished_++ == 0) {
+    told << "; not executed: " << policy_.id_name << " ";
+  } else {
+    told << ", ";
+  }
+  told << static_cast<std::uint64_t>(id);
+}
+
+template <typename Request>
+void MotionRunner<Request>::endQueued(const Reason& why, Reason& told) {
+  for (; queued_ > 0; --queued_) {
+    tell(queue_[first_].id, why, told);
+    first_ = (first_ + 1) % queue_.size();
+  }
+}
+
+template <typename Request>
+void MotionRunner<Request>::giveUp(const Reason& why) {
+  if (stage_ == RunnerStage::Rest) return;
+  Reason told = why;
+  unfinished_ = 0;
+  tell(stage_ == RunnerStage::Moving ? current_.id : next_.id, why, told);
+  endQueued(why, told);
+  motion_->stop();
+  loop_.open();
+  stage_ = RunnerStage::Rest;
+  state_ = MotionState::Aborted;
+  reason_ = told;
+}
+
+}  // namespace coglab_controllers

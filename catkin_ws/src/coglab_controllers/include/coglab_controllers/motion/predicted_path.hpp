@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string>
 
-#include "coglab_controllers/dmp/roll_out.hpp"
+#include "coglab_controllers/dmp/cartesian_motion.hpp"
 #include "coglab_controllers/names.hpp"
 
 namespace coglab_controllers {

@@ -9,11 +9,10 @@
 #include <string>
 
 #include "coglab_controllers/dmp/library.hpp"
-#include "coglab_controllers/goal/goal_feed.hpp"
+#include "coglab_controllers/goal/goal_input.hpp"
 #include "coglab_controllers/motion/motion_runner.hpp"
 #include "coglab_controllers/motion/predicted_path.hpp"
 #include "coglab_controllers/plugins/dmp_cycle.hpp"
-#include "coglab_controllers/plugins/dmp_request.hpp"
 
 namespace coglab_controllers {
 
@@ -47,7 +46,7 @@ class DmpController : public MotionRunner<DmpPlan> {
   /// What execute() would do now from where the arm is commanded to be, at rest: checked as that
   /// does, but nothing is begun, and the controller need not be the active one.
   Answer predict(const DmpRequest& request, PredictedPath& path);
-  /// dmp_goal, see GoalFeed::offer(). `frame` must be dmp_frame_name.
+  /// dmp_goal, see GoalInput::offer(). `frame` must be dmp_frame_name.
   Answer setGoal(const std::string& frame, const Vector3& goal, std::int64_t stamp_ns,
                  std::int64_t frame_ns = 0) {
     return goals_.offer(frame, goal, stamp_ns, frame_ns);
@@ -55,7 +54,7 @@ class DmpController : public MotionRunner<DmpPlan> {
   /// Asks the goal source for the goal frame of the motion; call it often (the ROS side: 200 Hz;
   /// lockstep: every tick).
   void pollGoal() { goals_.poll(); }
-  /// Who knows frames. Must outlive the controller, or be taken away with null.
+  /// Where poses of frames come from. Must outlive the controller, or be taken away with null.
   void setGoalSource(GoalSource* source) { goals_.setSource(source); }
   void setIkDebug(bool on) { ik_debug_.store(on, std::memory_order_relaxed); }
   bool ikDebug() const { return ik_debug_.load(std::memory_order_relaxed); }
@@ -87,9 +86,7 @@ class DmpController : public MotionRunner<DmpPlan> {
   void report(std::int64_t stamp_ns) override;
 
   Answer ask(const DmpRequest& request, bool execute);
-  Answer check(const DmpRequest& request, bool execute, DmpPlan& plan);
-  Answer checkPrimitive(const DmpRequest& request, DmpPlan& plan) const;
-  Answer checkStart(const DmpRequest& request, DmpPlan& plan) const;
+  Answer makePlan(const DmpRequest& request, bool execute, DmpPlan& plan);
   Answer checkReach(const DmpPlan& plan) const;
   Answer rollOutPlan(const DmpPlan& plan, bool at_rest, PredictedPath& path);
   Reason scaledTooFar(const DmpPlan& plan, const Vector3& start, const Vector3& goal) const;
@@ -103,7 +100,7 @@ class DmpController : public MotionRunner<DmpPlan> {
 
   mutable std::mutex library_mutex_;
   Library library_;
-  GoalFeed goals_;
+  GoalInput goals_;
   DmpCycle* const cycle_;  // the motion that the base runs
   std::mutex predict_mutex_;
   DmpCycle imagined_;  // begins motions that nothing runs

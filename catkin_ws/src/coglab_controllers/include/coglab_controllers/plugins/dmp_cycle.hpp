@@ -4,11 +4,10 @@
 
 #include <cstdint>
 
-#include "coglab_controllers/goal/goal_feed.hpp"
-#include "coglab_controllers/goal/goal_watch.hpp"
+#include "coglab_controllers/dmp/cartesian_motion.hpp"
+#include "coglab_controllers/goal/goal_input.hpp"
 #include "coglab_controllers/motion/motion.hpp"
 #include "coglab_controllers/motion/reference_loop.hpp"
-#include "coglab_controllers/plugins/dmp_plan.hpp"
 
 namespace coglab_controllers {
 
@@ -41,7 +40,7 @@ struct DmpSnapshot {
   Name primitive;
   CartesianMotion motion;
   Pose goal;  ///< of the hand in dmp_frame_name, as received, inside the workspace
-  Vector3 approach = Vector3::Zero();  ///< as of CartesianMotion::step
+  Vector3 approach = Vector3::Zero();  ///< see CartesianMotion::step
 };
 
 /// Where a DMP motion is.
@@ -54,12 +53,12 @@ enum class DmpStage : std::uint8_t {
   GivenUp  ///< the reason says why
 };
 
-/// The real-time half of the plug-in. Parameters: the goal's (GoalGateParameters), the estimator's
+/// The real-time half of the plug-in. Parameters: the goal's (GoalFrameLimits), the filter's
 /// and the end's (MotionEndParameters) as DmpController lists them.
 class DmpCycle : public Motion<DmpPlan> {
  public:
   /// @param goals outlives this object
-  explicit DmpCycle(GoalFeed& goals) : goals_(goals) {}
+  explicit DmpCycle(GoalInput& goals) : goals_(goals) {}
 
   void configure(MotionConfiguration& configuration) override;
   void start(const MotionStart<DmpPlan>& start) override;
@@ -78,7 +77,7 @@ class DmpCycle : public Motion<DmpPlan> {
   DmpProgress progress(std::int64_t stamp_ns, MotionState state, const Reason& reason) const;
   IkDebugRecord debug(const CycleInput& input, const IkResult& ik) const;
   DmpSnapshot snapshot(std::int64_t stamp_ns) const {
-    return {stamp_ns, primitive_, motion_, goal_, hand_.approachAt(gate_.goal())};
+    return {stamp_ns, plan_.primitive, motion_, goal_, plan_.approachAt(limits_.goal())};
   }
 
  private:
@@ -92,25 +91,22 @@ class DmpCycle : public Motion<DmpPlan> {
   void giveUp(const Reason& why) noexcept;
   void write(MotionReference& reference, double dt);
 
-  GoalFeed& goals_;
+  GoalInput& goals_;
 
   // set once, by configure()
   std::shared_ptr<const RobotSetup> robot_;
-  GoalGateParameters frame_gate_, topic_gate_;
+  GoalFrameLimits frame_limits_, topic_limits_;
   double arrive_distance_ = 0.01, finish_distance_ = 0.12;
 
   DmpStage stage_ = DmpStage::Rest;
   Reason reason_;
+  DmpPlan plan_;  // of the motion under way, with what switch_dmp changed
   CartesianMotion motion_;
-  GoalGate gate_;
-  GoalWatch watch_;
-  HandGoal hand_;
-  Name primitive_;
-  Pose base_from_dmp_, dmp_from_base_;
+  GoalLimits limits_;
+  Pose dmp_from_base_;
   Pose goal_;                     // of the hand, in dmp_frame_name, inside the workspace
   CartesianReference reference_;  // in dmp_frame_name
   CartesianReference in_base_;
-  std::uint64_t request_ = 0;  // whose goals are followed
   double remaining_distance_ = 0.0;
   bool projected_ = false;  // the goal is outside the workspace
   bool jumps_ = false;      // the motion begins elsewhere than where the arm is

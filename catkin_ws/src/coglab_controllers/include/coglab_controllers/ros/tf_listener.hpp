@@ -1,19 +1,25 @@
 /// @file
-/// Transforms from /tf and /tf_static into a tf2 buffer, less those that would spoil it.
+/// Transforms from /tf and /tf_static into a tf2 buffer, less those that would spoil it, and goals
+/// from that buffer.
 #pragma once
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <string>
+#include <utility>
 
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
 #include <ros/spinner.h>
 #include <tf2/buffer_core.h>
 #include <tf2_msgs/TFMessage.h>
+
+#include "coglab_controllers/goal/goal_input.hpp"
+#include "coglab_controllers/names.hpp"
 
 namespace coglab_controllers {
 
@@ -59,6 +65,24 @@ class TfListener {
   ros::CallbackQueue queue_;
   ros::Subscriber dynamic_, static_;
   std::unique_ptr<ros::AsyncSpinner> spinner_;
+};
+
+/// The newest transform of a tf2 buffer. Any thread but the control thread.
+class TfGoalSource : public GoalSource {
+ public:
+  /// @param listener what fills the buffer; both outlive the source
+  /// @param steady the clock of the samples, ns
+  TfGoalSource(const tf2::BufferCore& buffer, const TfListener& listener,
+               std::function<std::int64_t()> steady = steadyNow)
+      : buffer_(buffer), listener_(listener), steady_(std::move(steady)) {}
+  bool lookup(const std::string& reference, const std::string& frame, GoalObservation& observation,
+              std::string& why) override;
+  double ahead(const std::string& frame) override { return listener_.ahead(frame); }
+
+ private:
+  const tf2::BufferCore& buffer_;
+  const TfListener& listener_;
+  std::function<std::int64_t()> steady_;
 };
 
 }  // namespace coglab_controllers

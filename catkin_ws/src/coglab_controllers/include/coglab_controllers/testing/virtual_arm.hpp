@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "coglab_controllers/manager/controller_manager.hpp"
-#include "coglab_controllers/motion/authored_controller.hpp"
+#include "coglab_controllers/motion/custom_motion_controller.hpp"
 #include "coglab_rt/braking.hpp"
 #include "coglab_rt/interpolator.hpp"
 #include "coglab_rt/joint_limits_table.hpp"
@@ -61,12 +61,12 @@ class VirtualArm {
   VirtualArm& operator=(const VirtualArm&) = delete;
 
   /// Loads a motion and makes it the active controller. @throws std::runtime_error with the refusal
-  AuthoredController& load(const std::string& id, const std::string& type) {
+  CustomMotionController& load(const std::string& id, const std::string& type) {
     std::string active;
     Answer answer = manager->load(id, type);
     if (answer.success) answer = manager->switchTo(id, active);
     if (!answer.success) throw std::runtime_error(answer.message);
-    return dynamic_cast<AuthoredController&>(*manager->motion(id));
+    return dynamic_cast<CustomMotionController&>(*manager->motion(id));
   }
 
   /// From now on the arm follows within its acceleration and jerk limits.

@@ -1,0 +1,119 @@
+/// @file
+/// What a goal may do (docs/reference.md has the limits): which of its frames a motion believes,
+/// and when the motion ends because the goal leaves, goes back or falls.
+#pragma once
+
+#include <cstdint>
+
+#include "coglab_controllers/kinematics/types.hpp"
+#include "coglab_controllers/names.hpp"
+
+namespace coglab_controllers {
+
+/// A goal frame as received: from tf2 its pose, from dmp_goal its position with the identity as
+/// orientation.
+struct GoalObservation {
+  Vector3 position = Vector3::Zero();               ///< m, in dmp_frame_name
+  Quaternion orientation = Quaternion::Identity();  ///< of the goal frame, in dmp_frame_name
+  /// Time of capture, clock of the samples. It gives the age of the frame and does not identify
+  /// it: mapped from another clock twice, one frame has two of them.
+  std::int64_t stamp_ns = 0;
+  /// Identifies the frame: its stamp as received, ns; later ones are larger. 0: it has none and is
+  /// valid as long as it is received (a static transform).
+  std::int64_t frame_ns = 0;
+  /// How often the clock of frame_ns has stepped back so far: after a step stamps begin anew.
+  std::uint32_t clock_steps = 0;
+  std::uint64_t request = 0;  ///< which request asked for this frame; set by GoalInput
+
+  /// Whether this is a later frame than `other`, both with a stamp.
+  bool isLaterThan(const GoalObservation& other) const noexcept {
+    return clock_steps != other.clock_steps || frame_ns > other.frame_ns;
+  }
+};
+
+/// Limits of the frames, the same for all motions.
+struct GoalFrameLimits {
+  double max_age =
+      0.2;  ///< s: an older frame holds the last goal; 0: a goal stays valid until replaced
+  double max_jump = 0.15;    ///< m from one frame to the next; a larger one holds the last goal …
+  int frames_to_accept = 3;  ///< … until this many frames in a row agree within `agreement`
+  double agreement = 0.05;   ///< m
+  double lost_time = 1.0;  ///< s without a believable frame after which the goal is lost; 0: never
+};
+
+/// Limits of a request: where the goal may go during the motion. The defaults allow any way.
+struct GoalBounds {
+  Vector3 region_low = Vector3::Zero();   ///< m, corners of a box in dmp_frame_name that a goal
+  Vector3 region_high = Vector3::Zero();  ///< which was inside may not leave; equal: anywhere
+  double retreat = 0.0;  ///< m, how far it may go back from where it was nearest; 0: any way
+  double drop = 0.0;     ///< m, how far it may sink below its average of kDropTime; 0: any way
+
+  /// What is wrong with them; empty: nothing.
+  const char* wrong() const noexcept;
+};
+
+/// Holds the last believable goal and watches where it goes. Before begin() there is no goal: one
+/// is believed once frames_to_accept frames agree, or at once if it is static. No allocation, no
+/// throw.
+class GoalLimits {
+ public:
+  static constexpr double kDropTime = 0.15;  ///< s
+
+  enum class State : std::uint8_t {
+    Unsettled,  ///< no goal is believed yet
+    Fresh,      ///< the newest frame is followed
+    Old,        ///< no frame young enough: the last goal is held
+    Jumped,     ///< the newest frames are too far away: the last goal is held
+    Lost        ///< held for longer than lost_time
+  };
+
+  explicit GoalLimits(const GoalFrameLimits& frames = {}) : frames_(frames) {}
+
+  /// A motion begins with this goal, whatever came before.
+  /// @param hand where the motion begins, m, in dmp_frame_name
+  void begin(const GoalObservation& first, const Vector3& hand = Vector3::Zero(),
+             const GoalBounds& bounds = {}) noexcept;
+
+  /// One cycle.
+  /// @param now_ns clock of the samples
+  /// @param newest the newest frame received, again and again while no newer one comes; each is
+  /// judged once
+  State update(std::int64_t now_ns, const GoalObservation& newest) noexcept;
+
+  /// Whether the goal is still within the bounds of the motion; once per cycle of `dt` s.
+  /// @return why the motion has to end; empty: it may go on
+  Reason checkBounds(double dt) noexcept { return checkBounds(dt, goal_.position); }
+  /// The same for a goal (m) that did not pass update().
+  Reason checkBounds(double dt, const Vector3& goal) noexcept;
+
+  const GoalObservation& goal() const noexcept { return goal_; }  ///< the one to follow
+  double age() const noexcept { return age_; }                    ///< s, of the newest frame
+  double jump() const noexcept { return jump_; }  ///< m, of the newest frame against the goal held
+  State state() const noexcept { return state_; }
+
+ private:
+  bool isNew(const GoalObservation& newest) const noexcept;
+  void judge(const GoalObservation& newest) noexcept;
+  void believe(const GoalObservation& newest) noexcept;
+  bool outside(const Vector3& goal) const noexcept;
+
+  GoalFrameLimits frames_;
+  GoalObservation goal_;
+  GoalObservation candidate_;
+  GoalObservation last_;  // the newest frame judged
+  int agreeing_ = 0;      // frames in a row that agree, but not with the goal
+  bool settled_ = false;  // a goal is believed
+  bool seen_ = false;     // a frame was judged
+  std::int64_t believed_ns_ = 0;
+  double age_ = 0.0;
+  double jump_ = 0.0;
+  State state_ = State::Unsettled;
+
+  GoalBounds bounds_;
+  Vector3 hand_ = Vector3::Zero();
+  double nearest_ = 0.0;  // m, smallest distance from hand_ so far
+  double height_ = 0.0;   // m, averaged
+  bool was_inside_ = false;
+};
+
+}  // namespace coglab_controllers

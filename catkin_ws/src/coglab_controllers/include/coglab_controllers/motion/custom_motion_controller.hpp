@@ -1,0 +1,80 @@
+/// @file
+/// The motion controller around a motion that somebody wrote against motion/motion.hpp, and how
+/// such a motion is registered.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "coglab_controllers/manager/plugin_registry.hpp"
+#include "coglab_controllers/motion/motion_runner.hpp"
+
+namespace coglab_controllers {
+
+/// Arguments of start_motion.
+struct MotionRequestByName {
+  std::vector<std::string> names;  ///< arguments that are given; the others have their default
+  std::vector<double> values;      ///< one for each name, in the unit that the motion declared
+  bool queue = false;  ///< wait for the end of the motion under way; false: take its place
+};
+
+/// Progress of the motion under way, for motion_feedback.
+struct MotionProgress {
+  std::int64_t stamp_ns = 0;
+  int id = -1;  ///< of the motion under way or the last one; -1: none yet
+  MotionState state = MotionState::Idle;
+  Reason reason;
+  double time = 0.0;  ///< s since it began, on its own clock
+  int queued = 0;
+};
+
+/// The numbers of the file that is being compiled, for libraries of motions: what they share with
+/// the program beside what motionAbi() names. The first one is raised when meanings change. Static,
+/// so that a library keeps its own.
+static inline constexpr ctrl_more::Abi customMotionAbi() {
+  return ctrl_more::abiOf<Motion<>, MotionConfiguration, MotionArgument, MotionArguments,
+                          MotionStart<>, SetPoint, MotionCycle, IkResult, MotionReference>(2);
+}
+
+/// Runs any Motion<>. Parameters: those of MotionRunner, and one for the default of each argument.
+class CustomMotionController : public MotionRunner<MotionArguments> {
+ public:
+  /// One for a motion of a library. Made here and not in the library, which may have been compiled
+  /// when a controller had another size.
+  /// @param motion what it runs
+  /// @param library what the caller was compiled with; leave it out
+  /// @throws std::runtime_error if that is not what the program was compiled with
+  static MotionController* make(std::unique_ptr<Motion<>> motion,
+                                const ctrl_more::Abi& library = customMotionAbi());
+  ~CustomMotionController() override;
+
+  /// start_motion; any thread.
+  MotionAnswer startMotion(const MotionRequestByName& request);
+  /// What start_motion may give: name, unit, default and range of each argument, one line each.
+  std::string describeArguments() const;
+  /// Newest progress; one reader thread.
+  bool readProgress(MotionProgress& progress) { return progress_.read(progress); }
+
+ private:
+  explicit CustomMotionController(std::unique_ptr<Motion<>> motion);
+  void report(std::int64_t stamp_ns) override;
+  Answer readArguments(const MotionRequestByName& request, MotionArguments& values) const;
+
+  TripleBuffer<MotionProgress> progress_;
+};
+
+}  // namespace coglab_controllers
+
+/// Registers a class derived from Motion<> from one of its library's source files, outside of any
+/// namespace: `COGLAB_REGISTER_MOTION("wave/Wave", Wave)`. Where the library is lib<name>.so and
+/// the type <name>/…, load_controller finds it by the type alone.
+#define COGLAB_REGISTER_MOTION(type, Class)                                                    \
+  namespace {                                                                                  \
+  const ::coglab_controllers::MotionRegistration coglab_motion_registration(                   \
+      type,                                                                                    \
+      {[]() -> ::coglab_controllers::MotionController* {                                       \
+         return ::coglab_controllers::CustomMotionController::make(std::make_unique<Class>()); \
+       },                                                                                      \
+       nullptr});                                                                              \
+  }

@@ -1,0 +1,357 @@
+// Plug-ins that throw, give no numbers or take too long: told, and nobody else suffers.
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <stdexcept>
+#include <thread>
+#include <tuple>
+
+#include "coglab_rt/joint_limits_table.hpp"
+#include "virtual_robot.hpp"
+
+namespace coglab_controllers {
+namespace {
+
+TEST(Faults, AnExceptionOfAClassThatOnlyThePluginHasIsToldAndLeavesNothing) {
+  VirtualRobot robot("{" + kTypes + "}");
+  for (int round = 0; round < 3; ++round) {
+    const Answer answer = robot.manager->load("odd", "test/Throwing");
+    EXPECT_TRUE(refused(answer, {"'odd'", "test/Throwing", "an error of its own"}));
+    EXPECT_EQ(answer.code, ReasonCode::InvalidArgument);
+  }
+  std::vector<std::string> ids, types;
+  robot.manager->list(ids, types);
+  EXPECT_TRUE(ids.empty());
+}
+
+TEST(Faults, WhatCannotBeAttachedIsNotLoadedAndItsIdStaysFree) {
+  VirtualRobot robot;
+  int attached = 0;
+  const auto attach = [&](MotionController&, const MotionMaker&) {
+    EXPECT_TRUE(refused(robot.manager->load("ptp", "coglab/PtpController"), {"in use"}));
+    if (++attached == 1) throw std::runtime_error("no service for this one");
+  };
+  std::string type;
+  EXPECT_TRUE(refused(robot.manager->load("ptp", "coglab/PtpController", attach), {"no service"}));
+  EXPECT_TRUE(refused(robot.manager->switchTo("ptp", type), {"not loaded"}));
+  EXPECT_TRUE(VirtualRobot::ok(robot.manager->load("ptp", "coglab/PtpController", attach)));
+  EXPECT_TRUE(VirtualRobot::ok(robot.manager->switchTo("ptp", type)));
+  EXPECT_EQ(attached, 2);
+}
+
+TEST(Faults, GainsThatTheCycleCannotCloseALoopWithAreRefused) {
+  const std::string slow = ", cycle_time: 0.01}";
+  VirtualRobot standard("{dmp: {pos_clik_gain: 110}, ptp: {Kp: 110}}");
+  VirtualRobot slower("{dmp: {rot_clik_gain: 60}, ptp: {Kp: 60}" + slow);
+  const std::string dmp = "coglab/DmpController", ptp = "coglab/PtpController";
+  EXPECT_TRUE(refused(standard.manager->load("dmp", dmp), {"dmp/pos_clik_gain", "110", "to 100"}));
+  EXPECT_TRUE(refused(standard.manager->load("ptp", ptp), {"ptp/Kp", "110", "to 100"}));
+  EXPECT_TRUE(refused(slower.manager->load("dmp", dmp), {"dmp/rot_clik_gain", "60", "to 50"}));
+  EXPECT_TRUE(refused(slower.manager->load("ptp", ptp), {"ptp/Kp", "60", "to 50"}));
+  EXPECT_TRUE(VirtualRobot::ok(standard.manager->load("fine", ptp)));
+}
+
+class Fault : public ::testing::TestWithParam<std::pair<const char*, const char*>> {};
+
+TEST_P(Fault, GivesZeroVelocityItsReasonAndALivingManager) {
+  VirtualRobot robot(std::string("{odd: {fault: ") + GetParam().first + "}, " + kTypes + "}");
+  robot.loadBoth("ptp");
+  ASSERT_TRUE(VirtualRobot::ok(robot.manager->load("odd", "test/Misbehaving")));
+  robot.switchTo("odd");
+  for (int i = 0; i < 10; ++i) {
+    robot.tick();
+    EXPECT_GT(robot.command.velocity.norm(), 0.0);
+  }
+  for (int i = 0; i < 20; ++i) {
+    robot.tick();
+    EXPECT_EQ(robot.command.velocity, JointVector::Zero().eval());
+  }
+  const CycleReport report = robot.manager->report();
+  EXPECT_TRUE(report.fault);
+  EXPECT_EQ(report.state, ManagerState::Fault);
+  EXPECT_NE(report.reason.str().find(GetParam().second), std::string::npos)
+      << report.reason.c_str();
+  EXPECT_NE(report.reason.str().find("'odd'"), std::string::npos);
+  const Answer welcome = robot.manager->motionWelcome("odd", report);
+  EXPECT_TRUE(refused(welcome, {"fault"}));
+  EXPECT_EQ(welcome.code, ReasonCode::ControllerFault);
+  robot.switchTo("ptp");
+  EXPECT_EQ(robot.ptp().add({{-1.3, -0.6, 1.5, 1.7, 0.2, 0.2, 0.8}, {}, {}}).status,
+            MotionAnswer::kStarted);
+  robot.tick();
+  robot.tick();
+  EXPECT_GT(robot.command.velocity.norm(), 0.0);
+  robot.switchTo("odd");  // afresh
+  robot.tick();
+  EXPECT_GT(robot.command.velocity.norm(), 0.0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Faults, Fault,
+                         ::testing::Values(std::make_pair("throw", "told to throw"),
+                                           std::make_pair("throw_int", "threw"),
+                                           std::make_pair("nan", "not finite")));
+
+/// Runs a controller that spins for 20 ms, where 15 are allowed, in each cycle but the fifth and
+/// the tenth, and compares what is told of it. False if the machine itself delayed one of these
+/// two: the row of slow cycles is longer then, and the rest cannot be judged.
+bool overrunsWereJudged() {
+  const coglab_rt::JointLimits limits =
+      coglab_rt::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
+  ctrl_more::Logger logger;
+  ManagerSettings settings = readManagerSettings(
+      YAML::Load("{odd: {fault: slow, after: 0, rest_every: 5, rests: 2}, overrun_time: 0.015, " +
+                 kTypes + "}"),
+      readText(std::string(DESCRIPTION_DIR) + "/urdf/lwr_ih2.urdf"), limits, false);
+  EXPECT_EQ(settings.cycle.overruns_to_fault, 5);
+  settings.logger = &logger;
+  std::atomic<bool> stop{false};
+  ControllerManager manager(std::move(settings));
+  std::thread services([&] {
+    std::string type;
+    EXPECT_TRUE(VirtualRobot::ok(manager.load("odd", "test/Misbehaving")));
+    EXPECT_TRUE(VirtualRobot::ok(manager.switchTo("odd", type)));
+    stop = true;
+  });
+  while (!stop) manager.cycle().idle(manager.now_ns());
+  services.join();
+  RobotSample sample;
+  sample.position = kHome;
+  sample.commanded_position = sample.position;
+  sample.block = coglab_rt::MotionBlock::None;
+  VelocityCommand command;
+  const auto run = [&] {
+    ++sample.sequence;
+    sample.stamp_ns = manager.now_ns();
+    manager.cycle().run(sample, 0.005, command);
+    return manager.report();
+  };
+  std::uint64_t overruns = 0;
+  for (int i = 1; i <= 10; ++i) {
+    const CycleReport report = run();
+    if (i % 5 == 0 && report.overruns != overruns) return false;
+    overruns = report.overruns;
+    EXPECT_EQ(overruns, static_cast<std::uint64_t>(i - i / 5));
+    EXPECT_FALSE(report.fault) << report.reason.c_str();
+    EXPECT_GT(command.velocity.norm(), 0.0);
+  }
+  for (int i = 1; i <= 5; ++i) {
+    EXPECT_FALSE(manager.report().fault);
+    run();
+  }
+  const CycleReport report = manager.report();
+  EXPECT_TRUE(report.fault);
+  EXPECT_EQ(report.faults, 1u);
+  EXPECT_EQ(report.overruns, 13u);
+  EXPECT_NE(report.reason.str().find("too slow 5 times in a row: "), std::string::npos)
+      << report.reason.c_str();
+  EXPECT_NE(report.reason.str().find(" ms, allowed 15.000 ms"), std::string::npos);
+  EXPECT_EQ(command.velocity, JointVector::Zero().eval());
+  return true;
+}
+
+TEST(Faults, OverrunsInARowFaultTheControllerAndSinglesDoNot) {
+  constexpr int kAttempts = 20;
+  for (int attempt = 0; attempt < kAttempts && !HasFailure(); ++attempt) {
+    if (overrunsWereJudged()) return;
+  }
+  FAIL() << "in each of " << kAttempts << " attempts a quick cycle counted as an overrun";
+}
+
+/// Takes 20 ms.
+class Slow : public ctrl_more::FeedbackController {
+ public:
+  ctrl_more::Description describe() const override {
+    ctrl_more::Description description;
+    description.type = "Slow";
+    description.modifies(ctrl_more::ControlContainer::TaskSpaceReferencePose, "ee")
+        .in("m, quaternion x y z w")
+        .frameOf("base")
+        .about("left as it is");
+    return description;
+  }
+  void initialize(ctrl_more::Setup&) override {}
+  void update(const ctrl_more::Cycle&, const ctrl_more::RobotStates&,
+              const ctrl_more::ControlStates&, ctrl_more::ModifiedControlStates&) override {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(20);
+    while (std::chrono::steady_clock::now() < end) {
+    }
+  }
+};
+
+TEST(Faults, TheTimeOfASlowFeedbackControllerIsNotChargedToTheMotionController) {
+  const coglab_rt::JointLimits limits =
+      coglab_rt::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
+  ctrl_more::Logger logger;
+  ManagerSettings settings = readManagerSettings(
+      YAML::Load("{odd: {fault: none}, overrun_time: 0.015, " + kTypes + "}"),
+      readText(std::string(DESCRIPTION_DIR) + "/urdf/lwr_ih2.urdf"), limits, false);
+  settings.logger = &logger;
+  ControllerManager manager(std::move(settings));
+  ctrl_more::ControllerEntry entry;
+  entry.blend_s = 0.0;
+  ASSERT_TRUE(manager.feedback().addController(std::make_unique<Slow>(), "slow", entry).ok());
+  ASSERT_TRUE(manager.feedback().setProfile("odd", {"slow"}).ok());
+  std::atomic<bool> stop{false};
+  std::thread services([&] {
+    std::string type;
+    EXPECT_TRUE(VirtualRobot::ok(manager.load("odd", "test/Misbehaving")));
+    EXPECT_TRUE(VirtualRobot::ok(manager.switchTo("odd", type)));
+    stop = true;
+  });
+  while (!stop) manager.cycle().idle(manager.now_ns());
+  services.join();
+  RobotSample sample;
+  sample.position = kHome;
+  sample.commanded_position = sample.position;
+  sample.block = coglab_rt::MotionBlock::None;
+  VelocityCommand command;
+  for (int i = 0; i < 12; ++i) {
+    ++sample.sequence;
+    sample.stamp_ns = manager.now_ns();
+    manager.cycle().run(sample, 0.005, command);
+  }
+  const CycleReport report = manager.report();
+  EXPECT_FALSE(report.fault) << report.reason.c_str();
+  EXPECT_LE(report.overruns, 2u);  // a busy machine may delay the motion controller itself
+  EXPECT_GT(command.velocity.norm(), 0.0);
+}
+
+/// Does what a test tells it to, and writes down what the cycle calls.
+class Scripted : public MotionController {
+ public:
+  void configure(const MotionSetup&) override {}
+  void adopt(const CycleInput&) override { call("adopt"); }
+  void start(const CycleInput&) override { call("start"); }
+  void stop() override { call("stop"); }
+  void abort(const Reason& reason) override {
+    why = reason;
+    doing = MotionState::Aborted;
+    call("abort");
+  }
+  void computeReference(const CycleInput&, References&) override { call("computeReference"); }
+  void resolve(const CycleInput&, References& references) override {
+    references.states.view<kMaxJoints>(references.joint_velocity) = velocity;
+    call("resolve");
+  }
+  MotionState state() const override { return doing; }
+  const Reason& reason() const override { return why; }
+
+  JointVector velocity = JointVector::Zero();
+  MotionState doing = MotionState::Running;
+  Reason why;
+  bool marked = true;  // as running a plug-in's code, in each call
+  const ControlCycle* cycle = nullptr;
+  std::string throws, throws_number;
+  std::vector<std::string> calls;
+
+ private:
+  void call(const std::string& what) {
+    calls.push_back(what);
+    marked = marked && (cycle == nullptr || cycle->inPlugin());
+    if (what == throws) throw std::runtime_error("told to");
+    if (what == throws_number) throw 7;
+  }
+};
+
+/// A robot with one of them, which is not the active controller yet.
+struct ScriptedRobot : VirtualRobot {
+  explicit ScriptedRobot(const std::string& parameters = "") : VirtualRobot(parameters) {
+    EXPECT_TRUE(ok(manager->load("script", "test/Scripted")));
+    script = dynamic_cast<Scripted*>(manager->motion("script"));
+  }
+  Scripted* script = nullptr;
+};
+
+using Calls = std::vector<std::string>;
+
+/// Counts the cycles in which it runs.
+class Counting : public ctrl_more::FeedbackController {
+ public:
+  Counting(ctrl_more::Stage stage, int& ran) : stage_(stage), ran_(ran) {}
+  ctrl_more::Description describe() const override {
+    using ctrl_more::ControlContainer;
+    const bool task = stage_ == ctrl_more::Stage::Task;
+    ctrl_more::Description description;
+    description.type = "Counting";
+    description.stage = stage_;
+    description
+        .modifies(
+            task ? ControlContainer::TaskSpaceReferenceVel : ControlContainer::JointSpaceReference,
+            task ? "ee" : "Velocity")
+        .in(task ? "m/s, rad/s" : "rad/s")
+        .frameOf(task ? "base" : "joints in wire order")
+        .about("left as it is");
+    return description;
+  }
+  void initialize(ctrl_more::Setup&) override {}
+  void update(const ctrl_more::Cycle&, const ctrl_more::RobotStates&,
+              const ctrl_more::ControlStates&, ctrl_more::ModifiedControlStates&) override {
+    ++ran_;
+  }
+
+ private:
+  ctrl_more::Stage stage_;
+  int& ran_;
+};
+
+TEST(Faults, NoStepOfTheCycleRunsAfterTheOneThatFailed) {
+  const std::string id = "controller 'script' ";
+  for (const auto& [where, tasks, words] :
+       {std::tuple("computeReference", 1, "threw in computeReference: told to"),
+        std::tuple("resolve", 2, "threw in resolve: told to"),
+        std::tuple("", 2, "gave a velocity that is not finite")}) {
+    ScriptedRobot robot;
+    int task = 0, joint = 0;
+    ctrl_more::ControllerEntry entry;
+    entry.blend_s = 0.0;
+    auto& feedback = robot.manager->feedback();
+    using ctrl_more::Stage;
+    ASSERT_TRUE(
+        feedback.addController(std::make_unique<Counting>(Stage::Task, task), "tasks", entry).ok());
+    ASSERT_TRUE(
+        feedback.addController(std::make_unique<Counting>(Stage::Joint, joint), "joints", entry)
+            .ok());
+    ASSERT_TRUE(feedback.setProfile("script", {"tasks", "joints"}).ok());
+    robot.switchTo("script");
+    robot.script->velocity.setConstant(0.01);
+    robot.tick();
+    ASSERT_EQ(task, 1);
+    ASSERT_EQ(joint, 1);
+    robot.script->throws = where;
+    if (robot.script->throws.empty()) robot.script->velocity[6] = std::nan("");
+    for (int i = 0; i < 2; ++i) {
+      robot.tick();
+      EXPECT_EQ(task, tasks) << words;
+      EXPECT_EQ(joint, 1) << words;
+      EXPECT_TRUE(robot.command.velocity.isZero(0.0));
+      EXPECT_EQ(robot.reason(), id + words);
+    }
+    EXPECT_EQ(robot.manager->report().faults, 1u);
+  }
+}
+
+TEST(Faults, AControllerThatThrowsWhereItIsEndedIsEndedAllTheSame) {
+  ScriptedRobot robot;
+  robot.script->throws = "abort";
+  robot.switchTo("script");
+  robot.sample.block = MotionBlock::Held;
+  robot.tick();
+  EXPECT_EQ(robot.reason(), "controller 'script' threw in abort: told to");
+  EXPECT_EQ(robot.manager->report().faults, 1u);
+  EXPECT_EQ(std::count(robot.script->calls.begin(), robot.script->calls.end(), "abort"), 2);
+  robot.script->throws = "stop";
+  robot.sample.block = MotionBlock::None;
+  robot.switchTo("script");  // at fault: afresh
+  EXPECT_FALSE(robot.manager->report().fault) << robot.reason();
+  EXPECT_EQ(robot.script->calls.back(), "adopt");
+  robot.switchTo("");
+  robot.tick();  // with the robot's new state
+  EXPECT_EQ(robot.manager->report().state, ManagerState::Idle);
+  EXPECT_EQ(robot.manager->report().reason.str(), "");
+}
+
+}  // namespace
+}  // namespace coglab_controllers
+
+COGLAB_REGISTER_MOTION_CONTROLLER("test/Scripted", coglab_controllers::Scripted)

@@ -1,0 +1,232 @@
+// Parameters of the manager and the plug-ins: each range of docs/reference.md at both ends and just
+// beyond, with the words of its refusal; and what holds where nothing is named.
+#include <cmath>
+#include <fstream>
+#include <sstream>
+
+#include "virtual_robot.hpp"
+
+namespace coglab_controllers {
+namespace {
+
+struct Range {
+  const char* name;
+  double least, most;
+};
+
+std::string text(double value) {
+  std::ostringstream out;
+  out.precision(12);
+  out << value;
+  return out.str();
+}
+
+/// What a load of the plug-in says; empty if it is taken.
+std::string loading(const std::string& id, const std::string& parameters) {
+  VirtualRobot robot(parameters);
+  const Answer answer =
+      robot.manager->load(id, id == "ptp" ? "coglab/PtpController" : "coglab/DmpController");
+  return answer.success ? "" : answer.message;
+}
+
+/// What a start of the manager says; empty if it is taken.
+std::string starting(const std::string& parameters, bool lockstep = true) {
+  try {
+    VirtualRobot robot(parameters, 0.005, lockstep);
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return "";
+}
+
+/// Both ends are taken, and what is a little beyond them is refused with the range in words.
+template <typename Says>
+void expectRange(const Range& range, const std::string& where, Says&& says) {
+  std::ostringstream words;
+  words << "parameter " << where << range.name << ": expected a number from " << range.least
+        << " to " << range.most << ", got ";
+  for (const double end : {range.least, range.most}) {
+    EXPECT_EQ(says(text(end)), "") << range.name << ": " << end;
+    const double away = 1e-6 * std::max(std::abs(end), 1e-4);
+    const std::string outside = text(end == range.least ? end - away : end + away);
+    EXPECT_NE(says(outside).find(words.str() + outside), std::string::npos)
+        << range.name << ": " << outside << ": " << says(outside);
+  }
+  for (const std::string wrong : {".nan", ".inf", "[1]", "fast"}) {
+    EXPECT_NE(says(wrong).find(words.str()), std::string::npos) << range.name << ": " << wrong;
+  }
+}
+
+TEST(ParameterRanges, OfDmp) {
+  for (const Range& range : {Range{"pos_clik_gain", 0.0, 100.0},
+                             Range{"rot_clik_gain", 0.0, 100.0},
+                             Range{"correction_speed", 1e-3, 10.0},
+                             Range{"hold_blend", 0.0, 5.0},
+                             Range{"tolerance", 1e-5, 0.1},
+                             Range{"arrive_distance", 1e-4, 0.5},
+                             Range{"settle_time", 0.0, 60.0},
+                             Range{"goal_max_age", 0.01, 10.0},
+                             Range{"goal_max_jump", 0.01, 5.0},
+                             Range{"goal_lost_time", 0.0, 60.0},
+                             Range{"goal_timeout", 0.0, 3600.0},
+                             Range{"goal_finish_distance", 0.0, 1.0},
+                             Range{"goal_reach_margin", 0.0, 5.0},
+                             Range{"max_initial_distance", 0.0, 1.0},
+                             Range{"noisy_goal_time_constant", 0.005, 2.0},
+                             Range{"noisy_goal_turning_time_constant", 0.005, 2.0},
+                             Range{"noisy_goal_speed", 0.0, 1.0},
+                             Range{"noisy_goal_turning", 0.0, 10.0},
+                             Range{"predicted_goal_speed", 0.0, 1.0},
+                             Range{"goal_max_speed", 0.01, 10.0},
+                             Range{"goal_time_constant", 0.0, 2.0},
+                             Range{"end_phase", 1e-6, 0.5},
+                             Range{"end_speed", 1e-6, 1.0},
+                             Range{"end_turning", 1e-6, 10.0},
+                             Range{"end_distance", 1e-6, 0.5},
+                             Range{"follow_distance", 1e-3, 1.0},
+                             Range{"follow_time", 1e-6, 10.0},
+                             Range{"singularity_threshold", 1e-6, 1.0}}) {
+    expectRange(range, "dmp/", [&range](const std::string& value) {
+      return loading("dmp", "{dmp: {" + std::string(range.name) + ": " + value + "}}");
+    });
+  }
+  EXPECT_EQ(loading("dmp", "{dmp: {max_queue: 99}}"), "") << "it has no queue";
+  for (const std::string flag : {"enable_ik_debug", "rotation_first_scaling"}) {
+    EXPECT_NE(loading("dmp", "{dmp: {" + flag + ": 7}}").find("expected true or false, got 7"),
+              std::string::npos);
+  }
+  EXPECT_NE(loading("dmp", "{dmp: {dmp_file: /nowhere.xml}}").find("/nowhere.xml:0"),
+            std::string::npos);
+  EXPECT_EQ(loading("dmp", "{dmp: {dmp_file: " PACKAGE_DIR "/config/primitives.xml}}"), "");
+}
+
+TEST(ParameterRanges, OfPointToPoint) {
+  for (const Range& range :
+       {Range{"Kp", 0.0, 100.0}, Range{"default_speed", 0.01, 1.0},
+        Range{"default_acceleration", 0.01, 1.0}, Range{"tolerance", 1e-5, 0.1},
+        Range{"settle_time", 0.0, 60.0}, Range{"hold_blend", 0.0, 5.0}}) {
+    expectRange(range, "ptp/", [&range](const std::string& value) {
+      return loading("ptp", "{ptp: {" + std::string(range.name) + ": " + value + "}}");
+    });
+  }
+  for (const std::string fine : {"0", "64"}) {
+    EXPECT_EQ(loading("ptp", "{ptp: {max_queue: " + fine + "}}"), "");
+  }
+  for (const std::string bad : {"-1", "65", "1.5"}) {
+    EXPECT_NE(loading("ptp", "{ptp: {max_queue: " + bad + "}}")
+                  .find("ptp/max_queue: expected a whole number from 0 to 64, got " + bad),
+              std::string::npos);
+  }
+}
+
+TEST(ParameterRanges, OfLoopGainsHangOnTheCycle) {
+  // At most half a gain per cycle; and 200 and 100 where the cycle is quick.
+  for (const auto& [cycle, pose, joints] :
+       {std::tuple(0.02, 25.0, 25.0), std::tuple(0.002, 200.0, 100.0)}) {
+    const std::string rest = "}, cycle_time: " + text(cycle) + "}";
+    for (const auto& [id, name, most] :
+         {std::tuple("dmp", "pos_clik_gain", pose), std::tuple("dmp", "rot_clik_gain", pose),
+          std::tuple("ptp", "Kp", joints)}) {
+      const std::string head = std::string("{") + id + ": {" + name + ": ";
+      EXPECT_EQ(loading(id, head + text(most) + rest), "");
+      EXPECT_NE(loading(id, head + text(most + 0.1) + rest).find("from 0 to " + text(most)),
+                std::string::npos);
+    }
+  }
+  EXPECT_EQ(loading("dmp", "{cycle_time: 0.1}"), "") << "the defaults shrink with it";
+  EXPECT_EQ(loading("ptp", "{cycle_time: 0.1}"), "");
+  EXPECT_EQ(largestGain(0.005), 100.0);
+}
+
+TEST(ParameterRanges, OfTheManager) {
+  for (const Range& range :
+       {Range{"cycle_time", 0.0005, 0.1}, Range{"sample_timeout", 0.005, 5.0},
+        Range{"silent_time", 0.01, 10.0}, Range{"plan_timeout", 0.05, 30.0},
+        Range{"speed_scale", 0.0, 1.0}, Range{"hand_speed_limit", 0.0, 5.0},
+        Range{"elbow_speed_limit", 0.0, 5.0}, Range{"blocked_time", 0.05, 10.0},
+        Range{"position_margin", 0.01, 0.5}}) {
+    expectRange(range, "controller_manager/", [&range](const std::string& value) {
+      return starting("{" + std::string(range.name) + ": " + value + "}");
+    });
+  }
+  expectRange(Range{"overrun_time", 0.0, 10.0}, "controller_manager/",
+              [](const std::string& v) { return starting("{overrun_time: " + v + "}", false); });
+  EXPECT_EQ(starting("{overrun_time: -1}"), "") << "nothing is timed in lockstep";
+  const std::string box = "box_min: [-9, -9, -9], box_max: [9, 9, 9], ";
+  for (const Range& range : {Range{"base_radius", 0.0, 5.0}, Range{"max_stretch", 0.2, 1.0},
+                             Range{"deceleration", 0.05, 20.0}}) {
+    expectRange(range, "controller_manager/workspace/", [&](const std::string& value) {
+      return starting("{workspace: {" + box + range.name + ": " + value + "}}");
+    });
+  }
+  for (const std::string name : {"box_min", "box_max", "base_centre"}) {
+    for (const std::string bad : {"[1, 2]", "[-1200, 1200, 1600]"}) {
+      EXPECT_NE(starting("{workspace: {" + name + ": " + bad + "}}")
+                    .find(name + ": expected 3 finite numbers"),
+                std::string::npos);
+    }
+  }
+  EXPECT_NE(starting("{workspace: 7}").find("workspace: expected a block"), std::string::npos);
+  EXPECT_NE(starting("{plugin_paths: {a: b}}").find("expected a list of texts"), std::string::npos);
+  EXPECT_NE(starting("{feedback_file: [a]}").find("feedback_file: expected a text"),
+            std::string::npos);
+}
+
+/// The file that is shipped says what holds without it, but for the names of predicted goals.
+std::string shipped() {
+  YAML::Node node = YAML::LoadFile(PACKAGE_DIR "/config/controllers.yaml");
+  node.remove("feedback_file");
+  node["dmp"].remove("predicted_goals");
+  std::ostringstream out;
+  out << node;
+  return out.str();
+}
+
+TEST(ParameterDefaults, AReachAndAMotionWithTheShippedFileAreThoseWithoutIt) {
+  VirtualRobot one, other(shipped());
+  const auto both = [&](auto&& what) {
+    what(one);
+    what(other);
+  };
+  both([](VirtualRobot& robot) {
+    robot.loadBoth();
+    robot.followWithinLimits();
+    robot.see("human_hand", Vector3(0.8, 0.0, 0.45));
+    DmpRequest request = robot.reach();
+    request.orientation_control = true;
+    ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(request)));
+  });
+  for (int i = 0; i < 1500; ++i) {
+    // Noise, then a goal that leaves for good; frames of 30 Hz; an arm that is pushed aside.
+    const double t = i * 0.005, tremble = i % 14 < 7 ? 0.004 : -0.004;
+    const Vector3 goal(0.8 + (t < 1.0 ? tremble : 0.0), t > 4.0 ? 0.06 : 0.0, 0.45);
+    const Quaternion turned(Eigen::AngleAxisd(t < 1.0 ? 10.0 * tremble : 0.0, Vector3::UnitZ()));
+    both([&](VirtualRobot& robot) {
+      if (i % 7 == 0) robot.see("human_hand", goal, turned);
+      if (i == 100) robot.sample.position[5] += 0.02;
+      robot.tick();
+    });
+    ASSERT_EQ(one.command.velocity, other.command.velocity) << i << " " << one.reason();
+    ASSERT_EQ(one.reason(), other.reason());
+  }
+  EXPECT_EQ(one.state(), MotionState::Reached) << one.reason();
+  both([](VirtualRobot& robot) {
+    robot.switchTo("ptp");
+    std::vector<double> there(kHome.data(), kHome.data() + 7);
+    there[0] += 1.0;
+    for (int i = 0; i < 18; ++i) {
+      const int status = robot.ptp().add({there, {}, {}}).status;
+      EXPECT_EQ(status, i == 0   ? MotionAnswer::kStarted
+                        : i < 17 ? MotionAnswer::kQueued
+                                 : MotionAnswer::kRejected)
+          << i;
+    }
+  });
+  for (int i = 0; i < 200; ++i) {
+    both([](VirtualRobot& robot) { robot.tick(); });
+    ASSERT_EQ(one.command.velocity, other.command.velocity) << i;
+  }
+}
+
+}  // namespace
+}  // namespace coglab_controllers
