@@ -160,16 +160,6 @@ def test_a_foreign_ros_is_named_and_left_aside():
     assert "a ROS from /opt/ros is in ROS_PACKAGE_PATH; open a shell without it" in ended.stdout
 
 
-def test_pyenv_first_in_path(tmp_path):
-    shim = tmp_path / "python3"
-    shim.write_text("#!/bin/sh\nexit 42\n")
-    shim.chmod(0o755)
-    path = f"{tmp_path}:{os.environ['PATH']}"
-    ended = run(TOP / "coglab", "doctor", PATH=path)
-    assert f"python3 in your PATH is {shim}; ./coglab uses /usr/bin/python3 anyway" in ended.stdout
-    assert run(TOP / "coglab", "install", "run", PATH=path).returncode == 0
-
-
 def test_an_unknown_command_is_named():
     ended = run(TOP / "coglab", "lunch")
     assert ended.returncode == 2 and "unknown command 'lunch'" in ended.stdout and "./coglab launch" in ended.stdout

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from coglab_bringup.demo import keep, unfinished
 from coglab_bringup.handover import NotTaken
-from coglab_bringup.trial_plot import colours_of, draw_trial, lanes_of, rows_without_overlap, state_intervals
+from coglab_bringup.trial_plot import draw_trial, rows_without_overlap, state_intervals
 from coglab_bringup.trial_recorder import Trial, summarise
 from coglab_msgs.msg import ReasonCode
 
@@ -97,13 +97,6 @@ def two_approaches() -> Trial:
     trial.fingers = [(t, [10 * k + t for k in range(5)]) for t in times]
     trial.contacts = [(4.0, True, 2.0), (14.0, False, 1.0)]
     return trial
-
-
-def test_containers_of_one_name_share_a_lane_and_a_state_has_one_colour():
-    lanes = lanes_of(two_approaches(), 0.0, 18.0)
-    assert [name for name, _ in lanes].count("approach") == 1
-    colours = colours_of([name for _, rows in lanes for row in rows for _, _, name in row])
-    assert len(set(colours.values())) == len(colours)
 
 
 def test_the_picture_is_written_with_labels_in_their_bars(tmp_path, monkeypatch):

@@ -38,7 +38,7 @@ void take(CellConfig& config, const ros::NodeHandle& node, const CellParameter& 
   row.set(config, std::visit(read, row.get(config)));
 }
 
-/// A number that may be what the schema says. @throws std::invalid_argument naming the field.
+/// A number within the range of the schema. @throws std::invalid_argument naming the field.
 double numberOf(const YAML::Node& entry, const std::string& field, const YAML::Node& schema) {
   const auto value = entry.as<double>(std::nan(""));
   if (!std::isfinite(value)) throw std::invalid_argument(field + ": expected a number");

@@ -18,7 +18,7 @@ class Robot : public LockstepRobot {
   using LockstepRobot::LockstepRobot;
   std::uint16_t reason_code = 0;
 
-  py::tuple tell(const Answer& answer) {
+  py::tuple keep(const Answer& answer) {
     reason_code = answer.number();
     return py::make_tuple(answer.success, answer.message);
   }
@@ -175,7 +175,7 @@ PYBIND11_MODULE(_virtual, m) {
       .def(
           "load_controller",
           [](Robot& robot, const std::string& id, const std::string& type) {
-            return robot.tell(robot.load(id, type));
+            return robot.keep(robot.load(id, type));
           },
           py::arg("id"), py::arg("type"),
           "coglab/DmpController or coglab/PtpController; (success, message).")
@@ -183,13 +183,13 @@ PYBIND11_MODULE(_virtual, m) {
           "switch_controller",
           [](Robot& robot, const std::string& id) {
             std::string type;
-            return robot.tell(robot.manager().switchTo(id, type));
+            return robot.keep(robot.manager().switchTo(id, type));
           },
           py::arg("id"))
       .def(
           "apply_profile",
           [](Robot& robot, const std::string& profile) {
-            return robot.tell(robot.manager().applyProfile(profile));
+            return robot.keep(robot.manager().applyProfile(profile));
           },
           py::arg("profile"),
           "Enables exactly the feedback controllers of that profile; (success, message).")
@@ -197,7 +197,7 @@ PYBIND11_MODULE(_virtual, m) {
            "{profile, controllers: [{name, enabled, activity}]}, as the topic feedback/status.")
       .def("speed_scale",
            [](Robot& robot, double scale) {
-             return robot.tell(robot.manager().setSpeedScale(scale));
+             return robot.keep(robot.manager().setSpeedScale(scale));
            })
 
       .def_readonly("reason_code", &Robot::reason_code,
@@ -270,7 +270,7 @@ PYBIND11_MODULE(_virtual, m) {
             request.goal_limits = {region_low, region_high, retreat, drop};
             request.goal_approach = approach;
             request.arrival_speed = arrival_speed;
-            return robot.tell(robot.dmp().execute(request));
+            return robot.keep(robot.dmp().execute(request));
           },
           py::arg("primitive_id"), py::arg("dmp_ratio") = 1.0,
           py::arg("goal_offset") = Vector3d(Vector3d::Zero()),
@@ -283,7 +283,7 @@ PYBIND11_MODULE(_virtual, m) {
           "switch_dmp",
           [](Robot& robot, const std::string& primitive, double ratio, const Vector3d& offset,
              bool orientation_control, const Eigen::Vector4d& orientation) {
-            return robot.tell(robot.dmp().switchDmp(
+            return robot.keep(robot.dmp().switchDmp(
                 requestOf(primitive, ratio, offset, orientation_control, orientation, "")));
           },
           py::arg("primitive_id"), py::arg("dmp_ratio") = 1.0,
@@ -300,7 +300,7 @@ PYBIND11_MODULE(_virtual, m) {
             while (robot.dmp().readIkDebug(record)) records.append(debugOf(record));
             return records;
           },
-          "What dmp/ik_debug tells of the cycles since the last call: time s, goal m as estimated "
+          "Records of dmp/ik_debug since the last call: time s, goal m as estimated "
           "or latched, set_point and measured (position, quaternion) of the hand in the base "
           "frame.")
       .def("dmp_progress",

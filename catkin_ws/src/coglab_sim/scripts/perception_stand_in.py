@@ -43,7 +43,7 @@ from std_msgs.msg import UInt8
 
 PLAYBACK_HZ = 100.0
 LONGEST_WAIT = 10.0
-"""s for which a service waits at most, whatever is asked for."""
+"""s, longest time-out of a service"""
 OTHERS = [[1.05, 0.45, 0.35], [1.05, -0.45, 0.35]]
 """m, where the other people's hands are unless ~others says otherwise."""
 

@@ -126,7 +126,7 @@ class VirtualHumanNode:
             self.human.meets(scene, message.held_by in ("human", "both"))
 
     def on_command(self, message: String) -> None:
-        """What the person is asked to do."""
+        """A command for the person."""
         try:
             with self.lock:
                 self.human.command(message.data)
@@ -152,7 +152,7 @@ class VirtualHumanNode:
             time.sleep(max(0.0, due - self.pace.now()) / self.pace.factor)
 
     def publish(self, sample) -> None:
-        """Hand for the cell, phase for whoever watches."""
+        """Publish the hand for the cell, and the phase."""
         message = HumanHand(grip=sample.grip, grip_force=sample.grip_force)
         message.header.stamp = rospy.Time.now()
         message.header.frame_id = "world"

@@ -85,7 +85,7 @@ const MeasurementBytes& Cell::step(const std::uint8_t* answer, std::size_t size)
 }
 
 const MeasurementBytes& Cell::advance(bool on_time, bool anew) {
-  if (anew) felt_for_ = 0.0;
+  if (anew) averaged_for_ = 0.0;
   const krc::PeriodCommand command = controller_.tick(servos_, on_time);
   plant_.setBrakes(controller_.brakesWanted());
 
@@ -113,7 +113,7 @@ const MeasurementBytes& Cell::advance(bool on_time, bool anew) {
     plant_.step(servos_.motorTorque(), dt);
     servos_.observe(plant_.position(), plant_.velocity());
     torque_sensor_.advance(plant_.velocity(), dt);
-    feel(dt);
+    averageForces(dt);
     torque += plant_.jointTorque() / steps;
     fastest_ = i > 1 ? Vector7(fastest_.cwiseMax(plant_.velocity().cwiseAbs()))
                      : Vector7(plant_.velocity().cwiseAbs());
@@ -132,9 +132,9 @@ const MeasurementBytes& Cell::advance(bool on_time, bool anew) {
 }
 
 /// Takes one physics step into the means of the forces: a touch may last a single step.
-void Cell::feel(double dt) {
-  felt_for_ += dt;
-  const double share = dt / felt_for_;
+void Cell::averageForces(double dt) {
+  averaged_for_ += dt;
+  const double share = dt / averaged_for_;
   const auto average = [share](auto& mean, const auto& now) { mean += share * (now - mean); };
   const plant::Touch& touch = plant_.touch();
   touch_.phalanges.resize(touch.phalanges.size(), Vector3d::Zero());

@@ -1,5 +1,6 @@
 """A cell that cannot begin, or has ended for a reason, ends its launch in words: it is not started again for ever."""
 
+import os
 import signal
 import socket
 import subprocess
@@ -55,16 +56,11 @@ def test_what_cannot_begin_ends_the_launch_with_a_sentence(tmp_path, yaml, argum
     assert "exit code 1" in output
 
 
-def test_a_library_that_is_missing_ends_the_launch_before_anything_starts(tmp_path, monkeypatch, capfd):
-    """As the loader says it, from a stand-in for the module that is linked with the library."""
-    package = tmp_path / "coglab_sim"
-    package.mkdir()
-    (package / "__init__.py").touch()
-    line = "libmujoco.so.2.2.2: cannot open shared object file: No such file or directory"
-    (package / "_cell.py").write_text(f"raise ImportError({line!r})\n")
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+def test_a_library_that_cannot_be_loaded_ends_the_launch_before_anything_starts(tmp_path, monkeypatch, capfd):
+    (tmp_path / "libcoglab_sim_plant.so").touch()
+    monkeypatch.setenv("LD_LIBRARY_PATH", f"{tmp_path}:{os.environ['LD_LIBRARY_PATH']}")
     with pytest.raises(RLException):
         resolve()
     said = capfd.readouterr().err
-    assert f"the simulated cell cannot be loaded ({line})" in said
+    assert f"the simulated cell cannot be loaded ({tmp_path}/libcoglab_sim_plant.so: file too short)" in said
     assert "run ./coglab build" in said and "libmujoco-dev" in said and "./coglab doctor" in said

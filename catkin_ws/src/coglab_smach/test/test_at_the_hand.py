@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_py.pose import Pose, about_z
+from coglab_smach.context.grip import Grip
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.interfaces import HandState, Located
 from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states import hand as hands
 from coglab_smach.states import hand_tracking, regrasp
-from coglab_smach.states.grip import Grip
 from coglab_smach.states.hand import CalibrateHand, HandClose, HandTighten
 from coglab_smach.states.hand_tracking import (
     off_grasp,

@@ -1,21 +1,17 @@
 """The robot gives: the grip follows the person's share of the load, and every end without a taker keeps the object."""
 
-import math
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from coglab_contact.load import SAME, LeavingLoad
 from coglab_msgs.msg import ReasonCode, Say
 from coglab_py.pose import Pose
+from coglab_smach.context.grip import Grip
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.interfaces import HandState, Located
 from coglab_smach.ports.pending import Polled, Ready
 from coglab_smach.states import give
-from coglab_smach.states.grip import Grip
 from coglab_smach.states.held_object import HeldObject
-from coglab_trials.conditions import Conditions
-from coglab_trials.trial import VirtualTrial
 from conftest import Trial
 
 RECEIVE, GIVE = "exchange_human_to_robot", "exchange_robot_to_human"
@@ -175,98 +171,6 @@ def test_stop_in_the_middle_closes_the_grip():
     giving(script)
 
 
-def settled(carried=None, weight=WEIGHT, mass=0.31):
-    """Fed at 200 Hz with what hangs on the palm of an arm at rest."""
-    load = LeavingLoad(mass, 0.6, 100.0, carried)
-    assert not any(load.feed(0.005 * k, weight, True, False) for k in range(40))
-    return load
-
-
-def test_the_share_is_counted_from_rest_and_said_once():
-    load = settled()
-    assert load.share == pytest.approx(0.0)
-    assert not load.feed(0.3, 0.5 * WEIGHT, True, False) and load.share == pytest.approx(0.5)
-    said = [load.feed(0.3 + 0.005 * k, 0.3 * WEIGHT, True, False) for k in range(1, 40)]
-    assert sum(said) == 1 and said.index(True) in (10, 11), "after 50 ms"
-    assert load.share == pytest.approx(0.7) and load.margin == pytest.approx(0.7 / 0.6)
-    assert not load.feed(0.6, WEIGHT, True, False) and load.share == pytest.approx(0.0)
-
-
-@pytest.mark.parametrize("error", [0.0, 0.4, -0.4])
-def test_the_models_error_in_another_posture_is_no_load(error):
-    assert settled(carried=WEIGHT + error).share == pytest.approx(0.0)
-
-
-def test_who_lifts_before_the_arm_stands_is_felt():
-    load = LeavingLoad(0.31, 0.6, 100.0, WEIGHT)
-    assert any(load.feed(0.005 * k, 0.2 * WEIGHT, k > 60, False) for k in range(100))
-    assert load.share == pytest.approx(0.8) and 0.8 * WEIGHT > SAME
-    with pytest.raises(ValueError, match="mass"):
-        LeavingLoad(0.0, 0.6, 1.0)
-
-
-def test_what_the_posture_may_explain_loosens_no_grip_and_opens_no_hand():
-    light = LeavingLoad(0.12, 0.5, 100.0, 0.12 * 9.81)
-    gone = lambda newton, start: [  # noqa: E731
-        light.feed(start + 0.005 * k, 0.12 * 9.81 - newton, True, False) for k in range(60)
-    ]
-    assert not any(gone(0.55, 0.0)), "seen so, of an arm that stands elsewhere and an object that nobody has touched"
-    assert light.share == pytest.approx(0.55 / (0.12 * 9.81)) and 0.0 <= light.sure < 0.1
-    assert not any(gone(0.6, 0.3)) and light.needed == pytest.approx(0.25 + SAME / (0.12 * 9.81))
-    assert any(gone(1.1, 0.6)) and light.margin == pytest.approx(light.share / light.needed)
-    light.feed(0.9, 0.12 * 9.81 + 0.4, True, False)
-    assert light.sure == 0.0 and math.copysign(1.0, light.sure) == -1.0, "pressed down, perhaps"
-    light.feed(0.91, 0.12 * 9.81 + 2.0, True, False)
-    assert light.sure == pytest.approx(-(2.0 - SAME) / (0.12 * 9.81))
-
-
-def test_a_load_counted_from_where_the_arm_stands_is_all_sure():
-    load = settled(carried=WEIGHT + 0.4)
-    load.feed(0.3, 0.7 * WEIGHT, True, False)
-    assert load.sure == pytest.approx(load.share) == pytest.approx(0.3) and load.needed == pytest.approx(0.6)
-
-
-HERE, THERE = np.zeros(7), np.array([0.0, 0.25, 0.0, -0.1, 0.0, 0.0, 0.0])
-
-
-def test_an_arm_that_brings_the_object_elsewhere_is_not_sure_of_its_load_until_it_has_asked_again():
-    light = LeavingLoad(0.12, 0.5, 100.0)
-    weight = 0.12 * 9.81
-    for k in range(40):
-        light.feed(0.005 * k, weight, True, False, posture=HERE)
-    assert light.sure == pytest.approx(0.0) and light.needed == 0.5
-    for k in range(20):  # on the way the model errs by 0.45 N, which nobody has taken
-        assert not light.feed(0.2 + 0.005 * k, weight - 0.45, False, False, posture=THERE)
-    assert light.share > 0.3 and light.sure == 0.0 and light.needed > 0.6
-    light.feed(0.3, weight - 0.45, False, False, posture=0.4 * THERE)
-    assert 0.0 < light.sure < 0.2, "half as far away it may err by half as much"
-    for k in range(40):
-        light.feed(0.4 + 0.005 * k, weight - 0.35, True, False, posture=THERE)
-    assert light.share == pytest.approx(0.0) and light.needed == 0.5, "it is counted from there now"
-    assert any(light.feed(0.6 + 0.005 * k, 0.0, True, False, posture=THERE) for k in range(20))
-
-
-def test_what_a_person_has_taken_before_a_gap_is_still_theirs_after_it():
-    load = settled()
-    load.feed(0.3, 0.55 * WEIGHT, True, False)
-    assert not load.feed(0.4, None, True, True) and load.share is None, "nothing is known of a grip's load"
-    said = [load.feed(0.45 + 0.005 * k, 0.3 * WEIGHT, True, False) for k in range(20)]
-    assert any(said) and load.share == pytest.approx(0.7)
-
-
-def test_a_clock_that_is_set_asks_anew_and_keeps_the_time_limit():
-    load = settled()
-    load.feed(0.3, 0.0, True, False)
-    load.clock_was_set(-60.0)
-    said = [load.feed(-59.7 + 0.005 * k, 0.0, True, False) for k in range(20)]
-    assert load.until == pytest.approx(40.0) and sum(said) == 1 and said.index(True) in (10, 11)
-
-
-def test_what_weighs_next_to_nothing_is_never_told_as_taken_by_torques_alone():
-    feather = LeavingLoad(0.04, 0.5, 100.0, 0.04 * 9.81)
-    assert not any(feather.feed(0.005 * k, 0.0, True, False, posture=HERE) for k in range(100))
-
-
 class Carried:
     """A hand at one posture with an object that is seen so far (m, up) from its palm at 30 Hz."""
 
@@ -297,16 +201,6 @@ def test_an_object_that_sinks_in_the_hand_is_seen_and_one_wrong_sight_is_nothing
     carried.up -= 0.04
     assert carried.look(0.034).sunk == pytest.approx(0.0)
     assert carried.look(0.034).sunk == pytest.approx(0.04)
-
-
-def test_a_place_that_is_corrected_while_the_hand_still_comes_is_followed():
-    """Of this person the predicted place is near at first and 0.07 m farther when the hand is there; an arm that stands
-    where it was near never meets them. A hand that comes does not fall either, whatever its height does."""
-    trial = VirtualTrial(seed=6004, conditions=Conditions(object_id="screwdriver"))
-    results = trial.run(RECEIVE, GIVE)
-    assert [r.outcome for r in results] == ["succeeded", "succeeded"], [r.reason for r in results]
-    goal = trial.ctx.arm.request
-    assert goal.goal_frame.startswith("human_hand") and goal.goal_drop == 0.0
 
 
 def test_what_falls_as_it_is_given_was_not_given():

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_smach.context.holding import HoldingMemory
-from coglab_smach.context.requests import Requests, ask_for, command
+from coglab_smach.context.requests import ask_for
 from coglab_smach.ports.interfaces import Verdict
 from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states.arm import ConfigureLwr, PtpMotion
@@ -45,25 +45,6 @@ def test_what_is_held_is_noted_whole_and_read_again(tmp_path, monkeypatch):
 
 
 # --- triggers and the journal -----------------------------------------------------------------------------------------
-
-
-def test_a_trigger_is_taken_once_and_a_new_hub_forgets_it():
-    changes = []
-    requests = Requests(lambda: changes.append(1))
-    assert requests.submit("a").code == ReasonCode.WRONG_STATE and requests.default_object is None
-    requests.open("hub", ["a", "b"], default_object="mug")
-    assert (requests.hub(), requests.allowed(), requests.default_object) == ("hub", ("a", "b"), "mug")
-    answer = requests.submit("a", "ball", "me")
-    assert answer == (True, "'a' accepted by hub", 0) and requests.submit("b").code == ReasonCode.BUSY
-    taken = requests.take()
-    assert (taken.action, taken.object_id, taken.source) == ("a", "ball", "me") and requests.take() is None
-    requests.submit("a")
-    requests.open("other", ["a"], names_object=True)
-    assert requests.take() is None and requests.submit("a").code == ReasonCode.OBJECT_UNKNOWN
-    assert requests.submit("a", "mug").ok
-    requests.close()
-    assert (requests.hub(), requests.allowed(), requests.take(), len(changes)) == ("", (), None, 3)
-    assert command("a", "b") == "type: ./coglab start a or ./coglab start b"
 
 
 def test_a_trigger_waits_two_seconds_for_the_database():
@@ -151,6 +132,3 @@ def test_motion_home_is_resumed_once_the_person_has_let_go(holds, code, tries):
             ran(trial, state)
         assert error.value.code == code
     assert len(begun) == tries and all(b - a >= 1.0 for a, b in zip(begun, begun[1:], strict=False))
-
-
-# --- a descent and a clock --------------------------------------------------------------------------------

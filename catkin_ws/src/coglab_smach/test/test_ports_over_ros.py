@@ -13,7 +13,7 @@ from coglab_msgs.msg import Contact, ContactSignal, HandoverBelief, ReasonCode
 from coglab_msgs.msg import Recognition as RecognitionMessage
 from coglab_py import publish
 from coglab_smach.ports.interfaces import Ahead, ContactEvent, Recognition
-from coglab_smach.ports.pending import Permit, Polled, PortError, Ready, Threaded, ending_motion
+from coglab_smach.ports.pending import Permit, PortError, Ready, Threaded
 from coglab_smach.ros import calls, ports
 from geometry_msgs.msg import Point, Vector3, Vector3Stamped
 from test_arm_port import Topic, ended
@@ -217,20 +217,6 @@ def test_a_topic_that_is_closed_while_the_node_ends_is_no_error(monkeypatch, ove
 # --- what takes time --------------------------------------------------------------------------------------------------
 
 
-def test_answers_that_come_later():
-    error = PortError("no", ("because",), 4)
-    assert (error.sentence, error.causes, error.code) == ("no", ("because",), 4) and PortError("no").code == 0
-    assert Ready(3).done() and Ready(3).result() == 3 and Ready().result() is None
-    with pytest.raises(PortError, match="no"):
-        Ready(error=error).result()
-    cancelled = []
-    motion = ending_motion(Polled(lambda: False, lambda: 1, lambda: cancelled.append("call")), cancelled.append)
-    assert not motion.done() and motion.result() == 1
-    motion.cancel()
-    assert cancelled == ["call", "its owner has given up waiting"]
-    Polled(lambda: True, lambda: 1).cancel()
-
-
 def test_a_call_in_a_thread_of_its_own():
     good = ended(Threaded(lambda permit: permit.check() or 5, "it"))
     assert good.result() == 5 and not good.failed()
@@ -248,14 +234,3 @@ def test_a_call_in_a_thread_of_its_own():
     with pytest.raises(PortError) as error:
         permit.check()
     assert error.value.code == ReasonCode.CANCELLED
-
-
-def test_a_call_that_has_not_answered_says_so():
-    go = []
-    slow = Threaded(lambda permit: [time.sleep(0.005) for _ in iter(lambda: bool(go), True)], "it")
-    assert not slow.done() and not slow.failed()
-    with pytest.raises(PortError, match="it has not answered yet") as error:
-        slow.result()
-    assert error.value.code == ReasonCode.TIME_LIMIT
-    go.append(1)
-    ended(slow).result()

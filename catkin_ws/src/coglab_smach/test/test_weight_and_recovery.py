@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode, Say
 from coglab_py.pose import Pose
+from coglab_smach.context.grip import Grip
 from coglab_smach.machines import recovery
 from coglab_smach.machines.recovery import SecureHand, WhatIsHeld
 from coglab_smach.ports.interfaces import ContactEvent, HandState, Verdict
 from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states import weight
 from coglab_smach.states.base import TimeLimit
-from coglab_smach.states.grip import Grip
 from coglab_smach.states.hand_tracking import HandTrack
 from coglab_smach.states.weight import TakeWeight
 from coglab_trials.virtual_clock import using

@@ -4,7 +4,6 @@ import threading
 
 import pytest
 import smach
-from coglab_smach.clocks.clock import SteadyClock
 from coglab_trials.virtual_clock import ClockStalled, VirtualClock, VirtualCondition, using
 
 
@@ -32,14 +31,6 @@ def both(clock, *seconds):
         for i, s in enumerate(seconds):
             smach.Concurrence.add(f"C{i}", Waits(clock, s))
     return result
-
-
-def test_the_steady_clock():
-    clock = SteadyClock()
-    before = clock.now()
-    clock.sleep(0.01)
-    clock.sleep(-1.0)
-    assert clock.now() >= before + 0.009
 
 
 def test_an_hour_of_concurrent_machines_costs_nothing():
@@ -158,14 +149,3 @@ def test_a_member_that_raises_gives_its_turn_away():
         finally:
             threading.excepthook = hook
         assert clock.now() == 1.0
-
-
-def test_a_thread_that_does_not_start_leaves_no_member(monkeypatch):
-    clock = VirtualClock(stall_limit=0.2)
-    with monkeypatch.context() as patch:
-        patch.setattr(threading.Thread, "start", lambda self: (_ for _ in ()).throw(RuntimeError("no more threads")))
-        with pytest.raises(RuntimeError):
-            clock.start_thread(lambda: None, "never")
-    with clock.attached():
-        clock.sleep(1.0)
-    assert clock.now() == 1.0

@@ -93,9 +93,8 @@ Description Attitude::describe() const {
   d.gain("kd", 0).vector(3, 0.02).range(0.0, 2.0).in("s").about("damping of the measured rate");
   d.gain("max_angle", 0.3).range(0.0, 1.0).in("rad").about("largest correction");
   d.gain("dead_band", 0.0).range(0.0, 0.2).in("rad").about("errors below it count as zero");
-  for (const char* name : {"integral_x", "integral_y", "integral_z"}) {
-    d.state(name).in("rad").about("integral part about this axis of the body");
-  }
+  d.addStates({"integral_x", "integral_y", "integral_z"}, "rad",
+              "integral part about this axis of the body");
   d.setting("imu", "imu").about("key of the IMU in `measuredData`");
   d.setting("imu_layout", "rpy_gyro_acc")
       .oneOf({"rpy_gyro_acc", "quaternion_gyro_acc", "quaternion_acc_gyro",

@@ -35,7 +35,7 @@ class EeAdmittance : public FeedbackController {
   Modify<Twist> twist_;
   Gain mass_, damping_, stiffness_, inertia_, rotary_damping_, rotary_stiffness_;
   Gain force_dead_band_, torque_dead_band_, max_offset_, max_angle_, max_velocity_;
-  SecondOrder axis_[6];
+  SecondOrderAxes<3> shift_, turn_;
   Vector6 offset_ = Vector6::Zero();                 // [m], [rad]
   Vector6 velocity_ = Vector6::Zero();               // [m/s], [rad/s]
   Eigen::Vector3d force_ = Eigen::Vector3d::Zero();  // that moves it, base frame [N]
@@ -138,15 +138,10 @@ Description EeAdmittance::describe() const {
       .bounded({5.0, kUnlimited, kUnlimited, kUnlimited})
       .about("the velocity of the offset is added");
   declareGains(d);
-  for (const char* name : {"offset_x", "offset_y", "offset_z"}) {
-    d.state(name).in("m").about("yielded distance");
-  }
-  for (const char* name : {"turn_x", "turn_y", "turn_z"}) {
-    d.state(name).in("rad").about("yielded rotation vector (axes: all)");
-  }
-  for (const char* name : {"force_x", "force_y", "force_z"}) {
-    d.state(name).in("N").about("force that moves it, without its dead band, base frame");
-  }
+  d.addStates({"offset_x", "offset_y", "offset_z"}, "m", "yielded distance");
+  d.addStates({"turn_x", "turn_y", "turn_z"}, "rad", "yielded rotation vector (axes: all)");
+  d.addStates({"force_x", "force_y", "force_z"}, "N",
+              "force that moves it, without its dead band, base frame");
   d.setting("wrench", "wrench").about("key of the wrench in `measuredData`");
   d.setting("ee", "ee").about("key of pose and velocity references");
   d.setting("wrench_frame", "base")
@@ -191,10 +186,8 @@ void EeAdmittance::update(const Cycle& cycle, const RobotStates& robot, const Co
   }
   force_ = force;
   const Eigen::Vector3d before = offset_.head<3>();
-  for (int i = 0; i < 3; ++i) {
-    axis_[i].prepare(gain(mass_)[i], gain(damping_)[i], gain(stiffness_)[i], cycle.dt);
-    axis_[i].step(force[i], offset_[i], velocity_[i]);
-  }
+  shift_.step(gain(mass_), gain(damping_), gain(stiffness_), cycle.dt, force, offset_.head<3>(),
+              velocity_.head<3>());
   const double speed = velocity_.head<3>().norm();
   const double max_velocity = scalar(max_velocity_);
   if (speed > max_velocity) {
@@ -209,11 +202,8 @@ void EeAdmittance::update(const Cycle& cycle, const RobotStates& robot, const Co
   }
   bound(offset_.head<3>(), velocity_.head<3>(), max_offset);
   if (rotates_) {
-    for (int i = 0; i < 3; ++i) {
-      axis_[3 + i].prepare(gain(inertia_)[i], gain(rotary_damping_)[i], gain(rotary_stiffness_)[i],
-                           cycle.dt);
-      axis_[3 + i].step(torque[i], offset_[3 + i], velocity_[3 + i]);
-    }
+    turn_.step(gain(inertia_), gain(rotary_damping_), gain(rotary_stiffness_), cycle.dt, torque,
+               offset_.tail<3>(), velocity_.tail<3>());
     bound(offset_.tail<3>(), velocity_.tail<3>(), scalar(max_angle_));
   }
   if (offset_.isZero(0.0) && velocity_.isZero(0.0)) return;  // every bit stays

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include <Eigen/Core>
+
 namespace ctrl_more {
 
 /// Mass, damper and spring, M x'' + D x' + K x = f, stepped exactly for a force that is constant
@@ -69,6 +71,24 @@ class SecondOrder {
  private:
   double mass_ = 0.0, damping_ = 0.0, stiffness_ = 0.0, dt_ = 0.0;
   double xx_ = 1.0, xv_ = 0.0, vx_ = 0.0, vv_ = 1.0, xf_ = 0.0, vf_ = 0.0;
+};
+
+/// N axes that do not disturb each other.
+template <int N>
+class SecondOrderAxes {
+ public:
+  using Vector = Eigen::Matrix<double, N, 1>;
+  /// Makes one step of `dt`; positions and velocities are changed.
+  void step(const Vector& mass, const Vector& damping, const Vector& stiffness, double dt,
+            const Vector& force, Eigen::Ref<Vector> positions, Eigen::Ref<Vector> velocities) {
+    for (int i = 0; i < N; ++i) {
+      axes_[i].prepare(mass[i], damping[i], stiffness[i], dt);
+      axes_[i].step(force[i], positions[i], velocities[i]);
+    }
+  }
+
+ private:
+  SecondOrder axes_[N];
 };
 
 }  // namespace ctrl_more

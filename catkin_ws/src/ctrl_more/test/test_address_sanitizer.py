@@ -22,6 +22,7 @@ FLAGS = [
     f"-I{PACKAGE / 'include'}",
     f"-I{PACKAGE / 'src'}",
     f"-I{PACKAGE / 'test'}",
+    f"-I{PACKAGE.parent / 'coglab_rt' / 'include'}",
     "-isystem/usr/include/eigen3",
 ]
 PLUGINS = ["good", "none", "two", "again", "paper_maker", "throwing", "wrong_type", "other_abi", "strangers", "rebuilt"]
@@ -53,7 +54,7 @@ def test_libraries_come_throw_and_go(tmp_path: Path) -> None:
         f'-DCTRL_MORE_TEST_PLUGIN_DIR="{plugins}"',
         f'-DCTRL_MORE_SOURCE_DIR="{PACKAGE}"',
         f'-DCTRL_MORE_PLUGIN_DIR="{plugins}"',
-        PACKAGE / "test" / "test_plugins.cpp",
+        PACKAGE / "test" / "loading" / "test_plugins.cpp",
         PACKAGE / "test" / "run_tests.cpp",
         "-o",
         program,

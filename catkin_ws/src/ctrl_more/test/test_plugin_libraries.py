@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-CONTROLLERS = ["attitude", "compliant_stabiliser", "zmp_dcm", "ee_admittance", "joint_limits"]
+CONTROLLERS = ["attitude", "ee_admittance", "joint_limits"]
 
 
 def workspace_lib() -> Path:
@@ -62,9 +62,9 @@ def test_plugins_are_thin(controller: str, tmp_path: Path) -> None:
 @pytest.mark.skipif(shutil.which("valgrind") is None, reason="valgrind is not installed")
 def test_loading_running_and_unloading_is_clean() -> None:
     lib = workspace_lib()
-    program = lib / "ctrl_more" / "ctrl_more_test_plugins"
+    program = lib / "ctrl_more" / "ctrl_more_test_loading"
     if not program.is_file():
-        pytest.fail("ctrl_more_test_plugins is not built: ./coglab build tests")
+        pytest.fail("ctrl_more_test_loading is not built: ./coglab build tests")
     result = subprocess.run(
         [
             "valgrind",

@@ -13,6 +13,9 @@
 
 namespace ctrl_more {
 
+/// Folder of the libraries in test/plugins.
+inline const std::string kPlugins = CTRL_MORE_TEST_PLUGIN_DIR;
+
 /// A controller put together in a test: a description and three functions.
 class TestController : public FeedbackController {
  public:
@@ -21,6 +24,8 @@ class TestController : public FeedbackController {
   std::function<void(TestController&, const Cycle&, const RobotStates&, const ControlStates&,
                      ModifiedControlStates&)>
       on_update;
+  /// In place of on_update, where nothing else is needed.
+  std::function<void(TestController&, ModifiedControlStates&)> on_write;
   int updates = 0;
   int resets = 0;
   int gains_changes = 0;
@@ -39,7 +44,11 @@ class TestController : public FeedbackController {
   void update(const Cycle& cycle, const RobotStates& robot, const ControlStates& original,
               ModifiedControlStates& modified) override {
     ++updates;
-    if (on_update) on_update(*this, cycle, robot, original, modified);
+    if (on_write) {
+      on_write(*this, modified);
+    } else if (on_update) {
+      on_update(*this, cycle, robot, original, modified);
+    }
   }
   void reset() override { ++resets; }
   void gainsChanged() override { ++gains_changes; }

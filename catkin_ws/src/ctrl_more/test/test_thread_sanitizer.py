@@ -30,6 +30,7 @@ def test_services_against_the_cycle(tmp_path: Path) -> None:
             *map(str, sources),
             f"-I{PACKAGE / 'include'}",
             f"-I{PACKAGE / 'src'}",
+            f"-I{PACKAGE.parent / 'coglab_rt' / 'include'}",
             "-I/usr/include/eigen3",
             "-lyaml-cpp",
             "-lpthread",

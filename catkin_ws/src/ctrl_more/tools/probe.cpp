@@ -9,7 +9,7 @@
 #include <string>
 
 #include "ctrl_more/feedback_controller.hpp"
-#include "loading/probe.hpp"
+#include "loading/library_file.hpp"
 
 namespace {
 

@@ -1,22 +1,17 @@
-"""The two ends of a port, byte by byte: what the host reads of it, and what the emulator's pty serves."""
+"""The host's end of a port, byte by byte."""
 
 from __future__ import annotations
 
 import errno
 import os
 import pty
-import select
 import time
 import tty
-from collections.abc import Callable
 from types import SimpleNamespace
 
 import pytest
 import serial
 from ih2_hand import transport
-from ih2_hand.emulator.faults import Faults
-from ih2_hand.emulator.hand import EmulatedHand
-from ih2_hand.emulator.pty_server import PtyServer
 from ih2_hand.errors import HandConnectionLost, HandPortError
 from ih2_hand.transport import SerialTransport
 
@@ -121,108 +116,3 @@ def test_a_port_that_cannot_be_opened_is_told_with_what_to_do(monkeypatch, tmp_p
     monkeypatch.setattr(transport, "serial_ports", lambda: ["/dev/a", "/dev/b"])
     with pytest.raises(HandPortError, match=words.replace("PORT", str(port))):
         SerialTransport(str(port))
-
-
-# -- the emulator's end --------------------------------------------------------------------------
-
-
-class Served:
-    """A pty whose serving is done here, step by step."""
-
-    def __init__(self, link: str | None = None) -> None:
-        self.ports: list[str] = []
-        self.traced: list[tuple[str, bytes]] = []
-        self.hand = EmulatedHand(greeting=True)
-        self.faults = Faults(self.hand)
-        trace = lambda way, data, _: self.traced.append((way, data))  # noqa: E731
-        self.server = PtyServer(self.hand, self.faults, link, self.ports.append, trace)
-        self.host = os.open(self.server.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-
-    def asks(self, data: bytes, count: int = 0) -> bytes:
-        """Sends, and serves until `count` bytes have come back; a crowded machine may take its time."""
-        os.write(self.host, data)
-        return self.serves_until(lambda came: len(came) >= count)
-
-    def serves_until(self, enough: Callable[[bytes], object]) -> bytes:
-        """What has come back when it is enough."""
-        came, end = self.serves(), time.monotonic() + 60.0
-        while not enough(came):
-            assert time.monotonic() < end, f"it waits for ever, with {came!r}"
-            came += self.serves()
-        return came
-
-    def serves(self) -> bytes:
-        """Serves for a moment, without a sleep; what has come back."""
-        end = time.monotonic() + 0.02
-
-        def ended() -> bool:
-            self.server._wake()
-            return time.monotonic() >= end
-
-        self.server.serve(ended)
-        return os.read(self.host, 100) if select.select([self.host], [], [], 0.0)[0] else b""
-
-
-@pytest.fixture
-def served(tmp_path):
-    served = Served(str(tmp_path / "hand"))
-    yield served
-    os.close(served.host)
-    served.server.shutdown()
-
-
-def test_a_slow_hand_answers_late_and_in_order(served):
-    served.server.fault("slow 100")
-    begun = time.monotonic()
-    assert served.asks(b"\x45\x02\x4b\x02") == b""
-    assert served.serves_until(lambda came: len(came) == 2) == b"\x00\x08"
-    assert time.monotonic() - begun >= 0.1
-
-
-def test_a_cable_can_be_pulled_and_plugged_in_again(served, tmp_path):
-    link, first = tmp_path / "hand", served.server.path
-    assert os.readlink(link) == first and served.ports == [first]
-    os.write(served.host, b"\x45")
-    served.serves_until(lambda _: served.hand.parser.waiting)
-    served.server.fault("unplug")
-    served.server.fault("unplug")
-    assert served.server.path == "" and served.ports == [first, ""] and not link.is_symlink()
-    assert served.hand.parser.waiting == b"", "what was cut off is forgotten"
-    served.server.fault("replug")
-    served.server.fault("replug")
-    assert len(served.ports) == 3 and os.readlink(link) == served.server.path == served.ports[2]
-
-
-def test_a_cable_plugs_itself_in_again_after_its_time(served):
-    begun = time.monotonic()
-    served.server.fault("unplug 0.1")
-    assert served.server.path == ""
-    served.serves_until(lambda _: served.server.path)
-    assert time.monotonic() - begun >= 0.1
-
-
-def test_answers_that_were_late_do_not_survive_the_cable(served):
-    served.server.fault("slow 60000")
-    os.write(served.host, b"\x45\x02")
-    served.serves_until(lambda _: served.server._late)
-    served.server.fault("unplug")
-    served.server.fault("replug")
-    assert served.server._late == []
-
-
-def test_the_loop_sleeps_until_something_is_due(served):
-    assert served.server._wait_s() == 1.0
-    served.server._late = [(time.monotonic() + 0.5, b"")]
-    assert 0.3 < served.server._wait_s() <= 0.5
-    served.server._replug_at = time.monotonic() - 1.0
-    assert served.server._wait_s() == 0.0
-    served.server._late, served.server._replug_at = [], None
-
-
-def test_bytes_beyond_a_full_line_are_lost_and_not_waited_for(served, monkeypatch):
-    def full(*_: object) -> int:
-        raise BlockingIOError
-
-    monkeypatch.setattr(os, "write", full)
-    served.server._send(b"\x00")
-    assert served.traced == []

@@ -5,6 +5,7 @@ The trial runs in virtual time, so that the film is the same for the same seed o
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from pathlib import Path
@@ -12,6 +13,7 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+import smach
 from coglab_sim._camera import Camera
 from coglab_sim.person.body import arm_of
 from coglab_trials.trial import VirtualTrial
@@ -164,20 +166,30 @@ class Film:
         sheet = Image.new("RGB", (SIZE[0], SIZE[1] * len(chosen)))
         for row, frame in enumerate(chosen):
             sheet.paste(frame, (0, row * SIZE[1]))
-        return sheet.quantize(COLOURS, method=Image.Quantize.MAXCOVERAGE)
+        return sheet.quantize(COLOURS, method=Image.Quantize.FASTOCTREE)
+
+
+def quiet(*_: object) -> None:
+    """Logs nothing."""
 
 
 def main(words: list[str]) -> int:
     """Exit status 0: the film is there and both handovers succeeded; 1: not; 2: usage."""
     try:
-        options = film_parser(Path.cwd()).parse_args(words)
+        options = film_parser(Path(os.environ["COGLAB_TOP"])).parse_args(words)
     except Refused as error:
         print(f"[coglab] error: {error}", file=sys.stderr)
         return 2
     begun, film = time.monotonic(), Film()
+    smach.set_loggers(quiet, smach.logwarn, quiet, smach.logerr)
     trial = VirtualTrial(seed=options.seed)
     trial.beside = film.look
-    results = trial.run(*ACTIONS)
+    print(f"[coglab] drawing a handover in both directions, seed {options.seed}: about a minute", flush=True)
+    try:
+        results = trial.run(*ACTIONS)
+    except (AssertionError, RuntimeError) as error:  # a machine that is stuck; no pictures without a screen
+        print(f"[coglab] error: {error}", file=sys.stderr)
+        return 1
     for result in results:
         print(f"[coglab] {result.action}: {result.outcome}")
     if not film.frames:

@@ -1,12 +1,11 @@
 """Contact and release from the estimated external joint torques, as D4.10 section 3.2 describes.
 
-Contact: low-passed torque, its difference over a short window (the residual bias of the estimate drops out), compared
-with a threshold learnt while the arm stood still, on the joints that feel forces in the plane perpendicular to the line
-between person and robot. Load and release: the vertical force that explains the change of torque, compared
-with a share of
-the object's weight; load counts from the torque before the contact, release from the torque on arming.
+Contact: the difference of the low-passed torque over a short window (the bias of the estimate drops out) is compared
+with a threshold learnt at rest, on the joints that feel forces across the line between person and robot. Load and
+release: the vertical force that explains the change of torque is compared with a share of the object's weight; load
+counts from the torque before the contact, release from the torque on arming.
 
-The detector works only while the arm stands still: it enforces that itself, whoever arms it.
+The detector works only while the arm stands still, and checks that itself.
 """
 
 from __future__ import annotations

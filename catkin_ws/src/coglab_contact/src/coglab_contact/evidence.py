@@ -1,4 +1,4 @@
-"""What speaks for contact: torques of the moving arm, fingers, touch; and all of it together.
+"""Evidence of a contact: torques of the moving arm, fingers, touch and sight, and all of it together.
 
 Each source turns what it measures into evidence: a margin (signal over its threshold) and the probability of a contact
 that goes with it. Sources count as independent: the probability that at least one of them is right decides.

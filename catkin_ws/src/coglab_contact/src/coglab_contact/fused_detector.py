@@ -1,11 +1,11 @@
-"""Contact from all that feels it, as one event: the detector behind the ContactPort.
+"""Fuses joint torques, finger motors, touch and sight into one contact event.
 
-Modes contact, load and, without a model of the arm, release are those of D4.10 (ContactDetector): torques of an arm
-that stands still. With a model, release watches the weight go from an arm that may move (LeavingLoad). Mode
-IN_MOTION watches from arming on, whether the arm moves or not: the moving arm's torques, the fingers, touch and the
-sight of the object at its grasp, each with a probability, and D4.10's derivative once the arm stands. The first moment
-at which a contact is likely enough is the event; its source is the one that says so alone, or ``fused``. Mode LIFT
-watches the weight come to an arm that lifts what it has grasped, counted from arming on.
+Modes contact, load and, without a model of the arm, release are those of D4.10 (ContactDetector), for a resting arm.
+With a model, release watches the weight go from an arm that may move (LeavingLoad). Mode IN_MOTION watches from
+arming on, whether the arm moves or not: torques of the moving arm, fingers, touch and the sight of the object at its
+grasp, each with a probability, and D4.10's derivative once the arm stands. The event is the first moment at which a
+contact is likely enough; its source is the one that is sure alone, or ``fused``. Mode LIFT watches the weight come to
+an arm that lifts what it has grasped, counted from arming on.
 """
 
 from __future__ import annotations

@@ -5,9 +5,9 @@ slow errors of the model drop out. That mean is long, since its own noise is par
 learnt: torques that lag behind positions look like a push wherever the acceleration changes, and an object that is
 heavier than its file says like one wherever the hand is turned or hastened. The change's variance, per joint, is a sum
 of shares that grow with speed, acceleration and what the load told needs; the shares are learnt by non-negative least
-squares, after the lag. The change is then explained by a force on the palm
-(generalised least squares), and the length of that force in standard deviations is compared with a limit that reaches
-without contact exceed with a chosen probability (Gumbel's law on the largest value of each reach).
+squares, after the lag. The change is then explained by a force on the palm (generalised least squares), and the length
+of that force in standard deviations is compared with a limit that reaches without contact exceed with a chosen
+probability (Gumbel's law on the largest value of each reach).
 """
 
 from __future__ import annotations

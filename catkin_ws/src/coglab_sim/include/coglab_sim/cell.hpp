@@ -90,7 +90,7 @@ class Cell {
 
  private:
   bool lost(double share);
-  void feel(double dt);
+  void averageForces(double dt);
   krc::ArmSignals signals(const Vector7& torque, const Vector7& acceleration) const;
 
   CellConfig config_;
@@ -104,8 +104,8 @@ class Cell {
   bool losing_ = false;
   bool sent_ = false;
   Vector7 fastest_ = Vector7::Zero();
-  // Means over felt_for_ s; see CellTruth
-  double felt_for_ = 0.0;
+  // Means over averaged_for_ s; see CellTruth
+  double averaged_for_ = 0.0;
   plant::Touch touch_;
   Vector3d touch_force_ = Vector3d::Zero(), palm_force_ = Vector3d::Zero();
   Vector7 external_torque_ = Vector7::Zero();

@@ -37,7 +37,7 @@ struct CellSnapshot {
   std::uint64_t sent = 0;        ///< measurements that left in time
   std::uint64_t unanswered = 0;  ///< those of them without an answer within their period
   double latest = 0.0;           ///< s, by which the latest period since takeLatest() began late
-  /// Why the person's hand is not there, though it was told where it is; empty: it is.
+  /// Why the person's hand was refused; empty: it was not.
   std::string refused_hand;
 };
 
@@ -95,7 +95,7 @@ class RealTimeCell {
  private:
   struct Action {
     std::packaged_task<void(Cell&)> task;
-    std::atomic<bool> taken{false};  // by the thread, or back by who asked
+    std::atomic<bool> taken{false};  // by the thread, or back by the caller
   };
   struct Delayed {
     double time;

@@ -13,7 +13,7 @@ namespace {
 void dropWarning(const char*) {}  // the plant reads them from mjData
 
 void checkLibrary() {
-  // Unless told so, MuJoCo ends the process on an error and writes a file on a warning.
+  // By default MuJoCo ends the process on an error and writes a file on a warning.
   mju_user_error = [](const char* text) { throwError(text); };
   mju_user_warning = dropWarning;
   if (mj_version() != mjVERSION_HEADER)

@@ -10,7 +10,7 @@
 namespace coglab_sim::plant {
 namespace {
 
-// Who collides with whom: one bit per group, and the groups that it meets. Fingers pass through
+// Collision groups: one bit each, and the groups that it meets. Fingers pass through
 // each other and through the palm. The object has two shapes, since a cylinder meets a capsule in
 // one point only: what hands meet is round (a capsule with the cylinder's side), what planes meet
 // is the solid itself.

@@ -421,20 +421,20 @@ void Plant::setPerson(const PersonInput& person) {
   PersonInput wanted = person;
   wanted.twist.linear = clipped(person.twist.linear, kFastestReach);
   wanted.twist.angular = clipped(person.twist.angular, kFastestTurn);
-  if (!person_present_) appear(wanted);
+  if (!person_present_) addPerson(wanted);
   person_ = wanted;
   person_age_ = 0.0;
 }
 
 /// The person's hand is there from now on, with what was put into it; or not, if it cannot be.
-void Plant::appear(const PersonInput& person) {
+void Plant::addPerson(const PersonInput& person) {
   const State before = state();
   put(model_->person_position, model_->person_velocity, person.hand, person.twist);
   person_present_ = true;
   keepPlaced();
   try {
-    acceptOr(before, model_->person, "where it comes from");
-    if (placed_) acceptOr(before, model_->object, "in that hand");
+    acceptOrRestore(before, model_->person, "where it comes from");
+    if (placed_) acceptOrRestore(before, model_->object, "in that hand");
   } catch (const std::invalid_argument&) {
     person_present_ = false;
     throw;
@@ -520,7 +520,8 @@ void Plant::applyPerson(double dt) {
 }
 
 /// Adds what one body of a contact feels, in world axes; `normal` is the pressing part, N.
-void Plant::feel(int body, int other, const Vector3d& force, double normal, Pressing& pressing) {
+void Plant::addContact(int body, int other, const Vector3d& force, double normal,
+                       Pressing& pressing) {
   const auto phalanx = std::find(model_->phalanges.begin(), model_->phalanges.end(), body);
   const bool on_palm = body == model_->palm;
   if (phalanx == model_->phalanges.end() && !on_palm) return;
@@ -532,7 +533,7 @@ void Plant::feel(int body, int other, const Vector3d& force, double normal, Pres
   (finger ? pressing.fingers : pressing.opposing) += normal;
 }
 
-/// Who touches what: forces on the fingers and the palm, who carries the object.
+/// Reads the contacts: forces on fingers and palm, and what carries the object.
 void Plant::readContacts(double dt) {
   const mjModel* m = model_->get();
   const mjData* d = model_->data();
@@ -555,8 +556,8 @@ void Plant::readContacts(double dt) {
     // Rows of the frame are normal and tangents; the force acts on the second body.
     const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> frame(contact.frame);
     const Vector3d force = frame.transpose() * Vector3d(local[0], local[1], local[2]);
-    feel(one, two, -force, local[0], pressing);
-    feel(two, one, force, local[0], pressing);
+    addContact(one, two, -force, local[0], pressing);
+    addContact(two, one, force, local[0], pressing);
   }
   touch_force_ = touch_.palm;
   for (const Vector3d& force : touch_.phalanges) touch_force_ += force;
@@ -659,7 +660,7 @@ Plant::State Plant::state() const {
 
 /// Computes everything for the positions as they are now; where a body would stand in something,
 /// they become again what they were before, and it throws.
-void Plant::acceptOr(const State& before, int body, const char* where) {
+void Plant::acceptOrRestore(const State& before, int body, const char* where) {
   mjData* d = model_->data();
   mj_step1(model_->get(), d);
   try {
@@ -686,15 +687,15 @@ void Plant::place(Place place, const Pose& pose) {
     twist = {with.at(object.position - hand.position), with.angular};
   }
   put(model_->object_position, model_->object_velocity, object, twist);
-  acceptOr(before, model_->object, in_hand ? "in that hand" : "there");
-  forget();
+  acceptOrRestore(before, model_->object, in_hand ? "in that hand" : "there");
+  resetObject();
   place_ = place;
   in_hand_ = pose;
   placed_ = in_hand;
 }
 
-/// Nothing is known of an object that has just been placed.
-void Plant::forget() {
+/// Forgets who held the object: it has just been placed.
+void Plant::resetObject() {
   grip_.release();
   placed_ = grip_lost_ = false;
   on_board_ = on_floor_ = dropped_ = false;
@@ -703,37 +704,36 @@ void Plant::forget() {
   person_force_.setZero();
 }
 
-/// What the hand does at such a start is tried out beside: another plant, whose arm stands on its
-/// brakes in the same posture, closes its fingers on the object, and only what it holds in the end
-/// is taken over.
+/// Tries it on a copy of the plant first: there the arm stands on its brakes in the same posture
+/// and the fingers close on the object. Only what they hold in the end is taken over.
 void Plant::placeInRobotHand(const Pose& in_palm) {
   PlantConfig config = config_;
   config.home = position_;
-  Plant beside(config);
+  Plant copy(config);
   std::copy(model_->get()->opt.gravity, model_->get()->opt.gravity + 3,
-            beside.model_->get()->opt.gravity);
-  beside.closeAround(in_palm);
+            copy.model_->get()->opt.gravity);
+  copy.closeAround(in_palm);
 
   mjData* d = model_->data();
-  const mjData* from = beside.model_->data();
+  const mjData* from = copy.model_->data();
   const State before = state();
   for (std::size_t i = 0; i < model_->phalanx_position.size(); ++i) {
     d->qpos[model_->phalanx_position[i]] = from->qpos[model_->phalanx_position[i]];
     d->qvel[model_->phalanx_velocity[i]] = 0.0;
   }
-  const Pose palm = this->palm(), object = palm * (beside.palm().inverse() * beside.object());
+  const Pose palm = this->palm(), object = palm * (copy.palm().inverse() * copy.object());
   const Twist twist = palmTwist();
   put(model_->object_position, model_->object_velocity, object,
       {twist.at(object.position - palm.position), twist.angular});
   std::copy(from->qacc_warmstart, from->qacc_warmstart + model_->get()->nv, d->qacc_warmstart);
-  acceptOr(before, model_->object, "in that hand");
-  forget();
+  acceptOrRestore(before, model_->object, "in that hand");
+  resetObject();
   place_ = Place::RobotHand;
-  motors_ = beside.motors_;
-  robot_share_ = beside.robot_share_;
-  squeeze_ = beside.squeeze_;
-  grasp_force_ = beside.grasp_force_;
-  object_force_ = beside.object_force_;
+  motors_ = copy.motors_;
+  robot_share_ = copy.robot_share_;
+  squeeze_ = copy.squeeze_;
+  grasp_force_ = copy.grasp_force_;
+  object_force_ = copy.object_force_;
 }
 
 /// Closes the hand of a plant that nobody else uses on the object, which is kept where it is to be

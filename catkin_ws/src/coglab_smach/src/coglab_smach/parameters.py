@@ -61,17 +61,19 @@ def _other(name: str, default: Any, unit: str, text: str, **schema: Any) -> Para
 
 
 DAY = 86400.0
+TEXT = {"type": "string"}
 WORD = {"type": "string", "minLength": 1}
 TRIPLE = {"type": "array", "minItems": 3, "maxItems": 3, "items": {"type": "number", "minimum": -10, "maximum": 10}}
 JOINTS = {"type": "array", "minItems": 7, "maxItems": 7, "items": {"type": "number", "minimum": -3.2, "maximum": 3.2}}
 SPEEDS = {"type": "array", "minItems": 7, "maxItems": 7, "items": {"type": "number", "exclusiveMinimum": 0}}
+ACTIONS = {"offer": "exchange_human_to_robot", "request": "exchange_robot_to_human"}
 PATTERNS = {"centre": "reach_human", "left": "reach_human", "right": "reach_human", "high": "reach_human_high"}
 
 TABLE = (
     _other("controllers", NO_DEFAULT, "", "id: plug-in type, loaded in this order", type="object", minProperties=1,
            additionalProperties=WORD),
     _other("lwr_commands", ["position", "start"], "", "sent while motion is not allowed", type="array", items=WORD),
-    Parameter("dmp_library", NO_DEFAULT, "", "file of the primitives", schema={"type": "string"}),
+    Parameter("dmp_library", NO_DEFAULT, "", "file of the primitives", schema=TEXT),
     Parameter("auto_trigger", False, "", "coglab_init_robot does not wait for 'initialise'"),
     _above("trigger_timeout", 3600.0, "s", "wait for 'initialise'", DAY),
     Parameter("default_object", "mug", "", "object of a trigger that names none"),
@@ -181,8 +183,8 @@ TABLE = (
     Parameter("recognition_trigger.enabled", False, "", "a belief in an offer or a request leaves a hub"),
     _row("recognition_trigger.belief", 0.9, "", "probability from which it does; it has to have been below "
          "`handover.doubt` in this hub before", 0, 1, timed=True),
-    Parameter("recognition_trigger.actions.offer", "exchange_human_to_robot", "", "action that an offer starts"),
-    Parameter("recognition_trigger.actions.request", "exchange_robot_to_human", "", "action that a request starts"),
+    _other("recognition_trigger.actions", ACTIONS, "", "offer or request: the action that it starts; left out: none",
+           type="object", additionalProperties=False, properties={"offer": TEXT, "request": TEXT}),
     _row("board.room", 0.01, "m", "that hand and forearm keep above the board", 0, 0.3),
     _row("board.lift", 0.03, "m", "by which a goal is raised for it at most; else it is refused", 0, 0.3),
     _row("take.sights", 10, "", "sights of the object that are averaged", 1, 10000),

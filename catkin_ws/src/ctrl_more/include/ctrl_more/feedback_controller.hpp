@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "ctrl_more/description/change.hpp"
+#include "ctrl_more/description/configuration.hpp"
 #include "ctrl_more/description/description.hpp"
-#include "ctrl_more/description/gains.hpp"
 #include "ctrl_more/description/setup.hpp"
 #include "ctrl_more/loading/plugin_types.hpp"
 #include "ctrl_more/log/logger.hpp"

@@ -22,7 +22,6 @@
 #include <thread>
 
 #include "ctrl_more/loading/search_path.hpp"
-#include "loading/probe.hpp"
 
 namespace fs = std::filesystem;
 using std::chrono::steady_clock;

@@ -9,15 +9,40 @@
 #include <map>
 #include <mutex>
 #include <stdexcept>
+#include <tuple>
 #include <utility>
 
 #include "ctrl_more/log/words.hpp"
 #include "loading/library_file.hpp"
-#include "loading/probe.hpp"
 
 namespace fs = std::filesystem;
 
 namespace ctrl_more {
+
+std::vector<PluginTypes::Refusal> PluginTypes::takeRefused() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  std::vector<Refusal> refused;
+  refused.swap(refused_);
+  return refused;
+}
+
+void PluginTypes::refuse(const std::string& type, const std::string& clause) {
+  refused_.push_back({type, "registers '" + type + "'" + clause});
+}
+
+bool PluginTypes::admit(const std::string& type, bool known, bool has_maker, const Abi& abi) {
+  if (!(abi == abi_)) {
+    refuse(type, " " + abi.otherThan(package_, abi_));
+  } else if (!has_maker) {
+    refuse(type, " without a maker");
+  } else if (known) {
+    refuse(type, knownAlready());
+  } else {
+    return true;
+  }
+  return false;
+}
+
 namespace {
 
 // Serialises opening and closing.
@@ -27,17 +52,7 @@ std::recursive_mutex& loaderMutex() {
 }
 
 // What tells a file from a later build under the same name.
-struct Build {
-  dev_t device = 0;
-  ino_t inode = 0;
-  off_t size = 0;
-  std::int64_t changed_ns = 0;
-
-  bool operator==(const Build& other) const {
-    return device == other.device && inode == other.inode && size == other.size &&
-           changed_ns == other.changed_ns;
-  }
-};
+using Build = std::tuple<dev_t, ino_t, off_t, std::int64_t>;
 
 Build buildOf(const std::string& file) {
   struct stat info {};

@@ -26,8 +26,6 @@ std::vector<std::string> foldersOf(const char* variable) {
   return folders;
 }
 
-// Folder of the core library.
-
 }  // namespace
 
 std::string coreFolder() {

@@ -5,7 +5,6 @@
 #include <condition_variable>
 #include <cstdio>
 #include <cstring>
-#include <fstream>
 #include <iostream>
 #include <mutex>
 #include <sstream>
@@ -74,19 +73,12 @@ std::string LogRecord::toLine() const {
   return out.str();
 }
 
-struct FileLogSink::File {
-  std::ofstream stream;
-};
-
-FileLogSink::FileLogSink(const std::string& path) : file_(std::make_unique<File>()) {
-  file_->stream.open(path, std::ios::app);
-  if (!file_->stream) throw std::runtime_error("cannot open log file " + path + " for appending");
+FileLogSink::FileLogSink(const std::string& path) : stream_(path, std::ios::app) {
+  if (!stream_) throw std::runtime_error("cannot open log file " + path + " for appending");
 }
 
-FileLogSink::~FileLogSink() = default;
-
 void FileLogSink::write(const LogRecord& record) {
-  file_->stream << record.toLine() << '\n' << std::flush;
+  stream_ << record.toLine() << '\n' << std::flush;
 }
 
 void StreamLogSink::write(const LogRecord& record) { out_ << record.toLine() << '\n'; }

@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "ctrl_more/description/config_node.hpp"
+#include "ctrl_more/description/configuration.hpp"
 #include "ctrl_more/log/words.hpp"
-#include "description/controller_config.hpp"
 
 namespace ctrl_more {
 namespace {

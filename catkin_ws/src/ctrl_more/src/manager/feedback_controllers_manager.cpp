@@ -10,7 +10,7 @@
 
 #include "coglab_rt/clock.hpp"
 #include "coglab_rt/triple_buffer.hpp"
-#include "description/controller_config.hpp"
+#include "ctrl_more/description/configuration.hpp"
 #include "manager/controller_list.hpp"
 #include "manager/list_file.hpp"
 #include "manager/plan.hpp"

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "ctrl_more/description/gains.hpp"
+#include "ctrl_more/description/configuration.hpp"
 #include "ctrl_more/states/cycle.hpp"
 
 namespace ctrl_more {

@@ -21,9 +21,8 @@ void RobotStates::stampSignal(std::uint32_t index, std::int64_t stamp_ns) {
   newest_ = std::max(newest_, stamp_ns);
 }
 
-Status RobotStates::set(RobotSource source, const std::string& key,
-                        const Eigen::Ref<const Eigen::VectorXd>& value, std::int64_t stamp_ns,
-                        const char* who) {
+Status RobotStates::set(RobotSource source, const std::string& key, const Values& value,
+                        std::int64_t stamp_ns, const char* who) {
   if (stamp_ns < 0) {
     return table_.refuse(std::string(who) + ": stamp of " + nameOf(source) + "/" + key +
                          " must be monotonic nanoseconds >= 0, got " + std::to_string(stamp_ns));
@@ -55,48 +54,6 @@ Status RobotStates::setStamp(RobotSource source, const std::string& key, std::in
   }
   stampSignal(signal.index(), stamp_ns);
   return {};
-}
-
-Status RobotStates::setMeasuredData(const std::string& key,
-                                    const Eigen::Ref<const Eigen::VectorXd>& value,
-                                    std::int64_t stamp_ns, const char* who) {
-  return set(RobotSource::Measured, key, value, stamp_ns, who);
-}
-
-Status RobotStates::setEstimatedData(const std::string& key,
-                                     const Eigen::Ref<const Eigen::VectorXd>& value,
-                                     std::int64_t stamp_ns, const char* who) {
-  return set(RobotSource::Estimated, key, value, stamp_ns, who);
-}
-
-Status RobotStates::getMeasuredData(const std::string& key, Eigen::VectorXd& value,
-                                    const char* who) const {
-  return get(RobotSource::Measured, key, value, nullptr, who);
-}
-
-Status RobotStates::getMeasuredData(const std::string& key, Eigen::VectorXd& value,
-                                    std::int64_t& stamp_ns, const char* who) const {
-  return get(RobotSource::Measured, key, value, &stamp_ns, who);
-}
-
-Status RobotStates::getEstimatedData(const std::string& key, Eigen::VectorXd& value,
-                                     const char* who) const {
-  return get(RobotSource::Estimated, key, value, nullptr, who);
-}
-
-Status RobotStates::getEstimatedData(const std::string& key, Eigen::VectorXd& value,
-                                     std::int64_t& stamp_ns, const char* who) const {
-  return get(RobotSource::Estimated, key, value, &stamp_ns, who);
-}
-
-Status RobotStates::setMeasurementTimeStamp(const std::string& key, std::int64_t stamp_ns,
-                                            const char* who) {
-  return setStamp(RobotSource::Measured, key, stamp_ns, who);
-}
-
-Status RobotStates::setEstimateTimeStamp(const std::string& key, std::int64_t stamp_ns,
-                                         const char* who) {
-  return setStamp(RobotSource::Estimated, key, stamp_ns, who);
 }
 
 RobotSignal RobotStates::find(RobotSource source, const std::string& key) const {

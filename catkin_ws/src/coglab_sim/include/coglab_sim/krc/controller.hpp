@@ -3,8 +3,8 @@
 /// program.
 ///
 /// Per FRI period: `receive()` every datagram that came, then `tick()`, which judges the answer to
-/// the last measurement and says what the servos do during the next period; after the arm has
-/// moved, `measure()` writes the next measurement.
+/// the last measurement and returns the command of the servos for the next period; after the arm
+/// has moved, `measure()` writes the next measurement.
 #pragma once
 
 #include <deque>

@@ -20,7 +20,7 @@ struct ServoParameters {
 #include "coglab_sim/parameter_table.inc"
 };
 
-/// What is asked of the joint servos during one step.
+/// Input of the joint servos for one step.
 struct ServoCommand {
   lwr_fri_bridge::fri::ControlStrategy strategy = lwr_fri_bridge::fri::ControlStrategy::Position;
   Vector7 position = Vector7::Zero();   ///< rad

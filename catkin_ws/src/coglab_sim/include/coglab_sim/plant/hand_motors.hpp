@@ -8,7 +8,7 @@
 
 namespace coglab_sim::plant {
 
-/// What a motor is to do until told otherwise.
+/// What a motor does until the next command.
 struct MotorCommand {
   double speed = 0.0;    ///< share of the full speed, 0 .. 1; 0: off
   double target = 0.0;   ///< share of the stroke to go to, 0 open .. 1 closed

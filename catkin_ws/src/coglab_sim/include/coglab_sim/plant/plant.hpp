@@ -161,7 +161,7 @@ class Plant {
   };
 
   Twist twistOf(int body) const;
-  void feel(int body, int other, const Vector3d& force, double normal, Pressing& pressing);
+  void addContact(int body, int other, const Vector3d& force, double normal, Pressing& pressing);
   FreeBody freeBody(int body, int velocity) const;
   void put(int position, int velocity, const Pose& pose, const Twist& twist);
   void keepPlaced();
@@ -173,10 +173,10 @@ class Plant {
   void readArm(const Vector7& before, double dt);
   Vector7 pushedTorque() const;
   double blockDamping(int dof) const;
-  void appear(const PersonInput& person);
+  void addPerson(const PersonInput& person);
   State state() const;
-  void acceptOr(const State& before, int body, const char* where);
-  void forget();
+  void acceptOrRestore(const State& before, int body, const char* where);
+  void resetObject();
   void placeInRobotHand(const Pose& in_palm);
   void closeAround(const Pose& in_palm);
   void refuseOverlap(int body, const char* where) const;

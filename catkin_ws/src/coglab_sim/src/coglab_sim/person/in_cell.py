@@ -21,7 +21,7 @@ def pose_of_truth(pose: Mapping[str, Any]) -> Pose:
 
 def view_of(truth: Mapping[str, Any]) -> WorldView:
     """What there is to be seen and felt in the cell's truth. What is felt of the object is the force that the person's
-    own grip carries, whoever else holds it."""
+    own grip carries, even where the robot holds it, too."""
     return WorldView(
         pose_of_truth(truth["robot_hand"]),
         float(truth["hand_closure"]),

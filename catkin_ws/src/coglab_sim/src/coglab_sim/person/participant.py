@@ -111,13 +111,13 @@ class Participant:
     presses_again: int = 0
     """how often an object is pressed again into an open hand that has backed away"""
     used_to_touch: bool = False
-    """True: who is touched by the open hand while waiting places the object all the same; else it counts as placed"""
+    """True: a touch by the open hand while the person waits does not count as placing the object"""
     believes_closed: float = math.inf
     """s after which a hand that is seen closed is believed to hold, felt or not"""
     aligns_within: float = math.inf
     """m off the palm's middle, along the fingers, from which on the person corrects while placing"""
     relaxes: bool = False
-    """True: with half of the grip the arm sinks, so that the weight comes to lie on whoever holds"""
+    """True: with half of the grip the arm sinks, so that the robot, if it holds, gets the weight"""
     sway: float = 0.002
     tremor: float = 0.0003
 

@@ -34,7 +34,7 @@ FARTHEST = 0.30
 SHORTEST = 0.10
 """m, of a reach"""
 LEAVES_CLOSED = 0.05
-"""share of their way by which the robot's fingers must have been seen to close for who leaves at the recorded time"""
+"""share of their way that the robot's fingers are seen to close before a person lets go who leaves as recorded"""
 
 
 class RecordedHand:

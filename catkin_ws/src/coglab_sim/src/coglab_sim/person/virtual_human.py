@@ -2,7 +2,7 @@
 
 Phases: idle, reacting, reaching, waiting (hand at the handover point, the robot comes), placing (the object is brought
 gently into the robot's palm; for receiving: the hand closes and lifts), holding, releasing, retreating. The person
-knows of the cell what eyes and hand perceive (senses), and of the robot's intention what it says (coglab_msgs/Say).
+knows the cell through eyes and hand (senses), and the robot's intention through its words (coglab_msgs/Say).
 All frames in world, SI units.
 """
 
@@ -286,7 +286,7 @@ class VirtualHuman:
             self._go("waiting", t)
 
     def _withdraws(self, gap: float) -> bool:
-        """Who does that takes the offer back when the robot's hand is seen to come, the first five times."""
+        """With the behaviour `withdraws`: take the offer back as the robot's hand comes, in the first trials."""
         teases = self.participant.behaviour == "withdraws" and self._task == "give" and self.trial <= WITHDRAWALS
         return teases and gap < COMES
 
@@ -334,7 +334,7 @@ class VirtualHuman:
     def _retreating(self, t: float, dt: float, seen: Percept) -> None:
         assert self._reach is not None
         self._follow(t)
-        if self._grip > 0.0:  # who had begun to let go holds on again
+        if self._grip > 0.0:  # fingers that had begun to open close again
             self._grip = min(1.0, self._grip + dt / REGRIPS)
         felt = length(seen.load) > LOST * self._weight()
         if self._grip == 0.0 or felt or length(seen.object.position - self._hand) < AWAY:
@@ -453,7 +453,7 @@ class VirtualHuman:
             self._go("releasing", t)
 
     def _releasing(self, t: float, dt: float, seen: Percept) -> None:
-        """Open the grip; halfway, whoever gives waits to feel that the robot carries, else holds on again."""
+        """Open the grip; halfway a giver waits to feel that the robot carries, else holds on again."""
         self._velocity = np.zeros(3)
         p = self.participant
         careful = self._task == "give" and p.behaviour != "early_release"

@@ -28,7 +28,7 @@ IN_HAND = 0.20
 
 
 class NotSeen(Exception):
-    """Perception cannot answer; the text is the sentence for who asked, `code` its ReasonCode."""
+    """Perception cannot answer; the text is the sentence of the answer, `code` its ReasonCode."""
 
     def __init__(self, sentence: str, code: int) -> None:
         super().__init__(sentence)
@@ -50,7 +50,7 @@ class PartnerChoice:
         self._chosen = ""
 
     def choose(self, hands: Mapping[str, Pose], robot: Pose | None) -> str:
-        """Name of the partner's hand, empty if none can be told."""
+        """Name of the partner's hand, empty if it is not clear."""
         if len(hands) <= 1:
             self._chosen = next(iter(hands), "")
             return self._chosen
@@ -193,7 +193,7 @@ class Vision:
         return self.clock() - tracker.newest.captured < OLDEST
 
     def _doubt(self, name: str) -> str:
-        """The sentence if somebody's hand is meant and it cannot be told whose; else empty."""
+        """Sentence if the partner's hand is meant and it is not clear whose that is; else empty."""
         if self.people <= 1 or self._partner or not self._world_is_visible():
             return ""
         if name != self.names.human_hand and not self._is_held(name):

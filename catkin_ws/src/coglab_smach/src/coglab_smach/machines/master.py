@@ -10,7 +10,6 @@ from coglab_smach.machines.exchange_robot_to_human import build_exchange_robot_t
 from coglab_smach.machines.init import build_init_system
 from coglab_smach.machines.recovery import WhatIsHeld, build_recovery
 from coglab_smach.states.base import CoglabMachine
-from coglab_smach.states.grip import Grip
 from coglab_smach.states.hub import Fault, Hub, Stopped
 
 ACTIONS_EMPTY = ("exchange_human_to_robot", "take")
@@ -34,7 +33,6 @@ def build_master(ctx: Context) -> CoglabMachine:
     master = CoglabMachine(ctx, LABEL, ["preempted"])
     master.userdata.object_id = master.userdata.grasp_name = ""
     master.userdata.object_entry, master.userdata.grasp = {}, {}
-    master.userdata.grip = Grip()
     with master:
         master.add_state(
             "coglab_init_system",

@@ -8,6 +8,7 @@ from typing import Any
 from coglab_msgs.msg import ReasonCode, Say
 
 from coglab_smach.context.context import Context
+from coglab_smach.context.grip import Grip
 from coglab_smach.context.holding import UNKNOWN
 from coglab_smach.context.requests import command
 from coglab_smach.context.wait_reasons import HAND
@@ -15,7 +16,6 @@ from coglab_smach.ports.interfaces import Verdict
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.arm import HomeRobot
 from coglab_smach.states.base import CoglabMachine, CoglabState
-from coglab_smach.states.grip import Grip
 from coglab_smach.states.hand import HandTighten
 from coglab_smach.states.hand_tracking import AWAY, from_palm
 from coglab_smach.states.held_object import LOOK, HeldObject
@@ -66,11 +66,11 @@ class EndMotion(CoglabState):
 
 
 class SecureHand(CoglabState):
-    """Decide what the hand does during recovery: keep holding if it closed on an object, else open. Fingers that a STOP
-    has left half open say that they hold something: what the tracker sees away from the palm is not in them.
+    """Decide what the hand does during recovery: keep holding if it closed on an object, else open. After a STOP a half
+    open hand may report a grip that is none: an object that is seen away from the palm is not held.
 
-    The arm goes nowhere with an object that the person may hold too. They are told that it is over; where their hand is
-    not seen to go within LETS_GO s the outcome is stopped, until the operator has looked and asks for 'reset'
+    The arm does not move with an object that the person may hold, too. They are told that it is over. If their hand is
+    not seen to go within LETS_GO the outcome is stopped, until the operator has looked and asks for 'reset'
     (``operator``: this is the recovery after that).
     """
 
@@ -123,8 +123,8 @@ class SecureHand(CoglabState):
         return "succeeded"
 
     def _closed_on_the_way(self) -> None:
-        """What the fingers have caught on the last of a reach that has failed then. A person who holds it gets it back;
-        one who let go at the first touch has left it to the robot, wherever their hand is."""
+        """Fingers that closed on the way of a reach that has failed may have caught the object. A person who holds it
+        gets it back; one who let go at the first touch has left it to the robot, wherever their hand is."""
         grip = self._grip
         closing = grip.take_closing()
         if closing is None or not grip.shared or self.ctx.holding:
@@ -147,8 +147,8 @@ class SecureHand(CoglabState):
         return {"mass": self._grip.mass, "load_share": self.ctx.config.number("hand.load_share")}
 
     def _await_letting_go(self) -> None:
-        """Nobody else holds the object, or has taken it along, once the person's hand is seen away from it. Where it
-        was not seen to go another one may be seen there: then it is felt whether they hold it."""
+        """Nobody else holds the object once the person's hand is seen away from it. If the hand was not seen to go it
+        may be another one: then the arm feels whether the person holds the object."""
         self._tell()
         self.allow(LETS_GO + 10.0)
         end, felt = self.ctx.clock.now() + LETS_GO, False
@@ -163,7 +163,7 @@ class SecureHand(CoglabState):
             self.pause(0.05)
 
     def _look_for_it(self) -> None:
-        """Empties the context's hand where the object is seen elsewhere. What nobody sees is where the hand says."""
+        """Nothing is held any more if the object is seen elsewhere. If nobody sees it the hand is believed."""
         held, end = HeldObject(self.ctx, self.ctx.holding, self._grip), self.ctx.clock.now() + LOOK
         try:
             while not held.seen_with_the_hand() and self.ctx.clock.now() < end:

@@ -13,6 +13,7 @@ from coglab_msgs.msg import ReasonCode
 from coglab_smach.context import wait_reasons
 from coglab_smach.context.config import ConfigError
 from coglab_smach.context.context import Context
+from coglab_smach.context.grip import Grip
 from coglab_smach.context.journal import Failure, Wait
 from coglab_smach.context.requests import command
 from coglab_smach.ports.pending import Pending, PortError
@@ -245,11 +246,13 @@ class _Placed:
     container: Any | None
     targets: Mapping[str, str]
     is_action: bool
+    userdata: Any
 
     def place(self, ctx: Context, label: str) -> None:
         """Set the name until the container is added to another one."""
         self.ctx, self.label, self.container, self.targets = ctx, label, None, {}
         self.is_action = False
+        self.userdata.grip = Grip()  # that of the container around it, where it has the key
 
     def begin(self, parent_ud: Any) -> Any:
         """Start of a run: an action opens its record in the journal. Returns user data, empty where none is given."""

@@ -11,10 +11,10 @@ import numpy as np
 from coglab_msgs.msg import ReasonCode
 
 from coglab_smach.context.context import Context
+from coglab_smach.context.grip import Grip
 from coglab_smach.context.wait_reasons import PERSON, SIGHT
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
-from coglab_smach.states.grip import Grip
 from coglab_smach.states.hand import firm_speed
 from coglab_smach.states.hand_tracking import AWAY, HandLook, HandTrack, from_palm, hand_from_palm, way_to_hand
 from coglab_smach.states.held_object import HeldObject
@@ -34,15 +34,13 @@ LOOKS = 0.3  # s between two looks, between which a hand that waits moves by les
 
 
 class WaitTaker(WaitForPerson):
-    """The end of a reach toward the person's hand: the arm stands and follows nothing any more, and the contact
-    detector is armed for release.
+    """wait_stop of a reach toward the person's hand. At its end the arm stands, and the contact detector is armed for
+    release.
 
-    The goal is the person's hand, and that now comes to the object: an arm that still followed it would back away, and
-    one that is held would drag the hand along that it follows. So within the last ``give.touch_within`` m, with the
-    hand within ``give.near`` m of the palm, the reach ends with a contact, and when the goal goes away from the arm
-    again by ``give.goal_leaves`` m because the hand is nearer to the palm than at the delivery: a person who waits does
-    not do that, and the rest of the way is theirs. A hand that is farther away is still on its way, and its predicted
-    place is corrected: that is followed.
+    The goal is the person's hand, and it now comes to the object: an arm that still followed it would back away. So
+    within the last ``give.touch_within`` m, with the hand within ``give.near`` m of the palm, the reach ends with a
+    contact, or when the hand is nearer to the palm than at the delivery, so that the goal goes away again by
+    ``give.goal_leaves`` m: the rest of the way is the person's. A hand that is farther away is followed.
     """
 
     def __init__(self, ctx: Context) -> None:
@@ -125,10 +123,17 @@ class GiveLoad(CoglabState):
         super().__init__(ctx, input_keys=["object_id", "object_entry", "grasp_name", "delivery"], io_keys=["grip"])
         self._grip = Grip()
         self._fingers: LooseningGrip
+        self._needed = self._slips_at = self._weight = 0.0
+        """share of the load; N of grip below which the object slips while the hand carries all of it; N"""
+        self._firm = 0  # wire speed of the grip that is as firm as before
         self._held: HeldObject
         self._hand: HandLook
         self._offer: Callable[[], np.ndarray | None] = lambda: None
         """the way (m) from the object to where the person's hand takes it"""
+        self._reset()
+
+    def _reset(self) -> None:
+        """For each object that is given."""
         self._lowering: Pending | None = None
         self._moving: Pending | None = None
         self._ending: Pending | None = None  # of what moves
@@ -136,9 +141,6 @@ class GiveLoad(CoglabState):
         self._brings = self._sinks = 0
         self._pressed_since: float | None = None
         self._way: np.ndarray | None = None  # m, of the last look: from the object to where the person's hand takes it
-        self._needed = self._slips_at = self._weight = 0.0
-        """share of the load; N of grip below which the object slips while the hand carries all of it; N"""
-        self._firm = 0  # wire speed of the grip that is as firm as before
         self._back_since: float | None = None
 
     def _number(self, name: str) -> float:
@@ -164,8 +166,7 @@ class GiveLoad(CoglabState):
             contact.grip,
         )
         self._firm = firm_speed(self.ctx, entry, ud.grasp_name)
-        self._lowering = self._moving = self._ending = self._back_since = self._pressed_since = None
-        self._brings, self._sinks, self._way = 0, 0, None
+        self._reset()
         self._offer = partial(way_to_hand, self, ud.object_id, ud.delivery)
         self._held = HeldObject(self.ctx, ud.object_id, grip)
         now = self.ctx.clock.now()

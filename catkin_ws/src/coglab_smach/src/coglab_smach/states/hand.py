@@ -25,36 +25,34 @@ DRAWING_BACK = 2.0  # s that drawing back may take beyond what limits and speed 
 
 
 def gentle(grasp: Mapping[str, Any]) -> dict[str, Any]:
-    """The hand of a grasp as it closes beside a person, whose fingers may be between its own: with the lowest force
-    level that every dialect has for its mode."""
+    """The hand of a grasp with the lowest force level that every dialect has for its mode: a person's fingers may be
+    between the robot's."""
     return {**grasp["hand"], "level": levels_of(grasp["hand"]["mode"], "legacy")[0]}
 
 
 def closes_gently(grasp: Mapping[str, Any]) -> bool:
-    """Whether every hand can close by this grasp with the lowest force level that there is: not in a mode that older
-    hands know firm alone."""
+    """Whether every hand can close by this grasp with the lowest force level: older hands have some modes only firm."""
     return bool(gentle(grasp)["level"] == LEVELS[0])
 
 
 def firm_speed(ctx: Context, entry: Mapping[str, Any], grasp_name: str) -> int:
-    """Wire speed, and with it the force, of closing as firmly as the object's entry says; 0 where that is the level of
-    gentle(), too."""
+    """Wire speed, and with it the force, of closing as firmly as the object's entry asks for; 0 if gentle() does."""
     own = entry["grasps"][grasp_name]
     level = own["hand"]["level"]
     return 0 if level == gentle(own)["level"] else int(ctx.config.get(f"hand.tighten.{level}"))
 
 
 def stopped_by_object(mode: str, positions: Sequence[int]) -> bool:
-    """Whether the closed fingers of a grasp stand around something: the thumb (motor 1), and one finger that opposes it
-    where the mode closes some, have not come to their closed ends. Fingers that alone stand on it hold it by an edge,
-    against the palm, and it falls. Nothing is said of a hand that does not tell ``positions`` (counts of 254)."""
+    """Whether the closed fingers stand around something: the thumb (motor 1), and one finger that opposes it if the
+    mode closes any, have stopped before their closed ends. Otherwise they hold the object by an edge, and it falls.
+    True for a hand that does not report ``positions`` (counts of 254)."""
     standing = [motor for motor in CLOSING_MOTORS[mode] if len(positions) <= motor or positions[motor] < AT_END]
     return 1 in standing and len(standing) >= min(2, len(CLOSING_MOTORS[mode]))
 
 
 class CalibrateHand(CoglabState):
-    """Calibration order to the hand; skipped, with a sentence, if it is calibrated and the configuration
-    does not insist, and always if the hand holds something: calibrating opens the fingers."""
+    """Calibrate the hand. Skipped if it is calibrated already (but see ``hand.calibrate_always``), and always if it
+    holds something: calibrating opens the fingers."""
 
     default_time_limit = 30.0
 
@@ -94,9 +92,9 @@ class HandPreshape(CoglabState):
 class HandClose(CoglabState):
     """Close the preshaped hand on the object and make sure that something is in it.
 
-    Outcomes missed and edge, with ``from_person``: the fingers have closed on nothing, or do not stand around it
-    (stopped_by_object), for the first time in this action; a person who offers waits, so the arm may try once more.
-    Meanwhile the palm goes along with who pulls (YieldToPull).
+    With ``from_person`` the palm yields to a pull meanwhile. Outcomes missed and edge: the fingers have closed on
+    nothing, or do not stand around it (stopped_by_object), for the first time in this action. The person still waits,
+    so the arm may try once more.
     """
 
     default_time_limit = 12.0
@@ -118,7 +116,7 @@ class HandClose(CoglabState):
         self.ctx.journal.mark("closing")
         # From here on the hand may hold: a failure in the middle must not make the recovery drop the object.
         grip, self.ctx.holding = ud.grip, ud.object_id
-        closing = grip.take_closing() or self.ctx.hand.close_on_object()
+        closing = (grip.take_closing() if self.from_person else None) or self.ctx.hand.close_on_object()
         grip.shared = self.from_person
         grip.firm = int(ud.grasp["hand"].get("firm", 0)) if self.from_person else 0
         if self.from_person:
@@ -177,13 +175,13 @@ class HandClose(CoglabState):
 
 
 class HandTighten(CoglabState):
-    """Hold what the person has let go of as firmly as the object's entry says: the fingers close from where they are,
-    at the wire speed, and with it the force, of ``hand.tighten`` for the grasp's level (Grip.firm).
+    """Hold what the person has let go of as firmly as the object's entry asks for: the fingers close from where they
+    are, at the wire speed Grip.firm. The arm does not wait until they stand: they press within
+    ``hand.settle_after_close`` s.
 
-    The arm need not wait until the hand is sure that they stand: they press within ``hand.settle_after_close`` s.
-    Nobody's fingers may be there: the person's hand has to be seen all the way until it is FREE m farther than it was,
-    and so for FREE_FOR s, which no hand that was taken for another is. Where it was not seen to go it is held firmly
-    ``at_home``, if no hand is seen near the palm there."""
+    No person's fingers may be between: the person's hand has to be seen all the way until it is FREE farther away than
+    it was, for FREE_FOR. If it was not seen to go, the object is held firmly ``at_home``, if no hand is seen near the
+    palm there."""
 
     default_time_limit = 5.0
 
@@ -251,8 +249,8 @@ class HandOpen(CoglabState):
 class LetGo(CoglabState):
     """Open the hand for the person who has taken the object, and tell them.
 
-    It opens as far as its preshape, in which the object came in, and meanwhile the palm draws back from the object,
-    outward by ``give.draw_back`` m: who has an object goes with it at once, and fingers beside it would tear it away.
+    It opens as far as its preshape, in which the object came in. Meanwhile the palm draws back from the object by
+    ``give.draw_back`` m: a person who has an object goes at once, and fingers beside it would tear it away.
     """
 
     default_time_limit = 8.0

@@ -13,15 +13,13 @@ import numpy as np
 from coglab_py.pose import Pose
 
 from coglab_smach.context.context import Context
+from coglab_smach.context.grip import JUMP, HandTrack, Sight, far
 from coglab_smach.context.wait_reasons import SIGHT
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.interfaces import Located
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.base import CoglabState
 
-JUMP = 0.12  # m between two sights that no hand and no falling object covers
-FASTEST = 2.0  # m/s of a hand: for each second for which it was hidden it may be so much farther away
-PLACE = 0.06  # m within which a hand is where it was
 NEARER = 0.02  # m by which an object that a person has missed is brought nearer than it was offered
 AT_HAND = 0.3  # m from the palm within which a person's hand may reach what is in it
 AWAY = 0.5  # m from the palm from which on a person's hand holds nothing that is in the robot's
@@ -32,58 +30,10 @@ LATELY = 0.4  # s of sights that show whether something is held still
 STILL = 0.025  # m, more than something moves that is held still
 STILL_TIME = 0.3  # s
 
-Sight = tuple[float, np.ndarray]
-"""s, when it was taken, and m"""
-
-
-class HandTrack:
-    """Follows one hand from sight to sight, where it matters whose hand it is: a hidden hand may be elsewhere when it
-    is seen again, and the tracker may have taken another hand for it."""
-
-    def __init__(self) -> None:
-        self.is_one = True
-        """False from a sight of another hand on, until a sight leads back to where the first one may be"""
-        self.is_sure = False
-        """whether it was seen all the way from the object on; False from a jump on, until it is seen again where it was
-        before that"""
-        self._newest: Sight | None = None
-        self._last: Sight | None = None  # the newest one of that hand
-        self._sure: Sight | None = None  # the newest one while that was sure
-
-    def follow(self, at: float, place: np.ndarray, at_object: bool = True) -> None:
-        """Take a sight of time ``at`` (s); ``at_object``: from there the hand may reach the object."""
-        before, sure = self._newest, self._sure
-        at = at if before is None else max(at, before[0])
-        self._newest = at, place
-        jumped = before is not None and _too_far(before, at, place)
-        if jumped or not self.is_one:
-            # It may go on from where it was sure last, whatever was taken for it in between.
-            self.is_one = any(
-                _far(place, each[1]) <= PLACE or (jumped and not _too_far(each, at, place))
-                for each in (self._last, sure)
-                if each is not None
-            )
-        if self.is_one:
-            self._last = at, place
-            if sure is None:
-                self.is_sure = at_object
-            else:
-                self.is_sure = _far(place, sure[1]) <= (JUMP if self.is_sure else PLACE)
-            self._sure = self._last if self.is_sure else sure
-
-
-def _far(place: np.ndarray, other: np.ndarray) -> float:
-    return float(np.linalg.norm(place - other))
-
-
-def _too_far(before: Sight, at: float, place: np.ndarray) -> bool:
-    """Whether no hand goes from that sight to this one."""
-    return _far(place, before[1]) > JUMP + FASTEST * (at - before[0])
-
 
 def jumped_from(last: Sight | None, now: float, place: np.ndarray) -> tuple[bool, Sight | None]:
     """Whether a sight shows something else than the last one that was no jump, and the one that is the last now."""
-    if last is not None and _far(place, last[1]) > JUMP and now - last[0] < SWAPPED:
+    if last is not None and far(place, last[1]) > JUMP and now - last[0] < SWAPPED:
         return True, last
     return False, (now, place)
 
@@ -137,7 +87,7 @@ def person_at(state: CoglabState) -> np.ndarray | None:
 def hand_from_palm(state: CoglabState) -> float | None:
     """Distance of the person's hand from the palm."""
     person, palm = person_at(state), palm_at(state.ctx)
-    return None if person is None or palm is None else _far(person, palm)
+    return None if person is None or palm is None else far(person, palm)
 
 
 def way_to_grasp(state: CoglabState, goal: Mapping[str, Any]) -> np.ndarray | None:
@@ -199,7 +149,7 @@ class HandLook:
 def _follow(ctx: Context, track: HandTrack, seen: Located, palm: np.ndarray) -> float:
     """Distance of the hand from the palm."""
     place = np.array(seen.xyz)
-    away = _far(place, palm)
+    away = far(place, palm)
     track.follow(ctx.clock.now() - seen.age, place, away <= AT_HAND)
     return away
 
@@ -235,7 +185,7 @@ class HandoverRegion:
         ``moving`` only what is held still is."""
         self._seen = [(t, p) for t, p in self._seen if now - t <= LATELY] + [(now, place)]
         since, first = self._seen[0]
-        still = now - since > STILL_TIME and _far(place, first) < STILL
+        still = now - since > STILL_TIME and far(place, first) < STILL
         return (moving or still) and self.holds(place, self._still_margin if still else 0.0)
 
     def limits(self, place: Sequence[float] | np.ndarray) -> dict[str, Any]:

@@ -8,9 +8,9 @@ import numpy as np
 from coglab_msgs.msg import ReasonCode
 
 from coglab_smach.context.context import Context
+from coglab_smach.context.grip import Grip
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.pending import Pending, PortError
-from coglab_smach.states.grip import Grip
 from coglab_smach.states.hand import AT_END
 
 NEAR = 0.20  # m between palm and object within which the object counts as carried
@@ -23,11 +23,10 @@ SETTLES = 0.1  # s in which a falling object moves by more
 
 
 class HeldObject:
-    """Ask it again and again while the arm carries ``object_id``.
+    """Call check() again and again while the arm carries ``object_id``.
 
-    Two things tell that it is gone: the hand, whose fingers are open or closed to their ends, and the tracker, which
-    sees it away from the palm it was at when the asking began, or too far from it at once. Fingers that stand where
-    they closed do not feel what slides out of them.
+    The object is gone if the fingers are open or closed to their ends, or if the tracker sees it farther from the palm
+    than at first, or too far away at once: fingers do not feel what slides out of them.
     """
 
     def __init__(self, ctx: Context, object_id: str, grip: Grip) -> None:
@@ -45,7 +44,7 @@ class HeldObject:
         """s, when the newest sight was taken that has shown it as far from the palm as the first one"""
 
     def check(self) -> None:
-        """PortError, and an empty hand in the context, where the object is gone. It never waits."""
+        """PortError, and nothing held any more, if the object is gone. It never waits."""
         hand = self._ctx.hand.state()
         if hand.connected and not hand.holding:
             self._lost(hand.message or "the fingers are open")
@@ -76,12 +75,12 @@ class HeldObject:
         return self._away_since is None
 
     def seen_with_the_hand(self) -> bool:
-        """Whether one sight at least has shown it near the palm, and none has since shown it elsewhere."""
+        """Whether a sight has shown it near the palm, and none since then elsewhere."""
         return self._carried is not None and self._away_since is None
 
     def stays(self, since: float) -> bool:
-        """Check it; whether a sight that was taken SETTLES s after ``since`` (s) or later shows it as far from the palm
-        as at first: it does not fall, or slide out, from then on."""
+        """Check it; whether a sight of SETTLES after ``since`` (s) or later shows it as far from the palm as at first:
+        since then it neither falls nor slides out."""
         self.check()
         return self._kept_at >= since + SETTLES
 

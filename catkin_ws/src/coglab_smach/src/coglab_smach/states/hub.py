@@ -166,7 +166,7 @@ class Hub(CoglabState):
         if probability < config.number("recognition_trigger.belief"):
             self._saw_rest = self._saw_rest or probability < config.number("handover.doubt")
             return
-        action = config.text(f"recognition_trigger.actions.{name}")
+        action = str(config.get("recognition_trigger.actions").get(name, ""))
         if self._saw_rest and action in self.actions:
             what = f" of '{ahead.object_id}'" if ahead.object_id else ""
             self.ctx.requests.submit(action, ahead.object_id, f"belief in an {name}{what} ({probability:.2f})")

@@ -11,12 +11,12 @@ from coglab_msgs.msg import ReasonCode, Say
 from coglab_py.pose import Pose, mean_pose
 
 from coglab_smach.context.context import Context
+from coglab_smach.context.grip import Grip
 from coglab_smach.context.journal import Wait
 from coglab_smach.context.wait_reasons import PERSON, SIGHT
 from coglab_smach.kinematics.goals import approach_of, delivery_goal, grasp_goal, palm_at_grasp, place_goal, ranked
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState
-from coglab_smach.states.grip import Grip
 from coglab_smach.states.hand import closes_gently, firm_speed, gentle
 from coglab_smach.states.hand_tracking import (
     HandoverRegion,
@@ -62,12 +62,10 @@ class QueryDatabase(CoglabState):
 
 
 class LocateOnBoard(CoglabState):
-    """Where the object lies on the board, averaged over several sights; the pose in the board frame goes
-    into user data.
+    """Where the object lies on the board, averaged over several sights; user data gets its pose in the board frame.
 
-    The board stands still and so does the object, so the goal of the precise motion must not follow single
-    noisy sights,
-    nor an object that the hand pushes.
+    Board and object stand still, so the goal of the precise motion follows neither single noisy sights nor an object
+    that the hand pushes.
     """
 
     default_time_limit = 12.0

@@ -27,9 +27,8 @@ class LooseningGrip:
         easing_speed: int = 1,
         force: Callable[[], float | None] = lambda: None,
     ) -> None:
-        """``speed``, ``closing_speed``: 1..511, wire speeds at which they loosen and close; the second one stands for
-        the force with which they hold then. ``force``: N of grip that are felt, None where nothing tells; where it
-        tells, they loosen at ``easing_speed``."""
+        """``speed``, ``closing_speed``, ``easing_speed``: 1..511, wire speeds of loosening, of closing (and with it the
+        force) and of loosening while ``force`` (N of grip that are felt) is not None."""
         self._hand, self._speed, self._closing_speed = hand, speed, closing_speed
         self._easing_speed, self._force = easing_speed, force
         self._closed, self._firm = hand.state().positions, force()
@@ -40,8 +39,7 @@ class LooseningGrip:
         self._closing: Pending | None = None
 
     def loosened(self) -> int | None:
-        """Counts by which the finger that has moved most is more open than in the grip; None where the hand does not
-        tell."""
+        """Counts by which the finger that has moved most is more open than in the grip; None if that is not known."""
         now = self._hand.state().positions
         if not now or not self._closed:
             return None

@@ -11,12 +11,12 @@ import numpy as np
 from coglab_msgs.msg import ReasonCode
 
 from coglab_smach.context.context import Context
+from coglab_smach.context.grip import Grip
 from coglab_smach.context.wait_reasons import ARM, CONTACT, HAND, PERSON
 from coglab_smach.kinematics.motion_time import reach_time
 from coglab_smach.ports.interfaces import ContactEvent, DmpProgress, DmpRequest
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
-from coglab_smach.states.grip import Grip
 from coglab_smach.states.hand_tracking import (
     GLANCE,
     HandLook,
@@ -263,10 +263,14 @@ class WaitContact(WaitForPerson):
 
     def __init__(self, ctx: Context) -> None:
         super().__init__(ctx, ["object_entry", "goal", "grasp"])
-        self._phase = Phase.REACH
         self._goal: dict[str, Any] = {}
         self._hand: dict[str, Any] = {}  # of the grasp
         self._contact_settings: dict[str, Any] = {}  # of the object's entry, and where it is looked for
+        self._reset()
+
+    def _reset(self) -> None:
+        """For each reach."""
+        self._phase = Phase.REACH
         self._bumps = 0
         self._arrived: float | None = None  # s, when the hand was first at its goal
         self._went_on = False  # the hand has gone on from there
@@ -278,8 +282,7 @@ class WaitContact(WaitForPerson):
         self._grip, self._goal, self._hand = ud.grip, ud.goal, ud.grasp["hand"]
         mass = float(entry.get("mass", 0.0))
         self._contact_settings = {**entry.get("contact", {}), "mass": mass, **ud.goal.get("object", {})}
-        self._bumps, self._arrived, self._look = 0, None, None
-        self._went_on = self._caught = False
+        self._reset()
         target = target_of(ud.goal)
         self._grip.reach_for(target, mass, int(self._hand.get("firm", 0)))
         self.watch_person(ud.goal, target)
@@ -289,7 +292,6 @@ class WaitContact(WaitForPerson):
             Phase.TOUCHED: self._touched,
             Phase.BUMPED: self._bumped,
         }
-        self._phase = Phase.REACH
         try:
             while self._phase is not Phase.HELD:
                 self._phase = phases[self._phase]()

@@ -21,9 +21,9 @@ PUSHES = 6.5  # N on the palm from which something is in its way
 
 
 class Regrasp(CoglabState):
-    """Move the open hand straight to the grasp of the object that a person still holds, as it is seen now and by
-    FARTHEST m at most. A reach ends with the first touch, and that may come beside the grasp; another reach would feel
-    the same touch at once. The way ends where the hand pushes, or in time. Without a sight of the object nothing moves.
+    """Move the open hand straight to the grasp of the object that a person still holds, as it is seen now, by FARTHEST
+    at most. A reach ends with the first touch, which may come beside the grasp, and another reach would feel the same
+    touch at once. The way ends where the hand pushes, or in time. Without a sight of the object nothing moves.
     """
 
     default_time_limit = 6.0

@@ -32,11 +32,10 @@ IN_MOTION = 1.6  # N by which the weight that a slow arm tells differs from what
 
 
 def person_holds(state: CoglabState, settings: dict[str, Any]) -> bool | None:
-    """Whether the person does: the palm carries less where the arm has sunk with the object, by as much as it rises at
-    most, and carries it again where the arm is back. A hand that merely is there takes no weight, and a pull that has
-    ended gives none back; what had gone before may have been such a pull, or a hand that goes along. None where it is
-    not sure, or cannot be felt. ``settings``: mass (kg) and load_share of the object. Only with controller 'ptp', and
-    an arm that comes to rest."""
+    """True if the person holds the object. At rest the torque signal is too weak for light objects, so the arm sinks
+    with it and rises again: a person who holds it takes weight below and gives it back above, a hand that is merely
+    there or a pull that has ended does not. None if it is not sure, or cannot be felt. ``settings``: mass (kg) and
+    load_share of the object. Only with controller 'ptp'."""
     contact, lift = state.ctx.contact, state.ctx.config.number("hand.lift")
     state.allow(2.0 * SINKING + 16.0)
     await_rest(state.ctx, state.check)
@@ -60,8 +59,8 @@ def person_holds(state: CoglabState, settings: dict[str, Any]) -> bool | None:
 
 
 def _shifts(state: CoglabState, up: float, enough: float = math.inf) -> bool:
-    """Rise by ``up`` m, sink if negative, until ``enough`` of the weight has gone, and come to rest. Whether the arm
-    has gone the whole way. PortError where it does not."""
+    """Rise by ``up`` m (sink if negative) until ``enough`` of the weight has gone, and come to rest. Whether the arm
+    has gone the whole way; PortError if it does not move."""
     ctx = state.ctx
     motion = rise(ctx, up, ctx.config.number("give.lower_speed"))
     if motion is None:
@@ -84,7 +83,7 @@ def _shifts(state: CoglabState, up: float, enough: float = math.inf) -> bool:
 
 
 def person_has_it(state: CoglabState, track: HandTrack, settings: dict[str, Any]) -> bool:
-    """Whether the person holds the object (person_holds), and their hand is there before and after."""
+    """The same, with the person's hand at the object before and after."""
 
     def at_hand() -> bool:
         away = from_palm(state, track, 0.3)
@@ -94,36 +93,36 @@ def person_has_it(state: CoglabState, track: HandTrack, settings: dict[str, Any]
 
 
 def _share_at_rest(state: CoglabState) -> float:
-    """Share of the weight that has gone from a palm that rests. TimeLimit where the detector does not tell it."""
-    told: list[float] = []
+    """Share of the weight that has gone from a resting palm. TimeLimit if the detector does not report it."""
+    shares: list[float] = []
 
-    def tells() -> bool:
+    def has_come() -> bool:
         share = state.ctx.contact.share_gone()
-        told.extend([] if share is None else [share])
-        return bool(told)
+        shares.extend([] if share is None else [share])
+        return bool(shares)
 
     state.pause(SETTLES)
-    state.wait_for(tells, "the share of the weight that the contact detector tells", TELLS)
-    return told[0]
+    state.wait_for(has_come, "the share of the weight that the contact detector tells", TELLS)
+    return shares[0]
 
 
 class TakeWeight(CoglabState):
-    """Lift what the hand has closed on until the person's hand has left it, by ``hand.lift`` m at most and at
-    ``hand.lift_speed`` m/s. A person who does not let go gets the object back, where they hold it in truth.
+    """Lift the object until the person's hand has left it, by ``hand.lift`` m at most. A person who does not let go
+    gets the object back if they really hold it.
 
-    The weight that comes is measured (``hand.load_share`` of the object's), and the rise stands then: the person feels
-    that it is carried, is told so, and an arm that went on would draw gentle fingers along what is still held. But the
-    weight is counted from the closing of the fingers, when a person often still presses the object up or down: where
-    they hold on for ``hand.lift_pause`` s all the same, the arm rises on by ``hand.lift_step`` m, again and again.
-    ``hand_distance``: m, of the person's hand from the palm before the fingers closed; None where no tracker saw it.
-    Where it was not at the object, the hand counts from where it is seen there first. While it is seen nowhere the
-    weight has to have come by the end of the whole rise; and it has to have come, too, where the hand was hidden on its
-    way, since another one may be seen now. A hand that goes has let go where the object stays: who pulls it out of
-    gentle fingers has taken it back. Where the tracker has lost the hand, or taken another one for it (HandTrack), the
-    person may have gone: it is felt whether they hold it. Where that is not sure nothing is opened, and the arm stays.
+    The rise stops when ``hand.load_share`` of the weight has come: the person feels that, is told so, and an arm that
+    went on would draw gentle fingers along the object. But the weight is counted from the closing of the fingers, when
+    a person often still presses: if they hold on for ``hand.lift_pause`` s the arm rises on by ``hand.lift_step`` m,
+    again and again.
 
-    The palm goes along with who pulls (YieldToPull), and the rise goes on afterwards. The fingers close again and again
-    (``give.close_speed``, the lowest force).
+    The person has let go when their hand has gone from where it held the object (``hand_distance``, m from the palm
+    before the fingers closed, or where it is seen at the object first) and the object has stayed. If the hand is seen
+    nowhere, the weight has to have come by the end of the rise; if it was hidden on its way, the weight has to have
+    come, too, since another hand may be seen now. At the time limit, if the hand may have gone, the arm feels whether
+    the person holds the object. If that is not sure, nothing is opened and the arm stays.
+
+    The palm yields to a pull (YieldToPull), and the rise goes on afterwards. The fingers close again and again with the
+    lowest force (``give.close_speed``).
     """
 
     default_time_limit = 16.0
@@ -137,11 +136,15 @@ class TakeWeight(CoglabState):
             io_keys=["grip"],
         )
         self._way: YieldToPull
+        self._hand: HandTrack
+        self._held: HeldObject
+        self._reset()
+
+    def _reset(self) -> None:
+        """For each object that is taken over."""
         self._top: float | None = None  # m, height to which the palm rises
         self._rises = 0
         self._told = self._seen_away = False
-        self._hand: HandTrack
-        self._held: HeldObject
         self._farther: float | None = None  # m from the palm from which on the person's hand has left the object
         self._gone: float | None = None  # s, since when it has
         self._on: float | None = None  # s, when it rises on with the weight; None: the weight has not come
@@ -152,15 +155,13 @@ class TakeWeight(CoglabState):
         limit, contact = self.ctx.config.number("hand.load_timeout"), self.ctx.contact
         end = self.ctx.clock.now() + limit
         self._hand, self._held = ud.grip.hand, HeldObject(self.ctx, ud.object_id, ud.grip)
-        self._farther = self._gone = None
+        self._reset()
         self._count_from(ud.hand_distance)
         settings = {
             "mass": float(ud.object_entry.get("mass", 0.0)),
             "load_share": self.ctx.config.number("hand.load_share"),
         }
-        self._way, self._rises, self._on, self._told = YieldToPull(self.ctx), 0, None, False
-        self._seen_away = False
-        self._closing, self._closes = None, 0.0
+        self._way = YieldToPull(self.ctx)
         self.await_pending(contact.arm("lift", limit, settings), "arming of the contact detector", 2.0)
         try:
             self.pause(self.ctx.config.number("hand.lift_after"))
@@ -186,8 +187,8 @@ class TakeWeight(CoglabState):
         return "succeeded"
 
     def _count_from(self, distance: float | None) -> None:
-        """The person's hand was seen so far from the palm (m). One that is not at the object has left it already, or is
-        another one: it says nothing."""
+        """The person's hand was seen so far from the palm (m). A hand that is not at the object does not count: it has
+        left already, or is another one."""
         if distance is not None and distance <= AT_HAND:
             self._farther = distance + self.ctx.config.number("hand.let_go")
 
@@ -219,8 +220,8 @@ class TakeWeight(CoglabState):
         return False
 
     def _has_gone(self, away: float | None, carried: bool) -> bool:
-        """Whether the person's hand, ``away`` m from the palm, has left the object, and the object has stayed. A hand
-        that was not seen all the way may be another one: then its weight has to be ``carried``, too."""
+        """Whether the person's hand, ``away`` m from the palm, has left the object, and the object has stayed. If the
+        hand was not seen all the way the weight has to be ``carried``, too."""
         gone = away is not None and away > (AWAY if self._farther is None else self._farther)
         if away is None or not gone or not (carried or self._hand.is_sure):
             self._gone = None
@@ -244,8 +245,7 @@ class TakeWeight(CoglabState):
             self._rise(step)
 
     def _follow(self) -> None:
-        """Again and again, with the lowest force: what the person holds less and less shifts between the fingers, and
-        those that stand where they closed would lose it."""
+        """Close again and again with the lowest force: as the person lets go the object shifts between the fingers."""
         now = self.ctx.clock.now()
         if now >= self._closes and (self._closing is None or self._closing.done()):
             self._closes = now + FOLLOWS
@@ -258,7 +258,7 @@ class TakeWeight(CoglabState):
             self.ctx.say(Say.I_HAVE_IT, "I have it.")
 
     def _rise(self, most: float = math.inf) -> None:
-        """Up to where the rise that began first was to end, by ``most`` m; nothing where the palm is there."""
+        """Up to the end of the first rise, by ``most`` m."""
         palm, speed = palm_at(self.ctx), self.ctx.config.number("hand.lift_speed")
         if palm is None or self._rises >= MOST_RISES:
             return
@@ -271,7 +271,7 @@ class TakeWeight(CoglabState):
             self._way.begin(rise(self.ctx, left, speed))
 
     def _taken_back(self, object_id: str, error: PortError) -> PortError:
-        """The failure, where the object has left the hand with the person's."""
+        """The failure; "taken back" if the object has gone with the person's hand."""
         if error.code == ReasonCode.OBJECT_NOT_SEEN and not self.ctx.holding:
             self._way.stop()
             self.pause(FALLS)
@@ -287,14 +287,14 @@ class TakeWeight(CoglabState):
         return error
 
     def _is_left(self, settings: dict[str, Any]) -> bool:
-        """Whether a hand is seen far from the object, or none at it while the weight has come, and nobody holds it."""
+        """Whether a hand is seen far from the object, or none while the weight has come, and nobody holds it."""
         self._way.stop()
         away, loaded = from_palm(self, self._hand, 0.3), self.ctx.contact.event() is not None
         gone = loaded if away is None else away > (AT_HAND if loaded else AWAY)
         return gone and person_holds(self, settings) is False
 
     def _not_released(self, object_id: str, limit: float, error: TimeLimit, settings: dict[str, Any]) -> PortError:
-        """The failure, and who has the object then: the person who holds it, else the robot, which opens nothing."""
+        """The failure. A person who holds the object gets it; else the robot keeps it."""
         causes: tuple[str, ...] = (error.sentence,)
         loaded, away = self.ctx.journal.marked("loaded"), from_palm(self, self._hand)
         if person_has_it(self, self._hand, settings):

@@ -1,4 +1,4 @@
-"""Giving way to a person who pulls at what the robot's hand holds, too."""
+"""Yielding to a person who pulls at what the robot's hand holds, too."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ LEAST_WAY = 0.005  # m, a shorter way is not begun
 
 
 class YieldToPull:
-    """The one motion of an arm that stands beside a person: what a state wants (``begin``), until somebody pulls; then
-    the palm goes along with the pull (``follow``, called again and again), by ``pull.way`` m in all at most.
+    """The one motion of an arm beside a person: what a state wants (``begin``), until somebody pulls; then the palm
+    goes along with the pull (``follow``, called again and again), by ``pull.way`` m in all at most.
 
-    Every motion is ended, and the set-point stands, before the next one begins. A pull is what the contact detector
-    feels, but for two parts: along the vertical the object's weight comes and goes, and the arm itself lifts; and who
-    presses the object into the palm gives it.
+    Every motion is ended, and the set-point stands, before the next one begins. A pull is the force that the contact
+    detector feels, without its vertical part (the object's weight and the lift) and without its part into the palm (a
+    person who gives the object presses).
     """
 
     def __init__(self, ctx: Context) -> None:
@@ -33,7 +33,7 @@ class YieldToPull:
         return self._ctx.config.number(f"pull.{name}")
 
     def pull(self) -> np.ndarray:
-        """N, base frame, horizontal; nothing where nothing is known."""
+        """N, base frame, horizontal; zero if the force is not known."""
         force = self._ctx.contact.force()
         outward = palm_axis(self._ctx)
         if force is None or outward is None:
@@ -42,11 +42,11 @@ class YieldToPull:
         return pull * (1.0, 1.0, 0.0)
 
     def begin(self, motion: Pending | None) -> None:
-        """What the state wants the arm to do; only while nothing is under way."""
+        """The motion that the state wants; only while no other is under way."""
         self._motion = motion
 
     def halt(self, why: str) -> None:
-        """End what the state wanted; a palm that gives way goes on."""
+        """End what the state wanted; a palm that yields goes on."""
         if self._from is None and self._ending is None and not self.idle():
             self._end(why)
 
@@ -59,7 +59,7 @@ class YieldToPull:
         return self._motion is None and self._ending is None
 
     def follow(self) -> None:
-        """Begin to give way, go on, or end it, as the pull asks for."""
+        """Begin to yield, go on, or end it, as the pull is."""
         pull, now = self.pull(), self._ctx.clock.now()
         size = float(np.linalg.norm(pull))
         if self._from is not None:
@@ -83,7 +83,7 @@ class YieldToPull:
         self._ctx.journal.mark("gave_way")
 
     def _way(self, direction: np.ndarray) -> np.ndarray | None:
-        """m that the palm may still go there; None where it has gone far enough."""
+        """m that the palm may still go there; None if it has gone far enough."""
         most = self._number("way")
         there = self._went + most * direction
         way = there * min(1.0, most / max(float(np.linalg.norm(there)), 1e-9)) - self._went

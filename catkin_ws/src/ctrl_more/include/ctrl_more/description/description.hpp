@@ -175,6 +175,11 @@ struct Description {
 
   /// Adds a number that state() writes.
   StateSpec& state(const std::string& name);
+  /// Adds several with one unit and text.
+  void addStates(const std::vector<std::string>& names, const std::string& units,
+                 const std::string& words) {
+    for (const std::string& name : names) state(name).in(units).about(words);
+  }
 
   /// What a manager needs to run the controller safely: names unique, sizes and ranges sensible,
   /// stage and modified containers in agreement. Empty if all is well, else one sentence each.

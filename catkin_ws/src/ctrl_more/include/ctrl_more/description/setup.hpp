@@ -4,9 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "ctrl_more/description/configuration.hpp"
 #include "ctrl_more/description/description.hpp"
-#include "ctrl_more/description/gains.hpp"
-#include "ctrl_more/description/settings.hpp"
 #include "ctrl_more/states/control_states.hpp"
 #include "ctrl_more/states/handles.hpp"
 #include "ctrl_more/states/robot_states.hpp"

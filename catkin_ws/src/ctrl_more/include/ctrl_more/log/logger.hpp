@@ -3,6 +3,7 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <fstream>
 #include <memory>
 #include <ostream>
 #include <string>
@@ -47,12 +48,10 @@ class FileLogSink : public LogSink {
   /// Opens the file for appending; throws std::runtime_error naming the path if it cannot.
   /// @param path the file itself, as given
   explicit FileLogSink(const std::string& path);
-  ~FileLogSink() override;
   void write(const LogRecord& record) override;
 
  private:
-  struct File;
-  std::unique_ptr<File> file_;
+  std::ofstream stream_;
 };
 
 /// Writes records as lines to a stream that outlives it.

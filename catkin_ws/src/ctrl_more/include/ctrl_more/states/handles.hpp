@@ -68,7 +68,7 @@ class Read {
 
 /// Handle of a control signal of N numbers. A controller only sees constant stores, so for it this
 /// handle reads: `original.view(handle)`; the host may write by it. Setup and
-/// ControlStore::find<N>() make one, and have compared N with the signal's size then.
+/// ControlStates::find<N>() make one, and have compared N with the signal's size then.
 template <int N = AnySize>
 class Reference {
  public:
@@ -83,7 +83,7 @@ class Reference {
 
  private:
   friend class Setup;
-  friend class ControlStore;
+  friend class ControlStates;
   explicit Reference(ControlSignal signal) : signal_(signal) {}
   ControlSignal signal_;
 };
@@ -105,7 +105,7 @@ class Modify {
 
  private:
   friend class Setup;
-  friend class ControlStore;
+  friend class ControlStates;
   friend class ModifiedControlStates;
   Modify(ControlSignal signal, std::uint32_t owner) : signal_(signal), owner_(owner) {}
   ControlSignal signal_;

@@ -52,41 +52,52 @@ class RobotStates {
   /// Errors name the key, the expected size, the size that came and who asked.
   /// @{
 
+  using Values = Eigen::Ref<const Eigen::VectorXd>;
+
   /// Writes `measuredData[key]` and its stamp; a new key is added and announced.
   /// @param key name of the signal
   /// @param value all of its numbers, finite
   /// @param stamp_ns time of measurement, monotonic nanoseconds >= 0
   /// @param who name of the writer for messages
-  Status setMeasuredData(const std::string& key, const Eigen::Ref<const Eigen::VectorXd>& value,
-                         std::int64_t stamp_ns, const char* who = "user");
-
+  Status setMeasuredData(const std::string& key, const Values& value, std::int64_t stamp_ns,
+                         const char* who = "user") {
+    return set(RobotSource::Measured, key, value, stamp_ns, who);
+  }
   /// As setMeasuredData(), in `estimatedData`.
-  Status setEstimatedData(const std::string& key, const Eigen::Ref<const Eigen::VectorXd>& value,
-                          std::int64_t stamp_ns, const char* who = "user");
-
+  Status setEstimatedData(const std::string& key, const Values& value, std::int64_t stamp_ns,
+                          const char* who = "user") {
+    return set(RobotSource::Estimated, key, value, stamp_ns, who);
+  }
   /// Reads `measuredData[key]`; on failure `value` is untouched.
   Status getMeasuredData(const std::string& key, Eigen::VectorXd& value,
-                         const char* who = "user") const;
-
+                         const char* who = "user") const {
+    return get(RobotSource::Measured, key, value, nullptr, who);
+  }
   /// Reads `measuredData[key]` with its stamp; on failure both are untouched.
   Status getMeasuredData(const std::string& key, Eigen::VectorXd& value, std::int64_t& stamp_ns,
-                         const char* who = "user") const;
-
+                         const char* who = "user") const {
+    return get(RobotSource::Measured, key, value, &stamp_ns, who);
+  }
   /// As getMeasuredData(), from `estimatedData`.
   Status getEstimatedData(const std::string& key, Eigen::VectorXd& value,
-                          const char* who = "user") const;
-
+                          const char* who = "user") const {
+    return get(RobotSource::Estimated, key, value, nullptr, who);
+  }
   /// As getMeasuredData(), from `estimatedData`.
   Status getEstimatedData(const std::string& key, Eigen::VectorXd& value, std::int64_t& stamp_ns,
-                          const char* who = "user") const;
-
+                          const char* who = "user") const {
+    return get(RobotSource::Estimated, key, value, &stamp_ns, who);
+  }
   /// Writes `measurementTimeStamp[key]`; refused when `measuredData` has no such key.
   Status setMeasurementTimeStamp(const std::string& key, std::int64_t stamp_ns,
-                                 const char* who = "user");
-
+                                 const char* who = "user") {
+    return setStamp(RobotSource::Measured, key, stamp_ns, who);
+  }
   /// Writes `estimateTimeStamp[key]`; refused when `estimatedData` has no such key.
   Status setEstimateTimeStamp(const std::string& key, std::int64_t stamp_ns,
-                              const char* who = "user");
+                              const char* who = "user") {
+    return setStamp(RobotSource::Estimated, key, stamp_ns, who);
+  }
   /// @}
 
   /// @name Access by handle (inside the cycle: no allocation, no lock)
@@ -151,8 +162,7 @@ class RobotStates {
   void print(std::ostream& out, std::int64_t now_ns = kNeverWritten) const;
 
  private:
-  Status set(RobotSource source, const std::string& key,
-             const Eigen::Ref<const Eigen::VectorXd>& value, std::int64_t stamp_ns,
+  Status set(RobotSource source, const std::string& key, const Values& value, std::int64_t stamp_ns,
              const char* who);
   Status get(RobotSource source, const std::string& key, Eigen::VectorXd& value,
              std::int64_t* stamp_ns, const char* who) const;

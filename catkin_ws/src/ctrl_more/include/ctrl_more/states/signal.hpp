@@ -113,7 +113,7 @@ class ControlSignal : public Signal {
   ControlSignal() = default;
 
  private:
-  friend class ControlStore;
+  friend class ControlStates;
   explicit ControlSignal(const Signal& signal) : Signal(signal) {}
 };
 

@@ -1,0 +1,94 @@
+#include "test_support.hpp"
+
+namespace ctrl_more {
+namespace {
+
+TEST(AttributionTest, AttributionNamesWhoChangedWhatByHowMuch) {
+  Rig rig;
+  rig.add(adder("pose", "ee", 1.0), "a");
+  rig.add(adder("pose", "ee", -0.25), "b");
+  rig.add(adder("pose", "ee", 9.0), "off", false);
+  auto turning = adder("pose", "ee", 0.0);
+  turning->on_write = [](TestController& self, ModifiedControlStates& m) {
+    m[self.out].tail<4>() = Eigen::Vector4d(0, std::sin(0.15), 0, std::cos(0.15));
+  };
+  rig.add(std::move(turning), "turn");
+  rig.step(2, 5.0);
+  const std::vector<Attribution> list = rig.manager->attribution();
+  ASSERT_EQ(list.size(), 3u);
+  EXPECT_EQ(list[0].controller, "a");
+  EXPECT_EQ(list[0].signal, "taskSpaceReferencePose/ee");
+  EXPECT_EQ(list[0].cycle, rig.cycle.number);
+  EXPECT_EQ(list[0].before[0], 5.0);
+  EXPECT_EQ(list[0].after[0], 6.0);
+  EXPECT_EQ(list[0].size, 1.0);
+  EXPECT_EQ(list[1].before, list[0].after) << "a chain without a gap";
+  EXPECT_EQ(list[1].size, 0.25);
+  EXPECT_EQ(list[2].controller, "turn");
+  EXPECT_NEAR(list[2].angle, 0.3, 1e-12);
+}
+
+TEST(AttributionTest, AttributionIsOfTheLastCycleHoweverOftenItIsAsked) {
+  Rig rig;
+  double amount = 0.0;
+  auto c = adder("pose", "ee", 0.0);
+  c->on_write = [&](TestController& self, ModifiedControlStates& m) { m[self.out][0] += amount; };
+  rig.add(std::move(c), "c");
+  for (int i = 1; i <= 7; ++i) {
+    amount = i;
+    rig.step(i % 3 + 1);
+    for (int asked = 0; asked < i % 4; ++asked) {
+      const std::vector<Attribution> list = rig.manager->attribution();
+      ASSERT_EQ(list.size(), 1u);
+      EXPECT_EQ(list[0].cycle, rig.cycle.number);
+      EXPECT_EQ(list[0].size, i);
+    }
+  }
+  rig.manager->beginCycle({0, 0.005, 1000});  // a cycle is running: what is complete is given
+  const std::vector<Attribution> meanwhile = rig.manager->attribution();
+  ASSERT_EQ(meanwhile.size(), 1u);
+  EXPECT_EQ(meanwhile[0].cycle, rig.cycle.number);
+}
+
+TEST(AttributionTest, WhatDidNotRunInTheLastCycleIsLeftOut) {
+  Rig rig;
+  EXPECT_EQ(rig.manager->lastCycle().cycle, 0u);
+  rig.add(adder("pose", "ee", 1.0), "task");
+  rig.add(adder("joint", "Velocity", 1.0), "joint");
+  rig.step();
+  EXPECT_EQ(rig.manager->attribution().size(), 2u);
+  for (int i = 0; i < 4; ++i) {
+    ++rig.cycle.number;
+    rig.setReferences();
+    rig.manager->beginCycle(rig.cycle);
+    rig.manager->updateStage(Stage::Task, rig.robot, rig.control);
+    rig.manager->endCycle();
+    const CycleRecord record = rig.manager->lastCycle();
+    EXPECT_EQ(record.cycle, rig.cycle.number);
+    ASSERT_EQ(record.changes.size(), 1u) << "the joint stage did not run";
+    EXPECT_EQ(record.changes[0].controller, "task");
+    EXPECT_EQ(record.changes[0].angle, 0.0);
+  }
+}
+
+TEST(AttributionTest, ACycleWithoutAStageLeavesTheRecordOfTheOneBefore) {
+  Rig rig;
+  rig.manager->beginCycle({0, 0.005, 7});
+  rig.manager->endCycle();
+  EXPECT_EQ(rig.manager->lastCycle().cycle, 0u) << "nothing ran yet";
+  rig.add(adder("pose", "ee", 1.0), "a");
+  for (int i = 1; i <= 4; ++i) {
+    rig.step();
+    const std::uint64_t ran = rig.cycle.number;
+    for (int empty = 0; empty < i; ++empty) {
+      rig.manager->beginCycle({0, 0.005, ++rig.cycle.number});
+      rig.manager->endCycle();
+    }
+    const CycleRecord record = rig.manager->lastCycle();
+    EXPECT_EQ(record.cycle, ran);
+    EXPECT_EQ(record.changes.size(), 1u);
+  }
+}
+
+}  // namespace
+}  // namespace ctrl_more
