@@ -83,7 +83,7 @@ class KdlController : public MotionController {
  public:
   void configure(const MotionSetup& setup) override {
     inverse_ = std::make_unique<KdlInverse<Solver>>(setup.robot->chain.kdl());
-    plan_.system = TransformationSystem(library().at("reach_human"));
+    plan_.dmp = Dmp(library().at("reach_human"));
   }
   void adopt(const CycleInput&) override {}
   void start(const CycleInput& input) override {
@@ -108,7 +108,7 @@ class KdlController : public MotionController {
 
  private:
   std::unique_ptr<KdlInverse<Solver>> inverse_;
-  CartesianMotionPlan plan_;
+  DmpPlan plan_;
   CartesianMotion motion_;
   CartesianReference reference_;
   Pose goal_;
@@ -227,12 +227,11 @@ struct Inputs {
 };
 
 void dmpStep(benchmark::State& state) {
-  const TransformationSystem system(library().at("reach_human"));
   const Vector3 goal(0.6, 0.1, 0.4);
-  Dmp dmp;
+  Dmp dmp(library().at("reach_human"));
   int i = 0;
   for (auto _ : state) {
-    if (i++ % 240 == 0) dmp.start(system, Vector3::Zero(), Vector3::Zero(), goal, 1.0);
+    if (i++ % 240 == 0) dmp.start(Vector3::Zero(), Vector3::Zero(), goal, 1.0);
     benchmark::DoNotOptimize(dmp.step(kCycle, goal).position.x());
   }
 }
