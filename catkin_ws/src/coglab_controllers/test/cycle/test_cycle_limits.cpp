@@ -18,7 +18,7 @@ std::vector<double> turned(double angle, int joint = 0) {
   return there;
 }
 
-struct Cycle : ::testing::Test {
+struct CycleLimits : ::testing::Test {
   void begin(const std::string& parameters = "") {
     robot = std::make_unique<VirtualRobot>(parameters);
     robot->loadBoth("ptp");
@@ -41,7 +41,7 @@ struct Cycle : ::testing::Test {
   std::unique_ptr<VirtualRobot> robot;
 };
 
-TEST_F(Cycle, AJointStateCountsIfEachOfItsNumbersIsFinite) {
+TEST_F(CycleLimits, AJointStateCountsIfEachOfItsNumbersIsFinite) {
   begin();
   move();
   JointVector RobotSample::*const fields[] = {&RobotSample::position,
@@ -71,7 +71,7 @@ TEST_F(Cycle, AJointStateCountsIfEachOfItsNumbersIsFinite) {
   EXPECT_GT(robot->command.velocity.norm(), 0.05) << "and the motion goes on";
 }
 
-TEST_F(Cycle, TheTimeBetweenJointStatesIsAboveZeroAndATenthOfASecondAtMost) {
+TEST_F(CycleLimits, TheTimeBetweenJointStatesIsAboveZeroAndATenthOfASecondAtMost) {
   begin();
   move();
   for (const auto& [dt, words] : {std::pair(0.0, "not newer"),
@@ -88,7 +88,7 @@ TEST_F(Cycle, TheTimeBetweenJointStatesIsAboveZeroAndATenthOfASecondAtMost) {
   EXPECT_EQ(fine.dt, 0.1);
 }
 
-TEST_F(Cycle, SilenceIsToldAfterATenthAndEndsAMotionAfterHalfASecond) {
+TEST_F(CycleLimits, SilenceIsToldAfterATenthAndEndsAMotionAfterHalfASecond) {
   begin();
   move();
   ControlCycle& cycle = robot->manager->cycle();
@@ -105,7 +105,7 @@ TEST_F(Cycle, SilenceIsToldAfterATenthAndEndsAMotionAfterHalfASecond) {
   EXPECT_EQ(report().motion, MotionState::Aborted);
 }
 
-TEST_F(Cycle, ARobotThatStopsOrLeavesCommandModeForAMomentEndsTheMotion) {
+TEST_F(CycleLimits, ARobotThatStopsOrLeavesCommandModeForAMomentEndsTheMotion) {
   begin();
   move();
   robot->sample.block = MotionBlock::Held;
@@ -124,7 +124,7 @@ TEST_F(Cycle, ARobotThatStopsOrLeavesCommandModeForAMomentEndsTheMotion) {
   EXPECT_NE(report().reason.str().find("for a moment"), std::string::npos);
 }
 
-TEST_F(Cycle, AMotionThatWasReachedAndFollowsItsGoalEndsWhenTheRobotLeftCommandMode) {
+TEST_F(CycleLimits, AMotionThatWasReachedAndFollowsItsGoalEndsWhenTheRobotLeftCommandMode) {
   begin();
   robot->switchTo("dmp");
   const Vector3 goal(0.8, 0.0, 0.45);
@@ -145,7 +145,7 @@ TEST_F(Cycle, AMotionThatWasReachedAndFollowsItsGoalEndsWhenTheRobotLeftCommandM
   EXPECT_EQ(report().reason.code(), ReasonCode::Held);
 }
 
-TEST_F(Cycle, ACancelOfAControllerThatIsNotActiveEndsNothingLater) {
+TEST_F(CycleLimits, ACancelOfAControllerThatIsNotActiveEndsNothingLater) {
   begin();
   const CancelOrder order = robot->manager->askCancel("dmp", "");
   CancelAnswer answer;
