@@ -122,7 +122,7 @@ def console_commands(_top: Path) -> str:
     """What the experimenter's page may do, for programs."""
     from coglab_console.desk import commands as console
 
-    about = "`POST /api/command` takes `{\"name\": ..., \"arguments\": {...}}`; fields in brackets may be left out."
+    about = '`POST /api/command` takes `{"name": ..., "arguments": {...}}`; fields in brackets may be left out.'
     return f"# Commands of the console\n\n{about}\n\n" + "\n".join(console.table())
 
 
