@@ -13,7 +13,6 @@ from typing import Any
 
 import matplotlib
 import numpy as np
-import smach
 from coglab_sim._camera import Camera
 from coglab_sim.person.body import arm_of
 from coglab_trials import GIVE, RECEIVE, VirtualTrial, World
@@ -165,10 +164,6 @@ class Film:
         return sheet.quantize(COLOURS, method=Image.Quantize.FASTOCTREE)
 
 
-def quiet(*_: object) -> None:
-    """Logs nothing."""
-
-
 def main(words: list[str]) -> int:
     """Exit status 0: the film is there and both handovers succeeded; 1: not; 2: usage."""
     try:
@@ -177,7 +172,6 @@ def main(words: list[str]) -> int:
         print(f"[coglab] error: {error}", file=sys.stderr)
         return 2
     begun, film = time.monotonic(), Film()
-    smach.set_loggers(quiet, smach.logwarn, quiet, smach.logerr)
     trial = VirtualTrial(seed=options.seed)
     trial.beside = film.look
     print(f"[coglab] drawing a handover in both directions, seed {options.seed}: about a minute", flush=True)
