@@ -1,4 +1,4 @@
-"""What the headers include, codes that are those of the message, and the page that shows the example."""
+"""Includes of the headers; reason codes equal those of the message."""
 
 from __future__ import annotations
 
@@ -32,9 +32,3 @@ def test_reason_codes_are_the_numbers_of_the_message() -> None:
     assert len(codes) > 40
     for name, number in codes.items():
         assert message[re.sub(r"(?<!^)(?=[A-Z])", "_", name).upper()] == number, name
-
-
-def test_the_page_shows_the_example_that_is_compiled() -> None:
-    page = read(PACKAGE.parents[2] / "docs" / "arm_back_end.md")
-    blocks = re.findall(r"^```cpp\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
-    assert read(PACKAGE / "example" / "shortest_arm.hpp") in blocks

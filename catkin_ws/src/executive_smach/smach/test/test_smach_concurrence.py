@@ -54,10 +54,9 @@ def test_children_run_in_named_threads_all_released_together():
         names.append(threading.current_thread().name)
 
     both = concurrence(children={k: Calls(run) for k in "ABC"}, default="done")
-    before = threading.active_count()
     assert both.execute() == "done"
     assert sorted(names) == [f"concurrent_split:{k}" for k in "ABC"]
-    assert threading.active_count() == before
+    assert not [one for one in threading.enumerate() if one.name.startswith("concurrent_split:")]
 
 
 def test_children_share_user_data_through_remappers():
