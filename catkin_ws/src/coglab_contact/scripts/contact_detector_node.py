@@ -52,8 +52,7 @@ SIGNAL = 0.01  # s, shortest time between two messages on ~signal
 
 
 def made_at(message: JointState) -> float | None:
-    """Returns the time (s) on the robot controller's clock: the bridge writes ns to frame_id. None for other
-    drivers."""
+    """Returns the robot controller's time (s), which our bridge writes as ns to frame_id; None for other drivers."""
     text = message.header.frame_id
     return 1e-9 * int(text) if text.isdecimal() else None
 
@@ -141,8 +140,7 @@ class ContactDetectorNode:
             self.moving.observer.period = message.cycle_time
 
     def on_joints(self, message: JointState) -> None:
-        """Process positions, velocities and torques in wire order. Missing velocities are computed from the
-        positions."""
+        """Process positions, velocities and torques in wire order. Missing velocities are differentiated positions."""
         index = {name: i for i, name in enumerate(message.name)}
         if any(name not in index for name in self.joints) or len(message.position) != len(message.name):
             return

@@ -332,8 +332,7 @@ class ContactDetector:
         self._rest.learn(self._filtered, self._gap)
 
     def sigma(self) -> np.ndarray:
-        """Returns the robust standard deviation (Nm) of the difference at rest, per joint; the floor if data is
-        missing."""
+        """Returns the robust standard deviation (Nm) of the difference at rest, per joint; without data, the floor."""
         if len(self._rest_differences) < 2:
             return np.full(7, self.settings.floor)
         values = np.array(self._rest_differences)

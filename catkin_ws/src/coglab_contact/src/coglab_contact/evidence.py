@@ -85,7 +85,7 @@ class Touch:
         self._margins.clear()
 
     def feed(self, stamp: float, forces: Sequence[Sequence[float]], deviation: float = 0.0) -> Evidence | None:
-        """Forces (N) on each phalanx and on the palm, n x 3. ``deviation``: noise of one component, N. None if not
+        """Forces (N) on each phalanx and on the palm, n x 3. ``deviation``: noise of a component, N. None if not
         finite."""
         table = np.asarray(forces, dtype=float).reshape(-1, 3)
         if not (len(table) and np.all(np.isfinite(table)) and math.isfinite(stamp)):

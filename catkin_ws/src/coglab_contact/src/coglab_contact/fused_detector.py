@@ -133,8 +133,7 @@ class FusedDetector:
         self._until = self._lift = self._leaving = None
 
     def state(self) -> str:
-        """Returns off, waiting or watching (see ContactDetector.state). IN_MOTION watches when it has enough
-        samples."""
+        """Returns off, waiting or watching (see ContactDetector.state). IN_MOTION watches after enough samples."""
         if self._leaving is not None:
             return "waiting" if self._leaving.share is None else "watching"
         if self._until is None:
@@ -205,8 +204,7 @@ class FusedDetector:
         return self._judge(stamp, self._touch.feed(stamp, forces, deviation))
 
     def feed_sight(self, stamp: float, distance: float, angle: float, speed: float) -> ContactEvent | None:
-        """Process the distance (m, rad) of the palm from its grasp of the object named on arming, and its speed
-        (m/s)."""
+        """Process the palm's distance (m, rad) from its grasp of the object named on arming, and its speed (m/s)."""
         return self._judge(stamp, self._palm.feed(stamp, distance, angle, speed))
 
     def feed_hand(self, stamp: float, motors: Sequence[Motor]) -> ContactEvent | None:

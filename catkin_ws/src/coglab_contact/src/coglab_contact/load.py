@@ -104,8 +104,7 @@ class GripAndLoad:
         return self._load if self._forces is not None and abs(now - self._stamp) <= OLDEST else None
 
     def share_gone(self, now: float, weight: float) -> Felt | None:
-        """Returns the share of ``weight`` (N) that has gone. None without touch data, or if it did not match the
-        weight."""
+        """Returns the share of ``weight`` (N) that has gone. None without touch data that matched the weight."""
         load, usual = self.load(now), self._counted_from
         if load is None or usual is None or abs(usual - weight) > COVERED * weight:
             return None

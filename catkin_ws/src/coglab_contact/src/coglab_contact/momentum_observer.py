@@ -58,8 +58,7 @@ class Dynamics(Protocol):
 
 @dataclass(frozen=True)
 class Residual:
-    """Result of the observer for one sample. Torques in Nm, velocity in rad/s, acceleration in rad/s^2; seven
-    joints."""
+    """Result of the observer for one sample. Nm, rad, rad/s, rad/s^2; seven joints each."""
 
     stamp: float
     torque: np.ndarray
@@ -69,8 +68,7 @@ class Residual:
     acceleration: np.ndarray
     """low-passed like the estimate"""
     rate: np.ndarray
-    """derivative of the measured torque, Nm/s, with the same low-pass: 1 s more of lag subtracts it from the
-    estimate"""
+    """derivative of the measured torque, Nm/s, low-passed too; a lag of 1 s more subtracts it from the estimate"""
     fresh: bool = False
     """the observer has restarted: earlier estimates do not count"""
 
@@ -123,7 +121,7 @@ class MomentumObserver:
         self._made = made
         if step == 0.0:
             return None
-        if step is not None and step < 0.0:  # the estimate stays, velocities begin anew
+        if step is not None and step < 0.0:  # the estimate stays, the velocities restart
             self._stamp, self._grid, self._velocity = stamp, stamp, None
             self._position, self._torque = q, tau
             return None

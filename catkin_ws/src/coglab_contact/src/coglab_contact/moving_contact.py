@@ -1,5 +1,4 @@
-"""Contact from the torques of a moving arm: momentum observer, change of its residual, thresholds, and their
-learning."""
+"""Contact from the torques of a moving arm: momentum observer, change of its residual, learnt thresholds."""
 
 from __future__ import annotations
 
@@ -30,8 +29,7 @@ LONGEST = 4000  # samples, longest recorded motion; later samples belong to the 
 
 
 class MovingContact:
-    """Processes every sample of lwr/joint_states; returns evidence of contact. The hand is empty until a payload is
-    set."""
+    """Processes every sample of lwr/joint_states; returns evidence of contact. The default payload is zero."""
 
     def __init__(
         self,
@@ -130,8 +128,7 @@ class MovingContact:
         return np.asarray(np.linalg.lstsq(self._jacobian(self.residual.position).T, ahead, rcond=0.05)[0])
 
     def weight_before_motion(self) -> float | None:
-        """Returns the load (N) on the palm at the last rest before the present or last motion; None without such a
-        rest."""
+        """Returns the load (N) on the palm at the last rest before the present or last motion; None if unknown."""
         return self._free_weight
 
     def slow(self) -> bool:

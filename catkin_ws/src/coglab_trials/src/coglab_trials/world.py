@@ -206,7 +206,7 @@ class Hand(HandMemory):
             self.reason, self.message = Reason.HAND_REFUSED, f"calibration refused: {why}"
             return why
         self.calibration_began()
-        self.driver.calibration(words[0])  # takes no time in the world, only on the emulator's clock
+        self.driver.calibration(words[0])  # runs ahead on the emulator's clock; the world catches up
         self._calibrated_at = self.clock.monotonic()
         return None
 

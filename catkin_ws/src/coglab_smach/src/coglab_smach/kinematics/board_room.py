@@ -32,7 +32,7 @@ class Solid:
     radius: float = 0.0
 
     def below(self, link: Pose, up: np.ndarray) -> float:
-        """Returns the height (m along ``up``) of its lowest point. ``link``: pose of the link in the parent of
+        """Returns the height (m along ``up``) of its lowest point. ``link``: pose of the link in the frame of
         ``up``."""
         middle = link * self.at
         along = middle.rotation.inv().apply(up)
@@ -116,8 +116,7 @@ class BoardRoom:
     def _lowest(
         self, link: str, at: Pose, angles: dict[str, float], watched: set[str], counts: bool, up: np.ndarray
     ) -> float:
-        """Returns the height (m along ``up``) of the lowest point of a link (if it counts) and of all links after
-        it."""
+        """Returns the height (m along ``up``) of the lowest point of a link (if it counts) and of its children."""
         found = min((solid.below(at, up) for solid in self._solids.get(link, [])), default=np.inf) if counts else np.inf
         for joint in self._below.get(link, []):
             half = 0.5 * angles.get(joint.name, 0.0)

@@ -38,7 +38,7 @@ class MotionLimits:
 def ptp_time(
     limits: MotionLimits, start: Sequence[float], target: Sequence[float], max_velocity: Sequence[float] = ()
 ) -> float:
-    """Returns the duration (s) of a point-to-point motion at full speed scale. ``max_velocity`` (rad/s): as
+    """Returns the duration (s) of a point-to-point motion at full speed scale. ``max_velocity``: rad/s, as
     requested."""
     way = np.abs(np.asarray(target, dtype=float) - np.asarray(start, dtype=float))
     velocity = np.asarray(max_velocity if len(max_velocity) else limits.ptp_velocity, dtype=float)

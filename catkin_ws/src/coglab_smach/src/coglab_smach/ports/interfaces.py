@@ -88,8 +88,7 @@ class HandState:
 
 @dataclass(frozen=True)
 class Recognition:
-    """Recognised motion of the person: class name ('unknown' if none), confidence 0..1, and ``decided``: True if it is
-    final."""
+    """Recognised motion of the person: class name ('unknown' if none), confidence 0..1; ``decided``: it is final."""
 
     pattern: str = "unknown"
     confidence: float = 0.0

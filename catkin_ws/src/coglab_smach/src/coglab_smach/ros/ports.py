@@ -98,8 +98,7 @@ class RosDatabase:
 
 
 class RosContact:
-    """ContactPort on the topic coglab/contact, the arming service of its publisher, and the live signal of the
-    detector."""
+    """ContactPort on the topic coglab/contact, the arming service of its publisher, and the detector's signal."""
 
     def __init__(
         self,

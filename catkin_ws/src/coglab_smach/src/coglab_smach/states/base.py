@@ -53,8 +53,7 @@ class CoglabState(smach.State):
     """True for states that restore safety after STOP and must run to their end."""
 
     owns_motion = False
-    """True for states that start a motion of the arm or wait for one. If they end without success, the motion ends
-    too."""
+    """True for states that start a motion of the arm or wait for one. If they fail, the motion ends too."""
 
     essential = True
     """False if a failure of this state does not fail its action. Then it is only recorded as a transition, and its wait

@@ -150,8 +150,7 @@ class HandClose(CoglabState):
         return "succeeded"
 
     def _around(self, mode: str, positions: Sequence[int], hand: HandTrack) -> bool:
-        """True if the fingers stand around the object, or if the person has gone: opening would then drop the
-        object."""
+        """True if the fingers stand around the object, or if the person has gone: opening would then drop it."""
         if stopped_by_object(mode, positions):
             return True
         let_go = self.ctx.config.number("hand.let_go")

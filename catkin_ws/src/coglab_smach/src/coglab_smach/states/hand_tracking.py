@@ -109,8 +109,7 @@ def off_grasp(state: CoglabState, goal: Mapping[str, Any]) -> float | None:
 
 
 def way_to_hand(state: CoglabState, object_id: str, delivery: Mapping[str, Any]) -> np.ndarray | None:
-    """Returns the vector from the object to where the delivery offers it to the person's hand as seen now, but
-    NEARER."""
+    """Returns the vector from the object to the delivery's place at the hand as seen now, but NEARER to the person."""
     hand, thing = hand_name(state.ctx), seen_at(state, object_id)
     try:
         seen = state.await_pending(state.ctx.perception.locate_object(hand, 0.3), f"sight of '{hand}'", 0.5, code=SIGHT)

@@ -17,8 +17,7 @@ from coglab_smach.states.base import CoglabState, Interrupted
 
 
 class WaitForTrigger(CoglabState):
-    """Wait for the operator's trigger before anything moves. With ``auto_trigger`` in the configuration, it does not
-    wait."""
+    """Wait for the operator's trigger before anything moves. ``auto_trigger`` in the configuration skips this."""
 
     def __init__(self, ctx: Context, action: str = "initialise") -> None:
         super().__init__(ctx)

@@ -287,8 +287,7 @@ class TakeWeight(CoglabState):
         return error
 
     def _is_left(self, settings: dict[str, Any]) -> bool:
-        """True if nobody holds the object and a hand is seen far from it, or no hand is seen and the weight is
-        carried."""
+        """True if nobody holds the object, and a hand is seen far from it or (with the weight carried) none is seen."""
         self._way.stop()
         away, loaded = from_palm(self, self._hand, 0.3), self.ctx.contact.event() is not None
         gone = loaded if away is None else away > (AT_HAND if loaded else AWAY)
