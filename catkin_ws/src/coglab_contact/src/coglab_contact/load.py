@@ -47,7 +47,7 @@ def together(torques: float | None, deviation: float, felt: Felt | None) -> floa
     """Combines the shares by the arm's torques (with ``deviation``) and by touch; None if both are missing.
 
     Each counts by its variance. If they differ by more than APART, the lower one counts: either contacts miss the
-    sensors, or something leans on the arm. Nothing falls from a grip that waits.
+    sensors, or something leans on the arm. This is safe: a grip that loosens later drops nothing.
     """
     if torques is None or felt is None:
         return torques if felt is None else felt.share
@@ -104,7 +104,8 @@ class GripAndLoad:
         return self._load if self._forces is not None and abs(now - self._stamp) <= OLDEST else None
 
     def share_gone(self, now: float, weight: float) -> Felt | None:
-        """Returns the share of ``weight`` (N) that has gone. None without touch data that matched the weight."""
+        """Returns the gone share of ``weight`` (N). None without touch data, or if it did not match the weight
+        before."""
         load, usual = self.load(now), self._counted_from
         if load is None or usual is None or abs(usual - weight) > COVERED * weight:
             return None
@@ -130,7 +131,7 @@ class LeavingLoad:
 
     The share is counted from the load before the last motion. When the arm stands, it is counted from the load on the
     palm then, unless the difference is larger than a change of posture explains: then somebody has already lifted or
-    pulled. If an arm turns its joints by half of FAR meanwhile and stands, it decides this again. The torques alone
+    pulled. If an arm turns its joints by half of FAR meanwhile and stands, this decision is repeated. The torques alone
     cannot distinguish an object lighter than SAME from nothing: such an object is given with touch.
     """
 

@@ -5,8 +5,8 @@
 so that r follows the external torque as a first-order low-pass with time constant 1/K. M, C and g come from the robot
 description with the set payload. tau is the measured torque between motors and links: friction of the drives and
 inertia of the motors do not enter. Velocities are computed from positions only: the mean velocity between two samples
-belongs to the middle between them. The torque of a sample counts as the mean over the period that it ends, or earlier
-by the time by which torques lag behind positions: for a heavy arm with changing acceleration, 1 ms has an effect.
+belongs to the middle between them. The torque of a sample counts as the mean over the period that it ends, or over
+an earlier one if torques lag behind positions: for a heavy arm with changing acceleration, 1 ms has an effect.
 """
 
 from __future__ import annotations

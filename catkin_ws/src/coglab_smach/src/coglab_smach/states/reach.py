@@ -413,7 +413,7 @@ class WaitContact(WaitForPerson):
         arm = self.ctx.arm
         self._bumps += 1
         self.allow(20.0)
-        # Without standing still first, the next motion would inherit the speed and brake less than a stopping arm.
+        # Stop the arm first: a motion that starts while the arm moves inherits its speed and brakes later.
         self.await_pending(arm.cancel_motion("something touches the hand"), "rest of the arm", 3.0, code=ARM)
         self.await_pending(arm.switch_controller("ptp"), "switching to 'ptp'", 3.0)
         self._open_again()
