@@ -1,18 +1,18 @@
 #!/usr/bin/python3
-"""The node /contact_detector: torques, fingers and touch -> coglab/contact, armed by ~arm (coglab_msgs/ArmContact).
+"""The node /contact_detector: publishes contact events on coglab/contact; ~arm (coglab_msgs/ArmContact) arms it.
 
-Subscribes lwr/external_torques (effort, Nm), lwr/joint_states (with measured torques as effort), lwr/state (FRI
-period), ih2_hand/hand_status and ih2_hand/fingertip_forces (~tactile_topic; nobody has to publish it); names are
-relative; and tf2 for the object that is reached for. Parameters: perception/frames; private: the fields of
-coglab_contact.detector.DetectorSettings; robot_description is read
-for Jacobian and dynamics; ~thresholds_file: of the moving arm, learnt in simulation; ~learnt_file: where
-~learn_motion writes what this robot's own motions tell, and from where it is read at the next start.
-Publishes at 20 Hz ~margin (std_msgs/Float64) while watching, ~signal (coglab_msgs/ContactSignal) while torques come;
-both at 100 Hz while a load is given by a hand that has touch; with the samples of the joints, at 100 Hz at most,
-~force (geometry_msgs/Vector3Stamped, base frame): N that pull or push at the palm beyond what did before the last reach
-that was watched.
-Services: ~learn (Learn), the noise at rest anew; ~learn_motion (LearnMotion), true: gather motions
-without contact, false: learn from them.
+Names are relative. Subscribes: lwr/external_torques (effort, Nm), lwr/joint_states (measured torques as effort),
+lwr/state (FRI period), ih2_hand/hand_status, ih2_hand/fingertip_forces (~tactile_topic, optional), and tf2 for the
+object of a reach.
+Parameters: perception/frames; robot_description, for Jacobian and dynamics. Private: the fields of
+coglab_contact.detector.DetectorSettings; ~thresholds_file: thresholds of the moving arm, learnt in simulation;
+~learnt_file: thresholds that ~learn_motion learns from this robot's motions, read at the next start.
+Publishes ~margin (std_msgs/Float64) at 20 Hz while watching, and ~signal (coglab_msgs/ContactSignal) at 20 Hz while
+torques come; both at 100 Hz while a hand with touch sensors gives a load. With the joint samples, at most at 100 Hz:
+~force (geometry_msgs/Vector3Stamped, base frame), the force (N) on the palm relative to that before the last watched
+reach.
+Services: ~learn (Learn): learn the noise at rest again. ~learn_motion (LearnMotion): true: record motions without
+contact, false: learn from them.
 """
 
 import dataclasses
@@ -46,19 +46,19 @@ from geometry_msgs.msg import Vector3, Vector3Stamped
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
-FORCE_PERIOD = 0.009  # s between two messages of ~force, at least
-OLDEST_SIGHT = 0.15  # s, older sights of an object do not tell whether it is in the palm
-SIGNAL = 0.01  # s between two messages on ~signal at least
+FORCE_PERIOD = 0.009  # s, shortest time between two messages of ~force
+OLDEST_SIGHT = 0.15  # s, oldest sight of an object that is compared with the palm
+SIGNAL = 0.01  # s, shortest time between two messages on ~signal
 
 
 def made_at(message: JointState) -> float | None:
-    """s on the robot controller's clock, which the bridge writes as ns into frame_id; None from another driver."""
+    """Returns the robot controller's time (s), which our bridge writes as ns to frame_id; None for other drivers."""
     text = message.header.frame_id
     return 1e-9 * int(text) if text.isdecimal() else None
 
 
 def pose_of(place, turn) -> Pose | None:
-    """Of a message's point and quaternion; None where they are no pose."""
+    """Converts a message's point and quaternion to a pose; None if they are invalid."""
     p, q = np.array([place.x, place.y, place.z]), np.array([turn.x, turn.y, turn.z, turn.w])
     if not (np.all(np.isfinite(p)) and np.all(np.isfinite(q)) and abs(float(np.linalg.norm(q)) - 1.0) < 0.01):
         return None
@@ -66,7 +66,7 @@ def pose_of(place, turn) -> Pose | None:
 
 
 class ContactDetectorNode:
-    """Thin node over FusedDetector."""
+    """ROS node of FusedDetector."""
 
     def __init__(self, urdf: str) -> None:
         settings = DetectorSettings()
@@ -89,10 +89,10 @@ class ContactDetectorNode:
         self.position: list[float] | None = None
         self.velocity: list[float] | None = None
         self.joint_stamp = 0.0
-        self.pace = Pace().follow()  # stamps are told as time passes in the cell
-        self.last_sample: float | None = None  # of torques, paced
+        self.pace = Pace().follow()  # converts stamps to the time of the simulated cell
+        self.last_sample: float | None = None  # s, time of the last torques, converted
         self.last_stamp = rospy.Time()
-        self.heard = -math.inf  # monotonic s, when it came
+        self.heard = -math.inf  # s, monotonic arrival time of the last torques
         self.publisher = rospy.Publisher("coglab/contact", Contact, queue_size=10)
         self.margin = rospy.Publisher("~margin", Float64, queue_size=1)
         self.signal = rospy.Publisher("~signal", ContactSignal, queue_size=1)
@@ -104,8 +104,8 @@ class ContactDetectorNode:
         self.base = frames.world
         self.buffer = tf2_ros.Buffer(rospy.Duration(2.0))
         self.listener = TfListener(self.buffer, self.base)
-        self.grasp: tuple[str, Pose] | None = None  # the object that is reached for, and the palm in its frame
-        self.shown: float | None = None  # stamp of the sample that ~signal was published for
+        self.grasp: tuple[str, Pose] | None = None  # frame of the object of the reach, and the palm in that frame
+        self.shown: float | None = None  # time of the sample of the last ~signal
         rospy.Subscriber("lwr/joint_states", JointState, self.on_joints, queue_size=20, tcp_nodelay=True)
         rospy.Subscriber("lwr/state", LwrState, self.on_state, queue_size=1)
         rospy.Subscriber("ih2_hand/hand_status", HandStatus, self.on_hand, queue_size=1)
@@ -120,7 +120,7 @@ class ContactDetectorNode:
         steady.SteadyTimer(0.05, self.on_timer, "signal")
 
     def thresholds(self) -> Thresholds:
-        """Those that this robot has learnt, else those that come with the package."""
+        """Returns the thresholds that this robot has learnt, else those of the package."""
         shipped = str(package_path("coglab_contact", "config", "contact_thresholds.yaml"))
         file = Path(parameters.read("~thresholds_file", str, shipped))
         if self.learnt_file and Path(self.learnt_file).is_file():
@@ -128,20 +128,19 @@ class ContactDetectorNode:
         return Thresholds.load(file)
 
     def refuses(self, message: JointState | HandStatus | FingertipForces) -> bool:
-        """Whether the stamp of a message cannot be passed on with what it leads to; said."""
+        """Returns whether the stamp of a message is invalid for other messages; logs a warning."""
         if can_be_sent(message.header.stamp):
             return False
         rospy.logwarn_throttle(5.0, f"contact detector: {message._type} refused: no message can carry its stamp")
         return True
 
     def on_state(self, message: LwrState) -> None:
-        """The FRI period: stamps of reception jitter, the robot's measurements do not."""
+        """Set the FRI period: the stamps of reception jitter, the robot's measurements do not."""
         with self.lock:
             self.moving.observer.period = message.cycle_time
 
     def on_joints(self, message: JointState) -> None:
-        """Positions, velocities and torques in wire order; velocities are differentiated where the message has
-        none."""
+        """Process positions, velocities and torques in wire order. Missing velocities are differentiated positions."""
         index = {name: i for i, name in enumerate(message.name)}
         if any(name not in index for name in self.joints) or len(message.position) != len(message.name):
             return
@@ -172,7 +171,7 @@ class ContactDetectorNode:
             publish(self.force, out)
 
     def on_hand(self, message: HandStatus) -> None:
-        """Fingers; an empty hand carries nothing."""
+        """Process the finger motors. An empty hand has no payload."""
         if self.refuses(message):
             return
         with self.lock:
@@ -183,7 +182,7 @@ class ContactDetectorNode:
         self.publish_event(event, message.header.stamp)
 
     def on_touch(self, message: FingertipForces) -> None:
-        """Forces on fingers and palm."""
+        """Process the forces on fingers and palm."""
         if self.refuses(message):
             return
         forces = [(force.x, force.y, force.z) for force in [*message.forces, message.palm]]
@@ -191,11 +190,11 @@ class ContactDetectorNode:
             event = self.detector.feed_touch(self.pace.of(message.header.stamp.to_sec()), forces, message.deviation)
             giving = self.detector.share_gone() is not None
         self.publish_event(event, message.header.stamp)
-        if giving:  # fingers follow this signal
+        if giving:  # the grip follows this signal
             self.publish_signal()
 
     def on_torques(self, message: JointState) -> None:
-        """Each torque sample goes through the detector; an event is published at once."""
+        """Process each torque sample; an event is published at once."""
         if len(message.effort) != 7 or self.position is None or self.velocity is None or self.refuses(message):
             return
         with self.lock:
@@ -206,7 +205,7 @@ class ContactDetectorNode:
         self.publish_event(event, message.header.stamp)
 
     def publish_event(self, event, stamp) -> None:
-        """Tell it, if there is one; ``stamp``: of the sample that decided."""
+        """Publish an event, if there is one. ``stamp``: of the sample that decided."""
         if event is None:
             return
         out = Contact(
@@ -222,11 +221,11 @@ class ContactDetectorNode:
         rospy.loginfo("contact detector: %s", event.message)
 
     def silent(self) -> bool:
-        """Whether no torques have come for a second."""
+        """True if no torques have come for 1 s."""
         return (time.monotonic() - self.heard) * self.pace.factor > 1.0
 
     def on_arm(self, request):
-        """Arm or disarm."""
+        """Arm or disarm the detector."""
         with self.lock:
             if request.mode == "off":
                 self.detector.disarm()
@@ -256,7 +255,7 @@ class ContactDetectorNode:
 
     @staticmethod
     def grasp_of(request) -> tuple[str, Pose] | None:
-        """The object of a request; ValueError where the pose is none."""
+        """Returns the object of a request; ValueError for an invalid pose."""
         if not request.frame:
             return None
         p, q = request.grasp.position, request.grasp.orientation
@@ -269,7 +268,7 @@ class ContactDetectorNode:
         return request.frame, grasp
 
     def look_at_object(self) -> None:
-        """Where the palm is at the object that is reached for, as tracked."""
+        """Process the pose of the palm relative to the tracked object of the reach."""
         with self.lock:
             grasp, position, velocity = self.grasp, self.position, self.velocity
         if grasp is None or position is None or velocity is None:
@@ -291,8 +290,8 @@ class ContactDetectorNode:
         self.publish_event(event, now)
 
     def on_learn_motion(self, request):
-        """True: begin to gather motions without contact, if there is a file to write. False: end it, learn, write the
-        file and use it from now on."""
+        """True: start recording motions without contact, if a file can be written. False: stop, learn, write the file
+        and use it."""
         with self.lock:
             if request.gather:
                 why = self.no_file()
@@ -308,7 +307,7 @@ class ContactDetectorNode:
                     False, ReasonCode.NOTHING_RUNS, "nothing was gathered: call with gather true first"
                 )
             reaches = len(recorder.reaches)
-        # Minutes of samples take seconds to learn from: meanwhile the detector goes on.
+        # Learning from minutes of samples takes seconds: the lock is free meanwhile, so the detector continues.
         try:
             thresholds = recorder.learn()
             thresholds.save(Path(self.learnt_file))
@@ -316,7 +315,7 @@ class ContactDetectorNode:
             return LearnMotionResponse(False, ReasonCode.OUT_OF_RANGE, str(error))
         except OSError as error:
             with self.lock:
-                # A disk can be mended, the motions would have to be made anew.
+                # A disk error can be repaired; the motions would have to be repeated.
                 self.recorder = self.recorder or recorder
             return LearnMotionResponse(
                 False, ReasonCode.BAD_FILE, f"{error}; what was gathered is kept: call again with gather false"
@@ -328,13 +327,13 @@ class ContactDetectorNode:
         )
 
     def no_file(self) -> str:
-        """Why what is learnt could not be written, so that minutes of gathering would be in vain; else empty."""
+        """Returns the reason why the result could not be written, else ''. Checked first: recording takes minutes."""
         if not self.learnt_file:
             return "parameter ~learnt_file says where to write, and is not set: start with contact_learnt_file:=FILE"
         return unwritable(self.learnt_file)
 
     def on_learn(self, _request):
-        """Noise at rest."""
+        """Learn the noise at rest."""
         with self.lock:
             try:
                 return LearnResponse(True, ReasonCode.NONE, self.detector.still.learn())
@@ -342,12 +341,12 @@ class ContactDetectorNode:
                 return LearnResponse(False, ReasonCode.NODE_SILENT if self.silent() else ReasonCode.BUSY, str(error))
 
     def on_timer(self) -> None:
-        """The object as seen; live margin and signal."""
+        """Process the sight of the object; publish margin and signal."""
         self.look_at_object()
         self.publish_signal()
 
     def publish_signal(self) -> None:
-        """What the detector sees, once for a sample of torques, and at most every SIGNAL s."""
+        """Publish the state of the detector once per torque sample, at most every SIGNAL s."""
         with self.lock:
             before, stamp, sent = self.shown, self.last_sample, self.last_stamp
             if before is not None and stamp is not None and 0.0 < stamp - before < SIGNAL:

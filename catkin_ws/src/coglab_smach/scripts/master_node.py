@@ -1,13 +1,13 @@
 #!/usr/bin/python3
-"""The node /coglab: runs coglab_master on ROS ports, takes triggers, publishes transitions and introspection.
+"""The node /coglab: runs coglab_master on ROS ports, receives triggers, publishes transitions and introspection.
 
 Names are relative to the node's namespace.
 Services: coglab/start (coglab_msgs/Start), coglab/stop, coglab/why (std_srvs/Trigger).
 Topics: coglab/transitions (coglab_msgs/Transition), coglab/results (std_msgs/String, one JSON object per action,
-latched), coglab/holding (std_msgs/String, what the hand holds, latched), coglab/state (coglab_msgs/MasterState,
-latched, and five times a second), say (coglab_msgs/Say, what the robot says to the person, latched).
+latched), coglab/holding (std_msgs/String, object in the hand, latched), coglab/state (coglab_msgs/MasterState,
+latched, at least 5 Hz), say (coglab_msgs/Say, messages to the person, latched).
 Parameters: perception/frames (names of human_hand and board). Private: config_file, dmp_library (path of the
-primitives), auto_trigger, result_file (JSON lines), state_file (what the hand holds, to survive a restart; default
+primitives), auto_trigger, result_file (JSON lines), state_file (object in the hand, survives a restart; default
 coglab_holding.json in ROS_HOME), config_overrides (mapping of dotted names), introspection (default true).
 """
 
@@ -44,11 +44,11 @@ from coglab_smach.ros.ports import RosContact, RosDatabase, RosPerception
 from std_msgs.msg import String
 from std_srvs.srv import Trigger, TriggerResponse
 
-STATE_PERIOD = 0.2  # s between two messages on coglab/state where nothing changes
+STATE_PERIOD = 0.2  # s, period of coglab/state while nothing changes
 
 
 class Memory(HoldingMemory):
-    """Shows on a latched topic what it notes."""
+    """Publishes the noted object on a latched topic."""
 
     def __init__(self, path: str, warn) -> None:
         super().__init__(path, warn)
@@ -60,7 +60,7 @@ class Memory(HoldingMemory):
 
 
 class MasterNode:
-    """Ties the machines to ROS; holds no logic of its own."""
+    """Connects the machines to ROS. It contains no logic."""
 
     def __init__(self) -> None:
         frames = parameters.read("perception/frames", dict, {})
@@ -78,7 +78,7 @@ class MasterNode:
         self.results = rospy.Publisher("coglab/results", String, queue_size=20, latch=True)
         self.spoken = rospy.Publisher(
             "say", Say, queue_size=20, latch=True
-        )  # a listener that starts late hears it, too
+        )  # latched: a late listener receives the last message too
         self.result_file = parameters.read("~result_file", str, "")
         self.journal.listen(self.on_transition)
         self.journal.listen_results(self.on_result)
@@ -109,8 +109,8 @@ class MasterNode:
 
     @staticmethod
     def geometry(config):
-        """The checks of the arm's reach and of its room above the board, on the robot's own description; where there
-        is none, nothing is checked."""
+        """Returns the checks of reach and of the clearance above the board, from the robot description. Without one,
+        nothing is checked."""
         urdf = parameters.found_above("robot_description", str)
         if urdf is None:
             return {}
@@ -119,24 +119,24 @@ class MasterNode:
 
     @staticmethod
     def state_file() -> str:
-        """Where the held object is noted: one file per namespace."""
+        """Returns the path of the file for the held object: one file per namespace."""
         name = "coglab_holding" + rospy.get_namespace().rstrip("/").replace("/", "_") + ".json"
         return parameters.read("~state_file", str, "") or os.path.join(rospkg.get_ros_home(), name)
 
     def say(self, code: int, text: str) -> None:
-        """Something for the person; a speech synthesiser or the simulated person listens."""
+        """Publish a message to the person, for a speech synthesiser or the simulated person."""
         message = Say(code=code, text=text)
         message.header.stamp = rospy.Time.now()
         publish(self.spoken, message)
 
     def on_start(self, request):
-        """A trigger for the hub that is open now."""
+        """Pass a trigger to the open hub."""
         answer = ask_for(self.ctx, request.action, request.object_id)
         rospy.loginfo("start %s %s: %s", request.action, request.object_id, answer.message)
         return StartResponse(answer.ok, answer.code, answer.message)
 
     def on_stop(self, _request):
-        """STOP: the arm brakes and latches, the machine ends the action; the hand keeps what it holds."""
+        """STOP: the arm brakes and latches, the machine ends the action, the hand keeps its object."""
         self.ctx.stop.press("the operator pressed STOP")
         pending = self.ctx.arm.hold("the operator pressed STOP")
         end = self.ctx.clock.now() + 2.0
@@ -154,11 +154,11 @@ class MasterNode:
             return TriggerResponse(False, f"STOP is latched in the machine, but: {error}")
 
     def on_why(self, _request):
-        """'Why did it stop?' in one sentence."""
+        """Return the reason of the last stop in one sentence."""
         return TriggerResponse(True, self.watch.now().why or NOTHING_FAILED)
 
     def on_state(self, state: MasterState) -> None:
-        """Latched topic."""
+        """Publish the state on a latched topic."""
         message = MasterStateMsg(
             state=state.state,
             in_hub=state.in_hub,
@@ -170,14 +170,14 @@ class MasterNode:
             waits_code=state.waits_code,
         )
         message.header.stamp = rospy.Time.now()
-        if state.deadline:  # told in the brain's steady clock
-            # The state may be told again in the moment between its deadline and its end.
+        if state.deadline:  # on the brain's steady clock
+            # The state may be published again shortly after its deadline, before it ends.
             left = max(0.001, (state.deadline - self.ctx.clock.now()) / PACE.factor)
             message.deadline = message.header.stamp + rospy.Duration.from_sec(left)
         publish(self.states, message)
 
     def on_transition(self, record: TransitionRecord) -> None:
-        """Topic and log."""
+        """Publish and log a transition."""
         message = Transition(
             path=record.path,
             from_state=record.from_state,
@@ -192,7 +192,7 @@ class MasterNode:
         (rospy.logwarn if record.outcome in ("failed", "fault", "stopped") else rospy.loginfo)(record.sentence())
 
     def on_result(self, record: ActionRecord) -> None:
-        """Topic and result file, one JSON object per action."""
+        """Publish a result and append it to the result file, one JSON object per action."""
         row = record.to_dict()
         for name, when in (("started", record.started), ("ended", record.ended)):
             steady = PACE.steady(when)
@@ -210,7 +210,7 @@ class MasterNode:
     def run(self) -> None:
         """Execute the machine until shut-down."""
         self.thread.start()
-        # Called before rospy shuts anything: the machine still reaches the arm, to end what it has set in motion.
+        # rospy calls this before its own shut-down: the machine can still reach the arm and end its motion.
         rospy.on_shutdown(self.end)
         clock = ClockWatch()
         while not rospy.is_shutdown() and self.thread.is_alive():
@@ -222,14 +222,14 @@ class MasterNode:
             self.server.stop()
 
     def end(self) -> None:
-        """Preempt the machine and wait for its end."""
+        """Preempt the machine and wait for its end, at most 4 s."""
         self.master.request_preempt()
         if threading.current_thread() is not self.thread:
             self.thread.join(4.0)
 
 
 def main() -> int:
-    """Entry point; exit status 1 where the configuration cannot be used."""
+    """Entry point. Exit status 1: unusable configuration."""
     init_node("coglab")
     try:
         node = MasterNode()

@@ -14,7 +14,7 @@ from coglab_smach.kinematics.reachability import reachability_report
 
 
 def cmd_list(database: ObjectDatabase) -> int:
-    """One line per object."""
+    """Print one line per object."""
     for object_id in database.ids():
         entry = database.get(object_id)
         print(f"{object_id:12} {entry['mass']:5.2f} kg  grasps: {', '.join(entry['grasps'])}  {entry['name']}")
@@ -25,7 +25,7 @@ def cmd_list(database: ObjectDatabase) -> int:
 
 
 def cmd_check(folder: Path, ids: list[str], dialect: str) -> int:
-    """Schema, consistency and reachability of each object."""
+    """Check schema, consistency and reachability of each object."""
     failed = 0
     files = [folder / f"{i}.yaml" for i in ids] or sorted(folder.glob("*.yaml"))
     for path in files:
@@ -44,7 +44,7 @@ def cmd_check(folder: Path, ids: list[str], dialect: str) -> int:
 
 
 def cmd_new(folder: Path, object_id: str) -> int:
-    """Write a commented example to start from; never overwrites."""
+    """Write a commented example to start from. An existing file is not overwritten."""
     path = folder / f"{object_id}.yaml"
     if path.exists():
         print(f"{path} exists already; edit it or choose another id", file=sys.stderr)

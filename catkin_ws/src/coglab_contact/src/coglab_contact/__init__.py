@@ -1,1 +1,1 @@
-"""Contact, load and release, from torques, fingers, touch and sight."""
+"""Detection of contact, load and release from joint torques, finger motors, touch and sight."""

@@ -1,9 +1,9 @@
-"""Contact and release from the estimated external joint torques, as D4.10 section 3.2 describes.
+"""Detects contact and release in the estimated external joint torques (D4.10 section 3.2).
 
-Contact: the difference of the low-passed torque over a short window (the bias of the estimate drops out) is compared
-with a threshold learnt at rest, on the joints that feel forces across the line between person and robot. Load and
-release: the vertical force that explains the change of torque is compared with a share of the object's weight; load
-counts from the torque before the contact, release from the torque on arming.
+Contact: the change of the low-passed torque within a short window, so that the bias of the estimate cancels. It is
+compared with a threshold learnt at rest, on the joints that are sensitive to forces across the line from person to
+robot. Load and release: the vertical force that explains the change of torque is compared with a share of the object's
+weight. Load counts from the torque before the contact, release from the torque on arming.
 
 The detector works only while the arm stands still, and checks that itself.
 """
@@ -20,58 +20,57 @@ from coglab_msgs.msg import ReasonCode
 
 from coglab_contact.evidence import ContactEvent
 
-JOLT = 0.02  # rad that a joint moves at most when somebody pushes an arm that rests, or lets go of it
-REMEMBERED = 0.25
-"""s over which what is felt at rest is averaged, whatever the period: so long a push on the resting arm is not
-forgotten"""
+JOLT = 0.02  # rad, largest joint motion when somebody pushes a resting arm, or releases it
+REMEMBERED = 0.25  # s, average time of the torque at rest, at any sample period: a push of this length is not forgotten
 
 Joints = Sequence[float] | np.ndarray
-"""seven numbers, one for each joint in wire order"""
+"""seven numbers, one per joint in wire order"""
 
-GRAVITY = 9.81
-MAD_TO_SIGMA = 1.4826  # Standard deviation of normal noise per median absolute deviation
-LARGEST = 1e4  # Nm, rad, rad/s: no number of an arm is larger
-LONGEST_STEP = 1.0  # s between two samples that follow each other
+GRAVITY = 9.81  # m/s^2
+MAD_TO_SIGMA = 1.4826  # ratio of standard deviation to median absolute deviation, for normal noise
+LARGEST = 1e4  # Nm, rad, rad/s: larger values cannot come from an arm
+LONGEST_STEP = 1.0  # s, longest time between two consecutive samples
 
 
 @dataclass
 class DetectorSettings:
-    """Tuning; the defaults reproduce the sensitivities named in the documentation for 0.05 Nm sensor noise."""
+    """Settings. The defaults reach the sensitivities in the documentation for 0.05 Nm sensor noise."""
 
     cutoff: float = 20.0
-    """Hz, low-pass in front of the difference."""
+    """Hz, low-pass before the difference"""
     window: float = 0.04
-    """s, the difference reaches this far back."""
+    """s, length of the window of the difference"""
     still_speed: float = 0.02
-    """rad/s; a joint faster than this is motion."""
+    """rad/s; the arm moves if a joint is faster"""
     settle: float = 0.25
-    """s of stillness before anything is believed: vibration of the stop has to die out."""
+    """s of standstill before detection starts: the vibration of the stop must decay"""
     k: float = 6.0
-    """threshold in robust standard deviations learnt at rest."""
+    """threshold in robust standard deviations, learnt at rest"""
     confirm: int = 3
-    """samples in a row over the threshold."""
+    """number of consecutive samples over the threshold"""
     learn_samples: int = 100
-    """samples at rest needed before arming takes effect."""
+    """number of samples at rest before arming takes effect"""
     floor: float = 0.02
-    """Nm, smallest standard deviation believed: a noise-free simulation must not alarm on rounding."""
+    """Nm, lower limit of the standard deviation: in a noise-free simulation, rounding must not trigger"""
     offset_threshold: float = 1.2
-    """Nm: a torque this far from the last rest before the motion, found on arming, is a contact that came early."""
+    """Nm, offset against the last rest before the motion; a larger offset on arming is an early contact"""
     sensitivity_share: float = 0.5
-    """joints with at least this share of the most sensitive joint's lever are watched."""
+    """joints with at least this share of the most sensitive joint's lever are watched"""
     load_share: float = 0.5
-    """share of the weight whose coming counts as load and whose going as release, unless the request says otherwise."""
+    """default share of the weight whose arrival counts as load and whose loss counts as release"""
     release_confirm: float = 0.05
-    """s the load has to be gone."""
+    """s for which the load must be gone"""
     load_confirm: float = 0.3
-    """s the load has to be there: a hand that holds on presses down now and then."""
+    """s for which the load must be present: a holding hand presses down now and then"""
     user_direction: tuple[float, float, float] = (1.0, 0.0, 0.0)
-    """from the robot to the person, base frame."""
+    """direction from the robot to the person, base frame"""
 
 
 def sensitive_joints(jacobian: np.ndarray, user_direction: Sequence[float], share: float) -> list[int]:
-    """Indices of the joints whose torque changes most with forces perpendicular to the person-robot line.
+    """Returns the indices of the joints whose torque is most sensitive to forces across the line from person to robot.
 
-    ``jacobian`` is 3 x n (m/rad). The lever of joint j is the norm of its column after removing ``user_direction``.
+    ``jacobian``: 3 x n (m/rad). The lever of joint j is the norm of its column without the part along
+    ``user_direction``.
     """
     d = np.asarray(user_direction, dtype=float)
     d = d / np.linalg.norm(d)
@@ -81,20 +80,20 @@ def sensitive_joints(jacobian: np.ndarray, user_direction: Sequence[float], shar
 
 
 def confidence(deviations: float) -> float:
-    """Probability (0..1) that a signal is over its threshold when it was measured so many standard deviations above it,
-    with normal noise."""
+    """Probability (0..1) that a signal is over its threshold if it was measured ``deviations`` standard deviations
+    above it, for normal noise."""
     return 0.5 * (1.0 + math.erf(deviations / math.sqrt(2.0)))
 
 
 @dataclass(frozen=True)
 class Signal:
-    """What the detector sees now, for people who tune it. Joints in wire order."""
+    """State of the detector, for tuning. Joints in wire order."""
 
     state: str
     mode: str
-    """what it is armed for; empty while it is off"""
+    """mode for which it is armed; empty while it is off"""
     change: tuple[float, ...]
-    """Nm, within the window: the largest since the last look, with its sign"""
+    """Nm, signed largest change within the window since the last look()"""
     threshold: tuple[float, ...]
     """Nm"""
     watched: tuple[bool, ...]
@@ -114,31 +113,31 @@ class _Armed:
     carries: bool = False
     baseline: np.ndarray | None = None
     before: np.ndarray | None = None
-    """the baseline until somebody jolted the arm"""
+    """baseline before somebody jolted the arm"""
     watched: list[int] = field(default_factory=list)
     threshold: np.ndarray | None = None
     over: int = 0
     gone_since: float | None = None
 
     def stir(self, travels: bool) -> None:
-        """The arm does not rest any more: a baseline is taken anew."""
+        """The arm does not rest any more: take a new baseline later."""
         self.before = None if travels else self.baseline if self.before is None else self.before
         self.baseline, self.over = None, 0
 
 
 class RestTorque:
-    """Joint torques (Nm) at rest. Who pushes an arm at rest and lets go of it jolts it; that is no motion, and what it
-    felt between is no rest without a touch."""
+    """Joint torques (Nm) at rest. Pushing a resting arm and releasing it is a jolt, not a motion. The torque during a
+    jolt does not count as rest without touch."""
 
     def __init__(self) -> None:
         self.before_motion: np.ndarray | None = None
-        """at the last rest before a motion that was more than a jolt; None: there was none"""
+        """torque at the last rest before a motion larger than a jolt; None: there was none"""
         self._here: np.ndarray | None = None
         self._left: np.ndarray | None = None
-        self._travelled: np.ndarray | None = None  # rad, since the rest that was left; None: at rest
+        self._travelled: np.ndarray | None = None  # rad, travel since the last rest; None: at rest
 
     def move(self, gap: float, velocity: Sequence[float] | np.ndarray) -> None:
-        """The arm moves (rad/s), ``gap`` s after the sample before."""
+        """The arm moves with ``velocity`` (rad/s), ``gap`` s after the previous sample."""
         if self._travelled is None:
             self._left, self._travelled = self._here, np.zeros(7)
         self._travelled = self._travelled + gap * np.asarray(velocity)
@@ -147,21 +146,21 @@ class RestTorque:
 
     @property
     def travels(self) -> bool:
-        """Whether it is on a motion that is more than a jolt."""
+        """True during a motion that is larger than a jolt."""
         return self._travelled is not None and bool(np.abs(self._travelled).max() > JOLT)
 
     def stand(self) -> None:
-        """It has just come to a stop."""
+        """The arm has just stopped."""
         self._here = self._travelled = None
 
     def learn(self, torque: np.ndarray, gap: float) -> None:
-        """What it feels now, having stood for a while, ``gap`` s after the sample before."""
+        """Add a torque (Nm) of an arm that has stood for a while, ``gap`` s after the previous sample."""
         share = min(1.0, gap / REMEMBERED)
         self._here = torque if self._here is None else self._here + share * (torque - self._here)
 
 
 class ContactDetector:
-    """Feed it every torque sample; it answers with at most one event per arming. Times in s on one clock."""
+    """Processes every torque sample. Returns at most one event per arming. Times in s on one clock."""
 
     def __init__(self, settings: DetectorSettings, jacobian: Callable[[Joints], np.ndarray]) -> None:
         self.settings = settings
@@ -171,9 +170,9 @@ class ContactDetector:
         self._history: deque[tuple[float, np.ndarray]] = deque()
         self._rest_differences: deque[np.ndarray] = deque(maxlen=400)
         self._last_stamp: float | None = None
-        self._odd_stamp: float | None = None  # of the last sample that did not follow the one before it
+        self._odd_stamp: float | None = None  # stamp of the last sample that did not follow the previous one
         self._still_since: float | None = None
-        self._rest, self._gap = RestTorque(), 0.0  # the latter in s, between the last two samples
+        self._rest, self._gap = RestTorque(), 0.0  # gap: s between the last two samples
         self._unloaded: np.ndarray | None = None
         self.margin = 0.0
         self._largest = np.zeros(7)
@@ -189,9 +188,9 @@ class ContactDetector:
         load_share: float = 0.0,
         carries: bool = False,
     ) -> None:
-        """Watch for 'contact', 'load' or 'release' for ``timeout`` s, as soon as the arm stands still. ``joints`` as
-        1..7. ``carries``: an arm that carries something feels it elsewhere after each motion, and an offset against
-        the rest before says nothing. ValueError says what is wrong with the request."""
+        """Watch for 'contact', 'load' or 'release' for ``timeout`` s, as soon as the arm stands still. ``joints``:
+        1..7. ``carries``: the arm carries an object. After each motion its torque differs, so the offset against the
+        previous rest is not checked. ValueError: invalid request."""
         if mode not in ("contact", "load", "release"):
             raise ValueError(f"mode is contact, load, release or off, got '{mode}'")
         if not timeout > 0.0:
@@ -217,8 +216,8 @@ class ContactDetector:
         self._armed = None
 
     def learn(self) -> str:
-        """Forget the noise at rest and learn it anew, from now on; the answer in words. ValueError where the arm moves
-        or the detector is armed: what it would learn then is no noise."""
+        """Delete the noise at rest and learn it again from now on. Returns a sentence. ValueError if the arm moves or
+        the detector is armed: the samples would not be noise."""
         if self._armed is not None:
             raise ValueError(f"armed for {self._armed.mode}; the noise is learnt between actions, send mode off first")
         if not self.still():
@@ -227,7 +226,7 @@ class ContactDetector:
         return f"learning from the next {self.settings.learn_samples} samples; leave the arm alone"
 
     def look(self) -> Signal:
-        """What is seen now; the largest change is counted anew from here."""
+        """Returns the present state. The largest change is reset."""
         armed, change = self._armed, self._largest
         self._largest = np.zeros(7)
         k = armed.k if armed is not None else self.settings.k
@@ -245,13 +244,13 @@ class ContactDetector:
         )
 
     def state(self) -> str:
-        """off, waiting (armed, but the arm moves or too little rest was seen) or watching."""
+        """Returns off, waiting (armed, but the arm moves or the rest was too short) or watching."""
         if self._armed is None:
             return "off"
         return "watching" if self._armed.baseline is not None else "waiting"
 
     def still(self) -> bool:
-        """Whether the arm has stood still long enough."""
+        """True if the arm has stood still for ``settings.settle`` s."""
         return (
             self._still_since is not None
             and self._last_stamp is not None
@@ -259,8 +258,8 @@ class ContactDetector:
         )
 
     def feed(self, stamp: float, torque: Joints, position: Joints, velocity: Joints) -> ContactEvent | None:
-        """One sample: torque (Nm), position (rad), velocity (rad/s), seven joints each. One that no arm can give (not
-        finite, beyond LARGEST, of another length) is ignored."""
+        """Process one sample: torque (Nm), position (rad), velocity (rad/s), seven joints each. An impossible sample
+        (not finite, beyond LARGEST, wrong length) is ignored."""
         tau = np.asarray(torque, dtype=float)
         for values in (tau, np.asarray(position), np.asarray(velocity)):
             if values.shape != (7,) or not np.abs(values).max() <= LARGEST:
@@ -283,9 +282,9 @@ class ContactDetector:
         return self._watch(stamp, difference, position)
 
     def _in_time(self, stamp: float) -> bool:
-        """Whether a sample follows the one before it. A single one that does not is ignored; two that follow each other
-        mean that the clock was set, or that no samples came for long: an arming keeps the time that it had left, and
-        the arm counts as still only once it was seen so again."""
+        """Returns whether a sample follows the previous one. A single odd sample is ignored. Two consecutive ones mean
+        that the clock was set, or that samples were missing for long. Then an arming keeps its remaining time, and the
+        arm must be seen still again."""
         last, odd, self._odd_stamp = self._last_stamp, self._odd_stamp, None
         if last is None or 0.0 < stamp - last <= LONGEST_STEP:
             return True
@@ -310,7 +309,7 @@ class ContactDetector:
             self._rest.stand()
 
     def _filter(self, stamp: float, tau: np.ndarray) -> np.ndarray | None:
-        """Low-pass, remember, and return the difference over the window (None until the window is full)."""
+        """Low-pass and store a sample. Returns the difference over the window; None until the window is full."""
         dt = stamp - self._last_stamp if self._last_stamp is not None else 0.005
         self._last_stamp, self._gap = stamp, dt
         if self._filtered is None or dt > 0.1:
@@ -333,7 +332,7 @@ class ContactDetector:
         self._rest.learn(self._filtered, self._gap)
 
     def sigma(self) -> np.ndarray:
-        """Robust standard deviation (Nm) of the difference at rest, per joint; the floor where too little was seen."""
+        """Returns the robust standard deviation (Nm) of the difference at rest, per joint; without data, the floor."""
         if len(self._rest_differences) < 2:
             return np.full(7, self.settings.floor)
         values = np.array(self._rest_differences)
@@ -362,7 +361,7 @@ class ContactDetector:
         armed.over = armed.over + 1 if self.margin > 1.0 else 0
         if armed.over < self.settings.confirm:
             return None
-        # In standard deviations the threshold is k, and the signal margin times k.
+        # In standard deviations, the threshold is k and the signal is margin times k.
         return self._event(
             True,
             "joint_torque",
@@ -374,8 +373,8 @@ class ContactDetector:
         )
 
     def _check_offset(self, armed: _Armed) -> ContactEvent | None:
-        """Once at each rest: a person who was early has left an offset against the last rest before the motion, and a
-        touch that jolted the arm has left one against what was felt before."""
+        """Check the offset once at each rest. An early touch leaves an offset against the last rest before the motion.
+        A touch that jolted the arm leaves one against the torque before the jolt."""
         before_motion = None if armed.carries else self._rest.before_motion
         reference = before_motion if armed.before is None else armed.before
         if armed.mode != "contact" or reference is None or armed.baseline is None:
@@ -399,12 +398,12 @@ class ContactDetector:
         )
 
     def _watch_weight(self, stamp: float, armed: _Armed, position: Joints) -> ContactEvent | None:
-        """Has the weight come (load) or gone (release)?"""
+        """Check whether the weight has arrived (load) or gone (release)."""
         reference = self._unloaded if armed.mode == "load" else armed.baseline
         assert reference is not None and self._filtered is not None
         lever = self._jacobian(position)[2][armed.watched]
         change = (self._filtered - reference)[armed.watched]
-        # Least squares for one unknown: the vertical force (N, up positive) behind the change of torque.
+        # Least squares with one unknown: the vertical force (N, positive upward) that explains the change of torque.
         lifted = float(lever @ change) / float(lever @ lever)
         force = -lifted if armed.mode == "load" else lifted
         needed = armed.load_share * armed.mass * GRAVITY

@@ -1,7 +1,7 @@
-"""Evidence of a contact: torques of the moving arm, fingers, touch and sight, and all of it together.
+"""Evidence of a contact from the torques of the moving arm, fingers, touch and sight, and their combination.
 
-Each source turns what it measures into evidence: a margin (signal over its threshold) and the probability of a contact
-that goes with it. Sources count as independent: the probability that at least one of them is right decides.
+Each source converts its measurement to evidence: a margin (signal over threshold) and the probability of a contact. The
+sources are treated as independent: the probability that at least one of them is right decides.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ TACTILE = "tactile"
 FINGERS = "finger_motor"
 SIGHT = "sight"
 FUSED = "fused"
-DECIDED = 0.99  # probability from which it is a contact; a source at its threshold reaches it alone
-STEEPNESS = 12.0  # logits per unit of margin: at 0.8 of its threshold a source says 0.9, at 0.6 even chances
-SLOW = 0.03  # m/s of the palm below which what is seen in it stays there
-SPEAKS_TOO = 0.5  # a source that is this sure is named beside the surest one
+DECIDED = 0.99  # probability that counts as a contact; one source at its threshold is sufficient
+STEEPNESS = 12.0  # logits per unit of margin: at 0.8 of its threshold a source gives 0.9, at 0.6 it gives 0.5
+SLOW = 0.03  # m/s of the palm; below, an object seen in the palm stays there
+SPEAKS_TOO = 0.5  # probability from which a source counts as a contributor to the event
 
 
 @dataclass(frozen=True)
 class ContactEvent:
-    """Contact found (contact=True) or load released (False), as coglab_msgs/Contact has it.
+    """Contact detected (contact=True) or load released (False); fields of coglab_msgs/Contact.
 
-    ``margin`` is the signal over its threshold, ``confidence`` the probability that the signal is over its threshold
-    given the noise of the sensor (0..1), ``code`` the ReasonCode of the message.
+    ``margin``: signal over threshold. ``confidence``: probability (0..1) that the signal is over its threshold, given
+    the noise of the sensor. ``code``: ReasonCode of the message.
     """
 
     contact: bool
@@ -42,7 +42,7 @@ class ContactEvent:
 
 @dataclass(frozen=True)
 class Evidence:
-    """What one source says at one time (s) and until when it counts."""
+    """Evidence of one source at one time (s), valid until ``until`` (s)."""
 
     source: str
     stamp: float
@@ -52,40 +52,41 @@ class Evidence:
 
     @property
     def probability(self) -> float:
-        """Of a contact, by this source alone."""
+        """Probability of a contact from this source alone."""
         return probability(self.margin)
 
 
 def probability(margin: float) -> float:
-    """Of a contact, from a signal over its threshold: 0.99 at 1."""
+    """Returns the probability of a contact from a margin (signal over threshold): 0.99 at 1."""
     return 1.0 / (1.0 + math.exp(-min(60.0, math.log(DECIDED / (1.0 - DECIDED)) + STEEPNESS * (margin - 1.0))))
 
 
 def together(evidence: Iterable[Evidence]) -> float:
-    """Probability that at least one of the sources is right."""
+    """Returns the probability that at least one of the sources is right."""
     return 1.0 - math.prod(1.0 - each.probability for each in evidence)
 
 
 def name_of(evidence: Iterable[Evidence]) -> str:
-    """The source's name where one alone says so, else FUSED."""
+    """Returns the name of the source if only one contributes, else FUSED."""
     sure = [each for each in evidence if each.probability >= SPEAKS_TOO]
     return sure[0].source if len(sure) == 1 else FUSED
 
 
 class Touch:
-    """Tactile sensors of fingers and palm (FingertipForces). An object that is there already is contact as well."""
+    """Tactile sensors of fingers and palm (FingertipForces). An object that was there before also counts as contact."""
 
     def __init__(self, threshold: float = 0.5, deviations: float = 6.0, confirm: int = 2, hold: float = 0.05) -> None:
-        """``threshold``: N, at least; more where the sensors' noise times ``deviations`` is more. ``hold``: s."""
+        """``threshold``: N; raised to ``deviations`` times the noise of the sensors if that is larger. ``hold``: s."""
         self.threshold, self.deviations, self.confirm, self.hold = threshold, deviations, confirm, hold
         self._margins: list[float] = []
 
     def reset(self) -> None:
-        """Forget the past."""
+        """Delete the past samples."""
         self._margins.clear()
 
     def feed(self, stamp: float, forces: Sequence[Sequence[float]], deviation: float = 0.0) -> Evidence | None:
-        """Forces (N) on each phalanx and on the palm; ``deviation`` of one component, N. None for what is no number."""
+        """Forces (N) on each phalanx and on the palm, n x 3. ``deviation``: noise of a component, N. None if not
+        finite."""
         table = np.asarray(forces, dtype=float).reshape(-1, 3)
         if not (len(table) and np.all(np.isfinite(table)) and math.isfinite(stamp)):
             return None
@@ -98,19 +99,19 @@ class Touch:
 
 
 class InPalm:
-    """The tracked object at its grasp in the palm of an arm that has come to rest: it is there, felt or not."""
+    """The tracked object is at its grasp in the palm of a resting arm: it is there, even if it is not felt."""
 
     def __init__(self, near: float = 0.015, turned: float = math.radians(20.0), confirm: float = 0.12) -> None:
-        """``near`` (m) and ``turned`` (rad): of the palm from where it has to be for the grasp; ``confirm``: s."""
+        """``near`` (m), ``turned`` (rad): tolerance of the palm's pose at the grasp. ``confirm``: s."""
         self.near, self.turned, self.confirm = near, turned, confirm
         self._since: float | None = None
 
     def reset(self) -> None:
-        """Forget the past."""
+        """Delete the past sights."""
         self._since = None
 
     def feed(self, stamp: float, distance: float, angle: float, speed: float) -> Evidence | None:
-        """One sight: how far (m, rad) the palm is from the grasp, and the palm's speed (m/s)."""
+        """Process one sight: distance of the palm from the grasp (m, rad), and the palm's speed (m/s)."""
         if not all(map(math.isfinite, (stamp, distance, angle, speed))):
             return None
         if speed > SLOW or distance > self.near or angle > self.turned:
@@ -124,7 +125,7 @@ class InPalm:
 
 
 class Motor(Protocol):
-    """One motor of the hand, as coglab_msgs/MotorStatus."""
+    """One motor of the hand; fields of coglab_msgs/MotorStatus."""
 
     position: int
     current: int
@@ -135,25 +136,25 @@ class Motor(Protocol):
 
 
 class Fingers:
-    """Motors of the hand: a finger that stops before its target, or one that stands and is moved, strained or needs
-    current. The motors are read one value after the other, so that a command to close may fall between the reading of
-    `moving` and that of the current: a current counts once the next status has it, too, and still no motion."""
+    """Motors of the hand: a finger stops before its target, or a standing finger is moved, strained or needs current.
+    The motor values are read one after the other. A command to close may come between the reading of `moving` and that
+    of the current. Therefore, a current counts only if the next status also has it, without motion."""
 
     def __init__(self, counts: float = 8.0, current: float = 60.0, tension: float = 20.0, hold: float = 0.4) -> None:
-        """Thresholds in the counts of MotorStatus: way of a standing motor, current above that on arming, tension above
-        it. ``hold``: s for which one status counts; the hand is polled slowly while it does nothing."""
+        """Thresholds in the counts of MotorStatus: motion of a standing motor, current and tension above the values on
+        arming. ``hold``: validity of one status, s; an idle hand is polled slowly."""
         self.thresholds = np.array([counts, current, tension])
         self.hold = hold
         self.reset()
 
     def reset(self) -> None:
-        """Compare with the next status from now on."""
+        """Use the next status as the new reference."""
         self._reference: dict[int, np.ndarray] = {}
         self._moved: set[int] = set()
         self._loaded: set[int] = set()
 
     def feed(self, stamp: float, motors: Sequence[Motor]) -> Evidence | None:
-        """One status of all motors; None while there is nothing to compare with."""
+        """Process one status of all motors. None if there are no motors."""
         margin, message = 0.0, ""
         for number, motor in enumerate(motors):
             now = np.array([motor.position, motor.current, max(0, motor.force)], dtype=float)

@@ -1,11 +1,11 @@
 """Fuses joint torques, finger motors, touch and sight into one contact event.
 
-Modes contact, load and, without a model of the arm, release are those of D4.10 (ContactDetector), for a resting arm.
-With a model, release watches the weight go from an arm that may move (LeavingLoad). Mode IN_MOTION watches from
-arming on, whether the arm moves or not: torques of the moving arm, fingers, touch and the sight of the object at its
-grasp, each with a probability, and D4.10's derivative once the arm stands. The event is the first moment at which a
-contact is likely enough; its source is the one that is sure alone, or ``fused``. Mode LIFT watches the weight come to
-an arm that lifts what it has grasped, counted from arming on.
+Modes contact, load and (without a model of the arm) release are those of D4.10 for a resting arm (ContactDetector).
+With a model, RELEASE watches how the weight leaves an arm that may move (LeavingLoad). IN_MOTION watches from arming
+on, moving or not: torques of the moving arm, fingers, touch and the sight of the object at its grasp, each with a
+probability, and D4.10's derivative when the arm stands. The event is the first moment at which a contact is likely
+enough. Its source is the one that alone is likely enough, or ``fused``. LIFT watches how the weight comes to an arm
+that lifts a grasped object, counted from arming on.
 """
 
 from __future__ import annotations
@@ -38,15 +38,15 @@ from coglab_contact.moving_contact import MovingContact
 IN_MOTION = "contact_in_motion"
 LIFT = "lift"
 RELEASE = "release"
-GRAVITY = 9.81
-SETTLING = 0.10  # s after arming over which the residual is averaged that a weight is counted from
-CARRIED = 0.06  # s for which the weight has to be there
-HELD_CENTRE = (0.04, 0.0, 0.0)  # m in ih2_palm: about where the fingers hold an object
+GRAVITY = 9.81  # m/s^2
+SETTLING = 0.10  # s after arming in which the reference residual of a weight is averaged
+CARRIED = 0.06  # s for which the weight must be present
+HELD_CENTRE = (0.04, 0.0, 0.0)  # m in ih2_palm, approximate centre of a held object
 
 
 @dataclass
 class _Lift:
-    """A wait for the weight: N that it takes, and the mean residual of the first moment (Nm)."""
+    """State of mode LIFT. ``needed``: required weight, N. ``sum``: sum of the residuals after arming, Nm."""
 
     needed: float
     sum: np.ndarray = field(default_factory=lambda: np.zeros(7))
@@ -56,7 +56,7 @@ class _Lift:
 
 
 class FusedDetector:
-    """Feed it what there is; each feed may answer with the one event of an arming. Times in s on one clock."""
+    """Processes all available sources. Each feed may return the one event of an arming. Times in s on one clock."""
 
     def __init__(
         self,
@@ -66,21 +66,21 @@ class FusedDetector:
         fingers: Fingers | None = None,
         held: GripAndLoad | None = None,
     ) -> None:
-        """``moving`` None: there is no model of the arm, and IN_MOTION is refused. ``held``: what touch tells of grip
-        and load; without it, or where nobody feeds touch, the torques alone tell how much of a load has gone."""
+        """``moving``: None without a model of the arm; IN_MOTION is then refused. ``held``: grip and load by touch.
+        Without it, or without touch data, only the torques show how much of a load has gone."""
         self.still, self.moving = still, moving
         self._touch, self._fingers, self._palm = touch or Touch(), fingers or Fingers(), InPalm()
         self._held = held
         self.holds = False
-        """whether the hand says that it holds something, whatever the arm was told to carry"""
+        """True if the hand reports a grip, independently of the set payload"""
         self._lift: _Lift | None = None
         self._leaving: LeavingLoad | None = None
         self._until: float | None = None
-        self._first = False  # nothing was looked at yet since arming
+        self._first = False  # no sample was checked since arming
         self._evidence: dict[str, Evidence] = {}
         self._mass = 0.0
         self._before_reach: np.ndarray | None = None
-        """Nm, residual of the rest before the reach in which contact was watched for last"""
+        """Nm, residual at rest before the last reach with IN_MOTION"""
         self._last_stamp: float | None = None
 
     def arm(
@@ -93,14 +93,13 @@ class FusedDetector:
         mass: float = 0.0,
         load_share: float = 0.0,
     ) -> None:
-        """As ContactDetector.arm, with the modes IN_MOTION and LIFT besides. ValueError says what is wrong with the
-        request."""
+        """Like ContactDetector.arm, plus the modes IN_MOTION and LIFT. ValueError: invalid request."""
         request = (mode, now, timeout, k, joints, mass, load_share)
         if mode in (IN_MOTION, LIFT) and self.moving is None:
             raise ValueError(f"{mode} needs a model of the arm and learnt thresholds, and there are none")
         leaving = None
         if mode == RELEASE and self.moving is not None:
-            # Armed too, so that it does not learn what a hand that takes the load does; its own event is not told.
+            # Arm it too, so that it does not learn the effect of a taking hand as noise. Its own event is ignored.
             self.still.arm(*request)
             share = load_share if load_share > 0.0 else self.still.settings.load_share
             leaving = LeavingLoad(mass, share, now + timeout, self.moving.weight_before_motion())
@@ -118,7 +117,7 @@ class FusedDetector:
             self._before_reach = self.moving.before_motion()
         self._leaving = leaving
         if self._held is not None:
-            # Who is given something may touch it while the arm still comes.
+            # A person who receives an object may touch it while the arm is still coming.
             {IN_MOTION: self._held.count_from_now, RELEASE: self._held.count_on}.get(mode, self._held.anew)()
         self._mass = mass if mode in ("load", LIFT) else 0.0
         self._until = now + timeout if mode in (IN_MOTION, LIFT) else None
@@ -134,7 +133,7 @@ class FusedDetector:
         self._until = self._lift = self._leaving = None
 
     def state(self) -> str:
-        """off, waiting or watching, see ContactDetector.state; in motion it watches as soon as it has seen enough."""
+        """Returns off, waiting or watching (see ContactDetector.state). IN_MOTION watches after enough samples."""
         if self._leaving is not None:
             return "waiting" if self._leaving.share is None else "watching"
         if self._until is None:
@@ -143,7 +142,7 @@ class FusedDetector:
 
     @property
     def margin(self) -> float:
-        """Largest signal over its threshold now."""
+        """Largest present signal over its threshold."""
         if self._leaving is not None:
             return self._leaving.margin
         if self._until is None:
@@ -151,19 +150,20 @@ class FusedDetector:
         return max((each.margin for each in self._evidence.values()), default=0.0)
 
     def set_payload(self, mass: float, centre: Joints = HELD_CENTRE) -> None:
-        """The hand carries this from now on; 0 kg: nothing. ValueError for what is no mass."""
+        """Set the mass (kg, 0: nothing) that the hand carries from now on. ValueError: invalid mass."""
         if self.moving is not None:
             self.moving.set_payload(mass, centre)
         if self._held is not None:
             self._held.anew()
 
     def feed(self, stamp: float, torque: Joints, position: Joints, velocity: Joints) -> ContactEvent | None:
-        """External torques as the robot controller estimates them, and the joints: see ContactDetector.feed."""
+        """Process the external torques as estimated by the robot controller, and the joints: see
+        ContactDetector.feed."""
         event = self.still.feed(stamp, torque, position, velocity)
         if event is None or self._leaving is not None:
             return None
         self._until = None
-        # Who has felt the load come knows what the arm carries from now on; with its going the hand is empty.
+        # After a load event the payload is known; after a release the hand is empty.
         if event.code == ReasonCode.LOAD_CARRIED:
             self.set_payload(self._mass)
         elif event.code == ReasonCode.LOAD_RELEASED:
@@ -173,7 +173,7 @@ class FusedDetector:
     def feed_measured(
         self, stamp: float, position: Joints, torque: Joints, made: float | None = None
     ) -> ContactEvent | None:
-        """Joints and torques as measured (rad, Nm); ``made``: see MomentumObserver.feed."""
+        """Process measured joints and torques (rad, Nm). ``made``: see MomentumObserver.feed."""
         if self.moving is None:
             return None
         self._follow_clock(stamp)
@@ -195,8 +195,8 @@ class FusedDetector:
     def feed_touch(
         self, stamp: float, forces: Sequence[Sequence[float]], deviation: float = 0.0
     ) -> ContactEvent | None:
-        """Forces on the phalanges and the palm (N), as FingertipForces has them. Fingers that hold something feel that:
-        while they do, or a payload was told, touch is no source of contact, but tells grip and load."""
+        """Process the forces (N) on phalanges and palm, as in FingertipForces. While the fingers hold something, or a
+        payload is set, touch is no evidence of contact: it measures grip and load."""
         if self._held is not None and self.moving is not None and self.moving.residual is not None:
             self._held.feed(stamp, forces, deviation, self.moving.residual.position)
         if self.holds or (self.moving is not None and self.moving.load > 0.0):
@@ -204,15 +204,15 @@ class FusedDetector:
         return self._judge(stamp, self._touch.feed(stamp, forces, deviation))
 
     def feed_sight(self, stamp: float, distance: float, angle: float, speed: float) -> ContactEvent | None:
-        """How far (m, rad) the palm is from its place at the object that was named on arming, and its speed (m/s)."""
+        """Process the palm's distance (m, rad) from its grasp of the object named on arming, and its speed (m/s)."""
         return self._judge(stamp, self._palm.feed(stamp, distance, angle, speed))
 
     def feed_hand(self, stamp: float, motors: Sequence[Motor]) -> ContactEvent | None:
-        """Motors of the hand, as HandStatus has them."""
+        """Process the motors of the hand, as in HandStatus."""
         return self._judge(stamp, self._fingers.feed(stamp, motors))
 
     def _follow_clock(self, stamp: float) -> None:
-        """A clock that was set leaves an arming the time that it had."""
+        """If the clock was set, an arming keeps its remaining time."""
         if not math.isfinite(stamp):
             return
         if self._last_stamp is not None and abs(stamp - self._last_stamp) > 1.0:
@@ -226,7 +226,7 @@ class FusedDetector:
         self._last_stamp = stamp
 
     def _watch_lift(self, stamp: float, lift: _Lift) -> ContactEvent | None:
-        """Has the weight come?"""
+        """Check whether the weight has come."""
         assert self.moving is not None and self._until is not None
         residual = self.moving.residual
         if stamp > self._until:
@@ -250,8 +250,8 @@ class FusedDetector:
         return ContactEvent(True, MOMENTUM, margin, message, probability(margin), ReasonCode.LOAD_CARRIED)
 
     def _watch_leaving(self, stamp: float, leaving: LeavingLoad) -> ContactEvent | None:
-        """Has the weight gone? The share is told until the watch ends. What the hand carries stays told as well, until
-        it is empty."""
+        """Check whether the weight has gone. The share is available until the watch ends. The payload stays set until
+        the hand is empty."""
         assert self.moving is not None
         residual = self.moving.residual
         if stamp > leaving.until:
@@ -272,24 +272,23 @@ class FusedDetector:
         return None
 
     def share_gone(self) -> float | None:
-        """Share of the weight that has left the hand since it was armed for RELEASE, as far as that is sure
-        (LeavingLoad.sure); None while it is not watched."""
+        """Returns the certain part of the weight share that has left the hand since arming for RELEASE
+        (LeavingLoad.sure); None while nothing is watched."""
         return self._leaving.sure if self._leaving is not None else None
 
     def force(self) -> np.ndarray | None:
-        """N on the palm, base frame, beyond what acted before the reach in which contact was watched for last, less the
-        payload that was told; see MovingContact.force_since. None where that is not known."""
+        """Returns the force (N) on the palm in the base frame, relative to the force before the last reach with
+        IN_MOTION, without the set payload; see MovingContact.force_since. None if unknown."""
         if self.moving is None or self._before_reach is None:
             return None
         return self.moving.force_since(self._before_reach)
 
     def grip(self, now: float) -> float | None:
-        """N with which the fingers squeeze what they hold, as touch feels it; None where that does not tell at ``now``
-        (s)."""
+        """Returns the grip force (N) of the fingers by touch; None if touch has no data at ``now`` (s)."""
         return None if self._held is None else self._held.grip(now)
 
     def look(self) -> Signal:
-        """As ContactDetector.look; the margin of RELEASE is told too."""
+        """Like ContactDetector.look, also with the margin of RELEASE."""
         seen, leaving = self.still.look(), self._leaving
         if leaving is None:
             return seen

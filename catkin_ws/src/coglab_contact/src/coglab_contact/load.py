@@ -1,11 +1,11 @@
-"""Grip and load as the fingers feel them: what hangs on a hand with touch sensors, and how hard it squeezes it.
+"""Grip and load of a hand with touch sensors: the weight that hangs on it, and the force with which it squeezes.
 
-Load: the part along the vertical of the sum of all contact forces on phalanges and palm. What one finger presses
-against another cancels in it, and so does the weight of the hand itself: an arm that moves feels the object alone.
+Load: vertical part of the sum of all contact forces on phalanges and palm. Forces between the fingers cancel, and so
+does the weight of the hand itself: a moving arm measures only the object.
 
-Grip: contact forces are divided into those that carry the load and those that balance one another, the internal or
-grasping forces (Yoshikawa and Nagai 1991); the grip is half the sum of the magnitudes of the latter, so that two
-fingers that press with F each grip with F. Each contact is taken to carry its part of the load by its magnitude.
+Grip: contact forces are divided into those that carry the load and those that balance each other, the internal or
+grasping forces (Yoshikawa and Nagai 1991). The grip is half the sum of the magnitudes of the latter, so that two
+fingers that press with F each grip with F. Each contact is assumed to carry load in proportion to its magnitude.
 """
 
 from __future__ import annotations
@@ -19,38 +19,35 @@ import numpy as np
 Joints = Sequence[float] | np.ndarray
 
 SMOOTH = 0.015  # s, time constant of the low-pass of each force
-USUAL = 0.5  # s, time constant of the load that is felt while nobody takes it
-NOISE = 3.0  # deviations of one component up to which a low-passed force is none
-OLDEST = 0.1  # s after which touch tells nothing any more; after such a gap it begins anew
-COVERED = 0.3
-"""share of the weight by which the usual load may differ from it; where it is more, contacts miss the sensors"""
-EXACT = 0.1  # N, deviation of the felt load of sensors without noise: their place and scale
-APART = 2.0  # deviations of the torques' load by which touch may differ from it while both are believed
+USUAL = 0.5  # s, time constant of the average load while nobody takes it
+NOISE = 3.0  # standard deviations of one component; smaller low-passed forces count as zero
+OLDEST = 0.1  # s, oldest touch data that is used; a longer gap restarts the filters
+COVERED = 0.3  # largest difference of the average load from the weight (share); else some contacts miss the sensors
+EXACT = 0.1  # N, standard deviation of the load of noise-free sensors, from their position and scale
+APART = 2.0  # standard deviations of the load by torques; if touch differs by more, the lower share counts
 
 
-GRAVITY = 9.81
-SETTLING = 0.10  # s after arming over which the weight is averaged
-CONFIRMED = 0.05  # s for which the load has to be gone
-SAME = 0.5  # N by which the weight may seem to differ between two postures: the error of the model
-FAR = 0.2  # rad that a joint has turned between two such postures
-PART = 1.0 / 3.0
-"""of the weight that may seem to have gone or come by that, at most: who takes more has begun to take it"""
+GRAVITY = 9.81  # m/s^2
+SETTLING = 0.10  # s after arming in which the weight is averaged
+CONFIRMED = 0.05  # s for which the load must be gone
+SAME = 0.5  # N, error of the model: apparent change of the weight between two postures
+FAR = 0.2  # rad, joint rotation between two such postures
+PART = 1.0 / 3.0  # of the weight, limit for such an apparent change: a larger one means that somebody takes the load
 
 
 @dataclass(frozen=True)
 class Felt:
-    """Share of the weight that has gone, by touch, and its standard deviation."""
+    """Share of the weight that has gone, measured by touch, and its standard deviation."""
 
     share: float
     deviation: float
 
 
 def together(torques: float | None, deviation: float, felt: Felt | None) -> float | None:
-    """One share of the weight from that of the arm's torques, with its standard deviation, and that of touch; None
-    where neither tells.
+    """Combines the shares by the arm's torques (with ``deviation``) and by touch; None if both are missing.
 
-    Each counts by its variance. Where they are APART the lower one does: either contacts miss the sensors, or something
-    leans on the arm, and nothing falls from a grip that waits.
+    Each counts by its variance. If they differ by more than APART, the lower one counts: either contacts miss the
+    sensors, or something leans on the arm. This is safe: a grip that loosens later drops nothing.
     """
     if torques is None or felt is None:
         return torques if felt is None else felt.share
@@ -61,21 +58,21 @@ def together(torques: float | None, deviation: float, felt: Felt | None) -> floa
 
 
 class GripAndLoad:
-    """Feed it the forces; ask it for grip and load. N, base frame with z up."""
+    """Processes the touch forces; returns grip and load. N, base frame with z up."""
 
     def __init__(self, turned: Callable[[Joints], np.ndarray]) -> None:
-        """``turned``: position of the joints (rad) to the rotation (3 x 3) from ih2_palm to the base frame."""
+        """``turned``: converts joint positions (rad) to the rotation (3 x 3) from ih2_palm to the base frame."""
         self._turned = turned
         self._forces: np.ndarray | None = None  # n x 3, N on each phalanx and the palm, ih2_palm, low-passed
         self._stamp = 0.0
-        self._noise = 0.0  # N, deviation of one component as measured
+        self._noise = 0.0  # N, measured standard deviation of one component
         self._load = 0.0
         self._usual: float | None = None
         self._counted_from: float | None = None
 
     def feed(self, stamp: float, forces: Sequence[Sequence[float]], deviation: float, position: Joints) -> None:
-        """Forces (N, ih2_palm) of the world on each phalanx and the palm, ``deviation`` of one component, joints (rad).
-        What is no number is left out."""
+        """Process the forces (n x 3, N, ih2_palm) on each phalanx and the palm, the standard deviation of one component
+        (N) and the joints (rad). Samples that are not finite are ignored."""
         table = np.asarray(forces, dtype=float).reshape(-1, 3)
         if not (len(table) and np.all(np.isfinite(table)) and math.isfinite(stamp)):
             return
@@ -90,24 +87,25 @@ class GripAndLoad:
         self._usual = usual + (1.0 - math.exp(-step / USUAL)) * (self._load - usual)
 
     def count_from_now(self) -> None:
-        """Somebody may take the load from now on: it is counted from what has usually hung on the hand."""
+        """Somebody may take the load from now on: count from the present average load."""
         self._counted_from = self._usual
 
     def count_on(self) -> None:
-        """As it was counted before, if it was."""
+        """Keep the reference load; set it if there is none."""
         if self._counted_from is None:
             self.count_from_now()
 
     def anew(self) -> None:
-        """The hand holds something else, or nothing."""
+        """The hand holds another object, or nothing: delete the reference load."""
         self._counted_from = None
 
     def load(self, now: float) -> float | None:
-        """N that hang on the hand; None where touch does not tell (any more)."""
+        """Returns the load (N) on the hand; None without recent touch data."""
         return self._load if self._forces is not None and abs(now - self._stamp) <= OLDEST else None
 
     def share_gone(self, now: float, weight: float) -> Felt | None:
-        """Of ``weight`` (N); None where touch does not tell, or did not feel the weight before it was taken."""
+        """Returns the gone share of ``weight`` (N). None without touch data, or if it did not match the weight
+        before."""
         load, usual = self.load(now), self._counted_from
         if load is None or usual is None or abs(usual - weight) > COVERED * weight:
             return None
@@ -115,7 +113,7 @@ class GripAndLoad:
         return Felt((usual - load) / weight, math.hypot(EXACT, self._noise * math.sqrt(len(self._forces))) / weight)
 
     def grip(self, now: float) -> float | None:
-        """N; None where touch does not tell (any more)."""
+        """Returns the grip force (N); None without recent touch data."""
         if self._forces is None or self.load(now) is None:
             return None
         sizes = np.linalg.norm(self._forces, axis=1)
@@ -129,47 +127,46 @@ class GripAndLoad:
 
 
 class LeavingLoad:
-    """The share that is gone, and the moment from which it has been enough for long enough.
+    """Computes the share of the weight that has gone, and the time from which it has been enough for long enough.
 
-    It is counted from what was carried before the last motion, and once the arm stands, from what hangs on the palm
-    then: unless that is more different than another posture explains, because somebody has been lifting or pulling
-    already. An arm that turns its joints by half of FAR meanwhile, and stands, asks itself that again. What weighs less
-    than SAME the torques alone do not tell from nothing: such an object is given with touch.
+    The share is counted from the load before the last motion. When the arm stands, it is counted from the load on the
+    palm then, unless the difference is larger than a change of posture explains: then somebody has already lifted or
+    pulled. If an arm turns its joints by half of FAR meanwhile and stands, this decision is repeated. The torques alone
+    cannot distinguish an object lighter than SAME from nothing: such an object is given with touch.
     """
 
     def __init__(self, mass: float, needed: float, until: float, carried: float | None = None) -> None:
-        """``mass``: kg, of the object; ``needed``: share of its weight; ``until``: s, when the watch ends by itself;
-        ``carried``: N on the palm before the last motion, None where that is not known. ValueError for what is no
-        mass."""
+        """``mass``: of the object, kg. ``needed``: share of its weight. ``until``: end of the watch, s. ``carried``:
+        load (N) on the palm before the last motion, None if unknown. ValueError: invalid mass."""
         if not mass > 0.0:
             raise ValueError(f"release needs the mass of the object in kg, got {mass}")
         self.weight, self._asked, self.until = mass * GRAVITY, needed, until
         self.share: float | None = None
-        """1: all of it; None until enough was seen to count from"""
+        """1: all of the weight; None until there is a reference load"""
         self.told = False
-        self._from = carried  # N, that the share is counted from
-        self._posture: Joints = ()  # rad, of the newest sample
-        self._counted: Joints | None = None  # the posture in which that weight hung on the palm; None: another one
-        self._looked: Joints | None = None  # the posture in which it was last asked what hangs there
-        self._doubt = SAME  # N of what is gone that the posture alone may explain
+        self._from = carried  # N, reference load of the share
+        self._posture: Joints = ()  # rad, posture of the newest sample
+        self._counted: Joints | None = None  # rad, posture of the reference load; None: another one
+        self._looked: Joints | None = None  # rad, posture in which the load was averaged last
+        self._doubt = SAME  # N, part of the lost load that the change of posture alone may explain
         self._sum, self._count = 0.0, 0
         self._begun = 0.0
         self._since: float | None = None
 
     @property
     def needed(self) -> float:
-        """Share that has to be gone: what was asked for, and half of that for sure."""
+        """Share that must be gone: the requested one, and at least half of that without doubt."""
         return max(self._asked, 0.5 * self._asked + self._doubt / self.weight)
 
     @property
     def margin(self) -> float:
-        """Share that is gone over the one that is needed."""
+        """Share that is gone, over the needed one."""
         return (self.share or 0.0) / self.needed
 
     @property
     def sure(self) -> float | None:
-        """The share less what is told by another posture alone, which no grip may follow: half of what a light object
-        weighs. None as above."""
+        """The share without the part that another posture may explain; a grip must not follow that part, which is half
+        of the weight of a light object. None like ``share``."""
         if self.share is None:
             return None
         return math.copysign(max(0.0, abs(self.share) - self._doubt / self.weight), self.share)
@@ -183,10 +180,10 @@ class LeavingLoad:
         felt: Felt | None = None,
         posture: Joints = (),
     ) -> bool:
-        """One sample: s, and N on the palm, None while the arm moves too fast to tell; ``still``: the arm stands;
-        ``fresh``: nothing is known of the time before; ``felt``: the share by touch, None where that does not tell;
-        ``posture``: rad, of all joints. Whether enough is gone now, said once. Where nothing tells, the share stays as
-        it was, but for a fresh one, and what seemed gone has to be so anew."""
+        """Process one sample. ``stamp``: s. ``weight``: N on the palm, None while the arm moves too fast. ``still``:
+        the arm stands. ``fresh``: the estimate has restarted. ``felt``: share by touch, None without data. ``posture``:
+        rad, all joints. Returns True once, when enough is gone. Without any data the share stays, except after a
+        restart, and the confirmation starts again."""
         self._posture = posture
         if fresh:
             self.share, self._count, self._since = None, 0, None
@@ -206,18 +203,18 @@ class LeavingLoad:
         return True
 
     def clock_was_set(self, step: float) -> None:
-        """By so many s: the watch keeps the time that it had, and what seemed gone has to be so anew."""
+        """The clock was set by ``step`` s: the watch keeps its remaining time, and the confirmation starts again."""
         self.until += step
         self._since, self._count = None, 0
 
     def _turned(self, since: Joints | None) -> float:
-        """rad by which the joint that has turned most has turned since; inf where it is not known since when."""
+        """Returns the largest joint rotation (rad) since a posture; inf if the posture is unknown."""
         if since is None:
             return math.inf
         return float(np.max(np.abs(np.subtract(self._posture, since)), initial=0.0))
 
     def _settle(self, stamp: float, weight: float) -> None:
-        """Average what hangs on the palm, and then decide what is counted from."""
+        """Average the load on the palm, then decide about the reference load."""
         if self._count == 0 or stamp < self._begun:
             self._begun, self._sum, self._count = stamp, 0.0, 0
         self._sum, self._count = self._sum + weight, self._count + 1

@@ -2,11 +2,11 @@
 
     r = K (p - integral of (tau + C^T q' - g + r)),   p = M(q) q'
 
-so that r follows the external torque as a first-order low-pass with the time constant 1/K. M, C and g are those of the
-robot description with what the hand is told to carry; tau is the measured torque between motors and links, so that
-friction of the drives and inertia of the motors do not enter. Velocities come from positions alone: the mean velocity
-between two samples, in the middle of them. The torque of a sample counts as the mean over the period that it ends, or
-over one so much earlier as torques lag behind positions: a heavy arm whose acceleration changes feels a millisecond.
+so that r follows the external torque as a first-order low-pass with time constant 1/K. M, C and g come from the robot
+description with the set payload. tau is the measured torque between motors and links: friction of the drives and
+inertia of the motors do not enter. Velocities are computed from positions only: the mean velocity between two samples
+belongs to the middle between them. The torque of a sample counts as the mean over the period that it ends, or over
+an earlier one if torques lag behind positions: for a heavy arm with changing acceleration, 1 ms has an effect.
 """
 
 from __future__ import annotations
@@ -19,20 +19,19 @@ from typing import Protocol
 import numpy as np
 
 Joints = Sequence[float] | np.ndarray
-"""seven numbers, one for each joint in wire order"""
+"""seven numbers, one per joint in wire order"""
 
-LONGEST_GAP = 0.05  # s between two samples that the observer bridges; after a longer one it begins anew
-SILENCE = 1.0
-"""s without a sample, after which the robot may have begun a new session, whose time does not follow the old one"""
+LONGEST_GAP = 0.05  # s, longest gap between two samples that is bridged; after a longer one the observer restarts
+SILENCE = 1.0  # s without a sample: the robot may have started a new session with another time
 BESIDE = 0.4
-"""periods by which a stamp may lie beside the grid of the measurements; farther away nobody can say how many have
-passed, and one too many or too few would look like a push"""
-JUMP = 12.0  # Nm by which one sample differs from the estimate if its stamp may be wrong: it is left out
-DOUBTS = 2  # such samples in a row at most: what stays is a hit
+"""periods, largest distance of a stamp from the grid of the measurements. Beyond that, the number of passed periods is
+unclear, and a wrong number would look like a push."""
+JUMP = 12.0  # Nm, difference of one sample from the estimate; a larger one may come from a wrong stamp and is left out
+DOUBTS = 2  # largest number of consecutive samples that are left out; a lasting difference is a hit
 
 
 class Terms(Protocol):
-    """Rigid-body terms at one posture and velocity, as coglab_controllers.DynamicTerms."""
+    """Rigid-body terms at one posture and velocity; see coglab_controllers.DynamicTerms."""
 
     @property
     def momentum(self) -> np.ndarray:
@@ -48,18 +47,18 @@ class Terms(Protocol):
 
 
 class Dynamics(Protocol):
-    """The model of the arm, as coglab_controllers.ArmDynamics."""
+    """Model of the arm; see coglab_controllers.ArmDynamics."""
 
     def evaluate(self, q: np.ndarray, velocity: np.ndarray) -> Terms:
-        """Terms at q (rad) and velocity (rad/s)."""
+        """Returns the terms at q (rad) and velocity (rad/s)."""
 
     def set_payload(self, mass: float, centre: np.ndarray) -> None:
-        """A point of ``mass`` kg at ``centre`` (m, frame of the palm) from now on."""
+        """Set a point mass of ``mass`` kg at ``centre`` (m, frame of the palm)."""
 
 
 @dataclass(frozen=True)
 class Residual:
-    """What the observer tells with one sample. Torques in Nm, rad/s, rad/s^2; seven joints each."""
+    """Result of the observer for one sample. Nm, rad, rad/s, rad/s^2; seven joints each."""
 
     stamp: float
     torque: np.ndarray
@@ -67,31 +66,31 @@ class Residual:
     position: np.ndarray
     velocity: np.ndarray
     acceleration: np.ndarray
-    """low-passed as the estimate is"""
+    """low-passed like the estimate"""
     rate: np.ndarray
-    """of the measured torque, Nm/s, low-passed in the same way: a second more of lag takes this from the estimate"""
+    """derivative of the measured torque, Nm/s, low-passed too; a lag of 1 s more subtracts it from the estimate"""
     fresh: bool = False
-    """the observer has begun anew: the estimates before this one do not count"""
+    """the observer has restarted: earlier estimates do not count"""
 
 
 class MomentumObserver:
-    """One sample after the other; a sample that is no number is left out, one that comes after a long gap or with a
-    clock that was set begins a new estimate at zero error: what acts then counts as the arm's own."""
+    """Processes consecutive samples. A sample that is not finite is left out. After a long gap or a set clock, a new
+    estimate starts at zero: the torque that acts then counts as the arm's own."""
 
     def __init__(self, dynamics: Dynamics, gain: float = 40.0, period: float = 0.0) -> None:
-        """``gain``: K, 1/s. ``period``: s between the robot's measurements, of which the times between samples are
-        whole multiples; 0: the stamps are exact. Stamps of reception jitter, and a velocity feels that;
-        up to a quarter of a period is taken away."""
+        """``gain``: K, 1/s. ``period``: of the robot's measurements, s; the time between samples is a multiple of it.
+        0: the stamps are exact. Stamps of reception jitter, which affects velocities; jitter up to a quarter of a
+        period is removed."""
         if not gain > 0.0 or not math.isfinite(gain):
             raise ValueError(f"gain must be a positive number of 1/s, got {gain}")
         self.gain, self.period = gain, period
         self.lag = 0.0
-        """s by which the torques come later than the positions of the same sample"""
+        """s by which the torques lag behind the positions of the same sample"""
         self._dynamics = dynamics
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything."""
+        """Delete all past samples."""
         self._stamp: float | None = None
         self._made: float | None = None
         self._grid = 0.0
@@ -104,14 +103,14 @@ class MomentumObserver:
         self._doubts = 0
 
     def set_payload(self, mass: float, centre: Joints) -> None:
-        """The hand carries this from now on: what it weighs and its inertia are no external torque any more. The
-        estimate begins anew. ValueError for what is no mass."""
+        """Set the payload: its weight and inertia are then no external torque. The estimate restarts. ValueError:
+        invalid mass."""
         self._dynamics.set_payload(mass, np.asarray(centre, dtype=float))
         self.reset()
 
     def feed(self, stamp: float, position: Joints, torque: Joints, made: float | None = None) -> Residual | None:
-        """One sample: s, rad, Nm. None while too few samples have followed each other. ``made``: s, the robot's time
-        of the measurement, if it is known: then no stamp counts, which a busy computer gives too late."""
+        """Process one sample: s, rad, Nm. None until enough consecutive samples have come. ``made``: the robot's time
+        (s) of the measurement, if known; then the stamp, which is late on a busy computer, is not used."""
         q, tau = np.asarray(position, dtype=float), np.asarray(torque, dtype=float)
         if not (math.isfinite(stamp) and np.isfinite(q).all() and np.isfinite(tau).all()):
             return None
@@ -122,7 +121,7 @@ class MomentumObserver:
         self._made = made
         if step == 0.0:
             return None
-        if step is not None and step < 0.0:  # the estimate stays, velocities begin anew
+        if step is not None and step < 0.0:  # the estimate stays, the velocities restart
             self._stamp, self._grid, self._velocity = stamp, stamp, None
             self._position, self._torque = q, tau
             return None
@@ -131,8 +130,8 @@ class MomentumObserver:
         return None if step is None else self._advance(stamp, step, last_position, last_torque)
 
     def _since_last(self, stamp: float, made: float | None) -> float | None:
-        """s since the last sample; None if this one does not follow it; 0 for one that was there already; negative
-        where nobody can say."""
+        """Returns the time (s) since the last sample. None: it does not follow the last one. 0: it is a repetition.
+        Negative: the time is unclear."""
         if self._stamp is None or (made is None) != (self._made is None):
             return None
         step = stamp - self._stamp
@@ -142,7 +141,7 @@ class MomentumObserver:
         if step == 0.0 or not -LONGEST_GAP <= step <= LONGEST_GAP:
             return 0.0 if step == 0.0 else None
         if self.period > 0.0:
-            # The measurements lie on a grid that the stamps tell with jitter, and that is followed slowly.
+            # The measurements lie on a regular grid. The stamps show it with jitter, so the grid follows them slowly.
             since = (stamp - self._grid) / self.period
             periods = max(1, round(since))
             if abs(since - periods) > BESIDE:
@@ -160,7 +159,7 @@ class MomentumObserver:
         self._velocity, self._momentum, self._forces, self._step = velocity, momentum, forces, step
         if last_velocity is None:
             return None
-        # From the middle of the last interval to that of this one: each of the two torques is a mean over its interval.
+        # From the middle of the last interval to the middle of this one: each torque is a mean over its interval.
         span = 0.5 * (step + last_step)
         torque = (last_step * torque_before + step * self._torque) / (step + last_step)
         rate = (self._torque - torque_before) / span

@@ -1,13 +1,13 @@
-"""How large the residual of a momentum observer gets without any contact, learnt from the robot's own reaches.
+"""Size of the momentum observer's residual without contact, learnt from the robot's own reaches.
 
-What counts is the residual's change against its own mean of a moment ago: sensors' offsets, a wrong payload and other
-slow errors of the model drop out. That mean is long, since its own noise is part of the change. What changes quickly is
-learnt: torques that lag behind positions look like a push wherever the acceleration changes, and an object that is
-heavier than its file says like one wherever the hand is turned or hastened. The change's variance, per joint, is a sum
-of shares that grow with speed, acceleration and what the load told needs; the shares are learnt by non-negative least
-squares, after the lag. The change is then explained by a force on the palm (generalised least squares), and the length
-of that force in standard deviations is compared with a limit that reaches without contact exceed with a chosen
-probability (Gumbel's law on the largest value of each reach).
+The detector uses the change of the residual against its own recent mean, so that sensor offsets, a wrong payload and
+other slow errors of the model cancel. The mean is long, because its noise is part of the change. The fast errors are
+learnt. Torques that lag behind positions look like a push when the acceleration changes. An object that is heavier than
+in its file looks like a push when the hand turns or accelerates. The variance of the change, per joint, is a sum of
+shares that grow with speed, acceleration and the torque of the set payload. The shares are learnt by non-negative least
+squares, after the lag. Then the change is explained by a force on the palm (generalised least squares). The length of
+that force in standard deviations is compared with a limit that reaches without contact exceed with a chosen probability
+(Gumbel's law for the largest value of each reach).
 """
 
 from __future__ import annotations
@@ -35,30 +35,30 @@ FEATURES = (
     "acceleration squared",
     "torque of the load squared",
 )
-"""what a variance (Nm^2) grows with: 1, v (rad/s, fastest joint, over what the residual remembers), v^2, the same over
-the moment ago that the residual is compared with, a^2 (rad/s^2, fastest changing joint), and, joint by joint, the
-square of the change (Nm) in what the payload told needs to be carried and accelerated"""
-FLOOR = 1e-4  # Nm^2, smallest variance believed: a noise-free simulation must not alarm on rounding
-RECENT = 0.10  # s; the change is counted from the mean of the samples between RECENT
-OLD = 0.60  # s and OLD ago
-LATELY = 0.25  # s: an offset is of the mean between RECENT and so long ago
-MEMORY = 0.025  # s over which speeds and the torque of the load are averaged, about the time constant of the residual
-LEAST = 20  # samples of that mean
-CONFIRM = 2  # samples in a row over the limit
+"""Terms of the variance (Nm^2): 1; v (rad/s, fastest joint, averaged over the memory of the residual); v^2; v^2 in the
+time of the reference mean; a^2 (rad/s^2, joint with the largest acceleration); and, for each joint, the square of the
+change (Nm) of the torque that carries and accelerates the set payload"""
+FLOOR = 1e-4  # Nm^2, lower limit of the variance: in a noise-free simulation, rounding must not trigger
+RECENT = 0.10  # s, age of the newest sample of the reference mean
+OLD = 0.60  # s, age of its oldest sample
+LATELY = 0.25  # s, age of the oldest sample of the mean for an offset
+MEMORY = 0.025  # s, averaging time of speeds and payload torque; about the time constant of the residual
+LEAST = 20  # smallest number of samples of the reference mean
+CONFIRM = 2  # consecutive samples over the limit
 ALARM_SHARE = 2e-3  # probability with which a reach without contact may exceed the limit
 EULER = 0.5772156649015329
 AXES = np.eye(3)
-WEIGHT = np.array([0.0, 0.0, 9.81])  # m/s^2 that carrying needs, base frame
-LONGEST_LAG = 0.01  # s of lag that is believed
+WEIGHT = np.array([0.0, 0.0, 9.81])  # m/s^2, acceleration for carrying, base frame
+LONGEST_LAG = 0.01  # s, largest plausible lag
 
 
 class ThresholdError(ValueError):
-    """Thresholds that cannot be used or learnt; the sentence says why."""
+    """Thresholds cannot be used or learnt. The sentence gives the reason."""
 
 
 @dataclass(frozen=True)
 class Offset:
-    """Residual at rest after a motion less that at rest before it, Nm, with the palm's 3 x 7 Jacobian there."""
+    """Residual at rest after a motion minus that before it, Nm, with the palm's 3 x 7 Jacobian there."""
 
     torque: np.ndarray
     jacobian: np.ndarray
@@ -66,35 +66,35 @@ class Offset:
 
 @dataclass(frozen=True)
 class Change:
-    """The residual's change at one sample, Nm; what its variance grows with; where the joints were, rad."""
+    """Change of the residual at one sample, Nm; the terms of its variance; the joint positions, rad."""
 
     stamp: float
     torque: np.ndarray
     features: np.ndarray
     """7 x FEATURES"""
     rate: np.ndarray
-    """the change, Nm/s, that a second less of lag adds to the torque's"""
+    """Nm/s, derivative of this change with respect to the lag: the torque's rate"""
     position: np.ndarray
     jacobian_at: Callable[[np.ndarray], np.ndarray]
 
     @cached_property
     def jacobian(self) -> np.ndarray:
-        """The palm's 3 x 7 Jacobian there; computed where somebody asks, which is seldom."""
+        """The palm's 3 x 7 Jacobian at this position. Computed on demand, which is rare."""
         return self.jacobian_at(self.position)
 
 
 class ChangeOfResidual:
-    """The residual against its own mean of a moment ago."""
+    """Change of the residual against its own recent mean."""
 
     def __init__(self, jacobian: Any) -> None:
-        """``jacobian``: position of the joints (rad) to 3 x 7, m/rad, base frame."""
+        """``jacobian``: converts joint positions (rad) to the 3 x 7 matrix, m/rad, base frame."""
         self._jacobian = jacobian
         self._recent: deque[tuple[float, np.ndarray]] = deque()
         self._old: deque[tuple[float, np.ndarray]] = deque()
         self.reset()
 
     def reset(self) -> None:
-        """Forget the past."""
+        """Delete the past."""
         self._recent.clear()
         self._old.clear()
         self._speed: float | None = None
@@ -105,11 +105,11 @@ class ChangeOfResidual:
 
     @property
     def past(self) -> np.ndarray:
-        """Nm, the mean of a moment ago; of fewer samples than the change is counted from."""
+        """Nm, mean of the samples between RECENT and LATELY; fewer samples than for the change."""
         return np.asarray(np.mean([all_of[:7] for at, all_of in self._old if at >= self._stamp - LATELY], axis=0))
 
     def _needed(self, residual: Residual, load: float, step: float, blend: float) -> np.ndarray:
-        """Nm that the load told needs to be carried and accelerated, low-passed."""
+        """Returns the low-passed torque (Nm) that carries and accelerates the payload."""
         if not load > 0.0:
             return self._carried
         jacobian = self._jacobian(residual.position)
@@ -121,13 +121,13 @@ class ChangeOfResidual:
         return self._carried
 
     def feed(self, residual: Residual, load: float) -> Change | None:
-        """One residual, ``load`` kg told; None while there is no past to compare with."""
+        """Process one residual with the payload ``load`` (kg). None until there is a reference mean."""
         if residual.fresh:
             self.reset()
         speed = float(np.abs(residual.velocity).max()) ** 2
         step = residual.stamp - self._stamp
         blend = 1.0 if self._speed is None else 1.0 - float(np.exp(-step / MEMORY))
-        # Residual, its rate, what the load needs and the speed's square: one sum over the moment ago serves them all.
+        # Residual, its rate, payload torque and squared speed share one running sum.
         now = np.empty(22)
         now[:7], now[7:14], now[21] = residual.torque, residual.rate, speed
         now[14:21] = self._needed(residual, load, step, blend)
@@ -152,8 +152,8 @@ class ChangeOfResidual:
 
 @dataclass(frozen=True)
 class Thresholds:
-    """What was learnt: shares of the variance of a change (7 joints x FEATURES), standard deviations of an offset (7,
-    Nm), of both the limit of the force in deviations, and the lag of the torques (s, see MomentumObserver)."""
+    """Learnt values: shares of the variance of a change (7 joints x FEATURES), standard deviations of an offset (7,
+    Nm), the limits of both forces in standard deviations, and the lag of the torques (s, see MomentumObserver)."""
 
     variance: np.ndarray
     limit: float
@@ -163,20 +163,20 @@ class Thresholds:
     lag: float = 0.0
 
     def deviation(self, features: np.ndarray) -> np.ndarray:
-        """Standard deviation of each joint's change without contact, Nm."""
+        """Returns the standard deviation of each joint's change without contact, Nm, shape (7,)."""
         return np.sqrt(np.maximum((self.variance * features).sum(axis=1), FLOOR))
 
     def force(self, change: Change) -> tuple[np.ndarray, float]:
-        """The force on the palm (N, base frame) that explains a change best, and its length in deviations."""
+        """Returns the force on the palm (N, base frame) that explains a change best, and its length in deviations."""
         return explained(change.torque, self.deviation(change.features), change.jacobian)
 
     def steady_force(self, offset: Offset, features: np.ndarray) -> tuple[np.ndarray, float]:
-        """The same of an offset, seen while the arm moves with these ``features``."""
+        """The same for an offset, seen while the arm moves with these ``features``."""
         deviation = np.sqrt(self.steady**2 + self.deviation(features) ** 2)
         return explained(offset.torque, deviation, offset.jacobian)
 
     def save(self, path: Path) -> None:
-        """Write the file; OSError where that is not possible."""
+        """Write the file; OSError if that fails."""
         text = {
             "features": list(FEATURES),
             "variance": [[float(f"{v:.5g}") for v in row] for row in self.variance],
@@ -190,7 +190,7 @@ class Thresholds:
 
     @staticmethod
     def load(path: Path) -> Thresholds:
-        """Read a file. ThresholdError, or an error of coglab_py.yaml_file, says what is wrong with it."""
+        """Read a file. ThresholdError, or an error of coglab_py.yaml_file, gives the reason of a failure."""
         data = read(path).value
         if not isinstance(data, dict) or data.get("features") != list(FEATURES):
             raise ThresholdError(f"{path}: expected the features {', '.join(FEATURES)}; learn the thresholds anew")
@@ -212,10 +212,10 @@ class Thresholds:
 
 
 def explained(torque: np.ndarray, deviation: np.ndarray, jacobian: np.ndarray) -> tuple[np.ndarray, float]:
-    """The force on the palm (N) behind joint torques (Nm) with these deviations, and its length in deviations."""
+    """Returns the force on the palm (N) that explains joint torques (Nm), and its length in standard deviations."""
     weighed = jacobian / deviation
     information = weighed @ weighed.T
-    # A stretched arm feels no force along itself: the small share keeps the solution finite there.
+    # A stretched arm cannot measure forces along itself: the small term keeps the solution finite there.
     steadied = information + 1e-9 * information.trace() * AXES
     force = np.linalg.solve(steadied, weighed @ (torque / deviation))
     return force, math.sqrt(max(0.0, force @ information @ force))
@@ -227,8 +227,8 @@ def learn(
     alarm_share: float = ALARM_SHARE,
     lag: float = 0.0,
 ) -> Thresholds:
-    """From the changes of whole reaches without contact, at least 20 of them, and their offsets where the hand was
-    empty; ``lag``: of the torques (s), as it was believed meanwhile. ThresholdError says what is missing."""
+    """Learn from the changes of at least 20 complete reaches without contact, and from the offsets of the empty hand.
+    ``lag``: lag of the torques (s) that was used meanwhile. ThresholdError: data is missing."""
     runs = [list(reach) for reach in reaches if len(reach) >= CONFIRM]
     if len(runs) < 20:
         raise ThresholdError(f"expected at least 20 reaches without contact, got {len(runs)}")
@@ -241,7 +241,7 @@ def learn(
     runs = [[replace(change, torque=change.torque - moved * change.rate) for change in run] for run in runs]
     variance = shares_of(torques - moved * rates, features)
     rests = np.array([offset.torque for offset in offsets]).reshape(-1, 7)
-    # Until offsets were seen an offset has to be as large as the one that D4.10's detector asks for.
+    # Without enough offsets, use a limit as large as the offset of D4.10's detector.
     steady = np.sqrt(np.mean(rests**2, axis=0)) if len(rests) >= 20 else np.full(7, 0.3)
     draft = Thresholds(variance, 1.0, steady, 1.0, len(runs))
     changed = [largest_confirmed([draft.force(change)[1] for change in run]) for run in runs]
@@ -251,10 +251,10 @@ def learn(
 
 
 def shares_of(torques: np.ndarray, features: np.ndarray) -> np.ndarray:
-    """The shares (7 x FEATURES) of the variance of n changes (n x 7, Nm) with their features (n x 7 x FEATURES)."""
+    """Returns the shares (7 x FEATURES) of the variance of n changes (n x 7, Nm) with features (n x 7 x FEATURES)."""
     variance = np.zeros(features.shape[1:])
     for joint in range(7):
-        # A squared change scatters with its own size: weighing by that size keeps the quiet samples' share.
+        # The scatter of a squared change grows with its size: the weights keep the influence of the quiet samples.
         squares, seen, weight = torques[:, joint] ** 2, features[:, joint], np.ones(len(features))
         for _ in range(4):
             variance[joint] = nnls(seen * weight[:, None], squares * weight)[0]
@@ -263,13 +263,14 @@ def shares_of(torques: np.ndarray, features: np.ndarray) -> np.ndarray:
 
 
 def limit_of(largest: Sequence[float], alarm_share: float) -> float:
-    """What the largest value of a reach exceeds with this probability, by Gumbel's law; never less than was seen."""
+    """Returns the limit that the largest value of a reach exceeds with this probability (Gumbel's law), and at least
+    1.05 times the largest seen value."""
     scale = float(np.std(largest)) * np.sqrt(6.0) / np.pi
     gumbel = float(np.mean(largest)) - EULER * scale - scale * float(np.log(-np.log1p(-alarm_share)))
     return max(gumbel, 1.05 * float(np.max(largest)))
 
 
 def largest_confirmed(values: Sequence[float]) -> float:
-    """The largest value that CONFIRM samples in a row have reached."""
+    """Returns the largest value that CONFIRM consecutive samples have reached."""
     each = np.asarray(values, dtype=float)
     return float(np.max(np.minimum.reduce([each[k : len(each) - CONFIRM + 1 + k] for k in range(CONFIRM)])))

@@ -1,4 +1,4 @@
-"""Contact from the torques of an arm that moves: momentum observer, its change, thresholds, and how to learn them."""
+"""Contact from the torques of a moving arm: momentum observer, change of its residual, learnt thresholds."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from coglab_contact.evidence import MOMENTUM, Evidence
 from coglab_contact.momentum_observer import Dynamics, Joints, MomentumObserver, Residual
 from coglab_contact.motion_thresholds import CONFIRM, Change, ChangeOfResidual, Offset, Thresholds, learn
 
-HOLD = 0.03  # s for which one sample counts
-STILL = 0.02  # rad/s; a joint faster than this is motion
+HOLD = 0.03  # s, validity of one sample
+STILL = 0.02  # rad/s; the arm moves if a joint is faster
 SLOW = 0.15  # rad/s of the fastest joint
 GENTLE = 1.0  # rad/s^2
-SETTLED = 0.25  # s of stillness before the residual is taken as that of a free arm
-LEAD = 0.03  # s by which a force is extrapolated: about the observer's own delay
-GROWTH = 0.02  # s over which its growth is measured
+SETTLED = 0.25  # s of standstill before the residual counts as that of a free arm
+LEAD = 0.03  # s by which a force is extrapolated: about the delay of the observer
+GROWTH = 0.02  # s over which the growth of the force is measured
 
 
-SHORTEST = 40  # samples of a motion that counts
-LONGEST = 4000  # samples of one that is kept; what follows belongs to the next
+SHORTEST = 40  # samples, shortest motion that counts
+LONGEST = 4000  # samples, longest recorded motion; later samples belong to the next one
 
 
 class MovingContact:
-    """Feed it every sample of lwr/joint_states, and ask it for evidence. The hand carries nothing until it is told."""
+    """Processes every sample of lwr/joint_states; returns evidence of contact. The default payload is zero."""
 
     def __init__(
         self,
@@ -38,34 +38,34 @@ class MovingContact:
         jacobian: Callable[[Joints], np.ndarray],
         period: float = 0.0,
     ) -> None:
-        """``jacobian``: position of the joints (rad) to the palm's 3 x 7, base frame. ``period``: see
+        """``jacobian``: converts joint positions (rad) to the palm's 3 x 7 matrix, base frame. ``period``: see
         MomentumObserver."""
         self.observer = MomentumObserver(dynamics, period=period)
         self.use(thresholds)
         self.load = 0.0
         self.change: Change | None = None
-        """the newest one"""
+        """newest change"""
         self.residual: Residual | None = None
-        """the newest one"""
+        """newest residual"""
         self._jacobian = jacobian
         self._changes = ChangeOfResidual(jacobian)
         self._newest: deque[Change] = deque(maxlen=CONFIRM)
         self._still_since: float | None = None
         self._rest: np.ndarray | None = None
         self._free: np.ndarray | None = None
-        """mean residual of the rest before the motion, or of this one while the arm has not moved"""
+        """mean residual of the rest before the motion"""
         self._rest_position, self._rest_stamp = np.zeros(7), 0.0
-        self._free_weight: float | None = None  # N on the palm then
-        self._growing: deque[tuple[float, np.ndarray]] = deque()  # s and Nm: the residuals of the last GROWTH
+        self._free_weight: float | None = None  # N, load on the palm at that rest
+        self._growing: deque[tuple[float, np.ndarray]] = deque()  # (s, Nm): residuals of the last GROWTH s
 
     def use(self, thresholds: Thresholds) -> None:
-        """These thresholds, and the lag of the torques that was learnt with them, from now on."""
+        """Use these thresholds, and the lag of the torques that was learnt with them."""
         self.thresholds = thresholds
         self.observer.lag = thresholds.lag
 
     def set_payload(self, mass: float, centre: Joints = (0.0, 0.0, 0.0)) -> None:
-        """The hand carries ``mass`` kg at ``centre`` (m, ih2_palm) from now on; the past does not count any more, so
-        that the load's own coming is no contact. ValueError for what is no mass."""
+        """Set a payload of ``mass`` kg at ``centre`` (m, ih2_palm). The past is deleted, so that the arrival of the
+        load is no contact. ValueError: invalid mass."""
         self.observer.set_payload(mass, centre)
         self.load = mass
         self._forget()
@@ -77,23 +77,23 @@ class MovingContact:
         self.change = self._still_since = self._rest = self._free = self._free_weight = None
 
     def still(self) -> bool:
-        """Whether the arm has stood still long enough."""
+        """True if the arm has stood still for SETTLED s."""
         return self._rest is not None
 
     def offset(self) -> Offset | None:
-        """Residual of a moment ago less that of the last rest before the motion; None where no rest was seen."""
+        """Returns the recent mean residual minus that of the last rest before the motion; None without such a rest."""
         if self.change is None or self._free is None:
             return None
         return Offset(self._changes.past - self._free, self.change.jacobian)
 
     def offset_of_motion(self) -> Offset | None:
-        """Residual of this rest less that of the rest before the motion; None while the arm moves."""
+        """Returns the residual of this rest minus that of the rest before the motion; None while the arm moves."""
         if self.change is None or self._free is None or self._rest is None:
             return None
         return Offset(self._rest - self._free, self.change.jacobian)
 
     def steady(self) -> Evidence | None:
-        """What the offset says: a person who was early has left one before anybody watched."""
+        """Returns the evidence from the offset: an early touch leaves an offset before the detector was armed."""
         offset = self.offset()
         if offset is None or self.change is None or self.load > 0.0:
             return None
@@ -103,23 +103,23 @@ class MovingContact:
         return Evidence(MOMENTUM, stamp, stamp + HOLD, margin, message)
 
     def weight_since(self, before: np.ndarray) -> float:
-        """N that have come to hang on the palm since the residual was ``before`` (Nm), whether the arm moves or not:
-        down's part of the force on the palm that explains the change best, so that a pull aside is no weight."""
+        """Returns the weight (N) that has come to the palm since the residual was ``before`` (Nm), moving or not. It is
+        the downward part of the force on the palm that explains the change best: a sideways pull is no weight."""
         assert self.residual is not None
         return self.weight(self.residual.torque - before, self.residual.position)
 
     def weight(self, residual: Joints, position: Joints) -> float:
-        """N that hang on the palm by a residual (Nm) at a position (rad): see weight_since."""
+        """Returns the weight (N) on the palm for a residual (Nm) at a position (rad): see weight_since."""
         return -float(np.linalg.lstsq(self._jacobian(position).T, residual, rcond=0.05)[0][2])
 
     def before_motion(self) -> np.ndarray | None:
-        """Mean residual (Nm) of the last rest before the motion that goes on or was the last, or of this rest while the
-        arm has not moved; None where none was seen."""
+        """Returns the mean residual (Nm) of the last rest before the present or last motion, or of this rest if the arm
+        has not moved yet; None without such a rest."""
         return self._rest if self._free is None else self._free
 
     def force_since(self, before: np.ndarray) -> np.ndarray | None:
-        """N on the palm, base frame, beyond what acted when the residual was ``before`` (Nm): as far as it will have
-        grown in LEAD s if it goes on like that. None where nothing was measured yet."""
+        """Returns the force (N) on the palm in the base frame, relative to the residual ``before`` (Nm), extrapolated
+        by LEAD s. None before the first measurement."""
         if not self._growing or self.residual is None:
             return None
         (begin, first), (stamp, torque) = self._growing[0], self._growing[-1]
@@ -128,11 +128,11 @@ class MovingContact:
         return np.asarray(np.linalg.lstsq(self._jacobian(self.residual.position).T, ahead, rcond=0.05)[0])
 
     def weight_before_motion(self) -> float | None:
-        """N on the palm in the last rest before the motion that goes on or was the last; None where none was seen."""
+        """Returns the load (N) on the palm at the last rest before the present or last motion; None if unknown."""
         return self._free_weight
 
     def slow(self) -> bool:
-        """Whether the arm moves so little that what is missing in its model's inertia is no force."""
+        """True if the arm moves so slowly that errors of the model's inertia do not matter."""
         residual = self.residual
         if residual is None or np.abs(residual.velocity).max() > SLOW:
             return False
@@ -153,7 +153,7 @@ class MovingContact:
             self._rest_position, self._rest_stamp = residual.position, residual.stamp
 
     def feed(self, stamp: float, position: Joints, torque: Joints, made: float | None = None) -> None:
-        """One sample: s, rad, Nm as measured; ``made``: see MomentumObserver.feed."""
+        """Process one measured sample: s, rad, Nm. ``made``: see MomentumObserver.feed."""
         residual = self.residual = self.observer.feed(stamp, position, torque, made)
         if residual is None:
             return
@@ -171,8 +171,8 @@ class MovingContact:
             self._newest.append(self.change)
 
     def evidence(self) -> Evidence | None:
-        """What the newest samples say; None while there is too little of a past, or where the last sample was left
-        out. Who does not watch does not ask: the force behind a change costs more than all the rest."""
+        """Returns the evidence of the newest samples. None without a reference mean, or if the last sample was left
+        out. Call it only while watching: the force behind a change is the most expensive computation here."""
         if self.residual is None or self.change is None:
             return None
         forces = [self.thresholds.force(change) for change in self._newest]
@@ -184,8 +184,8 @@ class MovingContact:
 
 
 def unwritable(file: str) -> str:
-    """Why what is learnt cannot be written to this file, in a sentence; empty where it can. The file is not touched: an
-    empty one would be read at the next start."""
+    """Returns the reason why a file cannot be written, a sentence; empty if it can. The file is not touched: an empty
+    one would be read at the next start."""
     path = Path(file)
     if path.is_dir():
         return f"{path} is a folder: name a file in it"
@@ -198,7 +198,7 @@ def unwritable(file: str) -> str:
 
 
 class MotionRecorder:
-    """Look at a MovingContact after each sample; nobody touches the arm meanwhile."""
+    """Records the motions of a MovingContact, for learning. Nobody may touch the arm meanwhile."""
 
     def __init__(self, moving: MovingContact) -> None:
         self.moving = moving
@@ -208,7 +208,7 @@ class MotionRecorder:
         self._stamp = 0.0
 
     def look(self) -> None:
-        """After each sample of the arm: one motion lasts from rest to rest."""
+        """Call this after each sample of the arm. One motion lasts from rest to rest."""
         change = self.moving.change
         if change is None or change.stamp == self._stamp:
             return
@@ -218,14 +218,14 @@ class MotionRecorder:
         if len(self._reach) >= LONGEST or (resting and self._moved()):
             self.end()
         elif resting:
-            # Of the rest before a motion its last moment belongs to it: the stop of the one before does not.
+            # Of the rest before a motion, only the last moment belongs to it, not the stop of the previous motion.
             self._reach = self._reach[-SHORTEST:]
 
     def _moved(self) -> bool:
         return max(change.features[0, 1] for change in self._reach) > 0.1
 
     def end(self) -> None:
-        """The motion is over, or has lasted long enough."""
+        """End the motion and keep it if it was long enough."""
         if len(self._reach) >= SHORTEST and self._moved():
             self.reaches.append(self._reach)
             offset = self.moving.offset_of_motion()
@@ -234,5 +234,5 @@ class MotionRecorder:
         self._reach = []
 
     def learn(self) -> Thresholds:
-        """From what was gathered. ThresholdError where that is too little."""
+        """Learn from the recorded motions. ThresholdError if there are too few."""
         return learn(self.reaches, self.offsets, lag=self.moving.thresholds.lag)

@@ -1,5 +1,5 @@
-"""High-level cognitive controller of CogLab: state machines and contact detection.
+"""High-level cognitive controller of CogLab: the state machines.
 
-Packages from the bottom up, each of which imports only those before it: clocks, kinematics, ports, contact, context,
-states, machines, simulated, ros. None but ros imports a ROS client library: states talk to ports.
+Packages from bottom to top; each imports only the ones before it: clocks, kinematics, ports, context, states, machines,
+ros. Only ros imports a ROS client library; the states use ports.
 """

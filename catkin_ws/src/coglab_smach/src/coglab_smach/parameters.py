@@ -1,4 +1,4 @@
-"""Parameters of the state machines: one row each. Ranges, the check of machines.yaml and the reference come from here.
+"""Parameters of the state machines, one row each: source of the ranges, the check of machines.yaml and the reference.
 
 ``python3 -m coglab_smach.parameters`` prints the reference as a Markdown table.
 """
@@ -12,12 +12,12 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
-NO_DEFAULT: Any = object()  # of a parameter that the file has to set
+NO_DEFAULT: Any = object()  # default of a parameter that the file must set
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One parameter by its dotted name."""
+    """One parameter and its dotted name."""
 
     name: str
     default: Any
@@ -26,14 +26,14 @@ class Parameter:
     low: float | None = None
     high: float | None = None
     above: bool = False
-    """``low`` itself is not allowed"""
+    """True: the value must be above ``low``"""
     timed: bool = False
-    """a timing may set it"""
+    """True: a timing may set this parameter"""
     schema: Mapping[str, Any] = field(default_factory=dict)
-    """JSON schema (draft 7) where type and range do not say it all"""
+    """JSON schema (draft 7), if type and range are not sufficient"""
 
     def json_schema(self) -> dict[str, Any]:
-        """What a value has to fit."""
+        """Returns the JSON schema of the value."""
         if self.schema:
             return dict(self.schema)
         if isinstance(self.default, bool):
@@ -200,7 +200,7 @@ BY_NAME = {row.name: row for row in TABLE}
 
 @lru_cache(maxsize=1)
 def schema() -> dict[str, Any]:
-    """JSON schema of machines.yaml."""
+    """Returns the JSON schema of machines.yaml."""
     timed = {row.name: row.json_schema() for row in TABLE if row.timed}
     timing = {"type": "object", "additionalProperties": False, "properties": timed}
     top = _group()
@@ -219,7 +219,7 @@ def _group() -> dict[str, Any]:
 
 
 def unknown(values: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], str]]:
-    """Way to each name in a file that is no parameter, and the nearest one that is, or ''."""
+    """Yields the path to each unknown name in a file, and the nearest known name or ''."""
     groups = {".".join(name.split(".")[:k]) for name in BY_NAME for k in range(1, name.count(".") + 1)}
     open_ways: list[tuple[tuple[str, ...], Any]] = [((str(name),), value) for name, value in values.items()]
     while open_ways:
@@ -232,7 +232,7 @@ def unknown(values: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], str]]:
 
 
 def markdown() -> str:
-    """The table for the reference."""
+    """Returns the table for the reference."""
     lines = ["| parameter | default | range | unit | meaning |", "| --- | --- | --- | --- | --- |"]
     for row in TABLE:
         default = "" if row.default in (NO_DEFAULT, None) else f"`{json.dumps(row.default)}`"

@@ -1,4 +1,4 @@
-"""Whole handovers in virtual time, without a ROS master: a world, trials in it, and scripted ports for unit tests."""
+"""Simulated handovers in virtual time, without a ROS master: World, VirtualTrial, and scripted ports for unit tests."""
 
 from coglab_trials.conditions import Conditions
 from coglab_trials.trial import GIVE, RECEIVE, TrialResult, VirtualTrial

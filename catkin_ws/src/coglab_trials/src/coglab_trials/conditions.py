@@ -1,4 +1,4 @@
-"""Under which conditions a trial runs: whose hand, which tracker, which object; and hardships that can be added."""
+"""Conditions of a trial: person, tracker and object, and hardships that can be added."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from coglab_sim.tracker.tracker import PerceptionSettings
 
 @dataclass(frozen=True)
 class Conditions:
-    """Of one trial. By default a person is drawn, the tracker has the errors of trackers, and the object is as its file
-    says. Example::
+    """Conditions of one trial. By default, the seed draws the person, the tracker has realistic errors, and the object
+    has the mass and friction of its file. Example::
 
         tired = Conditions(person={"reaction_median": 0.6}, object_id="bottle", mass=1.3)
         sharp = Conditions(profile="accustomed", perception=PerceptionSettings(perfect=True))
@@ -21,28 +21,28 @@ class Conditions:
     """
 
     behaviour: str = "normal"
-    """what the person does: coglab_sim.person.participant.BEHAVIOURS, e.g. "slow" or "never_release"."""
+    """behaviour of the person: one of coglab_sim.person.participant.BEHAVIOURS, e.g. "slow" or "never_release" """
     profile: str = "drawn"
-    """who the person is: "drawn" by the seed, "patient" or "accustomed"."""
+    """type of person: "drawn" (by the seed), "patient" or "accustomed" """
     person: Mapping[str, Any] = field(default_factory=dict)
-    """fields of Participant that are set, whoever was drawn"""
+    """fields of Participant that override the profile"""
     perception: PerceptionSettings = PerceptionSettings()
     object_id: str = "mug"
     mass: float = 1.0
-    """of the true object, as share of what its file says"""
+    """mass of the simulated object, relative to its file"""
     friction: float = 1.0
 
     def participant(self, seed: int) -> Participant:
-        """The person with this seed."""
+        """Returns the person for this seed."""
         return replace(Participant.draw(seed, self.behaviour, self.profile), **self.person)
 
 
 PATIENT = Conditions(profile="patient", perception=PerceptionSettings(perfect=True))
-"""Where the physics are judged: a patient person, perfect perception."""
+"""For tests of the physics: a patient person, perfect perception."""
 CONSIDERATE = Conditions(profile="accustomed", perception=PerceptionSettings(perfect=True))
-"""For what is about machinery and not about people: an accustomed person, perfect perception."""
+"""For tests of the machines, not of people: an accustomed person, perfect perception."""
 CAREFUL = Conditions(person=HABITS)
-"""The world as it is, but for people with the habits of the accustomed: printed beside it."""
+"""Default conditions, but the person has the habits of the accustomed profile. Reported beside the default."""
 
 HARDSHIPS: dict[str, Callable[[Conditions, int], Conditions]] = {
     "trust 0.1 s": lambda c, seed: replace(c, person={**c.person, "trust": 0.1}),
@@ -52,11 +52,11 @@ HARDSHIPS: dict[str, Callable[[Conditions, int], Conditions]] = {
     "friction -30 %": lambda c, seed: replace(c, friction=0.7 * c.friction),
     "latency +100 ms": lambda c, seed: replace(c, perception=replace(c.perception, latency=c.perception.latency + 0.1)),
 }
-"""Each alone makes the world harder; the seed decides where there are two ways."""
+"""Each hardship alone makes the trial harder. The seed chooses the sign where two are possible."""
 
 
 def hardship(name: str, seed: int, conditions: Conditions = Conditions()) -> Conditions:
-    """The conditions with one hardship; none for an empty name. ValueError for an unknown one."""
+    """Returns the conditions with one hardship added; unchanged for an empty name. ValueError: unknown name."""
     if not name:
         return conditions
     if name not in HARDSHIPS:

@@ -1,4 +1,4 @@
-"""Whole trials in virtual time: the state machines of coglab_smach in a World, and what came of them."""
+"""Simulated trials in virtual time: the state machines of coglab_smach in a World, and their results."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ from coglab_trials.world_ports import VirtualContact, VirtualDatabase, VirtualHa
 RECEIVE, GIVE = "exchange_human_to_robot", "exchange_robot_to_human"
 MACHINES = str(package_path("coglab_smach", "config", "machines.yaml"))
 LIBRARY = str(package_path("coglab_controllers", "config", "primitives.xml"))
-TOUCH = 0.3  # N on the robot's hand, all in all, from which something touches it
+TOUCH = 0.3  # N, total force on the robot's hand that counts as touched
 LOG = logging.getLogger("coglab_trials")
 
 
 @contextmanager
 def _engine_logs() -> Iterator[None]:
-    """Inside the block the engine logs to ``coglab_trials``, transitions as debug messages, which are not shown."""
+    """Inside the block, the SMACH engine logs to ``coglab_trials``; transitions as hidden debug messages."""
     before = smach.loginfo, smach.logwarn, smach.logdebug, smach.logerr
     smach.set_loggers(LOG.debug, LOG.warning, LOG.debug, LOG.error)
     try:
@@ -48,33 +48,33 @@ def _engine_logs() -> Iterator[None]:
 
 @dataclass(frozen=True)
 class TrialResult:
-    """How one action of a trial ended. Times in s of virtual time since the trial began."""
+    """Result of one action of a trial. Times in s of virtual time since the start of the trial."""
 
     action: str
     object_id: str
     outcome: str
-    """"succeeded"; "failed_empty" or "failed_holding", by what the hand is left with; "stopped" or "fault" where the
-    robot needs help before it can go on"""
+    """"succeeded"; "failed_empty" or "failed_holding": the hand is empty or holds the object; "stopped" or "fault": the
+    operator must help before the robot can continue"""
     code: int
-    """coglab_msgs/ReasonCode of the reason; 0 after success"""
+    """coglab_msgs/ReasonCode; 0 after success"""
     reason: str
-    """a sentence; empty after success"""
+    """one sentence; empty after success"""
     causes: tuple[str, ...]
-    """what is behind it, nearest first"""
+    """causes of the reason, nearest first"""
     started: float
     ended: float
     marks: Mapping[str, float]
-    """when what happened: "contact", "closing", ..."""
+    """times of events: "contact", "closing", ..."""
 
     @classmethod
     def of(cls, record: ActionRecord) -> TrialResult:
-        """From the record in the journal of the state machines."""
+        """Converts the record from the journal of the state machines."""
         r = record
         return cls(r.kind, r.object_id, r.outcome, r.code, r.reason, r.causes, r.started, r.ended, dict(r.marks))
 
 
 class VirtualTrial:
-    """The robot's state machines in a World of their own: asks for actions and tells how they ended.
+    """The robot's state machines in their own World. Requests actions and returns their results.
 
     Example::
 
@@ -83,14 +83,13 @@ class VirtualTrial:
             print(result.action, result.outcome, f"{result.ended - result.started:.1f} s", result.reason)
         print(trial.world.truth["held_by"], [reach.touched for reach in trial.reaches])
 
-    The same arguments give the same trial, to the last bit. A trial runs once. Transitions of the machines are logged
-    as debug messages of the logger ``coglab_trials``.
+    The same arguments give the same trial, bit for bit. A trial runs once. Transitions of the machines are logged as
+    debug messages of the logger ``coglab_trials``.
 
-    Attributes: ``world``; ``clock`` (virtual time, s); ``hub``, ``results``, ``why()``: what the machines say;
-    ``begun``: actions that were accepted; ``reach``: the Reach under way, or None; ``reaches``: those that are over;
-    ``said``: (s, code of coglab_msgs/Say) of what the person was told; ``beside``: called with the trial after
-    each period, to look and to interfere; ``ctx``: the Context of the machines, for tests of the machines
-    themselves.
+    Attributes: ``world``. ``clock``: virtual time, s. ``hub``, ``results``, ``why()``: state and results of the
+    machines. ``begun``: accepted actions. ``reach``: the current Reach, or None. ``reaches``: the finished ones.
+    ``said``: (s, code of coglab_msgs/Say) of each message to the person. ``beside``: called with the trial after each
+    period, to observe or to interfere. ``ctx``: the Context of the machines, for tests of the machines.
     """
 
     def __init__(
@@ -104,13 +103,13 @@ class VirtualTrial:
         touch: float | None = None,
     ) -> None:
         """
-        ``seed``, ``conditions``: of the world. ``world``: one that was made already, instead of these.
+        ``seed``, ``conditions``: of the world. ``world``: an existing world, instead of these.
         ``settings``: dotted names of machines.yaml with their values, e.g. ``{"handover.reach_ratio": 2.0}``.
-        ``recogniser``: a coglab_perception Recogniser that sees what the tracker sees; None: movements are not
-        recognised. ``touch``: standard deviation (N) of the hand's touch sensors; None: the hand has none.
+        ``recogniser``: a coglab_perception Recogniser that receives the tracker's sights; None: no recognition.
+        ``touch``: standard deviation (N) of the hand's touch sensors; None: no sensors.
 
-        ValueError: seed or conditions beside a world. ObjectError: no such object. ConfigError: a setting that does
-        not exist, or is out of range. ImportError: the simulation was not built.
+        ValueError: conditions together with a world. ObjectError: unknown object. ConfigError: a setting does not exist
+        or is out of range. ImportError: the simulation was not built.
         """
         if world is not None and conditions is not None:
             raise ValueError("give a world, or seed and conditions, not both: a world has its own")
@@ -143,21 +142,21 @@ class VirtualTrial:
         self.begun: list[str] = []
         self.said: list[tuple[float, int]] = []
         self.last_hub = ""
-        """the hub in which the machines waited when the trial ended; empty: in none"""
+        """hub in which the machines waited at the end of the trial; empty if in none"""
         self._over = False
         self._failure: Exception | None = None
 
     def run(
         self, *actions: str, limit: float = 60.0, script: Callable[[VirtualTrial], None] | None = None
     ) -> list[TrialResult]:
-        """Initialise the robot, then carry out ``actions`` one after the other, until one fails.
+        """Initialise the robot, then execute ``actions`` one after the other until one fails.
 
-        ``actions``: "exchange_human_to_robot", "exchange_robot_to_human", "take", "put". ``limit``: s of virtual time
-        for each. ``script(trial)`` instead of actions: a function that calls ``wait_hub``, ``ask_for`` and
-        ``clock.sleep``. Returns the results of all actions but the initialisation.
+        ``actions``: "exchange_human_to_robot", "exchange_robot_to_human", "take", "put". ``limit``: virtual time (s)
+        for each. ``script(trial)``: a function used instead of actions; it calls ``wait_hub``, ``ask_for`` and
+        ``clock.sleep``. Returns the results of all actions except the initialisation.
 
-        TimeoutError: an action does not end within the limit. RuntimeError: the trial has run already. Whatever the
-        script raises.
+        TimeoutError: an action does not end within the limit. RuntimeError: the trial has already run. Exceptions of
+        the script are raised again.
         """
         if self._over:
             raise RuntimeError("a trial runs once: make another one with the same seed")
@@ -167,14 +166,14 @@ class VirtualTrial:
             self.clock.start_thread(lambda: self._run_script(walk), "script")
             self.master.execute()
             self._over = True
-        self._end_reach()  # of a machine that was stopped in it
+        self._end_reach()  # a machine that was stopped leaves its reach open
         if self._failure is not None:
             raise self._failure
         return self.results
 
     @property
     def results(self) -> list[TrialResult]:
-        """Of the actions that have ended, without the initialisation."""
+        """Results of the finished actions, without the initialisation."""
         return [TrialResult.of(r) for r in self.ctx.journal.results if r.kind != "coglab_init_system"]
 
     @property
@@ -184,16 +183,16 @@ class VirtualTrial:
         return self.ctx.requests.hub()
 
     def why(self) -> str:
-        """Why the last action did not succeed, as the operator is told: a sentence."""
+        """Returns the reason why the last action failed, as shown to the operator: one sentence."""
         return self.ctx.journal.why()
 
     def submit(self, action: str, object_id: str | None = None) -> bool:
-        """Ask the hub for an action, or for "reset"; whether it was accepted. Does not wait."""
+        """Request an action or "reset" from the hub. Returns True if it was accepted. Does not wait."""
         accepted: bool = self.ctx.requests.submit(action, self.object_id if object_id is None else object_id)[0]
         return accepted
 
     def wait_hub(self, label: str, limit: float = 60.0) -> None:
-        """Within a script: wait until this hub is open. TimeoutError after ``limit`` s."""
+        """In a script: wait until this hub is active. TimeoutError after ``limit`` s."""
         end = self.clock.now() + limit
         while self.hub != label:
             if self.clock.now() >= end:
@@ -201,21 +200,21 @@ class VirtualTrial:
             self.clock.sleep(0.05)
 
     def ask_for(self, *actions: str, limit: float = 60.0) -> None:
-        """Within a script: the actions one after the other, each in its hub, until one fails. TimeoutError after
-        ``limit`` s for one of them."""
+        """In a script: execute the actions one after the other, each in its hub, until one fails. TimeoutError if one
+        takes longer than ``limit`` s."""
         for action in actions:
             end = self.clock.now() + limit
             while self.hub == "" and self.clock.now() < end:
                 self.clock.sleep(0.1)
             if not self.submit(action):
-                return  # the action before it failed, so that this hub does not take it
+                return  # the previous action failed, so this hub does not accept it
             self.begun.append(action)
             before = len(self.ctx.journal.results)
             while len(self.ctx.journal.results) == before:
                 if self.clock.now() > end:
                     raise TimeoutError(f"'{action}' has not ended within {limit:g} s: {self._last()}")
                 self.clock.sleep(0.05)
-            # The person's hand comes back before the next action.
+            # Wait until the person's hand has returned, before the next action.
             while self.world.human.phase != "idle" and self.clock.now() < end:
                 self.clock.sleep(0.1)
             end = self.clock.now() + 10.0
@@ -248,12 +247,12 @@ class VirtualTrial:
             self.master.request_preempt()
 
     def _say(self, code: int, text: str) -> None:
-        """The person hears it."""
+        """Pass the message to the person."""
         self.said.append((self.clock.now(), code))
         self.world.human.hear(self.world.t, code)
 
     def _on_transition(self, record: TransitionRecord) -> None:
-        """Begins and ends the records of reaches."""
+        """Start and end the records of reaches."""
         if record.from_state == "execute_dmp" and record.outcome == "succeeded":
             self._end_reach()
             self.reach = Reach(self.world, self.arm.request, self.contact, self.begun[-1] if self.begun else "")
@@ -264,7 +263,7 @@ class VirtualTrial:
             self._end_reach()
 
     def _end_reach(self) -> None:
-        """Keep the record of the reach that is over, if one is."""
+        """Store the record of the finished reach, if there is one."""
         if self.reach is not None:
             self.reach.end()
             self.reaches.append(self.reach)
@@ -272,18 +271,18 @@ class VirtualTrial:
 
 
 class Reach:
-    """What one reach of the arm did. Times in s of the world's time, None for what never happened.
+    """Record of one reach of the arm. Times in s of the world; None if the event did not happen.
 
-    ``action``, ``request`` (DmpRequest); ``begin``; ``path``: (s, palm, goal in use) per cycle, positions in m;
-    ``reached``: when the motion was at its goal; ``over``: when the machine left the wait for it; ``met``: it left it
-    with success, which without standing still is a touch or a person who has come; ``stood``: the arm stood still at
-    the end. Neither ``stood`` nor ``met``: unfinished.
+    ``action``, ``request`` (DmpRequest). ``begin``: start. ``path``: (s, palm, goal in use) per cycle, positions in m.
+    ``reached``: the motion arrived at its goal. ``over``: the machine left the state that waits for the arrival.
+    ``met``: it left that state with success; if the arm still moved, the reason is a touch or an arriving person.
+    ``stood``: the arm stood still at the end. Without ``stood`` and ``met``, the reach is unfinished.
 
-    Distances (m, rad) of the palm once the arm stands still, or else at the end: ``to_goal``: from the goal as the
-    motion has estimated it; ``to_sight``: from the newest single sight; ``to_truth``: from where the grasp really is.
+    Distances (m, rad) of the palm when the arm stands still, or else at the end: ``to_goal``: to the goal as estimated
+    by the motion. ``to_sight``: to the newest single sight. ``to_truth``: to the true grasp.
 
-    ``touched``: when something first touched the robot's hand; ``found``: when contact was found; ``moving``,
-    ``moving_when_found``: whether the arm moved then.
+    ``touched``: first touch of the robot's hand. ``found``: contact was detected. ``moving``, ``moving_when_found``:
+    the arm moved at that time.
     """
 
     def __init__(self, world: World, request: Any, contact: VirtualContact, action: str) -> None:
@@ -303,17 +302,17 @@ class Reach:
 
     @property
     def false_alarm(self) -> bool:
-        """Contact was found before anything had touched the hand."""
+        """True if contact was detected before anything touched the hand."""
         return self.found is not None and (self.touched is None or self.found < self.touched)
 
     def look(self) -> None:
-        """After each period of the world."""
+        """Update the record; called after each period of the world."""
         robot, t = self._world.robot, self._world.t
         for record in robot.look_at_motion():
             self.path.append((record["time"], record["measured"][0], record["goal"][0]))
         if self.reached is None and robot.progress["motion"] == "reached":
             self.reached = t
-        # Measured when the detector begins to watch an arm that stands still and nobody has touched yet.
+        # Measure when the arm stands still and the detector starts to watch, before anybody touches the arm.
         contact = self._contact
         watching = contact.detector.state() == "watching" and (contact.moving.still() or self.action != GIVE)
         if not self.stood and self.reached is not None and watching:
@@ -325,13 +324,13 @@ class Reach:
             self.found, self.moving_when_found = t, not robot.report["standing"]
 
     def leave(self, succeeded: bool) -> None:
-        """Nobody waits for its end any more; what comes then, such as the giving of the load, is no part of it."""
+        """The machine no longer waits for the arrival. Later events, such as the load transfer, are not recorded."""
         self.over, self.met = self._world.t, succeeded
         if self.reached is None:
             self._measure()
 
     def end(self) -> None:
-        """The reach is over: one that never stood still is measured where it is, unless it was when it was left."""
+        """The reach is over. If the arm never stood still, measure it here, unless leave() has already measured it."""
         if not self.stood and (self.over is None or self.reached is not None):
             self._measure()
 

@@ -1,4 +1,4 @@
-"""The arm of a World as the machines reach it: the real controller manager and bridge, in virtual time."""
+"""ArmPort of a World: the real controller manager and bridge, in virtual time."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SILENT = "lwr/joint_states is silent"
 
 
 class VirtualArm:
-    """ArmPort of a World. Requests act at once; motions go on until they end, whoever waits."""
+    """ArmPort of a World. Requests act at once. A motion goes on until it ends, even if nobody waits for it."""
 
     def __init__(self, world: World) -> None:
         self.world, self.robot = world, world.robot.virtual
@@ -27,7 +27,7 @@ class VirtualArm:
         return bool(self.world.robot.silent > limit)
 
     def _answered(self, answer: Sequence[Any], value: Any = None) -> Pending:
-        """(success, message) of a controller as a Pending."""
+        """Converts the (success, message) of a controller to a Pending."""
         return Ready(value) if answer[0] else Ready(error=PortError(answer[1], code=self.robot.reason_code))
 
     def load_controller(self, controller_id: str, controller_type: str) -> Pending:
@@ -80,7 +80,7 @@ class VirtualArm:
         return Verdict(standing, "" if standing else "the set-point moves")
 
     def cancel_motion(self, reason: str) -> Pending:
-        """Never withdrawn: whoever gives up waiting leaves it in force."""
+        """The request is never withdrawn: it stays in force if the caller stops waiting."""
         begun = self.world.t
         answers: dict[str, dict[str, Any]] = {}
         orders = {name: self.robot.ask_cancel(name, reason) for name in self.world.robot.loaded}

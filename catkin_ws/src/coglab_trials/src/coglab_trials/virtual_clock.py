@@ -1,11 +1,11 @@
-"""A clock in which time passes only while everybody waits, so that hours of a machine's life take milliseconds.
+"""A clock whose time passes only while all its threads wait. Hours of a state machine take milliseconds.
 
-The threads that belong to the clock take turns: one runs until it waits, then the next that is ready, and only when
-none is ready does the time jump to the nearest deadline. Runs are therefore the same each time. Threads that do not
-belong to the clock may set events and sleep on it too, but when they do so is up to the operating system.
+The threads of the clock take turns. One thread runs until it waits, then the next ready thread runs. If no thread is
+ready, the time jumps to the nearest deadline. Therefore, every run is the same. Other threads may also set events and
+sleep on the clock, but the operating system decides when they do so.
 
-`using` puts a machine under such a clock. It needs nothing of the engine but that `smach.concurrence` takes its
-threads, events and conditions from `threading`, as ours and the ROS distributions' do.
+`using` runs a machine under such a clock. It requires only that `smach.concurrence` takes its threads, events and
+conditions from `threading`. Our engine and those of the ROS distributions do so.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from coglab_smach.clocks.clock import Clock
 
 
 class ClockStalled(RuntimeError):
-    """Virtual time cannot go on: all wait without a deadline, or one thread has stopped taking part.
+    """Virtual time cannot go on: all threads wait without a deadline, or a running thread does not return to it.
 
-    Two states that wait for each other's event end with it instead of hanging.
+    Two states that wait for each other's event raise this error instead of hanging.
     """
 
 
 class _Parked:
-    """One waiting thread: whether it has its turn (`going`), and was woken by an event (`fired`) or by the time.
+    """One waiting thread. `going`: it has its turn. `fired`: an event woke it, not the time.
 
-    Its gate is a bare lock that is held until the turn comes: an event of `threading` costs several locks each time.
+    The gate is a bare lock that is held until the turn comes. An event of `threading` would cost several locks.
     """
 
     __slots__ = ("fired", "gate", "going", "released", "thread")
@@ -45,7 +45,7 @@ class _Parked:
         self.fired = self.going = self.released = False
 
     def go(self) -> None:
-        """Give it the turn. The clock's lock is held."""
+        """Give the turn to this thread. The caller holds the clock's lock."""
         if not self.going:
             self.going = True
             self.gate.release()
@@ -60,11 +60,11 @@ class VirtualEvent:
         self._waiters: list[_Parked] = []
 
     def is_set(self) -> bool:
-        """Whether the event has happened."""
+        """True after set(), until clear()."""
         return self._flag
 
     def set(self) -> None:
-        """Wake all who wait, in the order in which they came."""
+        """Wake all waiting threads, in the order of their arrival."""
         with self._clock._lock:
             self._flag = True
             waiters, self._waiters = self._waiters, []
@@ -73,12 +73,12 @@ class VirtualEvent:
             self._clock._dispatch()
 
     def clear(self) -> None:
-        """From now on let others wait."""
+        """Reset the event: wait() blocks again."""
         with self._clock._lock:
             self._flag = False
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Wait at most `timeout` seconds of virtual time; whether the event is set."""
+        """Wait at most `timeout` seconds of virtual time. Returns True if the event is set."""
         if self._flag:
             return True
         if timeout is not None and timeout <= 0.0:
@@ -87,7 +87,7 @@ class VirtualEvent:
 
 
 class VirtualCondition:
-    """`threading.Condition` on a VirtualClock. Its lock is an ordinary one: nobody may wait while holding it."""
+    """`threading.Condition` on a VirtualClock. Its lock is an ordinary one: do not wait while holding it."""
 
     def __init__(self, clock: VirtualClock, lock: Any = None) -> None:
         self._clock = clock
@@ -102,7 +102,7 @@ class VirtualCondition:
         self._lock.__exit__(*exception)
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Release the lock until somebody notifies or `timeout` seconds have passed; whether it was a notification."""
+        """Release the lock and wait for a notification, at most `timeout` s. Returns True if it was notified."""
         told = self._clock.event()
         self._waiters.append(told)
         self.release()
@@ -114,18 +114,18 @@ class VirtualCondition:
                 self._waiters.remove(told)
 
     def notify(self, n: int = 1) -> None:
-        """Wake the first `n` who wait."""
+        """Wake the first `n` waiting threads."""
         woken, self._waiters = self._waiters[:n], self._waiters[n:]
         for told in woken:
             told.set()
 
     def notify_all(self) -> None:
-        """Wake all who wait."""
+        """Wake all waiting threads."""
         self.notify(len(self._waiters))
 
 
 class VirtualThread(threading.Thread):
-    """A thread that belongs to a VirtualClock from `start()` to its end; its first turn comes before time goes on."""
+    """A thread that belongs to a VirtualClock from `start()` to its end. Time waits for its first turn."""
 
     def __init__(self, clock: VirtualClock, *args: Any, **kw: Any) -> None:
         super().__init__(*args, **kw)
@@ -133,7 +133,7 @@ class VirtualThread(threading.Thread):
         self._turn = _Parked(self)
 
     def start(self) -> None:
-        # Queued by the caller, so that the order is that of the calls and not of the operating system.
+        # The caller queues the thread: the order is then that of the calls, not that of the operating system.
         self._clock._enter(self, self._turn)
         try:
             super().start()
@@ -152,10 +152,10 @@ class VirtualThread(threading.Thread):
 
 
 class VirtualClock(Clock):
-    """Time that jumps from deadline to deadline.
+    """A clock whose time jumps from deadline to deadline.
 
-    `start`: the first time (s). `stall_limit`: after so many seconds of wall time without any progress those who wait
-    get ClockStalled. Example::
+    `start`: the first time (s). `stall_limit`: wall time (s) without progress after which waiting threads raise
+    ClockStalled. Example::
 
         with using(VirtualClock()) as clock:
             clock.sleep(3600.0)         # returns at once
@@ -166,8 +166,8 @@ class VirtualClock(Clock):
         self._lock = threading.Lock()
         self._now = float(start)
         self._stall_limit = stall_limit
-        self._members: Counter[threading.Thread] = Counter()  # thread -> how often it has attached
-        self._holder: threading.Thread | None = None  # the member whose turn it is
+        self._members: Counter[threading.Thread] = Counter()  # thread -> number of its attachments
+        self._holder: threading.Thread | None = None  # the member that has the turn
         self._ready: deque[_Parked] = deque()
         self._timed: list[tuple[float, int, _Parked]] = []
         self._parked: dict[_Parked, None] = {}
@@ -175,17 +175,19 @@ class VirtualClock(Clock):
         self._progress = time.monotonic()
 
     def now(self) -> float:
-        """The virtual time, s."""
+        """Returns the virtual time, s."""
         return self._now
 
     def sleep(self, seconds: float) -> None:
-        """Wait in virtual time; 0 lets the others take their turn."""
+        """Wait in virtual time. 0 gives the other threads a turn."""
         if not self._pass_alone(seconds):
             self._park(None, max(0.0, seconds))
 
     def _pass_alone(self, seconds: float) -> bool:
-        """Moves time on by itself where nobody else has a turn until then: most sleeps of the one who steps the world.
-        Nobody can come between, because the turn is the caller's."""
+        """Move the time on directly if no other thread has a turn before `seconds` have passed. Returns True if it did.
+
+        Most sleeps of the thread that steps the world take this path. The caller has the turn, so no other thread
+        can interfere."""
         if seconds <= 0.0 or self._holder is not threading.current_thread():
             return False
         with self._lock:
@@ -197,18 +199,18 @@ class VirtualClock(Clock):
         return True
 
     def event(self) -> VirtualEvent:
-        """A new event, unset."""
+        """Returns a new event that is not set."""
         return VirtualEvent(self)
 
     def start_thread(self, target: Callable[[], object], name: str, daemon: bool = False) -> threading.Thread:
-        """Start a thread that belongs to this clock."""
+        """Start a thread that belongs to this clock, and return it."""
         thread = VirtualThread(self, target=target, name=name, daemon=daemon)
         thread.start()
         return thread
 
     @contextmanager
     def attached(self) -> Iterator[VirtualClock]:
-        """The calling thread belongs to this clock inside the block: time waits for it."""
+        """Inside the block, the calling thread belongs to this clock: time waits for it."""
         me = threading.current_thread()
         turn = _Parked(me)
         first = self._enter(me, turn)
@@ -221,7 +223,7 @@ class VirtualClock(Clock):
             self._leave(me)
 
     def _enter(self, thread: threading.Thread, turn: _Parked) -> bool:
-        """Make `thread` a member; `turn` is queued, and True returned, if it was none."""
+        """Make `thread` a member. If it is a new member, `turn` is queued and True is returned."""
         with self._lock:
             self._members[thread] += 1
             if self._members[thread] > 1:
@@ -250,7 +252,7 @@ class VirtualClock(Clock):
                 self._dispatch()
 
     def _park(self, event: VirtualEvent | None, timeout: float | None) -> bool:
-        """Wait for the event or the time; whether it was the event."""
+        """Wait for the event or the time. Returns True if the event came."""
         me = threading.current_thread()
         parked = _Parked(me)
         with self._lock:
@@ -274,14 +276,14 @@ class VirtualClock(Clock):
         return parked.fired
 
     def _release(self, parked: _Parked, fired: bool) -> None:
-        """Put a waiting thread among the ready ones. The lock is held."""
+        """Put a waiting thread into the queue of ready threads. The caller holds the lock."""
         if not parked.released:
             parked.released = True
             parked.fired = fired
             self._ready.append(parked)
 
     def _dispatch(self) -> None:
-        """Give the turn to the next ready thread, moving time on if there is none. The lock is held."""
+        """Give the turn to the next ready thread. If none is ready, move the time on. The caller holds the lock."""
         while self._holder is None:
             while not self._ready:
                 if not self._timed:
@@ -318,7 +320,7 @@ class VirtualClock(Clock):
 
 
 class _Threading:
-    """The module `threading` with threads, events and conditions of a clock."""
+    """The module `threading`, but with threads, events and conditions of a VirtualClock."""
 
     def __init__(self, clock: VirtualClock) -> None:
         self._clock = clock
@@ -338,8 +340,8 @@ class _Threading:
 
 @contextmanager
 def using(clock: VirtualClock) -> Iterator[VirtualClock]:
-    """Inside the block the calling thread belongs to `clock`, and so do the children of each Concurrence that is made
-    and executed there. One clock at a time in a process. Example::
+    """Inside the block, the calling thread belongs to `clock`. So do the children of each Concurrence that is
+    created and executed there. Only one clock at a time in a process. Example::
 
         with using(VirtualClock()) as clock:
             machine = build()

@@ -1,5 +1,5 @@
-"""The whole cell in one process and in virtual time: the robot (KRC stand-in, bridge and controller manager, byte for
-byte in lockstep), the hand emulator behind its driver, virtual human, tracker."""
+"""The simulated cell in one process and in virtual time: robot (simulated KRC, bridge and controller manager; same
+bytes as on the network, in lockstep), hand emulator behind the real driver, virtual human, tracker."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from ih2_hand.reasons import Reason
 from coglab_trials.conditions import Conditions
 
 try:
-    import coglab_sim._cell  # noqa: F401  (knows the type of LockstepRobot.cell)
+    import coglab_sim._cell  # noqa: F401  (registers the type of LockstepRobot.cell)
     from coglab_sim._virtual import LockstepRobot
 except ImportError as error:
     raise ImportError(
@@ -41,25 +41,20 @@ except ImportError as error:
     ) from error
 
 LIMITS = str(package_path("lwr_description", "config", "joint_limits.yaml"))
-BOARD = Pose(np.array([0.45, -0.55, 0.05]), about_z(-np.pi / 2))
-"""of the frame board in world"""
-DT = 0.005
-"""s, FRI period"""
-FLOAT32 = 5e-4
-"""rad/s, what rounding to float32 on the wire adds to a velocity between two answers"""
-TASK_LIMIT = 8.0
-"""s, of a preshape or a grasp"""
-OLDEST = 1e9
-"""s, age of a frame that was never seen"""
+BOARD = Pose(np.array([0.45, -0.55, 0.05]), about_z(-np.pi / 2))  # frame `board` in `world`, m
+DT = 0.005  # s, FRI period
+FLOAT32 = 5e-4  # rad/s, velocity error between two answers from rounding to float32
+TASK_LIMIT = 8.0  # s, time limit of a preshape or a grasp
+OLDEST = 1e9  # s, age of a frame that was never seen
 
 
 def urdf_file() -> str:
-    """Path of the robot description."""
+    """Returns the path of the robot description."""
     return str(package_path("lwr_description", "urdf", "lwr_ih2.urdf"))
 
 
 def manager_parameters() -> dict[str, Any]:
-    """The parameters of /controller_manager as the launch file loads them."""
+    """Returns the parameters of /controller_manager as the launch file loads them."""
     file = package_path("coglab_controllers", "config", "controllers.yaml")
     parameters: dict[str, Any] = read(file).value
     package, _, path = parameters["feedback_file"].removeprefix("package://").partition("/")
@@ -68,9 +63,9 @@ def manager_parameters() -> dict[str, Any]:
 
 
 class Robot:
-    """LockstepRobot with what figures and detectors need of each period.
+    """LockstepRobot with the measurements of each period that evaluation and detectors use.
 
-    ``cell``: parameters of the simulated cell, ``__`` for ``/`` in their names; ``limits``: table of joint limits.
+    ``cell``: parameters of the simulated cell, with ``__`` for ``/`` in their names. ``limits``: file of joint limits.
     """
 
     def __init__(self, seed: int, limits: str = LIMITS, **cell: Any) -> None:
@@ -84,7 +79,7 @@ class Robot:
         self.virtual = LockstepRobot(urdf_file(), limits, parameters, yaml.safe_dump(manager_parameters()))
         self.cell = self.virtual.cell
         self.limits = cc.load_joint_limits(limits)
-        # Plain floats: seven numbers are compared sooner by hand than by arrays, and that 200 times a second.
+        # Plain floats: at 200 Hz, comparing seven floats is faster than numpy.
         self._fastest_to_command = [float(speed) for speed in self.limits.velocity]
         self._fastest = [float(v) for v in read(limits).value["default"]["velocity"]]
         lowest, highest = self.limits.lower_position, self.limits.upper_position
@@ -105,20 +100,20 @@ class Robot:
         self.loaded: dict[str, str] = {}
         self.peak_share = self.measured_share = 0.0
         self.outside = {"commanded": 0, "measured": 0, "over_command": 0}
-        self.silent = 0.0
-        """s for which the robot's process has stood still (``virtual.frozen``)"""
+        self.silent = 0.0  # s since the robot's process has stopped (``virtual.frozen``)
         self.debug: dict[str, Any] | None = None
         self._commanded: list[float] | None = None
 
     @property
     def limit_violations(self) -> int:
-        """Periods in which the arm was outside a limit, by its commands or as it moved."""
+        """Number of periods in which the commands or the true joints were outside a limit."""
         return self.outside["commanded"] + self.outside["measured"]
 
     def _look_at_arm(self) -> None:
-        """Judge the true joints by the arm's own limits: where they are, and how fast they were in any step of the
-        period. Nothing is differentiated or rounded, and no tolerance is given. Commands are bound to a few percent
-        less (``servo_overshoot`` of the table): periods with a joint over that bound are counted apart."""
+        """Compare the true joints with the arm's limits: position, and highest speed in any physics step of the period.
+
+        Nothing is differentiated or rounded, and there is no tolerance. The limit of commands is a few percent lower
+        (``servo_overshoot`` in the file of limits). Periods with a joint above that limit are counted separately."""
         fastest = self.cell.fastest.tolist()
         share = max(map(truediv, fastest, self._fastest))
         self.measured_share = max(self.measured_share, share)
@@ -129,7 +124,7 @@ class Robot:
         return not all(low <= at <= high for at, (low, high) in zip(position, self._range, strict=True))
 
     def step(self) -> None:
-        """One FRI period; the limits are looked at in how the arm moved and in what it was told."""
+        """Run one FRI period. Check the true joints and the commands against the limits."""
         self.virtual.tick()
         self.silent = self.silent + DT if self.virtual.frozen else 0.0
         self._look_at_arm()
@@ -150,11 +145,11 @@ class Robot:
         self.outside["commanded"] += outside
 
     def palm(self) -> Pose:
-        """Pose of the palm in the base frame, by the measured joints."""
+        """Returns the pose of the palm in the base frame, from the measured joints."""
         return Pose(*self.chain.fk(self.report["position"]))
 
     def look_at_motion(self) -> list[dict[str, Any]]:
-        """Progress of the DMP and, while it moves, the newest set-point and goal."""
+        """Read the progress of the DMP. Returns the new records of set-point and goal; empty while no motion runs."""
         self.progress = self.virtual.dmp_progress()
         records: list[dict[str, Any]] = self.virtual.ik_debug()
         if records:
@@ -163,7 +158,7 @@ class Robot:
 
 
 class Job:
-    """A task of the hand with its end: the verdict, None while it runs."""
+    """A task of the hand. ``verdict``: its result, None while it runs."""
 
     def __init__(self, task: Task, begun: float) -> None:
         self.task, self.begun = task, begun
@@ -171,8 +166,8 @@ class Job:
 
 
 class Hand(HandMemory):
-    """Driver on the emulator over a line without a pty, as the hand's node uses it: one task at a time, polled at 30 Hz
-    while it runs. ``dead``: nothing is polled and nothing told, as if that node were frozen."""
+    """The real driver on the emulated hand, without a pty. As in the hand's node, one task runs at a time and is polled
+    at 30 Hz. ``dead``: nothing is polled or reported, as if that node were frozen."""
 
     def __init__(self, cell: Any) -> None:
         super().__init__(is_current=True, limit=TASK_LIMIT)
@@ -190,7 +185,7 @@ class Hand(HandMemory):
         self._calibrated_at = 0.0
 
     def begin(self, name: str, **fields: Any) -> Job:
-        """Start a goal of one of the hand's actions; what runs ends. Raises what refuses it."""
+        """Start a goal of one of the hand's actions. A running goal ends. Raises the error that refuses the goal."""
         if self.job is not None:
             self.end(self.job, "replaced by a new goal; fingers stopped", Reason.SUPERSEDED)
         task = self.task_for(name, SimpleNamespace(**fields), self.driver)
@@ -199,30 +194,30 @@ class Hand(HandMemory):
         return self.job
 
     def end(self, job: Job, text: str, reason: Reason) -> None:
-        """End a goal before its time; the fingers stop. One that has ended stays as it is."""
+        """End a goal early and stop the fingers. A goal that has already ended does not change."""
         if job is self.job:
             self._over(Verdict(text, done=True, stop=True, reason=reason))
 
     def calibrate(self, mode: str) -> str | None:
-        """Begin to calibrate; or why not. ``calibrating`` until it has ended."""
+        """Start a calibration; ``calibrating`` is True until it ends. Returns the reason if it is refused."""
         words = mode.split()
         why = self.why_not_calibrate(words, self.job.task.name if self.job else None)
         if why is not None:
             self.reason, self.message = Reason.HAND_REFUSED, f"calibration refused: {why}"
             return why
         self.calibration_began()
-        self.driver.calibration(words[0])  # at once in the emulator's time, which the world's has to catch up with
+        self.driver.calibration(words[0])  # runs ahead on the emulator's clock; the world catches up
         self._calibrated_at = self.clock.monotonic()
         return None
 
     def calibration_over(self, t: float) -> bool:
-        """Whether a calibration that was begun has ended by now."""
+        """True if no calibration is running at time ``t`` (s)."""
         if self.calibrating and t >= self._calibrated_at:
             self.calibrating, self.calibrated = False, True
         return not self.calibrating
 
     def step(self, t: float) -> None:
-        """Follow the time and the motors that the physics turns; tell these what to do."""
+        """Advance to time ``t`` (s): read the simulated motors, poll the driver, set the motor commands."""
         self.clock.now = max(self.clock.now, t)
         self.emulator.follow(
             [
@@ -263,9 +258,9 @@ class Hand(HandMemory):
 
 
 class World:
-    """The simulated cell: robot, hand, an object, a person and a tracker, advanced by ``step()``.
+    """The simulated cell: robot, hand, object, person and tracker. ``step()`` advances it.
 
-    No ROS master, no threads, no real time: the same arguments give the same world, to the last bit. Example::
+    No ROS master, no threads, no real time. The same arguments give the same world, bit for bit. Example::
 
         world = World(seed=3, conditions=Conditions(object_id="bottle"))
         world.human.command("give bottle")
@@ -273,11 +268,11 @@ class World:
             world.step()
         print(world.t, world.truth["held_by"], world.newest("human_hand"))
 
-    Attributes: ``t`` (s, virtual time); ``truth``: the true state of the cell, a dict of SI units in the base frame;
-    ``human``: the person (``command``, ``hear``, ``phase``); ``robot``: arm, controllers and limits; ``hand``: of the
-    robot; ``cell``: the physics, for pushes and faults; ``sights``: newest Sight by frame; ``blind``: names of
-    frames that the tracker does not see from now on; ``after_period``: functions that are called at the end of each
-    period with a robot that is connected; ``seed`` and ``conditions``, as given.
+    Attributes: ``t``: virtual time, s. ``truth``: true state of the cell, a dict in SI units and the base frame.
+    ``human``: the person (``command``, ``hear``, ``phase``). ``robot``: arm, controllers and limits. ``hand``: the
+    robot's hand. ``cell``: the physics, for pushes and faults. ``sights``: newest Sight by frame. ``blind``: names of
+    frames that the tracker does not see; a test can change it. ``after_period``: functions that are called after each
+    period with a connected robot. ``seed`` and ``conditions``: as given.
     """
 
     def __init__(
@@ -290,12 +285,12 @@ class World:
         recording: Mapping[str, Any] | None = None,
     ) -> None:
         """
-        ``seed``: of person, noise and tracker. ``conditions``: what person, tracker and object are like.
-        ``object_on``: "human_hand", or "world" for the middle of the board. ``turned``: rad, by which the person holds
-        the object turned about the vertical. ``limits``: path of the arm's table of joint limits. ``recording``: the
-        person's hand goes as recorded; settings of coglab_sim.person.recorded_person.open_recorded_hand.
+        ``seed``: for person, noise and tracker. ``conditions``: properties of person, tracker and object.
+        ``object_on``: "human_hand", or "world" for the middle of the board. ``turned``: rotation (rad) of the object in
+        the person's hand about the vertical. ``limits``: path of the arm's joint limits. ``recording``: the person's
+        hand follows a recording; settings of coglab_sim.person.recorded_person.open_recorded_hand.
 
-        ObjectError: no such object. RecordingError: the recording cannot be used. ValueError: a value out of range.
+        ObjectError: unknown object. RecordingError: unusable recording. ValueError: a value is out of range.
         """
         conditions = conditions or Conditions()
         self.seed, self.conditions = seed, conditions
@@ -326,7 +321,7 @@ class World:
         self.cell = self.robot.cell
         self.hand = Hand(self.cell)
         self.board = conditions.perception.calibration(seed) * BOARD
-        """as the tracker sees it, which is off for the board as for everything"""
+        """pose of the board as the tracker measures it, with the calibration error"""
         self.trackers = {name: Tracker(name, conditions.perception, seed) for name in (self.object_frame, "human_hand")}
         self.after_period: list[Callable[[], None]] = []
         self.speed_scale = 1.0
@@ -337,7 +332,7 @@ class World:
         self.blind: set[str] = set()
 
     def newest(self, name: str) -> tuple[Pose | None, float]:
-        """Newest sight of a frame and its age; the board stands where it was seen once."""
+        """Returns the newest pose of a frame and its age (s). The board was seen once and does not move: age 0."""
         if name == "board":
             return self.board, 0.0
         sight = self.sights.get(name)
@@ -346,7 +341,7 @@ class World:
         return sight.frame, self.t - sight.captured
 
     def step(self) -> None:
-        """One FRI period, 5 ms."""
+        """Advance by one FRI period, 5 ms."""
         if self.ticks % 2 == 0:
             self._person_and_tracker()
         self.hand.step(self.t)
@@ -362,7 +357,7 @@ class World:
         self.truth = truth = self.cell.truth()
         view = view_of(truth)
         move_person(self.cell, self.human.step(self.t, view))
-        # The hand is where the arm has brought it, not where the person wants it.
+        # Use the hand where the arm has moved it, not where the person wants it.
         frames = {self.object_frame: view.object, "human_hand": pose_of_truth(truth["human_hand"])}
         for name, frame in frames.items():
             others = [other for each, other in frames.items() if each != name]

@@ -1,5 +1,5 @@
-"""The ports of the state machines in a World, but for the arm's (virtual_arm): the hand's driver on its emulator, the
-trackers, the object files, the contact detector on the simulated torques."""
+"""Ports of the state machines in a World, except the arm (virtual_arm): hand driver on the emulator, trackers, object
+files, and contact detector on the simulated torques."""
 
 from __future__ import annotations
 
@@ -34,12 +34,11 @@ from coglab_trials.world import World
 
 THRESHOLDS = package_path("coglab_contact", "config", "contact_thresholds.yaml")
 HAND = "human_hand"
-OLDEST_SIGHT = 0.15
-"""s, older sights of an object do not tell whether it is in the palm"""
+OLDEST_SIGHT = 0.15  # s, oldest sight of an object that is compared with the palm
 
 
 class VirtualHand:
-    """HandPort on the virtual world's hand, which has the rules of the hand's node."""
+    """HandPort on the hand of the World, with the rules of the real hand's node."""
 
     def __init__(self, world: World) -> None:
         self.world = world
@@ -48,11 +47,11 @@ class VirtualHand:
         hand = self.world.hand
         try:
             job = hand.begin(name, **fields)
-        except Exception as error:  # whatever refuses it
+        except Exception as error:  # any refusal becomes a PortError
             return Ready(error=PortError(f"{name} ended ABORTED", (str(error),), reason_of(error)))
 
         def value() -> None:
-            assert job.verdict is not None  # it is done
+            assert job.verdict is not None  # the task is done
             if not job.verdict.ok:
                 raise PortError(f"{name} ended without success", (job.verdict.text,), job.verdict.reason)
 
@@ -66,7 +65,7 @@ class VirtualHand:
         sent: list[str | None] = []
 
         def done() -> bool:
-            # After a start the hand counts as holding until a poll has shown it empty: give it 2 s for that.
+            # At start the hand counts as holding until a poll shows that it is empty. Wait at most 2 s for that.
             if not sent and (not hand.holding or self.world.t - asked > 2.0):
                 sent.append(hand.calibrate(mode))
             return bool(sent) and hand.calibration_over(self.world.t)
@@ -100,13 +99,13 @@ class VirtualHand:
 
 
 class VirtualPerception:
-    """PerceptionPort on the virtual world's trackers; recogniser and belief (BeliefFilter), if given, see what these
-    see: each new sight once, as in the recogniser's node."""
+    """PerceptionPort on the trackers of the World. The optional recogniser and belief (BeliefFilter) receive each new
+    sight once, as in the recogniser's node."""
 
     def __init__(self, world: World, recogniser: Any = None, belief: Any = None) -> None:
         self.world, self.recogniser, self.belief = world, recogniser, belief
         self._taken: dict[str, float] = {}
-        self._seen = self._believed = -math.inf  # s, when the last sight of the hand came, and the last belief
+        self._seen = self._believed = -math.inf  # s, times of the last sight of the hand and of the last belief
         world.after_period.append(self._believe)
 
     def init_vision(self, time_limit: float) -> Pending:
@@ -124,7 +123,7 @@ class VirtualPerception:
             if not fresh():
                 raise PortError(f"'{name}' was not seen within {time_limit:.1f} s", code=ReasonCode.OBJECT_NOT_SEEN)
             frame, age = self.world.newest(name)
-            assert frame is not None  # it is fresh
+            assert frame is not None  # fresh() is true
             x, y, z = frame.position
             qx, qy, qz, qw = frame.orientation
             return Located(name, "world", (x, y, z), (qx, qy, qz, qw), age)
@@ -135,7 +134,7 @@ class VirtualPerception:
         return Ready([Located("", "board", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), 0.0)])
 
     def _believe(self) -> None:
-        """Each new sight, objects first; the frames ahead, as the recogniser's node sends them."""
+        """Feed each new sight to the filter, objects first. Set the predicted frames, as the recogniser's node does."""
         t = self.world.t
         for name, sight in sorted(self.world.sights.items(), reverse=True):
             if sight.captured <= self._taken.get(name, -1.0):
@@ -153,7 +152,7 @@ class VirtualPerception:
             end = self.recogniser.pattern_end() if self.recogniser is not None else None
             seen = self.belief.see_hand(sight.captured, sight.frame.position, t, self.world.hand.holding, end)
             if seen.stamp != sight.captured:
-                continue  # the filter has no use for this sight, and nothing is sent
+                continue  # the filter ignored this sight; the node publishes nothing either
             self._believed = t
             places = {HAND: seen.hand_place, f"object_{seen.object_id}": seen.place if seen.object_id else None}
             for frame, place in places.items():
@@ -180,7 +179,7 @@ class VirtualPerception:
 
 
 class VirtualDatabase:
-    """DatabasePort over the real object files."""
+    """DatabasePort on the real object files."""
 
     def __init__(self, database: ObjectDatabase) -> None:
         self.database = database
@@ -196,10 +195,10 @@ class VirtualDatabase:
 
 
 class VirtualContact:
-    """ContactPort: the detector on the virtual arm's torques, the hand's motors, the trackers and touch."""
+    """ContactPort: the detector on the simulated joint torques, hand motors, trackers and touch sensors."""
 
     def __init__(self, world: World, touch: float | None = None) -> None:
-        """``touch``: N, standard deviation of each component of the hand's touch sensors; None: it has none."""
+        """``touch``: standard deviation (N) of each component of the hand's touch sensors. None: no sensors."""
         self.world, self._touch = world, touch
         self._noise = np.random.default_rng(0)
         chain = world.robot.chain
@@ -208,8 +207,7 @@ class VirtualContact:
         self.moving = moving
         held = GripAndLoad(lambda q: Pose(*chain.fk(q)).rotation.as_matrix())
         self.detector = FusedDetector(ContactDetector(DetectorSettings(), jacobian), moving, held=held)
-        self.watched_while_moving = 0
-        """periods in which the detector of an arm at rest watched though the arm moved"""
+        self.watched_while_moving = 0  # periods in which the detector for an arm at rest watched a moving arm
         self._event: ContactEvent | None = None
         self._grasp: tuple[str, Pose] | None = None
         self._polled: Any = None
@@ -233,7 +231,7 @@ class VirtualContact:
             self.watched_while_moving += 1
 
     def _sense_hand(self) -> ContactEvent | None:
-        """The motors, as often as they are polled; an empty hand carries nothing."""
+        """Feed the hand motors at each new poll. An empty hand has no payload."""
         hand = self.world.hand
         if hand.readings is self._polled or hand.dead:
             return None
@@ -243,7 +241,7 @@ class VirtualContact:
         return self.detector.feed_hand(self.world.t, hand.readings)
 
     def _sense_touch(self) -> ContactEvent | None:
-        """Phalanges and palm, of a hand that has touch sensors."""
+        """Feed the forces on phalanges and palm, if the hand has touch sensors."""
         if self._touch is None:
             return None
         forces = np.array(list(self.world.cell.touch().values()))
@@ -251,7 +249,7 @@ class VirtualContact:
         return self.detector.feed_touch(self.world.t, forces.tolist(), self._touch)
 
     def _sense_object(self, position: Any, velocity: np.ndarray) -> ContactEvent | None:
-        """The object as tracked, against the palm."""
+        """Feed the tracked pose of the object relative to the palm."""
         if self._grasp is None:
             return None
         frame, grasp = self._grasp

@@ -1,1 +1,1 @@
-"""Clocks that states measure time and wait by: the steady one, and a virtual one in which threads take turns."""
+"""Clocks of the states, for measuring time and waiting. The virtual clock is in coglab_trials."""

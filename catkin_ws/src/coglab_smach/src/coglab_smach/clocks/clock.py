@@ -1,4 +1,4 @@
-"""The clock that states measure time and wait by: the steady one of the machine, or a virtual one (virtual_clock)."""
+"""Clocks of the states, for measuring time and waiting: steady, or slowed with the simulated cell."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from coglab_py.pace import Pace
 
 
 class Clock(ABC):
-    """A source of time and of waiting. Times are in seconds; the origin is arbitrary."""
+    """Measures time and waits. Times are in s; the origin is arbitrary."""
 
     @abstractmethod
     def now(self) -> float:
-        """The time, s."""
+        """Returns the time, s."""
 
     @abstractmethod
     def sleep(self, seconds: float) -> None:
-        """Wait; a negative duration counts as 0."""
+        """Wait for ``seconds``; a negative duration counts as 0."""
 
 
 class SteadyClock(Clock):
-    """Wall time that no adjustment of the system's date can move: the robot's."""
+    """The robot's clock: monotonic, independent of changes of the system date."""
 
     def now(self) -> float:
         return time.monotonic()
@@ -31,7 +31,7 @@ class SteadyClock(Clock):
 
 
 class PacedClock(Clock):
-    """The steady clock, slowed while the simulated cell is slowed down on a busy computer."""
+    """The steady clock, slowed together with the simulated cell on a busy computer."""
 
     def __init__(self, pace: Pace) -> None:
         self._pace = pace

@@ -1,1 +1,1 @@
-"""What every state is given: configuration, journal, triggers, memory."""
+"""Objects that every state receives: configuration, journal, triggers, memory."""

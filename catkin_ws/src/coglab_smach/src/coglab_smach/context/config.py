@@ -1,6 +1,5 @@
-"""Configuration of the machines: what machines.yaml and the node's parameters set, else coglab_smach.parameters.
-
-The file is read again whenever it changes."""
+"""Configuration of the machines: values of machines.yaml and the node's parameters, else the defaults of
+coglab_smach.parameters. The file is read again when it changes."""
 
 from __future__ import annotations
 
@@ -15,11 +14,11 @@ from coglab_smach.parameters import BY_NAME, NO_DEFAULT, schema, unknown
 
 
 class ConfigError(Exception):
-    """The configuration file cannot be used; the sentence names file and field."""
+    """The configuration file cannot be used. The sentence names file and field."""
 
 
 class Config:
-    """Values by dotted name. A file that has become bad keeps the old values and says so once."""
+    """Values by dotted name. If the changed file is invalid, the old values stay in force and one warning is given."""
 
     def __init__(self, values: Mapping[str, Any], path: str = "", warn: Callable[[str], None] | None = None) -> None:
         self._values = dict(values)
@@ -32,7 +31,7 @@ class Config:
     def load(
         path: str, overrides: Mapping[str, Any] | None = None, warn: Callable[[str], None] | None = None
     ) -> Config:
-        """Read a file; ConfigError names file and line. ``overrides`` (dotted names) win over the file for good."""
+        """Read a file; ConfigError names file and line. ``overrides`` (dotted names) always win over the file."""
         config = Config(_read(path), path, warn)
         _checked(Document("configuration given beside the file", "", _nested(overrides or {}), {}))
         config._overrides = dict(overrides or {})
@@ -42,7 +41,7 @@ class Config:
     _overrides: dict[str, Any] = {}
 
     def get(self, name: str) -> Any:
-        """Value of ``a.b.c``; ConfigError if neither the file nor the table of parameters has one."""
+        """Returns the value of ``a.b.c``. ConfigError if neither the file nor the table of parameters has one."""
         if name in self._overrides:
             return self._overrides[name]
         self._reload_if_changed()
@@ -60,21 +59,21 @@ class Config:
         return node
 
     def number(self, name: str) -> float:
-        """The same of a number."""
+        """Returns the value as a float."""
         return float(self.get(name))
 
     def text(self, name: str) -> str:
-        """The same of a text."""
+        """Returns the value as a str."""
         return str(self.get(name))
 
     def _timing(self) -> Mapping[str, Any]:
-        """Values by dotted name of the timing that is in force; a name that the file does not have changes nothing."""
+        """Returns the values (by dotted name) of the selected timing; empty if the file does not have this timing."""
         chosen = self._overrides.get("timing", self._values.get("timing", ""))
         timed: Mapping[str, Any] = self._values.get("timings", {}).get(chosen, {})
         return timed
 
     def set(self, name: str, value: Any) -> None:
-        """Override one value while running (the console and tests use it)."""
+        """Override one value at run time (used by the console and tests)."""
         self._overrides = {**self._overrides, name: value}
 
     def _reload_if_changed(self) -> None:
@@ -106,7 +105,7 @@ def _read(path: str) -> dict[str, Any]:
 
 
 def _region_in_order(path: str, handover: Mapping[str, Any]) -> None:
-    """ConfigError where the handover region is no box."""
+    """ConfigError if the lower corner of the handover region is not below the upper one."""
     low, high = handover.get("region_low"), handover.get("region_high")
     if low is not None and high is not None and any(a >= b for a, b in zip(low, high, strict=True)):
         raise ConfigError(f"{path}: handover.region_low {low} is not below region_high {high} (m, each axis)")
@@ -125,14 +124,14 @@ def _checked(document: Document) -> dict[str, Any]:
 
 
 def _known_timing(path: str, timing: str, values: Mapping[str, Any]) -> None:
-    """ConfigError where a timing is asked for that there is not."""
+    """ConfigError if the selected timing does not exist."""
     timings = values.get("timings", {})
     if timing and timing not in timings:
         raise ConfigError(f"{path}: there is no timing '{timing}'; timings: {', '.join(timings) or 'none'}")
 
 
 def _nested(overrides: Mapping[str, Any]) -> dict[str, Any]:
-    """Values by dotted name as the file would have them."""
+    """Converts values by dotted name to the nested form of the file."""
     values: dict[str, Any] = {}
     for name, value in overrides.items():
         node = values

@@ -1,4 +1,4 @@
-"""What every state is given: ports, clock, configuration, journal, triggers."""
+"""Objects that every state receives: ports, clock, configuration, journal, triggers."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from coglab_smach.ports.interfaces import ArmPort, ContactPort, DatabasePort, Ha
 
 
 class StopSwitch:
-    """STOP as the machines see it: set by the operator, cleared only by an explicit reset."""
+    """STOP for the machines: set by the operator, cleared only by an explicit reset."""
 
     def __init__(self) -> None:
         self._event = threading.Event()
         self.reason = ""
 
     def press(self, reason: str) -> None:
-        """Latch with a reason in words."""
+        """Latch STOP with a reason, a sentence."""
         self.reason = reason
         self._event.set()
 
@@ -34,13 +34,13 @@ class StopSwitch:
         self.reason = ""
 
     def pressed(self) -> bool:
-        """Whether STOP is latched."""
+        """True while STOP is latched."""
         return self._event.is_set()
 
 
 @dataclass
 class Context:
-    """Injected into each state. ``clock`` is steady for the robot, virtual for tests and benches."""
+    """Passed to each state. ``clock`` is steady on the robot and virtual in tests and benches."""
 
     clock: Clock
     arm: ArmPort
@@ -50,16 +50,16 @@ class Context:
     contact: ContactPort
     config: Config
     journal: Journal
-    requests: Requests = None  # type: ignore[assignment]  # made below, so that its changes are told
+    requests: Requests = None  # type: ignore[assignment]  # made in __post_init__, to report its changes to the journal
     stop: StopSwitch = field(default_factory=StopSwitch)
     memory: HoldingMemory = field(default_factory=HoldingMemory)
     reachable: Callable[[Pose], bool] = lambda pose: True
-    """whether the arm can bring the palm to a pose in the base frame"""
+    """returns whether the arm can bring the palm to a pose in the base frame"""
     raised: Callable[[Pose, Pose, float, float], tuple[float, Pose | None]] = lambda _board, palm, *_: (0.0, palm)
-    """(board, palm, room, most): m by which the palm has to rise to leave so much room above the board, and that palm;
-    None where that is more than most (BoardRoom.raised)"""
+    """(board, palm, room, most) -> (m by which the palm must rise to keep ``room`` m above the board, raised palm). The
+    palm is None if it must rise by more than ``most`` m (BoardRoom.raised)."""
     say: Callable[[int, str], None] = lambda code, text: None
-    """tell the person something: code of coglab_msgs/Say and a sentence"""
+    """gives a message to the person: code of coglab_msgs/Say and a sentence"""
     _holding: str = ""
 
     def __post_init__(self) -> None:

@@ -1,6 +1,6 @@
-"""What the robot's hand holds, as far as the machines know: in memory, and in a small file that outlives the node.
+"""Id of the object in the robot's hand: in memory, and in a small file that survives a restart of the node.
 
-The file is only believed where the hand itself says that it is holding something: see WhatIsHeld.
+The file counts only if the hand itself reports a grip: see WhatIsHeld.
 """
 
 from __future__ import annotations
@@ -9,18 +9,18 @@ import json
 import os
 from collections.abc import Callable
 
-UNKNOWN = "unknown"  # Id of an object that the hand holds though nobody remembers which it is
+UNKNOWN = "unknown"  # id of a held object whose name is not known
 
 
 class HoldingMemory:
-    """One object id on disk; an empty id is an empty hand. Written at once, read at start."""
+    """One object id on disk; an empty id means an empty hand. Written at each change, read at start."""
 
     def __init__(self, path: str = "", warn: Callable[[str], None] | None = None) -> None:
         self.path = path
         self._warn = warn or (lambda text: None)
 
     def recall(self) -> str:
-        """The id noted last; empty if there is none or the file cannot be read."""
+        """Returns the last noted id; empty if there is none or the file cannot be read."""
         if not self.path or not os.path.exists(self.path):
             return ""
         try:
@@ -31,7 +31,7 @@ class HoldingMemory:
             return ""
 
     def note(self, object_id: str) -> None:
-        """Remember this id; replaces the file as a whole."""
+        """Store this id. Replaces the file in one step."""
         if not self.path:
             return
         try:

@@ -1,4 +1,4 @@
-"""What happened and why: transitions with their reason, the cause chain of a failure, the result of each action."""
+"""Record of transitions and their reasons, the causes of failures, and the result of each action."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class TransitionRecord:
 
 @dataclass(frozen=True)
 class Failure:
-    """Something that did not succeed: sentence, the causes behind it (nearest first), its ReasonCode."""
+    """A failure: sentence, its causes (nearest first), its ReasonCode."""
 
     sentence: str = ""
     causes: tuple[str, ...] = ()
@@ -47,8 +47,8 @@ class Failure:
 
 @dataclass(frozen=True)
 class Wait:
-    """What an active state waits for, in words and as a code of ``wait_reasons``, and when it gives up (s of the
-    journal's clock). ``aside``: the state only looks on beside others, and nobody waits for its end."""
+    """What an active state waits for: a sentence, a code of ``wait_reasons``, and the time (s of the journal's clock)
+    at which it gives up. ``aside``: the state only monitors others in parallel; no state waits for its end."""
 
     what: str = ""
     deadline: float = math.inf
@@ -58,7 +58,7 @@ class Wait:
 
 @dataclass
 class ActionRecord:
-    """One action of the master (an exchange, take, put, initialisation): what was asked and how it ended."""
+    """One action of the master (an exchange, take, put, initialisation): the request and its result."""
 
     kind: str
     object_id: str
@@ -71,7 +71,7 @@ class ActionRecord:
     marks: dict[str, float] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain types for a result file."""
+        """Returns plain types for a result file."""
         return {
             "kind": self.kind,
             "object_id": self.object_id,
@@ -106,28 +106,28 @@ class Journal:
         self._change_listeners: list[Callable[[], None]] = []
 
     def listen(self, on_transition: Callable[[TransitionRecord], None]) -> None:
-        """Call this for each transition, in the thread that made it."""
+        """Add a callback for each transition. It runs in the thread that made the transition."""
         self._listeners.append(on_transition)
 
     def listen_results(self, on_result: Callable[[ActionRecord], None]) -> None:
-        """Call this at the end of each action."""
+        """Add a callback for the end of each action."""
         self._result_listeners.append(on_result)
 
     def listen_changes(self, on_change: Callable[[], None]) -> None:
-        """Call this whenever another state is active, or something else is to be told as the newest failure."""
+        """Add a callback for each change of the active states or of the newest failure."""
         self._change_listeners.append(on_change)
 
     def listen_waits(self, on_change: Callable[[], None]) -> None:
-        """Call this whenever a state begins to wait for something, puts the end of a wait off, or waits no more."""
+        """Add a callback for each start, extension and end of a wait."""
         self._wait_listeners.append(on_change)
 
     def changed(self) -> None:
-        """Tell whoever listens for changes."""
+        """Call the callbacks for changes."""
         for listener in self._change_listeners:
             listener()
 
     def entered(self, path: str) -> None:
-        """A leaf state begins; side by side with others in a concurrence."""
+        """A leaf state starts. In a concurrence, several are active."""
         with self._lock:
             self._active.append(path)
         self.changed()
@@ -138,7 +138,7 @@ class Journal:
             self._active.remove(path)
 
     def waits(self, path: str, wait: Wait | None) -> None:
-        """The active state of this path waits for something; None: not any more."""
+        """Set the wait of the active state with this path; None: it waits no longer."""
         with self._lock:
             if wait is None:
                 self._waits.pop(path, None)
@@ -149,7 +149,7 @@ class Journal:
 
     @contextmanager
     def waiting(self, path: str, wait: Wait) -> Iterator[None]:
-        """``waits`` for as long as the block runs."""
+        """Inside the block, the state of this path waits."""
         self.waits(path, wait)
         try:
             yield
@@ -157,8 +157,8 @@ class Journal:
             self.waits(path, None)
 
     def wait(self) -> Wait:
-        """Of the waits of all active states the one that gives up first; empty where none has a limit. One aside counts
-        only where no other state is active."""
+        """Returns the wait of all active states that gives up first; an empty Wait if none has a limit. Waits with
+        ``aside`` count only if no other state is active."""
         with self._lock:
             looking_on = {path for path, wait in self._waits.items() if wait.aside}
             alone = looking_on.issuperset(self._active)
@@ -166,7 +166,7 @@ class Journal:
         return min(limited, key=lambda wait: wait.deadline, default=Wait())
 
     def active(self) -> tuple[str, ...]:
-        """Paths of the active leaf states, in the order in which they began."""
+        """Returns the paths of the active leaf states, in the order of their start."""
         with self._lock:
             return tuple(self._active)
 
@@ -189,14 +189,14 @@ class Journal:
             listener(record)
 
     def begin_action(self, kind: str, object_id: str) -> None:
-        """A new action starts: earlier failures do not explain it."""
+        """A new action starts. Earlier failures are not its reason."""
         with self._lock:
             self._failure = None
             self._action = ActionRecord(kind, object_id, self._now())
 
     def end_action(self, outcome: str) -> None:
-        """The action has ended; its reason is its first failure. A success has none, and explains away what failed
-        before it."""
+        """The action has ended. Its first failure becomes its reason. A success has no reason and deletes the earlier
+        failures."""
         with self._lock:
             action, self._action = self._action, None
             if action is None:
@@ -214,25 +214,25 @@ class Journal:
         self.changed()
 
     def mark(self, name: str) -> None:
-        """Note the time of an event of the running action (first one of that name counts)."""
+        """Store the time of an event of the running action. Only the first event of each name counts."""
         with self._lock:
             if self._action is not None:
                 self._action.marks.setdefault(name, self._now())
 
     def marked(self, name: str) -> bool:
-        """Whether this event has happened in the running action."""
+        """True if this event has happened in the running action."""
         with self._lock:
             return self._action is not None and name in self._action.marks
 
     def failure(self, sentence: str, causes: tuple[str, ...] = (), code: int = 0) -> None:
-        """A state failed: kept as the reason of the action if it is the first."""
+        """A state failed. The first failure of an action becomes its reason."""
         with self._lock:
             if self._failure is None:
                 self._failure = self._newest = Failure(sentence, causes, code)
 
     def stopped(self, sentence: str, block: str, code: int = 0) -> None:
-        """The action cannot even recover: that is what the operator has to know. What failed before becomes its cause,
-        unless it names the same ``block`` already."""
+        """Even the recovery is impossible: this becomes the failure that the operator sees. The earlier failure becomes
+        its cause, unless that already names the same ``block``."""
         with self._lock:
             before = self._failure or Failure()
             if block in before.sentence or any(block in cause for cause in before.causes):
@@ -241,8 +241,8 @@ class Journal:
             self._failure = self._newest = Failure(sentence, causes, code)
 
     def settle(self, forget: bool = False) -> None:
-        """The machine waits in a hub: what fails from now on is no consequence of what failed before. ``forget``: the
-        operator has answered it, so it is not told any more either."""
+        """The machine waits in a hub: later failures do not follow from earlier ones. ``forget``: the operator has
+        confirmed the failure, so it is no longer shown."""
         with self._lock:
             self._failure = None
             if forget:
@@ -250,15 +250,15 @@ class Journal:
         self.changed()
 
     def first_failure(self) -> Failure:
-        """The running action's first failure; empty if all is well."""
+        """Returns the first failure of the running action; an empty one if there is none."""
         with self._lock:
             return self._failure or Failure()
 
     def newest_failure(self) -> Failure:
-        """The newest thing that did not succeed; empty after a reset or a successful action."""
+        """Returns the newest failure; an empty one after a reset or a successful action."""
         with self._lock:
             return self._newest
 
     def why(self) -> str:
-        """'Why did it stop?' in one sentence."""
+        """Returns the reason of the last stop in one sentence."""
         return str(self.newest_failure()) or NOTHING_FAILED

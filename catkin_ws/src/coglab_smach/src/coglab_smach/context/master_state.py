@@ -1,4 +1,4 @@
-"""Where the brain stands, for people and programs that look on: what coglab/state shows."""
+"""State of the brain for observers (people and programs), as published on coglab/state."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from coglab_smach.context.requests import COMMAND, command
 
 @dataclass(frozen=True)
 class MasterState:
-    """The fields of coglab_msgs/MasterState but its header."""
+    """Fields of coglab_msgs/MasterState without its header."""
 
     state: str = ""
     in_hub: bool = False
@@ -23,11 +23,11 @@ class MasterState:
     waits_for: str = ""
     waits_code: int = 0
     deadline: float = 0.0
-    """s of the brain's clock; 0 without a limit"""
+    """s on the brain's clock; 0: no limit"""
 
 
 class StateWatch:
-    """Calls ``publish`` with each new MasterState, in order, from whichever thread made the change."""
+    """Calls ``publish`` with each new MasterState, in order, in the thread that made the change."""
 
     def __init__(self, ctx: Context, publish: Callable[[MasterState], None]) -> None:
         self._ctx = ctx
@@ -46,19 +46,19 @@ class StateWatch:
                 self._publish(now)
 
     def tell_again(self) -> None:
-        """The newest once more: who looks on knows from it that the brain is not silent."""
+        """Publish the newest state again, as a sign of life."""
         with self._lock:
             if self._shown is not None:
                 self._publish(self._shown)
 
     def now(self) -> MasterState:
-        """As it stands."""
+        """Returns the present state."""
         ctx = self._ctx
         failure, hub = ctx.journal.newest_failure(), ctx.requests.hub()
         why = str(failure)
         if hub in ("stopped", "fault") and COMMAND not in why:
             why = f"{why or f'the machine is in {hub}'}; to go on {command(*ctx.requests.allowed())}"
-        active = ctx.journal.active()  # of several side by side the one that began last
+        active = ctx.journal.active()  # of several parallel states, the one that started last is shown
         wait = ctx.journal.wait()
         return MasterState(
             active[-1] if active else "",

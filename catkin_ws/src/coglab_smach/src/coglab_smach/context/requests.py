@@ -1,4 +1,4 @@
-"""Triggers of the hubs: who asks for what, and which hub takes it."""
+"""Triggers of the hubs: requests for actions, and the hub that accepts them."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from coglab_smach.ports.pending import PortError
 if TYPE_CHECKING:
     from coglab_smach.context.context import Context
 
-DATABASE_WAIT = 2.0  # s that a trigger waits for the object database
-COMMAND = "./coglab start"  # asks the machine for an action
+DATABASE_WAIT = 2.0  # s, time limit of the object database for a trigger
+COMMAND = "./coglab start"  # command that requests an action
 
 
 def command(*actions: str) -> str:
-    """What the operator has to type, for the end of a sentence."""
+    """Returns the command that the operator must type, for the end of a sentence."""
     return "type: " + " or ".join(f"{COMMAND} {action}" for action in actions)
 
 
 @dataclass(frozen=True)
 class Request:
-    """One trigger: an action by name, the object it is about (may be empty), who asked (operator or recognition)."""
+    """One trigger: name of the action, id of its object (may be empty), its source (operator or recognition)."""
 
     action: str
     object_id: str = ""
@@ -33,7 +33,7 @@ class Request:
 
 
 class Answer(NamedTuple):
-    """Whether a trigger is taken, one sentence, and the ReasonCode of a refusal."""
+    """Answer to a trigger: accepted or not, one sentence, and the ReasonCode of a refusal."""
 
     ok: bool
     message: str
@@ -41,7 +41,7 @@ class Answer(NamedTuple):
 
 
 class Requests:
-    """Mailbox between the trigger's sender and the state that waits for one. Accepts only what the open hub takes."""
+    """Mailbox between the sender of a trigger and the waiting state. It accepts only actions of the open hub."""
 
     def __init__(self, on_change: Callable[[], None] = lambda: None) -> None:
         self._lock = threading.Lock()
@@ -51,27 +51,27 @@ class Requests:
         self._request: Request | None = None
         self._names_object = False
         self.default_object: str | None = None
-        """object of a trigger that names none; None where triggers are about no object of the database"""
+        """object of a trigger without an object id; None if triggers do not refer to an object of the database"""
 
     def open(
         self, hub: str, allowed: Iterable[str], names_object: bool = False, default_object: str | None = None
     ) -> None:
-        """A hub starts to wait for one of these actions; a trigger left over is dropped.
+        """A hub starts to wait for one of these actions. An old trigger is deleted.
 
-        ``names_object``: nobody knows what the hand holds, so the trigger has to say it."""
+        ``names_object``: the object in the hand is unknown, so the trigger must name it."""
         with self._lock:
             self._hub, self._allowed, self._request = hub, tuple(allowed), None
             self._names_object, self.default_object = names_object, default_object
         self._on_change()
 
     def close(self) -> None:
-        """The hub has left; triggers are refused until the next one opens."""
+        """The hub is left. Triggers are refused until the next hub opens."""
         with self._lock:
             self._hub, self._allowed, self._request = "", (), None
         self._on_change()
 
     def refusal(self, action: str, object_id: str = "") -> Answer | None:
-        """Why no hub takes this now; None if one does."""
+        """Returns the reason why no hub accepts this now; None if one does."""
         with self._lock:
             return self._refusal(action, object_id)
 
@@ -106,7 +106,7 @@ class Requests:
         return None
 
     def submit(self, action: str, object_id: str = "", source: str = "operator") -> Answer:
-        """Ask for an action. Returns whether a hub takes it, and one sentence."""
+        """Request an action. Returns whether a hub accepts it, and one sentence."""
         with self._lock:
             refusal = self._refusal(action, object_id)
             if refusal is not None:
@@ -115,25 +115,25 @@ class Requests:
             return Answer(True, f"'{action}' accepted by {self._hub}")
 
     def take(self) -> Request | None:
-        """The trigger, once; None while there is none."""
+        """Returns the trigger and removes it; None if there is none."""
         with self._lock:
             request, self._request = self._request, None
             return request
 
     def hub(self) -> str:
-        """Label of the open hub, empty while an action runs."""
+        """Returns the label of the open hub; empty while an action runs."""
         with self._lock:
             return self._hub
 
     def allowed(self) -> tuple[str, ...]:
-        """What the open hub takes."""
+        """Returns the actions that the open hub accepts."""
         with self._lock:
             return self._allowed
 
 
 def ask_for(ctx: Context, action: str, object_id: str = "", source: str = "operator") -> Answer:
-    """A trigger from outside: refused at once where no hub takes it, or where the database has no such object. Waits
-    for the database for 2 s at most."""
+    """Process a trigger from outside. It is refused at once if no hub accepts it or if the database has no such object.
+    Waits at most 2 s for the database."""
     refusal = ctx.requests.refusal(action, object_id)
     if refusal is not None:
         return refusal

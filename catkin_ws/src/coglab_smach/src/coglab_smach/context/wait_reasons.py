@@ -1,4 +1,4 @@
-"""What the brain may wait for: the codes that stand beside ``waits_for`` of coglab_msgs/MasterState."""
+"""Reasons for which the brain may wait: values of ``waits_code`` of coglab_msgs/MasterState."""
 
 from coglab_msgs.msg import ReasonCode
 

@@ -1,1 +1,1 @@
-"""Where the arm can reach, how long it may take, and where the palm has to go."""
+"""Reachability and motion time of the arm, and goals of the palm."""

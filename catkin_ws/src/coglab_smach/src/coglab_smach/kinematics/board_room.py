@@ -1,7 +1,7 @@
-"""How much room is left between the storage board and the arm: pure geometry on the robot description.
+"""Clearance between the storage board and the arm, computed from the robot description.
 
-The board counts as a plane without end, and what is above it as the arm from the elbow on: forearm, wrist and hand with
-straight fingers. What is nearer to the base stands beside the board and is not looked at.
+The board is an infinite plane. The arm is checked from the elbow on: forearm, wrist and hand with straight fingers.
+Links nearer to the base stand beside the board and are not checked.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from coglab_py.pose import Pose
 
 from coglab_smach.kinematics.reachability import solve
 
-FROM_ELBOW = 3  # index of the first joint of the arm whose link is looked at
-STEPS = 5  # times that a palm is raised at most: the posture of the arm changes with it
-ENOUGH = 1e-4  # m that may be missing after that
+FROM_ELBOW = 3  # index of the first joint whose link is checked
+STEPS = 5  # largest number of lifts of a palm: each one changes the posture of the arm
+ENOUGH = 1e-4  # m, tolerance of the clearance
 
 
 @dataclass(frozen=True)
 class Solid:
-    """A plain shape of a link: a box, a cylinder along z, or a sphere. ``at``: pose of its middle in the link;
-    ``half``: m, half sizes of the box, (0, 0, half length) of the cylinder, zeros of the sphere; ``radius`` m."""
+    """Primitive shape of a link: box, cylinder along z, or sphere. ``at``: pose of its centre in the link. ``half``, m:
+    half sizes of the box; (0, 0, half length) of the cylinder; zeros for the sphere. ``radius``, m."""
 
     kind: str
     at: Pose
@@ -32,7 +32,8 @@ class Solid:
     radius: float = 0.0
 
     def below(self, link: Pose, up: np.ndarray) -> float:
-        """m along ``up`` of its lowest point, the link being at a pose in the same parent."""
+        """Returns the height (m along ``up``) of its lowest point. ``link``: pose of the link in the frame of
+        ``up``."""
         middle = link * self.at
         along = middle.rotation.inv().apply(up)
         flat = float(np.sqrt(max(0.0, 1.0 - along[2] ** 2))) if self.kind == "cylinder" else 1.0
@@ -44,14 +45,14 @@ def _numbers(text: str | None) -> list[float]:
 
 
 def _pose(element: ElementTree.Element) -> Pose:
-    """Of what has an <origin>."""
+    """Returns the pose of an element with an <origin>."""
     origin = element.find("origin")
     xyz, rpy = (_numbers(None if origin is None else origin.get(name)) for name in ("xyz", "rpy"))
     return Pose.from_dict({"xyz": xyz, "rpy_deg": np.degrees(rpy).tolist()})
 
 
 def _solid(element: ElementTree.Element) -> Solid | None:
-    """Of a <collision> or <visual>; None of a mesh, which has no plain shape."""
+    """Converts a <collision> or <visual>. None for a mesh, which is not a primitive shape."""
     at = _pose(element)
     for shape in element.findall("geometry/*"):
         if shape.tag == "box":
@@ -73,11 +74,10 @@ class _Joint:
 
 
 class BoardRoom:
-    """Room above the board for a palm that is to be somewhere.
+    """Clearance above the board for a given pose of the palm.
 
-    ``urdf``: the robot description; links without <collision>, such as fingers, count as they are drawn. ``start``
-    (rad): the posture from which the arm comes, by default home. ValueError where the description has no arm to
-    ``ih2_palm``.
+    ``urdf``: the robot description. Links without <collision>, such as fingers, use their <visual>. ``start`` (rad):
+    the posture from which the arm starts, by default home. ValueError if the description has no arm to ``ih2_palm``.
     """
 
     def __init__(self, urdf: str, start: Sequence[float] | None = None) -> None:
@@ -102,9 +102,9 @@ class BoardRoom:
         }
 
     def over(self, board: Pose, palm: Pose) -> float:
-        """m between the plane through ``board``, whose z axis is up, and the lowest point of the arm from the elbow on
-        with the palm at a pose in the same parent, the base frame; negative: it would stand in the board. Infinite
-        where the arm has no posture for the palm: that is not for the board to judge."""
+        """Returns the distance (m) from the plane through ``board`` (z axis up) to the lowest point of the arm from the
+        elbow on, for a pose of the palm in the same parent, the base frame. Negative: the arm would be in the board.
+        Infinite if the arm has no posture for the palm: other checks handle that."""
         posture = solve(self._arm, palm, self._start)
         if posture is None:
             return np.inf
@@ -116,7 +116,7 @@ class BoardRoom:
     def _lowest(
         self, link: str, at: Pose, angles: dict[str, float], watched: set[str], counts: bool, up: np.ndarray
     ) -> float:
-        """m along ``up`` of the lowest point of a link, if it counts, and of all below it."""
+        """Returns the height (m along ``up``) of the lowest point of a link (if it counts) and of its children."""
         found = min((solid.below(at, up) for solid in self._solids.get(link, [])), default=np.inf) if counts else np.inf
         for joint in self._below.get(link, []):
             half = 0.5 * angles.get(joint.name, 0.0)
@@ -127,8 +127,8 @@ class BoardRoom:
         return float(found)
 
     def raised(self, board: Pose, palm: Pose, room: float, most: float) -> tuple[float, Pose | None]:
-        """(m by which the palm has to rise so that ``room`` m are left, that palm); None for the palm where it would
-        be more than ``most`` m."""
+        """Returns (lift (m) of the palm for a clearance of ``room`` m, lifted palm). The palm is None if the lift would
+        exceed ``most`` m."""
         lift, up = 0.0, board.axis(2)
         for _ in range(STEPS):
             now = Pose(palm.position + lift * up, palm.orientation)

@@ -1,7 +1,7 @@
-"""Can the arm bring the palm to an object's grasp and delivery poses in the handover region?
+"""Checks whether the arm can bring the palm to the grasp and delivery poses of an object in the handover region.
 
-A damped least-squares descent from the home posture, with joint limits, to grid points of the region: what the motion
-itself will do. Coarse on purpose; it finds the grasp that asks the wrist for the impossible.
+Damped least squares from the home posture, with joint limits, to grid points of the region, similar to the real motion.
+Coarse on purpose: it finds grasps that are impossible for the wrist.
 """
 
 from __future__ import annotations
@@ -18,26 +18,26 @@ from coglab_py.yaml_file import read
 
 from coglab_smach.kinematics.goals import palm_at_grasp
 
-POSITION_TOLERANCE = 0.003
-ANGLE_TOLERANCE = np.radians(3.0)
+POSITION_TOLERANCE = 0.003  # m
+ANGLE_TOLERANCE = np.radians(3.0)  # rad
 REGION = ((0.72, 0.78, 0.82), (-0.12, 0.0, 0.12), (0.28, 0.38, 0.45))  # m, base frame: object positions at a handover
 
 
 @lru_cache(maxsize=1)
 def default_arm() -> cc.Chain:
-    """The arm of lwr_description."""
+    """Returns the arm of lwr_description."""
     return cc.Chain(package_path("lwr_description", "urdf", "lwr_ih2.urdf").read_text(encoding="utf-8"))
 
 
 @lru_cache(maxsize=1)
 def joint_limits() -> cc.JointLimits:
-    """The table of lwr_description."""
+    """Returns the joint limits of lwr_description."""
     return cc.load_joint_limits(str(package_path("lwr_description", "config", "joint_limits.yaml")))
 
 
 @lru_cache(maxsize=1)
 def home_posture() -> np.ndarray:
-    """``postures.home`` of the machines' configuration, rad; read-only, since all share it."""
+    """Returns ``postures.home`` of the machines' configuration, rad, shape (7,). Read-only, because it is cached."""
     machines = read(package_path("coglab_smach", "config", "machines.yaml")).value
     home = np.array(machines["postures"]["home"], dtype=float)
     home.setflags(write=False)
@@ -45,13 +45,14 @@ def home_posture() -> np.ndarray:
 
 
 def position_jacobian(arm: cc.Chain, q: Sequence[float]) -> np.ndarray:
-    """3 x 7: velocity of the palm (m/s, base frame) per joint velocity; its transpose maps force to torque."""
+    """Returns the 3 x 7 matrix from joint velocity (rad/s) to palm velocity (m/s, base frame). Its transpose maps force
+    to torque."""
     return np.asarray(arm.jacobian(np.asarray(q, dtype=float)))[:3]
 
 
 def solve(arm: cc.Chain, target: Pose, start: Sequence[float] | None = None, steps: int = 120) -> np.ndarray | None:
-    """Joint positions (rad) that bring the palm to ``target`` within 3 mm and 3 deg, or None. Begins at ``start``, by
-    default at home."""
+    """Returns joint positions (rad) that bring the palm to ``target`` within 3 mm and 3 deg, or None. Starts from
+    ``start``, by default home."""
     q = np.array(home_posture() if start is None else start, dtype=float)
     lower, upper = 0.98 * joint_limits().lower_position, 0.98 * joint_limits().upper_position
     for _ in range(steps):
@@ -71,8 +72,8 @@ def solve(arm: cc.Chain, target: Pose, start: Sequence[float] | None = None, ste
 def share_reached(
     palm_in_object: Pose, arm: cc.Chain | None = None, yaws_deg: Sequence[float] = (-20.0, 0.0, 20.0)
 ) -> tuple[int, int]:
-    """How many object poses of the handover region (27 places, turned about z) the palm can be brought to:
-    (n, of m)."""
+    """Counts the object poses of the handover region (27 places, rotated about z) that the palm can reach. Returns
+    (reached, total)."""
     arm = arm or default_arm()
     reached = total = 0
     for x in REGION[0]:
@@ -86,7 +87,7 @@ def share_reached(
 
 
 def reachability_report(entry: Mapping[str, Any], needed: float = 0.7) -> list[tuple[str, bool]]:
-    """One sentence per grasp and whether it is good enough."""
+    """Returns one sentence per grasp, and whether enough places are reached (share ``needed``)."""
     report = []
     for name, grasp in entry["grasps"].items():
         reached, total = share_reached(palm_at_grasp(grasp), yaws_deg=(0.0,))

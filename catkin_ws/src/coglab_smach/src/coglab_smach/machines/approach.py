@@ -1,4 +1,4 @@
-"""The reach shared by all actions: arm motion, hand preshape and monitor_dmp side by side."""
+"""The reach that all actions share: arm motion, hand preshape and monitor_dmp in parallel."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ TAKER_KEYS = [*KEYS, "delivery"]
 
 
 def build_arm_motion(ctx: Context, trigger: str) -> CoglabMachine:
-    """switch_to_dmp, execute_dmp (starts only), wait_stop (waits for everything)."""
+    """switch_to_dmp, execute_dmp (only starts the motion), wait_stop (waits for its end)."""
     machine = CoglabMachine(
         ctx,
         "arm_motion",
@@ -32,7 +32,7 @@ def build_arm_motion(ctx: Context, trigger: str) -> CoglabMachine:
 
 
 def build_approach(ctx: Context, label: str, trigger: str, preshape: bool, monitor: bool) -> CoglabConcurrence:
-    """Concurrence of arm_motion with, if asked, hand_preshape and monitor_dmp. Outcomes succeeded, failed,
+    """Concurrence of arm_motion and, optionally, hand_preshape and monitor_dmp. Outcomes: succeeded, failed,
     preempted."""
     essential = ["arm_motion", "hand_preshape"] if preshape else ["arm_motion"]
     decide, conclude = require_all(essential)

@@ -1,4 +1,4 @@
-"""take and put (D4.10 Figures 7 and 8): the storage board instead of a person."""
+"""take and put (D4.10 Figures 7 and 8): the robot uses the storage board instead of a person."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from coglab_smach.states.knowledge import FindPlace, LocateOnBoard, QueryDatabas
 def build_look_while_moving(
     ctx: Context, label: str, look_label: str, look: CoglabState, output_key: str
 ) -> CoglabConcurrence:
-    """The arm moves toward the board while perception looks."""
+    """The arm moves to the board while perception searches."""
     decide, conclude = require_all([look_label, "move_to_board"])
     group = CoglabConcurrence(
         ctx,
@@ -35,7 +35,7 @@ def build_look_while_moving(
 def build_take(ctx: Context) -> CoglabMachine:
     """query -> locate while moving to the board -> preshape -> precise DMP motion -> close -> home.
 
-    ``take.preshape`` in the configuration: 'before' the precise motion or 'during' it (read when the machine is built).
+    ``take.preshape`` in the configuration: 'before' or 'during' the precise motion. Read when the machine is built.
     """
     during = ctx.config.text("take.preshape") == "during"
     outputs = ["object_entry", "grasp", "grasp_name"]
@@ -67,7 +67,7 @@ def build_take(ctx: Context) -> CoglabMachine:
 
 
 def build_put(ctx: Context) -> CoglabMachine:
-    """free place while moving to the board -> precise DMP motion -> open -> home; ends with an empty hand."""
+    """free place while moving to the board -> precise DMP motion -> open -> home. Ends with an empty hand."""
     machine = CoglabMachine(
         ctx, "put", ACTION_OUTCOMES, input_keys=["object_id", "object_entry", "grasp", "grasp_name"], io_keys=["grip"]
     )

@@ -16,11 +16,11 @@ SHARED = ["object_entry", "grasp", "grasp_name"]
 
 
 def build_exchange_human_to_robot(ctx: Context) -> CoglabMachine:
-    """query -> goal from the best grasp -> reach and preshape -> contact -> close gently -> take the weight -> close
-    firmly, where the person's hand was seen to go -> home, and firmly there where it was not.
+    """query -> goal from the best grasp -> reach and preshape -> contact -> close gently -> take the weight -> tighten
+    (if the person's hand was seen to leave) -> home -> tighten there otherwise.
 
-    A hand that has closed on nothing opens to its preshape, and the arm comes once more; one that has closed on an edge
-    opens, goes to the grasp from where it is, and closes again."""
+    If the hand closed on nothing, it opens to its preshape and the arm reaches once more. If it closed on an edge, it
+    opens, moves from there to the grasp, and closes again."""
     machine = CoglabMachine(
         ctx, "exchange_human_to_robot", ACTION_OUTCOMES, input_keys=["object_id"], output_keys=SHARED, io_keys=["grip"]
     )

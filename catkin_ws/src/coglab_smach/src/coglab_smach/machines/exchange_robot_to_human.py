@@ -13,7 +13,7 @@ from coglab_smach.states.knowledge import SetDeliveryGoal
 
 
 def build_exchange_robot_to_human(ctx: Context) -> CoglabMachine:
-    """delivery goal (no new query: the entry travels in user data) -> reach -> give the load -> let go -> home."""
+    """delivery goal (no new query: user data contains the entry) -> reach -> give the load -> let go -> home."""
     machine = CoglabMachine(
         ctx,
         "exchange_robot_to_human",

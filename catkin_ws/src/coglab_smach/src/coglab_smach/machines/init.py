@@ -1,4 +1,4 @@
-"""coglab_init_system: perception and robot are initialised in parallel (D4.10, Figures 3 and 4)."""
+"""coglab_init_system: initialises perception and robot in parallel (D4.10, Figures 3 and 4)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from coglab_smach.states.knowledge import InitVision
 
 
 def build_calibrate_and_home(ctx: Context) -> CoglabConcurrence:
-    """Hand calibration while the arm goes to its home posture."""
+    """Calibrates the hand while the arm moves to its home posture."""
     decide, conclude = require_all(["hand_calibration", "coglab_home_robot"])
     group = CoglabConcurrence(
         ctx, "calibrate_and_home", ["succeeded", "failed", "preempted"], "failed", decide, conclude
@@ -23,7 +23,7 @@ def build_calibrate_and_home(ctx: Context) -> CoglabConcurrence:
 
 
 def build_init_robot(ctx: Context) -> CoglabMachine:
-    """coglab_init_robot: plug-ins, primitives, LWR, trigger, then calibration and home concurrently (Figure 4)."""
+    """coglab_init_robot: plug-ins, primitives, LWR, trigger, then calibration and home in parallel (Figure 4)."""
     machine = CoglabMachine(ctx, "coglab_init_robot", ["succeeded", "failed", "preempted"])
     with machine:
         machine.add_state("load_controllers", LoadControllers(ctx), {"succeeded": "load_dmps"})
@@ -35,7 +35,7 @@ def build_init_robot(ctx: Context) -> CoglabMachine:
 
 
 def build_init_system(ctx: Context) -> CoglabConcurrence:
-    """coglab_init_system: coglab_init_vision beside coglab_init_robot."""
+    """coglab_init_system: coglab_init_vision and coglab_init_robot in parallel."""
     decide, conclude = require_all(["coglab_init_vision", "coglab_init_robot"])
     group = CoglabConcurrence(
         ctx, "coglab_init_system", ["succeeded", "failed", "preempted"], "failed", decide, conclude

@@ -1,5 +1,4 @@
-"""coglab_master (D4.10 Figure 3): initialisation, then two hubs from which every action leaves and to which
-it returns."""
+"""coglab_master (D4.10 Figure 3): initialisation, then two hubs. Each action starts in a hub and returns to one."""
 
 from __future__ import annotations
 
@@ -29,7 +28,7 @@ def _after_action(succeeded: str) -> dict[str, str]:
 
 
 def build_master(ctx: Context) -> CoglabMachine:
-    """The whole hierarchy. Its only outcome is 'preempted': a shut-down is the only way out."""
+    """Returns the whole hierarchy. Its only outcome is 'preempted', at shut-down."""
     master = CoglabMachine(ctx, LABEL, ["preempted"])
     master.userdata.object_id = master.userdata.grasp_name = ""
     master.userdata.object_entry, master.userdata.grasp = {}, {}
@@ -39,7 +38,7 @@ def build_master(ctx: Context) -> CoglabMachine:
             build_init_system(ctx),
             {"succeeded": "which_hub", "failed": "fault", "preempted": "preempted"},
         )
-        # After a repair the hand may still hold the object of the action that failed.
+        # After a repair, the hand may still hold the object of the failed action.
         master.add_state(
             "which_hub",
             WhatIsHeld(ctx),

@@ -1,4 +1,4 @@
-"""Recovery: whatever failed, the arm ends at home and the hand is open or holding, unless STOP or a fault
+"""Recovery from any failure: the arm goes home and the hand is open or holds the object, unless STOP or a fault
 forbids motion."""
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from coglab_smach.states.motion import end_motion
 from coglab_smach.states.reach import CAUGHT
 from coglab_smach.states.weight import person_has_it, person_holds
 
-LETS_GO = 5.0  # s in which a person who is told that it is over lets go of what the robot's fingers hold, too, and goes
+LETS_GO = 5.0  # s, time for a person to let go of a shared object and leave after the message that the action is over
 
 
 def arm_is_blocked(state: CoglabState) -> Verdict:
-    """Whether the arm is there but may not move (hold, command mode lost), and why; not if its node is silent."""
+    """Returns whether the arm may not move (hold, command mode lost), and why. Not blocked if its node is silent."""
     allowed = state.ctx.arm.motion_allowed()
     if allowed.ok or state.ctx.arm.joint_positions() is None:
         return Verdict(False)
@@ -35,8 +35,8 @@ def arm_is_blocked(state: CoglabState) -> Verdict:
 
 
 class EndMotion(CoglabState):
-    """First step of every recovery: the running motion is ended and the arm stands. After STOP, or while the arm is
-    blocked, nothing is touched at all: the operator decides, and the hand keeps what it holds."""
+    """First step of every recovery: end the running motion and wait until the arm stands. After STOP, or while the arm
+    is blocked, it does nothing: the operator decides, and the hand keeps its object."""
 
     default_time_limit = 12.0
     ignores_stop = True
@@ -66,12 +66,12 @@ class EndMotion(CoglabState):
 
 
 class SecureHand(CoglabState):
-    """Decide what the hand does during recovery: keep holding if it closed on an object, else open. After a STOP a half
-    open hand may report a grip that is none: an object that is seen away from the palm is not held.
+    """Decide whether the hand keeps holding or opens: it keeps holding if it closed on an object. After a STOP, a half
+    open hand may report a false grip. Therefore, an object that is seen away from the palm is not held.
 
-    The arm does not move with an object that the person may hold, too. They are told that it is over. If their hand is
-    not seen to go within LETS_GO the outcome is stopped, until the operator has looked and asks for 'reset'
-    (``operator``: this is the recovery after that).
+    The arm does not move with an object that the person may also hold. The person is informed that the action is over.
+    If their hand is not seen to leave within LETS_GO, the outcome is stopped, until the operator has looked and
+    requests 'reset'. ``operator``: this is the recovery after that 'reset'.
     """
 
     default_time_limit = 10.0
@@ -88,7 +88,7 @@ class SecureHand(CoglabState):
         return outcome
 
     def _tell(self) -> None:
-        """Once: it is over."""
+        """Inform the person once that the action is over."""
         if not self._told:
             self._told = True
             self.ctx.say(Say.GIVEN_UP, "That did not work; I stop here.")
@@ -117,14 +117,14 @@ class SecureHand(CoglabState):
                 return self._stay(
                     f"the hand could not be opened, and the person may hold what is in it ({error.sentence})"
                 )
-            # A dead hand must not keep the arm from going home; what it may hold is unknown, so it is not forced.
+            # A dead hand must not keep the arm from going home. Its object is unknown, so the hand is not forced.
             self.reason = f"the hand could not be opened: {error.sentence}"
         self._grip.release()
         return "succeeded"
 
     def _closed_on_the_way(self) -> None:
-        """Fingers that closed on the way of a reach that has failed may have caught the object. A person who holds it
-        gets it back; one who let go at the first touch has left it to the robot, wherever their hand is."""
+        """Fingers that closed during a failed reach may have caught the object. A person who still holds it gets it
+        back. If the person let go at the first touch, the robot keeps it, wherever the person's hand is."""
         grip = self._grip
         closing = grip.take_closing()
         if closing is None or not grip.shared or self.ctx.holding:
@@ -139,16 +139,16 @@ class SecureHand(CoglabState):
             self.ctx.holding, grip.shared = grip.object_id, not self._is_away(away)
 
     def _is_away(self, away: float | None) -> bool:
-        """Whether the person's hand, ``away`` m from the palm, was seen to go so far that it holds nothing there."""
+        """True if the person's hand was tracked without a gap to ``away`` m from the palm, too far to hold it."""
         return away is not None and away > AWAY and self._grip.hand.is_sure
 
     def _weighed(self) -> dict[str, float]:
-        """What to feel for."""
+        """Returns the settings of the load measurement."""
         return {"mass": self._grip.mass, "load_share": self.ctx.config.number("hand.load_share")}
 
     def _await_letting_go(self) -> None:
-        """Nobody else holds the object once the person's hand is seen away from it. If the hand was not seen to go it
-        may be another one: then the arm feels whether the person holds the object."""
+        """Wait until the person's hand is seen away from the object: then only the robot holds it. If the hand was not
+        tracked on its whole way, it may be another hand. Then the arm measures whether the person holds the object."""
         self._tell()
         self.allow(LETS_GO + 10.0)
         end, felt = self.ctx.clock.now() + LETS_GO, False
@@ -163,7 +163,7 @@ class SecureHand(CoglabState):
             self.pause(0.05)
 
     def _look_for_it(self) -> None:
-        """Nothing is held any more if the object is seen elsewhere. If nobody sees it the hand is believed."""
+        """Set the hand to empty if the object is seen elsewhere. If it is not seen, the hand's report counts."""
         held, end = HeldObject(self.ctx, self.ctx.holding, self._grip), self.ctx.clock.now() + LOOK
         try:
             while not held.seen_with_the_hand() and self.ctx.clock.now() < end:
@@ -179,10 +179,10 @@ class SecureHand(CoglabState):
 
 
 class WhatIsHeld(CoglabState):
-    """Which hub is the right one now. The hand's own grip decides; memory only names the object.
+    """Choose the hub. The hand reports whether it holds an object; the memory only gives the object's name.
 
-    After a restart the machine knows of no object though the hand may hold one: then it is the one noted on disk, or an
-    unknown one. A hand that turns out to be empty, because somebody took the object meanwhile, is believed too.
+    After a restart, the machine knows no object but the hand may hold one. Then the name comes from the file on disk,
+    or is unknown. If the hand reports that it is empty, because somebody took the object meanwhile, that counts too.
     """
 
     default_time_limit = 8.0
@@ -207,8 +207,8 @@ class WhatIsHeld(CoglabState):
         return "holding" if self.ctx.holding else "empty"
 
     def _seen_by_the_hand(self) -> bool | None:
-        """Whether the hand's grip says so; None if the hand does not answer. A hand node that has just started counts
-        as holding until a poll of the motors has shown it empty: that gets ``hand.settle_after_start``."""
+        """Returns whether the hand reports a grip; None if it does not answer. A newly started hand node reports a grip
+        until a poll of the motors shows that the hand is empty; it gets ``hand.settle_after_start`` s for that."""
         end = self.ctx.clock.now() + self.ctx.config.number("hand.settle_after_start")
         while True:
             state = self.ctx.hand.state()
@@ -220,8 +220,8 @@ class WhatIsHeld(CoglabState):
 
 
 def build_recovery(ctx: Context, operator: bool = False) -> CoglabMachine:
-    """Outcomes: empty, holding (arm at home), stopped (STOP is latched, the arm is blocked, or a person may hold
-    what is in the hand), fault (arm or controller does not obey). ``operator``: the recovery that a 'reset' begins."""
+    """Outcomes: empty or holding (arm at home), stopped (STOP is latched, the arm is blocked, or a person may also hold
+    the object), fault (arm or controller does not obey). ``operator``: recovery after a 'reset'."""
     machine = CoglabMachine(ctx, "recover", ["empty", "holding", "stopped", "fault", "preempted"], io_keys=["grip"])
     failed = {"failed": "check_stop", "preempted": "preempted"}
     with machine:
@@ -230,7 +230,7 @@ def build_recovery(ctx: Context, operator: bool = False) -> CoglabMachine:
             "secure_hand", SecureHand(ctx, operator), {"succeeded": "coglab_home_robot", "stopped": "stopped", **failed}
         )
         machine.add_state("coglab_home_robot", HomeRobot(ctx), {"succeeded": "tighten_at_home", **failed})
-        # What it closes on is held before it has: a hand that refuses is no reason to end here.
+        # The object is already held before the hand tightens, so a refusal of the hand does not end the recovery.
         machine.add_state(
             "tighten_at_home",
             HandTighten(ctx, at_home=True),
@@ -250,7 +250,7 @@ def build_recovery(ctx: Context, operator: bool = False) -> CoglabMachine:
 
 
 class CheckStop(CoglabState):
-    """A step of recovery failed: because of STOP or a blocked arm, or because something is broken?"""
+    """A recovery step failed. Outcome stopped: because of STOP or a blocked arm. Outcome fault: something is broken."""
 
     ignores_stop = True
 
@@ -262,7 +262,7 @@ class CheckStop(CoglabState):
 
 
 ACTION_OUTCOMES = ["succeeded", "failed_empty", "failed_holding", "stopped", "fault", "preempted"]
-"""Outcomes of every action machine; the master's transitions depend on nothing else."""
+"""Outcomes of every action machine. The master's transitions depend only on these."""
 
 RECOVERY_TRANSITIONS = {
     "empty": "failed_empty",
@@ -271,9 +271,9 @@ RECOVERY_TRANSITIONS = {
     "fault": "fault",
     "preempted": "preempted",
 }
-"""How the outcomes of 'recover' end an action."""
+"""Maps the outcomes of 'recover' to those of an action."""
 
 
 def to_recovery(**transitions: str) -> dict[str, str]:
-    """Transitions of a state inside an action: its own, and failure to recovery."""
+    """Transitions of a state inside an action: the given ones, and 'failed' to recovery."""
     return {**transitions, "failed": "recover", "preempted": "preempted"}

@@ -1,1 +1,1 @@
-"""What the machines need from the rest of the system: interfaces, and answers that take time."""
+"""Interfaces of the state machines to the rest of the system, and answers that take time."""

@@ -1,4 +1,4 @@
-"""Answers that take time: every port call that may wait returns a Pending, and states wait on it with a limit."""
+"""Answers that take time: each port call that may wait returns a Pending. States wait for it with a time limit."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from coglab_msgs.msg import ReasonCode
 
 
 class PortError(Exception):
-    """A port could not do what was asked: one sentence with what was expected, what came, what to do next.
+    """A port could not fulfil a request. One sentence: what was expected, what came, what to do next.
 
-    ``causes`` is the chain behind the sentence, nearest first. ``code`` is its number in coglab_msgs/ReasonCode, for
-    programs: no program reads the words.
+    ``causes``: causes of the error, nearest first. ``code``: its coglab_msgs/ReasonCode. Programs use only the code,
+    not the text.
     """
 
     def __init__(self, sentence: str, causes: tuple[str, ...] = (), code: int = ReasonCode.NONE) -> None:
@@ -24,22 +24,22 @@ class PortError(Exception):
 
 
 class Pending:
-    """A value that arrives later. Polled, never blocking, so that it works in virtual time too."""
+    """A value that arrives later. It is polled and never blocks, so that it also works in virtual time."""
 
     def done(self) -> bool:
-        """True when result() will not say 'not yet' any more."""
+        """True when result() returns the value or raises the error of the call."""
         raise NotImplementedError
 
     def result(self) -> Any:
-        """The value; raises PortError if the call failed."""
+        """Returns the value; raises PortError if the call failed."""
         raise NotImplementedError
 
     def cancel(self) -> None:
-        """Nobody waits any more: what has not been sent never is, a motion that was started is ended."""
+        """Stop waiting: an unsent request is not sent any more, and a started motion ends."""
 
 
 class Ready(Pending):
-    """A value that is already there, or an error that already happened."""
+    """A value or an error that is available at once."""
 
     def __init__(self, value: Any = None, error: PortError | None = None) -> None:
         self._value = value
@@ -55,7 +55,8 @@ class Ready(Pending):
 
 
 class Polled(Pending):
-    """A value computed from callables: ``ready()`` says when, ``value()`` gives it (may raise PortError)."""
+    """A value computed by callables: ``ready()`` returns whether it is there; ``value()`` returns it or raises
+    PortError."""
 
     def __init__(
         self, ready: Callable[[], bool], value: Callable[[], Any], cancel: Callable[[], None] | None = None
@@ -76,7 +77,7 @@ class Polled(Pending):
 
 
 def ending_motion(pending: Pending, cancel_motion: Callable[[str], object]) -> Pending:
-    """The handle of a motion: cancelled, the request is withdrawn if it was not sent, and the motion is ended."""
+    """Returns the handle of a motion. Its cancel() withdraws an unsent request and ends the motion."""
 
     def cancel() -> None:
         pending.cancel()
@@ -86,29 +87,29 @@ def ending_motion(pending: Pending, cancel_motion: Callable[[str], object]) -> P
 
 
 class Permit:
-    """Whether a request may still be sent. Sending and giving up happen in different threads: whichever comes first
-    decides, and what was given up first is never sent."""
+    """Permission to send a request. Sending and giving up happen in different threads. The first one decides: a request
+    that was given up first is never sent."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._withdrawn = threading.Event()
 
     def withdraw(self) -> None:
-        """Nothing more is sent."""
+        """Forbid sending from now on."""
         with self._lock:
             self._withdrawn.set()
 
     def check(self) -> None:
-        """PortError if it was withdrawn; called at the last moment before something is sent."""
+        """Raises PortError if the permit was withdrawn. Call it immediately before sending."""
         with self._lock:
             if self._withdrawn.is_set():
                 raise PortError("the request was given up before it was sent", code=ReasonCode.CANCELLED)
 
 
 class Threaded(Pending):
-    """A blocking call run in a daemon thread of its own; abandoned, not awaited, when nobody waits any more.
+    """A blocking call in its own daemon thread. If the caller stops waiting, the thread is abandoned, not joined.
 
-    ``call`` is given the Permit that it has to check before it sends anything.
+    ``call`` receives the Permit and must check it before it sends anything.
     """
 
     def __init__(self, call: Callable[[Permit], Any], what: str) -> None:
@@ -125,7 +126,7 @@ class Threaded(Pending):
             self._value = self._call(self._permit)
         except PortError as error:
             self._error = error
-        except Exception as error:  # whatever the middleware throws becomes one sentence for the machine
+        except Exception as error:  # any exception of the middleware becomes one sentence
             self._error = PortError(f"{self._what} failed: {error}", code=ReasonCode.UNEXPECTED)
         self._event.set()
 
@@ -133,7 +134,7 @@ class Threaded(Pending):
         return self._event.is_set()
 
     def failed(self) -> bool:
-        """Whether it has ended with an error."""
+        """True if the call has ended with an error."""
         return self._event.is_set() and self._error is not None
 
     def result(self) -> Any:

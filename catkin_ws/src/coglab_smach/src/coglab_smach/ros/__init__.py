@@ -1,1 +1,1 @@
-"""Ports over services, actions and topics."""
+"""Ports that use ROS services, actions and topics."""

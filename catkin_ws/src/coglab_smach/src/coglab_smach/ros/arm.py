@@ -1,4 +1,4 @@
-"""ArmPort over the services and topics of the controller manager and of the LWR interface. Names are relative."""
+"""ArmPort on the services and topics of the controller manager and of the LWR interface. Names are relative."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ JOINTS = ("lwr_a1", "lwr_a2", "lwr_e1", "lwr_a3", "lwr_a4", "lwr_a5", "lwr_a6")
 
 
 class RosArm:
-    """ArmPort over controller_manager and lwr; it drives the plug-ins loaded under the ids dmp and ptp."""
+    """ArmPort on controller_manager and lwr. It uses the plug-ins that are loaded as dmp and ptp."""
 
     def __init__(self, manager: str = "controller_manager", lwr: str = "lwr") -> None:
         self._manager, self._lwr = manager, lwr
@@ -72,7 +72,7 @@ class RosArm:
 
     def load_controller(self, controller_id: str, controller_type: str) -> Pending:
         def run(permit: Permit) -> None:
-            # Read here because the parameter server may hang, and a state must not.
+            # Read in this thread: the parameter server may hang, and a state must not.
             self._limits = read_limits(parameters.read(self._manager, dict, {}))
             loaded = call_now(f"{self._manager}/list_controllers", ListControllers, permit)
             if (controller_id, controller_type) in zip(loaded.controller_ids, loaded.controller_types, strict=False):
@@ -134,7 +134,7 @@ class RosArm:
     def cancel_motion(self, reason: str) -> Pending:
         status = self._status.message
         running = {self._addressed, status.active_controller if status is not None else ""} & {"dmp", "ptp"}
-        # Permits of their own, which nobody withdraws.
+        # Each call has its own Permit, which is never withdrawn.
         calls = [self._cancelling(name, reason) for name in sorted(running)]
         if not calls:
             return Polled(lambda: self.standing().ok, lambda: None)
@@ -142,7 +142,7 @@ class RosArm:
         def failed() -> bool:
             return any(c.failed() for c in calls)
 
-        # The answer may be here before the status that says so.
+        # The answer may arrive before the status message that reports the standstill.
         return Polled(
             lambda: failed() or (all(c.done() for c in calls) and self.standing().ok),
             lambda: [c.result() for c in calls][0],
@@ -160,7 +160,7 @@ class RosArm:
             )
         except PortError as error:
             status = self._status.message
-            # A robot node that has started anew has nothing loaded: no service, and nothing that moves.
+            # A restarted robot node has no plug-in loaded: it has no such service, and nothing moves.
             elsewhere = status is not None and status.active_controller != controller_id
             gone = error.code == ReasonCode.NODE_SILENT and elsewhere
             if not gone and error.code not in (ReasonCode.NOTHING_RUNS, ReasonCode.NOT_ACTIVE):
@@ -254,7 +254,7 @@ class RosArm:
         return ending_motion(Polled(finished, value, added.cancel), self.cancel_motion)
 
     def _end_of_ptp(self, added: Pending) -> tuple[PortError | None] | None:
-        """How the motion has ended, as a tuple with the error, if any; None while it runs."""
+        """Returns None while the motion runs; at its end, a tuple with its error or None."""
         try:
             identity = added.result().ptp_id
         except PortError as error:
@@ -289,7 +289,7 @@ class RosArm:
 
 
 def _fields(request: DmpRequest, kind: type[ExecuteDmpRequest | SwitchDmpRequest]) -> dict[str, Any]:
-    """The fields of a request that this service has; the others keep their defaults."""
+    """Returns the fields of a request that this service has. Other fields of the service keep their defaults."""
     message = kind()
     for name, value in vars(request).items():
         if name in message.__slots__:

@@ -1,6 +1,6 @@
-"""Services and topics as the ports over ROS use them.
+"""Service calls and subscriptions of the ROS ports.
 
-A rospy service call has no time limit of its own, so each runs in a thread and the state that waits gives it one.
+A rospy service call has no time limit. Therefore, each call runs in a thread, and the waiting state limits the time.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from coglab_py.steady import POLL, service_answers
 
 from coglab_smach.ports.pending import Pending, Permit, Polled, PortError, Threaded
 
-SERVICE_WAIT = 20.0  # s to wait for a service to appear: a node may still be starting
-PACE = Pace()  # By which ages pass; the node gives it the topic of the simulated cell
+SERVICE_WAIT = 20.0  # s, time limit for a service to appear: its node may still be starting
+PACE = Pace()  # pace of the simulated cell, for ages; the node sets its topic
 
 
 class Newest:
-    """The newest message of a topic with the time it came (monotonic s)."""
+    """The newest message of a topic and its arrival time (s, monotonic)."""
 
     def __init__(self, topic: str, kind: Any, on_message: Callable[[Any], None] | None = None) -> None:
         self.message: Any = None
@@ -35,26 +35,27 @@ class Newest:
             self._on_message(message)
 
     def age(self) -> float:
-        """s since the last message, as they pass in the cell; large if there was none."""
+        """Returns the age of the last message, s in the time of the cell; large if there was none."""
         return (time.monotonic() - self.stamp) * PACE.factor
 
 
 def call(name: str, kind: Any, wait: float = SERVICE_WAIT, **fields: Any) -> Pending:
-    """Call a service in a thread; a response with ``success`` false becomes a PortError with message and reason_code.
+    """Call a service in a thread. A response with ``success`` false becomes a PortError with message and reason_code.
 
-    Cancelled before the server has taken the connection, the request is never sent, however late the server comes.
+    If the call is cancelled before the server accepts the connection, the request is never sent, even if the server
+    answers later.
     """
     return Threaded(lambda permit: call_now(name, kind, permit, wait, **fields), f"service {name}")
 
 
 def call_now(name: str, kind: Any, permit: Permit, wait: float = SERVICE_WAIT, **fields: Any) -> Any:
-    """The same in the thread of the caller, which must be one of its own; returns the response."""
+    """The same as call(), but blocking: call it only from a separate thread. Returns the response."""
     full = rospy.resolve_name(name)
     _await_service(full, wait, permit)
 
     class Request(kind._request_class):
-        """rospy serialises a request when its server has answered the connection's header, and sends it then: that is
-        the last moment at which it can be given up. A frozen server answers no header."""
+        """rospy serialises and sends a request after the server has answered the connection header. This is the last
+        moment to give it up. A frozen server does not answer the header."""
 
         def serialize(self, buff: Any) -> None:
             permit.check()
@@ -72,7 +73,7 @@ def call_now(name: str, kind: Any, permit: Permit, wait: float = SERVICE_WAIT, *
 
 
 def _await_service(full: str, wait: float, permit: Permit) -> None:
-    """Until the service answers; a call that is given up leaves no thread behind."""
+    """Wait until the service answers. A withdrawn permit ends the wait, so that no thread remains."""
     end = time.monotonic() + wait
     permit.check()
     while not service_answers(full):
@@ -87,5 +88,5 @@ def _await_service(full: str, wait: float, permit: Permit) -> None:
 
 
 def mapped(pending: Pending, value: Callable[[Any], Any]) -> Pending:
-    """The same call with its response turned into a value."""
+    """Returns the same call with its response converted by ``value``."""
     return Polled(pending.done, lambda: value(pending.result()), pending.cancel)

@@ -1,4 +1,4 @@
-"""HandPort over the four actions, the calibration topic and the status of ih2_hand."""
+"""HandPort on the four actions, the calibration topic and the status of ih2_hand."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from coglab_smach.ports.interfaces import HandState
 from coglab_smach.ports.pending import Pending, Polled, PortError
 from coglab_smach.ros.calls import Newest
 
-SERVER_WAIT = 10.0  # s to wait for an action server to appear
+SERVER_WAIT = 10.0  # s, time limit for an action server to appear
 
 
 class ActionCall(Pending):
-    """One goal sent to an action server; the result's ``isOk`` decides, ``message`` is the reason."""
+    """One goal of an action server. ``isOk`` of the result decides on success; ``message`` is the reason."""
 
-    # Not actionlib.SimpleActionClient: it loses an end that comes while its send_goal() still runs.
+    # Not actionlib.SimpleActionClient: it misses a result that arrives during its send_goal().
     def __init__(self, client: actionlib.ActionClient, name: str, goal: Any) -> None:
         self._client, self._name = client, name
         self._done = threading.Event()
@@ -86,7 +86,7 @@ class ActionCall(Pending):
         return self._result
 
     def cancel(self) -> None:
-        """End the action; a goal that is not sent yet never will be."""
+        """End the action. An unsent goal is not sent any more."""
         with self._lock:
             self._cancelled = True
             if self._handle is not None and not self._done.is_set():
@@ -94,7 +94,7 @@ class ActionCall(Pending):
 
 
 class RosHand:
-    """HandPort over ROS."""
+    """HandPort on ROS."""
 
     def __init__(self, namespace: str = "ih2_hand") -> None:
         self._ns = namespace
@@ -126,7 +126,7 @@ class RosHand:
         return self._call("hand_open", HandOpenGoal(speed=speed))
 
     def calibrate(self, mode: str) -> Pending:
-        """Publish the order once the hand listens, then follow hand_status: started, ended, or refused."""
+        """Publish the order when the hand node is connected. Then follow hand_status: started, ended, or refused."""
         begun: dict[str, Any] = {"sent": 0.0, "seen": False, "asked": time.monotonic(), "error": None}
 
         def fail(why: str, code: int) -> bool:
@@ -138,7 +138,7 @@ class RosHand:
             if begun["error"] is not None:
                 return True
             if not begun["sent"]:
-                # After a start the hand counts as holding until a poll has shown it empty: give it 2 s for that.
+                # At start the hand counts as holding until a poll shows that it is empty. Wait at most 2 s for that.
                 settled = not state.holding or time.monotonic() - begun["asked"] > 2.0
                 if state.connected and settled and self._calibration.get_num_connections() > 0:
                     self._calibration.publish(String(mode))

@@ -1,6 +1,6 @@
-"""The ports over ROS to perception, object database and contact detector; the arm is in ros.arm, the hand in ros.hand.
+"""ROS ports of perception, object database and contact detector. The arm is in ros.arm, the hand in ros.hand.
 
-All names are relative: in the node's own namespace, so that two robots fit in one graph.
+All names are relative to the node's namespace, so that two robots can share one ROS graph.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from coglab_smach.ports.interfaces import OLDEST_BELIEF, OLDEST_RECOGNITION, Ahe
 from coglab_smach.ports.pending import Pending, Permit, PortError, Threaded
 from coglab_smach.ros.calls import SERVICE_WAIT, Newest, call, call_now, mapped
 
-OLDEST_SIGNAL = 0.3  # s
-OLDEST_FORCE = 0.1  # s
-DEFAULT_SHARE = 0.5  # of the load, where a request leaves it to the detector
+OLDEST_SIGNAL = 0.3  # s, oldest ContactSignal that is used
+OLDEST_FORCE = 0.1  # s, oldest force that is used
+DEFAULT_SHARE = 0.5  # share of the load, if the request does not set one
 
 
 class RosPerception:
-    """PerceptionPort over perception and the recogniser's topic."""
+    """PerceptionPort on the perception services and the recogniser's topics."""
 
     def __init__(self, namespace: str = "perception") -> None:
         self._ns = namespace
@@ -35,7 +35,7 @@ class RosPerception:
         self._belief = Newest(f"{namespace}/belief", HandoverBelief)
 
     def init_vision(self, time_limit: float) -> Pending:
-        # A service that is not there is said before the limit of whoever waits runs out.
+        # Report a missing service before the caller's time limit ends.
         wait = max(0.5, min(SERVICE_WAIT, time_limit - 1.0))
         return mapped(call(f"{self._ns}/init_vision", InitVision, wait, timeout=time_limit), lambda r: r.message)
 
@@ -84,7 +84,7 @@ def _entry(object_id: str, text: str) -> dict[str, Any]:
 
 
 class RosDatabase:
-    """DatabasePort over object_database."""
+    """DatabasePort on object_database."""
 
     def __init__(self, namespace: str = "object_database") -> None:
         self._ns = namespace
@@ -98,7 +98,7 @@ class RosDatabase:
 
 
 class RosContact:
-    """ContactPort: the topic coglab/contact, the service that arms whoever publishes there, and its live signal."""
+    """ContactPort on the topic coglab/contact, the arming service of its publisher, and the detector's signal."""
 
     def __init__(
         self,
@@ -110,7 +110,7 @@ class RosContact:
         self._service = service
         self._force = Newest(force, Vector3Stamped)
         self._signal = Newest(signal, ContactSignal)
-        self._needed: float | None = None  # share of the load that is armed for; None where another mode is
+        self._needed: float | None = None  # share of the load in mode 'release'; None in other modes
         self._armed_at = 0.0
         self._event: ContactEvent | None = None
         self._wanted: bool | None = None
@@ -152,8 +152,8 @@ class RosContact:
         )
 
     def _request(self, wait: float, **fields: Any) -> Pending:
-        """One request, sent when the one before it has ended: a disarm must not land after a later arm, nor before the
-        arm that it is to end."""
+        """Send one request after the end of the previous one. A disarm must arrive neither after a later arm nor before
+        the arm that it ends."""
         before, self._before = self._before, threading.Event()
         over = self._before
 

@@ -1,1 +1,1 @@
-"""Leaf states of the machines; each does one thing through a port and ends within its time limit."""
+"""Leaf states of the machines. Each does one thing through a port and ends within its time limit."""

@@ -1,4 +1,4 @@
-"""States of the arm: plug-ins and primitives, LWR interface, point-to-point."""
+"""States of the arm: plug-ins and primitives, LWR interface, point-to-point motion."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from coglab_smach.states.base import CoglabState, TimeLimit
 from coglab_smach.states.hand_tracking import person_at, seen_at
 from coglab_smach.states.held_object import LOOK, HeldObject
 
-RESUMES = 3  # times that a motion is begun again that did not reach its target, as when a person still holds on
-RESUME_AFTER = 1.0  # s from such an end to the next try
-FELL = 0.5  # m below the person's hand in which an object is not in it any more
+RESUMES = 3  # retries of a motion that did not reach its target, e.g. because a person holds on
+RESUME_AFTER = 1.0  # s from the end of such a motion to the next try
+FELL = 0.5  # m below the person's hand: there, an object counts as fallen
 
 
 class LoadControllers(CoglabState):
-    """Ask the controller manager to load the DMP and the point-to-point plug-in (D4.10 Figure 4)."""
+    """Load the DMP and the point-to-point plug-in into the controller manager (D4.10 Figure 4)."""
 
     default_time_limit = 40.0
 
@@ -60,7 +60,7 @@ class ConfigureLwr(CoglabState):
             except TimeLimit:
                 raise
             except PortError:
-                # The robot controller may still be starting: ask again while the limit allows it.
+                # The robot controller may still be starting: try again within the time limit.
                 if self.left() < 2.0:
                     raise
                 self.pause(1.0)
@@ -74,7 +74,7 @@ class ConfigureLwr(CoglabState):
 
 
 class SwitchController(CoglabState):
-    """Make one plug-in the active one. Switching to 'ptp' is what ends a running DMP."""
+    """Make one plug-in the active one. A switch to 'ptp' ends a running DMP."""
 
     default_time_limit = 5.0
     owns_motion = True
@@ -92,8 +92,8 @@ class SwitchController(CoglabState):
 
 class PtpMotion(CoglabState):
     """Point-to-point motion to a named posture of the configuration (``postures.<name>``); 'home' is
-    coglab_home_robot. It may take ``ptp_timeout`` beyond half as long again as its limits and its way ask for. Where
-    something keeps the arm from its target the motion is begun again, RESUMES times at most."""
+    coglab_home_robot. Time limit: ``ptp_timeout`` plus 1.5 times the duration computed from limits and path. If
+    something keeps the arm from its target, the motion is repeated, RESUMES times at most."""
 
     default_time_limit = 20.0
     owns_motion = True
@@ -134,11 +134,11 @@ class PtpMotion(CoglabState):
         )
 
     def _look_after(self, ud: Any) -> Callable[[], object]:
-        """What is to be looked at again and again on the way: it raises what ends the motion, and returns nothing."""
+        """Returns a function that is called repeatedly during the motion; it raises an error to end the motion."""
         return lambda: None
 
     def _verify(self, target: list[float]) -> None:
-        """The controller says it has arrived: the measured joints must agree (they are allowed 1 s to settle)."""
+        """Check that the measured joints agree with the reported arrival; they have 1 s to settle."""
         tolerance = self.ctx.config.number("ptp_tolerance")
 
         def arrived() -> bool:
@@ -150,9 +150,9 @@ class PtpMotion(CoglabState):
 
 
 class HomeRobot(PtpMotion):
-    """coglab_home_robot: the arm goes to its home posture; with ``carries``, with the object of the action in the hand,
-    and it ends where that is lost, and stands at home until it is seen to stay; with ``gave``, an object that has
-    fallen from the person's hand meanwhile was not given."""
+    """coglab_home_robot: the arm moves to its home posture. ``carries``: the hand holds the object of the action. The
+    state fails if the object is lost; at home it waits until the object is seen to stay. ``gave``: the state fails if
+    the object has meanwhile fallen from the person's hand."""
 
     def __init__(self, ctx: Context, carries: bool = False, gave: bool = False) -> None:
         super().__init__(ctx, "home")
@@ -178,8 +178,8 @@ class HomeRobot(PtpMotion):
         return self._held.check
 
     def _see_held(self) -> None:
-        """What falls in the last moments of the way is not held: look until it is seen to stay, for LOOK s at most.
-        What nobody sees is where the hand says."""
+        """An object that falls at the end of the motion is not held. Wait until it is seen to stay, at most LOOK s. If
+        it is not seen, the hand's report counts."""
         here = self.ctx.clock.now()
         self.allow(2.0 * LOOK)
         while not self._held.stays(here) and self.ctx.clock.now() < here + LOOK:

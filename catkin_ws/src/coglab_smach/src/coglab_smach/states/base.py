@@ -1,4 +1,4 @@
-"""The state every other one derives from: time limit, preemption, STOP, reasons; and containers that record them."""
+"""Base class of all states: time limit, preemption, STOP, reasons; and containers that record these."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from coglab_smach.context.requests import command
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.motion import end_motion
 
-POLL_PERIOD = 0.01  # s between two looks at a condition: well below the 60 ms in which a contact has to be found
+POLL_PERIOD = 0.01  # s between two polls of a condition; contact must be detected within 60 ms
 
-RETOLD = 0.2  # s by which the end of a wait that is put off moves until it is told again
+RETOLD = 0.2  # s, smallest extension of a wait that is published again
 
 
 class Interrupted(Exception):
-    """The wait of a state was ended from outside: by preemption (``stop=False``) or by STOP."""
+    """A preemption (``stop=False``) or STOP has ended the wait of a state."""
 
     def __init__(self, stop: bool, reason: str) -> None:
         super().__init__(reason)
@@ -33,31 +33,31 @@ class Interrupted(Exception):
 
 
 class TimeLimit(PortError):
-    """A state's time limit ran out; the sentence says what it waited for."""
+    """A time limit has run out. The sentence names what the state waited for."""
 
     def __init__(self, sentence: str, causes: tuple[str, ...] = (), code: int = ReasonCode.TIME_LIMIT) -> None:
         super().__init__(sentence, causes, code)
 
 
 class CoglabState(smach.State):
-    """Leaf state. Subclasses implement ``run`` and wait only through ``wait_for``, ``await_pending`` and ``pause``.
+    """Leaf state. Subclasses implement ``run`` and wait only with ``wait_for``, ``await_pending`` and ``pause``.
 
-    Outcomes always include failed and preempted. A PortError, a limit, STOP or a programming error ends the state with
-    'failed' and leaves its sentence in the journal, so that no error can leave a machine stuck.
+    The outcomes always include failed and preempted. A PortError, a time limit, STOP or a programming error ends the
+    state with 'failed' and a sentence in the journal. No error can leave a machine stuck.
     """
 
     default_time_limit = 10.0
-    """s; the configuration's ``time_limits.<label>`` wins."""
+    """s; ``time_limits.<label>`` in the configuration overrides it."""
 
     ignores_stop = False
-    """True for states that make things safe after STOP and must run to their end."""
+    """True for states that restore safety after STOP and must run to their end."""
 
     owns_motion = False
-    """True for states that start a motion of the arm or wait for one: it has ended when they end without success."""
+    """True for states that start a motion of the arm or wait for one. If they fail, the motion ends too."""
 
     essential = True
-    """False where a failure of this state is no failure of its action: it is recorded as a transition alone, and what
-    it waits for is told only where nothing else is done."""
+    """False if a failure of this state does not fail its action. Then it is only recorded as a transition, and its wait
+    is published only if no other state is active."""
 
     def __init__(
         self,
@@ -77,14 +77,14 @@ class CoglabState(smach.State):
         self.targets: Mapping[str, str] = {}
         self.reason = ""
         self._deadline = 0.0
-        self._waits = False  # a wait is under way
+        self._waits = False  # True during a wait
 
     def run(self, ud: Any) -> str:
-        """Do the work; returns an outcome. ``self.reason`` may hold a sentence for it."""
+        """Do the work; returns an outcome. ``self.reason`` may contain a sentence about it."""
         raise NotImplementedError
 
     def path(self) -> str:
-        """Introspection path of the container this state is in."""
+        """Returns the introspection path of the container of this state."""
         return self.container.full_path() if self.container is not None else ""
 
     def execute(self, ud: Any) -> str:
@@ -93,10 +93,10 @@ class CoglabState(smach.State):
         try:
             outcome, failure = self._run(ud)
             if outcome not in ("failed", "preempted") and self.asked_to_end():
-                # Asked for after the last look: the work is done, but nothing may follow it.
+                # The request came after the last check. The work is done, but no further state may start.
                 outcome, failure = "preempted", Failure(f"{self.label} was preempted", (), ReasonCode.PREEMPTED)
             if outcome == "preempted":
-                # Served here alone. A request that a failure has overtaken stays up, and the container passes it on.
+                # Only here is the request served. After a failure it stays set, and the container passes it on.
                 self.service_preempt()
             if self.owns_motion and outcome in ("failed", "preempted"):
                 trouble = end_motion(self.ctx, failure.sentence)
@@ -118,7 +118,7 @@ class CoglabState(smach.State):
         return outcome
 
     def _run(self, ud: Any) -> tuple[str, Failure]:
-        """Outcome of ``run`` and the sentence for it: whatever it raises becomes one."""
+        """Returns the outcome of ``run`` and its sentence. Every exception becomes an outcome."""
         try:
             self.check()
             outcome = self.run(ud)
@@ -138,11 +138,11 @@ class CoglabState(smach.State):
             )
 
     def time_limit(self) -> float:
-        """Longest duration of this state, s."""
+        """Returns the longest duration of this state, s."""
         return float(self._configured_limits().get(self.label, self.default_time_limit))
 
     def allow(self, duration: float) -> None:
-        """From now on this state may take ``duration`` s, unless the configuration gives it a limit of its own."""
+        """Set the time limit to ``duration`` s from now, unless the configuration sets one for this state."""
         if self.label not in self._configured_limits():
             self._deadline = self.ctx.clock.now() + duration
 
@@ -150,14 +150,15 @@ class CoglabState(smach.State):
         return dict(self.ctx.config.get("time_limits"))
 
     def left(self) -> float:
-        """Time left before the limit, s."""
+        """Returns the time left before the limit, s."""
         return self._deadline - self.ctx.clock.now()
 
     def asked_to_end(self) -> bool:
-        """Whether a preempt was requested of this state or of a container around it.
+        """Returns whether this state or a container around it was requested to preempt.
 
-        Upstream's Concurrence takes a request and passes it to its children a moment later, in another thread. Nothing
-        may begin in between; and nothing in these machines follows upon a preempt, so that the request stands for all.
+        The upstream Concurrence takes a request and passes it to its children slightly later, in another thread.
+        Nothing may start in between. In these machines, nothing follows a preempt, so the request counts for all states
+        inside.
         """
         asked: Any | None = self
         while asked is not None and not asked.preempt_requested():
@@ -179,16 +180,16 @@ class CoglabState(smach.State):
         pace: Callable[[], float] | None = None,
         code: int = wait_reasons.ANSWER,
     ) -> None:
-        """Wait until ``condition()``; TimeLimit naming ``what`` after ``limit`` s or at the end of the
-        state's own limit. ``code`` of ``wait_reasons`` tells programs what it is.
+        """Wait until ``condition()``. After ``limit`` s or at the state's own limit: TimeLimit that names ``what``.
+        ``code``: the code of ``wait_reasons``, for programs.
 
-        With ``pace`` (0..1, such as the speed scale) the limit counts in the time of a motion: it is used up so much
-        slower, down to a tenth, and the state's own limit is put off likewise.
+        ``pace`` (0..1, e.g. the speed scale): the limit counts the time of a slowed motion. The used time is multiplied
+        by the pace (at least 0.1), and the state's own limit is extended accordingly.
         """
         allowed = self.left() if limit is None else min(limit, self.left())
         left, before, told = allowed, self.ctx.clock.now(), -math.inf
         path = f"{self.path()}/{self.label}"
-        # What a condition waits for itself, such as a sight, belongs to the wait that is told.
+        # A wait inside a condition, e.g. for a sight, is published as part of the outer wait.
         within, self._waits = self._waits, True
         try:
             while True:
@@ -219,7 +220,7 @@ class CoglabState(smach.State):
         pace: Callable[[], float] | None = None,
         code: int = wait_reasons.ANSWER,
     ) -> Any:
-        """The pending call's value; cancelled if the wait ends otherwise."""
+        """Wait for the pending call and return its value. Cancel the call if the wait ends otherwise."""
         try:
             self.wait_for(pending.done, what, limit, pace, code)
         except (Interrupted, TimeLimit):
@@ -228,8 +229,8 @@ class CoglabState(smach.State):
         return pending.result()
 
     def pause(self, duration: float) -> None:
-        """Wait for a duration, ended early by preemption or STOP. TimeLimit at the end of the state's own limit, so
-        that what loops around it ends, too."""
+        """Wait for a duration (s); preemption or STOP ends it. At the state's own limit: TimeLimit, so that loops
+        around it end too."""
         end = self.ctx.clock.now() + duration
         while self.ctx.clock.now() < end:
             self.check()
@@ -239,7 +240,7 @@ class CoglabState(smach.State):
 
 
 class _Placed:
-    """What both containers share: label, place in the hierarchy, and the record of how they ended."""
+    """Common part of both containers: label, place in the hierarchy, and the record of their end."""
 
     ctx: Context
     label: str
@@ -249,29 +250,29 @@ class _Placed:
     userdata: Any
 
     def place(self, ctx: Context, label: str) -> None:
-        """Set the name until the container is added to another one."""
+        """Initialise. The container has no parent until it is added to another one."""
         self.ctx, self.label, self.container, self.targets = ctx, label, None, {}
         self.is_action = False
-        self.userdata.grip = Grip()  # that of the container around it, where it has the key
+        self.userdata.grip = Grip()  # replaced by the grip of the outer container, if it passes the key
 
     def begin(self, parent_ud: Any) -> Any:
-        """Start of a run: an action opens its record in the journal. Returns user data, empty where none is given."""
+        """Start of a run. An action opens its record in the journal. Returns the user data; empty if there are none."""
         ud = parent_ud if parent_ud is not None else smach.UserData()
         if self.is_action:
             self.ctx.journal.begin_action(self.label, str(ud.object_id) if "object_id" in ud else "")
         return ud
 
     def full_path(self) -> str:
-        """Introspection path of this container."""
+        """Returns the introspection path of this container."""
         prefix = self.container.full_path() if self.container is not None else ""
         return f"{prefix}/{self.label}"
 
     def adopt(self, label: str, state: Any, transitions: Mapping[str, str]) -> None:
-        """Tell a child where it is."""
+        """Set label, container and transitions of a child."""
         state.label, state.container, state.targets = label, self, dict(transitions)
 
     def record_end(self, outcome: str | None) -> None:
-        """Record the container's own transition with the first failure as its reason; close the record of an action."""
+        """Record the container's own transition; its reason is the first failure. Close the record of an action."""
         if outcome is None:
             return
         failure = self.ctx.journal.first_failure() if outcome != "succeeded" else Failure()
@@ -290,7 +291,7 @@ class _Placed:
 
 
 def withdraw_requests(container: Any) -> None:
-    """Clear what preempts were requested of the children of a container, all the way down, and not served."""
+    """Clear all preempt requests that the children of a container have not served, at all levels."""
     for child in container.get_children().values():
         child.recall_preempt()
         if isinstance(child, smach.Container):
@@ -298,7 +299,7 @@ def withdraw_requests(container: Any) -> None:
 
 
 class CoglabMachine(_Placed, smach.StateMachine):
-    """A state machine of labelled states that records how it ended."""
+    """A state machine of labelled states that records its end."""
 
     def __init__(
         self,
@@ -317,7 +318,7 @@ class CoglabMachine(_Placed, smach.StateMachine):
     def add_state(
         self, label: str, state: Any, transitions: Mapping[str, str], remapping: Mapping[str, str] | None = None
     ) -> Any:
-        """Add a state inside ``with machine:``; outcomes left out of ``transitions`` are outcomes of the machine."""
+        """Add a state inside ``with machine:``. An outcome without a transition must be an outcome of the machine."""
         smach.StateMachine.add(label, state, transitions=dict(transitions), remapping=dict(remapping or {}))
         self.adopt(label, state, transitions)
         return state
@@ -329,8 +330,8 @@ class CoglabMachine(_Placed, smach.StateMachine):
 
 
 class CoglabConcurrence(_Placed, smach.Concurrence):
-    """Children side by side. ``decide(outcomes)`` is asked after each child's end: True preempts those still
-    running."""
+    """Children that run in parallel. ``decide(outcomes)`` is called at the end of each child. If it returns True, the
+    other children are preempted."""
 
     def __init__(
         self,
@@ -363,17 +364,18 @@ class CoglabConcurrence(_Placed, smach.Concurrence):
 
     def execute(self, parent_ud: Any = None) -> str:
         outcome = smach.Concurrence.execute(self, self.begin(parent_ud))
-        # A child that fails while its siblings' end is asked of it leaves the request standing. In upstream's engine it
-        # would end the next run of that child. What was asked of this container from above stays with it.
+        # A child that fails while it is preempted leaves the request set. In the upstream engine, this would end the
+        # next run of that child. A request to this container from outside remains.
         withdraw_requests(self)
         self.record_end(outcome)
         return outcome
 
 
 def require_all(essential: Sequence[str]) -> tuple[Callable[..., bool], Callable[..., str]]:
-    """Rule for a concurrence: it succeeds when all essential children have; the first failure ends the others.
+    """Rule for a concurrence: it succeeds when all essential children have succeeded. The first failure ends the
+    others.
 
-    Children that are not essential run until the essential ones have ended. Returns (decide, conclude).
+    Other children run until the essential ones have ended. Returns (decide, conclude).
     """
 
     def decide(outcomes: Mapping[str, str | None]) -> bool:

@@ -1,4 +1,4 @@
-"""Giving an object to a person: the grip loosens as they take the load, and closes again if they do not keep it."""
+"""Giving an object: the grip loosens while the person takes the load, and closes again if they do not keep it."""
 
 from __future__ import annotations
 
@@ -23,24 +23,24 @@ from coglab_smach.states.motion import await_rest, rise, shift
 from coglab_smach.states.reach import WaitForPerson
 from coglab_smach.states.weight import person_holds
 
-GRAVITY = 9.81
-ASTRAY = 0.02  # m that the object is from where it is offered, from which on it is brought there
-BEYOND = 0.06  # m, the same before ``give.lower_after``: a hand that is nearer comes to the object by itself
-PRESSES = 2.0  # N, or the weight if that is more: a hand that has the object presses it down
+GRAVITY = 9.81  # m/s^2
+ASTRAY = 0.02  # m, smallest distance from object to person's hand that the arm corrects
+BEYOND = 0.06  # m, the same before ``give.lower_after``: a nearer hand comes to the object by itself
+PRESSES = 2.0  # N (or the weight, if larger): downward force of a hand that has the object
 LASTS = 0.3  # s of pressing after which the arm sinks with the hand
-SINKS = 3  # times at most that the arm sinks
-BRINGS = 3  # times at most that the object is brought to the hand
-LOOKS = 0.3  # s between two looks, between which a hand that waits moves by less than ASTRAY
+SINKS = 3  # largest number of times that the arm sinks
+BRINGS = 3  # largest number of times that the arm brings the object to the hand
+LOOKS = 0.3  # s between two looks; a waiting hand moves by less than ASTRAY in between
 
 
 class WaitTaker(WaitForPerson):
-    """wait_stop of a reach toward the person's hand. At its end the arm stands, and the contact detector is armed for
+    """wait_stop of a reach to the person's hand. At its end the arm stands, and the contact detector is armed for
     release.
 
-    The goal is the person's hand, and it now comes to the object: an arm that still followed it would back away. So
-    within the last ``give.touch_within`` m, with the hand within ``give.near`` m of the palm, the reach ends with a
-    contact, or when the hand is nearer to the palm than at the delivery, so that the goal goes away again by
-    ``give.goal_leaves`` m: the rest of the way is the person's. A hand that is farther away is followed.
+    The goal is the person's hand. When the hand comes to the object, a following arm would back away. Therefore, the
+    reach ends early within the last ``give.touch_within`` m, if the hand is within ``give.near`` m of the palm: at a
+    contact, or when the hand is nearer to the palm than at the delivery, so that the goal moves away again by
+    ``give.goal_leaves`` m. The person covers the rest of the way. A hand that is farther away is followed.
     """
 
     def __init__(self, ctx: Context) -> None:
@@ -58,13 +58,13 @@ class WaitTaker(WaitForPerson):
         self.reason = self._await_taker(settings, ud.goal) if not self.arrived() else ""
         self.ctx.journal.mark("motion_reached")
         self.leave_approach_profile()
-        if not self.reason:  # it has to come to rest at the goal that it has latched
+        if not self.reason:  # the arm must come to rest at its latched goal
             await_rest(self.ctx, self.check)
         self.await_pending(self.ctx.arm.switch_controller("ptp"), "end of the reach by switching to 'ptp'", 3.0)
         self.wait_for(self._held.there, "a sight of the object in the hand", 2.0, code=SIGHT)
         limit = float(release.get("timeout", self.ctx.config.get("release_timeout")))
         weight = {"mass": settings["mass"], "load_share": float(release.get("threshold", 0.5))}
-        # give_load begins in a moment, and ends it.
+        # give_load starts immediately afterwards, and disarms it.
         self.await_pending(contact.arm("release", limit + 5.0, weight), "arming of the contact detector", 2.0)
         return "succeeded"
 
@@ -73,7 +73,7 @@ class WaitTaker(WaitForPerson):
         return super().arrived()
 
     def _await_taker(self, settings: dict[str, Any], goal: dict[str, Any]) -> str:
-        """Until the reach has ended; or until the person has come, and then what tells that."""
+        """Wait until the reach has ended or the person has come. Returns the evidence that they have come, or ''."""
         contact, leaves = self.ctx.contact, self.ctx.config.number("give.goal_leaves")
         nearest, delivered = math.inf, math.hypot(*goal["offset"])
 
@@ -102,18 +102,20 @@ class WaitTaker(WaitForPerson):
 
 
 class GiveLoad(CoglabState):
-    """Let the person take the load of the object that the arm holds out, and end when they carry as much of it as the
-    delivery's ``release`` asks for. The contact detector is armed for release (WaitStop).
+    """Let the person take the load of the offered object. Ends when they carry the share given by the delivery's
+    ``release``. The contact detector is already armed for release (WaitTaker).
 
-    The grip loosens in proportion to their share of the weight, as people's does (Chan 2012, Endo 2012): where the hand
-    feels its grip, the force of it falls as the load does, down to ``give.grip_safety`` times what friction needs for
-    what the hand still carries, by ``give.ease`` counts at most; else it is ``give.loosen`` counts. When the load comes
-    back to the arm, or the object sinks in the hand by ``give.slip`` m, the grip closes again; what has sunk so once is
-    held closed to the end. If the person's hand waits near, but not at the object, the arm brings the object to it,
-    from ``give.bring_after`` s after its arrival on: a predicted place may be wrong for a hand that hesitates. If
-    nothing has happened for ``give.lower_after`` s the arm sinks by ``give.lower`` m, so that the weight comes to lie
-    in the hand; at once if the hand that has the object presses it down. After the time limit the grip closes, with the
-    lowest force (``give.close_speed``) since the person's fingers are there, and firmly at home only.
+    The grip loosens in proportion to the person's share of the weight, as the grip of people does (Chan 2012, Endo
+    2012). If the hand measures its grip force, the force falls with the load: at least ``give.grip_safety`` times the
+    force that friction needs for the rest of the load, and at most ``give.ease`` counts looser. Otherwise the grip
+    opens by up to ``give.loosen`` counts. If the load returns to the arm, or the object sinks in the hand by
+    ``give.slip`` m, the grip closes again. After such a slip it stays closed to the end.
+
+    If the person's hand waits near, but not at the object, the arm brings the object to it, from ``give.bring_after`` s
+    after its arrival on: the predicted place may be wrong for a hand that hesitates. If nothing has happened for
+    ``give.lower_after`` s, the arm sinks by ``give.lower`` m, so that the weight rests in the hand. It sinks at once if
+    the hand presses the object down. After the time limit the grip closes with the lowest force (``give.close_speed``),
+    because the person's fingers are there. It tightens only at home.
     """
 
     default_time_limit = 20.0
@@ -124,23 +126,24 @@ class GiveLoad(CoglabState):
         self._grip = Grip()
         self._fingers: LooseningGrip
         self._needed = self._slips_at = self._weight = 0.0
-        """share of the load; N of grip below which the object slips while the hand carries all of it; N"""
-        self._firm = 0  # wire speed of the grip that is as firm as before
+        """needed: share of the load. slips_at: grip force (N) below which the object slips if the hand carries all of
+        it. weight: N"""
+        self._firm = 0  # wire speed that restores the grip force of before
         self._held: HeldObject
         self._hand: HandLook
         self._offer: Callable[[], np.ndarray | None] = lambda: None
-        """the way (m) from the object to where the person's hand takes it"""
+        """returns the vector (m) from the object to the place where the person's hand takes it"""
         self._reset()
 
     def _reset(self) -> None:
-        """For each object that is given."""
+        """Reset for each object."""
         self._lowering: Pending | None = None
         self._moving: Pending | None = None
-        self._ending: Pending | None = None  # of what moves
+        self._ending: Pending | None = None  # cancel request of the running motion
         self._lower_at = self._look_at = 0.0
         self._brings = self._sinks = 0
         self._pressed_since: float | None = None
-        self._way: np.ndarray | None = None  # m, of the last look: from the object to where the person's hand takes it
+        self._way: np.ndarray | None = None  # m, from the object to the place where the hand takes it, at the last look
         self._back_since: float | None = None
 
     def _number(self, name: str) -> float:
@@ -156,7 +159,7 @@ class GiveLoad(CoglabState):
         grip.mass, grip.hand = float(entry.get("mass", 0.0)), HandTrack()
         self._hand = HandLook(self.ctx, grip.hand)
         self._weight = GRAVITY * grip.mass
-        # Two sides press: the object slips where friction on both does not carry it.
+        # Two sides press on the object: it slips if the friction on both cannot carry it.
         self._slips_at = self._weight / (2.0 * float(entry.get("friction", 0.5)))
         self._fingers = LooseningGrip(
             self.ctx.hand,
@@ -187,7 +190,7 @@ class GiveLoad(CoglabState):
             for motion in (self._moving, self._lowering):
                 if motion is not None:
                     motion.cancel()
-        # Until the hand is open the arm must not go away with what the person holds as well.
+        # Until the hand is open, the arm must not move away: the person holds the object too.
         grip.shared = True
         self.ctx.journal.mark("contact")
         event = contact.event()
@@ -195,7 +198,7 @@ class GiveLoad(CoglabState):
         return "succeeded"
 
     def _taken(self) -> bool:
-        """Look at the person's share, and do what it asks for; whether it is enough."""
+        """Process the person's share of the load. Returns True if it is large enough."""
         if self._held.there() and self.ctx.contact.event() is not None:
             return True
         self._hand.look()
@@ -213,7 +216,7 @@ class GiveLoad(CoglabState):
         return False
 
     def _is_pressed(self, share: float, now: float) -> bool:
-        """Whether a hand that has the object has pressed it down for LASTS s."""
+        """True if a hand that has the object has pressed it down for LASTS s."""
         if -share * self._weight < max(PRESSES, self._weight):
             self._pressed_since = None
         elif self._pressed_since is None:
@@ -221,9 +224,9 @@ class GiveLoad(CoglabState):
         return self._pressed_since is not None and now - self._pressed_since >= LASTS
 
     def _sink_with_them(self, now: float) -> None:
-        """Rather than bring it anywhere."""
+        """Sink with a hand that presses, instead of bringing the object elsewhere."""
         if self._moving is not None and not self._moving.done():
-            # The next motion begins when this one has ended, or its end would be the next one's.
+            # Wait for the end of this motion; otherwise its end would count as the end of the next one.
             if self._ending is None:
                 self._ending = self.ctx.arm.cancel_motion("the object is pressed down")
             if not self._ending.done():
@@ -233,14 +236,14 @@ class GiveLoad(CoglabState):
             self._lower(now)
 
     def _follow(self, share: float, begins: float, now: float) -> None:
-        """As loose as the share asks for; closed again where it does not stay, and where the object slips."""
+        """Loosen the grip according to the share. Close it again if the load returns or the object slips."""
         if self._held.sunk > self._number("slip"):
             self._close_again()
         elif share > begins / 2:
             self._back_since = None
             part = (share - begins) / max(1e-6, self._needed - begins)
             if part > 0.0:
-                # The person's hand is at the object: the arm must not go away with it.
+                # The person's hand is at the object: the arm must not move away with it.
                 self._grip.shared = True
                 if not self._ease(share):
                     self._fingers.loosen_to(min(1.0, part) * self._number("loosen"))
@@ -254,13 +257,13 @@ class GiveLoad(CoglabState):
                 self._close_again()
 
     def _ease(self, share: float) -> bool:
-        """The ratio of grip and load stays; False where the hand does not feel its grip."""
+        """Keep the ratio of grip force and load. Returns False if the hand does not measure its grip force."""
         left = 1.0 - min(1.0, share)
         least = left * self._slips_at * self._number("grip_safety")
         return self._fingers.ease_to(left, least, self._number("ease"), self.ctx.clock.now())
 
     def _bring_or_lower(self, now: float) -> None:
-        """Bring the object to a person's hand that waits elsewhere, or sink; where no hand is, look again soon."""
+        """Bring the object to a waiting hand, or sink. If no hand is seen nearby, look again later."""
         self._look_at = now + LOOKS
         distance, near, before = hand_from_palm(self), self._number("near"), self._way
         self._way = None
@@ -277,13 +280,13 @@ class GiveLoad(CoglabState):
             self._lower(now)
 
     def _lower(self, now: float) -> None:
-        """The arm sinks."""
+        """Let the arm sink by ``give.lower`` m."""
         self._look_at, self._sinks = now + LOOKS, self._sinks + 1
         self._lowering = rise(self.ctx, -self._number("lower"), self._number("lower_speed"))
 
     def _may_hold(self) -> bool:
-        """Whether the person does: what they carry of a light object is not sure to be felt while the arm stands. Only
-        a hand that was seen to go away from it holds nothing; one that nobody sees may be at it."""
+        """Returns whether the person may hold the object. At rest, the load of a light object may be too small to
+        measure. Only a hand that was tracked away from the object does not hold it; an unseen hand may be at it."""
         away = from_palm(self, self._grip.hand, 0.3)
         if away is not None and away > AWAY and self._grip.hand.is_sure:
             return False
@@ -293,12 +296,12 @@ class GiveLoad(CoglabState):
         return person_holds(self, {"mass": self._grip.mass, "load_share": self._needed}) is not False
 
     def _keep(self) -> None:
-        """The object stays in the hand: closed again, where it was loosened."""
+        """The object stays in the hand: close the grip again if it was loosened."""
         self._fingers.stand()
         self._close_again()
 
     def _close_again(self) -> None:
-        """Gently, if it is loosened."""
+        """Close gently, if the grip is loosened."""
         if (self._fingers.loosened() or 0) > 0:
             self._grip.firm = self._firm
             self._fingers.tighten()

@@ -16,43 +16,43 @@ from coglab_smach.states.hand_tracking import AT_HAND, AWAY, HandLook, HandTrack
 from coglab_smach.states.motion import shift, shift_time
 from coglab_smach.states.yield_to_pull import YieldToPull
 
-LOOSE = 40  # counts of 254 that the fingers have opened when the palm begins to draw back
-AT_END = 250  # counts of 254 from which a finger has closed past the object
-FREE = 0.10  # m that the person's hand is farther away than it was when none of its fingers is at the object
-FREE_FOR = 0.2  # s for which it has to be
-GOES = 1.0  # s in which it has to go so far
-DRAWING_BACK = 2.0  # s that drawing back may take beyond what limits and speed scale ask for
+LOOSE = 40  # counts of 254 by which the fingers must open before the palm draws back
+AT_END = 250  # counts of 254: a finger at or above has closed past the object
+FREE = 0.10  # m, increase of the hand's distance from the palm at which no finger of the person is at the object
+FREE_FOR = 0.2  # s for which the hand must stay that far away
+GOES = 1.0  # s, time limit for the hand to move that far away
+DRAWING_BACK = 2.0  # s, added to the planned duration of drawing back
 
 
 def gentle(grasp: Mapping[str, Any]) -> dict[str, Any]:
-    """The hand of a grasp with the lowest force level that every dialect has for its mode: a person's fingers may be
-    between the robot's."""
+    """Returns the hand settings of a grasp with the lowest force level that all firmware dialects support for its mode:
+    a person's fingers may be between the robot's."""
     return {**grasp["hand"], "level": levels_of(grasp["hand"]["mode"], "legacy")[0]}
 
 
 def closes_gently(grasp: Mapping[str, Any]) -> bool:
-    """Whether every hand can close by this grasp with the lowest force level: older hands have some modes only firm."""
+    """True if every hand can close this grasp with the lowest force level. Older hands have some modes only as firm."""
     return bool(gentle(grasp)["level"] == LEVELS[0])
 
 
 def firm_speed(ctx: Context, entry: Mapping[str, Any], grasp_name: str) -> int:
-    """Wire speed, and with it the force, of closing as firmly as the object's entry asks for; 0 if gentle() does."""
+    """Returns the wire speed (and thus force) of the firm grip in the object's entry; 0 if gentle() gives the same."""
     own = entry["grasps"][grasp_name]
     level = own["hand"]["level"]
     return 0 if level == gentle(own)["level"] else int(ctx.config.get(f"hand.tighten.{level}"))
 
 
 def stopped_by_object(mode: str, positions: Sequence[int]) -> bool:
-    """Whether the closed fingers stand around something: the thumb (motor 1), and one finger that opposes it if the
-    mode closes any, have stopped before their closed ends. Otherwise they hold the object by an edge, and it falls.
-    True for a hand that does not report ``positions`` (counts of 254)."""
+    """Returns whether the closed fingers stand around an object. Then the thumb (motor 1) has stopped before its closed
+    end, and so has one opposing finger if the mode closes any. Otherwise they hold the object by an edge, and it falls.
+    ``positions``: counts of 254. True for a hand that does not report them."""
     standing = [motor for motor in CLOSING_MOTORS[mode] if len(positions) <= motor or positions[motor] < AT_END]
     return 1 in standing and len(standing) >= min(2, len(CLOSING_MOTORS[mode]))
 
 
 class CalibrateHand(CoglabState):
-    """Calibrate the hand. Skipped if it is calibrated already (but see ``hand.calibrate_always``), and always if it
-    holds something: calibrating opens the fingers."""
+    """Calibrate the hand. Skipped if it is calibrated (but see ``hand.calibrate_always``). Always skipped if it holds
+    an object: calibration opens the fingers."""
 
     default_time_limit = 30.0
 
@@ -74,7 +74,7 @@ class CalibrateHand(CoglabState):
 
 
 class HandPreshape(CoglabState):
-    """Take the preshape of the object's grasp mode."""
+    """Move the hand to the preshape of the object's grasp mode."""
 
     default_time_limit = 6.0
 
@@ -90,11 +90,11 @@ class HandPreshape(CoglabState):
 
 
 class HandClose(CoglabState):
-    """Close the preshaped hand on the object and make sure that something is in it.
+    """Close the preshaped hand on the object and check that it holds it.
 
-    With ``from_person`` the palm yields to a pull meanwhile. Outcomes missed and edge: the fingers have closed on
-    nothing, or do not stand around it (stopped_by_object), for the first time in this action. The person still waits,
-    so the arm may try once more.
+    With ``from_person``, the palm yields to a pull meanwhile. Outcomes for the first failure in this action: missed
+    (the fingers have closed on nothing) and edge (they do not stand around the object, see stopped_by_object). The
+    person still waits, so the arm may try once more.
     """
 
     default_time_limit = 12.0
@@ -110,11 +110,11 @@ class HandClose(CoglabState):
         )
         self.from_person = from_person
         self._before: float | None = None
-        """m from the person's hand to the palm before the fingers had closed; None: not seen"""
+        """distance (m) from the person's hand to the palm before closing; None: not seen"""
 
     def run(self, ud: Any) -> str:
         self.ctx.journal.mark("closing")
-        # From here on the hand may hold: a failure in the middle must not make the recovery drop the object.
+        # From here on the hand may hold the object: after a failure, the recovery must not drop it.
         grip, self.ctx.holding = ud.grip, ud.object_id
         closing = (grip.take_closing() if self.from_person else None) or self.ctx.hand.close_on_object()
         grip.shared = self.from_person
@@ -150,17 +150,17 @@ class HandClose(CoglabState):
         return "succeeded"
 
     def _around(self, mode: str, positions: Sequence[int], hand: HandTrack) -> bool:
-        """Whether the fingers stand around the object; or the person has gone, so that opening would let it fall."""
+        """True if the fingers stand around the object, or if the person has gone: opening would then drop it."""
         if stopped_by_object(mode, positions):
             return True
         let_go = self.ctx.config.number("hand.let_go")
         gone = AT_HAND if self._before is None else min(AT_HAND, self._before + let_go)
         away = from_palm(self, hand, 0.3)
-        # A hand that nobody sees may have gone, too, and so may one for which another one is seen.
+        # An unseen hand may have gone, and so may a hand that the tracker has confused with another one.
         return away is None or away > gone
 
     def _give_way(self, closing: Pending, hand: HandLook) -> None:
-        """Until the fingers have closed."""
+        """Yield to pulls until the fingers have closed."""
         way = YieldToPull(self.ctx)
 
         def closed() -> bool:
@@ -175,13 +175,12 @@ class HandClose(CoglabState):
 
 
 class HandTighten(CoglabState):
-    """Hold what the person has let go of as firmly as the object's entry asks for: the fingers close from where they
-    are, at the wire speed Grip.firm. The arm does not wait until they stand: they press within
-    ``hand.settle_after_close`` s.
+    """Tighten the grip on an object that the person has let go of, to the force of the object's entry. The fingers
+    close from their present positions with wire speed Grip.firm. The arm does not wait until they stand still: they
+    reach the force within ``hand.settle_after_close`` s.
 
-    No person's fingers may be between: the person's hand has to be seen all the way until it is FREE farther away than
-    it was, for FREE_FOR. If it was not seen to go, the object is held firmly ``at_home``, if no hand is seen near the
-    palm there."""
+    No fingers of a person may be in between. The person's hand must be tracked without a gap until it is FREE farther
+    away than before, for FREE_FOR. Otherwise the grip is tightened ``at_home``, if no hand is seen near the palm."""
 
     default_time_limit = 5.0
 
@@ -203,7 +202,7 @@ class HandTighten(CoglabState):
             self.reason = "the person's hand was not seen to go: at home"
             return "succeeded"
         closing, end = self.ctx.hand.close(speed), self.ctx.config.number("hand.settle_after_close")
-        # It goes on while the arm does: a STOP ends it then as well (EndMotion).
+        # The closing continues while the arm moves. A STOP ends it then (EndMotion).
         ud.grip.tightening = closing
         end += self.ctx.clock.now()
         while not closing.done() and self.ctx.clock.now() < end:
@@ -216,7 +215,7 @@ class HandTighten(CoglabState):
         return "succeeded"
 
     def _is_free(self, before: float | None, hand: HandTrack) -> bool:
-        """Whether the person's hand, which was ``before`` m from the palm, is seen away from the object."""
+        """True if the person's hand, ``before`` m from the palm at first, is seen to move away from the object."""
         free, since = AWAY if before is None else before + FREE, None
         end = self.ctx.clock.now() + GOES
         while self.ctx.clock.now() < end:
@@ -231,7 +230,7 @@ class HandTighten(CoglabState):
 
 
 class HandOpen(CoglabState):
-    """Open the hand; afterwards nothing is held."""
+    """Open the hand. Afterwards it holds nothing."""
 
     default_time_limit = 8.0
 
@@ -247,10 +246,10 @@ class HandOpen(CoglabState):
 
 
 class LetGo(CoglabState):
-    """Open the hand for the person who has taken the object, and tell them.
+    """Open the hand for the person who has taken the object, and inform them.
 
-    It opens as far as its preshape, in which the object came in. Meanwhile the palm draws back from the object by
-    ``give.draw_back`` m: a person who has an object goes at once, and fingers beside it would tear it away.
+    The hand opens to its preshape, in which the object came in. Meanwhile the palm draws back from the object by
+    ``give.draw_back`` m: people leave at once, and fingers beside the object would tear it from them.
     """
 
     default_time_limit = 8.0
@@ -266,11 +265,11 @@ class LetGo(CoglabState):
         try:
             self.wait_for(lambda: opening.done() or self._open_by(closed), "opening of the hand", code=HAND)
         except TimeLimit:
-            # STOP lets the fingers open: the person has what is between them.
+            # At STOP the fingers continue to open: the person has the object.
             opening.cancel()
             raise
         if opening.done():
-            opening.result()  # fingers that are stuck would drag what the person holds
+            opening.result()  # raises if the fingers are stuck: drawing back would drag the object
         axis, way, limit = palm_axis(self.ctx), self.ctx.config.number("give.draw_back"), DRAWING_BACK
         if axis is not None and way > 0.0:
             speed = self.ctx.config.number("give.draw_back_speed")
@@ -279,17 +278,17 @@ class LetGo(CoglabState):
         self.await_pending(opening, "opening of the hand", code=HAND)
         self.ctx.holding = ""
         ud.grip.release()
-        # Not earlier: who is told so goes, and fingers that are half open would keep the object.
+        # Not earlier: the person leaves after this message, and half-open fingers would keep the object.
         self.ctx.say(Say.YOU_HAVE_IT, "You have it.")
         if back is not None:
             self.allow(limit + 1.0)
             try:
                 self.await_pending(back, "drawing back", limit, self.ctx.arm.speed_scale, ARM)
             except PortError as error:
-                self.reason = error.sentence  # as far as it goes; the way home goes on from there
+                self.reason = error.sentence  # an incomplete retreat is enough; the motion home goes on from there
         return "succeeded"
 
     def _open_by(self, closed: tuple[int, ...]) -> bool:
-        """Whether a finger has opened by LOOSE counts since."""
+        """True if a finger has opened by LOOSE counts."""
         now = self.ctx.hand.state().positions
         return len(now) == len(closed) > 0 and max(c - n for c, n in zip(closed[1:], now[1:], strict=True)) >= LOOSE

@@ -1,6 +1,6 @@
-"""Where the robot's palm, the object and the person's hand are now, whose hand it is, and the handover region.
+"""Positions of the robot's palm, the object and the person's hand; identity of the hand; the handover region.
 
-Places are in the base frame, m; None where a place is not known.
+Positions are in the base frame, in m, shape (3,); None if unknown.
 """
 
 from __future__ import annotations
@@ -20,44 +20,44 @@ from coglab_smach.ports.interfaces import Located
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.base import CoglabState
 
-NEARER = 0.02  # m by which an object that a person has missed is brought nearer than it was offered
-AT_HAND = 0.3  # m from the palm within which a person's hand may reach what is in it
-AWAY = 0.5  # m from the palm from which on a person's hand holds nothing that is in the robot's
-GLANCE = 0.05  # s that a look may take while something else is waited for
-OLDEST = 0.5  # s: an older sight does not show where the hand is
-SWAPPED = 0.2  # s after which a sight beyond JUMP is believed
-LATELY = 0.4  # s of sights that show whether something is held still
-STILL = 0.025  # m, more than something moves that is held still
-STILL_TIME = 0.3  # s
+NEARER = 0.02  # m by which a missed object is brought nearer to the person than it was offered
+AT_HAND = 0.3  # m from the palm: a person's hand within this distance may reach the object in the robot's hand
+AWAY = 0.5  # m from the palm: a person's hand beyond this distance does not hold the object in the robot's hand
+GLANCE = 0.05  # s, time limit of a sight during another wait
+OLDEST = 0.5  # s, oldest sight that shows the position of the hand
+SWAPPED = 0.2  # s after which a sight beyond JUMP is accepted
+LATELY = 0.4  # s, time window for judging whether something is held still
+STILL = 0.025  # m, limit of motion of something that is held still
+STILL_TIME = 0.3  # s, shortest time for which it is held still
 
 
 def jumped_from(last: Sight | None, now: float, place: np.ndarray) -> tuple[bool, Sight | None]:
-    """Whether a sight shows something else than the last one that was no jump, and the one that is the last now."""
+    """Returns (True if this sight jumped, i.e. shows something else; the last sight without a jump)."""
     if last is not None and far(place, last[1]) > JUMP and now - last[0] < SWAPPED:
         return True, last
     return False, (now, place)
 
 
 def palm_at(ctx: Context) -> np.ndarray | None:
-    """The palm."""
+    """Returns the position of the palm."""
     here = ctx.arm.joint_positions()
     return None if here is None else np.asarray(default_arm().fk(np.asarray(here))[0])
 
 
 def palm_axis(ctx: Context) -> np.ndarray | None:
-    """Unit vector out of the palm."""
+    """Returns the unit vector out of the palm."""
     here = ctx.arm.joint_positions()
     return None if here is None else Pose(*default_arm().fk(np.asarray(here))).axis(0)
 
 
 def hand_name(ctx: Context) -> str:
-    """The person's hand, as perception names it."""
+    """Returns perception's name of the person's hand."""
     return ctx.config.text("perception.human_hand")
 
 
 def sight_or_refusal(state: CoglabState, target: str, limit: float = 0.3) -> Located | PortError | None:
-    """The sight of an object or of the person's hand within ``limit`` s, or perception's refusal; None if the sight is
-    older than OLDEST."""
+    """Returns the sight of an object or of the person's hand within ``limit`` s, or perception's refusal. None if the
+    sight is older than OLDEST."""
     try:
         seen: Located = state.await_pending(
             state.ctx.perception.locate_object(target, limit), f"sight of '{target}'", limit + 0.2, code=SIGHT
@@ -68,30 +68,30 @@ def sight_or_refusal(state: CoglabState, target: str, limit: float = 0.3) -> Loc
 
 
 def sight_of(state: CoglabState, target: str, limit: float = 0.3) -> Located | None:
-    """The same, None for a refusal."""
+    """The same as sight_or_refusal, but None for a refusal."""
     seen = sight_or_refusal(state, target, limit)
     return None if isinstance(seen, PortError) else seen
 
 
 def seen_at(state: CoglabState, target: str) -> np.ndarray | None:
-    """An object, or the person's hand."""
+    """Returns the position of an object or of the person's hand."""
     seen = sight_of(state, target)
     return None if seen is None else np.array(seen.xyz)
 
 
 def person_at(state: CoglabState) -> np.ndarray | None:
-    """The person's hand."""
+    """Returns the position of the person's hand."""
     return seen_at(state, hand_name(state.ctx))
 
 
 def hand_from_palm(state: CoglabState) -> float | None:
-    """Distance of the person's hand from the palm."""
+    """Returns the distance of the person's hand from the palm."""
     person, palm = person_at(state), palm_at(state.ctx)
     return None if person is None or palm is None else far(person, palm)
 
 
 def way_to_grasp(state: CoglabState, goal: Mapping[str, Any]) -> np.ndarray | None:
-    """Vector from the palm to where it would hold the object of ``goal``; None if the goal names no object."""
+    """Returns the vector from the palm to its grasp of the object of ``goal``; None if the goal names no object."""
     thing, here = goal.get("object", {}), state.ctx.arm.joint_positions()
     if not thing or here is None:
         return None
@@ -103,13 +103,13 @@ def way_to_grasp(state: CoglabState, goal: Mapping[str, Any]) -> np.ndarray | No
 
 
 def off_grasp(state: CoglabState, goal: Mapping[str, Any]) -> float | None:
-    """Length of way_to_grasp()."""
+    """Returns the length of way_to_grasp()."""
     way = way_to_grasp(state, goal)
     return None if way is None else float(np.linalg.norm(way))
 
 
 def way_to_hand(state: CoglabState, object_id: str, delivery: Mapping[str, Any]) -> np.ndarray | None:
-    """Vector from the object to where the delivery offers it to the person's hand, as that is seen now, but NEARER."""
+    """Returns the vector from the object to the delivery's place at the hand as seen now, but NEARER to the person."""
     hand, thing = hand_name(state.ctx), seen_at(state, object_id)
     try:
         seen = state.await_pending(state.ctx.perception.locate_object(hand, 0.3), f"sight of '{hand}'", 0.5, code=SIGHT)
@@ -124,14 +124,14 @@ def way_to_hand(state: CoglabState, object_id: str, delivery: Mapping[str, Any])
 
 
 class HandLook:
-    """Follows the person's hand from sight to sight without waiting for one."""
+    """Follows the person's hand from sight to sight, without waiting for one."""
 
     def __init__(self, ctx: Context, track: HandTrack) -> None:
         self._ctx, self._track = ctx, track
         self._sight: Pending | None = None
 
     def look(self) -> None:
-        """Call this again and again."""
+        """Process a new sight, if there is one. Call this repeatedly."""
         if self._sight is None:
             self._sight = self._ctx.perception.locate_object(hand_name(self._ctx), GLANCE)
         if not self._sight.done():
@@ -147,7 +147,7 @@ class HandLook:
 
 
 def _follow(ctx: Context, track: HandTrack, seen: Located, palm: np.ndarray) -> float:
-    """Distance of the hand from the palm."""
+    """Add a sight to the track. Returns the distance of the hand from the palm, m."""
     place = np.array(seen.xyz)
     away = far(place, palm)
     track.follow(ctx.clock.now() - seen.age, place, away <= AT_HAND)
@@ -155,8 +155,8 @@ def _follow(ctx: Context, track: HandTrack, seen: Located, palm: np.ndarray) -> 
 
 
 def from_palm(state: CoglabState, track: HandTrack, limit: float = GLANCE) -> float | None:
-    """Distance of the tracked hand from the palm, by one more sight within ``limit`` s; None if the sight shows another
-    hand."""
+    """Returns the distance (m) of the tracked hand from the palm, from a new sight within ``limit`` s. None if the
+    sight shows another hand."""
     seen, palm = sight_of(state, hand_name(state.ctx), limit), palm_at(state.ctx)
     if seen is None or palm is None:
         return None
@@ -165,11 +165,11 @@ def from_palm(state: CoglabState, track: HandTrack, limit: float = GLANCE) -> fl
 
 
 class HandoverRegion:
-    """A box in the base frame, and what was seen there lately. What is held still counts as offered up to
-    ``handover.still_margin`` m outside; what moves, or is only predicted, has to be inside."""
+    """The handover region, a box in the base frame, and recent sights there. An object that is held still counts as
+    offered up to ``handover.still_margin`` m outside. A moving or predicted one must be inside."""
 
     def __init__(self, ctx: Context, margin: float = 0.0) -> None:
-        """``margin`` (m) widens it on all sides: a hand is behind the object it holds or asks for."""
+        """``margin`` (m) widens the region on all sides: a hand is behind the object that it holds or requests."""
         config = ctx.config
         self.low = np.array(config.get("handover.region_low"), dtype=float) - margin
         self.high = np.array(config.get("handover.region_high"), dtype=float) + margin
@@ -177,20 +177,20 @@ class HandoverRegion:
         self._seen: list[tuple[float, np.ndarray]] = []
 
     def holds(self, place: Sequence[float] | np.ndarray, wider: float = 0.0) -> bool:
-        """Whether a place lies in it, or at most ``wider`` m outside."""
+        """True if a place is inside the region, or at most ``wider`` m outside."""
         return bool(np.all(place >= self.low - wider) and np.all(place <= self.high + wider))
 
     def offers(self, now: float, place: np.ndarray, moving: bool = True) -> bool:
-        """Whether something that was seen at ``place`` at time ``now`` (s) is offered; call this at each sight. Without
-        ``moving`` only what is held still is."""
+        """Returns whether something seen at ``place`` at time ``now`` (s) is offered. Call this for each sight. If not
+        ``moving``, only things that are held still count."""
         self._seen = [(t, p) for t, p in self._seen if now - t <= LATELY] + [(now, place)]
         since, first = self._seen[0]
         still = now - since > STILL_TIME and far(place, first) < STILL
         return (moving or still) and self.holds(place, self._still_margin if still else 0.0)
 
     def limits(self, place: Sequence[float] | np.ndarray) -> dict[str, Any]:
-        """Region for the goal of a reach that begins toward ``place``. What is offered outside was held still there,
-        and may not go farther than that counts."""
+        """Returns the region for the goal of a reach to ``place``. If the place is outside, the object was held still
+        there: the region is widened by the margin of such objects."""
         wider = 0.0 if self.holds(place) else self._still_margin
         return {
             "goal_region_low": (self.low - wider).tolist(),
@@ -199,13 +199,13 @@ class HandoverRegion:
 
 
 def anything_believed(ctx: Context) -> bool:
-    """Whether somebody seems to offer something, or to ask for it."""
+    """True if the person seems to offer or to request something."""
     ahead = ctx.perception.ahead()
     return max(ahead.offer, ahead.request) >= ctx.config.number("handover.doubt")
 
 
 def ends_outside(ctx: Context, region: HandoverRegion, frame: str) -> bool:
-    """Whether the person's reach with ``frame`` is predicted to end outside the region."""
+    """True if the person's reach with ``frame`` is predicted to end outside the region."""
     ahead = ctx.perception.ahead()
     return anything_believed(ctx) and ahead.frame == f"{frame}_ahead" and not region.holds(ahead.place)
 
@@ -213,15 +213,15 @@ def ends_outside(ctx: Context, region: HandoverRegion, frame: str) -> bool:
 def unless_withdrawn(
     ctx: Context, goal: Mapping[str, Any], margin: float = 0.0, may_fall: bool = True
 ) -> dict[str, Any]:
-    """The goal of a motion that ends by itself when its goal leaves the region, goes back or, with ``may_fall``, falls.
-    ``goal`` holds the place (m) of its frame, as it was offered."""
+    """Returns the goal with the limits at which its motion ends by itself: the goal leaves the region, goes back or,
+    with ``may_fall``, falls. ``goal`` contains the position (m) of its frame when it was offered."""
     margins = {
         "goal_retreat": ctx.config.number("handover.retreat"),
         "goal_drop": ctx.config.number("handover.drop") if may_fall else 0.0,
     }
     limits = HandoverRegion(ctx, margin).limits(goal["place"])
     watch = {"retreat": margins["goal_retreat"], "drop": margins["goal_drop"], "margin": margin}
-    # A predicted place moves as the prediction is corrected: going back and falling are watched in what is seen, by the
-    # state that waits for the reach.
+    # A predicted place moves with each correction of the prediction. Therefore, the state that waits for the reach
+    # checks the sights for going back and falling.
     predicted = str(goal["frame"]).endswith("_ahead")
     return {**goal, "limits": {**limits, **(dict.fromkeys(margins, 0.0) if predicted else margins)}, "watch": watch}

@@ -1,4 +1,4 @@
-"""Whether the hand still holds what it carries, for states in which the arm moves with it."""
+"""Checks that the hand still holds its object while the arm moves with it."""
 
 from __future__ import annotations
 
@@ -14,37 +14,37 @@ from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.hand import AT_END
 
 NEAR = 0.20  # m between palm and object within which the object counts as carried
-FARTHER = 0.15  # m by which it is farther away when it is not carried
-LOST_TIME = 0.3  # s for which it is seen there
-LOOK = 0.8  # s for which an arm that stands looks for what its hand may have lost
-OLDEST = 0.2  # s, older sights do not tell
-KEPT = 0.04  # m by which the distance of a held object from the palm changes at most
-SETTLES = 0.1  # s in which a falling object moves by more
+FARTHER = 0.15  # m, increase of that distance at which the object counts as lost
+LOST_TIME = 0.3  # s for which the object must be seen that far away
+LOOK = 0.8  # s for which a standing arm looks for a possibly lost object
+OLDEST = 0.2  # s, oldest sight that counts
+KEPT = 0.04  # m, limit for changes of a held object's distance from the palm
+SETTLES = 0.1  # s in which a falling object moves by more than KEPT
 
 
 class HeldObject:
-    """Call check() again and again while the arm carries ``object_id``.
+    """Call check() repeatedly while the arm carries ``object_id``.
 
-    The object is gone if the fingers are open or closed to their ends, or if the tracker sees it farther from the palm
-    than at first, or too far away at once: fingers do not feel what slides out of them.
+    The object is lost if the fingers are open or closed to their ends, or if the tracker sees it farther from the palm
+    than at first, or too far away at the first sight. The fingers cannot detect an object that slides out.
     """
 
     def __init__(self, ctx: Context, object_id: str, grip: Grip) -> None:
         self._ctx, self._object_id, self._grip = ctx, object_id, grip
         self._sight: Pending | None = None
-        self._above = 0.0  # m of the object over the palm
+        self._above = 0.0  # m, height of the object above the palm
         self._carried: float | None = None
         self._height = self._before = self._taken = 0.0
         self.sunk = 0.0
-        """m by which the object is lower against the palm than it was at first, in both of its last two sights"""
+        """m by which the object has sunk relative to the palm since the first sight, in both of the last two sights"""
         self.moved = False
-        """whether the newest sight has shown it farther from the palm, or nearer, than at first"""
+        """True if the newest sight shows the object farther from or nearer to the palm than at first"""
         self._away_since: float | None = None
         self._kept_at = -math.inf
-        """s, when the newest sight was taken that has shown it as far from the palm as the first one"""
+        """time (s) of the newest sight that shows the object as far from the palm as at first"""
 
     def check(self) -> None:
-        """PortError, and nothing held any more, if the object is gone. It never waits."""
+        """PortError if the object is lost; then nothing is held. Never waits."""
         hand = self._ctx.hand.state()
         if hand.connected and not hand.holding:
             self._lost(hand.message or "the fingers are open")
@@ -60,7 +60,7 @@ class HeldObject:
         self.moved = self._carried is not None and abs(distance - self._carried) >= KEPT
         if self._carried is not None and not self.moved:
             self._kept_at = self._taken
-        # What is far away at the first sight already was lost before anybody asked.
+        # An object that is far away already at the first sight was lost before the first check.
         if distance < (NEAR if self._carried is None else self._carried) + FARTHER:
             self._away_since = None
             return
@@ -70,17 +70,17 @@ class HeldObject:
             self._lost(f"it is seen {distance:.2f} m from the palm")
 
     def there(self) -> bool:
-        """Check it; False while it is not decided, because it was seen away from the palm last."""
+        """Check the object. False while it is undecided, because the last sight shows it away from the palm."""
         self.check()
         return self._away_since is None
 
     def seen_with_the_hand(self) -> bool:
-        """Whether a sight has shown it near the palm, and none since then elsewhere."""
+        """True if a sight has shown the object near the palm, and no later one elsewhere."""
         return self._carried is not None and self._away_since is None
 
     def stays(self, since: float) -> bool:
-        """Check it; whether a sight of SETTLES after ``since`` (s) or later shows it as far from the palm as at first:
-        since then it neither falls nor slides out."""
+        """Check the object. True if a sight from at least SETTLES after ``since`` (s) shows it as far from the palm as
+        at first: then it neither falls nor slides out."""
         self.check()
         return self._kept_at >= since + SETTLES
 
@@ -90,7 +90,7 @@ class HeldObject:
         raise PortError(f"'{self._object_id}' has left the hand on the way", (why,), ReasonCode.OBJECT_NOT_SEEN)
 
     def _distance(self) -> float | None:
-        """m between the palm and the object, where a new sight has come; else None."""
+        """Returns the distance (m) between palm and object if there is a new sight, else None."""
         if self._sight is None:
             self._sight = self._ctx.perception.locate_object(self._object_id, 0.2)
         if not self._sight.done():

@@ -1,4 +1,4 @@
-"""States in which the machine waits for somebody: the trigger of the initialisation and the hubs of the master."""
+"""States that wait for the operator or the person: the trigger of the initialisation and the hubs of the master."""
 
 from __future__ import annotations
 
@@ -17,8 +17,7 @@ from coglab_smach.states.base import CoglabState, Interrupted
 
 
 class WaitForTrigger(CoglabState):
-    """Wait for the operator's go-ahead before anything moves; with ``auto_trigger`` in the configuration it
-    is not awaited."""
+    """Wait for the operator's trigger before anything moves. ``auto_trigger`` in the configuration skips this."""
 
     def __init__(self, ctx: Context, action: str = "initialise") -> None:
         super().__init__(ctx)
@@ -44,12 +43,12 @@ class WaitForTrigger(CoglabState):
 
 
 class Hub(CoglabState):
-    """wait_without_object and wait_with_object: left by a trigger or, where the configuration allows it, on
-    recognition.
+    """wait_without_object and wait_with_object: a trigger, or (if configured) the recognition of an intention, ends the
+    wait.
 
-    Outcomes are the actions this hub takes; 'stopped' when STOP is pressed or the arm is blocked while waiting (hold
-    latched at the robot, command mode lost), so that it shows and waits for the operator's reset; failed when the robot
-    node is silent.
+    Outcomes: the actions of this hub. 'stopped': STOP was pressed or the arm was blocked while waiting (hold latched at
+    the robot, command mode lost); the state is shown and waits for the operator's reset. 'failed': the robot node is
+    silent.
     """
 
     def __init__(self, ctx: Context, actions: Sequence[str], with_object: bool) -> None:
@@ -62,14 +61,14 @@ class Hub(CoglabState):
         self._code = 0
 
     def time_limit(self) -> float:
-        # A hub is the place to wait in: it has no end of its own.
+        # A hub waits without a time limit.
         return math.inf
 
     def run(self, ud: Any) -> str:
         if not self.with_object:
             self.ctx.holding = ""
         elif ud.object_id != self.ctx.holding or not ud.object_entry:
-            # Held since before this start: user data knows nothing of it.
+            # The object is held since before this start, so user data does not contain its entry.
             ud.object_id, ud.object_entry = self.ctx.holding, {}
         self._blocked_since, self._saw_rest = None, False
         self.ctx.journal.settle()
@@ -100,7 +99,7 @@ class Hub(CoglabState):
         self.ctx.requests.open(self.label, self.actions, unknown, default)
 
     def _await_request(self) -> Request | None:
-        """The next trigger; None, with a reason, if the arm was stopped first."""
+        """Returns the next trigger; None, with a reason, if the arm was stopped first."""
         while True:
             try:
                 self.check()
@@ -118,7 +117,7 @@ class Hub(CoglabState):
             self.ctx.clock.sleep(0.02)
 
     def _blocked(self) -> bool:
-        """Whether the arm has been blocked for longer than a hiccup; PortError if its node is silent."""
+        """True if the arm has been blocked longer than ``hub.blocked_time``. PortError if its node is silent."""
         allowed = self.ctx.arm.motion_allowed()
         now = self.ctx.clock.now()
         if allowed.ok:
@@ -137,8 +136,8 @@ class Hub(CoglabState):
         return True
 
     def _learn_what_is_held(self, ud: Any, request: Request) -> str:
-        """With an object in the hand the action is about that object, whatever else was named. After a restart its
-        entry is read first. Returns why the trigger cannot be followed, empty if it can."""
+        """With an object in the hand, the action always concerns that object. After a restart, read its entry first.
+        Returns the reason if the trigger must be refused, else ''."""
         if ud.object_id == UNKNOWN:
             self.ctx.holding = ud.object_id = request.object_id
         elif request.object_id and request.object_id != ud.object_id:
@@ -156,8 +155,8 @@ class Hub(CoglabState):
         return ""
 
     def _watch_partner(self) -> None:
-        """An offer or a request that is believed in is a trigger like the operator's, if this hub has the action for
-        it: the same belief with which a reach begins. Only one that began in this hub counts."""
+        """A believed offer or request is a trigger like the operator's, if this hub has an action for it. The same
+        belief starts a reach. Only an intention that began in this hub counts."""
         config = self.ctx.config
         if not config.get("recognition_trigger.enabled"):
             return
@@ -173,9 +172,9 @@ class Hub(CoglabState):
 
 
 class Stopped(CoglabState):
-    """After STOP: nothing moves until the operator asks for 'reset'. Then the arm is enabled again; the hand
-    keeps what it holds. A 'reset' that somebody has sent to the robot itself is not enough: the arm would go home
-    without having been asked to."""
+    """After STOP: nothing moves until the operator requests 'reset'. Then the arm is enabled again; the hand keeps its
+    object. A 'reset' sent directly to the robot is not enough: the arm would go home without a request from the
+    operator."""
 
     ignores_stop = True
 
@@ -184,12 +183,12 @@ class Stopped(CoglabState):
 
     def run(self, ud: Any) -> str:
         await_operator(self, "reset")
-        # The operator has answered: it is not told any more, and what fails from now on is no consequence of it.
+        # The operator has confirmed the failure: it is no longer shown, and later failures do not follow from it.
         self.ctx.journal.settle(forget=True)
         self.await_pending(self.ctx.arm.lwr_command("reset"), "LWR command 'reset'", 5.0)
         self.ctx.stop.reset()
         if not self.ctx.arm.motion_allowed().ok:
-            # Command mode was lost as well: the operator's reset is the explicit start that it needs.
+            # Command mode was lost too. The operator's reset is the explicit start that it needs.
             self.pause(0.3)
             if not self.ctx.arm.motion_allowed().ok:
                 self.await_pending(self.ctx.arm.lwr_command("start"), "LWR command 'start'", 20.0)
@@ -198,8 +197,8 @@ class Stopped(CoglabState):
 
 
 class Fault(CoglabState):
-    """Something is broken that recovery could not mend: says why and waits for 'initialise'; nothing moves
-    by itself."""
+    """A fault that the recovery could not remove. Reports the reason and waits for 'initialise'. Nothing moves by
+    itself."""
 
     ignores_stop = True
 
@@ -211,18 +210,18 @@ class Fault(CoglabState):
         await_operator(self, "initialise")
         self.ctx.journal.settle(forget=True)
         if self.ctx.stop.pressed() or not self.ctx.arm.motion_allowed().ok:
-            # A hold that is latched at the robot would let the new initialisation fail as well.
+            # A hold that is latched at the robot would make the new initialisation fail too.
             try:
                 self.await_pending(self.ctx.arm.lwr_command("reset"), "LWR command 'reset'", 5.0)
             except PortError:
-                pass  # the robot may not be there yet; the initialisation says so if it stays away
+                pass  # the robot may not be running yet; if it stays silent, the initialisation reports it
             self.ctx.stop.reset()
         self.reason = "the operator asked for a new initialisation"
         return "succeeded"
 
 
 def await_operator(state: CoglabState, action: str) -> None:
-    """Wait, for ever, until the operator asks for this one action."""
+    """Wait, without a time limit, until the operator requests this one action."""
     state.ctx.requests.open(state.label, [action])
     try:
         while state.ctx.requests.take() is None:

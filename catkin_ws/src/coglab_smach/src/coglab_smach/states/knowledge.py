@@ -1,4 +1,4 @@
-"""States that turn knowledge into a goal: the object database and perception."""
+"""States that compute a goal from the object database and perception."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from coglab_smach.states.hand_tracking import (
 )
 
 Goals = Callable[[Mapping[str, Any]], list[dict[str, Any]]]
-"""goals for what was seen, best first"""
+"""returns the goals for a sight, best first"""
 
 
 class InitVision(CoglabState):
@@ -44,7 +44,7 @@ class InitVision(CoglabState):
 
 
 class QueryDatabase(CoglabState):
-    """Read the object's entry; its nominal grasp goes into user data for all later states."""
+    """Read the object's entry. Its default grasp is stored in user data for all later states."""
 
     default_time_limit = 5.0
 
@@ -62,10 +62,10 @@ class QueryDatabase(CoglabState):
 
 
 class LocateOnBoard(CoglabState):
-    """Where the object lies on the board, averaged over several sights; user data gets its pose in the board frame.
+    """Locate the object on the board, averaged over several sights. User data receives its pose in the board frame.
 
-    Board and object stand still, so the goal of the precise motion follows neither single noisy sights nor an object
-    that the hand pushes.
+    Board and object do not move. Therefore, the goal of the precise motion follows neither a single noisy sight nor an
+    object that the hand pushes.
     """
 
     default_time_limit = 12.0
@@ -88,7 +88,7 @@ class LocateOnBoard(CoglabState):
 
 @contextmanager
 def refused_as(code: int) -> Iterator[None]:
-    """A refusal inside means this ReasonCode, where the port has none of its own."""
+    """A refusal inside the block gets this ReasonCode if the port has not set one."""
     try:
         yield
     except PortError as error:
@@ -97,7 +97,7 @@ def refused_as(code: int) -> Iterator[None]:
 
 
 def locate(state: CoglabState, target: str) -> dict[str, Any]:
-    """Wait for perception to see ``target`` (object id or 'human_hand'); plain dict for user data."""
+    """Wait until perception sees ``target`` (object id or 'human_hand'). Returns a plain dict for user data."""
     limit = state.ctx.config.number("perception.locate_timeout")
     with refused_as(ReasonCode.OBJECT_NOT_SEEN):
         found = state.await_pending(
@@ -120,12 +120,13 @@ def locate(state: CoglabState, target: str) -> dict[str, Any]:
 
 
 def await_offer(state: CoglabState, target: str, goals: Goals, margin: float = 0.0) -> dict[str, Any]:
-    """Wait until ``target`` is inside the handover region, so that the arm does not chase a hand at rest, and until the
-    arm has a posture for one of ``goals``, so that the hand does not run into whoever offers; that goal. With
-    ``handover.start_after`` all that has to have been so for as long (s).
+    """Wait for an offer. ``target`` must be inside the handover region, so that the arm does not chase a resting hand.
+    The arm must have a posture for one of ``goals``, so that the hand does not hit the person. Both must hold for
+    ``handover.start_after`` s. Returns that goal.
 
-    An object that is held still a little outside counts too. ``margin`` (m) widens the region: a hand is behind the
-    object it holds or asks for. PortError if nobody comes within ``handover.offer_timeout``; nothing has moved then.
+    An object that is held still slightly outside counts too. ``margin`` (m) widens the region: a hand is behind the
+    object that it holds or requests. PortError if nobody comes within ``handover.offer_timeout`` s; the arm has not
+    moved then.
     """
     config = state.ctx.config
     region = HandoverRegion(state.ctx, margin)
@@ -166,11 +167,11 @@ def await_offer(state: CoglabState, target: str, goals: Goals, margin: float = 0
 def believed(
     ctx: Context, target: str, located: Mapping[str, Any], person: bool, region: HandoverRegion
 ) -> dict[str, Any] | None:
-    """Where ``target`` will be at a handover that is believed to have begun: its frame ahead, turned as it is seen now;
-    None where nothing is believed yet, or something outside the handover region."""
+    """Returns the predicted place of ``target`` in a handover that is believed to have begun: its predicted frame, with
+    the orientation as seen now. None if there is no belief, or if the place is outside the handover region."""
     level = ctx.config.number("handover.belief")
     if person:
-        # A hand that asks carries nothing: its motion alone has to tell it from one that points.
+        # A requesting hand carries nothing: only its motion distinguishes it from a pointing hand.
         request = ctx.config.get("handover.belief_request")
         level = level if request is None else float(request)
     ahead = ctx.perception.ahead()
@@ -181,13 +182,13 @@ def believed(
 
 
 def palm_of(seen: Mapping[str, Any], goal: Mapping[str, Any]) -> Pose:
-    """Where the palm is to be, with the goal's frame where it was seen (its parent is the base frame)."""
+    """Returns the pose of the palm in the base frame, for the goal's frame as it was seen."""
     return Pose.from_dict(seen) * Pose.from_dict({"xyz": goal["offset"], "quaternion": goal["orientation"]})
 
 
 def first_reachable(ctx: Context, seen: Mapping[str, Any], goals: list[dict[str, Any]]) -> dict[str, Any] | None:
-    """The first of the goals for which the arm has a posture, relative to what was seen; with ``handover.check_reach``
-    false the first one."""
+    """Returns the first goal for which the arm has a posture, relative to the sight. If ``handover.check_reach`` is
+    false, returns the first one."""
     unchecked = not ctx.config.get("handover.check_reach")
     for goal in goals:
         if unchecked or ctx.reachable(palm_of(seen, goal)):
@@ -196,7 +197,7 @@ def first_reachable(ctx: Context, seen: Mapping[str, Any], goals: list[dict[str,
 
 
 def out_of_reach(target: str, seen: Mapping[str, Any], goal: Mapping[str, Any]) -> tuple[str, tuple[str, ...]]:
-    """Sentence and cause of an offer that cannot be taken."""
+    """Returns sentence and cause for an offer that the arm cannot reach."""
     where = ", ".join(f"{v:.2f}" for v in palm_of(seen, goal).position)
     return (
         f"'{target}' cannot be reached: the arm has no posture for the hand at ({where}) m turned like that",
@@ -205,18 +206,19 @@ def out_of_reach(target: str, seen: Mapping[str, Any], goal: Mapping[str, Any]) 
 
 
 def paced(ctx: Context, goal: dict[str, Any]) -> dict[str, Any]:
-    """The goal at the pace of a person: ``handover.reach_ratio`` times the object's own dmp_ratio, and slow at last, so
-    that a touch is light."""
+    """Returns the goal at a person's pace: ``handover.reach_ratio`` times the object's own dmp_ratio, and a low arrival
+    speed, so that a touch is light."""
     ratio = goal["dmp_ratio"] * ctx.config.number("handover.reach_ratio")
     return {**goal, "dmp_ratio": ratio, "arrival_speed": ctx.config.number("handover.arrival_speed")}
 
 
 class SetGraspGoal(CoglabState):
-    """DMP goal from the best of the object's grasps: palm relative to the tracked object frame, ``handover.standoff`` m
-    short of it. The hand takes that grasp's preshape meanwhile, so that it is open when the arm arrives.
+    """DMP goal from the best of the object's grasps: the palm relative to the tracked object frame,
+    ``handover.standoff`` m in front of it. Meanwhile the hand moves to the preshape of that grasp, so that it is open
+    on arrival.
 
-    Ends when the object is on offer, that is inside the handover region: the arm must not chase an object that still
-    rests with the person. Nobody offering it within the limit is a failure, and the arm has not moved.
+    Ends when the object is offered, i.e. inside the handover region: the arm must not chase an object that rests with
+    the person. If nobody offers it within the limit, the state fails. The arm has not moved then.
     """
 
     default_time_limit = 20.0
@@ -239,16 +241,16 @@ class SetGraspGoal(CoglabState):
         hand = {**gentle(grasp), "firm": firm_speed(self.ctx, entry, name)}
         ud.grasp_name, ud.grasp = name, {**grasp, "hand": hand}
         self.reason = f"grasp '{name}'"
-        # The detector looks whether the object is in the palm, wherever the motion's goal comes from.
+        # The detector checks whether the object is in the palm, for seen and predicted goals.
         grasped = {"frame": goal["frame"].removesuffix("_ahead"), "grasp": palm_at_grasp(grasp, 0.0).to_dict()}
         ud.goal = unless_withdrawn(self.ctx, {**goal, "object": grasped})
         return "succeeded"
 
     def _goals(self, entry: Mapping[str, Any], seen: Mapping[str, Any], grip: Grip) -> list[dict[str, Any]]:
-        """One for each grasp, best first, of the object where it was seen."""
+        """Returns one goal for each grasp of the object as it was seen, best first."""
         config = self.ctx.config
         names = ranked(entry, Pose.from_dict(seen), person_at(self), palm_at(self.ctx), self._grasp_name)
-        # A mode that some hands know firm alone is for objects that have no other.
+        # Modes that some hands have only as firm are used only for objects without another mode.
         names = [name for name in names if closes_gently(entry["grasps"][name])] or names
         if names[0] != self._grasp_name:
             self._grasp_name, hand = names[0], gentle(entry["grasps"][names[0]])
@@ -265,8 +267,8 @@ class SetGraspGoal(CoglabState):
 
 
 def off_the_board(state: CoglabState, goal: dict[str, Any]) -> dict[str, Any]:
-    """The goal in the board frame, raised so far that hand and forearm stay ``board.room`` m above the board: an object
-    that is seen a little tilted or low would lead them into it. PortError where that is more than ``board.lift`` m."""
+    """Returns the goal in the board frame, raised so that hand and forearm stay ``board.room`` m above the board. This
+    corrects objects that are seen slightly tilted or low. PortError if the lift exceeds ``board.lift`` m."""
     config = state.ctx.config
     board = Pose.from_dict(locate(state, config.text("perception.board")))
     room, most = config.number("board.room"), config.number("board.lift")
@@ -286,8 +288,8 @@ def off_the_board(state: CoglabState, goal: dict[str, Any]) -> dict[str, Any]:
 
 
 class SetTakeGoal(CoglabState):
-    """DMP goal in the board frame, from detection and database, with a little clearance between palm and object; the
-    last of the way leads along the grasp's approach axis."""
+    """DMP goal in the board frame, from detection and database, with a small clearance between palm and object. The
+    last part of the path follows the grasp's approach axis."""
 
     default_time_limit = 8.0
 
@@ -297,16 +299,16 @@ class SetTakeGoal(CoglabState):
     def run(self, ud: Any) -> str:
         clearance = self.ctx.config.number("take.clearance")
         goal = off_the_board(self, place_goal(ud.object_entry, ud.grasp, ud.located, "take", clearance))
-        # From above, fingers would come down on what is wider than the hand is open there.
+        # From above, the fingers would land on objects that are wider than the opening of the hand.
         way = approach_of(ud.grasp, self.ctx.config.number("take.approach"))
         ud.goal = {**goal, "approach": Pose.from_dict(ud.located).rotation.apply(way).tolist()}
         return "succeeded"
 
 
 class SetDeliveryGoal(CoglabState):
-    """DMP goal from the delivery mode: where the palm must be, relative to the person's hand, to offer the object.
+    """DMP goal from the delivery mode: the pose of the palm, relative to the person's hand, that offers the object.
 
-    Ends when the person's hand is in the handover region: until then nobody asks for the object.
+    Ends when the person's hand is in the handover region: before, nobody requests the object.
     """
 
     default_time_limit = 20.0
@@ -328,7 +330,7 @@ class SetDeliveryGoal(CoglabState):
         goal = paced(self.ctx, delivery_goal(entry, ud.grasp, delivery, ""))
         margin = self.ctx.config.number("handover.hand_margin")
         hand = hand_name(self.ctx)
-        # A hand does not fall: one that sinks has come lower, and is followed or has gone back.
+        # A hand does not fall. A sinking hand has moved lower and is followed, or has gone back.
         asked = await_offer(self, hand, lambda seen: [goal], margin)
         goal = unless_withdrawn(self.ctx, asked, margin, may_fall=False)
         ud.delivery_pose = {"xyz": goal["offset"], "quaternion": goal["orientation"]}
@@ -337,7 +339,7 @@ class SetDeliveryGoal(CoglabState):
 
 
 class FindPlace(CoglabState):
-    """Ask perception for a free place on the board (Figure 8)."""
+    """Request a free place on the board from perception (Figure 8)."""
 
     default_time_limit = 8.0
 
@@ -357,7 +359,7 @@ class FindPlace(CoglabState):
 
 
 class SetPlaceGoal(CoglabState):
-    """DMP goal from a free place: the palm pose that brings the held object there."""
+    """DMP goal from a free place: the pose of the palm that puts the held object there."""
 
     default_time_limit = 8.0
 

@@ -1,4 +1,4 @@
-"""The fingers around an object that a person takes: looser as they carry it, and closed again."""
+"""The fingers around an object that a person takes: they loosen with the load, and can close again."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from coglab_smach.ports.interfaces import HandPort
 from coglab_smach.ports.pending import Pending
 
 FINGERS = slice(1, 5)  # motors that bend fingers
-FIRMER = 0.15  # share of the wanted grip force above which the fingers open
-WEAKER = 0.3  # share below which they close
-AHEAD = 0.04  # s for which the grip goes on after an order to stand: delay of sensors, nodes and the hand's line
-SEEN_AFTER = 0.1  # s after which the effect of that order is seen
+FIRMER = 0.15  # excess over the wanted grip force (relative) at which the fingers open
+WEAKER = 0.3  # lack of the wanted grip force (relative) at which they close
+AHEAD = 0.04  # s from the order to stop until the grip force stops changing: sensors, nodes and serial line
+SEEN_AFTER = 0.1  # s from that order until its effect is measured
 
 
 class LooseningGrip:
-    """The fingers around an object: opened by counts of a motor's position (0 open .. 254 closed), or until the grip
-    that is felt has come down, and closed again."""
+    """The fingers around an object. They open by counts of motor position (0 open .. 254 closed), or until the measured
+    grip force has fallen to a value. They can close again."""
 
     def __init__(
         self,
@@ -27,26 +27,26 @@ class LooseningGrip:
         easing_speed: int = 1,
         force: Callable[[], float | None] = lambda: None,
     ) -> None:
-        """``speed``, ``closing_speed``, ``easing_speed``: 1..511, wire speeds of loosening, of closing (and with it the
-        force) and of loosening while ``force`` (N of grip that are felt) is not None."""
+        """Wire speeds, 1..511: ``speed`` of loosening; ``closing_speed`` of closing, which also sets the force;
+        ``easing_speed`` of loosening while ``force`` (measured grip force, N) is not None."""
         self._hand, self._speed, self._closing_speed = hand, speed, closing_speed
         self._easing_speed, self._force = easing_speed, force
         self._closed, self._firm = hand.state().positions, force()
         self._seen: tuple[float, float] | None = None
         self._rate, self._stood = 0.0, -math.inf
-        """N/s of the grip, and when (s) fingers that followed it stood last"""
+        """rate: N/s of the grip force. stood: time (s) when force-controlled fingers stopped last"""
         self._opening: Pending | None = None
         self._closing: Pending | None = None
 
     def loosened(self) -> int | None:
-        """Counts by which the finger that has moved most is more open than in the grip; None if that is not known."""
+        """Returns the counts by which the finger that moved most has opened since the grip; None if unknown."""
         now = self._hand.state().positions
         if not now or not self._closed:
             return None
         return max(c - n for c, n in zip(self._closed[FINGERS], now[FINGERS], strict=True))
 
     def loosen_to(self, counts: float) -> None:
-        """Open on until they are so loose; call it again and again."""
+        """Open the fingers up to ``counts``. Call this repeatedly."""
         if not self._has_closed():
             return
         loosened = self.loosened()
@@ -57,8 +57,8 @@ class LooseningGrip:
             self.stand()
 
     def ease_to(self, part: float, least: float, counts: float, now: float) -> bool:
-        """Grip with so much of the force of the closed grip, with ``least`` N at least, and looser by ``counts`` at
-        most; call it again and again. False, and nothing done, where no force is felt."""
+        """Open the fingers until the grip force is ``part`` of that of the closed grip, at least ``least`` N, and open
+        them by ``counts`` at most. Call this repeatedly. Returns False, and does nothing, if no force is measured."""
         force, loosened = self._force(), self.loosened()
         if force is None or loosened is None:
             return False
@@ -86,7 +86,7 @@ class LooseningGrip:
         return True
 
     def _has_closed(self) -> bool:
-        """Whether no closing is under way any more. What they hold with then is the closed grip."""
+        """Returns whether no closing is running. A finished closing defines the new closed grip."""
         if self._closing is None:
             return True
         if not self._closing.done():
@@ -95,13 +95,13 @@ class LooseningGrip:
         return True
 
     def stand(self) -> None:
-        """No looser."""
+        """Stop loosening."""
         if self._opening is not None:
             self._opening.cancel()
             self._opening = None
 
     def tighten(self) -> None:
-        """Close again, unless they do."""
+        """Close the fingers again, unless they are already closing."""
         self.stand()
         if self._closing is None:
             self._closing = self._hand.close(self._closing_speed)

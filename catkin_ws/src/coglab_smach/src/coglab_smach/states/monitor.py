@@ -1,4 +1,4 @@
-"""Beside a reach: another primitive where another reaching pattern is recognised."""
+"""Runs beside a reach: replaces its primitive if another reaching pattern is recognised."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from coglab_smach.states.reach import dmp_request
 
 
 class MonitorDmp(CoglabState):
-    """Beside the motion: if another reaching pattern is recognised, substitute its primitive (switch_dmp).
+    """Runs beside the motion. If another reaching pattern is recognised, it substitutes its primitive (switch_dmp).
 
-    Only among the primitives of ``monitor.primitives``: a motion that runs with another one (giving, the board) is left
-    alone. A pattern counts from ``monitor.confidence`` on. Runs until preempted; where it fails, the reach goes on."""
+    It only replaces primitives in ``monitor.primitives``, not those of giving or of the board. A pattern counts from
+    ``monitor.confidence`` on. Runs until preempted. If it fails, the reach goes on."""
 
     default_time_limit = 600.0
     essential = False
@@ -57,7 +57,7 @@ class MonitorDmp(CoglabState):
             switches += 1
 
     def _other_pattern(self, family: dict[str, str], running: str) -> bool:
-        # Once the hand has arrived there is nothing left to substitute, and the arm has to stand still.
+        # After arrival there is nothing left to substitute, and the arm must stand still.
         if self.ctx.arm.dmp_progress().state not in ("running", "holding"):
             return False
         seen = self.ctx.perception.recognition()

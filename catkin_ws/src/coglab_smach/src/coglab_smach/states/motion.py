@@ -1,4 +1,4 @@
-"""The end of a motion: whoever started one ends it before anything else begins."""
+"""Ending motions: the state that started a motion ends it before anything else begins; shifts of the palm."""
 
 from __future__ import annotations
 
@@ -12,16 +12,15 @@ from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.pending import Pending, PortError
 
 POLL_PERIOD = 0.01  # s
-SILENCE = 0.5  # s that a robot that says nothing is waited for; the request stays in force
+SILENCE = 0.5  # s, time limit for a silent robot; the request stays in force
 
 
 def end_motion(ctx: Context, reason: str) -> str:
-    """End every motion of the arm and wait until its set-point stands, and the arm with it; returns why it does not,
-    empty if it does.
+    """End every motion of the arm and wait until its set-point and the arm stand still. Returns '' on success, else the
+    reason.
 
-    Deaf to preemption and STOP, because this is how both are obeyed; each wait takes ``motion.end_timeout`` s at most.
-    Where cancelling fails although the robot is there, the last means is ``hold``: the arm brakes and latches, and the
-    operator sees it.
+    It ignores preemption and STOP, because both use it. Each wait takes at most ``motion.end_timeout`` s. If cancelling
+    fails although the robot answers, the last resort is ``hold``: the arm brakes and latches, and the operator sees it.
     """
     trouble = _await(ctx, ctx.arm.cancel_motion(reason))
     if not trouble:
@@ -35,8 +34,8 @@ def end_motion(ctx: Context, reason: str) -> str:
 
 
 def await_rest(ctx: Context, look: Callable[[], object] = lambda: None) -> None:
-    """Until no joint has moved by more than 1 mrad for 0.2 s, or 1.5 s are over: the arm sways a little after its
-    set-point has come to rest. ``look`` is called all the while; what it returns ends the wait if it is true."""
+    """Wait until no joint has moved by more than 1 mrad for 0.2 s, at most 1.5 s: the arm sways slightly after its
+    set-point has stopped. ``look`` is called at each poll; a true result ends the wait."""
     end = ctx.clock.now() + 1.5
     still_since, place = ctx.clock.now(), ctx.arm.joint_positions()
     while ctx.clock.now() < end and ctx.clock.now() - still_since < 0.2:
@@ -49,37 +48,37 @@ def await_rest(ctx: Context, look: Callable[[], object] = lambda: None) -> None:
 
 
 def rise(ctx: Context, height: float, speed: float) -> Pending | None:
-    """shift() up by ``height`` m, down if negative."""
+    """Start shift() by ``height`` m upward (negative: downward)."""
     return shift(ctx, np.array([0.0, 0.0, height]), speed)
 
 
 def shift(ctx: Context, by: np.ndarray, speed: float) -> Pending | None:
-    """Begin to move the palm ``by`` (m, base frame) without turning it, at ``speed`` m/s or as fast as the limits let
-    it, each joint as fast as its share of the way asks for; None where the posture is not known. Only with controller
+    """Start a motion of the palm by ``by`` (m, base frame) without rotation. The speed is ``speed`` m/s, or less if a
+    joint limit requires it; all joints move in proportion. None if the posture is unknown. Only with controller
     'ptp'."""
     here = ctx.arm.joint_positions()
     return None if here is None else ctx.arm.move_ptp(*_joint_way(ctx, here, by, speed))
 
 
 def shift_time(ctx: Context, by: np.ndarray, speed: float) -> float:
-    """s that shift() takes at full speed scale; 0 where the posture is not known."""
+    """Returns the duration (s) of shift() at full speed scale; 0 if the posture is unknown."""
     here = ctx.arm.joint_positions()
     return 0.0 if here is None else ptp_time(ctx.arm.motion_limits(), here, *_joint_way(ctx, here, by, speed))
 
 
 def _joint_way(ctx: Context, here: Sequence[float], by: np.ndarray, speed: float) -> tuple[list[float], list[float]]:
-    """Where the joints are after a shift (rad), and how fast each goes there (rad/s)."""
+    """Returns the joint positions after a shift (rad) and the joint speeds (rad/s)."""
     jacobian = default_arm().jacobian(np.asarray(here))
     twist = np.concatenate([by, np.zeros(3)])
     way = jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + 1e-4 * np.eye(6), twist)
     velocity = np.maximum(np.abs(way) * speed / float(np.linalg.norm(by)), 1e-3)
-    # Beyond a limit the motion would be refused: all joints are slowed down alike, so that the way stays straight.
+    # The controller refuses speeds above a limit. Slow all joints by the same factor, so that the path stays straight.
     share = float(np.min(np.asarray(ctx.arm.motion_limits().velocity) / velocity))
     return (np.asarray(here) + way).tolist(), (velocity * min(1.0, share)).tolist()
 
 
 def _await(ctx: Context, pending: Pending) -> str:
-    """Why the call did not succeed; empty if it did."""
+    """Returns the reason why the call failed; empty on success."""
     limit = ctx.config.number("motion.end_timeout")
     begin = ctx.clock.now()
     while not pending.done():

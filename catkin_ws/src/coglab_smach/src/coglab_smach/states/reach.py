@@ -1,4 +1,4 @@
-"""A reach: starting the motion, waiting for its end or for an object in the hand, and what ends it for a person."""
+"""A reach: starting the motion, waiting for its end or for an object in the hand, and stopping it for a person."""
 
 from __future__ import annotations
 
@@ -34,22 +34,22 @@ from coglab_smach.states.hand_tracking import (
 )
 from coglab_smach.states.motion import shift, shift_time
 
-BUMPS = 2  # touches of something else after which the arm still comes again
-RETREAT = 0.06  # m that the hand draws back from what it has touched
+BUMPS = 2  # touches of other things after which the arm still tries again
+RETREAT = 0.06  # m, retreat of the hand after such a touch
 RETREAT_SPEED = 0.1  # m/s
-RETREAT_TIMEOUT = 5.0  # s that drawing back may take beyond what limits and speed scale ask for
-SEATED = 0.03  # m from its grasp, at most, at which the fingers may close on an object at a touch
-FIRM = 2.5  # margin of a touch that is more than brushing past
-BETWEEN = 0.01  # m beyond the last of the way within which an object is seen between the fingers
-NEWS = 0.02  # s after which the arm reports a motion that has begun
-CAUGHT = 1.0  # s in which fingers that have begun to close on the way stand
-SLIDING = 0.6  # s for which the hand goes on to the grasp after a touch, at most, at full speed scale
+RETREAT_TIMEOUT = 5.0  # s, added to the planned duration of the retreat
+SEATED = 0.03  # m, largest distance from the grasp at which the fingers may close at a touch
+FIRM = 2.5  # margin of a contact that is more than brushing past
+BETWEEN = 0.01  # m, added to ``handover.close_within``: an object within this distance is between the fingers
+NEWS = 0.02  # s after which the arm reports a started motion
+CAUGHT = 1.0  # s, time limit for fingers that closed on the way to stop on an object
+SLIDING = 0.6  # s, limit for moving on to the grasp after a touch, at full speed scale
 
-PERIOD = 0.03  # s between two looks at what the reach is for
-DOUBT_TIME = 0.2  # s without belief before a reach pauses; after a gap in what is seen belief is back by then
-BACKWARD = 0.6  # share of the allowed retreat from which on the arm waits to see whether the hand goes back
-SLIPPED = 0.06  # m by which an object that has left the person's hand is lower against it than at first
-TOGETHER = 0.05  # s between a sight of the hand and one of the object that may be compared
+PERIOD = 0.03  # s between two looks at the target of the reach
+DOUBT_TIME = 0.2  # s without belief before a reach pauses; after a gap in the sights, belief returns within this time
+BACKWARD = 0.6  # share of the allowed retreat at which the arm waits to see whether the hand goes back
+SLIPPED = 0.06  # m by which an object that has left the person's hand has sunk relative to it
+TOGETHER = 0.05  # s, largest time between sights of hand and object that are compared
 LOOK = 0.4  # s for which hand and object are compared
 
 OUTSIDE = (int(ReasonCode.GOAL_AHEAD_OUTSIDE), "the person's reach seems to end outside the handover region")
@@ -58,7 +58,7 @@ LOWERED = "it was lowered with the hand that holds it"
 
 
 def dmp_request(goal: dict[str, Any], primitive: str | None = None, ratio: float | None = None) -> DmpRequest:
-    """The request of a goal as it travels in user data."""
+    """Converts a goal from user data to a request."""
     orientation = goal.get("orientation")
     return DmpRequest(
         primitive_id=primitive or goal["primitive"],
@@ -74,7 +74,7 @@ def dmp_request(goal: dict[str, Any], primitive: str | None = None, ratio: float
 
 
 def start(state: CoglabState, request: DmpRequest) -> None:
-    """Start a reach. A goal that the tracker has lost gets ``goal_lost_time``, as in a running motion."""
+    """Start a reach. If the tracker has lost the goal, try again for ``goal_lost_time`` s, as in a running motion."""
     ctx = state.ctx
     end = ctx.clock.now() + ctx.config.number("goal_lost_time")
     while True:
@@ -90,12 +90,12 @@ def start(state: CoglabState, request: DmpRequest) -> None:
 
 
 def target_of(goal: Mapping[str, Any]) -> str:
-    """The object that a reach is for, or the person's hand, as perception names it; '' for a place."""
+    """Returns perception's name of the object or the person's hand that a reach is for; '' for a place."""
     return str(goal["frame"]).removesuffix("_ahead").removeprefix("object_")
 
 
 class ExecuteDmp(CoglabState):
-    """Temporary state: starts the motion and passes on to wait_stop; the controller manager closes the loop."""
+    """Start the motion and end at once; wait_stop follows. The controller manager closes the loop."""
 
     default_time_limit = 5.0
     owns_motion = True
@@ -115,8 +115,8 @@ class ExecuteDmp(CoglabState):
 
 
 class WaitStop(CoglabState):
-    """wait_stop: wait for the end of the reach. It may take ``reach_timeout`` beyond what the primitive's duration and
-    the arm's limits ask for."""
+    """wait_stop: wait for the end of the reach. Time limit: ``reach_timeout`` plus the duration from the primitive and
+    the arm's limits."""
 
     default_time_limit = 20.0
     owns_motion = True
@@ -127,11 +127,11 @@ class WaitStop(CoglabState):
         return "succeeded"
 
     def arrived(self) -> bool:
-        """Whether the motion has reached its goal; TimeLimit where it has failed."""
+        """True if the motion has reached its goal. TimeLimit if it has failed."""
         return self.has_reached(self.ctx.arm.dmp_progress())
 
     def has_reached(self, progress: DmpProgress) -> bool:
-        """The same for a progress that was read before."""
+        """The same as arrived(), for a given progress."""
         if progress.state == "aborted":
             why = progress.reason or "the controller gave no reason"
             raise TimeLimit("the reach was aborted", (why,), progress.code)
@@ -140,7 +140,7 @@ class WaitStop(CoglabState):
         return progress.state == "reached"
 
     def await_reach(self, near: Callable[[], bool]) -> None:
-        """Wait until ``near()``. The limit comes from the motion's first feedback."""
+        """Wait until ``near()``. The time limit is computed from the first feedback of the motion."""
         arm = self.ctx.arm
         try:
             self.wait_for(lambda: self.arrived() or arm.dmp_progress().primitive_id != "", "news of the reach", 2.0)
@@ -158,8 +158,8 @@ class WaitStop(CoglabState):
             raise
 
     def leave_approach_profile(self) -> None:
-        """Back to the rigid profile, and wait until what the compliant one added is gone: contact is found in forces,
-        which a compliant arm would not show."""
+        """Return to the rigid profile, and wait until the correction of the compliant one has faded: contact is
+        detected in forces, which a compliant arm would hide."""
         if not self.ctx.config.text("approach_profile"):
             return
         self.await_pending(self.ctx.arm.apply_profile("dmp"), "feedback profile 'dmp'", 2.0)
@@ -171,8 +171,9 @@ class WaitStop(CoglabState):
 
 
 class WaitForPerson(WaitStop):
-    """A reach for what a person offers, or for their hand. While nobody seems to offer or ask any more the arm pauses
-    (PausedForPerson): it stands, goes on with a person who goes on within ``handover.pause`` s, and gives up else."""
+    """A reach for an object that a person offers, or for their hand. If nobody seems to offer or request any more, the
+    arm pauses (PausedForPerson) and stands. It continues if the person continues within ``handover.pause`` s, else it
+    gives up."""
 
     def __init__(self, ctx: Context, keys: Sequence[str]) -> None:
         super().__init__(ctx, input_keys=keys, io_keys=["grip"])
@@ -181,7 +182,7 @@ class WaitForPerson(WaitStop):
         self._persons_grip: PersonsGrip | None = None
 
     def watch_person(self, goal: dict[str, Any], target: str = "") -> None:
-        """From now on; ``target``: the object that the person holds."""
+        """Watch the person from now on. ``target``: the object that the person holds."""
         self._persons_grip = PersonsGrip(self, target) if target else None
         self._watch = ReachWatch(self, goal, self._persons_grip, self._closes) if "watch" in goal else None
 
@@ -191,7 +192,7 @@ class WaitForPerson(WaitStop):
             grip.look()
         if progress.state == "aborted":
             if progress.code == ReasonCode.GOAL_LEFT_REGION and watch is not None:
-                # It may have been believed so for a moment only, or is held still there.
+                # The belief may have been wrong for a moment, or the object is held still there.
                 self._paused_for_person(watch, *(OUTSIDE if watch.predicted else LEFT))
                 return False
             if progress.code == ReasonCode.GOAL_FELL and grip is not None:
@@ -199,13 +200,13 @@ class WaitForPerson(WaitStop):
                 why = progress.reason if code == ReasonCode.GOAL_FELL else LOWERED
                 raise TimeLimit("the reach was aborted", (why or "the controller gave no reason",), code)
         there = super().has_reached(progress)
-        # What falls or is taken back ends the reach at its place, too, but for what the fingers close on.
+        # Falling or taking back also ends a reach at its goal, unless the fingers close on the object.
         if watch is not None and not (there and self._closes()) and watch.doubted() and not there:
             self._paused_for_person(watch, *watch.doubt())
         return there
 
     def _paused_for_person(self, watch: ReachWatch, code: int, why: str) -> None:
-        """Phase PausedForPerson, from any other one. ``code``, ``why``: of giving up."""
+        """Pause for the person; possible in every phase. ``code``, ``why``: the reason if the arm gives up."""
         limit = self.ctx.config.number("handover.pause")
         self.allow(limit + 8.0)
         resting = self.ctx.arm.cancel_motion("the arm waits: nobody offers or asks")
@@ -224,21 +225,21 @@ class WaitForPerson(WaitStop):
         self._begin_again(watch.goal_now())
 
     def _closes(self) -> bool:
-        """Whether the fingers close on the object."""
+        """True if the fingers close on the object."""
         return False
 
     def _has_it(self) -> bool:
-        """Whether the object has come into the hand during a pause."""
+        """True if the object has come into the hand during a pause."""
         return False
 
     def _open_again(self) -> None:
-        """Open fingers that have begun to close."""
+        """Open fingers that have started to close."""
 
     def _begin_again(self, goal: dict[str, Any]) -> None:
-        """Start the reach anew. What lies where no hand may go by now has fallen, or was taken there."""
+        """Start the reach again. A target that is now in a forbidden place has fallen, or was taken there."""
         try:
             start(self, dmp_request(goal))
-            self.pause(NEWS)  # until then the arm reports how the motion before has ended
+            self.pause(NEWS)  # until then the arm reports the end of the previous motion
         except PortError as error:
             if error.code != ReasonCode.GOAL_OUTSIDE_WORKSPACE or self._persons_grip is None:
                 raise
@@ -247,7 +248,7 @@ class WaitForPerson(WaitStop):
 
 
 class Phase(Enum):
-    """What WaitContact does; each phase ends with the next one. It pauses in any of them (WaitForPerson)."""
+    """Phases of WaitContact; each ends with the next phase. The reach can pause in any of them (WaitForPerson)."""
 
     REACH = "the hand goes to the object"
     NEAR_GOAL = "contact is watched for, the fingers may begin to close, and the hand goes on where it feels nothing"
@@ -257,25 +258,25 @@ class Phase(Enum):
 
 
 class WaitContact(WaitForPerson):
-    """Wait until the object that a person offers is in the hand: on the way, at its end, or brought there once the arm
-    waits. Contact is watched for from the last ``contact_within`` m of the reach on. Something that touches the hand
-    while the object is elsewhere is not the object."""
+    """Wait until the offered object is in the hand: during the reach, at its end, or when the person brings it to the
+    waiting arm. Contact is detected within the last ``contact_within`` m of the reach. A touch while the object is
+    elsewhere is a touch of something else."""
 
     def __init__(self, ctx: Context) -> None:
         super().__init__(ctx, ["object_entry", "goal", "grasp"])
         self._goal: dict[str, Any] = {}
-        self._hand: dict[str, Any] = {}  # of the grasp
-        self._contact_settings: dict[str, Any] = {}  # of the object's entry, and where it is looked for
+        self._hand: dict[str, Any] = {}  # hand settings of the grasp
+        self._contact_settings: dict[str, Any] = {}  # from the object's entry, and the place where the object is sought
         self._reset()
 
     def _reset(self) -> None:
-        """For each reach."""
+        """Reset for each reach."""
         self._phase = Phase.REACH
         self._bumps = 0
-        self._arrived: float | None = None  # s, when the hand was first at its goal
-        self._went_on = False  # the hand has gone on from there
-        self._caught = False  # the fingers have closed around something while the arm paused
-        self._look: HandLook | None = None  # at the person's hand, once the fingers have begun to close
+        self._arrived: float | None = None  # s, time of the first arrival at the goal
+        self._went_on = False  # the hand has moved on from the goal
+        self._caught = False  # the fingers have closed on something while the arm paused
+        self._look: HandLook | None = None  # follows the person's hand, once the fingers have started to close
 
     def run(self, ud: Any) -> str:
         entry = ud.object_entry
@@ -296,7 +297,7 @@ class WaitContact(WaitForPerson):
             while self._phase is not Phase.HELD:
                 self._phase = phases[self._phase]()
         except Interrupted:
-            # STOP, or an action that is ended: what closes on a person's object stops at once.
+            # STOP or the end of the action: stop fingers that close on a person's object at once.
             self._grip.stop()
             raise
         return "succeeded"
@@ -341,8 +342,8 @@ class WaitContact(WaitForPerson):
         return False
 
     def _close_on_the_way(self) -> None:
-        """The fingers need as long as the last of the way, and a person lets go of a light object at the first touch.
-        So they begin to close where the object is seen between them."""
+        """Closing takes as long as the last part of the path, and people release a light object at the first touch.
+        Therefore, the fingers start to close as soon as the object is seen between them."""
         grip, within = self._grip, self.ctx.config.number("handover.close_within")
         if grip.closing is not None or not grip.preshaped or not self._is_within(within):
             return
@@ -353,7 +354,7 @@ class WaitContact(WaitForPerson):
             self.ctx.journal.mark("closing_on_the_way")
 
     def _go_on(self) -> None:
-        """Nothing is felt at the goal: a tracker's error, or a light touch. The hand goes on along the grasp's axis."""
+        """No contact at the goal: tracker error, or a light touch. The hand moves on along the grasp's axis."""
         self._went_on = True
         goal = self._watch.goal_now() if self._watch is not None else self._goal
         axis = np.array(goal.get("approach", np.zeros(3)))
@@ -367,7 +368,7 @@ class WaitContact(WaitForPerson):
             except TimeLimit:
                 raise
             except PortError as error:
-                self.reason = error.sentence  # it waits where it is
+                self.reason = error.sentence  # the arm waits at the goal
 
     def _touched(self) -> Phase:
         away, event = off_grasp(self, self._goal), self.ctx.contact.event()
@@ -391,8 +392,8 @@ class WaitContact(WaitForPerson):
         self.reason = (event.message if event is not None else "") or felt
 
     def _slide_in(self) -> None:
-        """Fingers that close on an object as they brush past would hold it by its edge. The reach goes on until the
-        palm is at its grasp, unless something stands in its way."""
+        """Fingers that close while they brush past an object would hold its edge. Continue the reach until the palm is
+        at its grasp, unless something blocks it."""
         contact = self.ctx.contact
         end = self.ctx.clock.now() + SLIDING / max(0.1, self.ctx.arm.speed_scale())
         try:
@@ -408,11 +409,11 @@ class WaitContact(WaitForPerson):
             contact.disarm()
 
     def _bumped(self) -> Phase:
-        """Draw back against the palm's outward axis with the hand open, and begin the reach anew."""
+        """Retreat against the palm's outward axis with the hand open, and start the reach again."""
         arm = self.ctx.arm
         self._bumps += 1
         self.allow(20.0)
-        # What begins while the arm moves takes its speed along, and brakes less than an arm that is stopped.
+        # Stop the arm first: a motion that starts while the arm moves inherits its speed and brakes later.
         self.await_pending(arm.cancel_motion("something touches the hand"), "rest of the arm", 3.0, code=ARM)
         self.await_pending(arm.switch_controller("ptp"), "switching to 'ptp'", 3.0)
         self._open_again()
@@ -425,14 +426,14 @@ class WaitContact(WaitForPerson):
                 try:
                     self.await_pending(motion, "drawing back", limit, arm.speed_scale, ARM)
                 except PortError as error:
-                    self.reason = error.sentence  # as far as it goes
+                    self.reason = error.sentence  # an incomplete retreat is enough
         self.await_pending(arm.switch_controller("dmp"), "switching to controller 'dmp'", 3.0)
         watch = self._watch
         if watch is None:
             self._begin_again(self._goal)
         elif watch.hopeful():
             watch.forgive()
-            # The prediction ends with the person's reach.
+            # The prediction is only valid until the end of the person's reach.
             self._begin_again(watch.goal_now())
         else:
             self._paused_for_person(watch, *watch.doubt())
@@ -443,23 +444,23 @@ class WaitContact(WaitForPerson):
 
     def _has_it(self) -> bool:
         if self._phase is Phase.NEAR_GOAL and self.ctx.contact.event() is not None:
-            return True  # an object has come into the hand that stands
+            return True  # an object has come into the standing hand
         self._caught = self._has_caught()
         return self._caught
 
     def _has_caught(self) -> bool:
-        """Whether fingers that have begun to close hold something: they do not open for somebody who is merely seen."""
+        """True if fingers that closed on the way hold an object. Then they do not open when a person is merely seen."""
         closing, hand = self._grip.closing, self.ctx.hand
         if closing is None:
             return False
         end = self.ctx.clock.now() + CAUGHT
-        # The hand reports that it holds something a moment after its order has ended.
+        # The hand reports its grip shortly after the end of the closing order.
         while not (closing.done() and hand.state().holding) and self.ctx.clock.now() < end:
             self.pause(NEWS)
         return hand.state().holding
 
     def _open_again(self) -> None:
-        """Fingers that have begun to close would come as a fist."""
+        """Open fingers that have started to close: otherwise the hand would arrive as a fist."""
         self._caught = False
         closing, self._look = self._grip.take_closing(), None
         if closing is None:
@@ -471,7 +472,7 @@ class WaitContact(WaitForPerson):
 
 
 class PersonsGrip:
-    """Tells an object that falls from one that is lowered fast: by whether the person's hand is still at it."""
+    """Distinguishes a falling object from one that is lowered fast: is the person's hand still at it?"""
 
     def __init__(self, state: CoglabState, target: str) -> None:
         self._state, self._target = state, target
@@ -479,21 +480,21 @@ class PersonsGrip:
         self.look()
 
     def look(self) -> None:
-        """Measure how far they are apart before anything falls, once they are seen together."""
+        """Measure the distance of hand and object before a fall, once both are seen at the same time."""
         if self._at_first is None:
             self._at_first = self._apart()
 
     def _apart(self) -> float | None:
-        """m from the object up to the person's hand; None unless both sights are TOGETHER: a fast hand would seem apart
-        from what it holds."""
+        """Returns the height (m) of the person's hand above the object. None unless the two sights are at most TOGETHER
+        apart: otherwise a fast hand would seem apart from its object."""
         at, thing = sight_of(self._state, hand_name(self._state.ctx)), sight_of(self._state, self._target)
         if at is None or thing is None or abs(at.age - thing.age) > TOGETHER:
             return None
         return float(at.xyz[2] - thing.xyz[2])
 
     def fell_or_withdrawn(self) -> int:
-        """ReasonCode of an object that has gone down. If it fell it is soon far below the hand; if it is lowered it may
-        seem so for a sight or two."""
+        """Returns the ReasonCode of an object that has moved down. A fallen object is soon far below the hand; a
+        lowered one seems so only for one or two sights."""
         clock, found = self._state.ctx.clock, []
         end = clock.now() + LOOK
         while clock.now() < end:
@@ -506,9 +507,9 @@ class PersonsGrip:
 
 
 class ReachWatch:
-    """Watches the target of a reach, an offered object or the person's hand: it may not go back nor fall (cc.GoalWatch,
-    as in the controller, but over several motions), it has to be, or to be predicted, in the handover region, and
-    somebody has to go on offering it."""
+    """Watches the target of a reach: an offered object or the person's hand. It must not go back or fall (cc.GoalWatch,
+    as in the controller, but over several motions). It must be seen, or predicted, in the handover region. And somebody
+    must continue to offer it."""
 
     def __init__(
         self,
@@ -517,30 +518,30 @@ class ReachWatch:
         grip: PersonsGrip | None,
         closes: Callable[[], bool] = lambda: False,
     ) -> None:
-        """``grip``: the person's, on the target; ``closes``: whether the robot's fingers close on it."""
+        """``grip``: the person's grip on the target. ``closes``: returns whether the robot's fingers close on it."""
         self.state, self.goal, self.limits, self.may = state, goal, goal["limits"], goal["watch"]
         self._closes = closes
         self.target, self._grip = target_of(goal), grip
         self._frame = str(goal["frame"]).removesuffix("_ahead")
         self.predicted = self._began_on_belief = self._frame != goal["frame"]
-        """whether the arm goes to where the target will be, and not to where it is seen"""
+        """True if the arm moves to the predicted place of the target, not to the seen one"""
         self._watch: cc.GoalWatch | None = None
-        self._sure = state.ctx.clock.now()  # when it was last believed
+        self._sure = state.ctx.clock.now()  # s, time of the last belief
         self._looked = self._sure - PERIOD
-        self._last: Sight | None = None  # s, m: the newest sight that was no jump
-        self._from: np.ndarray | None = None  # m, the palm when the reach began
+        self._last: Sight | None = None  # newest sight without a jump
+        self._from: np.ndarray | None = None  # m, position of the palm at the start of the reach
         self._nearest, self._back = np.inf, 0.0
-        """m from there to the target's nearest place, and by which it has gone back since"""
-        self._hand: cc.GoalWatch | None = None  # of the person's hand, for a hidden object
-        self._hand_last: Sight | None = None  # as of the target
-        self._seen_at = 0.0  # s, when the target was seen there
+        """nearest: m, smallest distance of the target from there; back: m by which the target has gone back since"""
+        self._hand: cc.GoalWatch | None = None  # watches the person's hand, for a hidden object
+        self._hand_last: Sight | None = None  # newest sight of the hand without a jump
+        self._seen_at = 0.0  # s, time of the newest sight of the target
         self._region = HandoverRegion(state.ctx, self.may["margin"])
         self._outside: tuple[int, str] | None = None
         """ReasonCode and sentence of an offer or request outside the region"""
-        self._untold: PortError | None = None  # why perception cannot tell whose hand is at the target
+        self._untold: PortError | None = None  # reason why perception cannot identify the hand at the target
 
     def doubt(self) -> tuple[int, str]:
-        """ReasonCode and sentence of the doubt."""
+        """Returns ReasonCode and sentence of the doubt."""
         if self._outside is not None:
             return self._outside
         if self._untold is not None:
@@ -548,8 +549,8 @@ class ReachWatch:
         return int(ReasonCode.GOAL_WITHDRAWN), "the person does not offer or ask any more"
 
     def doubted(self) -> bool:
-        """Whether nobody has offered or asked for DOUBT_TIME, or the target goes back. TimeLimit, which ends the reach,
-        where it went back too far, or fell."""
+        """Returns True if nobody has offered or requested for DOUBT_TIME, or if the target goes back. TimeLimit, which
+        ends the reach, if the target went back too far or fell."""
         now = self.state.ctx.clock.now()
         if now - self._looked >= PERIOD and self.hopeful():
             self._sure = now
@@ -559,7 +560,7 @@ class ReachWatch:
         return self._back > BACKWARD * self.may["retreat"] > 0.0
 
     def hopeful(self) -> bool:
-        """Whether somebody offers or asks now, within the region: it is believed, or seen. TimeLimit as doubted()."""
+        """True if somebody offers or requests now within the region, believed or seen. TimeLimit as in doubted()."""
         ctx = self.state.ctx
         now = ctx.clock.now()
         passed, self._looked = max(0.0, now - self._looked), now
@@ -569,15 +570,15 @@ class ReachWatch:
         self._follow_hand(passed, hidden=place is None)
         held = place is not None and self._region.offers(self._seen_at, place, moving=False)
         if self._goes_back() and held:
-            # It is offered there: by as much less may it go back from now on.
+            # The target is offered there: from now on, it may go back by less.
             self._nearest, self._back = self._nearest + self._back, 0.0
         if self._goes_back():
             return False
         hope, outside = anything_believed(ctx), ends_outside(ctx, self._region, self._frame)
-        # Who passes through the region on the way out of it offers nothing there.
+        # A target that passes through the region on its way out is not offered.
         offered = held or (place is not None and not outside and self._region.holds(place))
         if not offered and not outside:
-            # What is hidden may have been taken back where nothing but a belief spoke for it.
+            # If the reach began on a belief and the belief is gone, a hidden target may have been taken back.
             hidden = place is None and (hope or not self._began_on_belief)
             ahead = self._began_on_belief and hope and ctx.perception.ahead().frame == self.goal["frame"]
             offered = hidden or ahead
@@ -589,7 +590,7 @@ class ReachWatch:
         return offered
 
     def goal_now(self) -> dict[str, Any]:
-        """The goal: where the target will be as long as that is believed, else where it is seen."""
+        """Returns the goal: at the predicted place while it is believed, else at the seen one."""
         ahead = self.state.ctx.perception.ahead()
         self.predicted = ahead.frame == self.goal["frame"] and self._region.holds(ahead.place)
         if self.predicted:
@@ -599,11 +600,11 @@ class ReachWatch:
         return {**self.goal, "frame": self._frame, "limits": {**limits, **watched}}
 
     def forgive(self) -> None:
-        """The doubt is over."""
+        """End the doubt."""
         self._sure = self.state.ctx.clock.now()
 
     def _look(self) -> np.ndarray | None:
-        """m, where the target is seen; None where it is not: a hand that goes back may hide it."""
+        """Returns the seen position (m) of the target. None if it is not seen: a hand that goes back may hide it."""
         seen = sight_or_refusal(self.state, self.target, GLANCE)
         self._untold = None
         if isinstance(seen, PortError):
@@ -615,7 +616,7 @@ class ReachWatch:
         return np.array(seen.xyz)
 
     def _follow_hand(self, passed: float, hidden: bool) -> None:
-        """A hand that takes an object back may hide it. A hand that leaves what the fingers close on has let go."""
+        """A hand that takes an object back may hide it. A hand that leaves while the fingers close has let go."""
         if self._grip is None or self._from is None:
             return
         seen = sight_of(self.state, hand_name(self.state.ctx), GLANCE)
@@ -647,7 +648,7 @@ class ReachWatch:
         self._back = distance - self._nearest
         code, sentence = self._watch.update(passed, place)
         if code == ReasonCode.GOAL_FELL and self._grip is not None:
-            # The arm goes no further while it is found out.
+            # The arm stops while this is decided.
             resting = self.state.ctx.arm.cancel_motion(sentence)
             self.state.await_pending(resting, "rest of the arm", 3.0, code=ARM)
             code = self._grip.fell_or_withdrawn()

@@ -1,4 +1,4 @@
-"""A palm that has met an object beside its grasp goes to it before the fingers close again."""
+"""Moves a palm that has touched an object beside its grasp to that grasp, before the fingers close again."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from coglab_smach.states.base import CoglabState, TimeLimit
 from coglab_smach.states.hand_tracking import way_to_grasp
 from coglab_smach.states.motion import shift, shift_time
 
-FARTHEST = 0.05  # m that the palm goes at most
-LEAST = 0.005  # m, a shorter way is not begun
+FARTHEST = 0.05  # m, longest path of the palm
+LEAST = 0.005  # m, a shorter path is not started
 SPEED = 0.06  # m/s
-PUSHES = 6.5  # N on the palm from which something is in its way
+PUSHES = 6.5  # N on the palm that count as an obstacle
 
 
 class Regrasp(CoglabState):
     """Move the open hand straight to the grasp of the object that a person still holds, as it is seen now, by FARTHEST
-    at most. A reach ends with the first touch, which may come beside the grasp, and another reach would feel the same
-    touch at once. The way ends where the hand pushes, or in time. Without a sight of the object nothing moves.
+    m at most. A reach ends with the first touch, which may come beside the grasp. Another reach would detect the same
+    touch at once. The motion ends at a push or a time limit. Without a sight of the object nothing moves.
     """
 
     default_time_limit = 6.0
@@ -47,7 +47,7 @@ class Regrasp(CoglabState):
             try:
                 self.wait_for(over, "the way to the grasp", limit, self.ctx.arm.speed_scale, ARM)
             except TimeLimit as error:
-                # Held up by something that yields as the palm comes: the fingers can close here, too.
+                # The object moves away as the palm comes: the fingers can close here too.
                 self.reason = error.sentence
             self._end(motion)
         return "succeeded"

@@ -1,4 +1,4 @@
-"""Taking an object over from a person: the arm takes the weight, the person feels that and lets go."""
+"""Taking an object from a person: the arm takes the weight; the person notices that and lets go."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from coglab_smach.states.held_object import HeldObject
 from coglab_smach.states.motion import await_rest, rise
 from coglab_smach.states.yield_to_pull import LEAST_WAY, YieldToPull
 
-GRAVITY = 9.81
-MOST_RISES = 8  # the first one, and those that go on where the weight or somebody's pull has ended one
+GRAVITY = 9.81  # m/s^2
+MOST_RISES = 8  # rises: the first one, and continuations after the weight or a pull has ended one
 
-FOLLOWS = 0.25  # s from one closing of the fingers to the next at least
-UNSEEN = 0.4  # s after the person's hand has gone, when an object that nobody sees has stayed in the fingers
-WITH_HAND = 0.2  # m between the person's hand and an object that they have taken along, at most
-FALLS = 0.4  # s after which a falling object is far below where it was lost, and for which it is looked for then
+FOLLOWS = 0.25  # s, shortest time between two closing orders to the fingers
+UNSEEN = 0.4  # s after the person's hand has gone: an unseen object then counts as still in the fingers
+WITH_HAND = 0.2  # m, largest distance between the person's hand and an object that they have taken back
+FALLS = 0.4  # s after which a falling object is far below its place; also the time for which it is looked for
 RECENT = 0.15  # s, oldest sight that counts there
-SINKING = 3.0  # s in which the arm has sunk with the object, or is back
+SINKING = 3.0  # s, time limit for sinking with the object, and for rising again
 SETTLES = 0.3  # s before and after, for torques at rest
-TELLS = 1.0  # s in which the contact detector tells the share of the weight, once it is armed
+TELLS = 1.0  # s after arming within which the contact detector reports the share of the weight
 LIFTS = 0.8  # N, least load change that counts as "the person holds it": a soft hand (35 N/m) moved by 3 cm gives 1 N
-IN_MOTION = 1.6  # N by which the weight that a slow arm tells differs from what it tells at rest, at most
+IN_MOTION = 1.6  # N, largest difference between the weight measured in slow motion and at rest
 
 
 def person_holds(state: CoglabState, settings: dict[str, Any]) -> bool | None:
-    """True if the person holds the object. At rest the torque signal is too weak for light objects, so the arm sinks
-    with it and rises again: a person who holds it takes weight below and gives it back above, a hand that is merely
-    there or a pull that has ended does not. None if it is not sure, or cannot be felt. ``settings``: mass (kg) and
-    load_share of the object. Only with controller 'ptp'."""
+    """True if the person holds the object. At rest the torque signal is too weak for light objects. Therefore, the arm
+    sinks with the object and rises again. A person who holds it takes weight at the bottom and returns it at the top. A
+    hand that is merely there, or a pull that has ended, does not. None if it is uncertain or cannot be measured.
+    ``settings``: mass (kg) and load_share of the object. Only with controller 'ptp'."""
     contact, lift = state.ctx.contact, state.ctx.config.number("hand.lift")
     state.allow(2.0 * SINKING + 16.0)
     await_rest(state.ctx, state.check)
@@ -44,7 +44,7 @@ def person_holds(state: CoglabState, settings: dict[str, Any]) -> bool | None:
         state.await_pending(contact.arm("release", watch, settings), "arming of the contact detector", 2.0)
         least = min(float(settings["load_share"]), LIFTS / (GRAVITY * float(settings["mass"])))
         before, top = _share_at_rest(state), palm_at(state.ctx)
-        # Nobody is pressed down for longer than it takes to feel them.
+        # Sink no longer than necessary to measure: otherwise the object presses on the person's hand.
         whole = _shifts(state, -lift, before + least + IN_MOTION / (GRAVITY * float(settings["mass"])))
         sunk, bottom = _share_at_rest(state), palm_at(state.ctx)
         if sunk - before < least:
@@ -52,15 +52,15 @@ def person_holds(state: CoglabState, settings: dict[str, Any]) -> bool | None:
         _shifts(state, lift if top is None or bottom is None else max(LEAST_WAY, float(top[2] - bottom[2])))
         return True if sunk - _share_at_rest(state) >= 0.5 * least else None
     except PortError:
-        # A detector that is dead, or that nobody tells anything, finds nobody either.
+        # A dead detector, or one without data, finds nobody either.
         return None
     finally:
         contact.disarm()
 
 
 def _shifts(state: CoglabState, up: float, enough: float = math.inf) -> bool:
-    """Rise by ``up`` m (sink if negative) until ``enough`` of the weight has gone, and come to rest. Whether the arm
-    has gone the whole way; PortError if it does not move."""
+    """Rise by ``up`` m (negative: sink) until the share ``enough`` of the weight has gone, and come to rest. Returns
+    whether the arm has moved the whole way. PortError if it does not move."""
     ctx = state.ctx
     motion = rise(ctx, up, ctx.config.number("give.lower_speed"))
     if motion is None:
@@ -83,7 +83,7 @@ def _shifts(state: CoglabState, up: float, enough: float = math.inf) -> bool:
 
 
 def person_has_it(state: CoglabState, track: HandTrack, settings: dict[str, Any]) -> bool:
-    """The same, with the person's hand at the object before and after."""
+    """Like person_holds, but the person's hand must be at the object before and after."""
 
     def at_hand() -> bool:
         away = from_palm(state, track, 0.3)
@@ -93,7 +93,7 @@ def person_has_it(state: CoglabState, track: HandTrack, settings: dict[str, Any]
 
 
 def _share_at_rest(state: CoglabState) -> float:
-    """Share of the weight that has gone from a resting palm. TimeLimit if the detector does not report it."""
+    """Returns the share of the weight that has left the resting palm. TimeLimit if the detector does not report it."""
     shares: list[float] = []
 
     def has_come() -> bool:
@@ -107,21 +107,21 @@ def _share_at_rest(state: CoglabState) -> float:
 
 
 class TakeWeight(CoglabState):
-    """Lift the object until the person's hand has left it, by ``hand.lift`` m at most. A person who does not let go
-    gets the object back if they really hold it.
+    """Lift the object by at most ``hand.lift`` m until the person's hand has left it. A person who does not let go gets
+    the object back if they really hold it.
 
-    The rise stops when ``hand.load_share`` of the weight has come: the person feels that, is told so, and an arm that
-    went on would draw gentle fingers along the object. But the weight is counted from the closing of the fingers, when
-    a person often still presses: if they hold on for ``hand.lift_pause`` s the arm rises on by ``hand.lift_step`` m,
-    again and again.
+    The rise stops when the arm carries ``hand.load_share`` of the weight. The person feels that and is informed; a
+    further rise would pull gentle fingers along the object. But the weight is counted from the closing of the fingers,
+    when a person often still presses. If they hold on for ``hand.lift_pause`` s, the arm rises by another
+    ``hand.lift_step`` m, repeatedly.
 
-    The person has let go when their hand has gone from where it held the object (``hand_distance``, m from the palm
-    before the fingers closed, or where it is seen at the object first) and the object has stayed. If the hand is seen
-    nowhere, the weight has to have come by the end of the rise; if it was hidden on its way, the weight has to have
-    come, too, since another hand may be seen now. At the time limit, if the hand may have gone, the arm feels whether
-    the person holds the object. If that is not sure, nothing is opened and the arm stays.
+    The person has let go when their hand has left its place at the object and the object has stayed. The place is
+    ``hand_distance`` (m from the palm before the fingers closed), or the first sight at the object. If the hand is not
+    seen, the arm must carry the weight at the end of the rise. If the hand was hidden on its way, the arm must carry
+    the weight too, because the tracker may now see another hand. At the time limit, if the hand may have gone, the arm
+    measures whether the person holds the object. If that is uncertain, nothing opens and the arm stays.
 
-    The palm yields to a pull (YieldToPull), and the rise goes on afterwards. The fingers close again and again with the
+    The palm yields to a pull (YieldToPull), and the rise continues afterwards. The fingers close repeatedly with the
     lowest force (``give.close_speed``).
     """
 
@@ -141,15 +141,15 @@ class TakeWeight(CoglabState):
         self._reset()
 
     def _reset(self) -> None:
-        """For each object that is taken over."""
-        self._top: float | None = None  # m, height to which the palm rises
+        """Reset for each object."""
+        self._top: float | None = None  # m, target height of the palm
         self._rises = 0
         self._told = self._seen_away = False
-        self._farther: float | None = None  # m from the palm from which on the person's hand has left the object
-        self._gone: float | None = None  # s, since when it has
-        self._on: float | None = None  # s, when it rises on with the weight; None: the weight has not come
-        self._closing: Pending | None = None  # of the fingers, once more
-        self._closes = 0.0  # s, from when they may do so again
+        self._farther: float | None = None  # m from the palm beyond which the person's hand has left the object
+        self._gone: float | None = None  # s, time when the hand left
+        self._on: float | None = None  # s, time of the next rise with the weight; None: the arm does not carry it yet
+        self._closing: Pending | None = None  # repeated closing order to the fingers
+        self._closes = 0.0  # s, time of the next closing order
 
     def run(self, ud: Any) -> str:
         limit, contact = self.ctx.config.number("hand.load_timeout"), self.ctx.contact
@@ -177,7 +177,7 @@ class TakeWeight(CoglabState):
         finally:
             contact.disarm()
             self._way.stop()
-            if self._closing is not None:  # fingers that went on closing would press out what they hold
+            if self._closing is not None:  # fingers that continue to close would squeeze out the object
                 self._closing.cancel()
         event = contact.event()
         self.reason = event.message if event is not None else "the person's hand has left it"
@@ -187,13 +187,13 @@ class TakeWeight(CoglabState):
         return "succeeded"
 
     def _count_from(self, distance: float | None) -> None:
-        """The person's hand was seen so far from the palm (m). A hand that is not at the object does not count: it has
-        left already, or is another one."""
+        """Set the reference distance (m) of the person's hand from the palm. A hand that is not at the object does not
+        count: it has already left, or is another one."""
         if distance is not None and distance <= AT_HAND:
             self._farther = distance + self.ctx.config.number("hand.let_go")
 
     def _has_let_go(self) -> bool:
-        """Whether the person has; meanwhile rise until the weight has come, or give way."""
+        """True if the person has let go. Until then: rise until the arm carries the weight, or yield."""
         carried = self.ctx.contact.event() is not None
         if not (blocked := self.ctx.arm.motion_allowed()).ok:
             raise TimeLimit("the arm does not follow any more", (blocked.why,), blocked.code)
@@ -202,13 +202,13 @@ class TakeWeight(CoglabState):
         if carried:
             self.ctx.journal.mark("loaded")
             self._tell()
-        # Before and after the look, which waits for a sight.
+        # Before and after from_palm(), which waits for a sight.
         self._way.follow()
         away = from_palm(self, self._hand)
         if self._farther is None:
             self._count_from(away)
         if self._has_gone(away, carried):
-            # The other one of two hands may hold on where the first is seen to go.
+            # The other one of two hands may hold on while the first is seen to leave.
             self._seen_away = self._hand.is_sure and carried
             return True
         self._way.follow()
@@ -220,8 +220,8 @@ class TakeWeight(CoglabState):
         return False
 
     def _has_gone(self, away: float | None, carried: bool) -> bool:
-        """Whether the person's hand, ``away`` m from the palm, has left the object, and the object has stayed. If the
-        hand was not seen all the way the weight has to be ``carried``, too."""
+        """True if the person's hand, ``away`` m from the palm, has left the object and the object has stayed. If the
+        hand was not tracked all the way, the weight must be ``carried`` too."""
         gone = away is not None and away > (AWAY if self._farther is None else self._farther)
         if away is None or not gone or not (carried or self._hand.is_sure):
             self._gone = None
@@ -234,7 +234,7 @@ class TakeWeight(CoglabState):
         return self._held.there() and (away > AT_HAND or hidden)
 
     def _rise_on(self) -> None:
-        """With the weight, in steps, while the person holds on."""
+        """Rise with the weight, in steps, while the person holds on."""
         now = self.ctx.clock.now()
         if self._on is None:
             self._way.halt("the weight has come")
@@ -245,20 +245,20 @@ class TakeWeight(CoglabState):
             self._rise(step)
 
     def _follow(self) -> None:
-        """Close again and again with the lowest force: as the person lets go the object shifts between the fingers."""
+        """Close repeatedly with the lowest force: when the person lets go, the object shifts between the fingers."""
         now = self.ctx.clock.now()
         if now >= self._closes and (self._closing is None or self._closing.done()):
             self._closes = now + FOLLOWS
             self._closing = self.ctx.hand.close(self.ctx.config.get("give.close_speed"))
 
     def _tell(self) -> None:
-        """Once: the robot carries the object."""
+        """Inform the person once that the robot carries the object."""
         if not self._told:
             self._told = True
             self.ctx.say(Say.I_HAVE_IT, "I have it.")
 
     def _rise(self, most: float = math.inf) -> None:
-        """Up to the end of the first rise, by ``most`` m."""
+        """Rise by at most ``most`` m, up to the target height of the first rise."""
         palm, speed = palm_at(self.ctx), self.ctx.config.number("hand.lift_speed")
         if palm is None or self._rises >= MOST_RISES:
             return
@@ -271,7 +271,7 @@ class TakeWeight(CoglabState):
             self._way.begin(rise(self.ctx, left, speed))
 
     def _taken_back(self, object_id: str, error: PortError) -> PortError:
-        """The failure; "taken back" if the object has gone with the person's hand."""
+        """Returns the failure: "taken back" if the object has moved away with the person's hand."""
         if error.code == ReasonCode.OBJECT_NOT_SEEN and not self.ctx.holding:
             self._way.stop()
             self.pause(FALLS)
@@ -287,14 +287,14 @@ class TakeWeight(CoglabState):
         return error
 
     def _is_left(self, settings: dict[str, Any]) -> bool:
-        """Whether a hand is seen far from the object, or none while the weight has come, and nobody holds it."""
+        """True if nobody holds the object, and a hand is seen far from it or (with the weight carried) none is seen."""
         self._way.stop()
         away, loaded = from_palm(self, self._hand, 0.3), self.ctx.contact.event() is not None
         gone = loaded if away is None else away > (AT_HAND if loaded else AWAY)
         return gone and person_holds(self, settings) is False
 
     def _not_released(self, object_id: str, limit: float, error: TimeLimit, settings: dict[str, Any]) -> PortError:
-        """The failure. A person who holds the object gets it; else the robot keeps it."""
+        """Returns the failure. A person who holds the object gets it; otherwise the robot keeps it."""
         causes: tuple[str, ...] = (error.sentence,)
         loaded, away = self.ctx.journal.marked("loaded"), from_palm(self, self._hand)
         if person_has_it(self, self._hand, settings):

@@ -1,4 +1,4 @@
-"""Yielding to a person who pulls at what the robot's hand holds, too."""
+"""Yielding to a person who pulls at the object in the robot's hand."""
 
 from __future__ import annotations
 
@@ -9,31 +9,31 @@ from coglab_smach.ports.pending import Pending
 from coglab_smach.states.hand_tracking import palm_at, palm_axis
 from coglab_smach.states.motion import shift
 
-LEAST_WAY = 0.005  # m, a shorter way is not begun
+LEAST_WAY = 0.005  # m, a shorter path is not started
 
 
 class YieldToPull:
-    """The one motion of an arm beside a person: what a state wants (``begin``), until somebody pulls; then the palm
-    goes along with the pull (``follow``, called again and again), by ``pull.way`` m in all at most.
+    """Coordinates the motions of an arm beside a person. The state starts its motion with ``begin``. When somebody
+    pulls, the palm moves along with the pull (``follow``, called repeatedly), by at most ``pull.way`` m in total.
 
-    Every motion is ended, and the set-point stands, before the next one begins. A pull is the force that the contact
-    detector feels, without its vertical part (the object's weight and the lift) and without its part into the palm (a
-    person who gives the object presses).
+    Each motion ends, and the set-point stands still, before the next one starts. The pull is the measured contact force
+    without its vertical part (the object's weight and the lift) and without its part into the palm (a person who gives
+    the object presses).
     """
 
     def __init__(self, ctx: Context) -> None:
         self._ctx = ctx
         self._motion: Pending | None = None
         self._ending: Pending | None = None
-        self._from: np.ndarray | None = None  # m, where the palm was when it began to give way; None while it does not
-        self._went = np.zeros(3)  # m, by which it has
-        self._since: float | None = None  # s, since when somebody pulls
+        self._from: np.ndarray | None = None  # m, position of the palm at the start of yielding; None: not yielding
+        self._went = np.zeros(3)  # m, total yielding so far
+        self._since: float | None = None  # s, start of the pull
 
     def _number(self, name: str) -> float:
         return self._ctx.config.number(f"pull.{name}")
 
     def pull(self) -> np.ndarray:
-        """N, base frame, horizontal; zero if the force is not known."""
+        """Returns the horizontal pull (N, base frame); zero if the force is unknown."""
         force = self._ctx.contact.force()
         outward = palm_axis(self._ctx)
         if force is None or outward is None:
@@ -42,16 +42,16 @@ class YieldToPull:
         return pull * (1.0, 1.0, 0.0)
 
     def begin(self, motion: Pending | None) -> None:
-        """The motion that the state wants; only while no other is under way."""
+        """Set the motion of the state. Only while no other motion runs."""
         self._motion = motion
 
     def halt(self, why: str) -> None:
-        """End what the state wanted; a palm that yields goes on."""
+        """End the motion of the state. A yielding palm continues."""
         if self._from is None and self._ending is None and not self.idle():
             self._end(why)
 
     def idle(self) -> bool:
-        """Whether no motion is under way, not even to its end."""
+        """True if no motion runs, not even to its end."""
         if self._ending is not None and self._ending.done():
             self._ending = self._motion = None
         if self._motion is not None and self._from is None and self._ending is None and self._motion.done():
@@ -59,7 +59,7 @@ class YieldToPull:
         return self._motion is None and self._ending is None
 
     def follow(self) -> None:
-        """Begin to yield, go on, or end it, as the pull is."""
+        """Start, continue or end yielding, depending on the pull."""
         pull, now = self.pull(), self._ctx.clock.now()
         size = float(np.linalg.norm(pull))
         if self._from is not None:
@@ -83,14 +83,14 @@ class YieldToPull:
         self._ctx.journal.mark("gave_way")
 
     def _way(self, direction: np.ndarray) -> np.ndarray | None:
-        """m that the palm may still go there; None if it has gone far enough."""
+        """Returns the vector (m) by which the palm may still yield; None if it has yielded far enough."""
         most = self._number("way")
         there = self._went + most * direction
         way = there * min(1.0, most / max(float(np.linalg.norm(there)), 1e-9)) - self._went
         return way if float(np.linalg.norm(way)) > LEAST_WAY else None
 
     def _end(self, why: str) -> None:
-        """End the motion; the next one has to wait until the set-point stands."""
+        """End the motion. The next one must wait until the set-point stands still."""
         here = palm_at(self._ctx)
         if self._from is not None and here is not None:
             self._went = self._went + here - self._from
@@ -98,6 +98,6 @@ class YieldToPull:
         self._ending = self._ctx.arm.cancel_motion(why)
 
     def stop(self) -> None:
-        """No motion any more."""
+        """End all motion."""
         if not self.idle() and self._ending is None:
             self._end("nothing is to be given way to any more")

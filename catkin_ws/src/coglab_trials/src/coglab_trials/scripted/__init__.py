@@ -1,8 +1,7 @@
-"""Scripted ports: what the state machines need of arm, hand, perception, database and contact, without ROS and physics.
+"""Scripted ports for arm, hand, perception, database and contact, without ROS and physics.
 
-For unit tests of machines: order, times and outcomes. Everything that is asked for is accepted, unless the test says
-otherwise (``cell.faults``), and the person does what the test says (``cell.partner``). What the real robot refuses, and
-why, is found in a World.
+For unit tests of the state machines: order, times and outcomes. Every request is accepted unless ``cell.faults`` says
+otherwise. The person follows ``cell.partner``. A World shows which requests the real robot refuses, and why.
 """
 
 from coglab_trials.scripted.cell import Faults, Partner, ScriptedCell

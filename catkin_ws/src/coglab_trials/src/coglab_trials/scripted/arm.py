@@ -1,7 +1,7 @@
-"""The scripted arm: seven joints that follow minimum-jerk profiles and brake at constant deceleration.
+"""The scripted arm: seven joints that follow minimum-jerk profiles and brake with constant deceleration.
 
-A motion goes on until its end, whoever waits for it. It ends before only by cancelling, a switch, a hold, an abort or
-the loss of command mode, and then the arm brakes. Times in s on the cell's clock, angles in rad.
+A motion goes on until its end, even if nobody waits for it. Only a cancel, a switch, a hold, an abort or the loss of
+command mode ends it earlier; then the arm brakes. Times in s on the cell's clock, angles in rad.
 """
 
 from __future__ import annotations
@@ -19,8 +19,7 @@ from coglab_smach.ports.pending import Pending, Polled, PortError, ending_motion
 if TYPE_CHECKING:
     from coglab_trials.scripted.cell import ScriptedCell
 
-REACH = np.array([0.9, -0.5, 0.3, -0.4, 0.5, -0.6, 0.4])
-"""rad, what a reach adds to the posture it starts from; and back, from where it has ended"""
+REACH = np.array([0.9, -0.5, 0.3, -0.4, 0.5, -0.6, 0.4])  # rad, added to the joints by a reach; subtracted on return
 REACH_LENGTH = 0.45  # m
 SILENT = Verdict(False, "/lwr/state is silent", ReasonCode.NODE_SILENT)
 
@@ -31,8 +30,7 @@ class ScriptedArm:
     def __init__(self, cell: ScriptedCell) -> None:
         self._cell = cell
         self.limits: MotionLimits = read_limits({})
-        self.scale = 1.0
-        """speed scale"""
+        self.scale = 1.0  # speed scale, no unit
         self.reach_time = 1.3
         self.active = ""
         self.enabled = self.held = False
@@ -40,18 +38,18 @@ class ScriptedArm:
         self.request: DmpRequest | None = None
         self.dmp = self._heard = DmpProgress()
         self.motion_started: float | None = None
-        """when the DMP motion began that runs now or has ended last; None: none since the last switch"""
+        """start (s) of the running or the last DMP motion; None: no motion since the last switch"""
         self._start = self._end = np.full(7, 0.3)
         self._t0 = self._duration = 0.0
         self._braking = self._reached_out = False
         self._queue: list[tuple[object, np.ndarray, Sequence[float]]] = []
-        """point-to-point motions that run (the first) or wait: identity, target, speeds"""
+        """point-to-point motions: identity, target (rad), speeds (rad/s). The first one runs, the others wait."""
         self._ended: dict[object, PortError | None] = {}
 
-    # ---- where it is
+    # ---- position and velocity
 
     def _share(self) -> tuple[float, float]:
-        """(share of the way that is covered, its rate in 1/s) now."""
+        """Returns (covered share of the path, its rate in 1/s) now."""
         s = (self._cell.clock.now() - self._t0) / self._duration if self._duration > 0.0 else 1.0
         if s >= 1.0:
             return 1.0, 0.0
@@ -60,12 +58,12 @@ class ScriptedArm:
         return s**3 * (10.0 - 15.0 * s + 6.0 * s * s), 30.0 * s * s * (1.0 - s) ** 2 / self._duration
 
     def position(self) -> tuple[float, ...]:
-        """True joint positions, rad."""
+        """Returns the true joint positions, rad."""
         share = self._share()[0]
         return tuple(map(float, self._end if share >= 1.0 else self._start + share * (self._end - self._start)))
 
     def velocity(self) -> np.ndarray:
-        """True joint velocities, rad/s."""
+        """Returns the true joint velocities, rad/s."""
         return self._share()[1] * (self._end - self._start)
 
     def _go(self, target: np.ndarray, duration: float) -> None:
@@ -81,10 +79,10 @@ class ScriptedArm:
         self._start, self._end = here, here + 0.5 * duration * velocity
         self._t0, self._duration, self._braking = self._cell.clock.now(), duration, True
 
-    # ---- what moves it
+    # ---- motions
 
     def follow(self) -> None:
-        """What has happened since the last look: a motion at its end, a block, an abort."""
+        """Process what has happened since the last call: end of a motion, a block, an abort."""
         if "arm" in self._cell.faults.dead:
             self.enabled = False  # without answers the robot controller brakes and leaves command mode
         why, code = self._blocked()
@@ -114,7 +112,7 @@ class ScriptedArm:
         self._reached_out = self._reached_out or over
 
     def _blocked(self) -> tuple[str, int]:
-        """Why the arm may not move, and its code; 0 if it may."""
+        """Returns the reason why the arm may not move, and its code; code 0 if it may."""
         if self._cell.faults.arm_disabled:
             return self._cell.faults.arm_disabled, ReasonCode.NOT_IN_COMMAND_MODE
         if self.held:
@@ -122,7 +120,7 @@ class ScriptedArm:
         return ("", 0) if self.enabled else ("command mode was not asked for", ReasonCode.NOT_STARTED)
 
     def end(self, reason: str, code: int) -> None:
-        """End what runs and what waits; the arm brakes."""
+        """End the running and the waiting motions. The arm brakes."""
         for identity, _, _ in self._queue:
             self._ended[identity] = PortError("the point-to-point motion ended before its target", (reason,), code)
         self._queue = []
@@ -131,7 +129,7 @@ class ScriptedArm:
         self._brake()
 
     def _require(self, controller_id: str) -> None:
-        """PortError where this controller may not move the arm now."""
+        """PortError if this controller may not move the arm now."""
         if self.active != controller_id:
             raise PortError(f"refused: '{self.active}' is the active controller", code=ReasonCode.NOT_ACTIVE)
         why, code = self._blocked()
@@ -180,7 +178,7 @@ class ScriptedArm:
 
     def cancel_motion(self, reason: str) -> Pending:
         asked = self._ask("cancel", 0.02, lambda: self.end(reason, ReasonCode.CANCELLED))
-        # Never withdrawn: whoever gives up waiting leaves it in force.
+        # Never withdrawn: the cancel stays in force if the caller stops waiting.
         return Polled(lambda: asked.done() and self.standing().ok, asked.result)
 
     def motion_limits(self) -> MotionLimits:
@@ -197,7 +195,7 @@ class ScriptedArm:
                 self.end("ended by a switch to another controller", ReasonCode.SWITCHED)
                 self.motion_started = None
             self.active = controller_id
-            self._begin_profile(controller_id)  # the profile of the controller's name comes with it
+            self._begin_profile(controller_id)  # a switch also applies the profile of the same name
             return self._cell.loaded[controller_id]
 
         return self._ask(f"switch {controller_id}", 0.02, act)
@@ -209,7 +207,7 @@ class ScriptedArm:
         self.profile, self.profile_since = profile, self._cell.clock.now()
 
     def fading(self) -> bool:
-        """Whether a correction of the profile before is not gone."""
+        """True while a correction of the previous profile is fading out."""
         return self._cell.clock.now() - self.profile_since < self._cell.fade_time
 
     def profile_settled(self, profile: str) -> Verdict:
@@ -218,12 +216,12 @@ class ScriptedArm:
         return Verdict(False, "ee_admittance is stopping") if self.fading() else Verdict(True)
 
     def execute_dmp(self, request: DmpRequest) -> Pending:
-        """A reach out from where the arm is, or back if it is out already."""
+        """Reach out from the current posture, or return if the arm is already out."""
 
         def act() -> None:
             self._require("dmp")
             way = -REACH if self._reached_out else REACH
-            # 1.875: peak over mean velocity of a minimum-jerk profile.
+            # 1.875: ratio of peak to mean velocity of a minimum-jerk profile.
             slow = 1.875 * float(np.max(np.abs(way) / np.asarray(self.limits.velocity)))
             asked = self.reach_time * request.dmp_ratio
             self.request, self.motion_started = request, self._cell.clock.now()

@@ -19,20 +19,20 @@ from coglab_smach.ports.pending import Pending, Polled, PortError, Ready
 from coglab_trials.scripted.cell import ScriptedCell
 
 CALIBRATION = 1.7  # s
-AROUND = 150  # counts of the middle finger at which the closed hand begins to squeeze what it holds
-TAKER_STIFFNESS = 200.0  # N/m, of the hand of the person who takes the object
-TOUCH = 1.0  # N, a contact
+AROUND = 150  # counts of the middle finger at which the closing hand starts to squeeze the object
+TAKER_STIFFNESS = 200.0  # N/m, stiffness of the hand of the person who takes the object
+TOUCH = 1.0  # N, force that counts as contact
 
 
 class ScriptedHand:
-    """HandPort of a ScriptedCell. One order at a time: a newer one ends the older."""
+    """HandPort of a ScriptedCell. One order at a time: a new order ends the old one."""
 
     def __init__(self, cell: ScriptedCell) -> None:
         self._cell = cell
         self._order = 0
         self._calibrated_at = 0.0
         self._opening: tuple[float, float, tuple[int, ...]] | None = None
-        """since when the fingers open, s for the whole way, and from where"""
+        """opening fingers: (start in s, duration of the whole path in s, start positions in counts)"""
 
     def calibrate(self, mode: str) -> Pending:
         if "hand" not in self._cell.faults.dead:
@@ -44,7 +44,7 @@ class ScriptedHand:
         return self._cell.answer("hand", f"calibrate {mode}", CALIBRATION, act)
 
     def positions(self) -> tuple[int, ...]:
-        """Where the fingers are: those that open are on the way."""
+        """Returns the finger positions (counts), also while the fingers open."""
         if self._opening is None or self._cell.hand_positions != self._opening[2]:
             return self._cell.hand_positions
         begun, duration, start = self._opening
@@ -52,11 +52,11 @@ class ScriptedHand:
         return tuple(round(left * position) for position in start)
 
     def _stand(self) -> None:
-        """What moves stands where it is."""
+        """Stop the fingers where they are."""
         self._cell.hand_positions, self._opening = self.positions(), None
 
     def _move(self, name: str, after: float, positions: Callable[[], tuple[int, ...]]) -> Pending:
-        """An action: it moves the fingers unless it was cancelled, or replaced, before its time had come."""
+        """Start an action. It moves the fingers after ``after`` s, unless it is cancelled or replaced before."""
         if self._calibrating():
             return Ready(error=PortError(f"{name} refused: the hand calibrates", code=ReasonCode.HAND_CALIBRATING))
         self._stand()
@@ -90,7 +90,7 @@ class ScriptedHand:
         return self._move(f"preshape {mode}", 0.8, positions)
 
     def _closed(self) -> tuple[int, ...]:
-        """Around what was touched, which goes with them from then on, or past it."""
+        """Returns the closed positions (counts): around the touched object, which is then in the hand, or past it."""
         if self._cell.faults.empty_grasp:
             return (200, 254, 254, 254, 254)
         self._cell.at_palm = self._cell.at_palm or self._cell.touched
@@ -133,7 +133,7 @@ class ScriptedPerception:
     def __init__(self, cell: ScriptedCell) -> None:
         self._cell = cell
         self.places = [Pose(np.array([0.0, 0.0, 0.05]))]
-        """free places on the board"""
+        """free places on the board, in the frame `board`"""
 
     def init_vision(self, time_limit: float) -> Pending:
         return self._cell.answer("perception", "init_vision", 0.5, lambda: "ready")
@@ -176,7 +176,7 @@ def _located(frame: str, parent: str, pose: Pose) -> Located:
 
 
 class ScriptedDatabase:
-    """DatabasePort over the real object files."""
+    """DatabasePort on the real object files."""
 
     def __init__(self, cell: ScriptedCell, database: ObjectDatabase) -> None:
         self._cell, self.database = cell, database
@@ -195,7 +195,7 @@ class ScriptedDatabase:
 
 
 class ScriptedContact:
-    """ContactPort of a ScriptedCell: the partner's script decides, once the arm stands still."""
+    """ContactPort of a ScriptedCell. The partner's script decides, once the arm stands still."""
 
     EVENTS = {
         "contact": ReasonCode.CONTACT_FOUND,
@@ -212,15 +212,15 @@ class ScriptedContact:
         self._due: float | None = None
         self._event: ContactEvent | None = None
         self._early = False
-        """what is felt now came while the arm moved"""
+        """the present contact began while the arm moved"""
         self._brings: tuple[str, Pose] | None = None
-        """what the person brings to the palm, and the palm relative to it"""
+        """(object that the person brings to the palm, pose of the palm relative to it)"""
         self._lifted_before = self._needed = self._weight = 0.0
         self._taken_at: float | None = None
-        """m, height of the palm where the person began to carry what it holds"""
+        """height (m) of the palm when the person began to carry the object"""
         self.armed_while_moving = False
         self.armed_with_profile: list[str] = []
-        """profile in force at each arming, with ' fading' while another one's correction was not gone"""
+        """profile in force at each arming, with ' fading' while the previous profile's correction fades out"""
 
     def arm(self, mode: str, time_limit: float, settings: dict[str, Any]) -> Pending:
         cell = self._cell
@@ -228,7 +228,7 @@ class ScriptedContact:
 
         def act() -> None:
             partner, touch = cell.partner, mode in ("contact", "contact_in_motion")
-            if mode != "load":  # load counts from the torque before the contact
+            if mode != "load":  # mode load counts from the torque before the contact
                 self._lifted_before = cell.lifted
             self._weight = float(settings.get("mass", 0.0)) * 9.81
             self._needed = TOUCH if touch else float(settings.get("load_share", 0.5)) * self._weight
@@ -271,7 +271,7 @@ class ScriptedContact:
             return None
         lifts = self._cell.lifted - self._lifted_before
         if self.event() is not None and self._is_due():
-            # The person who takes it holds it where it is: a hand that sinks is lifted more.
+            # The person holds the object in place: if the robot's hand sinks, they carry more of the load.
             height = float(self._cell.palm().position[2])
             self._taken_at = height if self._taken_at is None else self._taken_at
             lifts += self._weight + TAKER_STIFFNESS * (self._taken_at - height)
@@ -289,7 +289,7 @@ class ScriptedContact:
         return self._cell.touch * max(0, self._positions()[2] - AROUND)
 
     def _is_due(self) -> bool:
-        """Whether the script's moment has come, while somebody watches."""
+        """True if the script's time has come before the time limit."""
         return self._due is not None and self._due <= min(self._cell.clock.now(), self._until)
 
     def _pushed(self) -> bool:
@@ -299,7 +299,7 @@ class ScriptedContact:
 
 
 def scripted_context(clock: Clock, database: ObjectDatabase, config: Config) -> tuple[Context, ScriptedCell]:
-    """A complete Context of the state machines on scripted ports, and the cell behind them."""
+    """Returns a complete Context of the state machines on scripted ports, and its cell."""
     cell = ScriptedCell(clock)
     hand = ScriptedHand(cell)
     ctx = Context(
