@@ -1,4 +1,4 @@
-"""What the hand's sentences mean, for programs."""
+"""Reason codes of the hand, for programs."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ from enum import IntEnum
 
 
 class Reason(IntEnum):
-    """Those numbers of coglab_msgs/ReasonCode that the hand gives; without ROS, so that the driver
-    needs none."""
+    """The numbers of coglab_msgs/ReasonCode that the hand uses, copied so that the driver needs no ROS."""
 
     NONE = 0
     INVALID_ARGUMENT = 100
