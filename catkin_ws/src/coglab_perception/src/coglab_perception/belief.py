@@ -187,7 +187,7 @@ class BeliefFilter:
         self._place, self._onset = CriticallyDamped(), -math.inf
         self._pattern, self._pattern_weight, self._pattern_stamp = "", 0.0, -math.inf
 
-    # -- sights ----------------------------------------------------------------------------------------------------
+    # -- observations ----------------------------------------------------------------------------------------------
 
     def see_object(self, stamp: float, object_id: str, position: np.ndarray, now: float) -> None:
         """Process an observation of an object's frame (m, world)."""

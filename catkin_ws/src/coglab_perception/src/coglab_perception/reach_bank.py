@@ -169,7 +169,7 @@ class ReachBank:
         self._home = position
         self._seen = True
 
-    # -- what is believed ------------------------------------------------------------------------------------------
+    # -- estimates -------------------------------------------------------------------------------------------------
 
     @property
     def handover(self) -> float:
@@ -202,7 +202,7 @@ class ReachBank:
         deviation = math.sqrt(float(weight @ (arrivals - arrival) ** 2))
         return Prediction(end, covariance, arrival, deviation, float(weight @ self._onset[self._toward]))
 
-    # -- a sight ---------------------------------------------------------------------------------------------------
+    # -- observations ----------------------------------------------------------------------------------------------
 
     def step(self, stamp: float, position: np.ndarray) -> bool:
         """Process an observation. False if it does not show this hand or is impossible for a hand; then only the

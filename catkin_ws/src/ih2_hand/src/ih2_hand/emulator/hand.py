@@ -83,7 +83,7 @@ class EmulatedHand:
         self._after_preshape: list[tuple[int, str, int]] = []
         self._now = self.clock.monotonic()
 
-    # -- what the cell sees ----------------------------------------------------------------------
+    # -- interface to the cell -------------------------------------------------------------------
 
     @property
     def calibrating(self) -> bool:
