@@ -44,8 +44,8 @@ class CriticallyDamped:
         self._value = None
 
     def step(self, stamp: float, wanted: np.ndarray, time_constant: float) -> np.ndarray:
-        """Output at ``stamp`` (s, later than the last one). ``wanted`` (3,) is the input since the last stamp, and
-        1/``time_constant`` (1/s) is the pole. With a time constant of 0 the output is the input."""
+        """Output at ``stamp`` (s, later than the last one). ``wanted`` (3,) is the input since the last stamp. Both
+        poles are at 1/``time_constant`` (1/s). With a time constant of 0 the output is the input."""
         gap, self._stamp = stamp - self._stamp, stamp
         if self._value is None or time_constant <= 0.0:
             value, self._rate = np.array(wanted, dtype=float), np.zeros(3)

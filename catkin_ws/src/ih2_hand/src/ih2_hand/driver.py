@@ -112,7 +112,7 @@ class HandSerialDriver:
     # -- connection ------------------------------------------------------------------------------
 
     def close(self) -> None:
-        """Close the port. The fingers continue as they are; call stop_all first to stop them."""
+        """Close the port. Moving fingers keep moving; call stop_all first to stop them."""
         self.line.close()
 
     def __enter__(self) -> HandSerialDriver:

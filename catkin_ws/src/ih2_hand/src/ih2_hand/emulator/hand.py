@@ -38,7 +38,7 @@ class HandCounters:
 
 
 class EmulatedHand:
-    """Five motors, one parser, one clock. Not thread-safe.
+    """Five motors, one parser, one clock. Not thread-safe: the caller must use a lock.
 
     `calibration_scale` multiplies the calibration times of W12. 0 ends calibrations at once; above 1.2 the
     fast calibration lasts longer than the 2.0 s that published drivers wait. `greeting` starts calibrated, as

@@ -109,7 +109,7 @@ class HandNode(HandMemory):
 
     def run(self) -> int:
         """Run until the node is shut down; return the exit status. A running goal is aborted and the
-        fingers are stopped. Without a goal the fingers continue as they are."""
+        fingers are stopped. Without a goal no command is sent."""
         # Before rospy closes the topics, so that action clients receive the result.
         rospy.on_shutdown(self.goals.shutdown)
         self._thread.start()
