@@ -10,7 +10,7 @@ There are three kinds of tests, found by their place in a package:
 Packages that the build omitted (./coglab build --upstream-smach) are listed and not tested.
 A program or a file without a case is a failure, too.
 
-At least two programs run at a time, up to one per processor core and four. No test may fail because others run beside
+One program per processor core runs at a time, at least two and at most four. No test may fail because others run beside
 it. --repeat N runs everything N times, --load beside two busy processes, and lists each case whose result differs
 between the runs. --long also runs the campaigns: tests that read COGLAB_LONG from the environment.
 """
