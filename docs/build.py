@@ -1,7 +1,7 @@
 """Builds the documentation site: ./coglab docs. Works without a network, in the environment of the workspace.
 
-docs/_build/source gets the pages of docs/, the README of each package and what is generated from the code; Sphinx makes
-docs/_build/html of it. A warning of Sphinx is an error.
+docs/_build/source receives the pages of docs/, the README of each package and pages generated from the code. Sphinx
+converts it to docs/_build/html. A warning of Sphinx counts as an error.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ CPP_PACKAGES = ("coglab_rt", "lwr_fri_bridge", "ctrl_more", "coglab_controllers"
 
 
 def places() -> dict[Path, str]:
-    """Each page of the project with its place on the site."""
+    """Every page of the project, with its path on the site."""
     found = {page: page.name for page in DOCS.glob("*.md")}
     found |= {TOP / "CHANGELOG.md": "changelog.md", TOP / "CONTRIBUTING.md": "contributing.md"}
     for page in sorted(SOURCES.glob("*/README.md")):
@@ -34,7 +34,7 @@ def places() -> dict[Path, str]:
 
 
 def with_links(text: str, page: Path, found: dict[Path, str]) -> str:
-    """The text of a page with its links as they are on the site. Files that are not on the site become plain text."""
+    """The text of a page with its links changed to those of the site. Links to other files become plain text."""
 
     def link(match: re.Match[str]) -> str:
         mark, label, target = match.groups()
@@ -51,7 +51,7 @@ def with_links(text: str, page: Path, found: dict[Path, str]) -> str:
 
 
 def collect(source: Path) -> None:
-    """Copies pages and pictures."""
+    """Copy pages and pictures."""
     found = places()
     for page, place in found.items():
         target = source / place
@@ -63,7 +63,7 @@ def collect(source: Path) -> None:
 
 
 def describe_controllers(folder: Path) -> None:
-    """The page that each feedback controller of ctrl_more has of itself."""
+    """Write the generated page of each feedback controller of ctrl_more."""
     folder.mkdir()
     for library in sorted((TOP / "catkin_ws/devel/lib").glob("libctrl_more_*.so")):
         said = subprocess.run(["ctrl_more_describe", "page", library], capture_output=True, text=True, check=False)
@@ -73,7 +73,7 @@ def describe_controllers(folder: Path) -> None:
 
 
 def read_headers(out: Path) -> list[tuple[str, list[tuple[str, str]]]]:
-    """Runs Doxygen on the public headers; the documented classes and structs of each package."""
+    """Run Doxygen on the public headers. Returns the documented classes and structs of each package."""
     classes = []
     for package in CPP_PACKAGES:
         settings = {
@@ -105,7 +105,7 @@ def read_headers(out: Path) -> list[tuple[str, list[tuple[str, str]]]]:
 
 
 def write_api(source: Path, classes: list[tuple[str, list[tuple[str, str]]]]) -> None:
-    """A page of C++ classes per package."""
+    """Write one page of C++ classes per package."""
     folder = source / "cpp"
     folder.mkdir()
     for package, names in classes:
@@ -116,7 +116,7 @@ def write_api(source: Path, classes: list[tuple[str, list[tuple[str, str]]]]) ->
 
 
 def main() -> int:
-    """Prints where the site is; exit status 1 if Sphinx complained."""
+    """Build the site and print its path. Exit status 1 if Sphinx reported a problem."""
     shutil.rmtree(BUILD, ignore_errors=True)
     source = BUILD / "source"
     source.mkdir(parents=True)

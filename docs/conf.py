@@ -26,7 +26,7 @@ breathe_default_project = PACKAGES[0]
 
 
 def plain(_app, _what, _name, _obj, _options, lines):
-    """Docstrings are plain text with names in backticks: nothing else of them is markup."""
+    """Escape the markup of docstrings: they are plain text with names in backticks."""
     text = []
     for line in lines:
         parts = re.split(r"(`+[^`]+`+)", line.strip())

@@ -1,6 +1,6 @@
-"""The part of the reference that is generated: from message files, tables in the code, launch files and --help.
+"""Generates a part of the reference from message files, tables in the code, launch files and --help.
 
-One function per table; docs/build.py writes them as pages of the site.
+One function per table. docs/build.py writes them as pages of the site.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 from pathlib import Path
 
-COMMANDS = ("demo", "test", "bench", "launch", "film")  # of ./coglab, those with a --help
+COMMANDS = ("demo", "test", "bench", "launch", "film")  # commands of ./coglab with a --help
 
 
 def table(head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
@@ -22,13 +22,13 @@ def table(head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
 
 
 def code(value: object) -> str:
-    """As code, or nothing."""
+    """`value` as Markdown code; empty if there is none."""
     text = f"{value:g}" if isinstance(value, float) else str(value)
     return f"`{text}`" if text else ""
 
 
 def _part(lines: list[str]) -> tuple[str, list[list[str]]]:
-    """What one part of a message file says of itself, and its fields: type, name, comment."""
+    """Description and fields (type, name, comment) of one part of a message file."""
     about: list[str] = []
     fields: list[list[str]] = []
     for line in lines:
@@ -37,16 +37,16 @@ def _part(lines: list[str]) -> tuple[str, list[list[str]]]:
             kind, _, name = text.partition(" ")
             fields.append([code(kind), code(re.sub(r"\s*=\s*", "=", name.strip())), comment])
         elif comment and fields and line.startswith(" "):
-            fields[-1][2] += " " + comment  # goes on from the line before
+            fields[-1][2] += " " + comment  # continues the previous line
         elif comment and fields:
-            fields.append(["", "", comment])  # about the fields below
+            fields.append(["", "", comment])  # describes the fields below
         elif comment:
             about.append(comment)
     return " ".join(about), fields
 
 
 def message_page(file: Path, parts: tuple[str, ...]) -> str:
-    """Fields of a message, a service or an action."""
+    """Page with the fields of a message, a service or an action."""
     page = [f"## {file.stem}", ""]
     texts = re.split(r"^---.*$", file.read_text(encoding="utf-8"), flags=re.MULTILINE)
     for name, text in zip(parts, texts, strict=False):
@@ -58,7 +58,7 @@ def message_page(file: Path, parts: tuple[str, ...]) -> str:
 
 
 def messages(top: Path) -> str:
-    """coglab_msgs."""
+    """Pages of coglab_msgs."""
     folder = top / "catkin_ws" / "src" / "coglab_msgs"
     kinds = {"msg": ("",), "srv": ("Request", "Answer"), "action": ("Goal", "Result", "Feedback")}
     page = [
@@ -74,7 +74,7 @@ def messages(top: Path) -> str:
 
 
 def reason_codes(top: Path) -> str:
-    """Of coglab_msgs/ReasonCode."""
+    """Table of coglab_msgs/ReasonCode."""
     text = (top / "catkin_ws/src/coglab_msgs/msg/ReasonCode.msg").read_text(encoding="utf-8")
     rows = re.findall(r"^uint16 (\w+)=(\d+)\s*#?\s*(.*)$", text, re.MULTILINE)
     about = "The numbers of `coglab_msgs/ReasonCode`: what a refusal or a failure means, for programs."
@@ -84,7 +84,7 @@ def reason_codes(top: Path) -> str:
 
 
 def cell_parameters(_top: Path) -> str:
-    """Of the simulated cell, from its own table."""
+    """Parameters of the simulated cell, from its table."""
     from coglab_sim import _cell
 
     def span(row: dict) -> str:
@@ -103,7 +103,7 @@ def cell_parameters(_top: Path) -> str:
 
 
 def machine_parameters(_top: Path) -> str:
-    """Of the state machines, from their table."""
+    """Parameters of the state machines, from their table."""
     from coglab_smach import parameters
 
     about = "In `coglab_smach/config/machines.yaml`, which is read again whenever it changes."
@@ -111,7 +111,7 @@ def machine_parameters(_top: Path) -> str:
 
 
 def wire_choices(_top: Path) -> str:
-    """What public documents leave open of the hand's protocol."""
+    """The open points of the hand's protocol that public documents leave."""
     from ih2_hand.wire_choices import as_markdown
 
     about = "One row per choice of `ih2_hand/wire_choices.py`, which driver and emulator share."
@@ -119,7 +119,7 @@ def wire_choices(_top: Path) -> str:
 
 
 def console_commands(_top: Path) -> str:
-    """What the experimenter's page may do, for programs."""
+    """Commands of the experimenter's page, for programs."""
     from coglab_console.desk import commands as console
 
     about = '`POST /api/command` takes `{"name": ..., "arguments": {...}}`; fields in brackets may be left out.'
@@ -159,7 +159,7 @@ def configuration(top: Path) -> str:
 
 
 def launch_arguments(top: Path) -> str:
-    """Of every launch file."""
+    """Arguments of every launch file."""
     page = ["# Launch arguments", "", "`./coglab launch NAME:=VALUE` takes those of `coglab.launch`."]
     files = sorted((top / "catkin_ws" / "src").glob("*/launch/*.launch"), key=lambda f: (f.stem != "coglab", f.stem))
     for file in files:
@@ -174,7 +174,7 @@ def launch_arguments(top: Path) -> str:
 
 
 def commands(top: Path) -> str:
-    """What ./coglab prints about itself."""
+    """Help texts of ./coglab."""
     page = ["# Commands of ./coglab"]
     for words in (["help"], *([name, "--help"] for name in COMMANDS)):
         done = subprocess.run([top / "coglab", *words], capture_output=True, text=True, check=True)
@@ -196,7 +196,7 @@ PAGES = {
 
 
 def write(top: Path, folder: Path) -> None:
-    """All pages."""
+    """Write all pages."""
     folder.mkdir()
     for name, page in PAGES.items():
         (folder / f"{name}.md").write_text(page(top) + "\n", encoding="utf-8")

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
-"""The node /object_database: serves the object files of a folder and reads them again when they change.
+"""The node /object_database: serves the object files of a folder and reloads them when they change.
 
-Services (private): get_object, list_objects, reload (Reload: problems in words, one code).
-Parameters: ~folder; ih2_hand/dialect (legacy), that of the hand. Mirrors the good entries read-only to ~objects/<id>.
+Private services: get_object, list_objects, reload (returns error messages and one code).
+Parameters: ~folder; ih2_hand/dialect (legacy), dialect of the hand. Copies valid entries to ~objects/<id>, read-only.
 """
 
 import sys
@@ -18,15 +18,15 @@ MIRROR = "~objects"
 
 
 class ObjectDatabaseNode:
-    """Thin node over ObjectDatabase."""
+    """ROS interface of ObjectDatabase."""
 
     def __init__(self) -> None:
         self.database = ObjectDatabase(
             parameters.read("~folder", str), parameters.read("ih2_hand/dialect", str, "legacy")
         )
         self.reported: list[str] = []
-        self.mirrored: dict[str, str] | None = None  # text by id; None: what an earlier run has left is not removed yet
-        self.behind = False  # the mirror could not be brought up to the database
+        self.mirrored: dict[str, str] | None = None  # text by id; None: entries of an earlier run are not removed yet
+        self.behind = False  # True while the copy on the parameter server is not up to date
         self.reload(only_changed=False)
         rospy.Service("~get_object", GetObject, self.on_get)
         rospy.Service("~list_objects", ListObjects, self.on_list)
@@ -34,7 +34,7 @@ class ObjectDatabaseNode:
         steady.SteadyTimer(1.0, self.on_timer, "reload")
 
     def reload(self, only_changed: bool) -> list[str]:
-        """Read, warn about each problem that is new, mirror to the parameter server."""
+        """Read the files, log each new error, copy the entries to the parameter server."""
         problems = self.database.reload(only_changed)
         for problem in problems:
             if problem not in self.reported:
@@ -44,7 +44,7 @@ class ObjectDatabaseNode:
         return problems
 
     def mirror(self) -> None:
-        """Bring ~objects up to the database; what the master does not take is tried again each second."""
+        """Update ~objects. If the master refuses or does not answer, it is tried again each second."""
         try:
             if self.mirrored is None:
                 if rospy.has_param(MIRROR):
@@ -59,13 +59,13 @@ class ObjectDatabaseNode:
                     rospy.set_param(f"{MIRROR}/{object_id}", self.database.get(object_id))
                     self.mirrored[object_id] = text
             self.behind = False
-        except Exception as error:  # the master is away, or will not have a value: the services go on
+        except Exception as error:  # the master does not answer or refuses a value: the services continue
             if not self.behind:
                 rospy.logwarn("object database: %s is not up to date: %s", rospy.resolve_name(MIRROR), error)
             self.behind = True
 
     def on_timer(self) -> None:
-        """Hot reload. No file may end the node."""
+        """Reload changed files. No file may end the node."""
         try:
             if self.database.changed():
                 self.reload(only_changed=True)
@@ -75,7 +75,7 @@ class ObjectDatabaseNode:
             rospy.logerr_throttle(10.0, f"object database: not read again ({type(error).__name__}: {error})")
 
     def on_list(self, _request):
-        """The ids, and what is wrong with the files that do not fit."""
+        """The ids, and the errors of invalid files."""
         problems = list(self.database.problems)
         return ListObjectsResponse(self.database.ids(), problems, [ReasonCode.BAD_FILE] * len(problems))
 
@@ -87,7 +87,7 @@ class ObjectDatabaseNode:
             return GetObjectResponse(False, ReasonCode.OBJECT_UNKNOWN, str(error), "")
 
     def on_reload(self, _request):
-        """Read everything again now."""
+        """Read all files now."""
         problems = self.reload(only_changed=False)
         code = ReasonCode.BAD_FILE if problems else ReasonCode.NONE
         return ReloadResponse(not problems, code, "; ".join(problems) or f"{len(self.database.ids())} objects")

@@ -1,13 +1,13 @@
 #!/usr/bin/python3
-"""The node motion_recogniser: partner's hand and objects from tf2 -> reaching pattern and belief of a handover.
+"""The node motion_recogniser: reaching pattern and belief of a handover, from the partner's hand and objects in tf2.
 
-Publishes for each new transform of the hand coglab_msgs/Recognition on perception/recognition (all
-probabilities, live) and coglab_msgs/HandoverBelief on perception/belief; broadcasts, while a place is
-predicted, the frames <hand>_ahead and <object>_ahead: where these will be at the handover, turned as
-they are seen now. Subscribes ih2_hand/hand_status: whether the robot holds something. Names are
+For each new transform of the hand it publishes coglab_msgs/Recognition on perception/recognition (all
+probabilities) and coglab_msgs/HandoverBelief on perception/belief. While a place is predicted, it
+broadcasts the frames <hand>_ahead and <object>_ahead: their places at the handover, with their current
+orientation. It subscribes to ih2_hand/hand_status for the state of the robot's hand. All names are
 relative. Parameters: perception/frames (mapping of frames.yaml); private: patterns (file of
-train_patterns.py), memory (s, how long an estimate outlives its reach; default the file's), belief
-(mapping, config/belief.yaml).
+train_patterns.py), memory (s for which an estimate is kept after its reach; default: that of the
+file), belief (mapping, config/belief.yaml).
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from geometry_msgs.msg import Point, TransformStamped, Vector3
 
 
 class RecogniserNode:
-    """Thin node over Recogniser and BeliefFilter."""
+    """ROS interface of Recogniser and BeliefFilter."""
 
     def __init__(self) -> None:
         self.frames = frames = FrameNames.from_mapping(
@@ -58,17 +58,17 @@ class RecogniserNode:
         self.publisher = rospy.Publisher("perception/recognition", Recognition, queue_size=1)
         self.beliefs = rospy.Publisher("perception/belief", HandoverBelief, queue_size=1)
         self.stamps = steady.Stamps()
-        self.last: dict[str, rospy.Time] = {}  # stamp of the newest transform taken, by frame
-        self.seen: dict[str, float] = {}  # the same on the steady clock, which no step of ROS time moves, s
+        self.last: dict[str, rospy.Time] = {}  # stamp of the newest transform processed, by frame
+        self.seen: dict[str, float] = {}  # the same on the steady clock (s), independent of steps of ROS time
         rospy.Subscriber("ih2_hand/hand_status", HandStatus, self.on_hand_status, queue_size=1)
         steady.SteadyTimer(0.01, self.take_newest, "newest transforms")
 
     def on_hand_status(self, status: HandStatus) -> None:
-        """The robot's hand."""
+        """Store whether the robot holds an object."""
         self.robot_holds = bool(status.holding)
 
     def take_newest(self) -> None:
-        """Take the newest transforms once: objects first, as the belief is about them when the hand is seen."""
+        """Process the newest transforms: objects first, because the belief is updated with the hand."""
         for frame in self.listener.moving():
             object_id = self.frames.object_id(frame)
             if object_id and frame != self.hand:
@@ -78,7 +78,7 @@ class RecogniserNode:
             self.take_hand(transform)
 
     def newest(self, frame: str) -> TransformStamped | None:
-        """The newest transform of a frame, None where it was taken already."""
+        """The newest transform of a frame; None if it was processed before."""
         try:
             transform = self.buffer.lookup_transform(self.base, frame, rospy.Time(0))
         except tf2_ros.TransformException:
@@ -91,14 +91,14 @@ class RecogniserNode:
         return transform
 
     def take_object(self, frame: str, object_id: str) -> None:
-        """A sight of an object."""
+        """Process an observation of an object."""
         transform = self.newest(frame)
         if transform is not None:
             seen, now = self.pace.at(self.seen[frame]), self.pace.now()
             self.filter.see_object(seen, object_id, position(transform), now)
 
     def take_hand(self, transform: TransformStamped) -> None:
-        """A sight of the hand: what is recognised and believed after it."""
+        """Process an observation of the hand and publish recognition and belief."""
         stamp, place = self.pace.at(self.seen[self.hand]), position(transform)
         self.recogniser.update(stamp, place.tolist())
         self.publisher.publish(self.recognition())
@@ -109,7 +109,7 @@ class RecogniserNode:
             self.broadcast(belief)
 
     def recognition(self) -> Recognition:
-        """What the recogniser says."""
+        """The recogniser's estimate as a message."""
         estimate = self.recogniser.estimate
         message = Recognition(
             pattern=estimate.pattern,
@@ -144,7 +144,7 @@ class RecogniserNode:
         return message
 
     def broadcast(self, belief: Belief) -> None:
-        """The frames ahead of hand and object; none while no place is predicted, so that what follows one stops."""
+        """Broadcast the predicted frames of hand and object; none without a prediction, so that a follower stops."""
         places = {self.hand: belief.hand_place}
         if belief.object_id:
             places[self.frames.object_frame(belief.object_id)] = belief.place
@@ -167,13 +167,13 @@ class RecogniserNode:
 
 
 def position(transform: TransformStamped) -> np.ndarray:
-    """m."""
+    """Translation of a transform (m)."""
     p = transform.transform.translation
     return np.array([p.x, p.y, p.z])
 
 
 def main() -> int:
-    """Entry point; exit status 1 where frames, patterns or parameters cannot be used."""
+    """Entry point. Exit status 1 if frames, patterns or parameters are invalid."""
     init_node("motion_recogniser")
     try:
         RecogniserNode()

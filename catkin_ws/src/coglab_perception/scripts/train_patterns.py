@@ -14,12 +14,12 @@ from collections.abc import Sequence
 import numpy as np
 from coglab_perception.recogniser import RecogniserSettings, save_patterns, train_patterns
 
-SHORTEST, FASTEST = 0.05, 5.0
-"""m, farthest point of a reach from its start; m/s between two samples"""
+SHORTEST = 0.05  # m, smallest distance of a reach's farthest point from its start
+FASTEST = 5.0  # m/s, largest speed between two samples
 
 
 def read(path: str, allow: Sequence[str] = ()) -> tuple[np.ndarray, np.ndarray]:
-    """(stamps, positions) of one recording."""
+    """Stamps (s) and positions (m) of one recording."""
     try:
         data = np.loadtxt(path, delimiter=",", skiprows=1, usecols=(0, 1, 2, 3), ndmin=2)
     except (OSError, ValueError) as error:

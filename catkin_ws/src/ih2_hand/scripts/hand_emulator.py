@@ -53,7 +53,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
 
 def tracer_to(path: str) -> Callable[[str, bytes, float], None]:
     tracer = Tracer()
-    out = sys.stdout if path == "-" else open(path, "a", encoding="utf-8")  # lives with the process
+    out = sys.stdout if path == "-" else open(path, "a", encoding="utf-8")  # closed at the end of the process
 
     def write(direction: str, data: bytes, stamp: float) -> None:
         for line in tracer.feed(direction, data, stamp):

@@ -14,7 +14,7 @@ from ih2_hand.trace import Tracer
 
 
 def follow(topic: str, count: int) -> int:
-    """Print what the hand node traces until interrupted, or `count` lines."""
+    """Print the lines that the hand node traces, until interrupted or `count` lines."""
     import rosgraph
     import rospy
     from std_msgs.msg import String

@@ -1,1 +1,1 @@
-"""The tools behind ./coglab: demo, test runner, bench frame, launch, doctor."""
+"""The tools behind ./coglab: demo, test runner, benchmarks, launch, doctor."""

@@ -1,9 +1,9 @@
-"""What the commands of ./coglab take: judged before anything is installed or built, with Python's own library alone.
+"""Checks the arguments of the ./coglab commands before anything is installed or built. Standard library only.
 
     python3 -m coglab_bringup.arguments TOP COMMAND [ARG ...]
 
-Exit status 0: fine; 2: refused, in one sentence that says what there is; 10: help was asked for and printed.
-The tools themselves parse with the same functions.
+Exit status 0: arguments are valid. 2: refused, with one sentence that lists the valid ones. 10: help was printed.
+The commands parse their arguments with the same functions.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def film_parser(top: Path) -> Parser:
 
 
 def package_folders(sources: Path) -> dict[str, Path]:
-    """Folder of each package of the workspace by name."""
+    """Folder of each package of the workspace, by package name."""
     found = {}
     for manifest in sorted(sources.rglob("package.xml")):
         name = re.search(r"<name>\s*([\w-]+)\s*</name>", manifest.read_text(encoding="utf-8"))
@@ -75,7 +75,7 @@ def package_folders(sources: Path) -> dict[str, Path]:
 
 
 def needs_of(folders: dict[str, Path]) -> dict[str, set[str]]:
-    """What each package needs by its package.xml, for whatever."""
+    """Dependencies of each package, of any kind, from its package.xml."""
     found = {}
     for name, folder in folders.items():
         text = (folder / "package.xml").read_text(encoding="utf-8")
@@ -84,7 +84,7 @@ def needs_of(folders: dict[str, Path]) -> dict[str, set[str]]:
 
 
 def used_by(package: str, folders: dict[str, Path]) -> set[str]:
-    """The packages of the workspace that `package` needs, directly or not."""
+    """The packages of the workspace that `package` depends on, directly or indirectly."""
     needs, found = needs_of(folders), set[str]()
     front = {package}
     while front:
@@ -94,7 +94,7 @@ def used_by(package: str, folders: dict[str, Path]) -> set[str]:
 
 
 def left_out(top: Path) -> list[str]:
-    """Packages that the last build left out for those installed on this machine: ./coglab build --upstream-smach."""
+    """Packages that the last build omitted because this computer has its own: ./coglab build --upstream-smach."""
     cache = top / "catkin_ws" / "build" / "CMakeCache.txt"
     text = cache.read_text(encoding="utf-8", errors="replace") if cache.is_file() else ""
     found = re.search(r"^CATKIN_BLACKLIST_PACKAGES:\w+=(.+)$", text, re.MULTILINE)
@@ -102,44 +102,44 @@ def left_out(top: Path) -> list[str]:
 
 
 def cases_in(path: Path) -> list[str]:
-    """The gtests of a C++ file, as --gtest_filter takes them."""
+    """Names of the gtests in a C++ file, in the form of --gtest_filter."""
     forms = {"TEST_P": "*{}.{}/*", "TYPED_TEST": "{}/*.{}"}
     found = GTEST_CASE.findall(path.read_text(encoding="utf-8"))
     return [forms.get(macro, "{}.{}").format(suite, name) for macro, suite, name in found]
 
 
 def test_files(test: Path) -> list[Path]:
-    """The test files in a package's folder test and in its rooms: folders whose .cpp files together are one gtest."""
+    """The test files in a package's folder test and in its rooms. The .cpp files of a room form one gtest binary."""
     files = [path for kind in TEST_FILES for path in sorted(test.glob(kind))]
     return files + [path for path in sorted(test.glob("*/*.cpp")) if cases_in(path)]
 
 
 def binary_of(package: str, path: Path) -> str:
-    """The gtest that holds this file, which is also its target: of the file itself, or of its room."""
+    """Name of the gtest binary (and target) that contains this file: that of the file itself or of its room."""
     return f"{package}_{path.stem}" if path.parent.name == "test" else f"{package}_test_{path.parent.name}"
 
 
 class Wanted(NamedTuple):
-    """Tests that a word of the command line names: PACKAGE, PACKAGE/ROOM, PACKAGE/FILE or PACKAGE/FILE::CASE."""
+    """Tests named by one command-line argument: PACKAGE, PACKAGE/ROOM, PACKAGE/FILE or PACKAGE/FILE::CASE."""
 
     package: str
-    file: str = ""  # in the package's folder test or in a room of it; "": all
+    file: str = ""  # in the package's folder test or in one of its rooms; "": all files
     case: str = ""
 
     @classmethod
     def of(cls, word: str) -> Wanted:
-        """E.g. "coglab_rt/test_clock.cpp::counts"."""
+        """Parse an argument, e.g. "coglab_rt/test_clock.cpp::counts"."""
         place, _, case = word.partition("::")
         package, _, file = place.rstrip("/").partition("/")
         return cls(package, file.removeprefix("test/"), case)
 
     def names(self, path: Path) -> bool:
-        """Whether it names this file of its package, or the file's room."""
+        """True if it names this file of its package, or the file's room."""
         room = "" if path.parent.name == "test" else path.parent.name
         return self.file in {"", path.name, room, f"{room}/{path.name}"}
 
     def check(self, sources: Path) -> None:
-        """Raises Refused, with what there is, if there is no such test."""
+        """Raise Refused if there is no such test. The message lists those that exist."""
         folders = package_folders(sources)
         _named([self.package], folders, "package")
         files = test_files(folders[self.package] / "test")
@@ -151,12 +151,12 @@ class Wanted(NamedTuple):
 
 
 NAMED_IN_A_TEST = r"""(?:\bfind |\bpkg=['"]|\bfrom |\bimport |_path\(['"]|\brosrun['"], ['"])(\w+)"""
-"""how launch files and Python programs name a package that they run or import"""
+"""How launch files and Python programs name a package that they run or import."""
 
 
 def test_targets(top: Path, wanted: list[Wanted]) -> list[str]:
-    """Targets of the workspace's CMakeFiles/Makefile2 that these tests need. Pytests and rostests: all of the packages
-    that the tests of their package name, and of those that these depend on."""
+    """Targets of the workspace's CMakeFiles/Makefile2 that these tests need. For pytests and rostests these are all
+    targets of the packages that the package's tests name, and of their dependencies."""
     sources = top / "catkin_ws" / "src"
     rules = (top / "catkin_ws" / "build" / "CMakeFiles" / "Makefile2").read_text(encoding="utf-8")
     of_tests = re.findall(r"^CMakeFiles/tests.dir/all: (\S+)", rules, re.MULTILINE)
@@ -177,7 +177,7 @@ def test_targets(top: Path, wanted: list[Wanted]) -> list[str]:
 
 
 def benchmarks(top: Path) -> list[str]:
-    """Names of the programs of the folder benchmarks."""
+    """Names of the programs in the folder benchmarks."""
     files = sorted((top / "benchmarks").glob("*.py"))
     return [path.stem for path in files if '__name__ == "__main__"' in path.read_text() and path.stem != "report"]
 
@@ -244,7 +244,7 @@ def _judge_shell(top: Path, words: list[str]) -> None:
 
 def _judge_tool(command: str, words: list[str]) -> None:
     verbs = TOOLS[command]
-    if words[:1] == ["--folder"]:  # of object_tool.py, which may come first
+    if words[:1] == ["--folder"]:  # option of object_tool.py, which may come first
         words = words[2:]
     if not words or words[0] not in verbs:
         what = f"got '{words[0]}'" if words else "got nothing"
@@ -259,11 +259,11 @@ TOOLS = {
     "object": {"new": 1, "check": 0, "list": 0},
     "console": {"picture": 0},
 }
-"""of each command what may come first, and how many more words it needs at least"""
+"""For each command: its first words, and the least number of words that follow each of them."""
 
 
 def judge(top: Path, command: str, words: list[str]) -> None:
-    """Raises Refused for arguments that the command cannot use."""
+    """Raise Refused for arguments that the command cannot use."""
     if command == "demo":
         demo_parser(top).parse_args(words)
     elif command == "film":
@@ -290,9 +290,9 @@ def judge(top: Path, command: str, words: list[str]) -> None:
 
 
 def main(words: list[str]) -> int:
-    """See the head of this file."""
+    """See the module's docstring."""
     top, command, rest = Path(words[0]), words[1], words[2:]
-    if command in ("test-names", "test-targets"):  # for the build before `test`, whose arguments these are
+    if command in ("test-names", "test-targets"):  # the build before `test` passes the arguments of `test`
         tests = test_options(top, rest).tests
         print(*(test_targets(top, tests) if command == "test-targets" else (one.package for one in tests)))
         return 0

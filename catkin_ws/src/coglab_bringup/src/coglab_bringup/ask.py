@@ -1,6 +1,6 @@
-"""./coglab start, status, hold and stop: what is said to a system that runs, wherever its ROS master listens.
+"""./coglab start, status, hold and stop: commands to a running system, on any ROS master of this computer.
 
-hold and stop have to be quick beside whatever else runs: this file needs no ROS, no site-packages and no build.
+hold and stop must be quick on a busy computer. So this file needs no ROS, no site-packages and no build.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import urlparse
 
-if not __package__:  # run as a file, isolated: ./coglab does
+if not __package__:  # ./coglab runs it as a file, in isolated mode
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from coglab_bringup.ros_wire import Connection, NoAnswer, Reader, call, master_call, subscribe, text
@@ -23,12 +23,12 @@ from coglab_bringup.run_directory import running_systems
 from coglab_bringup.usage import Parser, Refused, master_port
 
 DEFAULT_MASTER = "http://127.0.0.1:11311"  # of a plain roslaunch
-ANSWER_LIMIT = 5.0  # s for a service that exists
-STATE_LIMIT = 3.0  # s for the latched state
-CHANGE_LIMIT = 5.0  # s in a hub that does not take the action until it is refused: a hold takes a moment to show
-DEFAULT_ACTIONS = ("exchange_human_to_robot", "exchange_robot_to_human")  # whichever the hub takes
+ANSWER_LIMIT = 5.0  # s, longest wait for a service that exists
+STATE_LIMIT = 3.0  # s, longest wait for the latched state
+CHANGE_LIMIT = 5.0  # s before an action is refused that the hub does not list: after a hold the list needs a moment
+DEFAULT_ACTIONS = ("exchange_human_to_robot", "exchange_robot_to_human")  # the first one that the hub accepts
 FACTOR_TOPIC = "/coglab_sim/real_time_factor"
-OBJECT_PARAMETER = "/coglab_sim/cell/object/id"  # what the simulated person holds out
+OBJECT_PARAMETER = "/coglab_sim/cell/object/id"  # object that the simulated person offers
 
 
 def ask_parser(command: str) -> Parser:
@@ -57,7 +57,7 @@ def ask_parser(command: str) -> Parser:
 
 
 def brain_of(master: str) -> bool:
-    """Whether a ROS master answers there and knows the brain."""
+    """True if a ROS master answers at this address and the brain is registered there."""
     before = socket.getdefaulttimeout()
     socket.setdefaulttimeout(1.0)
     try:
@@ -69,8 +69,8 @@ def brain_of(master: str) -> bool:
 
 
 def find_master(top: Path, port: int, users_own: str) -> str:
-    """The master to speak to: of the port that was named, of the user's ROS_MASTER_URI if a brain is there, of the only
-    system that runs, or of a plain roslaunch. Refused if there is none, or several."""
+    """Address of the ROS master to use: the given port, the user's ROS_MASTER_URI if a brain runs there, the only
+    running system, or a plain roslaunch. Refused if there is none or more than one."""
     systems = running_systems(top)
     if port:
         return f"http://127.0.0.1:{port}"
@@ -90,7 +90,7 @@ def find_master(top: Path, port: int, users_own: str) -> str:
 
 @dataclass
 class State:
-    """coglab_msgs/MasterState, as far as it is shown or used here; `state` is empty as long as none has come."""
+    """Fields of coglab_msgs/MasterState that are used here. `state` is empty until a message arrives."""
 
     state: str = ""
     in_hub: bool = False
@@ -100,14 +100,14 @@ class State:
 
     @classmethod
     def of(cls, data: bytes) -> State:
-        """From the bytes of a message."""
+        """State from the bytes of a message."""
         reader = Reader(data)
         reader.header()
         return cls(reader.string(), reader.take("?"), reader.strings(), reader.string(), reader.string())
 
 
 class Brain:
-    """The brain of a running system, by its latched state and its services."""
+    """Client of the brain of a running system: its latched state and its services."""
 
     def __init__(self, master: str) -> None:
         self.master = master
@@ -115,17 +115,17 @@ class Brain:
         self._topic: Connection | None = None
 
     def _look(self, limit: float) -> None:
-        """Takes the states that have come; waits `limit` s at most for one."""
+        """Receive the states that have arrived. Wait up to `limit` s for one."""
         try:
             self._topic = self._topic or subscribe(self.master, "/coglab/state", ANSWER_LIMIT)
             while (data := self._topic.message(limit)) is not None:
                 self.state, limit = State.of(data), 0.0
-        except NoAnswer:  # the brain is not there yet, or has ended: a new one is looked for
+        except NoAnswer:  # the brain has not started yet, or has ended: look for a new one
             self._topic = None
             time.sleep(min(limit, 0.1))
 
     def wait_for_state(self, condition: Callable[[State], bool], limit: float) -> bool:
-        """Waits until a state has come for which the condition holds; whether it did within `limit` s."""
+        """Wait until a state meets the condition, up to `limit` s. True if one did."""
         end = time.monotonic() + limit
         self._look(0.0)
         while not (self.state.state and condition(self.state)):
@@ -136,20 +136,20 @@ class Brain:
         return True
 
     def call(self, name: str, request: bytes = b"") -> Reader:
-        """The response of a service. Refused if it does not exist or does not answer."""
+        """Response of a service. Refused if it does not exist or does not answer."""
         try:
             return call(self.master, name, request, ANSWER_LIMIT)
         except NoAnswer as error:
             raise Refused(f"{name} does not answer ({error}); what runs: ./coglab shell rosnode list") from error
 
     def command(self, name: str, *words: str) -> tuple[bool, str]:
-        """Success and message of a service that answers with success, reason_code and message."""
+        """Success and message of a service whose response has the fields success, reason_code and message."""
         reader = self.call(name, b"".join(text(word) for word in words))
         success, _ = reader.take("?"), reader.take("H")
         return success, reader.string()
 
     def factor(self) -> float:
-        """Simulated over real time; 1 where nothing is simulated."""
+        """Simulated time over real time; 1 if nothing is simulated."""
         try:
             topic = subscribe(self.master, FACTOR_TOPIC, 1.0)
             data = topic.message(1.0)
@@ -159,7 +159,7 @@ class Brain:
 
 
 def sentence_of(state: State) -> str:
-    """State, object and why, a line each."""
+    """State, object and reason, one per line."""
     name = state.state.rpartition("/")[2]
     takes = f"takes {', '.join(state.actions)}" if state.in_hub else "an action is under way"
     held = state.object_id or "none"
@@ -167,7 +167,7 @@ def sentence_of(state: State) -> str:
 
 
 def status(brain: Brain, _options: argparse.Namespace) -> int:
-    """Prints the latched state."""
+    """Print the latched state."""
     if not brain.wait_for_state(lambda state: True, STATE_LIMIT):
         raise Refused(
             "/coglab/state says nothing: the brain is starting, or it has ended; its words are in the terminal "
@@ -183,7 +183,7 @@ def status(brain: Brain, _options: argparse.Namespace) -> int:
 
 
 def choose(master: str, options: argparse.Namespace, state: State) -> tuple[str, str]:
-    """Action and object to ask for: what was named, else what this hub is there for. Refused if that cannot be said."""
+    """Action and object to request: those given, otherwise the defaults of this hub. Refused if there is no default."""
     action = options.action or next((name for name in DEFAULT_ACTIONS if name in state.actions), "")
     if not action:
         raise Refused(
@@ -204,7 +204,7 @@ def choose(master: str, options: argparse.Namespace, state: State) -> tuple[str,
 
 
 def start(brain: Brain, options: argparse.Namespace) -> int:
-    """Waits for the hub, then asks for the action; a refusal that the next hub may not repeat is waited for."""
+    """Wait for the hub, then request the action. A refusal that may be temporary is retried until the time limit."""
     deadline, wanted = time.monotonic() + options.wait, options.action
     if not brain.wait_for_state(lambda state: state.in_hub, min(1.0, options.wait)):
         now = brain.state.state.rpartition("/")[2] if brain.state.state else "the brain is starting"
@@ -224,14 +224,14 @@ def start(brain: Brain, options: argparse.Namespace) -> int:
             print(f"{f'{action} {object_id}'.strip()}: {message}; watch: ./coglab status")
             return 0
         if brain.wait_for_state(lambda state: not state.in_hub, 0.5):
-            continue  # the hub was left in that moment
+            continue  # the hub was left at this moment
         raise Refused(message)
     state = brain.state.state or "/coglab/state never came"
     raise Refused(f"no hub within {options.wait:.0f} s; the machine is in {state}; more: ./coglab status")
 
 
 def hold(brain: Brain, _options: argparse.Namespace) -> int:
-    """Brakes and latches the arm."""
+    """Brake the arm and latch the hold."""
     success, message = brain.command("/lwr/command", "hold")
     print(f"{message or 'held'}; on again: ./coglab start reset")
     return 0 if success else 1
@@ -249,10 +249,10 @@ COMMANDS = {"start": start, "status": status, "hold": hold, "stop": stop}
 
 
 def main(arguments: list[str]) -> int:
-    """Exit status 0: done; 1: refused, with the reason; 2: an argument that there is not."""
+    """Exit status 0: done; 1: refused, with the reason; 2: invalid argument."""
     command, words = arguments[0], arguments[1:]
     top = Path(os.environ["COGLAB_TOP"])
-    socket.setdefaulttimeout(ANSWER_LIMIT)  # of the master's answers
+    socket.setdefaulttimeout(ANSWER_LIMIT)  # for answers of the master
     try:
         options = ask_parser(command).parse_args(words)
     except Refused as error:
@@ -272,6 +272,6 @@ if __name__ == "__main__":
     try:
         code = main(sys.argv[1:])
         sys.stdout.flush()
-    except BrokenPipeError:  # whoever reads has seen enough
+    except BrokenPipeError:  # the reader closed the pipe
         code = 0
     sys.exit(code)

@@ -1,4 +1,4 @@
-"""./coglab bench: builds the helpers of the folder benchmarks, runs its programs, writes its page."""
+"""./coglab bench: builds the helper programs of the benchmarks, runs the benchmarks and writes their page."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from coglab_bringup import process_tree
 from coglab_bringup.arguments import bench_options
 from coglab_bringup.usage import Refused
 
-TIME_LIMIT = 4 * 3600.0  # s, per program
+TIME_LIMIT = 4 * 3600.0  # s per program
 
 
 def build_helpers(top: Path) -> None:
-    """The C++ programs that the benchmarks run, against the built workspace."""
+    """Build the C++ programs of the benchmarks against the built workspace."""
     build, log = top / ".coglab" / "benchmarks", top / ".coglab" / "benchmarks.log"
     configure = ["cmake", "-S", str(top / "benchmarks"), "-B", str(build), "-DCMAKE_BUILD_TYPE=Release"]
     configure.append("-DPYTHON_EXECUTABLE=/usr/bin/python3")
@@ -26,7 +26,7 @@ def build_helpers(top: Path) -> None:
 
 
 def main(arguments: list[str]) -> int:
-    """Exit status 0 if every program ran to its end, 1 if one did not, 2 for arguments that cannot be used."""
+    """Exit status 0: every program finished; 1: a program failed; 2: invalid arguments."""
     top = Path(os.environ["COGLAB_TOP"])
     folder = top / "benchmarks"
     python = os.environ.get("COGLAB_TEST_PYTHON", "/usr/bin/python3")

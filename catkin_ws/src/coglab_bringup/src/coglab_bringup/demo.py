@@ -1,4 +1,4 @@
-"""./coglab demo: launches everything, takes an object from the person, gives it back, writes what happened, stops."""
+"""./coglab demo: launches the system, takes an object from the person, gives it back, writes the results, stops."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from coglab_bringup.arguments import demo_parser
 from coglab_bringup.run_directory import free_port, record_run, run_environment
 from coglab_bringup.usage import Refused
 
-OBJECT = "mug"  # what the simulated person offers (coglab_sim/config/cell.yaml)
-KINDS = ("exchange_human_to_robot", "exchange_robot_to_human")  # take it from the person, then give it back
-MASTER_LIMIT = 30.0  # s until the ROS master answers, or without roslaunch doing anything
-CONSOLE_LIMIT = 30.0  # s after which it is said that the console starts late
+OBJECT = "mug"  # object that the simulated person offers (coglab_sim/config/cell.yaml)
+KINDS = ("exchange_human_to_robot", "exchange_robot_to_human")  # in this order
+MASTER_LIMIT = 30.0  # s until the ROS master answers, counted while roslaunch uses no processor time
+CONSOLE_LIMIT = 30.0  # s until a message reports that the console starts late
 
 
 class System:
-    """The launched system of one run; `stop()` ends every process of it."""
+    """The launched system of one run. `stop()` ends all of its processes."""
 
     def __init__(self, environment: dict[str, str], port: int, arguments: list[str], log: Path) -> None:
         self._log = log.open("w")
@@ -41,22 +41,22 @@ class System:
         )
 
     def alive(self) -> bool:
-        """Whether roslaunch still runs."""
+        """True while roslaunch runs."""
         return self._process.poll() is None
 
     def processor_time(self) -> float:
-        """s that its processes have used so far."""
+        """Processor time (s) that its processes have used."""
         return process_tree.processor_time(self._process.pid)
 
     def stop(self) -> None:
-        """SIGINT to roslaunch, as Ctrl-C does; returns when nothing is left of it."""
+        """Send SIGINT to roslaunch, as Ctrl-C does. Returns when all processes have ended."""
         self._process.send_signal(signal.SIGINT)
         self._process.wait()
         self._log.close()
 
 
 def say_console(home: Path, alive: Callable[[], bool], limit: float = CONSOLE_LIMIT) -> None:
-    """Prints where the experimenter's page is, as soon as its node has written it; after `limit` s, that it is late."""
+    """Print the address of the experimenter's page when its node has written it, or after `limit` s that it is late."""
     late, link = time.monotonic() + limit, home / "console.url"
     while not link.is_file() and alive():
         if time.monotonic() > late:
@@ -68,13 +68,13 @@ def say_console(home: Path, alive: Callable[[], bool], limit: float = CONSOLE_LI
 
 
 class PaceWatch:
-    """Says when this computer is too busy for real time; remembers how much the simulated cell was slowed."""
+    """Reports when this computer is too busy for real time. Stores the lowest real-time factor of the cell."""
 
     def __init__(self) -> None:
         self.lowest = 1.0
 
     def follow(self) -> None:
-        """Listens to the cell from now on."""
+        """Subscribe to the cell's real-time factor."""
         from coglab_py.pace import TOPIC
         from rospy import Subscriber
         from std_msgs.msg import Float64
@@ -82,7 +82,7 @@ class PaceWatch:
         self._subscriber = Subscriber(TOPIC, Float64, lambda message: self.take(message.data))
 
     def take(self, factor: float) -> None:
-        """The cell runs at this factor from now on."""
+        """Process a new real-time factor of the cell."""
         if factor < self.lowest:
             self.lowest = factor
             print(
@@ -93,8 +93,8 @@ class PaceWatch:
 
 
 def keep(problems: list[str], folder: Path, name: str, write: Callable[[Path], object]) -> None:
-    """Calls `write` with a path and moves what lies there then into `folder`: on a full disk nothing is half written.
-    `problems` gets a sentence where that fails."""
+    """Write a file completely or not at all: call `write` with a temporary path, then move the result into `folder`.
+    A full disk leaves no partial file. If it fails, `problems` receives a sentence."""
     try:
         with tempfile.TemporaryDirectory(prefix=".part-", dir=folder) as part:
             write(Path(part) / name)
@@ -105,7 +105,7 @@ def keep(problems: list[str], folder: Path, name: str, write: Callable[[Path], o
 
 
 def commit_of(top: Path) -> str:
-    """The commit of this checkout; "unknown" outside of one, or without git."""
+    """The commit of this checkout; "unknown" outside of a checkout or without git."""
     try:
         command = ["git", "-C", str(top), "rev-parse", "HEAD"]
         return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
@@ -118,7 +118,7 @@ def _interrupt(*_signal: object) -> None:
 
 
 def wait_for_master(system: System, limit: float) -> None:
-    """Waits until the ROS master of this run answers. RuntimeError if roslaunch ended, or did nothing for `limit` s."""
+    """Wait until the run's ROS master answers. RuntimeError if roslaunch ended, or was idle for `limit` s."""
     import rosgraph
 
     moved, before = time.monotonic(), -1.0
@@ -133,7 +133,7 @@ def wait_for_master(system: System, limit: float) -> None:
 
 
 def unfinished(kind: str, error: BaseException) -> dict:
-    """The row of a handover that did not come to its end."""
+    """Result row of a handover that did not finish."""
     from coglab_msgs.msg import ReasonCode
 
     interrupted = isinstance(error, KeyboardInterrupt)
@@ -153,7 +153,7 @@ PEOPLE = {
     ),
     "drawn": ((), "a person drawn by the seed, as people are, seen by the tracker as it is"),
 }
-"""Arguments of the launch file, and what they mean."""
+"""Launch arguments of each kind of person, and their description."""
 
 
 def main(arguments: list[str]) -> int:
@@ -172,8 +172,8 @@ def main(arguments: list[str]) -> int:
 
 
 def run(top: Path, options: argparse.Namespace) -> int:
-    """Launches, hands over, writes, stops; the exit status."""
-    signal.signal(signal.SIGTERM, _interrupt)  # what happened until then is still written down
+    """Launch the system, do the handovers, write the results, stop. Returns the exit status."""
+    signal.signal(signal.SIGTERM, _interrupt)  # so that the results up to this moment are written
     out: Path = options.out.absolute()
     out.mkdir(parents=True, exist_ok=True)
     person, words = PEOPLE[options.person]

@@ -1,4 +1,4 @@
-"""./coglab doctor: says in words what is missing on this machine and how to get it. Needs nothing but Python."""
+"""./coglab doctor: reports what is missing on this computer and how to install it. Standard library only."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-Finding = tuple[bool, str]  # whether it is fine, and a sentence, with what to do where it is not
+Finding = tuple[bool, str]  # True if it is fine; a sentence, with the remedy if it is not
 
 
 def package_groups(top: Path) -> dict[str, list[str]]:
-    """Groups of debian-packages.txt with their packages."""
+    """Package names by group, from debian-packages.txt."""
     groups: dict[str, list[str]] = {}
     for line in (top / "debian-packages.txt").read_text().splitlines():
         if line and not line.startswith("#"):
@@ -24,9 +24,9 @@ def package_groups(top: Path) -> dict[str, list[str]]:
 
 
 def installed(packages: list[str]) -> set[str]:
-    """Those of these Debian packages that are installed."""
+    """The installed ones of these Debian packages."""
     query = ["dpkg-query", "-W", "-f=${db:Status-Status} ${Package}\n", *packages]
-    found = subprocess.run(query, capture_output=True, text=True, check=False).stdout  # unknown names are left out
+    found = subprocess.run(query, capture_output=True, text=True, check=False).stdout  # lacks unknown packages
     return {line.split()[1] for line in found.splitlines() if line.startswith("installed ")}
 
 
@@ -37,7 +37,7 @@ def release() -> dict[str, str]:
 
 
 def smach_copies(top: Path) -> list[Path]:
-    """Folders outside our own, in the workspace or ROS paths, that hold a package smach, smach_msgs or smach_ros."""
+    """Foreign folders in the workspace or the ROS paths that contain a package smach, smach_msgs or smach_ros."""
     ours = top / "catkin_ws" / "src" / "executive_smach"
     places = [top / "catkin_ws" / "src", Path("/opt/ros"), Path("/usr/share")]
     places += [Path(p) for p in os.environ.get("ROS_PACKAGE_PATH", "").split(":") if p]
@@ -51,7 +51,7 @@ def smach_copies(top: Path) -> list[Path]:
 
 
 def package_findings(top: Path) -> Iterator[Finding]:
-    """Whether the Debian packages of each group are installed."""
+    """Findings on the Debian packages of each group."""
     optional = {
         "browser": "no browser is installed (only needed to test the console)",
         "viz": "rviz is not installed (only needed where there is a screen)",
@@ -71,11 +71,11 @@ def package_findings(top: Path) -> Iterator[Finding]:
 
 
 def environment_findings(top: Path) -> Iterator[Finding]:
-    """Other Pythons, other ROS distributions, other copies of smach."""
+    """Findings on other Pythons, other ROS distributions and other copies of smach."""
     python = shutil.which("python3")
     if python != "/usr/bin/python3":
         yield True, f"python3 in your PATH is {python}; ./coglab uses /usr/bin/python3 anyway, as does devel/setup.bash"
-    # The environment of this workspace names /opt/ros itself, where it was built with --upstream-smach.
+    # If it was built with --upstream-smach, the environment of this workspace contains /opt/ros.
     own, names = f"{top}/catkin_ws/", ("ROS_DISTRO", "ROS_ROOT", "CMAKE_PREFIX_PATH", "ROS_PACKAGE_PATH")
     values = {name: os.environ.get(name, "") for name in names}
     foreign = [name for name, value in values.items() if "/opt/ros" in value and own not in value]
@@ -92,7 +92,7 @@ def environment_findings(top: Path) -> Iterator[Finding]:
 
 
 def findings(top: Path) -> Iterator[Finding]:
-    """All of them."""
+    """All findings."""
     system = release()
     fine = system.get("VERSION_CODENAME") in ("bookworm", "trixie")
     name = system.get("PRETTY_NAME", "unknown")
@@ -115,7 +115,7 @@ def findings(top: Path) -> Iterator[Finding]:
 
 
 def main(arguments: list[str]) -> int:
-    """Prints the findings; exit status 0 if all are fine."""
+    """Print the findings. Exit status 0 if all are fine."""
     found = list(findings(Path(arguments[0])))
     for fine, sentence in found:
         print(("ok       " if fine else "MISSING  ") + sentence)

@@ -1,6 +1,6 @@
-"""./coglab film: a moving picture of a handover in both directions, drawn from the simulation without a screen.
+"""./coglab film: an animated picture of a handover in both directions, rendered from the simulation without a screen.
 
-The trial runs in virtual time, so that the film is the same for the same seed on any computer.
+The trial runs in virtual time, so the same seed gives the same film on every computer.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from coglab_bringup.usage import Refused
 CAPTIONS = {RECEIVE: "The robot takes the mug from the person", GIVE: "The robot gives it back"}
 SIZE = (560, 380)  # pixels
 RATE = 12.0  # frames per second of virtual time
-COLOURS = 96  # of the palette; fewer make a smaller file
-LARGEST = 3e6  # bytes
+COLOURS = 96  # in the palette; fewer colours give a smaller file
+LARGEST = 3e6  # bytes, limit of the file
 
 LOOK_AT, DISTANCE, AZIMUTH, ELEVATION = [0.74, 0.0, 0.39], 1.5, -84.0, -12.0  # m, degrees
 
@@ -38,7 +38,7 @@ UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
 
 class Painter:
-    """Draws the world of one trial; made in the thread that steps it, as the camera has to be."""
+    """Draws the world of one trial. Create it in the thread that steps the world: the camera requires it."""
 
     def __init__(self, world: World, size: tuple[int, int] = SIZE) -> None:
         self.world = world
@@ -51,11 +51,11 @@ class Painter:
         for body in ("ih2_base_link", *(name for name in world.cell.touch() if name != "palm")):
             camera.set_colour(body, DARK)
         camera.set_colour("object", RED)
-        camera.set_colour("person_hand", SKIN, 0.0)  # drawn as a whole arm instead
+        camera.set_colour("person_hand", SKIN, 0.0)  # invisible: a whole arm is drawn instead
         self._closed = 1.0
 
     def frame(self) -> Image.Image:
-        """The picture now."""
+        """Picture of the current moment."""
         truth = self.world.cell.truth()
         for origin in self.world.robot.chain.joint_origins(truth["position"])[1:]:
             self.camera.add("sphere", [0.073, 0.0, 0.0], origin, UPRIGHT, GREY)
@@ -66,7 +66,7 @@ class Painter:
         return Image.fromarray(self.camera.draw())
 
     def _bone(self, start: np.ndarray, end: np.ndarray, radius: float, colour: Any) -> np.ndarray:
-        """A capsule from one point of the world to another, which is returned."""
+        """Draw a capsule between two points of the world (m). Returns `end`."""
         along = end - start
         tilt = np.arctan2(np.hypot(along[0], along[1]), along[2])
         turn = Rotation.from_euler("yz", [tilt, np.arctan2(along[1], along[0])])
@@ -75,11 +75,11 @@ class Painter:
         return end
 
     def _hand(self, truth: Any) -> None:
-        """Palm, fingers and thumb at the frame human_hand, whose x points to the person; the fingers go round what is
-        0.04 m before the palm."""
+        """Draw palm, fingers and thumb at the frame human_hand, whose x axis points to the person. The fingers close
+        around the point 0.04 m in front of the palm."""
         position, turn = truth["human_hand"]["position"], Rotation.from_quat(truth["human_hand"]["rotation"])
         holds = truth["held_by"] in ("human", "both")
-        self._closed += (float(holds) - self._closed) * 0.4  # fingers take some frames to close or open
+        self._closed += (float(holds) - self._closed) * 0.4  # the fingers need some frames to close or open
         curl = 0.35 + 1.15 * self._closed
 
         def world(x: float, y: float, z: float) -> np.ndarray:
@@ -102,7 +102,7 @@ class Painter:
             angle += 0.7 * curl
 
     def _body(self, hand: np.ndarray) -> None:
-        """Arm, trunk and head."""
+        """Draw arm, trunk and head."""
         shoulder, elbow = arm_of(hand)
         wrist = hand + 0.09 * (elbow - hand) / np.linalg.norm(elbow - hand)
         self._bone(hand, wrist, 0.027, SKIN)
@@ -120,7 +120,7 @@ class Painter:
 
 
 class Film:
-    """Collects frames of a trial at RATE; `look` is called after each step of the world."""
+    """Collects frames of a trial at RATE. Call `look` after each step of the world."""
 
     def __init__(self) -> None:
         self.frames: list[Image.Image] = []
@@ -130,9 +130,9 @@ class Film:
         self._font = ImageFont.truetype(str(fonts / "DejaVuSans.ttf"), 15)
 
     def look(self, trial: VirtualTrial) -> None:
-        """Keeps a frame if the time has come for one."""
+        """Store a frame if one is due."""
         if not trial.begun:
-            self._next = trial.world.t + 1.0 / RATE  # the arm goes home before that
+            self._next = trial.world.t + 1.0 / RATE  # before the trial begins the arm moves home
             return
         if trial.world.t < self._next:
             return
@@ -148,7 +148,7 @@ class Film:
         return frame
 
     def save(self, path: Path) -> int:
-        """Writes an endless GIF with one palette; returns its size in bytes."""
+        """Write a GIF with one palette that repeats forever. Returns its size in bytes."""
         palette = self._palette()
         small = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in self.frames]
         duration = round(1000.0 / RATE)
@@ -156,7 +156,7 @@ class Film:
         return path.stat().st_size
 
     def _palette(self) -> Image.Image:
-        """COLOURS colours that fit all frames: those of a sheet of eight of them."""
+        """A palette of COLOURS colours for all frames, computed from eight of them."""
         chosen = self.frames[:: max(1, len(self.frames) // 8)][:8]
         sheet = Image.new("RGB", (SIZE[0], SIZE[1] * len(chosen)))
         for row, frame in enumerate(chosen):
@@ -165,7 +165,7 @@ class Film:
 
 
 def main(words: list[str]) -> int:
-    """Exit status 0: the film is there and both handovers succeeded; 1: not; 2: usage."""
+    """Exit status 0: the film is written and both handovers succeeded; 1: otherwise; 2: invalid arguments."""
     try:
         options = film_parser(Path(os.environ["COGLAB_TOP"])).parse_args(words)
     except Refused as error:
@@ -177,7 +177,7 @@ def main(words: list[str]) -> int:
     print(f"[coglab] drawing a handover in both directions, seed {options.seed}: about a minute", flush=True)
     try:
         results = trial.run(RECEIVE, GIVE)
-    except (TimeoutError, RuntimeError) as error:  # a machine that is stuck; no pictures without a screen
+    except (TimeoutError, RuntimeError) as error:  # the machine is stuck, or nothing can draw without a screen
         print(f"[coglab] error: {error}", file=sys.stderr)
         return 1
     for result in results:

@@ -1,4 +1,4 @@
-"""Asks a running system for one handover, as any user can, and waits for its end. For the demo and the tests."""
+"""Requests one handover from a running system and waits for its end. Used by the demo and the tests."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from coglab_py.yaml_file import read
 from coglab_bringup.trial_recorder import TrialRecorder, summarise
 
 READY_LIMIT = 90.0  # s without progress until the system waits in its hub
-LONGEST_START = 600.0  # s, with progress
-HANDOVER_LIMIT = 60.0  # s for one handover, as time passes in the cell
+LONGEST_START = 600.0  # s until then if there is progress
+HANDOVER_LIMIT = 60.0  # s of simulated time for one handover
 HUBS = ("wait_without_object", "wait_with_object")
 MASTER = "/coglab_master"
 
 
 class NotTaken(RuntimeError):
-    """The master machine did not take an action; `code` is the ReasonCode of its last refusal."""
+    """The master machine did not accept an action. `code` is the ReasonCode of its last refusal."""
 
     def __init__(self, sentence: str, code: int) -> None:
         super().__init__(sentence)
@@ -35,7 +35,7 @@ class NotTaken(RuntimeError):
 
 
 def services() -> int:
-    """How many services the nodes of this system have registered so far."""
+    """Number of services that the nodes of this system have registered."""
     try:
         return len(rosgraph.Master("/coglab_demo").getSystemState()[2])
     except (TimeoutError, OSError, rosgraph.MasterException):
@@ -43,9 +43,9 @@ def services() -> int:
 
 
 def ask_for(action: str, object_id: str, alive: Callable[[], bool], limit: float) -> None:
-    """Calls /coglab/start until the master machine takes the action. Raises NotTaken with its last refusal.
+    """Call /coglab/start until the master machine accepts the action. Raises NotTaken with its last refusal.
 
-    `limit` s without progress: no service more, and the same refusal. On a busy computer nodes start late.
+    `limit`: s without progress, that is, no new service and the same refusal. On a busy computer nodes start late.
     """
     refusal, code = "the service /coglab/start never appeared", ReasonCode.NODE_SILENT
     begun = moved = time.monotonic()
@@ -69,7 +69,7 @@ def ask_for(action: str, object_id: str, alive: Callable[[], bool], limit: float
 
 
 def entry_of(object_id: str) -> Mapping[str, Any] | None:
-    """What the database of the running system knows of an object; None if it does not tell."""
+    """Entry of an object in the database of the running system; None if the database does not return it."""
     try:
         wait_for_service("/object_database/get_object", 2.0)
         answer = rospy.ServiceProxy("/object_database/get_object", GetObject)(object_id)
@@ -81,9 +81,9 @@ def entry_of(object_id: str) -> Mapping[str, Any] | None:
 def run_handover(
     kind: str, object_id: str, recorder: TrialRecorder, alive: Callable[[], bool] = lambda: True
 ) -> tuple[dict, float, float]:
-    """Asks for one handover and waits for the hub after it, while `recorder` listens.
+    """Request one handover and wait until the system is in the hub again, while `recorder` records.
 
-    Returns its result row and when it began and ended (s of the steady clock).
+    Returns its result row, its start and its end (s of the steady clock).
     """
     table = package_path("lwr_description", "config", "joint_limits.yaml")
     limits = np.array(read(table).value["default"]["velocity"])

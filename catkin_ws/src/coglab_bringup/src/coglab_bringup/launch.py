@@ -1,4 +1,4 @@
-"""./coglab launch: the plain launch file on a master port of its own, so that several run side by side."""
+"""./coglab launch: runs the launch file on its own master port, so that several systems can run side by side."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from coglab_bringup.usage import Refused
 
 
 def main(arguments: list[str]) -> int:
-    """Replaces this process by roslaunch; `-p PORT` picks the master port, all else goes to roslaunch."""
+    """Replace this process by roslaunch. `-p PORT` selects the master port; other arguments go to roslaunch."""
     top = Path(os.environ["COGLAB_TOP"])
     try:
         judge_launch(top, arguments)
@@ -24,7 +24,7 @@ def main(arguments: list[str]) -> int:
         print(f"[coglab] error: port {port} is in use by another program; leave out -p for a free one", file=sys.stderr)
         return 1
     port = port or free_port()
-    home, _lock = lasting_home(top)  # not a new one: it holds which object the hand holds
+    home, _lock = lasting_home(top)  # kept between runs: it stores which object the hand holds
     environment = run_environment(port, home)
     record_run(top, port, "launch")
     print(

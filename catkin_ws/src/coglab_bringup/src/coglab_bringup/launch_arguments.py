@@ -1,5 +1,5 @@
-"""The arguments of coglab.launch, checked by name and value: roslaunch ignores a name that it does not know, and a node
-that cannot use its value would be started again and again."""
+"""Checks names and values of the arguments of coglab.launch. roslaunch ignores an unknown name, and restarts a node
+that cannot use its value again and again."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ HELP = """usage: ./coglab launch [-p PORT] [ARGUMENT:=VALUE ...] [OPTION of rosl
 
 Starts coglab.launch on a free port of its own for the ROS master, or on PORT. Arguments, with what they are by default:
 """
-Check = Callable[[str], object]  # raises for a value that cannot be used
+Check = Callable[[str], object]  # raises an exception for an invalid value
 
 
 def launch_arguments(sources: Path) -> dict[str, tuple[str, str]]:
-    """Default and meaning of each argument of coglab.launch, by name."""
+    """Default and description of each argument of coglab.launch, by name."""
     tree = ElementTree.parse(sources / "coglab_bringup" / "launch" / "coglab.launch")
     found = [arg.attrib for arg in tree.getroot().findall("arg") if "default" in arg.attrib]
     return {arg["name"]: (arg["default"], arg.get("doc", "")) for arg in found}
@@ -97,7 +97,7 @@ def _or_empty(check: Check) -> Check:
 
 
 def _checks(sources: Path, objects: Path) -> dict[str, Check]:
-    """What each argument takes; a name that is missing here takes any text. `objects` is the database's folder."""
+    """Check of each argument. An argument without a check accepts any text. `objects`: folder of the database."""
     profiles = re.findall(r"^(\w+):\s*$", (sources / LIMITS).read_text(encoding="utf-8"), re.MULTILINE)
     flags = ("alone", "sim", "split", "rviz", "perfect_perception", "auto_trigger", "recogniser", "console")
     files = ("controllers", "dmp_library", "machines", "patterns")
@@ -125,7 +125,7 @@ def _checks(sources: Path, objects: Path) -> dict[str, Check]:
 
 
 def split_port(words: list[str]) -> tuple[int, list[str]]:
-    """The port after `-p` (0: none) and the other words. Refused if it is none."""
+    """The port after `-p` (0: no -p) and the other words. Refused if it is not a port."""
     if "-p" not in words:
         return 0, words
     at = words.index("-p")
@@ -136,7 +136,7 @@ def split_port(words: list[str]) -> tuple[int, list[str]]:
 
 
 def judge_launch(top: Path, words: list[str]) -> None:
-    """Refused for an argument or value that the launch file cannot use; prints the arguments for --help and exits."""
+    """Raise Refused for an invalid argument or value of the launch file. For --help, print the arguments and exit."""
     sources = top / "catkin_ws" / "src"
     known = launch_arguments(sources)
     if "-h" in words or "--help" in words:
@@ -154,10 +154,10 @@ def judge_launch(top: Path, words: list[str]) -> None:
             raise Refused(f"launch expects ARGUMENT:=VALUE, -p PORT or one of {options}; got '{word}'")
         if equals and name not in known:
             raise Refused(f"coglab.launch has no argument '{name}'; there are: {', '.join(known)}")
-        if equals and "$(" not in value and name in checks:  # substitutions are roslaunch's to resolve
+        if equals and "$(" not in value and name in checks:  # roslaunch resolves substitutions
             try:
                 checks[name](value)
             except Refused:
                 raise
-            except Exception as error:  # ValueError, or argparse's own error
+            except Exception as error:  # ValueError or an error of argparse
                 raise Refused(f"{word}: {error}") from error

@@ -1,17 +1,17 @@
 """Runs a command such that nothing of it outlives it, however it ends: process_tree.py COMMAND [ARG ...]
 
-Two processes of this file stand above the command. The one that was started (the front) keeps its process id and does
-nothing but wait. Its child (the keeper) is the parent of the command. Both are subreapers (prctl(2)): a process of the
-command that forks twice, or opens a session of its own as every node of roslaunch does, becomes a child of the keeper
-when its parent ends, so that the tree below the keeper holds all of them. The keeper ends that tree when the command
-has ended, when it is told to (SIGTERM, SIGINT, SIGHUP, SIGQUIT), and when the front was killed; the front ends it when
-the keeper was killed. Only processes of this tree are ever signalled.
+Two processes of this file are above the command. The started process (the front) keeps its process id and only waits.
+Its child (the keeper) is the parent of the command. Both are subreapers (prctl(2)): a process of the command that
+forks twice, or that opens its own session like every node of roslaunch, becomes a child of the keeper when its parent
+ends. So the tree below the keeper contains all processes of the command. The keeper ends this tree when the command has
+ended, when it receives SIGTERM, SIGINT, SIGHUP or SIGQUIT, and when the front was killed. The front ends the tree when
+the keeper was killed. Only processes of this tree are signalled.
 
-A signal is passed on to the command at once; whatever is left is asked by SIGINT, then by SIGTERM, then killed. What a
-terminal sends on Ctrl-C reaches the command itself, which may take its time: roslaunch asks its nodes, an
-interpreter goes on.
+A signal is passed on to the command at once. The remaining processes receive SIGINT, then SIGTERM, then SIGKILL. Ctrl-C
+in a terminal reaches the command directly, and the command may take its time: roslaunch ends its nodes, an interpreter
+continues.
 
-Needs nothing but Python's own library: ./coglab uses it before anything is built.
+Standard library only: ./coglab uses it before anything is built.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from pathlib import Path
 from typing import Any
 
 PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER = 1, 36  # linux/prctl.h
-SI_KERNEL = 128  # siginfo_t.si_code of what a terminal sends; it reaches the whole foreground group
+SI_KERNEL = 128  # siginfo_t.si_code of a terminal's signal, which reaches the whole foreground group
 ENDING = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT)
-TOLD = ((0.8, signal.SIGINT), (1.5, signal.SIGTERM), (2.2, signal.SIGKILL))  # s after the order to end: what all get
-LEFT_OVER = ((0.0, signal.SIGINT), (0.6, signal.SIGTERM), (1.2, signal.SIGKILL))  # s after the command's own end
+TOLD = ((0.8, signal.SIGINT), (1.5, signal.SIGTERM), (2.2, signal.SIGKILL))  # s after an ending signal: signal to all
+LEFT_OVER = ((0.0, signal.SIGINT), (0.6, signal.SIGTERM), (1.2, signal.SIGKILL))  # s after the command ended by itself
 AT_ONCE = ((0.0, signal.SIGKILL),)
-KILL_LIMIT = 5.0  # s after SIGKILL until it is said what cannot be killed
-COULD_NOT_START = 127
+KILL_LIMIT = 5.0  # s after SIGKILL until the processes that survive it are reported
+COULD_NOT_START = 127  # exit status
 
 
 def _prctl(option: int, value: int) -> None:
@@ -42,7 +42,7 @@ def _prctl(option: int, value: int) -> None:
 
 
 def _parents() -> dict[int, int]:
-    """Parent of every process that runs; zombies are left out, they wait for their parent alone."""
+    """Parent of every running process, by process id. Without zombies, which only wait for their parent."""
     parents = {}
     for entry in os.listdir("/proc"):
         if not entry.isdigit():
@@ -57,7 +57,7 @@ def _parents() -> dict[int, int]:
 
 
 def descendants(root: int) -> list[int]:
-    """All processes below `root`, which is not part of them."""
+    """All processes below `root`, without `root`."""
     children: dict[int, list[int]] = {}
     for process, parent in _parents().items():
         children.setdefault(parent, []).append(process)
@@ -70,7 +70,7 @@ def descendants(root: int) -> list[int]:
 
 
 def processor_time(root: int) -> float:
-    """s that the processes below `root` which run now have used, with those that they have waited for."""
+    """Processor time (s) of the running processes below `root` and of their children that have ended."""
     ticks = 0
     for process in descendants(root):
         try:
@@ -82,7 +82,7 @@ def processor_time(root: int) -> float:
 
 
 def _reap() -> dict[int, int]:
-    """Statuses of the children that have ended, by process id."""
+    """Wait statuses of the children that have ended, by process id."""
     ended: dict[int, int] = {}
     while True:
         try:
@@ -99,11 +99,11 @@ def _send(sign: signal.Signals, processes: Sequence[int]) -> None:
         try:
             os.kill(process, sign)
         except (ProcessLookupError, PermissionError):
-            pass  # it has ended, or belongs to root: then sudo passes the signal on
+            pass  # it has ended, or it belongs to root (then sudo passes the signal on)
 
 
 class _Ending:
-    """The end of all processes below this one, by steps: (seconds after now, signal that all of them get)."""
+    """Ends all processes below this one in steps: (s after the start, signal to all of them)."""
 
     def __init__(self, steps: Sequence[tuple[float, signal.Signals]]) -> None:
         self._begin = time.monotonic()
@@ -111,7 +111,7 @@ class _Ending:
         self._limit = steps[-1][0] + KILL_LIMIT
 
     def step(self) -> list[int]:
-        """Sends what is due, in the last step again and again, since a process may fork; returns who is left."""
+        """Send the signal that is due; return the remaining processes. The last signal repeats: a process may fork."""
         left = descendants(os.getpid())
         passed = time.monotonic() - self._begin
         while self._ahead and passed >= self._ahead[0][0]:
@@ -122,7 +122,7 @@ class _Ending:
         return left
 
     def finish(self) -> None:
-        """Returns when none is left; what cannot be killed is named."""
+        """Return when no process is left. Report processes that cannot be killed."""
         while left := self.step():
             if time.monotonic() - self._begin > self._limit:
                 print(f"[coglab] error: these processes could not be ended: {left}", file=sys.stderr)
@@ -132,23 +132,23 @@ class _Ending:
 
 
 def _from_terminal(heard: signal.struct_siginfo) -> bool:
-    """Whether it is Ctrl-C, which the command gets from the terminal, too, and answers as it likes."""
+    """True for Ctrl-C in a terminal. The command receives it, too, and reacts in its own way."""
     return heard.si_code == SI_KERNEL and heard.si_signo in (signal.SIGINT, signal.SIGQUIT)
 
 
 def _shell_status(status: int) -> int:
-    """As a shell says it: 128 + signal for what a signal ended."""
+    """Exit status as in a shell: 128 + signal number for a process that a signal ended."""
     return 128 - status if status < 0 else status
 
 
 def _heard_signals() -> set[signal.Signals]:
-    """What front and keeper wait for; under nohup, SIGHUP ends nothing."""
+    """Signals that front and keeper wait for. SIGHUP is excluded under nohup."""
     ending = {sign for sign in ENDING if sign != signal.SIGHUP or signal.getsignal(sign) != signal.SIG_IGN}
     return {*ending, signal.SIGCHLD}
 
 
 def _start(command: list[str], mask: set[int | signal.Signals]) -> int:
-    """The process id of the command, with the signal mask that we were started with; 127 if it cannot start."""
+    """Start the command with the original signal mask and return its process id. Exit status 127: it cannot start."""
     process = os.fork()
     if process:
         return process
@@ -161,10 +161,10 @@ def _start(command: list[str], mask: set[int | signal.Signals]) -> int:
 
 
 def _keep(command: list[str], front: int, mask: set[int | signal.Signals], signals: set[signal.Signals]) -> int:
-    """Waits for the command, or for the order to end it; ends all of its tree; returns the exit status."""
+    """Wait for the command or an ending signal, then end the whole tree. Returns the exit status."""
     _prctl(PR_SET_CHILD_SUBREAPER, 1)
     _prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
-    if os.getppid() != front:  # it ended before we asked to be told
+    if os.getppid() != front:  # it ended before PR_SET_PDEATHSIG was set
         return 1
     child = _start(command, mask)
     status, ending = None, None
@@ -181,7 +181,7 @@ def _keep(command: list[str], front: int, mask: set[int | signal.Signals], signa
 
 
 def main(command: list[str]) -> int:
-    """Front: starts the keeper, hands on signals, and ends the tree itself should the keeper be killed."""
+    """Front: start the keeper, pass signals on, and end the tree if the keeper was killed."""
     if not command:
         print(f"usage: {__doc__.splitlines()[0]}", file=sys.stderr)
         return 2
@@ -202,19 +202,19 @@ def main(command: list[str]) -> int:
             _send(signal.Signals(heard.si_signo), [keeper])
         ended = _reap().get(keeper)
         if ended is not None:
-            _Ending(AT_ONCE).finish()  # nothing is left, unless the keeper was killed
+            _Ending(AT_ONCE).finish()  # processes are left only if the keeper was killed
             return _shell_status(ended)
 
 
 def above(command: Sequence[str]) -> list[str]:
-    """The command line that runs `command` below this file."""
+    """Command line that runs `command` below this file."""
     return [sys.executable, "-I", __file__, *command]
 
 
 def run(command: Sequence[str], limit: float, **options: Any) -> int | None:
-    """Runs a command of ours such that nothing of it outlives this call: its exit status, None if `limit` (s) ended it.
+    """Run a command so that none of its processes survives this call. Returns its exit status; None after `limit` s.
 
-    `options` go to subprocess.Popen. An exception here (Ctrl-C) ends the command, too.
+    `options` are passed to subprocess.Popen. An exception here (Ctrl-C) ends the command, too.
     """
     process = subprocess.Popen(above(command), **options)
     try:

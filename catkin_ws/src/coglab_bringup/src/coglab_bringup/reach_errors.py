@@ -1,7 +1,8 @@
-"""Distance of the palm from the true grasp at the end of each reach, by the truth of the simulated cell.
+"""Distance of the palm from the correct grasp at the end of each reach, measured in the simulated cell.
 
-A reach begins with each execute_dmp of an exchange and is over when wait_stop is left. It is measured when its last
-motion ended, or, if the machine ended it (at the touch, or as the person came), when wait_stop was left.
+A reach begins with each execute_dmp of an exchange and is over when wait_stop is left. It is measured at the end of its
+last motion. If the machine ended the motion (at contact, or because the person came), it is measured when wait_stop is
+left.
 """
 
 from __future__ import annotations
@@ -17,13 +18,13 @@ if TYPE_CHECKING:
     from coglab_bringup.trial_recorder import Trial
 
 TAKES, GIVES = "exchange_human_to_robot", "exchange_robot_to_human"
-MOVING = ("running", "holding")  # states of a motion that is on its way
-OLDEST = 0.1  # s, age of the oldest truth that is used
+MOVING = ("running", "holding")  # states of a motion in progress
+OLDEST = 0.1  # s, largest age of the simulated poses that are used
 
 
 def _reaches_of(trial: Trial, start: float, end: float) -> Iterator[tuple[float, str]]:
-    """When each reach that began between `start` and `end` (s) is measured, and how it ended: reached, met or
-    unfinished."""
+    """Time of the measurement (s) of each reach that began between `start` and `end` (s), and how it ended: reached,
+    met or unfinished."""
     begun: float | None = None
     for t, path, from_state, outcome, *_ in trial.transitions:
         if not start <= t <= end or not path.endswith("/approach/arm_motion"):
@@ -48,15 +49,15 @@ def _end_of(trial: Trial, begun: float, left: float, succeeded: bool) -> tuple[f
 
 
 def _grasp_of(trial: Trial, until: float) -> str:
-    """The grasp that was chosen last before `until` (s), from the transitions of set_dmp_goal; empty if none was."""
+    """Name of the last grasp chosen before `until` (s), from the transitions of set_dmp_goal; empty if none was."""
     told = [row[5] for row in trial.transitions if row[0] <= until and row[2] == "set_dmp_goal"]
     found = [match.group(1) for match in (re.fullmatch(r"grasp '(.+)'", reason) for reason in told) if match]
     return found[-1] if found else ""
 
 
 def _error(trial: Trial, kind: str, entry: Mapping[str, Any] | None, moment: float) -> dict[str, float | None]:
-    """mm and degrees from palm to goal: the grasp in the object's file, or the delivery before the person's hand; None
-    where that is not known."""
+    """Distance in mm and angle in degrees from the palm to its goal: the grasp in the object's file, or the delivery
+    pose in front of the person's hand. None if unknown."""
     truth = [row for row in trial.poses if moment - OLDEST <= row[0] <= moment]
     grasp = _grasp_of(trial, moment)
     if entry is None or kind not in (TAKES, GIVES) or not truth or (kind == TAKES and not grasp):
@@ -70,8 +71,8 @@ def _error(trial: Trial, kind: str, entry: Mapping[str, Any] | None, moment: flo
 
 
 def reach_errors(trial: Trial, kind: str, entry: Mapping[str, Any] | None, start: float, end: float) -> dict[str, Any]:
-    """Fields of result.json: `reaches`, those of the last one as `final_error_mm` and `final_error_deg`, and who
-    measured them, or why nobody did. `entry`: of the object, as the database has it."""
+    """Fields of result.json: `reaches`, the errors of the last reach as `final_error_mm` and `final_error_deg`, and the
+    source of the measurement, or the reason why there is none. `entry`: the object's entry in the database."""
     rows: list[dict[str, Any]] = [
         {"ended": ended, **_error(trial, kind, entry, moment)} for moment, ended in _reaches_of(trial, start, end)
     ]

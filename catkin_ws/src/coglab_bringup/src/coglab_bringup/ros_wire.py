@@ -1,7 +1,7 @@
-"""Services and latched topics of a running ROS system, spoken over the socket: nothing is imported from ROS (that takes
-0.3 s and more on a busy computer), and no node is registered with the master. Python's own library alone.
+"""Client for services and latched topics of a running ROS system, directly on sockets. Standard library only: importing
+ROS takes 0.3 s or more on a busy computer. It registers no node with the master.
 
-The protocol is TCPROS: a header of `name=value` fields, then messages; each is preceded by its length (uint32).
+The protocol is TCPROS: a header of `name=value` fields, then messages. Each has its length (uint32) in front.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from typing import Any
 from urllib.parse import urlparse
 
 CALLER = "/coglab_ask"
-ANY_TYPE = "*"  # as checksum and type: whatever the other side has
+ANY_TYPE = "*"  # checksum and type that match every service and topic
 
 
 class NoAnswer(Exception):
-    """Master, node or service is not there, or did not answer in time."""
+    """Master, node or service does not exist, or did not answer in time."""
 
 
 def master_call(master: str, method: str, *words: object) -> Any:
-    """A call of the master's XML-RPC API, or of a node's: its value. NoAnswer where there is none."""
+    """Value returned by the XML-RPC API of the master or of a node. NoAnswer if there is none."""
     try:
         code, sentence, value = getattr(xmlrpc.client.ServerProxy(master), method)(CALLER, *words)
     except (OSError, xmlrpc.client.Error, ValueError, TypeError) as error:
@@ -33,35 +33,35 @@ def master_call(master: str, method: str, *words: object) -> Any:
 
 
 def text(value: str) -> bytes:
-    """A string as ROS sends it."""
+    """A string in the format of ROS messages."""
     data = value.encode()
     return struct.pack("<I", len(data)) + data
 
 
 class Reader:
-    """Takes one value after the other out of a message."""
+    """Reads the values of a message one after the other."""
 
     def __init__(self, data: bytes) -> None:
         self._data, self._at = data, 0
 
     def take(self, kind: str) -> Any:
-        """A number or bool by its code of the module struct."""
+        """Next number or bool. `kind` is its format code in the module struct."""
         (value,) = struct.unpack_from("<" + kind, self._data, self._at)
         self._at += struct.calcsize("<" + kind)
         return value
 
     def string(self) -> str:
-        """A string."""
+        """Next string."""
         size = self.take("I")
         self._at += size
         return self._data[self._at - size : self._at].decode(errors="replace")
 
     def strings(self) -> list[str]:
-        """A list of strings."""
+        """Next list of strings."""
         return [self.string() for _ in range(self.take("I"))]
 
     def header(self) -> None:
-        """Passes over a std_msgs/Header."""
+        """Skip a std_msgs/Header."""
         for _ in range(3):  # seq, stamp
             self.take("I")
         self.string()
@@ -71,7 +71,7 @@ class Connection:
     """One connection to a service or to the publisher of a topic."""
 
     def __init__(self, host: str, port: int, limit: float, **fields: str) -> None:
-        """`fields`: of the header that is sent. NoAnswer where nobody answers within `limit` s, or who does refuses."""
+        """`fields` are sent in the header. NoAnswer if the peer does not answer within `limit` s or refuses."""
         self._buffer = b""
         try:
             self._socket = socket.create_connection((host, port), limit)
@@ -87,11 +87,11 @@ class Connection:
             raise NoAnswer(answer[answer.index(b"error=") + 6 :].decode(errors="replace"))
 
     def send(self, data: bytes) -> None:
-        """Sends a message."""
+        """Send a message."""
         self._socket.sendall(struct.pack("<I", len(data)) + data)
 
     def read(self, size: int, limit: float) -> bytes | None:
-        """The next `size` bytes; None if they are not here within `limit` s. NoAnswer where the connection ended."""
+        """Next `size` bytes; None if they do not arrive within `limit` s. NoAnswer if the connection has ended."""
         end = time.monotonic() + limit
         while len(self._buffer) < size:
             self._socket.settimeout(max(1e-3, end - time.monotonic()))
@@ -108,7 +108,7 @@ class Connection:
         return data
 
     def message(self, limit: float) -> bytes | None:
-        """The next message; None if it is not here within `limit` s."""
+        """Next message; None if it does not arrive within `limit` s."""
         head = self.read(4, limit)
         if head is None:
             return None
@@ -119,12 +119,12 @@ class Connection:
         return body
 
     def close(self) -> None:
-        """Ends it."""
+        """Close the connection."""
         self._socket.close()
 
 
 def call(master: str, service: str, request: bytes, limit: float) -> Reader:
-    """The response of a service, `limit` s for each step of the way. NoAnswer without one."""
+    """Response of a service, with a limit of `limit` s for each step. NoAnswer if there is none."""
     place = urlparse(master_call(master, "lookupService", service))
     connection = Connection(str(place.hostname), int(place.port or 0), limit, service=service)
     try:
@@ -141,9 +141,9 @@ def call(master: str, service: str, request: bytes, limit: float) -> Reader:
 
 
 def subscribe(master: str, topic: str, limit: float) -> Connection:
-    """A connection to the first publisher of a topic; a latched message comes first. NoAnswer where there is none.
+    """Connection to the first publisher of a topic. A latched message arrives first. NoAnswer if there is no publisher.
 
-    The publisher is asked directly: the master does not learn of this subscriber.
+    The publisher is contacted directly: the master does not register this subscriber.
     """
     publishers = dict(master_call(master, "getSystemState")[0]).get(topic, [])
     if not publishers:

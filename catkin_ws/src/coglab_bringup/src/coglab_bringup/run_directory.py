@@ -1,4 +1,4 @@
-"""What makes two runs on one machine independent: an own ROS master port, ROS_HOME and log folder per run."""
+"""Gives every run its own ROS master port, ROS_HOME and log folder, so that runs on one computer are independent."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from pathlib import Path
 
 
 def free_port() -> int:
-    """A TCP port on loopback that nobody holds at the moment."""
+    """A TCP port on loopback that is free at the moment."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
 
 
 def port_is_free(port: int) -> bool:
-    """Whether a ROS master could bind this TCP port."""
+    """True if a ROS master could bind this TCP port."""
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
@@ -29,7 +29,7 @@ def port_is_free(port: int) -> bool:
 
 
 def run_environment(port: int, home: Path | None = None) -> dict[str, str]:
-    """The environment of one run: `port` of its ROS master, `home` for ROS_HOME (default: a new temporary folder)."""
+    """Environment of one run. `port`: of its ROS master; `home`: ROS_HOME (default: a new temporary folder)."""
     ros_home = home or Path(tempfile.mkdtemp(prefix="coglab-run-"))
     ros_home.mkdir(parents=True, exist_ok=True)
     environment = dict(os.environ)
@@ -39,17 +39,17 @@ def run_environment(port: int, home: Path | None = None) -> dict[str, str]:
         ROS_HOME=str(ros_home),
         ROS_LOG_DIR=str(ros_home / "log"),
         ROSCONSOLE_STDOUT_LINE_BUFFERED="1",
-        PYTHONUNBUFFERED="1",  # what a node said last is in the log, also when it was killed
+        PYTHONUNBUFFERED="1",  # so that the last output of a killed node is in the log
     )
     environment.pop("ROS_HOSTNAME", None)
     return environment
 
 
 def lasting_home(top: Path) -> tuple[Path, int]:
-    """A ROS_HOME that the next run finds again, with what the hand holds (coglab_holding.json), and its lock.
+    """A ROS_HOME that is kept for the next run, with the object in the hand (coglab_holding.json), and its lock.
 
-    The first of .coglab/home_1, home_2, ... that no other run has. It is taken until the file descriptor is closed,
-    which is inheritable: so it belongs to the program that replaces this one.
+    It is the first of .coglab/home_1, home_2, ... that no other run uses. It stays locked until the file descriptor is
+    closed. The descriptor is inheritable, so the lock passes to the program that replaces this one.
     """
     number = 1
     while True:
@@ -67,7 +67,7 @@ def lasting_home(top: Path) -> tuple[Path, int]:
 
 
 def _start_time(process: int) -> str:
-    """When a process began, in ticks since boot, which tells it from a later one of its id; empty if it ended."""
+    """Start of a process in ticks since boot, to distinguish it from a later one with its id; empty if it ended."""
     try:
         fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
     except OSError:
@@ -76,7 +76,7 @@ def _start_time(process: int) -> str:
 
 
 def record_run(top: Path, port: int, command: str) -> None:
-    """Notes that this process, or what replaces it, runs a system whose ROS master listens on `port`."""
+    """Record that this process, or its replacement, runs a system whose ROS master listens on `port`."""
     folder = top / ".coglab" / "runs"
     folder.mkdir(parents=True, exist_ok=True)
     row = {"command": command, "pid": os.getpid(), "start_time": _start_time(os.getpid())}
@@ -84,7 +84,7 @@ def record_run(top: Path, port: int, command: str) -> None:
 
 
 def running_systems(top: Path) -> dict[int, str]:
-    """Command (launch, demo) by port of the ROS master, of the systems that run; forgets those that have ended."""
+    """Running systems: command (launch, demo) by port of the ROS master. Removes the records of ended systems."""
     found = {}
     for path in sorted((top / ".coglab" / "runs").glob("*.json")):
         try:

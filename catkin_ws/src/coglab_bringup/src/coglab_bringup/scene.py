@@ -1,6 +1,6 @@
-"""Markers that make a picture of the cell readable in rviz: pedestal, board, goal and path of a motion, a text.
+"""Markers for the cell in rviz: pedestal, board, goal and path of a motion, a text.
 
-Pure functions from numbers to visualization_msgs/Marker; the node around them is scripts/scene_markers.py. Lengths m.
+Pure functions from numbers to visualization_msgs/Marker. The node is scripts/scene_markers.py. Lengths in m.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker
 
 BASE = "lwr_base_link"
-FLOOR = -0.75  # of the simulated cell, below the robot's base
+FLOOR = -0.75  # m, height of the simulated cell's floor above the robot's base
 PEDESTAL = (0.30, 0.30)
 BOARD_THICKNESS = 0.02
 LEG = 0.04
@@ -27,20 +27,20 @@ def _marker(name: str, kind: int, frame: str, colour: tuple, scale: tuple, numbe
 
 
 def gone(name: str) -> Marker:
-    """Takes a marker away that is not there any more."""
+    """Marker that removes a marker."""
     return Marker(ns=name, id=0, action=Marker.DELETE)
 
 
 def pedestal() -> Marker:
-    """What the robot stands on, from the floor to its base."""
+    """The pedestal of the robot, from the floor to its base."""
     marker = _marker("pedestal", Marker.CUBE, BASE, GREY, (*PEDESTAL, -FLOOR))
     marker.pose.position.z = FLOOR / 2
     return marker
 
 
 def board(size: tuple[float, float], height: float) -> list[Marker]:
-    """The board, its top in the frame `board`, with four legs down to the floor; `size` along x and y of that frame,
-    `height` of the top above the robot's base."""
+    """The board with four legs down to the floor. Its top is in the frame `board`. `size`: m along x and y of this
+    frame; `height`: m of the top above the robot's base."""
     top = _marker("board", Marker.CUBE, "board", WOOD, (*size, BOARD_THICKNESS))
     top.pose.position.z = -BOARD_THICKNESS / 2
     legs, length = [], height - FLOOR - BOARD_THICKNESS
@@ -52,21 +52,21 @@ def board(size: tuple[float, float], height: float) -> list[Marker]:
 
 
 def goal(position: np.ndarray) -> Marker:
-    """The goal of the motion under way, in the robot's base."""
+    """The goal of the current motion (m, frame of the robot's base)."""
     marker = _marker("goal", Marker.SPHERE, BASE, GREEN, (0.05, 0.05, 0.05))
     marker.pose.position = Point(*position)
     return marker
 
 
 def path(points: np.ndarray) -> Marker:
-    """The path (n, 3) that the primitive takes to its present goal."""
+    """The path (n, 3), in m, of the primitive to its current goal."""
     marker = _marker("path", Marker.LINE_STRIP, BASE, BLUE, (0.012, 0.0, 0.0))
     marker.points = [Point(*point) for point in points]
     return marker
 
 
 def text(words: str) -> Marker:
-    """State, object and why, above the robot."""
+    """State, object and reason as text above the robot."""
     marker = _marker("state", Marker.TEXT_VIEW_FACING, BASE, DARK, (0.0, 0.0, 0.07))
     marker.pose = Pose(Point(0.35, 0.0, 1.05), Quaternion(w=1.0))
     marker.text = words
@@ -74,7 +74,7 @@ def text(words: str) -> Marker:
 
 
 def words_of(state: str, object_id: str, why: str, width: int = 60) -> str:
-    """The text for a state of the brain; a long reason is cut."""
+    """Text for a state of the brain. A long reason is cut."""
     name = state.rsplit("/", 1)[-1].replace("_", " ")
     lines = [f"{name}, holds {object_id}" if object_id else name]
     if why:

@@ -1,18 +1,18 @@
 """./coglab test: finds and runs every test of the workspace and counts each case once, from the JUnit files.
 
-Three kinds, found by where they lie in a package:
-  gtest    test/ROOM/*.cpp with a TEST in one of them: one binary, devel/lib/PACKAGE/PACKAGE_test_ROOM;
-           test/test_THING.cpp: a binary of its own, PACKAGE_test_THING. The target `tests` builds them; a binary that
-           is not there is a failure
+There are three kinds of tests, found by their place in a package:
+  gtest    test/ROOM/*.cpp with a TEST in one of them: one binary, devel/lib/PACKAGE/PACKAGE_test_ROOM.
+           test/test_THING.cpp: a separate binary, PACKAGE_test_THING. The target `tests` builds them. A missing binary
+           is a failure
   pytest   test/test_*.py: one process per package, with a worker that is replaced if it crashes. A file that calls
-           rospy.init_node has a process of its own, because a process can be one node only
-  rostest  test/*.test, each with a ROS master of its own
-Packages that the build left out (./coglab build --upstream-smach) are named and not tested.
-A program or a file without a single case is a failure, too.
+           rospy.init_node has its own process, because a process can be only one node
+  rostest  test/*.test, each with its own ROS master
+Packages that the build omitted (./coglab build --upstream-smach) are listed and not tested.
+A program or a file without a case is a failure, too.
 
-Two programs run at a time, or one per processor core up to four. None may be red because others run beside it.
---repeat N runs all of that N times, --load beside two busy processes, and lists each case that did not end alike each
-time. --long runs the campaigns, too: tests that look for COGLAB_LONG in the environment.
+One program per processor core runs at a time, at least two and at most four. No test may fail because others run beside
+it. --repeat N runs everything N times, --load beside two busy processes, and lists each case whose result differs
+between the runs. --long also runs the campaigns: tests that read COGLAB_LONG from the environment.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ from coglab_bringup.usage import Refused
 
 AT_A_TIME = max(2, min(4, os.cpu_count() or 2))
 BUSY = ("-c", "import os\nparent = os.getppid()\nwhile os.getppid() == parent:\n  sum(range(100000))")
-"""a process that uses one core as long as its parent lives"""
-OWN_NODE = "rospy.init_node("  # in a pytest file: it needs a process of its own
+"""A process that uses one core while its parent lives."""
+OWN_NODE = "rospy.init_node("  # in a pytest file: the file needs its own process
 SLOWEST = 10  # programs and files whose time is printed at the end
-TIME_LIMIT = 1800.0  # s, per test program
-LONG_TIME_LIMIT = 7200.0  # s, with --long
+TIME_LIMIT = 1800.0  # s per test program
+LONG_TIME_LIMIT = 7200.0  # s with --long
 
 
 @dataclass
@@ -50,20 +50,20 @@ class Program:
     kind: str  # gtest, pytest, rostest
     name: str
     command: list[str]
-    junit: Path  # file it writes, or (rostest) folder
-    files: list[str] = field(default_factory=list)  # pytest: each has to have a case
-    slots: int = 1  # of AT_A_TIME
+    junit: Path  # file that it writes; for rostest: folder
+    files: list[str] = field(default_factory=list)  # pytest: each file must have a case
+    slots: int = 1  # number of the AT_A_TIME slots that it occupies
     seconds: float = 0.0
     passed: int = 0
     failed: int = 0
     skipped: int = 0
     failures: list[str] = field(default_factory=list)
-    cases: dict[str, str] = field(default_factory=dict)  # passed, failed or skipped, by the name of the case
-    seconds_of: dict[str, float] = field(default_factory=dict)  # pytest: of each file
+    cases: dict[str, str] = field(default_factory=dict)  # passed, failed or skipped, by name of the case
+    seconds_of: dict[str, float] = field(default_factory=dict)  # pytest: by file
 
 
 def find_programs(top: Path, results: Path, python: str, wanted: list[Wanted]) -> list[Program]:
-    """The test programs wanted; if none is named, of all packages that the build did not leave out."""
+    """The requested test programs; if none is named, those of all packages that the build did not omit."""
     folders = package_folders(top / "catkin_ws" / "src")
     programs = []
     by_package: dict[str, list[Wanted]] = {}
@@ -81,14 +81,14 @@ def find_programs(top: Path, results: Path, python: str, wanted: list[Wanted]) -
             programs.append(Program(package, "rostest", path.name, ["rostest", str(path)], xml))
     for program in programs:
         if 1 < len(program.files) > sum(len(one.files) or 1 for one in programs) / 2:
-            program.slots = 2  # nearly alone: with one worker the other processor cores would idle
+            program.slots = 2  # nearly alone: with one worker the other cores would be idle
     return programs
 
 
 def _gtests(
     package: str, library: Path, results: Path, chosen: dict[Path, set[str]], files: list[Path]
 ) -> list[Program]:
-    """One program for each binary that holds a chosen file; with a filter unless all of its files are chosen whole."""
+    """One program per binary with a requested file. It has a filter unless all of its files are requested whole."""
     filters: dict[str, list[str]] = {}
     whole: dict[str, bool] = {}
     for path in (path for path in files if path.suffix == ".cpp"):
@@ -107,7 +107,7 @@ def _gtests(
 
 
 def _pytests(package: str, python: str, results: Path, chosen: dict[Path, set[str]]) -> list[Program]:
-    """One program for all files that can share a process, and one for each of the others."""
+    """One program for all files that can share a process, and one for each other file."""
     shared: list[Path] = []
     groups: list[tuple[str, list[Path]]] = []
     for path in (path for path in chosen if path.suffix == ".py"):
@@ -129,7 +129,7 @@ def _pytests(package: str, python: str, results: Path, chosen: dict[Path, set[st
 
 
 def count_cases(program: Program, report: Path) -> None:
-    """Adds the cases of one JUnit file to the program's counts."""
+    """Add the cases of one JUnit file to the program's counts."""
     for case in ElementTree.parse(report).getroot().iter("testcase"):
         name = f"{case.get('classname', '')}.{case.get('name', '')}".removeprefix(".")
         file = f"{name.partition('.')[0]}.py" if program.kind == "pytest" else ""
@@ -152,16 +152,16 @@ def count_cases(program: Program, report: Path) -> None:
 
 
 def unfinished(log: Path) -> list[str]:
-    """Tests that a pytest's log says began and does not say ended: `file::test` and `[gw0] [ 5%] PASSED file::test`."""
+    """Tests that began but did not end in a pytest log. Lines: `file::test`, then `[gw0] [ 5%] PASSED file::test`."""
     lines = log.read_text(encoding="utf-8", errors="replace").splitlines() if log.exists() else []
     ended = {words[-1] for words in map(str.split, lines) if len(words) > 1}
     return [line.strip() for line in lines if "::" in line and line.strip() == line.split()[0] not in ended]
 
 
 def count(program: Program, status: int | None, log: Path) -> None:
-    """Reads the program's JUnit files; one without such a file, or that died without a red case, is one failure."""
+    """Read the program's JUnit files. A missing file, or a program that died without a failed case, is one failure."""
     if program.kind == "rostest":
-        # rosunit-*.xml holds the cases; rostest-*.xml only says whether each test node left such a file
+        # rosunit-*.xml contains the cases; rostest-*.xml only records whether each test node wrote such a file
         reports = sorted(program.junit.rglob("rosunit-*.xml"))
         if status != 0 and not reports:
             reports = sorted(program.junit.rglob("rostest-*.xml"))
@@ -189,7 +189,7 @@ def count(program: Program, status: int | None, log: Path) -> None:
 
 
 def run(program: Program, log: Path, limit: float) -> None:
-    """Runs one program, and ends it at the limit; nothing that it started outlives it."""
+    """Run one program and end it at the time limit. None of its processes survives."""
     environment = dict(os.environ)
     if program.kind == "rostest":
         environment = run_environment(free_port(), program.junit)
@@ -199,7 +199,7 @@ def run(program: Program, log: Path, limit: float) -> None:
         program.failures.append(f"{program.command[0]} does not exist: it was not built; see .coglab/build.log")
         print(f"  {program.package:20s} {program.kind:8s}{program.name:44s} not built  FAILED", flush=True)
         return
-    # What a script starts in the background ignores SIGINT, and so would all below it: tests of Ctrl-C would be red.
+    # A script's background processes ignore SIGINT, and so would all processes below: tests of Ctrl-C would fail.
     command = ["env", "--default-signal=INT,QUIT", *program.command]
     if len(program.files) > 1:
         command += ["-n", str(program.slots), "--dist", "loadfile"]
@@ -218,19 +218,19 @@ def run(program: Program, log: Path, limit: float) -> None:
 
 
 def longest_first(programs: list[Program]) -> list[Program]:
-    """In the order in which they begin: the last ones are short, so that all processor cores end at the same time."""
+    """Programs in their starting order. Short ones are last, so that all processor cores finish at the same time."""
     kinds = ("pytest", "rostest", "gtest")
     return sorted(programs, key=lambda one: (-one.slots, kinds.index(one.kind), -len(one.files)))
 
 
 def log_of(program: Program, results: Path) -> Path:
-    """Where a program's output goes."""
+    """Log file of a program's output."""
     return results / "logs" / f"{program.junit.name.removesuffix('.xml')}.log"
 
 
 def report_differences(runs: list[list[Program]], out: Path) -> int:
-    """Prints each case that did not end alike in all runs; returns the exit status."""
-    ends: dict[tuple[str, str, str], dict[int, str]] = {}  # by case: how it ended, by the number of the run
+    """Print each case whose result differs between the runs. Returns the exit status."""
+    ends: dict[tuple[str, str, str], dict[int, str]] = {}  # by case: result by number of the run
     logs: dict[tuple[int, str, str], Path] = {}
     for number, programs in enumerate(runs, 1):
         for program in programs:
@@ -256,7 +256,7 @@ def report_differences(runs: list[list[Program]], out: Path) -> int:
 
 
 def report(programs: list[Program], results: Path) -> int:
-    """Prints failures, the time of each package and the closing line; returns the exit status."""
+    """Print failures, the time of each package and the last line. Returns the exit status."""
     for program in programs:
         for failure in program.failures:
             print(f"FAILED {program.package} {program.name}: {failure}")
@@ -280,7 +280,7 @@ def report(programs: list[Program], results: Path) -> int:
 
 
 def main(arguments: list[str]) -> int:
-    """Runs the tests; exit status 0 only if at least one passed and none failed."""
+    """Run the tests. Exit status 0 only if at least one test passed and none failed."""
     top = Path(os.environ["COGLAB_TOP"])
     try:
         options = test_options(top, arguments)
@@ -313,7 +313,7 @@ def main(arguments: list[str]) -> int:
 
 
 def run_all(top: Path, results: Path, wanted: list[Wanted], limit: float) -> tuple[list[Program], int]:
-    """Runs these tests once: the programs, and the exit status."""
+    """Run these tests once. Returns the programs and the exit status."""
     (results / "logs").mkdir(parents=True, exist_ok=True)
     python = os.environ.get("COGLAB_TEST_PYTHON", "/usr/bin/python3")
     programs = find_programs(top, results, python, wanted)

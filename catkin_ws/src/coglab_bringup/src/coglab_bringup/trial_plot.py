@@ -1,4 +1,4 @@
-"""One picture of a trial: phases, paths, speeds, torques and fingers on one time axis."""
+"""One figure of a trial: phases, paths, speeds, torques and fingers on one time axis."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from matplotlib.transforms import Bbox
 
 from coglab_bringup.trial_recorder import Trial
 
-# Okabe and Ito's colours: told apart by colour-blind readers too
+# Colours of Okabe and Ito, which colour-blind readers can distinguish
 COLOURS = ["#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#CC79A7", "#1B1F24"]
 CONTACT = COLOURS[3]
 JOINTS = ["A1", "A2", "E1", "A3", "A4", "A5", "A6"]
 FINGERS = ["thumb abduction", "thumb", "index", "middle", "ring+little"]
-TEXT = 7  # pt, smallest text of the picture, which is made for the width of a page (7.2 inch)
+TEXT = 7  # pt, smallest text of the figure, which has the width of a page (7.2 inch)
 STYLE = {
     "font.size": 8,
     "axes.labelsize": 8,
@@ -32,12 +32,12 @@ STYLE = {
 
 
 def _column(rows: list[tuple], index: int, origin: float) -> tuple[np.ndarray, np.ndarray]:
-    """Times relative to `origin` and one column of the rows."""
+    """Times (s) relative to `origin` and one column of the rows."""
     return np.array([row[0] for row in rows]) - origin, np.array([row[index] for row in rows])
 
 
 def _speed(times: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Speed of a path on an even 50 Hz grid, smoothed over 60 ms: times and m/s."""
+    """Speed along a path on a uniform 50 Hz grid, smoothed over 60 ms. Returns times (s) and speeds (m/s)."""
     grid = np.arange(times[0], times[-1], 0.02)
     even = np.column_stack([np.interp(grid, times, axis) for axis in points.T])
     speed = np.linalg.norm(np.gradient(even, 0.02, axis=0), axis=1)
@@ -45,18 +45,18 @@ def _speed(times: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def state_intervals(trial: Trial, end: float) -> dict[str, list[tuple[float, float, str]]]:
-    """For each container: when its states began and ended, from the transitions; what is still active ends at `end`."""
+    """For each container: start, end and name of its states, from the transitions. Active states end at `end` (s)."""
     intervals: dict[str, list[tuple[float, float, str]]] = {}
     entered: dict[tuple[str, str], float] = {}  # (container, state) -> time
     begun: dict[str, float] = {}  # container -> time
     left = {(path, from_state) for _, path, from_state, *_ in trial.transitions}
     for t, path, from_state, outcome, to_state, *_ in trial.transitions:
-        above = path  # a child of a concurrence begins with it, and no transition leads to it
+        above = path  # a child of a concurrence begins with its container, without a transition
         while above and above not in begun:
             above = above.rpartition("/")[0]
         since = entered.pop((path, from_state), begun.get(above, trial.transitions[0][0]))
         intervals.setdefault(path, []).append((since, t, from_state))
-        # a sibling, not the container's own outcome: it is left later, or (still active) not named like the outcome
+        # `to_state` is a sibling, not an outcome of the container: it is left later, or its name is not the outcome's
         if (path, to_state) in left or to_state != outcome:
             entered[path, to_state] = t
             begun[f"{path}/{to_state}"] = t
@@ -66,7 +66,7 @@ def state_intervals(trial: Trial, end: float) -> dict[str, list[tuple[float, flo
 
 
 def rows_without_overlap(intervals: list[tuple[float, float, str]]) -> list[list[tuple[float, float, str]]]:
-    """Spreads intervals over as few rows as it takes that none overlaps another (children of a concurrence)."""
+    """Distribute intervals over the smallest number of rows without overlaps (children of a concurrence overlap)."""
     rows: list[list[tuple[float, float, str]]] = []
     for interval in sorted(intervals):
         for row in rows:
@@ -79,9 +79,9 @@ def rows_without_overlap(intervals: list[tuple[float, float, str]]) -> list[list
 
 
 def lanes_of(trial: Trial, start: float, end: float) -> list[tuple[str, list[list[tuple[float, float, str]]]]]:
-    """The rows of the phases, from the outermost container inwards: label and intervals between `start` and `end`.
+    """Rows of the phases, from the outermost container inwards: label and intervals between `start` and `end` (s).
 
-    Containers of one name at one depth, such as the approach of each action, share a lane.
+    Containers with the same name and depth share a lane, for example the approach of each action.
     """
     lanes: dict[tuple[int, str], list[tuple[float, float, str]]] = {}
     for path, intervals in state_intervals(trial, end).items():
@@ -94,13 +94,13 @@ def lanes_of(trial: Trial, start: float, end: float) -> list[tuple[str, list[lis
 
 
 def colours_of(names: list[str]) -> dict[str, tuple]:
-    """One colour for each name, wherever it appears."""
+    """One colour for each name."""
     palette = plt.get_cmap("tab20").colors
     return {name: palette[k % len(palette)] for k, name in enumerate(dict.fromkeys(names))}
 
 
 def _label(axis: plt.Axes, x: float, y: float, name: str, space: Bbox) -> None:
-    """Writes a name into its bar, in one line or a word a line; not at all where neither fits."""
+    """Write a name into its bar, in one line or one word per line. Omit it if neither fits."""
     renderer = axis.figure.canvas.get_renderer()
     for words in (name, name.replace(" ", "\n")):
         label = axis.text(x, y, words, ha="center", va="center", fontsize=TEXT, linespacing=0.9, clip_on=True)
@@ -111,13 +111,13 @@ def _label(axis: plt.Axes, x: float, y: float, name: str, space: Bbox) -> None:
 
 
 def _phases(axis: plt.Axes, trial: Trial, start: float, end: float) -> None:
-    """A lane per container that was active, a bar per state; parallel children share the lane's height. A name is
-    written where it fits into its bar."""
+    """One lane per active container, one bar per state. Parallel children share the height of the lane. A name is
+    written if it fits into its bar."""
     lanes = lanes_of(trial, start, end)
     colours = colours_of([name for _, rows in lanes for row in rows for _, _, name in row])
     axis.set_xlim(0.0, end - start)
     axis.set_ylim(len(lanes) - 0.5, -0.5)
-    axis.figure.canvas.draw()  # the width of the bars in the picture has to be known
+    axis.figure.canvas.draw()  # to know the width of the bars
     renderer = axis.figure.canvas.get_renderer()
     for lane, (_, rows) in enumerate(lanes):
         height = 0.84 / len(rows)
@@ -142,7 +142,7 @@ def _phases(axis: plt.Axes, trial: Trial, start: float, end: float) -> None:
 
 
 def _hands(path_axis: plt.Axes, speed_axis: plt.Axes, truth: list[tuple], start: float) -> None:
-    """Paths and speeds of the robot's and the person's hand, as they really were."""
+    """True paths and speeds of the robot's and the person's hand."""
     times, robot = _column(truth, 1, start)
     _, human = _column(truth, 2, start)
     for k, name in enumerate("xyz"):
@@ -153,9 +153,9 @@ def _hands(path_axis: plt.Axes, speed_axis: plt.Axes, truth: list[tuple], start:
 
 
 def _torques(axis: plt.Axes, rows: list[tuple], start: float) -> None:
-    """External torques, a trace per joint above the next one, all on one scale that the bar at the right shows."""
+    """External torques: one trace per joint, one above the other, on one scale that the bar at the right shows."""
     times, torques = _column(rows, 1, start)
-    low, high = np.percentile(torques, [0.5, 99.5], axis=0)  # one shock must not flatten all the rest
+    low, high = np.percentile(torques, [0.5, 99.5], axis=0)  # so that one peak does not flatten the other traces
     step = 1.2 * float(np.max(high - low)) or 1.0
     for k in range(len(JOINTS)):
         axis.axhline(-k * step, color="0.85", lw=0.5)
@@ -168,14 +168,14 @@ def _torques(axis: plt.Axes, rows: list[tuple], start: float) -> None:
 
 
 def _fingers(axis: plt.Axes, rows: list[tuple], start: float) -> None:
-    """Positions of the five motors."""
+    """Positions of the five finger motors."""
     times, positions = _column(rows, 1, start)
     for k, name in enumerate(FINGERS):
         axis.plot(times, positions[:, k], color=COLOURS[k], label=name)
 
 
 def _contact_lines(axes: list[plt.Axes], contacts: list[tuple], start: float) -> None:
-    """Vertical lines where the detector reported, explained beside the phases."""
+    """Vertical lines at the events of the contact detector, explained beside the phases."""
     kinds = {True: ("contact or load felt", ":"), False: ("load taken over", "--")}
     for axis in axes:
         for t, found, *_ in contacts:
@@ -187,7 +187,7 @@ def _contact_lines(axes: list[plt.Axes], contacts: list[tuple], start: float) ->
 
 
 def draw_trial(trial: Trial, title: str, start: float, end: float, path: Path) -> None:
-    """Writes the picture of the trial between `start` and `end` (s of ROS time): `path` as PNG, beside it a PDF."""
+    """Write the figure of the trial between `start` and `end` (s of ROS time): `path` as PNG, a PDF beside it."""
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(
             6, 1, figsize=(7.2, 9.0), sharex=True, height_ratios=[2.2, 1.6, 0.9, 1.7, 1.0, 0.7], layout="constrained"

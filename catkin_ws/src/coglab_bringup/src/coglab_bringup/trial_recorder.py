@@ -1,6 +1,6 @@
-"""Listens to one trial and keeps what its result and its plot need.
+"""Records one trial: the data for its result and its plot.
 
-Reads the simulated truth: it measures, it does not control.
+It reads the true state of the simulation, but only to measure, not to control.
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ from sensor_msgs.msg import JointState
 
 from coglab_bringup.reach_errors import GIVES, reach_errors
 
-FORCE_THRESHOLD = 0.3  # N on palm and fingers from which something touches the hand (truth)
-LOST_KEYS = ("measurements lost", "answers lost")  # diagnostics values of the bridge that count lost FRI packets
+FORCE_THRESHOLD = 0.3  # N on palm and fingers; a larger true force counts as touch
+LOST_KEYS = ("measurements lost", "answers lost")  # diagnostics of the bridge that count lost FRI packets
 
 
 @dataclass
 class Trial:
-    """Time series of one trial; times in s of the steady clock, rows beside them."""
+    """Time series of one trial. Each row begins with its time t (s of the steady clock)."""
 
     joints: list[tuple] = field(default_factory=list)  # (t, position[7], velocity[7])
     external_torques: list[tuple] = field(default_factory=list)  # (t, torque[7]) in Nm
     truth: list[tuple] = field(default_factory=list)  # (t, robot xyz, human xyz, object xyz, force on the robot's hand)
-    poses: list[tuple] = field(default_factory=list)  # (t, palm, person's hand, object) as Poses in world, the truth
+    poses: list[tuple] = field(default_factory=list)  # (t, palm, person's hand, object): true Poses in world
     fingers: list[tuple] = field(default_factory=list)  # (t, position[5])
     feedback: list[tuple] = field(default_factory=list)  # (t, state, remaining distance)
     transitions: list[tuple] = field(default_factory=list)  # (t, path, from, outcome, to, reason, code)
-    contacts: list[tuple] = field(default_factory=list)  # (t, contact, margin, what the detector says)
+    contacts: list[tuple] = field(default_factory=list)  # (t, contact, margin, text of the detector)
     fri_lost: list[tuple] = field(default_factory=list)  # (t, FRI packets lost so far), from the bridge's diagnostics
 
 
@@ -59,13 +59,13 @@ class TrialRecorder:
         ]
 
     def stop(self) -> Trial:
-        """Ends listening; the trial is complete."""
+        """Stop recording and return the complete trial."""
         for subscriber in self._subscribers:
             subscriber.unregister()
         return self.trial
 
     def wait_for(self, condition: Callable[[], bool], limit: float) -> bool:
-        """Waits until `condition()` holds, at most `limit` seconds of the steady clock; whether it did."""
+        """Wait until `condition()` is true, up to `limit` (s of the steady clock). True if it is."""
         with self.changed:
             return bool(self.changed.wait_for(lambda: condition() or rospy.is_shutdown(), limit)) and condition()
 
@@ -125,24 +125,24 @@ def summarise(
     velocity_limits: np.ndarray,
     entry: Mapping[str, Any] | None = None,
 ) -> dict:
-    """The figures of one handover between `start` and `end` (s), for result.json. `entry`: of the object that is handed
-    over, as the database has it; None: not known.
+    """The values of one handover between `start` and `end` (s) for result.json. `entry`: the database entry of the
+    object that is handed over; None: unknown.
 
-    final_error_mm, final_error_deg, reaches: reach_errors(); believed_error_mm: hand to the goal that the motion
-    latched at its end, as the controller itself tells of reaches that say `reached`; contact_delay_ms: from the first
-    touch (truth) to the detector's sample; fri_lost: FRI packets lost meanwhile, as the bridge reports once a second;
-    peak_velocity_share: largest joint speed over its limit. None where nothing was measured (no contact is waited for
-    where the robot gives).
+    final_error_mm, final_error_deg, reaches: see reach_errors(). believed_error_mm: distance of the hand from the goal
+    that the motion latched at its end, as the controller publishes it, for motions that end as `reached`.
+    contact_delay_ms: from the first true touch to the detector's sample. fri_lost: FRI packets lost during the
+    handover, as the bridge publishes it once a second. peak_velocity_share: largest joint speed divided by its limit.
+    Values without a measurement are None (the machine waits for no contact when the robot gives).
     """
     contact = next((t for t, found, *_ in trial.contacts if found and start <= t <= end), None)
     until = next(
         (t for t, *_ in trial.contacts if start <= t <= end), end
-    )  # after a contact or a release the arm goes home
-    # A motion that is "holding" is on its way: it holds a goal that is not seen for the moment.
+    )  # after a contact or a release the arm moves home
+    # A motion in the state "holding" is in progress: its goal is not visible at the moment.
     arrived = [d for t, state, d in trial.feedback if start <= t <= until and state == "reached"]
     touch = next((t for t, *_, force in trial.truth if start <= t <= end and force > FORCE_THRESHOLD), None)
     delay = contact - touch if contact and touch else None
-    if kind == GIVES:  # the object touches the hand from the start
+    if kind == GIVES:  # the object touches the hand from the beginning
         delay = None
     lost_before = [count for t, count in trial.fri_lost if t <= start] or [count for _, count in trial.fri_lost][:1]
     lost_until = [count for t, count in trial.fri_lost if t <= end + 1.0]

@@ -1,4 +1,4 @@
-"""How arguments are refused, and the kinds of values that several commands take. Python's own library alone."""
+"""Refusal of arguments, and types of values that several commands accept. Standard library only."""
 
 from __future__ import annotations
 
@@ -9,33 +9,33 @@ import shutil
 from pathlib import Path
 from typing import NoReturn
 
-RESULTS_SPACE = 50e6  # bytes, for the results of a demo or of the tests
+RESULTS_SPACE = 50e6  # bytes for the results of a demo or of the tests
 
 
 class Refused(Exception):
-    """An argument that cannot be used; the sentence says what was expected."""
+    """An argument that cannot be used. The message states what was expected."""
 
 
 class Parser(argparse.ArgumentParser):
-    """Refuses in one sentence instead of a usage block."""
+    """An argument parser that refuses with one sentence instead of a usage block."""
 
     def error(self, message: str) -> NoReturn:
-        """Called by argparse."""
+        """Raise Refused; argparse calls this."""
         raise Refused(f"{message}; what there is: ./{self.prog} --help")
 
 
 def seed(text: str) -> int:
-    """A seed: a whole number from 0 to 2147483647."""
+    """Parse a seed: a whole number from 0 to 2147483647."""
     if not re.fullmatch(r"\d{1,10}", text) or int(text) > 2147483647:
         raise argparse.ArgumentTypeError(f"expected a whole number from 0 to 2147483647, got '{text}'")
     return int(text)
 
 
 def writable_folder(text: str) -> Path:
-    """A folder that exists or can be made, and written to."""
+    """Parse a folder that can be written to. It exists or can be created."""
     path = Path(text).absolute()
     there = next(parent for parent in (path, *path.parents) if parent.exists())
-    # os.access says yes to root even where the file system does not write, as in /proc
+    # For root, os.access returns True even where the file system cannot be written, as in /proc
     if not there.is_dir() or not os.access(there, os.W_OK | os.X_OK) or str(there).split("/")[1] in ("proc", "sys"):
         raise argparse.ArgumentTypeError(f"{text} cannot be written: {there} is no folder that takes files")
     free = shutil.disk_usage(there).free
@@ -46,7 +46,7 @@ def writable_folder(text: str) -> Path:
 
 
 def writable_file(text: str) -> Path:
-    """A file in a folder that exists and can be written to."""
+    """Parse a file name in an existing folder that can be written to."""
     path = Path(text)
     if path.is_dir() or not path.absolute().parent.is_dir():
         raise argparse.ArgumentTypeError(f"expected a file in a folder that exists, got {text}")
@@ -55,7 +55,7 @@ def writable_file(text: str) -> Path:
 
 
 def master_port(text: str) -> int:
-    """A TCP port."""
+    """Parse a TCP port."""
     if not text.isdigit() or not 0 < int(text) < 65536:
         raise argparse.ArgumentTypeError(f"expected a port number, such as 11411, got '{text}'")
     return int(text)

@@ -1,1 +1,1 @@
-"""The objects that are handed over: files, schema and loader."""
+"""The objects of the handovers: files, schema and loader."""

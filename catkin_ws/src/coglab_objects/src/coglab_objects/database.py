@@ -1,5 +1,5 @@
-"""Object database: one YAML file per object, checked against a JSON schema and against itself, reloaded
-without a restart."""
+"""Object database: one YAML file per object, checked with a JSON schema and for consistency, reloaded without a
+restart."""
 
 from __future__ import annotations
 
@@ -18,22 +18,21 @@ from coglab_py.yaml_file import Document, Field, YamlError, parse, read
 from ih2_hand.grasps import check_grasp
 
 SCHEMA_FILE = package_path("coglab_objects", "config", "object_schema.json")
-"""what an object may be: the simulated cell reads the ranges of mass, size and friction there, too"""
-SAME_LENGTH = 1e-6
-"""m by which `size` may differ from the box around `shape`: what rounding leaves"""
+"""JSON schema of an object. The simulated cell also reads the ranges of mass, size and friction from it."""
+SAME_LENGTH = 1e-6  # m, tolerance for rounding between `size` and the box around `shape`
 
 
 class ObjectError(ValueError):
-    """An object file cannot be used: file, line where known, field, and what was expected."""
+    """An object file is invalid: file, line if known, field, and the expected value."""
 
 
 def objects_folder() -> Path:
-    """The folder with the objects that are shipped."""
+    """The folder with the objects of this package."""
     return package_path("coglab_objects", "objects")
 
 
 def parse_object(text: str, origin: str, dialect: str = "legacy") -> dict[str, Any]:
-    """Parse and check one object for a hand of this dialect; ObjectError says ``origin:line: field: what``."""
+    """Parse and check one object for a hand of this dialect. ObjectError: ``origin:line: field: message``."""
     try:
         return _checked(parse(text, origin), dialect)
     except YamlError as error:
@@ -56,7 +55,7 @@ def _schema() -> dict[str, Any]:
 
 
 def _inconsistency(entry: dict[str, Any], dialect: str) -> tuple[Field, str] | None:
-    """What the schema cannot see: references between fields, and geometry. None if all is well."""
+    """An error that the schema cannot find, in references between fields or in the geometry. None if there is none."""
     solid = _solid(entry["shape"])
     if solid is not None and not np.allclose(entry["size"], solid[1], rtol=0.0, atol=SAME_LENGTH):
         size = [float(v) for v in entry["size"]]
@@ -83,7 +82,7 @@ def _inconsistency(entry: dict[str, Any], dialect: str) -> tuple[Field, str] | N
 
 
 def _solid(shape: dict[str, Any]) -> tuple[str, list[float]] | None:
-    """The shape in words and the box around it (m); None where the shape has no lengths of its own."""
+    """Name of the shape and the box around it (m); None if the shape has no lengths."""
     if shape["type"] == "box":
         return None
     radius = float(shape["radius"])
@@ -95,7 +94,7 @@ def _solid(shape: dict[str, Any]) -> tuple[str, list[float]] | None:
 
 
 def read_object(path: Path, dialect: str = "legacy") -> tuple[dict[str, Any], str]:
-    """Entry and text of one file; ObjectError if it cannot be read or used."""
+    """Entry and text of one file. Raises ObjectError if it cannot be read or is invalid."""
     try:
         document = read(path, path.name)
         entry = _checked(document, dialect)
@@ -107,9 +106,9 @@ def read_object(path: Path, dialect: str = "legacy") -> tuple[dict[str, Any], st
 
 
 def cell_parameters(entry: dict[str, Any]) -> dict[str, Any]:
-    """What the simulated cell needs of an entry, by the names of its parameters below ``object/``.
+    """Parameters of the simulated cell from an entry, by their names below ``object/``.
 
-    The object frame lies in the middle of the underside, so the middle of the solid is half of its height above."""
+    The origin of the object frame is the middle of the underside, half of the height below the middle of the solid."""
     return {
         "id": entry["id"],
         "mass": float(entry["mass"]),
@@ -122,7 +121,7 @@ def cell_parameters(entry: dict[str, Any]) -> dict[str, Any]:
 
 @dataclass
 class _File:
-    """What is known of one file: its ``stamp`` when it was read, what was wrong then, and its good entry, if any."""
+    """State of one file: its ``stamp`` when it was read, its error then, and its last valid entry, if any."""
 
     stamp: tuple[int, int] | None
     problem: str = ""
@@ -131,9 +130,9 @@ class _File:
 
 
 class ObjectDatabase:
-    """All objects of a folder. ``reload`` takes over what is good; a bad file keeps its old entry and is reported.
+    """All objects of a folder. ``reload`` accepts valid files. An invalid file keeps its last entry and is reported.
 
-    ``dialect``: that of the hand, legacy or v17; it decides which grasps there are.
+    ``dialect`` of the hand, legacy or v17, determines which grasps exist.
     """
 
     def __init__(self, folder: str | os.PathLike[str], dialect: str = "legacy") -> None:
@@ -144,7 +143,7 @@ class ObjectDatabase:
         self.problems: list[str] = []
 
     def reload(self, only_changed: bool = False) -> list[str]:
-        """Read the folder again; returns the problems there are (empty if all files are good)."""
+        """Read the folder again. Returns the errors; empty if all files are valid."""
         if not self.folder.is_dir():
             self.problems = [f"{self.folder}: no such folder; expected one YAML file per object in it"]
             return self.problems
@@ -167,7 +166,7 @@ class ObjectDatabase:
             try:
                 found = os.stat(path)
                 stamps[path.name] = (found.st_mtime_ns, found.st_size)
-            except OSError:  # a link to nothing, or gone meanwhile
+            except OSError:  # a broken link, or the file was removed meanwhile
                 stamps[path.name] = None
         return stamps
 
@@ -181,7 +180,7 @@ class ObjectDatabase:
             return _File(stamp, f"{error}; the old entry stays", known.entry, known.text)
 
     def changed(self) -> bool:
-        """Whether a file was added, removed or written since the last reload."""
+        """True if a file was added, removed or written since the last reload."""
         with self._lock:
             return self._stamps() != {name: file.stamp for name, file in self._files.items()}
 
@@ -203,13 +202,13 @@ class ObjectDatabase:
         return good[object_id]
 
     def get(self, object_id: str) -> dict[str, Any]:
-        """One entry; ObjectError names those that exist."""
+        """One entry. An ObjectError lists the existing ids."""
         entry = self._find(object_id).entry
         assert entry is not None
         return entry
 
     def text(self, object_id: str) -> str:
-        """The entry as it stands in its file."""
+        """The entry as text of its file."""
         return self._find(object_id).text
 
 
@@ -240,7 +239,7 @@ contact: {{k: 6.0, timeout: 6.0}}
 
 
 def new_object_text(object_id: str) -> str:
-    """A valid entry to start from; ObjectError if the id cannot be one."""
+    """Text of a valid entry as a template. Raises ObjectError if the id is invalid."""
     text = _EXAMPLE.format(id=object_id)
     parse_object(text, f"{object_id}.yaml")
     return text

@@ -1,1 +1,1 @@
-"""What the rest of the system may expect from perception, and recognition of the partner's reaching motion."""
+"""The interface of perception to the rest of the system, and recognition of the partner's reaching motion."""

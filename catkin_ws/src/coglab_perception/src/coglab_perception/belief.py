@@ -1,8 +1,8 @@
-"""What is the person about to do: offer an object, ask for the one in the robot's hand, or neither?
+"""Estimates the person's intention: to offer an object, to request the one in the robot's hand, or neither.
 
-A belief with probabilities, updated by every sight of the hand and of objects, from the beginning of a reach on. The
-motion of the hand says whether it goes to a handover (reach_bank), the objects say whether it carries one (carried). An
-offer needs an object in the person's hand, a request one in the robot's.
+The belief consists of probabilities. Every observation of the hand and of the objects updates it, from the beginning of
+a reach. The hand's motion shows whether it goes to a handover (reach_bank). The motion of the objects shows whether the
+hand carries one (carried). An offer needs an object in the person's hand, a request needs one in the robot's hand.
 """
 
 from __future__ import annotations
@@ -22,23 +22,17 @@ from .carried import CarriedObject, CarriedSettings
 from .reach_bank import Prediction, ReachBank, ReachSettings
 from .recogniser import CLOCK_JUMP, PatternEnd
 
-AHEAD = 0.05
-"""s by which clocks that are synchronised differ; what is stamped later than that has not happened"""
-ROOM = 100.0
-"""m: no hand is farther away"""
-GONE = 0.05
-"""probability of a motion toward a handover below which there is none to take back"""
-EXTRAPOLATED = 0.10
-"""s for which the hand goes on as it did, for an object that was seen after it"""
-WAITING = 40
-"""most sights of an object that wait for one of the hand"""
-BESIDE = 0.02
-"""s by which a sight of an object is beside one of the hand"""
+AHEAD = 0.05  # s, largest difference of synchronised clocks; observations with a later stamp are ignored
+ROOM = 100.0  # m, upper bound of each coordinate of a hand
+GONE = 0.05  # probability of a motion toward a handover below which the hand's return is not a withdrawal
+EXTRAPOLATED = 0.10  # s for which the hand's motion is extrapolated, for an object observed after the hand
+WAITING = 40  # largest number of observations of an object that wait for one of the hand
+BESIDE = 0.02  # s between observations of object and hand that count as simultaneous
 
 
 class CriticallyDamped:
-    """A low-pass filter of second order without overshoot, solved exactly, for samples at any times: two time constants
-    late behind a steady motion, at rest within about five."""
+    """Second-order low-pass filter without overshoot, solved exactly for samples at any times. It lags behind a
+    constant velocity by two time constants, and settles within about five."""
 
     def __init__(self) -> None:
         self._value: np.ndarray | None = None
@@ -46,12 +40,12 @@ class CriticallyDamped:
         self._stamp = -math.inf
 
     def forget(self) -> None:
-        """What comes next is where it begins, at rest."""
+        """Forget the state. The next input becomes the output, at rest."""
         self._value = None
 
     def step(self, stamp: float, wanted: np.ndarray, time_constant: float) -> np.ndarray:
-        """Where it is at ``stamp`` (s, later than the last one), with ``wanted`` (3,) and poles at 1/``time_constant``
-        (s) since then; 0: what comes in goes out."""
+        """Output at ``stamp`` (s, later than the last one). ``wanted`` (3,) is the input since the last stamp. Both
+        poles are at 1/``time_constant`` (1/s). With a time constant of 0 the output is the input."""
         gap, self._stamp = stamp - self._stamp, stamp
         if self._value is None or time_constant <= 0.0:
             value, self._rate = np.array(wanted, dtype=float), np.zeros(3)
@@ -68,43 +62,43 @@ class CriticallyDamped:
 
 @dataclass(frozen=True)
 class BeliefSettings:
-    """Of the belief. Lengths in m, times in s."""
+    """Settings of the belief. Lengths in m, times in s."""
 
     decision: float = 0.9
-    """probability of an offer or a request from which one may act on it"""
+    """probability of an offer or a request at which the robot may act"""
     shown: float = 0.3
-    """probability below which there is no prediction of a place"""
+    """probability below which no place is predicted"""
     withdrawal: float = 0.10
-    """a hand that goes back so far from where it had come to takes back what it was about"""
+    """distance by which a hand must return from its farthest point to cancel its intention"""
     unseen: float = 0.5
-    """probability that a hand holds something where no object is seen"""
+    """probability that the hand holds something if no object is observed"""
     max_gap: float = 1.0
-    """without a sight of the hand, after which nothing is known any more"""
+    """time without an observation of the hand after which the belief is reset"""
     lost_time: float = 0.25
-    """of sights that do not fit the hand, after which this is another hand"""
+    """time of observations that do not fit the hand, after which they belong to another hand"""
     lost_sights: int = 4
-    """and how many of them in a row"""
+    """smallest number of consecutive observations in that time"""
     pattern_deviation: float = 0.06
-    """of the end of a reach about the one of its pattern, beside the spread of the pattern itself"""
+    """standard deviation of a reach's end about the end of its pattern, in addition to that of the pattern"""
     pattern_time: float = 0.15
-    """in which a pattern that is recognised comes to its full weight in the prediction"""
+    """time until a recognised pattern has its full weight in the prediction"""
     place_time: float = 0.2
-    """time constant with which the place of an offer follows its predictions where they are as uncertain as `unsure`"""
+    """time constant of the filter for the place of an offer, if the standard deviation is `unsure` or more"""
     unsure: float = 0.05
-    """largest standard deviation of the place on an axis from which it is that; below it is as much shorter, but not"""
+    """standard deviation (largest of the axes); below it the time constant is proportional to the deviation"""
     least_share: float = 0.15
-    """less than this share of it"""
+    """smallest share of place_time that is used"""
     request_time: float = 0.14
-    """the same time constant for the place where somebody asks for the object"""
+    """time constant of the filter for the place of a request"""
     same_reach: float = 0.3
-    """by which the onset of one reach may be corrected"""
+    """largest correction of the onset of one reach"""
     reach: ReachSettings = field(default_factory=ReachSettings)
     carried: CarriedSettings = field(default_factory=CarriedSettings)
 
     @staticmethod
     def from_mapping(data: Mapping[str, Any], source: str = "belief") -> BeliefSettings:
-        """From a parameter: fields by name, `reach` and `carried` as mappings of theirs; what is left out keeps its
-        default. ValueError names a field that is unknown or not a number as it has to be."""
+        """Settings from a parameter: fields by name; `reach` and `carried` are mappings. Missing fields keep their
+        defaults. A ValueError names a field that is unknown or has an invalid value."""
         groups = {"reach": ReachSettings(), "carried": CarriedSettings()}
         own = _read(BeliefSettings(), {k: v for k, v in data.items() if k not in groups}, source)
         read = {k: _read(groups[k], data.get(k, {}), f"{source}/{k}") for k in groups}
@@ -112,8 +106,7 @@ class BeliefSettings:
 
 
 def _read(default: Any, data: Any, source: str) -> Any:
-    """A settings object with the numbers of a mapping in the place of its own; each has to be finite and not
-    negative."""
+    """A copy of a settings object with the numbers of a mapping. Each number must be finite and not negative."""
     if not isinstance(data, Mapping):
         raise ValueError(f"{source}: expected a mapping of numbers, got {str(data)[:60]!r}")
     known = {
@@ -146,24 +139,24 @@ def _read(default: Any, data: Any, source: str) -> Any:
 
 @dataclass(frozen=True)
 class Belief:
-    """After the sight of the hand at ``stamp`` (s). Without a prediction ``place`` is None."""
+    """The belief after the observation of the hand at ``stamp`` (s). Without a prediction ``place`` is None."""
 
     stamp: float
     offer: float = 0.0
     request: float = 0.0
     onset: float | None = None
-    """s, stamp at which the motion began that is taken for a reach to a handover"""
+    """s, stamp at which the motion toward a handover began"""
     object_id: str = ""
     pattern: str = ""
-    """that the prediction rests on beside the motion itself; empty: none"""
+    """pattern used for the prediction, in addition to the motion itself; empty: none"""
     hand_place: np.ndarray | None = None
-    """m, where the hand will be at rest"""
+    """m, place where the hand will be at rest"""
     place: np.ndarray | None = None
-    """m, where the object will be then; without one in the person's hand: the hand's"""
+    """m, place of the object then; without an object in the person's hand: place of the hand"""
     covariance: np.ndarray | None = None
-    """m^2, (3, 3), of both"""
+    """m^2, (3, 3), covariance of both places"""
     time: float = 0.0
-    """s from the stamp until then"""
+    """s from the stamp until the hand is at rest"""
     time_deviation: float = -1.0
 
     @property
@@ -173,31 +166,31 @@ class Belief:
 
 
 class BeliefFilter:
-    """One person's hand and the objects about. Feed it sights in the order in which they arrive, with the time now (s):
-    what is late, from the future or not finite is left out."""
+    """Belief about one person's hand and the objects nearby. Pass observations in the order of their arrival, with the
+    current time (s). Observations that are late, from the future or not finite are ignored."""
 
     def __init__(self, settings: BeliefSettings = BeliefSettings()) -> None:
         self.settings = settings
         self.belief = Belief(-math.inf)
         self._bank: ReachBank | None = None
         self._track: deque[tuple[float, np.ndarray]] = deque(maxlen=40)
-        """stamps with position and velocity (6) of the hand"""
+        """stamps with position (m) and velocity (m/s) of the hand (6)"""
         self._objects: dict[str, CarriedObject] = {}
-        """by id, after all sights"""
+        """by id, after all observations"""
         self._settled_objects: dict[str, CarriedObject] = {}
-        """the same after those alone that are not newer than the newest sight of the hand"""
+        """the same, but without observations that are newer than the newest one of the hand"""
         self._waiting: dict[str, deque[tuple[float, np.ndarray]]] = {}
-        """stamps and positions of the newer ones"""
+        """stamps and positions of these newer observations"""
         self._robot_holds: bool | None = None
         self._misses: list[float] = []
         self._rest = self._furthest = np.zeros(3)
         self._place, self._onset = CriticallyDamped(), -math.inf
         self._pattern, self._pattern_weight, self._pattern_stamp = "", 0.0, -math.inf
 
-    # -- sights ----------------------------------------------------------------------------------------------------
+    # -- observations ----------------------------------------------------------------------------------------------
 
     def see_object(self, stamp: float, object_id: str, position: np.ndarray, now: float) -> None:
-        """A sight of an object's frame (m, world)."""
+        """Process an observation of an object's frame (m, world)."""
         position = np.asarray(position, dtype=float)
         if self._bank is None or not _usable(stamp, position, now):
             return
@@ -216,9 +209,9 @@ class BeliefFilter:
         self._objects[object_id] = self._beside_hand(object_id)
 
     def _beside_hand(self, object_id: str) -> CarriedObject:
-        """An object after all its sights. What was seen of it since the newest sight of the hand is judged by where
-        the hand would be, as long as that is known, and again once the hand has been seen after it: a hand that is not
-        seen for a while, or stops meanwhile, does not go on as it did."""
+        """An object after all its observations. Observations newer than the newest one of the hand are first evaluated
+        with the hand's extrapolated motion, and again when the hand has been observed after them: a hand that is not
+        observed for a while, or stops, does not move as extrapolated."""
         newest, waiting = self._track[-1][0], self._waiting[object_id]
         known = self._settled_objects[object_id] = copy(self._settled_objects[object_id])
         while waiting and waiting[0][0] <= newest:
@@ -236,8 +229,8 @@ class BeliefFilter:
         return shown
 
     def _hand_seen_at(self, stamp: float) -> tuple[np.ndarray, np.ndarray] | None:
-        """Position and velocity of the hand at a stamp between two of its sights; None where these are far apart and
-        the stamp is not beside one of them: what the hand did there nobody knows."""
+        """Position (m) and velocity (m/s) of the hand at a stamp between two of its observations. None if the two are
+        far apart and neither is close to the stamp: the motion in between is unknown."""
         times = [t for t, _ in self._track]
         after = bisect_left(times, stamp)
         near = [i for i in (after - 1, after) if 0 <= i < len(times)]
@@ -252,8 +245,8 @@ class BeliefFilter:
     def see_hand(
         self, stamp: float, position: np.ndarray, now: float, robot_holds: bool = False, end: PatternEnd | None = None
     ) -> Belief:
-        """A sight of the hand (m, world). ``robot_holds``: whether the robot has something in its hand that the person
-        can ask for; ``end``: what the recogniser says, where it is sure."""
+        """Process an observation of the hand (m, world) and return the belief. ``robot_holds``: the robot holds an
+        object that the person can request. ``end``: end of the reach from the recogniser, if it has decided."""
         position = np.asarray(position, dtype=float)
         if not _usable(stamp, position, now):
             return self.belief
@@ -264,7 +257,7 @@ class BeliefFilter:
             return self.belief
         else:
             if robot_holds != self._robot_holds:
-                # What one hand held is in the other one: that handover is over, the next one needs a reach of its own.
+                # The object changed hands: this handover is over, and the next one needs a new reach.
                 self._robot_holds = robot_holds
                 bank.forget()
             self._step(bank, stamp, position)
@@ -272,7 +265,7 @@ class BeliefFilter:
         return self.belief
 
     def _begin(self, stamp: float, position: np.ndarray, robot_holds: bool) -> None:
-        """A hand that was not seen before."""
+        """Start with a new hand."""
         self._bank = ReachBank(stamp, position, self.settings.reach)
         self._robot_holds = robot_holds
         self._track.clear()
@@ -310,7 +303,7 @@ class BeliefFilter:
             self._rest = self._furthest = position
 
     def _hand_at(self, stamp: float) -> tuple[np.ndarray, np.ndarray]:
-        """m and m/s, where the hand was at a stamp, without the tracker's error, or where it would be."""
+        """Position (m) and velocity (m/s) of the hand at a stamp, filtered or extrapolated."""
         newest, state = self._track[-1]
         if stamp >= newest:
             return state[:3] + min(stamp - newest, EXTRAPOLATED) * state[3:], state[3:]
@@ -322,7 +315,7 @@ class BeliefFilter:
     # -- judgement -------------------------------------------------------------------------------------------------
 
     def _carried(self, stamp: float) -> tuple[str, float, np.ndarray]:
-        """Id, probability and place in the hand (m) of the object that is most probably in it."""
+        """Id, probability and offset from the hand (m) of the object that is most probably in the hand."""
         seen = {k: o for k, o in self._objects.items() if abs(stamp - o.stamp) <= self.settings.carried.memory}
         if not seen:
             return "", self.settings.unseen, np.zeros(3)
@@ -358,9 +351,9 @@ class BeliefFilter:
         )
 
     def _settled(self, stamp: float, place: np.ndarray, covariance: np.ndarray, onset: float) -> np.ndarray:
-        """The predicted place (m) without the to and fro of its corrections: the hand goes to one place, so what the
-        predictions of one reach differ in is their error. An offer has to be met, so its place counts as it is the
-        sooner, the surer it is; who asks comes to what is held out."""
+        """The predicted place (m), filtered. The hand goes to one place, so differences between the predictions of one
+        reach are errors. For an offer the filter is the faster, the more certain the prediction is, because the robot
+        must meet the hand. For a request the person comes to the object."""
         s = self.settings
         if onset > self._onset + s.same_reach:
             self._place.forget()
@@ -372,8 +365,8 @@ class BeliefFilter:
     def _with_pattern(
         self, stamp: float, prediction: Prediction, end: PatternEnd | None
     ) -> tuple[np.ndarray, np.ndarray, str]:
-        """End of the motion and of its pattern, each by its precision; a pattern gets its weight gradually, so that
-        what follows the place is not pushed."""
+        """End of the motion combined with the end of its pattern, weighted by precision. The weight of a pattern grows
+        gradually, so that a motion toward the place does not jump. Returns place, covariance and pattern."""
         name = end.pattern if end is not None else ""
         if name != self._pattern:
             self._pattern, self._pattern_weight = name, 0.0
@@ -390,6 +383,6 @@ class BeliefFilter:
 
 
 def _usable(stamp: float, position: np.ndarray, now: float) -> bool:
-    """Whether a sight is one: finite, of a place in a room, and not of the future."""
+    """True if an observation is finite, within a room, and not from the future."""
     fits = position.shape == (3,) and bool(np.all(np.abs(position) < ROOM))
     return math.isfinite(stamp) and stamp <= now + AHEAD and fits

@@ -1,7 +1,7 @@
-"""Does this object move with the hand? A hidden Markov model over the object's ways between its sights.
+"""Estimates whether an object moves with the hand: a hidden Markov model over its displacements between observations.
 
-Three modes: carried (it goes where the hand goes), lying (it stays), free (it falls, or goes elsewhere). At rest the
-first two look alike, and their probability stays what it was; the first motion tells them apart.
+There are three modes: carried (it moves with the hand), lying (it stays), free (it falls or moves elsewhere). At rest
+the first two look the same, and their probabilities do not change. The first motion distinguishes them.
 """
 
 from __future__ import annotations
@@ -14,34 +14,33 @@ from coglab_py.pose import length
 
 CARRIED, LYING, FREE = range(3)
 RATES = np.array([[0.0, 0.02, 0.1], [0.3, 0.0, 0.1], [0.3, 2.0, 0.0]])
-"""1/s, from mode (row) to mode: people take things up more readily than they let go; what falls is soon at rest"""
-JITTER = 0.003
-"""m per axis, by which a hand at rest seems to go between two sights"""
+"""1/s, rates from mode (row) to mode. People pick up more readily than they let go; a falling object soon rests"""
+JITTER = 0.003  # m per axis, apparent displacement of a resting hand between two observations
 
 
 @dataclass(frozen=True)
 class CarriedSettings:
-    """Lengths in m, times in s."""
+    """Settings for carried objects. Lengths in m, times in s."""
 
     reach: float = 0.25
-    """an object farther from the middle of the palm is in no hand"""
+    """an object farther from the middle of the palm is not in the hand"""
     turning: float = 0.3
-    """share of the hand's way by which a carried object's way may differ, because the hand turns"""
+    """share of the hand's displacement by which that of a carried object may differ, because the hand turns"""
     free_speed: float = 1.0
-    """m/s, standard deviation per axis of the speed of what is free"""
+    """m/s, standard deviation per axis of the velocity of a free object"""
     fastest: float = 2.0
-    """m/s: a way at more than this is no way of this object, but of something that the tracker took for it"""
+    """m/s; a faster displacement is not this object but another one that the tracker confused with it"""
     follow_time: float = 0.12
-    """over which the object's place in the hand is averaged"""
+    """averaging time of the object's offset from the hand"""
     lost_time: float = 0.25
-    """after which a place that was not believed is believed"""
+    """time after which a rejected place is accepted"""
     memory: float = 1.0
-    """for which an object that is not seen counts as seen"""
+    """time for which an object counts as observed after its last observation"""
 
 
 class CarriedObject:
-    """One object. ``carried`` is the probability that it is in the hand, ``offset`` (m, world axes) its place from
-    there."""
+    """One object. ``carried`` is the probability that it is in the hand, ``offset`` (m, world axes) its position
+    relative to the hand."""
 
     def __init__(
         self,
@@ -67,15 +66,15 @@ class CarriedObject:
     def step(
         self, stamp: float, position: np.ndarray, hand: np.ndarray, velocity: np.ndarray, hand_error: float
     ) -> None:
-        """A sight of it, with the hand's position and velocity (m/s) at that stamp and the standard deviation of the
-        hand's way beyond the tracker's error (m)."""
+        """Process an observation of the object. ``hand`` (m) and ``velocity`` (m/s) are those of the hand at that
+        stamp; ``hand_error`` (m) is the standard deviation of the hand's displacement beyond the tracker's error."""
         s = self.settings
         gap = stamp - self.stamp
         if gap <= 0.0:
             return
         way, believed = position - self._position, 0.5 * gap * (self._velocity + velocity)
-        # James and Stein, by the velocity that is believed: a way that may be nothing but jitter counts as none, or at
-        # rest what lies would look likelier.
+        # James-Stein shrinkage by the expected displacement: one that may be mere jitter counts as zero. Otherwise
+        # `lying` would become more likely at rest.
         moved = max(0.0, 1.0 - 3.0 * JITTER**2 / max(1e-12, float(believed @ believed)))
         hand_way = moved * (hand - self._hand)
         error = 2.0 * self._noise**2 * (1.0 - math.exp(-gap / self._noise_time)) + JITTER**2
@@ -95,7 +94,7 @@ class CarriedObject:
         likely = self._modes @ (changed + np.diag(1.0 - changed.sum(axis=1)))
         likely = np.maximum(likely, 1e-6) * np.exp(log - log.max())
         if self._near():
-            # The less is known of where the hand is, the less it tells of the object's place in it.
+            # The less certain the position of the hand, the less the observation changes the offset.
             known = self._noise**2 / (self._noise**2 + hand_error**2)
             follow = known * (1.0 - math.exp(-gap / s.follow_time))
             self.offset = self.offset + follow * (position - hand - self.offset)
@@ -105,9 +104,9 @@ class CarriedObject:
         self._modes = likely / likely.sum()
 
     def _possible(self, way: np.ndarray, hand_way: np.ndarray, gap: float, error: float) -> bool:
-        """Whether an object can have gone a way (m) in a gap (s), but for an error (m). What is free goes anywhere.
+        """True if an object can have moved by ``way`` (m) in ``gap`` (s), within ``error`` (m). Free: anywhere.
 
-        What was not free lies, goes with the hand, or has just left it and falls; any other way is something else's.
+        Another object lies, moves with the hand, or has just left it and falls. Any other motion is a different object.
         """
         if length(way) > self.settings.fastest * gap + error:
             return False

@@ -1,4 +1,4 @@
-"""The tf2 frames by role. Their names are in one file, config/frames.yaml, and nowhere else."""
+"""The tf2 frames by role. Their names are defined only in config/frames.yaml."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from typing import Any
 from coglab_py.yaml_file import YamlError, read
 
 AHEAD = "_ahead"
-"""ends the name of the frame where something tracked is predicted to be at the handover"""
+"""suffix of the frame at the predicted place of a tracked frame at the handover"""
 
 
 class FramesError(ValueError):
-    """The frames' file or parameter cannot be used; the sentence says what is wrong with it."""
+    """The file or parameter of the frames is invalid; the message states the error."""
 
 
 @dataclass(frozen=True)
 class FrameNames:
-    """`object` contains {id}, which stands for the object's id in the database.
+    """Names of the frames. `object` contains {id}, which stands for the object's id in the database.
 
     Example::
 
@@ -36,19 +36,19 @@ class FrameNames:
         return self.object.replace("{id}", object_id)
 
     def object_id(self, frame: str) -> str:
-        """Id of the object whose frame a tracker shows by this name; empty for every other frame."""
+        """Id of the object that has this tracked frame; empty for every other frame."""
         before, _, after = self.object.partition("{id}")
         if frame.endswith(AHEAD) or not (frame.startswith(before) and frame.endswith(after)):
             return ""
         return frame[len(before) : len(frame) - len(after)]
 
     def is_tracked(self, frame: str) -> bool:
-        """Whether a tracker shows this frame: the partner's hand, or an object's."""
+        """True if a tracker publishes this frame: the partner's hand or an object."""
         return frame == self.human_hand or self.object_id(frame) != ""
 
     @staticmethod
     def from_mapping(data: Any, source: str = "perception/frames") -> FrameNames:
-        """From the parameter, or any mapping. FramesError names what is missing, unknown or empty."""
+        """Names from the parameter or any mapping. A FramesError names the missing, unknown or empty role."""
         roles = [f.name for f in fields(FrameNames)]
         if not isinstance(data, Mapping):
             raise FramesError(
@@ -74,7 +74,7 @@ class FrameNames:
 
     @staticmethod
     def load(path: str) -> FrameNames:
-        """From a YAML file. FramesError names file and line."""
+        """Names from a YAML file. A FramesError names file and line."""
         try:
             return FrameNames.from_mapping(read(path).value, path)
         except YamlError as error:

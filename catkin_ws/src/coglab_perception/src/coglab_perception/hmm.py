@@ -1,7 +1,7 @@
 """Left-right hidden Markov model with Gaussian emissions (diagonal covariance): training and on-line filtering.
 
-Rabiner (1989), scaled forward-backward; the chain can stay in a state or go on to the next one. Plain numpy, because a
-model of five states needs nothing more.
+Scaled forward-backward algorithm, Rabiner (1989). The chain can stay in a state or go to the next one. Plain numpy is
+sufficient for models of five states.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ VARIANCE_FLOOR = 1e-5
 
 @dataclass
 class LeftRightHmm:
-    """``stay`` (n): probability to stay per state; ``mean``, ``variance`` (n, d): emissions. Starts in state 0."""
+    """``stay`` (n): probability to stay in each state; ``mean``, ``variance`` (n, d): emissions. Starts in state 0."""
 
     stay: np.ndarray
     mean: np.ndarray
@@ -49,7 +49,7 @@ class LeftRightHmm:
         return -0.5 * np.sum(delta**2 / self.variance + np.log(2 * np.pi * self.variance), axis=-1)
 
     def transition(self) -> np.ndarray:
-        """Transition matrix (n, n); the last state is kept for good."""
+        """Transition matrix (n, n). The last state is never left."""
         a = np.diag(self.stay) + np.diag(1.0 - self.stay[:-1], 1)
         a[-1, -1] = 1.0
         return a
@@ -65,9 +65,9 @@ class LeftRightHmm:
     def train(
         sequences: Sequence[np.ndarray], states: int = 5, iterations: int = 40, tolerance: float = 1e-4
     ) -> LeftRightHmm:
-        """Baum-Welch over several sequences (T_i, d), started from equal shares of each sequence.
+        """Baum-Welch on several sequences (T_i, d). Initially each sequence is divided equally among the states.
 
-        ValueError if a sequence is shorter than the number of states or not finite.
+        Raises ValueError if a sequence is shorter than the number of states or not finite.
         """
         data = [np.asarray(s, dtype=float) for s in sequences]
         for i, s in enumerate(data):
@@ -91,7 +91,7 @@ class LeftRightHmm:
         return model
 
     def _reestimate(self, data: Sequence[np.ndarray]) -> tuple[LeftRightHmm, float]:
-        """One Baum-Welch step; returns the new model and the log-likelihood under the old one."""
+        """One Baum-Welch step. Returns the new model and the log-likelihood with the old one."""
         a = self.transition()
         n, d = self.mean.shape
         weight, first, second = np.zeros(n), np.zeros((n, d)), np.zeros((n, d))
@@ -126,12 +126,12 @@ class LeftRightHmm:
         return LeftRightHmm(stay, mean, variance), score
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain types for a file."""
+        """The model as plain types for a file."""
         return {"stay": self.stay.tolist(), "mean": self.mean.tolist(), "variance": self.variance.tolist()}
 
     @staticmethod
     def from_dict(data: Mapping[str, Any]) -> LeftRightHmm:
-        """Inverse of to_dict; ValueError says what is wrong."""
+        """Inverse of to_dict. Raises ValueError for an invalid model."""
         missing = [k for k in ("stay", "mean", "variance") if k not in data]
         if missing:
             raise ValueError(f"a model needs stay, mean and variance; missing: {', '.join(missing)}")
@@ -139,7 +139,7 @@ class LeftRightHmm:
 
 
 class HmmFilter:
-    """Forward filter: one frame at a time, constant work per frame."""
+    """Forward filter: processes one frame at a time with constant effort."""
 
     def __init__(self, model: LeftRightHmm) -> None:
         self.model = model
@@ -149,7 +149,7 @@ class HmmFilter:
         self._belief[0] = 1.0
 
     def update(self, frame: np.ndarray) -> float:
-        """Take one frame (d,); returns log p(frame | frames before)."""
+        """Process one frame (d,). Returns log p(frame | frames before)."""
         model = self.model
         predicted = self._belief
         if self.frames > 0:
@@ -168,6 +168,6 @@ class HmmFilter:
         return increment
 
     def progress(self) -> float:
-        """Expected share of the pattern that is behind, 0..1."""
+        """Expected completed share of the pattern, 0..1."""
         n = self.model.states
         return float(self._belief @ np.arange(n)) / (n - 1) if n > 1 else 1.0

@@ -1,7 +1,7 @@
-"""Minimum jerk as feedback: how a hand goes on to where it will be at rest, from any position, speed and acceleration.
+"""Minimum jerk as feedback: the motion of a hand to its end, from any position, velocity and acceleration.
 
-Flash and Hogan (1985); as a linear system that knows only the way and the time that are left: Hoff and Arbib (1993). A
-changed end therefore changes the motion without a step, as people correct a reach.
+Flash and Hogan (1985); as a linear system of the remaining distance and time: Hoff and Arbib (1993). A change of
+the end changes the motion without a step, as when people correct a reach.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ POSITION, VELOCITY, ACCELERATION, END = range(4)
 
 
 def transition(remaining: np.ndarray, step: np.ndarray) -> np.ndarray:
-    """(..., 4, 4): state (m, m/s, m/s^2, end in m) after ``step`` s of a motion with ``remaining`` s to go.
+    """(..., 4, 4): transition of the state (m, m/s, m/s^2, end in m) over ``step`` s, ``remaining`` s before the end.
 
-    Both of one shape; a motion that is over by then rests at its end, a step of 0 or less changes nothing.
+    Both have the same shape. A motion that ends within the step rests at its end. A step <= 0 changes nothing.
     """
     over = step >= remaining - 1e-9
     left = np.where(over, 1.0, remaining)
@@ -22,7 +22,7 @@ def transition(remaining: np.ndarray, step: np.ndarray) -> np.ndarray:
     result = np.zeros((*x.shape, 4, 4))
     result[..., END, END] = 1.0
     x2, x3, x4 = x**2, x**3, x**4
-    # Quintic in x with the boundary values; each entry is what one boundary value adds to it or to its derivatives.
+    # Quintic in x with the boundary values; each entry is the contribution of one boundary value or its derivatives.
     way = 10 * x3 - 15 * x4 + 6 * x4 * x, 30 * x2 - 60 * x3 + 30 * x4, 60 * x - 180 * x2 + 120 * x3
     speed = x - 6 * x3 + 8 * x4 - 3 * x4 * x, 1 - 18 * x2 + 32 * x3 - 15 * x4, -36 * x + 96 * x2 - 60 * x3
     bend = (

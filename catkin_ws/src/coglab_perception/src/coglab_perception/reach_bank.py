@@ -1,9 +1,9 @@
-"""Is this hand on its way to a handover, and where will it be at rest? A bank of motion hypotheses over its sights.
+"""Estimates whether a hand moves to a handover and where it will rest: a bank of motion hypotheses over observations.
 
-Bayesian on-line change-point detection (Adams and MacKay 2007) with minimum-jerk motions: at each sight new motions may
-have begun, of each duration of a grid, toward a handover or toward anywhere else. Each hypothesis is a Kalman filter
-per axis on position, velocity, acceleration, end of the motion and the tracker's wandering error; its weight is the
-likelihood of all sights so far. A motion that is over is rest, at a handover or elsewhere.
+Bayesian on-line change-point detection (Adams and MacKay 2007) with minimum-jerk motions. At each observation new
+motions may have begun, with each duration of a grid, toward a handover or toward any other place. Each hypothesis is a
+Kalman filter per axis. Its state is position, velocity, acceleration, end of the motion and the slowly varying error of
+the tracker. Its weight is the likelihood of all observations. A completed motion is rest, at a handover or elsewhere.
 """
 
 from __future__ import annotations
@@ -18,74 +18,70 @@ from coglab_py.pose import length
 
 from .minimum_jerk import ACCELERATION, END, POSITION, VELOCITY, transition
 
-ERROR = 4
-"""index of the tracker's error in the state"""
+ERROR = 4  # index of the tracker's error in the state
 STATES = 5
-NEVER = -math.inf
-"""arrival of what rests"""
-SPAWN_STEP = 0.035
-"""s between two beginnings of motions that are told apart, where sights are farther apart than that"""
+NEVER = -math.inf  # arrival time of a hand at rest
+SPAWN_STEP = 0.035  # s between the onsets of new motions, if observations are farther apart
 
 
 @dataclass(frozen=True)
 class ReachSettings:
-    """What is known before a hand is seen. Lengths in m, times in s, rates in 1/s."""
+    """Prior knowledge about the hand. Lengths in m, times in s, rates in 1/s."""
 
     place: tuple[float, float, float] = (0.86, 0.0, 0.44)
-    """where a person's hand is at a handover, world axes"""
+    """mean place of a person's hand at a handover, world axes"""
     place_deviation: tuple[float, float, float] = (0.06, 0.08, 0.08)
     handover_rate: float = 0.2
-    """of motions from rest toward a handover"""
+    """rate of motions from rest toward a handover"""
     other_rate: float = 0.7
-    """and of all other motions"""
+    """rate of all other motions"""
     reach_time: float = 1.2
     """median duration of a motion toward a handover"""
     reach_time_deviation: float = 0.25
-    """of its logarithm"""
+    """standard deviation of its logarithm"""
     reach_times: tuple[float, ...] = (0.7, 0.85, 1.0, 1.2, 1.4, 1.7, 2.1, 2.6)
-    """grid of durations"""
+    """s, grid of durations"""
     small_times: tuple[float, ...] = (0.25, 0.4, 0.6, 0.9)
     wide_times: tuple[float, ...] = (0.5, 0.7, 0.9, 1.2, 1.6)
     small_way: float = 0.06
-    """standard deviation per axis of the ways of small other motions, which are as likely as wide ones"""
+    """standard deviation per axis of the displacements of small other motions, which are as likely as wide ones"""
     wide_way: float = 0.30
     return_rate: float = 1.0
-    """of motions back to where the hand usually rests, from a place farther away than twice return_way"""
+    """rate of motions back to the usual rest, from a place more than 2 return_way away from it"""
     return_way: float = 0.06
     """standard deviation per axis of their ends"""
     home_time: float = 4.0
-    """over which the place where the hand usually rests is averaged"""
+    """averaging time of the place of the hand's usual rest"""
     correction_rate: float = 0.1
-    """of changes of a motion's end on the way, and of shifts of a hand at a handover"""
+    """rate of changes of a motion's end during the motion, and of displacements of a hand at a handover"""
     correction_times: tuple[float, ...] = (0.45, 0.7, 1.1)
     correction_way: float = 0.10
-    """standard deviation per axis"""
+    """standard deviation per axis of these changes"""
     vertical_shares: tuple[float, ...] = (0.82, 0.95)
-    """of a reach's duration, within which its vertical part is over (decoupled minimum jerk, Huber et al. 2009); one as
-    likely as the other, other motions have the last one"""
+    """shares of a reach's duration after which its vertical part is complete (decoupled minimum jerk, Huber et al.
+    2009). Both are equally likely; other motions have the last one"""
     noise: float = 0.004
     """standard deviation of the tracker's error per axis"""
     noise_time: float = 0.5
-    """over which it wanders"""
+    """correlation time of this error"""
     rest_wander: float = 0.004
-    """of a hand at rest, m per square root of s"""
+    """random walk of a hand at rest, m per square root of s"""
     acceleration_wander: float = 0.8
-    """of a motion about minimum jerk, m/s^2 per square root of s"""
+    """random walk of the acceleration about minimum jerk, m/s^2 per square root of s"""
     end_wander: float = 0.02
-    """of the end of a motion, m per square root of s"""
+    """random walk of the end of a motion, m per square root of s"""
     clutter_density: float = 10.0
-    """1/m^3, probability density of a sight that shows something else; where no hypothesis explains one better it is
-    left out"""
+    """1/m^3, probability density of an observation of something else. An observation with a lower density is ignored"""
     clutter_again: float = 1e4
-    """and right after such a sight: who has been mistaken for something else is mistaken for it again"""
+    """the same density after such an observation: a tracker that confuses the hand with something else repeats it"""
     hypotheses: int = 150
-    """most that are kept"""
+    """largest number of hypotheses"""
 
 
 @dataclass(frozen=True)
 class _Motions:
-    """A family of motions that may begin: durations (s) of the axes, rates (1/s), variance (m^2) of their ends per
-    axis, kind."""
+    """A family of motions that may begin: durations (s) per axis, rates (1/s), variance (m^2) of their ends per axis,
+    and whether they go toward a handover."""
 
     times: np.ndarray
     rates: np.ndarray
@@ -96,13 +92,13 @@ class _Motions:
     def of(
         times: Sequence[float], vertical: float, rate: float, deviation: Sequence[float] | float, toward: bool
     ) -> _Motions:
-        """Every duration as likely, ``vertical`` times as long vertically; ``deviation`` of the end in m."""
+        """Motions with equally likely durations. ``vertical``: factor of the vertical duration; ``deviation`` in m."""
         n = len(times)
         variance = np.full((n, 3), np.square(deviation))
         return _Motions(np.outer(times, [1.0, 1.0, vertical]), np.full(n, rate / n), variance, toward)
 
     def and_(self, other: _Motions) -> _Motions:
-        """Both families."""
+        """The union of both families."""
         return _Motions(
             np.concatenate([self.times, other.times]),
             np.append(self.rates, other.rates),
@@ -113,8 +109,8 @@ class _Motions:
 
 @dataclass(frozen=True)
 class Prediction:
-    """Of the motions toward a handover: where (m, mean and covariance) and at what stamp (s) the hand comes to rest,
-    when the motion began, where the hand rested before."""
+    """Prediction from the motions toward a handover: place (m, mean and covariance) and stamp (s) at which the hand
+    comes to rest, onset of the motion (s), and the place of rest before it."""
 
     end: np.ndarray
     covariance: np.ndarray
@@ -124,8 +120,8 @@ class Prediction:
 
 
 class ReachBank:
-    """Of one hand. ``step`` with each sight, in the order of stamps; ``handover`` is then the probability that the hand
-    moves toward a handover or waits at one."""
+    """Hypotheses for one hand. Call ``step`` with each observation, in the order of stamps. ``handover`` is then the
+    probability that the hand moves toward a handover or waits at one."""
 
     def __init__(self, stamp: float, position: np.ndarray, settings: ReachSettings) -> None:
         self.settings = s = settings
@@ -133,8 +129,8 @@ class ReachBank:
         ratio = s.handover_rate / (s.handover_rate + s.other_rate)
         at_place = ratio * _density(position - np.array(s.place), np.array(s.place_deviation))
         elsewhere = (1.0 - ratio) * _density(position - np.array(s.place), np.full(3, 0.5))
-        # Whoever is seen for the first time has not been seen to come: rest at a handover is half as likely as it
-        # looks.
+        # The arrival of a hand that is observed for the first time was not observed. So rest at a handover gets half of
+        # its probability.
         share = 0.5 * at_place / (at_place + elsewhere)
         mean = np.zeros((2, 3, STATES))
         mean[..., POSITION] = mean[..., END] = position
@@ -173,7 +169,7 @@ class ReachBank:
         self._home = position
         self._seen = True
 
-    # -- what is believed ------------------------------------------------------------------------------------------
+    # -- estimates -------------------------------------------------------------------------------------------------
 
     @property
     def handover(self) -> float:
@@ -181,17 +177,17 @@ class ReachBank:
         return float(np.exp(self._log_weight[self._toward]).sum())
 
     def position(self) -> np.ndarray:
-        """m, expected now, without the tracker's error."""
+        """Expected current position (m), without the tracker's error."""
         position: np.ndarray = np.einsum("i,ij->j", np.exp(self._log_weight), self._mean[..., POSITION])
         return position
 
     def velocity(self) -> np.ndarray:
-        """m/s, expected now."""
+        """Expected current velocity (m/s)."""
         velocity: np.ndarray = np.einsum("i,ij->j", np.exp(self._log_weight), self._mean[..., VELOCITY])
         return velocity
 
     def prediction(self) -> Prediction | None:
-        """None where no hypothesis is left of a motion toward a handover."""
+        """Prediction of the handover; None if no hypothesis of a motion toward a handover is left."""
         if not self._toward.any():
             return None
         weight = np.exp(self._log_weight[self._toward] - self._log_weight[self._toward].max())
@@ -206,11 +202,11 @@ class ReachBank:
         deviation = math.sqrt(float(weight @ (arrivals - arrival) ** 2))
         return Prediction(end, covariance, arrival, deviation, float(weight @ self._onset[self._toward]))
 
-    # -- a sight ---------------------------------------------------------------------------------------------------
+    # -- observations ----------------------------------------------------------------------------------------------
 
     def step(self, stamp: float, position: np.ndarray) -> bool:
-        """False where the sight is none of this hand, or shows it where no hand can be; nothing but time has passed
-        then."""
+        """Process an observation. False if it does not show this hand or is impossible for a hand; then only the
+        prediction to the stamp is done."""
         gap = stamp - self.stamp
         self._spawn(stamp)
         self._predict(stamp)
@@ -232,12 +228,12 @@ class ReachBank:
         return seen
 
     def forget(self) -> None:
-        """What was a motion toward a handover is any other motion from now on."""
+        """Count every motion toward a handover as another motion from now on."""
         self._toward = np.zeros_like(self._toward)
         self._merge_rest()
 
     def _spawn(self, stamp: float) -> None:
-        """Motions that have begun since the last sight: from rest, and changes of motions under way."""
+        """Add motions that began since the last observation: from rest, and changes of motions in progress."""
         resting = self._arrival[:, 0] == NEVER
         gap = stamp - self.stamp
         begins = self.stamp + np.arange(0.0, gap, max(SPAWN_STEP, gap / 8.0))
@@ -269,7 +265,7 @@ class ReachBank:
             self._add(born)
 
     def _add(self, born: list[tuple[int, float, _Motions, np.ndarray, float]]) -> None:
-        """New motions (source, begin in s, which, middle of their ends in m, s for which they could have begun)."""
+        """Add motions (source, onset in s, family, mean of their ends in m, s during which they could have begun)."""
         counts = [len(motions.times) for _, _, motions, _, _ in born]
         source = np.repeat([b[0] for b in born], counts)
         begin = np.repeat([b[1] for b in born], counts)
@@ -283,7 +279,7 @@ class ReachBank:
         self._mean = np.concatenate([self._mean, mean])
         self._cov = np.concatenate([self._cov, cov])
         self._begin = np.append(self._begin, begin)
-        # A changed reach has begun when the first one did.
+        # The onset of a changed reach is the onset of the original one.
         changed = self._toward[source] & np.repeat([b[2].toward for b in born], counts)
         self._onset = np.append(self._onset, np.where(changed, self._onset[source], begin))
         self._arrival = np.concatenate([self._arrival, begin[:, None] + times])
@@ -293,7 +289,7 @@ class ReachBank:
         s = self.settings
         gap = stamp - self.stamp
         resting = self._arrival == NEVER
-        # A motion that began after the last sight has moved since its beginning only.
+        # A motion that began after the last observation has only moved since its onset.
         since = np.where(resting, gap, stamp - np.maximum(self.stamp, self._begin)[:, None])
         remaining = np.where(resting, 0.0, self._arrival - (stamp - since))
         over = since >= remaining - 1e-9
@@ -304,7 +300,7 @@ class ReachBank:
         self._mean = np.matmul(a, self._mean[..., None])[..., 0]
         self._cov = np.matmul(np.matmul(a, self._cov), np.swapaxes(a, -1, -2))
         self._cov[..., ERROR, ERROR] += s.noise**2 * (1.0 - keep**2)
-        # The same for every rest, at a handover or not: else the one that fits a still hand better would win in time.
+        # Equal for all hypotheses of rest: otherwise the one that fits a still hand better would win in time.
         wander = np.where(resting, s.rest_wander**2, s.end_wander**2) * since
         self._cov[..., END, END] += wander
         for i, j in ((POSITION, POSITION), (POSITION, END), (END, POSITION)):
@@ -340,7 +336,7 @@ class ReachBank:
         self._cov = self._cov - gain[..., :, None] * seen[..., None, :]
 
     def _merge_rest(self) -> None:
-        """All motions of a kind that are over are one rest of that kind, with their mean and covariance."""
+        """Merge all completed motions of a kind into one rest of that kind, with their mean and covariance."""
         over = self._arrival.max(axis=1) <= self.stamp + 1e-9
         rest = []
         for toward in (True, False):
@@ -366,7 +362,7 @@ class ReachBank:
             self._log_weight = np.append(self._log_weight[kept], [r[4] for r in rest])
 
     def _prune(self) -> None:
-        """The unlikely are dropped; the weights add up to one."""
+        """Drop unlikely hypotheses and normalise the weights."""
         top = float(self._log_weight.max())
         keep = np.flatnonzero(self._log_weight > top - 13.0)
         if len(keep) > self.settings.hypotheses:
@@ -380,5 +376,5 @@ class ReachBank:
 
 
 def _density(way: np.ndarray, deviation: np.ndarray) -> float:
-    """1/m^3, of a normal distribution with independent axes."""
+    """Density (1/m^3) of a normal distribution with independent axes."""
     return float(np.prod(np.exp(-0.5 * (way / deviation) ** 2) / (math.sqrt(2 * math.pi) * deviation)))

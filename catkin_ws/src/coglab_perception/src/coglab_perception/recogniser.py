@@ -1,9 +1,9 @@
-"""Which reaching pattern is the partner performing? Recognition from the hand's position, frame by frame.
+"""Recognises which reaching pattern the partner performs, from the position of the hand, frame by frame.
 
-Features: displacement from the place where the hand rested (m) and velocity over a short window (m/s). The posterior
-over the patterns comes from the models' forward filters; 'unknown' where even the best one explains the motion badly.
-A decision needs a confident posterior for several frames, and is kept until another pattern has been as confident for
-as long, or the reach has been over for a while.
+Features: displacement from the place where the hand rested (m), and velocity over a short window (m/s). The forward
+filters of the models give the posterior over the patterns. It is 'unknown' if even the best pattern explains the motion
+poorly. A decision needs a confident posterior in several frames. It is kept until another pattern was confident for as
+many frames, or until some time after the end of the reach.
 """
 
 from __future__ import annotations
@@ -22,36 +22,36 @@ from .hmm import HmmFilter, LeftRightHmm
 
 UNKNOWN = "unknown"
 CLOCK_JUMP = 5.0
-"""s: a frame that is older than the newest by more is no late one; the clock was set back, as when a bag is replayed"""
+"""s; a frame that is older than the newest by more is not late: the clock was set back, e.g. in a replayed bag"""
 FILE_VERSION = 1
 
 
 @dataclass(frozen=True)
 class RecogniserSettings:
-    """Of the recogniser. Times in s, lengths in m."""
+    """Settings of the recogniser. Times in s, lengths in m."""
 
     confident: float = 0.9
     """posterior that counts as confident"""
     frames: int = 5
-    """confident frames in a row for a decision"""
+    """number of consecutive confident frames for a decision"""
     onset_distance: float = 0.03
-    """the reach has begun when the hand is this far from its rest"""
+    """distance of the hand from its rest at which a reach begins"""
     rest_speed: float = 0.08
     rest_time: float = 0.3
-    """slower than rest_speed for so long: the hand rests, and the next motion is a new one"""
+    """if the hand is slower than rest_speed (m/s) for this time, it rests, and the next motion is a new one"""
     velocity_window: float = 0.10
-    """s, over which velocity is taken"""
+    """s, window of the velocity"""
     max_gap: float = 0.4
-    """s without a frame: what was seen before does not count any more"""
+    """s without a frame, after which earlier frames are discarded"""
     memory: float = 1.0
-    """s for which the estimate outlives its reach: who acts on it late must not act on an old one"""
+    """s for which the estimate is kept after its reach, so that a late reader does not act on an old one"""
     temperature: float = 3.0
-    """frames of a tracker are correlated: the log-likelihood is divided by this before it becomes a probability"""
+    """the log-likelihood is divided by this, because frames of a tracker are correlated"""
 
 
 @dataclass
 class Pattern:
-    """One reaching pattern: its model, and the log-likelihood per frame below which a motion is not this pattern."""
+    """One reaching pattern: its model, and the smallest log-likelihood per frame of a motion of this pattern."""
 
     name: str
     model: LeftRightHmm
@@ -60,7 +60,7 @@ class Pattern:
 
 @dataclass(frozen=True)
 class Estimate:
-    """What the recogniser says now: best pattern (or unknown), its probability, whether it is decided, share seen."""
+    """Current result: best pattern (or unknown), its probability, whether it is decided, share of the reach seen."""
 
     pattern: str = UNKNOWN
     confidence: float = 0.0
@@ -71,8 +71,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class PatternEnd:
-    """Where the reach ends by the pattern that was recognised: its name, place of the hand (m) and variance per
-    axis."""
+    """End of the reach from the recognised pattern: its name, place of the hand (m) and variance (m^2) per axis."""
 
     pattern: str
     place: np.ndarray
@@ -80,8 +79,8 @@ class PatternEnd:
 
 
 class FeatureStream:
-    """Positions to features; finds rest and onset by itself. ``rest`` is where the hand rested last (m), None
-    before."""
+    """Computes features from positions; detects rest and onset. ``rest`` is the last place of rest (m), None before
+    the first."""
 
     def __init__(self, settings: RecogniserSettings) -> None:
         self.settings = settings
@@ -92,8 +91,8 @@ class FeatureStream:
         self.started = False
 
     def update(self, stamp: float, position: Sequence[float]) -> np.ndarray | None:
-        """One frame; returns (6,) features while a reach is under way, else None. ``started`` is True on its
-        first frame."""
+        """Process one frame. Returns features (6,) during a reach, otherwise None. ``started`` is True on the first
+        frame of a reach."""
         s = self.settings
         p = np.asarray(position, dtype=float)
         self.started = False
@@ -119,7 +118,7 @@ class FeatureStream:
         return np.concatenate([p - self.rest, velocity])
 
     def _follow_rest(self, stamp: float, p: np.ndarray) -> None:
-        """The hand rests where the two halves of the last ``rest_time`` agree: noise averages out, motion does not."""
+        """Detect rest: the two halves of the last ``rest_time`` agree. Noise averages out, motion does not."""
         s = self.settings
         self._recent.append((stamp, p))
         while self._recent[-1][0] - self._recent[0][0] > s.rest_time:
@@ -133,13 +132,13 @@ class FeatureStream:
             return
         if self.moving or self.rest is None:
             self.rest = np.mean(places, axis=0)
-        # During the first frames of a reach the hand is still slow: follow only what is not yet a displacement.
+        # In the first frames of a reach the hand is still slow: follow only changes that are not yet a displacement.
         self.rest = self.rest + 0.1 * (p - self.rest)
         self.moving = False
 
 
 class Recogniser:
-    """Feed it stamped hand positions (m, robot base frame); it keeps an Estimate."""
+    """Processes stamped hand positions (m, robot base frame) and keeps an Estimate."""
 
     def __init__(self, patterns: Sequence[Pattern], settings: RecogniserSettings = RecogniserSettings()) -> None:
         if not patterns:
@@ -155,7 +154,7 @@ class Recogniser:
         self._newest = -math.inf
 
     def update(self, stamp: float, position: Sequence[float]) -> Estimate:
-        """One frame of the partner's hand."""
+        """Process one frame of the partner's hand."""
         if not np.all(np.isfinite(position)):
             return self.estimate
         features = self.stream.update(stamp, position)
@@ -172,15 +171,15 @@ class Recogniser:
         return self.estimate
 
     def pattern_end(self) -> PatternEnd | None:
-        """Where the present reach ends by the pattern that is decided, None without a decision: displacement and spread
-        of the model's last state."""
+        """End of the current reach from the decided pattern: rest plus displacement and variance of the model's last
+        state. None without a decision."""
         if not (self.estimate.decided and self.stream.moving) or self.stream.rest is None:
             return None
         model = next(p.model for p in self.patterns if p.name == self.estimate.pattern)
         return PatternEnd(self.estimate.pattern, self.stream.rest + model.mean[-1, :3], model.variance[-1, :3])
 
     def _forget(self, stamp: float) -> None:
-        """The hand rests: some time after a reach nothing is known any more."""
+        """Reset the estimate `memory` s after the end of a reach."""
         if self.stream.moving or not self.estimate.probabilities:
             return
         if stamp < self._newest - CLOCK_JUMP:
@@ -194,7 +193,7 @@ class Recogniser:
     def _judge(self) -> Estimate:
         scores = np.array([f.log_likelihood for f in self._filters])
         floors = np.array([p.floor * f.frames for p, f in zip(self.patterns, self._filters, strict=False)])
-        # 'unknown' competes with the likelihood that the worst genuine reach of the best pattern would have had.
+        # 'unknown' competes with the likelihood of the worst genuine reach of the best pattern.
         best = int(np.argmax(scores))
         scores = np.append(scores, floors[best]) / self.settings.temperature
         weights = np.exp(scores - scores.max())
@@ -219,9 +218,9 @@ def train_patterns(
     settings: RecogniserSettings = RecogniserSettings(),
     states: int = 5,
 ) -> list[Pattern]:
-    """One pattern per name from demonstrations [(stamps (T,), positions (T, 3)), ...].
+    """Train one pattern per name from demonstrations [(stamps (T,), positions (T, 3)), ...].
 
-    The floor is the mean less five standard deviations of the log-likelihood per frame over the demonstrations.
+    The floor is the mean minus five standard deviations of the demonstrations' log-likelihood per frame.
     """
     patterns = []
     for name, recordings in demonstrations.items():
@@ -253,7 +252,7 @@ def reach_features(stamps: np.ndarray, positions: np.ndarray, settings: Recognis
 
 
 def save_patterns(path: str, patterns: Sequence[Pattern], settings: RecogniserSettings, source: str) -> None:
-    """Write a pattern file (JSON)."""
+    """Write the patterns to a file (JSON)."""
     data = {
         "version": FILE_VERSION,
         "source": source,
@@ -264,7 +263,7 @@ def save_patterns(path: str, patterns: Sequence[Pattern], settings: RecogniserSe
 
 
 def load_patterns(path: str) -> tuple[list[Pattern], RecogniserSettings]:
-    """Read a pattern file; ValueError names file and field."""
+    """Read a pattern file. A ValueError names file and field."""
     try:
         data: Any = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:

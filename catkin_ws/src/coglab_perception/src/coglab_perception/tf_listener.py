@@ -1,4 +1,4 @@
-"""tf2 listener for nodes in Python that stand whatever stamp a transform has."""
+"""tf2 listener for Python nodes that tolerates every stamp of a transform."""
 
 from __future__ import annotations
 
@@ -7,16 +7,14 @@ import tf2_ros
 from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
 
-AHEAD = 0.05
-"""s by which clocks that are synchronised differ"""
-LARGEST = 2.0**32 - 1.0
-"""s: tf2's C++ part ends the process on a stamp beyond it, which secs and nsecs together can be"""
+AHEAD = 0.05  # s, largest difference of synchronised clocks
+LARGEST = 2.0**32 - 1.0  # s; the C++ part of tf2 ends the process at a larger stamp, which secs and nsecs can form
 
 
 class TfListener(tf2_ros.TransformListener):
-    """Keeps out of the buffer: transforms from the future, one of which would lock out all that come after it; static
-    ones with a stamp that tf2 does not survive; static ones of a frame that moves, which would stand from then on; and
-    any that gives ``root`` a parent, which tf2 would never forget."""
+    """Rejects four kinds of transforms: from the future (they would block all later ones); static with a stamp that
+    ends tf2; static for a moving frame (it would stand still); and any that gives ``root`` a parent (tf2 would keep
+    it)."""
 
     def __init__(self, buffer: tf2_ros.Buffer, root: str) -> None:
         self._root = root
@@ -24,7 +22,7 @@ class TfListener(tf2_ros.TransformListener):
         super().__init__(buffer)
 
     def moving(self) -> list[str]:
-        """Names of the frames that have been seen to move so far."""
+        """Names of the frames that have moved so far."""
         return list(self._moving)
 
     def callback(self, data: TFMessage) -> None:

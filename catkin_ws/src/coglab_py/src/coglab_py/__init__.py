@@ -1,1 +1,1 @@
-"""What the Python packages of CogLab share: poses, checked YAML files, checked ROS parameters."""
+"""Code that the Python packages of CogLab share: poses, checked YAML files, checked ROS parameters."""

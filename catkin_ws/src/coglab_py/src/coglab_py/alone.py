@@ -1,5 +1,5 @@
-"""A node does not take the place of a living one of its name: rospy would end that one, roslaunch would start it again,
-and two launches on one ROS master would end each other's nodes for ever."""
+"""Prevents a node from replacing a running node of the same name. Otherwise rospy would end the running node, roslaunch
+would restart it, and two launches on one ROS master would end each other's nodes again and again."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Any, NoReturn
 from xmlrpc.client import Error, ServerProxy, Transport
 
-ANSWER_LIMIT = 2.0  # s for master and node to answer
-PATIENCE = 2.0  # s for a node that is being started again and may still end
+ANSWER_LIMIT = 2.0  # s, longest wait for master or node
+PATIENCE = 2.0  # s in which a node that is being restarted may end
 
 
 class _Brief(Transport):
-    """Gives up after ANSWER_LIMIT s."""
+    """HTTP transport with a time limit of ANSWER_LIMIT."""
 
     def make_connection(self, host: Any) -> HTTPConnection:
         connection = super().make_connection(host)
@@ -25,7 +25,7 @@ class _Brief(Transport):
 
 
 def _answer(uri: str, method: str, *words: object) -> Any:
-    """The value of an XML-RPC call; None where nobody is there, or says no. TimeoutError where nobody answers."""
+    """Value of an XML-RPC call; None if there is no server or it refuses. TimeoutError if it does not answer."""
     try:
         code, _, value = getattr(ServerProxy(uri, transport=_Brief()), method)("/coglab_alone", *words)
     except TimeoutError:
@@ -36,7 +36,7 @@ def _answer(uri: str, method: str, *words: object) -> Any:
 
 
 def _command(process: int) -> str:
-    """The command line of a process of this computer, shortened."""
+    """Command line of a process of this computer, shortened."""
     try:
         words = Path(f"/proc/{process}/cmdline").read_bytes().split(b"\0")
     except OSError:
@@ -45,7 +45,7 @@ def _command(process: int) -> str:
 
 
 def living(master: str, name: str) -> str:
-    """Who has this node name with a master, in words: address, process and its command. Empty where nobody lives."""
+    """The running node with this name at a master, as text: address, process and command. Empty if there is none."""
     uri = _answer(master, "lookupNode", name)
     if not uri:
         return ""
@@ -60,13 +60,13 @@ def living(master: str, name: str) -> str:
 
 
 def refuse(sentence: str) -> NoReturn:
-    """Ends the process with a sentence."""
+    """Print an error and end the process with exit status 1."""
     print(f"[coglab] error: {sentence}", file=sys.stderr, flush=True)
     sys.exit(1)
 
 
 def init_node(name: str, **options: Any) -> None:
-    """rospy.init_node, unless a living node has this name: then the process ends with a sentence."""
+    """rospy.init_node, unless a running node has this name. Then the process ends with an error message."""
     import rosgraph.names
     import rospy
 
@@ -83,5 +83,5 @@ def init_node(name: str, **options: Any) -> None:
 def _living(master: str, name: str) -> str:
     try:
         return living(master, name)
-    except TimeoutError:  # of the master: rospy waits for it
+    except TimeoutError:  # the master did not answer: rospy waits for it
         return ""

@@ -1,4 +1,4 @@
-"""Poses from and to geometry_msgs."""
+"""Conversion of poses from and to geometry_msgs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the files of the packages are, in the source tree and in an install space alike."""
+"""Finds files of the packages, in the source tree and in an install space."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from pathlib import Path
 
 
 def package_path(package: str, *path: str) -> Path:
-    """A file or folder of a package of this workspace: beside this package, in the share folder, or through rospack.
-    FileNotFoundError where it is in none of them."""
+    """A file or folder of a package of this workspace: beside this package, in the share folder, or found by rospack.
+    Raises FileNotFoundError if it does not exist."""
     for parent in Path(__file__).resolve().parents:
         for candidate in (parent.joinpath(package, *path), parent.joinpath("share", package, *path)):
             if candidate.exists():

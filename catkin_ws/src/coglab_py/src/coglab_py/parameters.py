@@ -1,4 +1,4 @@
-"""ROS parameters of a type and range, read once when a node starts. What does not fit is said in one sentence."""
+"""Reads ROS parameters with a type and a range, once at the start of a node. An error is one sentence."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ T = TypeVar("T", bool, int, float, str, dict[str, Any])
 
 
 class ParameterError(ValueError):
-    """A parameter cannot be used; the sentence names it, what was expected and what came."""
+    """A parameter is invalid. The message contains its name, the expected value and its value."""
 
 
 def read(
@@ -23,21 +23,21 @@ def read(
     high: float = math.inf,
     among: Sequence[str] = (),
 ) -> T:
-    """A parameter of this type: bool, int, float, str or dict. A whole number is a float, too.
+    """A parameter of type bool, int, float, str or dict. A whole number is also accepted as a float.
 
-    ``default`` is taken where there is none; without one the parameter has to be there. Numbers lie in low..high, a
-    text is one of ``among`` where that is given. ParameterError.
+    ``default`` is used if the parameter is not set; without a default it must be set. A number must lie in low..high,
+    a text must be one of ``among`` if given. Raises ParameterError.
     """
     return checked(rospy.resolve_name(name), rospy.get_param(name, default), kind, low, high, among)
 
 
 def numbers(name: str, default: Sequence[float] | None = None, length: int = 0) -> list[float]:
-    """A parameter that is a list of finite numbers, as many as ``length`` says where it is not 0. ParameterError."""
+    """A parameter that is a list of finite numbers, of this ``length`` unless 0. Raises ParameterError."""
     return checked_numbers(rospy.resolve_name(name), rospy.get_param(name, default), length)
 
 
 def points(name: str, default: Sequence[Sequence[float]]) -> list[list[float]]:
-    """A parameter that is a list of points, three finite numbers each. ParameterError."""
+    """A parameter that is a list of points, with three finite numbers each. Raises ParameterError."""
     found, shown = rospy.get_param(name, default), rospy.resolve_name(name)
     if not isinstance(found, (list, tuple)):
         raise ParameterError(f"parameter {shown}: expected a list of points, got {str(found)[:60]!r}")
@@ -45,7 +45,7 @@ def points(name: str, default: Sequence[Sequence[float]]) -> list[list[float]]:
 
 
 def found_above(name: str, kind: type[T]) -> T | None:
-    """The parameter of that name in the nearest namespace above the node; None where there is none."""
+    """The parameter with this name in the nearest namespace above the node; None if there is none."""
     found = rospy.search_param(name)
     return None if found is None else read(found, kind)
 
@@ -53,7 +53,7 @@ def found_above(name: str, kind: type[T]) -> T | None:
 def checked(
     name: str, value: Any, kind: type[T], low: float = -math.inf, high: float = math.inf, among: Sequence[str] = ()
 ) -> T:
-    """``value`` if it has this type and lies in this range; ParameterError otherwise."""
+    """``value`` if it has this type and lies in this range. Otherwise raises ParameterError."""
     wanted = _wanted(kind, low, high, among)
     if value is None:
         raise ParameterError(f"parameter {name} is missing; expected {wanted}")
@@ -61,14 +61,14 @@ def checked(
         value = float(value)
     fits = isinstance(value, kind) and (kind is bool or not isinstance(value, bool))
     if fits and kind in (int, float):
-        fits = low <= value <= high  # not a number lies nowhere
+        fits = low <= value <= high  # False for nan
     if not fits or (among and value not in among):
         raise ParameterError(f"parameter {name}: expected {wanted}, got {str(value)[:60]!r}")
     return cast(T, value)
 
 
 def checked_numbers(name: str, value: Any, length: int = 0) -> list[float]:
-    """``value`` if it is a list of finite numbers of that length (0: any); ParameterError otherwise."""
+    """``value`` if it is a list of finite numbers of this length (0: any). Otherwise raises ParameterError."""
     good = isinstance(value, (list, tuple)) and all(
         isinstance(v, (int, float)) and not isinstance(v, bool) and math.isfinite(v) for v in value
     )

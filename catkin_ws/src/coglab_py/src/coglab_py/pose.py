@@ -1,4 +1,4 @@
-"""Poses of rigid frames: a position (m) and a unit quaternion (x y z w), turned by scipy's Rotation."""
+"""Poses of rigid frames: a position (m) and a unit quaternion (x y z w), rotated by scipy's Rotation."""
 
 from __future__ import annotations
 
@@ -11,17 +11,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-IDENTITY = (0.0, 0.0, 0.0, 1.0)
-"""quaternion of no rotation"""
+IDENTITY = (0.0, 0.0, 0.0, 1.0)  # quaternion without rotation
 
 
 def length(vector: np.ndarray) -> float:
-    """Of a vector, to the last bit as numpy.linalg.norm has it, without that function's preparations."""
+    """Euclidean length of a vector, bit-identical to numpy.linalg.norm but faster."""
     return math.sqrt(vector.dot(vector))
 
 
 def rotation(quaternion: ArrayLike) -> Rotation:
-    """Rotation of a quaternion (x y z w) of any length; ValueError if it has no direction or is not finite."""
+    """Rotation from a quaternion (x y z w) of any length. Raises ValueError if it is zero or not finite."""
     q = np.asarray(quaternion, dtype=float)
     if q.shape != (4,) or not np.all(np.isfinite(q)):
         raise ValueError(f"a quaternion has four finite numbers x y z w, got {quaternion!r}")
@@ -31,7 +30,7 @@ def rotation(quaternion: ArrayLike) -> Rotation:
 
 
 def about_z(angle: float) -> np.ndarray:
-    """Quaternion of a turn about the vertical axis (rad)."""
+    """Quaternion of a rotation about the vertical axis by `angle` (rad)."""
     turned: np.ndarray = Rotation.from_rotvec([0.0, 0.0, angle]).as_quat()
     return turned
 
@@ -45,11 +44,11 @@ class Pose:
 
     @property
     def rotation(self) -> Rotation:
-        """The orientation as scipy has it."""
+        """The orientation as scipy's Rotation."""
         return Rotation.from_quat(self.orientation)
 
     def __mul__(self, other: Pose) -> Pose:
-        """Pose of a frame given in this frame, expressed in this frame's parent."""
+        """`other` is the pose of a frame in this frame. Returns its pose in the parent of this frame."""
         turn = self.rotation
         return Pose(self.position + turn.apply(other.position), (turn * other.rotation).as_quat())
 
@@ -59,28 +58,28 @@ class Pose:
         return Pose(-back.apply(self.position), back.as_quat())
 
     def apply(self, point: ArrayLike) -> np.ndarray:
-        """A point given in this frame (m), in the parent."""
+        """Coordinates in the parent frame of a point given in this frame (m)."""
         placed: np.ndarray = self.position + self.rotation.apply(point)
         return placed
 
     def axis(self, i: int) -> np.ndarray:
-        """Unit vector of axis i (0 x, 1 y, 2 z) in the parent."""
+        """Unit vector of axis i (0 x, 1 y, 2 z) in the parent frame."""
         unit: np.ndarray = self.rotation.apply(np.eye(3)[i])
         return unit
 
     def distance(self, other: Pose) -> tuple[float, float]:
-        """(m, rad) between this pose and another one in the same parent."""
+        """Distance (m) and angle (rad) between this pose and another one in the same parent."""
         angle = (self.rotation.inv() * other.rotation).magnitude()
         return length(self.position - other.position), float(angle)
 
     def to_dict(self) -> dict[str, list[float]]:
-        """Plain lists, as user data and files hold it."""
+        """The pose as plain lists, for user data and files."""
         return {"xyz": [float(v) for v in self.position], "quaternion": [float(v) for v in self.orientation]}
 
     @staticmethod
     def from_dict(data: Mapping[str, Any]) -> Pose:
-        """Read ``{xyz: [m], rpy_deg: [deg]}`` or ``{xyz: [m], quaternion: [x, y, z, w]}``; roll, pitch and yaw are
-        about fixed axes, as in URDF. ValueError if malformed."""
+        """Pose from ``{xyz: [m], rpy_deg: [deg]}`` or ``{xyz: [m], quaternion: [x, y, z, w]}``. Roll, pitch and yaw are
+        about fixed axes, as in URDF. Raises ValueError if malformed."""
         xyz = np.asarray(data.get("xyz", [0.0, 0.0, 0.0]), dtype=float)
         if xyz.shape != (3,) or not np.all(np.isfinite(xyz)):
             raise ValueError(f"xyz has three finite numbers in m, got {data.get('xyz')}")
@@ -93,7 +92,7 @@ class Pose:
 
 
 def mean_pose(poses: Sequence[Pose]) -> Pose:
-    """Average of poses that differ by noise: mean position and mean rotation."""
+    """Mean position and mean rotation of poses, to reduce noise."""
     if not poses:
         raise ValueError("the mean of no poses is undefined")
     turned = Rotation.from_quat(np.array([pose.orientation for pose in poses])).mean()

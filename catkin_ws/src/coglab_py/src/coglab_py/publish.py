@@ -1,4 +1,4 @@
-"""Publishing from threads that outlive the node's topics for a moment, with stamps that came from elsewhere."""
+"""Publishing from threads that may outlive the node's topics, with stamps from other sources."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import rospy
 
 
 def publish(publisher: rospy.Publisher, message: Any) -> None:
-    """Publish, unless the node is shutting down: its topics close before its threads have ended."""
+    """Publish, unless the node is shutting down. At shutdown the topics close before the threads end."""
     try:
         publisher.publish(message)
     except rospy.ROSException:
@@ -17,6 +17,6 @@ def publish(publisher: rospy.Publisher, message: Any) -> None:
 
 
 def can_be_sent(stamp: rospy.Time) -> bool:
-    """Whether a message can carry this stamp, also as a number of seconds: nanoseconds beyond a second have led some
-    past the last one. Publishing it would throw, and end the timer that does so."""
+    """True if a message can carry this stamp, also converted to seconds: more than 1e9 nanoseconds can exceed
+    the largest number of seconds. Publishing such a stamp would raise an error and end the timer that publishes."""
     return bool(0.0 <= stamp.to_sec() < 2**32)

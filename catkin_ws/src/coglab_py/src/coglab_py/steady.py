@@ -1,7 +1,7 @@
-"""Timers, workers and waits of nodes by the steady clock, which no step of the date and no `/clock` moves.
+"""Timers, workers and waits for nodes by the steady clock, which is independent of date changes and of `/clock`.
 
-rospy's own timers, waits and sleeps follow ROS time: they hang while `/clock` stands still, and end with an exception
-when it goes back. What belongs to hardware uses these instead.
+rospy's timers, waits and sleeps follow ROS time: they block while `/clock` stands still, and raise an exception when it
+steps back. Code for hardware uses these functions instead.
 """
 
 from __future__ import annotations
@@ -17,45 +17,37 @@ from typing import Any
 import rosgraph
 import rospy
 
-FAILING = 10.0
-"""s for which every call of a timer's function may fail before the node ends"""
-SILENCE = 1.0
-"""s without a message on /clock, after which that is a fault"""
-STEP = 0.5
-"""s by which ROS time moves beside the steady clock where it was set"""
-SET = 0.04
-"""s beside the steady clock, beyond which ROS time counts as set where stamps are told on the other clock"""
-QUICK = 0.005
-"""s within which both clocks have to be read to be compared"""
-TRIES = 10
-"""to read them so quickly"""
-FOLLOWED = 0.01
-"""share of a small difference by which stamps follow at each look"""
-POLL = 0.1
-"""s between two looks of a wait"""
+FAILING = 10.0  # s in which all calls of a timer's function may fail before the node ends
+SILENCE = 1.0  # s without a message on /clock that count as a fault
+STEP = 0.5  # s of ROS time against the steady clock that count as a change of the date
+SET = 0.04  # s of ROS time against the steady clock after which stamps use the new ROS time
+QUICK = 0.005  # s within which both clocks must be read for a comparison
+TRIES = 10  # attempts to read them within that time
+FOLLOWED = 0.01  # share of a smaller difference that is corrected at each reading
+POLL = 0.1  # s between two checks of a wait
 
 _failed = threading.Event()
 
 
 def ending() -> bool:
-    """Whether rospy shuts down; true before it closes the topics, unlike rospy.is_shutdown()."""
+    """True if rospy shuts down. Unlike rospy.is_shutdown() it is true before the topics close."""
     return bool(rospy.core.is_shutdown_requested() or rospy.is_shutdown())
 
 
 def exit_status() -> int:
-    """Of the node: 1 where a worker has ended it."""
+    """Exit status of the node: 1 if a worker ended it, otherwise 0."""
     return int(_failed.is_set())
 
 
 def spin() -> int:
-    """Wait for the node's end; its exit status."""
+    """Wait for the end of the node. Returns its exit status."""
     rospy.spin()
     return exit_status()
 
 
 def worker(function: Callable[[], object], name: str) -> threading.Thread:
-    """A thread, to be started, without which the node is of no use: an exception in it is logged and ends the node, for
-    roslaunch to start it again."""
+    """A thread (not started) that the node cannot work without. An exception in it is logged and ends the node, so that
+    roslaunch restarts it."""
 
     def run() -> None:
         try:
@@ -71,9 +63,10 @@ def worker(function: Callable[[], object], name: str) -> threading.Thread:
 
 
 class SteadyTimer:
-    """Calls `function` every `period` s, in a worker of its own, until `shutdown()`. A late call is not caught up on.
+    """Calls `function` every `period` (s) in its own worker until `shutdown()`. Late calls are not repeated.
 
-    An exception of the function is logged, and the next call made; after FAILING s without a good one the node ends.
+    An exception of the function is logged, and the calls continue. After FAILING s without a successful call the node
+    ends.
     """
 
     def __init__(self, period: float, function: Callable[[], object], name: str) -> None:
@@ -83,7 +76,7 @@ class SteadyTimer:
         self._thread.start()
 
     def shutdown(self) -> None:
-        """No call begins any more; waits for the one under way, at most 1 s."""
+        """Stop the calls. Waits at most 1 s for a running call."""
         self._over.set()
         if threading.current_thread() is not self._thread:
             self._thread.join(1.0)
@@ -107,23 +100,23 @@ class SteadyTimer:
 
 
 class Stamps:
-    """Stamps of ROS time on the steady clock and back. Where ROS time was set, what comes afterwards is told by the new
-    time; else the two clocks are followed slowly, so that a busy computer does not make stamps jitter."""
+    """Converts stamps of ROS time to the steady clock and back. After a step of ROS time later stamps use the new time.
+    Smaller differences are corrected slowly, so that stamps do not jitter on a busy computer."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._offset: float | None = None
 
     def steady(self, stamp: rospy.Time) -> float:
-        """The steady time of a stamp, s."""
+        """Steady time (s) of a stamp."""
         return stamp.to_sec() + self._follow()
 
     def stamp(self, steady: float) -> rospy.Time:
-        """The stamp of a steady time (s)."""
+        """Stamp of a steady time (s)."""
         return rospy.Time.from_sec(max(0.0, steady - self._follow()))
 
     def _follow(self) -> float:
-        for _ in range(TRIES):  # a thread that loses the processor between the two readings compares nothing
+        for _ in range(TRIES):  # repeated if the thread was interrupted between the two readings
             before, ros, after = time.monotonic(), rospy.get_time(), time.monotonic()
             if after - before < QUICK:
                 break
@@ -137,13 +130,13 @@ class Stamps:
 
 
 def utc_of(steady: float) -> str:
-    """Date and time of a steady time (s), for people and other records; to the ms."""
+    """Date and time (UTC, to the ms) of a steady time (s), for people and for other records."""
     moment = datetime.fromtimestamp(time.time() - (time.monotonic() - steady), UTC)
     return moment.isoformat(timespec="milliseconds")
 
 
 def wait_for(condition: Callable[[], Any], limit: float) -> bool:
-    """Whether a condition comes true within `limit` s; looks at least once."""
+    """Wait until a condition is true, at most `limit` (s). True if it is. Checks at least once."""
     end = time.monotonic() + limit
     while not condition():
         if time.monotonic() >= end or ending():
@@ -153,7 +146,7 @@ def wait_for(condition: Callable[[], Any], limit: float) -> bool:
 
 
 def service_answers(name: str) -> bool:
-    """Whether a service is registered and its node takes connections."""
+    """True if a service is registered and its node accepts connections."""
     caller, name = rospy.get_name(), rospy.resolve_name(name)
     try:
         address = rospy.core.parse_rosrpc_uri(rosgraph.Master(caller).lookupService(name))
@@ -161,18 +154,18 @@ def service_answers(name: str) -> bool:
             header = {"probe": "1", "md5sum": "*", "callerid": caller, "service": name}
             rosgraph.network.write_ros_handshake_header(link, header)
         return True
-    except Exception:  # of the socket, of XML-RPC, or of the master that does not know it
+    except Exception:  # of the socket, of XML-RPC, or of a master without this service
         return False
 
 
 def wait_for_service(name: str, limit: float) -> None:
-    """Until a service answers; rospy.ROSException where it does not within `limit` s."""
+    """Wait until a service answers. Raises rospy.ROSException after `limit` (s)."""
     if not wait_for(lambda: service_answers(name), limit):
         raise rospy.ROSException(f"service {rospy.resolve_name(name)} does not answer after {limit:g} s")
 
 
 def server_is_there(client: Any) -> bool:
-    """Whether the server of an actionlib.ActionClient or SimpleActionClient is there, with every topic connected."""
+    """True if the server of an actionlib.ActionClient or SimpleActionClient runs, with all topics connected."""
     action = getattr(client, "action_client", client)
     if not action.last_status_msg:
         return False
@@ -184,16 +177,16 @@ def server_is_there(client: Any) -> bool:
 
 
 class ClockWatch:
-    """Whether ROS time runs. `look()` is to be called a few times a second; it logs what has changed."""
+    """Monitors whether ROS time runs. Call `look()` a few times per second; it logs changes."""
 
     def __init__(self) -> None:
         self.fault = ""
-        """/clock is silent, in words; else empty"""
+        """text if /clock is silent, otherwise empty"""
         self._ros, self._steady = rospy.get_time(), time.monotonic()
         self._moved = self._steady
 
     def look(self) -> str:
-        """The fault."""
+        """Check the clocks and return the fault."""
         ros, steady = rospy.get_time(), time.monotonic()
         if not rospy.rostime.is_wallclock():
             self._look_at_simulated(ros, steady)
@@ -220,9 +213,9 @@ class ClockWatch:
 
 
 def end_quietly() -> None:
-    """A thread that publishes on a topic which rospy has just closed ends without a traceback.
+    """Suppress the traceback of a thread that publishes on a topic which rospy has just closed.
 
-    It holds for threads of libraries, too, such as actionlib's status loop.
+    This includes threads of libraries, such as actionlib's status loop.
     """
     report = threading.excepthook
 

@@ -1,6 +1,6 @@
-"""YAML files that are read with their lines, so that what is wrong with one can be said as ``file:line: field: what``.
+"""Reads YAML files with the lines of their fields, so that errors have the form ``file:line: field: message``.
 
-Stricter than YAML: no aliases, no field twice, no deep nesting, numbers and texts that ROS can carry.
+Stricter than YAML: no aliases, no duplicate fields, no deep nesting, only numbers and texts that ROS can carry.
 """
 
 from __future__ import annotations
@@ -16,23 +16,20 @@ from typing import Any
 import jsonschema
 import yaml
 
-LARGEST_FILE = 100_000
-"""bytes; a configuration is a page of text, not a data set"""
-DEEPEST = 16
-"""levels of lists and mappings inside each other"""
-LARGEST_INTEGER = 2**31 - 1
-"""of the parameter server"""
+LARGEST_FILE = 100_000  # bytes; a configuration is a page of text, not a data set
+DEEPEST = 16  # levels of nested lists and mappings
+LARGEST_INTEGER = 2**31 - 1  # limit of the parameter server
 
 Field = tuple[Any, ...]
-"""way to a value: keys and indices from the top"""
+"""Path of a value: keys and indices from the top."""
 
 
 class YamlError(ValueError):
-    """A YAML file cannot be used: file, line where known, field, and what was expected."""
+    """A YAML file is invalid: file, line if known, field, and the expected value."""
 
 
 class _Loader(yaml.SafeLoader):
-    """Safe loader that refuses aliases and deep nesting."""
+    """Safe loader that rejects aliases and deep nesting."""
 
     depth = 0
 
@@ -50,16 +47,16 @@ class _Loader(yaml.SafeLoader):
 
 @dataclass(frozen=True)
 class Document:
-    """A YAML file that was read: its value, its text, and the line of each field."""
+    """Content of a YAML file: its value, its text, and the line of each field."""
 
     origin: str
-    """name of the file, as sentences have it"""
+    """name of the file in messages"""
     text: str
     value: Any
     lines: Mapping[Field, int]
 
     def sentence(self, path: Field, message: str) -> str:
-        """What is wrong with a field, with file and line."""
+        """A message about a field, with file and line."""
         known = path
         while known and known not in self.lines:
             known = known[:-1]
@@ -67,7 +64,7 @@ class Document:
         return f"{where}: {'.'.join(map(str, path)) or 'top level'}: {message}"
 
     def check(self, schema: Mapping[str, Any]) -> None:
-        """YamlError with the first thing that does not fit a JSON schema (draft 7), or that ROS cannot carry."""
+        """Raise YamlError with the first value that violates a JSON schema (draft 7) or that ROS cannot carry."""
         errors = sorted(
             jsonschema.Draft7Validator(schema).iter_errors(self.value),
             key=lambda e: (len(e.absolute_path), str(e.absolute_path)),
@@ -81,7 +78,7 @@ class Document:
 
 
 def parse(text: str, origin: str) -> Document:
-    """The document in a text; YamlError says ``origin:line: what``."""
+    """The document in a text. A YamlError has the form ``origin:line: message``."""
     if len(text) > LARGEST_FILE:
         raise YamlError(f"{origin}: {len(text)} bytes; such a file has at most {LARGEST_FILE}")
     lines: dict[Field, int] = {}
@@ -98,13 +95,13 @@ def parse(text: str, origin: str) -> Document:
         mark = getattr(error, "problem_mark", None)
         where = f"{origin}:{mark.line + 1}" if mark else origin
         raise YamlError(f"{where}: not YAML: {getattr(error, 'problem', error)}") from None
-    except Exception as error:  # a date that does not exist, a tag that does not fit its value, ...
+    except Exception as error:  # for example an invalid date, or a tag that does not match its value
         raise YamlError(f"{origin}: a value cannot be read as what it looks like or is tagged as: {error}") from None
     return Document(origin, text, value, lines)
 
 
 def read(path: str | os.PathLike[str], origin: str = "") -> Document:
-    """The document in a file; ``origin`` names it in sentences, by default with its whole path. YamlError."""
+    """The document in a file. ``origin`` is its name in messages, by default its path. Raises YamlError."""
     name = origin or str(path)
     try:
         found = os.stat(path)
@@ -136,7 +133,7 @@ def _walk_lines(node: yaml.Node, path: Field, lines: dict[Field, int]) -> None:
 
 
 def _unfit(value: Any, path: Field) -> Iterator[tuple[Field, str]]:
-    """What a schema lets pass and nobody can use: numbers that are none, texts that no message can carry."""
+    """Values that a schema accepts but ROS cannot carry: nan and similar numbers, texts that no message can contain."""
     if isinstance(value, dict):
         for key, item in value.items():
             yield from _unfit(key, path)

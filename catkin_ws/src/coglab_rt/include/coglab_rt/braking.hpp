@@ -1,6 +1,6 @@
 /// @file
-/// Velocity bounds from braking distance: whatever a source asks for, every joint can always be
-/// stopped before its position limits, within its acceleration and jerk limits.
+/// Velocity bounds from braking distances. Whatever velocity is requested, every joint can always
+/// be stopped before its position limits, within its acceleration and jerk limits.
 #pragma once
 
 #include <algorithm>
@@ -11,8 +11,8 @@
 
 namespace coglab_rt {
 
-/// How far an axis moves while it brakes to a stop at full jerk and acceleration, relative to where
-/// it is now.
+/// Displacement of an axis while it brakes to a stop at full jerk and acceleration, relative to its
+/// current position.
 struct BrakingReach {
   double lowest = 0.0;   ///< rad, <= 0
   double highest = 0.0;  ///< rad, >= 0
@@ -23,68 +23,69 @@ struct BrakingReach {
 BrakingReach brakingReach(double velocity, double acceleration, double max_acceleration,
                           double max_jerk);
 
-/// The same along that stop's profile.
+/// The same along the profile of the stop.
 BrakingReach brakingReach(double velocity, double acceleration, const AxisProfile& stop);
 
-/// Distance of the stop from constant speed (rad/s, >= 0), acceleration 0: v/2 (v/A + A/J), or v
-/// sqrt(v/J) where the acceleration limit is not reached.
+/// Distance (rad) of a stop from constant speed (rad/s, >= 0) with acceleration 0: v/2 (v/A + A/J),
+/// or v sqrt(v/J) if the acceleration limit is not reached.
 double brakingDistance(double speed, double max_acceleration, double max_jerk);
 
-/// Highest constant speed (rad/s) from which an axis stops within `distance` (rad) after going on
-/// at that speed for `delay` (s): inverse of delay*v + brakingDistance(v). 0 for distance <= 0. For
-/// guards that plan with margins, such as the controller manager's; the bridge itself looks one
-/// tick ahead with the exact state (BrakingGuard).
+/// Highest constant speed (rad/s) from which an axis stops within `distance` (rad) if braking
+/// begins after `delay` (s): inverse of delay*v + brakingDistance(v). 0 for distance <= 0. For
+/// guards that plan with margins, such as that of the controller manager. The bridge itself checks
+/// the next tick with the exact state (BrakingGuard).
 double brakingSpeed(double distance, double max_acceleration, double max_jerk, double delay);
 
-/// The cycles without an answer that a back end reckons with, at every period: as many as a robot
-/// controller rides through before it ends command mode (coglab_sim's figures; makers publish
-/// none). docs/limits_under_loss.md says why the limits hold.
+/// Cycles without an answer that a back end must tolerate, at every period: the number that a robot
+/// controller tolerates before it ends command mode. The values are those of coglab_sim; makers
+/// publish none. docs/limits_under_loss.md explains why the limits hold.
 struct LossBudget {
   static constexpr int kInARow = 5;
-  static constexpr int kPerWindow = 20;  ///< of any kWindow cycles: quality UNACCEPTABLE
+  static constexpr int kPerWindow = 20;  ///< of any kWindow cycles (limit of quality UNACCEPTABLE)
   static constexpr int kWindow = 100;
 };
 
-/// What lost cycles may add to the way of a stop, rad, both >= 0.
+/// Largest additional displacement of a stop because of lost cycles, rad, both >= 0.
 struct LossReserve {
   double down, up;
 };
 
-/// Way that an axis may make in lost cycles of `dt` (s), an upper bound over all losses within the
-/// LossBudget: the answer that the controller saw last led it from `before` to `after`, each answer
-/// from then on brakes at once along `stop`, and each lost cycle repeats the step of the answer
-/// before it. The way of the answers themselves is brakingReach's. Real-time safe.
+/// Upper bound of the displacement of an axis in lost cycles of `dt` (s), over all losses within
+/// the LossBudget. The last answer that the controller received moved the axis from `before` to
+/// `after`. Each later answer brakes at once along `stop`. Each lost cycle repeats the step of the
+/// answer before it. The displacement of the answers themselves is that of brakingReach. Real-time
+/// safe.
 LossReserve lossReserve(const AxisState& before, const AxisState& after, const AxisProfile& stop,
                         double dt, double max_jerk);
 
-/// Time (s) of constant speed that is at least what lossReserve keeps of one window of the
-/// LossBudget at period `dt` (s) of the arm's interface: what whoever plans a motion keeps before a
-/// limit, so that the bridge's own guard finds nothing to cut while no cycles or single ones are
-/// lost. Bursts of losses at full speed and long periods use up more before the plan hears of them;
-/// there that guard does cut, see docs/limits_under_loss.md. Real-time safe.
+/// Time (s) at constant speed whose displacement is at least the lossReserve of one window of the
+/// LossBudget at period `dt` (s) of the arm's interface. A planner of motions keeps this distance
+/// from a limit, so that the bridge's guard does not cut the motion while no cycles or single
+/// cycles are lost. Bursts of losses at full speed and long periods use more before the planner is
+/// informed. Then the guard does cut, see docs/limits_under_loss.md. Real-time safe.
 double lostTime(double dt);
 
-/// Rounding on the wire to the arm (float32 at 3 rad) that one lost cycle can add, rad: 0.24e-6 by
-/// the step that is repeated, both its ends, and 0.24e-6 by the set-point that is reported after
+/// Rounding (rad) that one lost cycle can add on the connection to the arm (float32 at 3 rad):
+/// 0.24e-6 for both ends of the repeated step, and 0.24e-6 for the set-point that is reported after
 /// it.
 constexpr double kLossRounding = 0.5e-6;
 
-/// What BrakingGuard keeps before a bound besides the margin, rad: the rounding of one window of
-/// lost cycles.
+/// Distance (rad) that BrakingGuard keeps from a bound in addition to the margin: the rounding of
+/// one window of lost cycles.
 constexpr double kWireRounding = LossBudget::kPerWindow * kLossRounding;
 
-/// Bounds target velocities so that the interpolator's next step leaves every joint able to stop
-/// inside its position limits whatever is lost within the LossBudget. A joint for which even
-/// braking at once leaves that open, such as one that is outside already, brakes at once or turns
-/// away from the limit.
+/// Bounds target velocities so that, after the interpolator's next step, every joint can stop
+/// inside its position limits after any losses within the LossBudget. If even braking at once
+/// cannot ensure this, for example for a joint that is outside already, the joint brakes at once or
+/// turns away from the limit.
 class BrakingGuard {
  public:
-  /// `margin` (rad) is kept from both ends of every range; it must leave room between them.
-  /// Besides, kWireRounding is kept.
+  /// `margin` (rad) is kept from both ends of every range and must leave room between them.
+  /// kWireRounding is kept in addition.
   BrakingGuard(const JointLimits& limits, double margin);
 
-  /// Cuts `target_velocity` (rad/s) in place and returns the joints that were cut, bit i for joint
-  /// i. Real-time safe.
+  /// Reduces `target_velocity` (rad/s) in place. Returns the reduced joints, bit i for joint i.
+  /// Real-time safe.
   unsigned bound(const Interpolator& interpolator, double dt, Vector7& target_velocity) const;
 
   const Vector7& lower() const { return lower_; }
@@ -112,8 +113,8 @@ inline BrakingReach brakingReach(double velocity, double acceleration, const Axi
   reach.end = advance({0.0, velocity, acceleration}, stop, stop.totalTime()).position;
   reach.lowest = std::min(0.0, reach.end);
   reach.highest = std::max(0.0, reach.end);
-  // The velocity changes its sign at most once, in the first phase, where the acceleration still
-  // has the old direction.
+  // The velocity changes its sign at most once, in the first phase, while the acceleration still
+  // has its old direction.
   const double j = stop.jerk[0];
   const double root = acceleration * acceleration - 2.0 * j * velocity;
   if (velocity * acceleration < 0.0 && root >= 0.0 && j != 0.0) {
@@ -136,8 +137,8 @@ inline double brakingDistance(double speed, double max_acceleration, double max_
 inline double brakingSpeed(double distance, double max_acceleration, double max_jerk,
                            double delay) {
   if (!(distance > 0.0)) return 0.0;
-  // With the acceleration limit reached the equation is quadratic; below that it is cubic in
-  // sqrt(v), solved by Newton from above, where it is convex and cannot undershoot.
+  // If the acceleration limit is reached, the equation is quadratic. Otherwise it is cubic in
+  // sqrt(v) and solved by Newton's method from above, where it is convex and cannot undershoot.
   const double corner = max_acceleration * max_acceleration / max_jerk;
   const double linear = delay + 0.5 * max_acceleration / max_jerk;
   if (delay * corner + brakingDistance(corner, max_acceleration, max_jerk) <= distance) {
@@ -160,7 +161,8 @@ inline LossReserve lossReserve(const AxisState& before, const AxisState& after,
                                const AxisProfile& stop, double dt, double max_jerk) {
   using B = LossBudget;
   // Longest step of a stop from its part `from`..`to` on. An axis slows down once its acceleration
-  // points against its motion; until then its speed peaks where the acceleration comes to zero.
+  // is opposite to its motion. Before that, its speed has its maximum where the acceleration is
+  // zero.
   const auto longest = [&](const AxisState& from, const AxisState& to) {
     const double step = to.position - from.position;
     const double peak =
@@ -173,7 +175,7 @@ inline LossReserve lossReserve(const AxisState& before, const AxisState& after,
     way.down += cycles * step.down;
     way.up += cycles * step.up;
   };
-  // The first window is lost as early as it can be: kInARow cycles after each of the first answers.
+  // The first window is lost as early as possible: kInARow cycles after each of the first answers.
   const double step = after.position - before.position;
   AxisState last = after;
   for (int answer = 1; answer < B::kPerWindow / B::kInARow; ++answer) {
@@ -184,7 +186,7 @@ inline LossReserve lossReserve(const AxisState& before, const AxisState& after,
     lose(B::kInARow, repeated);
     last = next;
   }
-  // Another window's losses can only come after as many answers as a window has.
+  // The losses of another window can only follow after as many answers as a window contains.
   constexpr int kAnswers = B::kWindow - B::kPerWindow;
   for (int k = kAnswers; (k - 1) * dt < stop.totalTime(); k += kAnswers) {
     const LossReserve repeated =
@@ -203,7 +205,7 @@ inline BrakingGuard::BrakingGuard(const JointLimits& limits, double margin)
       max_acceleration_(limits.acceleration),
       max_jerk_(limits.jerk) {}
 
-/// What one step towards `target` and a stop after it may reach, losses included.
+/// Range that one step towards `target` and a stop after it may reach, including losses.
 inline BrakingGuard::Range BrakingGuard::reach(int joint, const AxisState& state, double target,
                                                double dt) const {
   const double a = max_acceleration_[joint], j = max_jerk_[joint];
@@ -229,8 +231,8 @@ inline unsigned BrakingGuard::bound(const Interpolator& interpolator, double dt,
     };
     if (within(1.0)) continue;
 
-    // Where braking at once may pass a bound, losses before it have used what was kept for them, or
-    // the joint is outside; turning away goes no farther than braking does.
+    // If braking at once may exceed a bound, earlier losses have used their reserve, or the joint
+    // is outside. Turning away moves no farther than braking.
     const Range braked = reach(i, state, 0.0, dt);
     if (braked.high > high) {
       high = std::numeric_limits<double>::infinity();
@@ -240,7 +242,7 @@ inline unsigned BrakingGuard::bound(const Interpolator& interpolator, double dt,
       low = -std::numeric_limits<double>::infinity();
       target = std::max(target, 0.0);
     }
-    // Largest admissible part of the target; 0 is admissible. 20 halvings: 1e-6 of the target.
+    // Largest admissible fraction of the target; 0 is admissible. 20 halvings: 1e-6 of the target.
     double good = 0.0, bad = 1.0;
     if (within(bad)) good = bad;
     for (int step = 0; step < 20 && good < bad; ++step) {

@@ -10,7 +10,7 @@
 namespace coglab_rt {
 
 /// Bounded queue with one writer and one reader thread, both wait-free, no allocation.
-/// A full queue refuses the newest entry and counts it, so that the cycle never waits for a
+/// A full queue refuses the newest entry and counts it, so that the cycle never waits for the
 /// publisher.
 /// @tparam Size number of entries, a power of two
 template <typename T, std::size_t Size>
@@ -18,7 +18,7 @@ class EventRing {
   static_assert((Size & (Size - 1)) == 0, "Size must be a power of two");
 
  public:
-  /// Writer: appends an entry; false (and counted) if the queue is full.
+  /// Writer: appends an entry. Returns false and counts it if the queue is full.
   bool push(const T& value) {
     const std::size_t head = head_.load(std::memory_order_relaxed);
     if (head - tail_.load(std::memory_order_acquire) == Size) {
@@ -30,7 +30,7 @@ class EventRing {
     return true;
   }
 
-  /// Reader: takes the oldest entry; false if there is none.
+  /// Reader: takes the oldest entry. Returns false if there is none.
   bool pop(T& value) {
     const std::size_t tail = tail_.load(std::memory_order_relaxed);
     if (tail == head_.load(std::memory_order_acquire)) return false;

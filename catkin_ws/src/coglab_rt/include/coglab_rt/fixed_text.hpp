@@ -10,20 +10,20 @@
 
 namespace coglab_rt {
 
-/// A sentence of at most N-1 characters: no allocation, longer text is cut. Always terminated.
+/// A text of at most N-1 characters, always terminated. Never allocates; longer text is cut.
 template <std::size_t N>
 class FixedText {
  public:
   FixedText() { text_[0] = '\0'; }
   FixedText(const char* text) { *this << text; }  // NOLINT: converts like a string on purpose
 
-  /// Empties the text.
+  /// Clears the text.
   void clear() {
     size_ = 0;
     text_[0] = '\0';
   }
 
-  /// Appends a literal or other terminated text; null appends nothing.
+  /// Appends a terminated text; null appends nothing.
   FixedText& operator<<(const char* text) {
     while (text != nullptr && *text != '\0' && size_ + 1 < N) text_[size_++] = *text++;
     text_[size_] = '\0';
@@ -75,7 +75,7 @@ class FixedText {
   std::array<char, N> text_;
 };
 
-/// Ids of primitives and controllers.
+/// Id of a primitive or controller.
 using Name = FixedText<64>;
 
 }  // namespace coglab_rt

@@ -1,12 +1,12 @@
 /// @file
-/// Interpolator (D4.10 Figure 1): turns target velocities that arrive at any rate into position
-/// commands at the rate of the arm's interface, acceleration and jerk limited per joint.
+/// Interpolator (D4.10 Figure 1): converts target velocities that arrive at any rate into position
+/// commands at the rate of the arm's interface, with acceleration and jerk limits per joint.
 ///
 /// Closed form per axis: velocity target vf, final acceleration 0, time-optimal for |acceleration|
-/// <= A and |jerk| <= J. With d the sign of the change still needed once the acceleration has been
-/// brought to zero, v and a counted along d: peak acceleration ap = min(A, sqrt(J (vf - v) + a^2 /
-/// 2)), phases t1 = |ap - a| / J, t3 = ap / J, and t2 at ap for the rest. Nothing is stored between
-/// ticks besides position, velocity, acceleration.
+/// <= A and |jerk| <= J. Let d be the sign of the change that remains after the acceleration has
+/// been brought to zero; v and a are counted along d. Peak acceleration ap = min(A, sqrt(J (vf - v)
+/// + a^2 / 2)); phases t1 = |ap - a| / J, t3 = ap / J, and t2 at ap for the rest. Between ticks
+/// only position, velocity and acceleration are stored.
 #pragma once
 
 #include <algorithm>
@@ -23,7 +23,7 @@ struct AxisState {
   double acceleration = 0.0;
 };
 
-/// Three phases of constant jerk that lead to a velocity; after them the velocity is kept.
+/// Three phases of constant jerk that lead to a velocity, which is then kept.
 struct AxisProfile {
   double duration[3];      ///< s, >= 0
   double jerk[3];          ///< rad/s^3
@@ -34,32 +34,32 @@ struct AxisProfile {
 };
 
 /// Time-optimal profile from (velocity, acceleration) to target_velocity with final acceleration 0.
-/// Both limits must be positive. An acceleration beyond its limit is first brought back at full
-/// jerk.
+/// Both limits must be positive. An acceleration above its limit is first reduced at full jerk.
 AxisProfile planVelocity(double velocity, double acceleration, double target_velocity,
                          double max_acceleration, double max_jerk);
 
-/// State after `dt` (s, >= 0) of following the profile, integrated exactly.
+/// State after following the profile for `dt` (s, >= 0), integrated exactly.
 AxisState advance(const AxisState& start, const AxisProfile& profile, double dt);
 
 /// The seven axes. Real-time safe.
 class Interpolator {
  public:
-  /// Acceleration, jerk and velocity limits are taken from `limits`; position limits are
-  /// BrakingGuard's matter.
+  /// Uses the acceleration, jerk and velocity limits of `limits`. BrakingGuard observes the
+  /// position limits.
   explicit Interpolator(const JointLimits& limits);
 
-  /// Stands still at `position`.
+  /// Sets the state to rest at `position`.
   void reset(const Vector7& position);
 
-  /// Goes on from another position, with given velocity and acceleration (after a gap in the
-  /// connection).
+  /// Continues from another position with given velocity and acceleration (after an interruption of
+  /// the connection).
   void resume(const Vector7& position, const Vector7& velocity, const Vector7& acceleration);
 
-  /// Advances by `dt` towards the target velocities (rad/s), each cut to its velocity limit.
+  /// Advances by `dt` (s) towards the target velocities (rad/s), each reduced to its velocity
+  /// limit.
   void step(const Vector7& target_velocity, double dt);
 
-  /// Whether every joint stands: velocity and acceleration exactly zero.
+  /// True if every joint is at rest: velocity and acceleration are exactly zero.
   bool standsStill() const;
 
   AxisState axis(int joint) const {
@@ -79,7 +79,7 @@ class Interpolator {
 inline AxisProfile planVelocity(double velocity, double acceleration, double target_velocity,
                                 double max_acceleration, double max_jerk) {
   const double per_jerk = 1.0 / max_jerk;
-  // Velocity that is reached by doing nothing but bringing the acceleration to zero.
+  // Velocity that results if only the acceleration is brought to zero.
   const double coasting = velocity + 0.5 * acceleration * std::abs(acceleration) * per_jerk;
   const double d = target_velocity >= coasting ? 1.0 : -1.0;
   const double a = d * acceleration;
@@ -97,7 +97,7 @@ inline AxisProfile planVelocity(double velocity, double acceleration, double tar
     profile.duration[2] = peak * per_jerk;
   } else {
     const double sign =
-        a > max_acceleration ? -1.0 : 1.0;  // an acceleration beyond the limit comes down first
+        a > max_acceleration ? -1.0 : 1.0;  // an acceleration above the limit is reduced first
     profile.duration[0] = sign * (max_acceleration - a) * per_jerk;
     profile.jerk[0] *= sign;
     const double dv1 = 0.5 * sign * (max_acceleration * max_acceleration - a * a) * per_jerk;
@@ -120,7 +120,7 @@ inline AxisState advance(const AxisState& start, const AxisProfile& profile, dou
     if (within) return s;
     dt -= t;
   }
-  // Arrived: rounding must not leave a creeping rest of acceleration or velocity.
+  // The target is reached: rounding must not leave a small acceleration or velocity.
   s.velocity = profile.target_velocity;
   s.acceleration = 0.0;
   s.position += dt * s.velocity;

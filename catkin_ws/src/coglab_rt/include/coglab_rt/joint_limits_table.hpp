@@ -1,6 +1,6 @@
 /// @file
-/// Reader of the one table of joint limits, config/joint_limits.yaml of an arm's description. Not
-/// for real-time threads.
+/// Reader of the table of joint limits, config/joint_limits.yaml in the package of an arm's
+/// description. Not for real-time threads.
 #pragma once
 
 #include <algorithm>
@@ -18,8 +18,8 @@ namespace coglab_rt {
 
 namespace detail {
 
-/// A vector of the table: its name, where it goes, whether its values must be positive, and the
-/// largest size that an arm can have; a number in degrees is larger.
+/// A vector of the table: its name, its destination, whether its values must be positive, and its
+/// largest possible absolute value. A number in degrees is larger than that.
 struct LimitField {
   const char* name;
   Vector7 JointLimits::*member;
@@ -41,7 +41,7 @@ constexpr LimitField kLimitFields[] = {
   throw std::runtime_error("joint limits " + path + line + ": " + what);
 }
 
-/// Overwrites `value` if the section has the field; returns whether it had.
+/// Overwrites `value` if the section has the field. Returns true if it has.
 inline bool readLimitVector(const std::string& path, const YAML::Node& section,
                             const std::string& section_name, const LimitField& field,
                             Vector7& value) {
@@ -76,7 +76,7 @@ inline bool readLimitVector(const std::string& path, const YAML::Node& section,
   return true;
 }
 
-/// Reads one profile over what `limits` holds already.
+/// Reads one profile into `limits`; fields that are missing keep their values.
 inline void readLimitProfile(const std::string& path, const YAML::Node& root,
                              const std::string& name, JointLimits& limits) {
   const YAML::Node section = root[name];
@@ -114,7 +114,7 @@ inline YAML::Node openLimitsTable(const std::string& path) {
   return root;
 }
 
-/// The names of the joints; whether they are those of its arm, a back end has to see.
+/// Names of the joints. The back end checks whether they belong to its arm.
 inline std::array<std::string, 7> jointNames(const std::string& path, const YAML::Node& root) {
   const YAML::Node joints = root["joints"];
   if (!joints || !joints.IsSequence() || joints.size() != 7)
@@ -132,7 +132,7 @@ inline std::array<std::string, 7> jointNames(const std::string& path, const YAML
   return names;
 }
 
-/// Share by which the servos pass the speed that they are told; 0 if the table does not say.
+/// Share by which the servos exceed their commanded speed; 0 if the table does not contain it.
 inline double servoOvershoot(const std::string& path, const YAML::Node& root) {
   const YAML::Node node = root["servo_overshoot"];
   if (!node) return 0.0;
@@ -146,7 +146,7 @@ inline double servoOvershoot(const std::string& path, const YAML::Node& root) {
   return share;
 }
 
-/// Whether the file says that its limits may be wider than those of the arm's own table.
+/// True if the file declares that its limits may be wider than those of the arm's own table.
 inline bool mayBeWider(const std::string& path, const YAML::Node& root) {
   const YAML::Node node = root["wider_than_robot"];
   bool wider = false;
@@ -155,7 +155,7 @@ inline bool mayBeWider(const std::string& path, const YAML::Node& root) {
   return wider;
 }
 
-/// @throws std::runtime_error naming the field if a limit is wider than the arm's own.
+/// @throws std::runtime_error naming the field if a limit is wider than that of the arm.
 inline void requireWithin(const std::string& path, const JointLimits& limits,
                           const std::string& own_path, const JointLimits& own) {
   const auto compare = [&](const std::string& field, double value, double allowed, double excess) {
@@ -180,9 +180,9 @@ inline void requireWithin(const std::string& path, const JointLimits& limits,
 }  // namespace detail
 
 /// Reads the table. `profile` is "default" or a profile of the file such as "t1", which overrides
-/// what it names. `own_path`: table of the arm itself; a limit that is wider than there is refused
-/// unless the file has the line `wider_than_robot: true`. Empty: none.
-/// @throws std::runtime_error naming file, line, field and what was expected if anything is
+/// the fields that it contains. `own_path`: table of the arm itself; empty: none. A limit that is
+/// wider than in that table is refused unless the file has the line `wider_than_robot: true`.
+/// @throws std::runtime_error naming file, line, field and the expected value if anything is
 /// missing, of the wrong length, not finite, out of range or out of order.
 inline JointLimits loadJointLimits(const std::string& path, const std::string& profile = "default",
                                    const std::string& own_path = "") {

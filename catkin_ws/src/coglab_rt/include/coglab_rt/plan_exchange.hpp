@@ -1,5 +1,5 @@
 /// @file
-/// How requests reach the control cycle: immutable plans, adopted between two cycles.
+/// Passes requests to the control cycle as immutable plans, adopted between two cycles.
 #pragma once
 
 #include <atomic>
@@ -14,42 +14,41 @@
 
 namespace coglab_rt {
 
-/// What became of an offered plan.
+/// Result of an offered plan.
 enum class PlanOutcome : std::uint8_t {
   Adopted,    ///< the cycle acknowledged it
-  Withdrawn,  ///< the cycle did not take it in time; it was taken back and never had an effect
-  Taken       ///< the cycle took it but did not acknowledge in time: it is, or will be, in effect
+  Withdrawn,  ///< the cycle did not take it in time; it was withdrawn and had no effect
+  Taken       ///< the cycle took it but did not acknowledge in time: it is or will be in effect
 };
 
-/// Hands plans from the threads that build them to the one control thread.
+/// Passes plans from the threads that build them to the control thread.
 ///
-/// Builders (services) come one after another. Each offers a plan by one atomic pointer; the cycle
-/// takes it at its start, acknowledges its number, and never looks at the one before again; the
-/// builder then frees the old one. So the cycle neither locks nor frees, and what it reads is never
-/// changed under it (docs/architecture.md, step 3).
+/// Builders (services) take turns. Each offers a plan through an atomic pointer. The cycle takes
+/// the plan at its start, acknowledges its number, and does not access the previous plan any more.
+/// Then the builder frees the previous plan. So the cycle neither locks nor frees, and the data
+/// that it reads is never changed (docs/architecture.md, step 3).
 ///
-/// @tparam Plan what is handed over; the cycle may write fields of it that the builder reads after
-/// Adopted
+/// @tparam Plan type of the plans; the cycle may write fields of a plan that the builder reads
+/// after Adopted
 template <typename Plan>
 class PlanExchange {
  public:
-  /// Called again and again while a builder waits. Default: sleep 0.2 ms. Where nobody else runs
-  /// the cycle (lockstep, tests), set it to a function that adopts.
+  /// Called repeatedly while a builder waits. Default: sleep 0.2 ms. If no other thread runs the
+  /// cycle (lockstep, tests), set it to a function that adopts the plan.
   using Wait = std::function<void()>;
 
   PlanExchange() = default;
   PlanExchange(const PlanExchange&) = delete;
   PlanExchange& operator=(const PlanExchange&) = delete;
 
-  /// Replaces the way of waiting (before any plan is offered).
+  /// Replaces the waiting function. Call it before any plan is offered.
   void setWait(Wait wait) {
     const std::lock_guard<std::mutex> lock(building_);
     wait_ = std::move(wait);
   }
 
-  /// Offers a plan and waits for its acknowledgement, at most `timeout_s` seconds on the steady
-  /// clock.
-  /// @param read called with the plan as the cycle left it, if the outcome is Adopted
+  /// Offers a plan and waits for its acknowledgement, at most `timeout_s` (s, steady clock).
+  /// @param read called with the plan after the cycle has written to it, if the outcome is Adopted
   template <typename Read>
   PlanOutcome offer(std::unique_ptr<Plan> plan, double timeout_s, Read&& read) {
     const std::lock_guard<std::mutex> lock(building_);
@@ -78,13 +77,13 @@ class PlanExchange {
     return PlanOutcome::Taken;
   }
 
-  /// As above, for plans that bring nothing back.
+  /// The same for plans from which nothing is read.
   PlanOutcome offer(std::unique_ptr<Plan> plan, double timeout_s) {
     return offer(std::move(plan), timeout_s, [](const Plan&) {});
   }
 
-  /// Control thread: takes the newest plan if there is one, else returns null. The plan stays valid
-  /// until the one after it is adopted. Call acknowledge() when the one before is no longer used.
+  /// Control thread: takes the newest plan; null if there is none. The plan is valid until the next
+  /// one is adopted. Call acknowledge() when the previous plan is not used any more.
   Plan* take() {
     Offer* const offer = offered_.exchange(nullptr, std::memory_order_acq_rel);
     if (offer == nullptr) return nullptr;
@@ -92,7 +91,7 @@ class PlanExchange {
     return offer->plan.get();
   }
 
-  /// Control thread: the plan from take() is in effect, and its fields are final.
+  /// Control thread: declares that the plan from take() is in effect and its fields are final.
   void acknowledge() { adopted_number_.store(taken_number_, std::memory_order_release); }
 
   /// Number of the newest acknowledged plan; 0 before the first.
@@ -106,7 +105,7 @@ class PlanExchange {
 
   void retire(Offer* now_in_effect) {
     in_effect_.reset(now_in_effect);
-    unconfirmed_.clear();  // all of them are older than what the cycle acknowledged
+    unconfirmed_.clear();  // all of them are older than the acknowledged plan
   }
 
   std::mutex building_;

@@ -1,5 +1,5 @@
 /// @file
-/// Real-time scheduling of a thread, for those who have the right to it.
+/// Real-time scheduling of a thread, if the user has the permission.
 #pragma once
 
 #include <algorithm>
@@ -18,17 +18,17 @@
 
 namespace coglab_rt {
 
-/// Gives the calling thread SCHED_FIFO with `priority` (1..99). Returns an empty string, or what
-/// failed and what to do.
+/// Gives the calling thread SCHED_FIFO with `priority` (1..99). Returns an empty string, or the
+/// failure and its remedy.
 std::string enterRealTime(int priority);
 
-/// Locks present and future memory of the process (mlockall). Returns an empty string, or what
-/// failed and what to do.
+/// Locks present and future memory of the process (mlockall). Returns an empty string, or the
+/// failure and its remedy.
 std::string lockMemory();
 
-/// A thread with a bounded stack, the half of which that it uses first is touched once before it
-/// runs, so that locked memory stays small and no page fault comes later. Not copyable; the owner
-/// must join().
+/// A thread with a bounded stack. The half of the stack that it uses first is touched once before
+/// its body runs, so that locked memory stays small and no page fault occurs later. Not copyable;
+/// the owner must join().
 class BoundedThread {
  public:
   BoundedThread() = default;
@@ -36,7 +36,7 @@ class BoundedThread {
   BoundedThread& operator=(const BoundedThread&) = delete;
   ~BoundedThread() { join(); }
 
-  /// Starts `body`. `name` (at most 15 characters) shows in top and ps. @throws std::system_error
+  /// Starts `body`. top and ps show `name` (at most 15 characters). @throws std::system_error
   void start(const char* name, std::size_t stack_bytes, std::function<void()> body);
   void join();
   bool running() const { return running_; }
@@ -71,15 +71,15 @@ inline std::string lockMemory() {
 
 namespace detail {
 
-/// Touches so much of the stack below the caller. It must return before the body runs: what a frame
-/// has allocated lies above the frames of what it calls.
+/// Touches this number of bytes of the stack below the caller. It must return before the body runs:
+/// memory that a frame allocates lies above the frames of the functions that it calls.
 __attribute__((noinline)) inline void touchStack(std::size_t bytes) {
   auto* stack = static_cast<volatile char*>(alloca(bytes));
   for (std::size_t i = 0; i < bytes; i += 1024) stack[i] = 0;
 }
 
-/// Bytes of the calling thread's stack below its caller. Thread-local variables of all libraries
-/// lie in the stack too, so that it is less than was asked for; 0 if it is not known.
+/// Bytes of the calling thread's stack below its caller; 0 if unknown. Thread-local variables of
+/// all libraries are in the stack, too, so it is less than was requested.
 inline std::size_t stackLeft() {
   pthread_attr_t attributes;
   if (pthread_getattr_np(pthread_self(), &attributes) != 0) return 0;

@@ -1,5 +1,5 @@
 /// @file
-/// Why something was refused, holds or ended: a number for programs beside a sentence for people.
+/// Reason for a refusal, a hold or an end: a code for programs and a sentence for people.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +11,8 @@
 
 namespace coglab_rt {
 
-/// The numbers of coglab_msgs/ReasonCode that arms, motions and their requests use; the ROS side
-/// checks that they are equal. What each one means is said there.
+/// The codes of coglab_msgs/ReasonCode that arms, motions and their requests use. The ROS side
+/// checks that they are equal. Their meaning is documented there.
 enum class ReasonCode : std::uint16_t {
   None = 0,
 
@@ -66,12 +66,12 @@ enum class ReasonCode : std::uint16_t {
   TimeLimit = 408
 };
 
-/// A code with its sentence, which can be composed inside the control cycle: no allocation.
+/// A code with its sentence. It can be composed inside the control cycle: no allocation.
 class Reason {
  public:
-  /// All is well.
+  /// No fault.
   Reason() = default;
-  /// @param code anything but None  @param text beginning of the sentence; more follows with <<
+  /// @param code any code but None  @param text beginning of the sentence; << appends the rest
   explicit Reason(ReasonCode code, const char* text = "") : code_(code), text_(text) {}
 
   template <typename Part>
@@ -81,7 +81,7 @@ class Reason {
   }
 
   ReasonCode code() const { return code_; }
-  /// The code as the messages carry it.
+  /// The code as a number, as in messages.
   std::uint16_t number() const { return static_cast<std::uint16_t>(code_); }
   bool empty() const { return code_ == ReasonCode::None; }
   void clear() { *this = Reason(); }
@@ -93,8 +93,8 @@ class Reason {
   FixedText<200> text_;
 };
 
-/// Outcome of a request: a code and a sentence for the user if it was refused, perhaps a note if
-/// not.
+/// Result of a request: code and sentence for the user if it was refused, otherwise optionally a
+/// note.
 struct Answer {
   bool success = true;
   std::string message;
@@ -105,11 +105,11 @@ struct Answer {
     return refusal(ReasonCode::InvalidArgument, std::move(why));
   }
   static Answer refusal(const Reason& why) { return {false, why.str(), why.code()}; }
-  /// The code as the messages carry it.
+  /// The code as a number, as in messages.
   std::uint16_t number() const { return static_cast<std::uint16_t>(code); }
 };
 
-/// A reason of an arm not to move, and its code.
+/// A reason why an arm may not move, and its code.
 struct BlockCode {
   MotionBlock block;
   ReasonCode code;
@@ -127,7 +127,7 @@ constexpr BlockCode kBlockCodes[] = {
     {MotionBlock::DriveError, ReasonCode::DriveError},
 };
 
-/// The code of what keeps the arm from moving; None for MotionBlock::None. Real-time safe.
+/// Code of the reason why the arm may not move; None for MotionBlock::None. Real-time safe.
 inline ReasonCode codeOf(MotionBlock block) noexcept {
   for (const BlockCode& row : kBlockCodes) {
     if (row.block == block) return row.code;
@@ -135,7 +135,7 @@ inline ReasonCode codeOf(MotionBlock block) noexcept {
   return ReasonCode::NotStarted;
 }
 
-/// The other way round, from the number in a message; NotStarted for one that is none of those.
+/// Inverse of codeOf, from the number in a message; NotStarted for any other number.
 inline MotionBlock motionBlockOf(std::uint16_t number) noexcept {
   for (const BlockCode& row : kBlockCodes) {
     if (static_cast<std::uint16_t>(row.code) == number) return row.block;

@@ -1,6 +1,6 @@
 /// @file
-/// What an arm and its controllers tell each other: one RobotSample per measurement, one
-/// VelocityCommand per control cycle.
+/// Data between an arm and its controllers: one RobotSample per measurement, one VelocityCommand
+/// per control cycle.
 #pragma once
 
 #include <cstdint>
@@ -9,12 +9,12 @@
 
 namespace coglab_rt {
 
-/// Joint-space vector in the arm's order, from base to flange: see JointLimits::names.
+/// Joint-space vector in the order of the arm, from base to flange; see JointLimits::names.
 using Vector7 = Eigen::Matrix<double, 7, 1>;
 /// Force (N) and torque (Nm): Fx Fy Fz Tx Ty Tz.
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-/// Why motion is not allowed at the moment; the words are in `describe()`.
+/// Reason why motion is not allowed; `describe()` returns its text.
 enum class MotionBlock : std::uint8_t {
   None,          ///< motion is allowed
   Disconnected,  ///< no measurement within the arm's time limit
@@ -22,14 +22,14 @@ enum class MotionBlock : std::uint8_t {
   NoPower,       ///< not all drives are powered
   NotStarted,    ///< no `start` since the last stop or fall-back
   Held,          ///< `hold` is latched until `reset`
-  Stopping,      ///< `stop` was asked for; braking or waiting for monitor mode
-  Leashed,  ///< the set-point ran ahead of the arm; it returns, and the motion must be asked for
-            ///< anew
-  PoorQuality,  ///< the controller judged the connection unacceptable; stopped until `start`
-  DriveError    ///< a drive reported an error, with or without power; stopped until `start`
+  Stopping,      ///< `stop` was requested; the arm brakes or waits for monitor mode
+  Leashed,       ///< the set-point was too far ahead of the arm; it returns, and the motion must be
+                 ///< requested again
+  PoorQuality,   ///< the controller rated the connection as unacceptable; stopped until `start`
+  DriveError     ///< a drive reported an error, with or without power; stopped until `start`
 };
 
-/// Words for a MotionBlock, for messages to the user.
+/// Text of a MotionBlock for messages to the user.
 inline const char* describe(MotionBlock block) {
   switch (block) {
     case MotionBlock::None:
@@ -59,7 +59,7 @@ inline const char* describe(MotionBlock block) {
   return "?";
 }
 
-/// The event of `command` that takes the reason away, such as "start"; empty if none does.
+/// The event of `command` that ends the block, such as "start"; empty if there is none.
 inline const char* wayOut(MotionBlock block) {
   switch (block) {
     case MotionBlock::Monitor:
@@ -73,30 +73,31 @@ inline const char* wayOut(MotionBlock block) {
   }
 }
 
-/// What one measurement tells the controllers.
+/// Data of one measurement for the controllers.
 struct RobotSample {
   std::uint64_t sequence =
       0;  ///< number of measurements since the arm's interface started; 0: none yet
   std::int64_t stamp_ns = 0;  ///< time of receipt, steady clock (lockstep: simulated time), ns
   double cycle_time = 0.0;    ///< period of the measurements, s
   std::int64_t controller_ns =
-      0;  ///< time by the robot controller's counter, lost cycles included, ns;
-          ///< differences are the true dt (silence that ended the session counts one cycle)
+      0;  ///< time by the robot controller's counter, including lost cycles, ns; differences are
+          ///< the true dt (a silence that ended the session counts as one cycle)
   Vector7 position = Vector7::Zero();         ///< measured, rad
   Vector7 velocity = Vector7::Zero();         ///< from the velocity filter, rad/s
   Vector7 torque = Vector7::Zero();           ///< measured, Nm
   Vector7 external_torque = Vector7::Zero();  ///< estimated by the robot controller, Nm
-  Vector6 tool_wrench = Vector6::Zero();  ///< estimated by the robot controller, about the tool's
-                                          ///< origin in the tool's axes
+  Vector6 tool_wrench = Vector6::Zero();  ///< estimated by the robot controller, about the origin
+                                          ///< of the tool frame, in its axes
   Vector7 commanded_position = Vector7::Zero();      ///< set-point of the arm, rad
   Vector7 commanded_velocity = Vector7::Zero();      ///< of that set-point, rad/s
   Vector7 commanded_acceleration = Vector7::Zero();  ///< of that set-point, rad/s^2
   MotionBlock block = MotionBlock::Disconnected;     ///< None: target velocities are followed
-  std::int8_t blocking_joint = -1;  ///< Leashed: index of the joint that ran ahead, else -1
+  std::int8_t blocking_joint = -1;  ///< Leashed: index of the joint that was too far ahead, else -1
   std::uint32_t motion_epoch =
-      0;  ///< grows whenever motion is blocked or allowed again: abort what is running
-  /// What the arm's own guard keeps before a joint's stop beside the margin of JointLimits: the way
-  /// of so many seconds at constant speed, and so many rad. Who plans motions keeps the same.
+      0;  ///< increases whenever motion is blocked or allowed again: abort the current motion
+  /// Distance that the arm's own guard keeps from a joint's stop in addition to the margin of
+  /// JointLimits: the displacement during stop_delay (s) at constant speed, plus stop_rounding
+  /// (rad). Planners of motions keep the same distance.
   double stop_delay = 0.0, stop_rounding = 0.0;
 };
 
@@ -105,7 +106,7 @@ struct VelocityCommand {
   Vector7 velocity = Vector7::Zero();  ///< rad/s
   std::int64_t stamp_ns = 0;           ///< steady clock (lockstep: simulated time); 0: no command
   std::uint32_t motion_epoch =
-      0;  ///< epoch of the sample it was computed from; older ones are ignored
+      0;  ///< epoch of the sample from which it was computed; older epochs are ignored
 };
 
 }  // namespace coglab_rt

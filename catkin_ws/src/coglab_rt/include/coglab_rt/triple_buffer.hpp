@@ -1,5 +1,5 @@
 /// @file
-/// The newest value from one thread to another.
+/// Passes the newest value from one thread to another.
 #pragma once
 
 #include <atomic>
@@ -7,13 +7,13 @@
 
 namespace coglab_rt {
 
-/// A value that one thread writes and one thread reads, both wait-free: three slots, the newest
-/// complete one wins.
+/// A value that one thread writes and one thread reads, both wait-free. It has three slots; the
+/// reader gets the newest complete one.
 template <typename T>
 class TripleBuffer {
  public:
   TripleBuffer() = default;
-  /// @param initial value of every slot, for types whose assignment allocates unless sizes agree
+  /// @param initial value of every slot, for types whose assignment allocates unless sizes match
   explicit TripleBuffer(const T& initial) : slots_{initial, initial, initial} {}
 
   /// Publishes a value (writer thread only).
@@ -22,7 +22,7 @@ class TripleBuffer {
     publish();
   }
 
-  /// The slot that publish() makes the newest (writer thread only). It holds an old value.
+  /// The slot that publish() will publish (writer thread only). It contains an old value.
   T& back() { return slots_[write_]; }
   /// Number of that slot, 0 to 2.
   std::uint8_t backIndex() const { return write_; }
@@ -33,7 +33,7 @@ class TripleBuffer {
         kIndex;
   }
 
-  /// Copies the newest value (reader thread only). Returns whether it is newer than the last one
+  /// Copies the newest value (reader thread only). Returns true if it is newer than the last one
   /// read.
   bool read(T& value) {
     const bool fresh = take();
@@ -41,13 +41,13 @@ class TripleBuffer {
     return fresh;
   }
 
-  /// Makes the newest value the front (reader thread only). Returns whether there was a newer one.
+  /// Makes the newest value the front (reader thread only). Returns true if there was a newer one.
   bool take() {
     const bool fresh = (middle_.load(std::memory_order_relaxed) & kFresh) != 0;
     if (fresh) read_ = middle_.exchange(read_, std::memory_order_acq_rel) & kIndex;
     return fresh;
   }
-  /// The value that take() found (reader thread only).
+  /// The value that take() selected (reader thread only).
   const T& front() const { return slots_[read_]; }
   /// Number of its slot, 0 to 2.
   std::uint8_t frontIndex() const { return read_; }

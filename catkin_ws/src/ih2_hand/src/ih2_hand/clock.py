@@ -1,4 +1,4 @@
-"""Time as the driver and the emulator see it, so that tests can run in virtual time."""
+"""Clock of the driver and the emulator. Tests replace it to run in virtual time."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ class Clock(Protocol):
     """A steady clock in seconds."""
 
     def monotonic(self) -> float:
-        """Seconds since some fixed moment; never goes back."""
+        """Time (s) since a fixed moment; never steps back."""
 
     def sleep(self, seconds: float) -> None:
-        """Let that much time pass."""
+        """Wait for this time (s)."""
 
 
 class SteadyClock:
-    """The machine's steady clock."""
+    """The computer's steady clock."""
 
     monotonic = staticmethod(time.monotonic)
     sleep = staticmethod(time.sleep)
 
 
 class SteppedClock:
-    """A clock that moves only when somebody sleeps on it."""
+    """A clock that advances only by `sleep`."""
 
     def __init__(self, start: float = 0.0):
         self.now = start

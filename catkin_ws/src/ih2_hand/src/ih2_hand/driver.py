@@ -1,4 +1,4 @@
-"""The hand's functions, D4.10 Table 2, on top of the serial line. Needs pyserial, no ROS."""
+"""Driver of the IH2 Azzurra hand: the functions of D4.10 Table 2 on a serial line. Needs pyserial, no ROS."""
 
 from __future__ import annotations
 
@@ -41,24 +41,22 @@ CALIBRATIONS = {
     "complete": (frames.FIRST_CALIBRATION, "calibration_complete_limit_s"),
 }
 
-DIALECTS = ("legacy", "v17")
-"""Grasp commands that firmwares know (W1)."""
+DIALECTS = ("legacy", "v17")  # grasp commands of older and newer firmware (W1)
 
-LEAST_READ_TIMEOUT_S, LARGEST_READ_TIMEOUT_S = 0.005, 0.5
-"""Bounds of a read's time limit: longer than the hand's own delay, short enough to act upon."""
+# Bounds of the time limit of a read: longer than the hand's own delay (1 ms), short enough for the caller to react.
+LEAST_READ_TIMEOUT_S = 0.005
+LARGEST_READ_TIMEOUT_S = 0.5
 
-MILLIAMPERE_PER_COUNT = (0.81, 1.1, 1.1, 1.1, 1.1)
-"""Motor current, by motor (EH1 guide 2.2.2)."""
+MILLIAMPERE_PER_COUNT = (0.81, 1.1, 1.1, 1.1, 1.1)  # mA of motor current, by motor (EH1 guide 2.2.2)
 
 
 class HandSerialDriver:
     """One IH2 Azzurra hand on one serial port.
 
     Motors ("fingers" in Table 2): 0 thumb abduction, 1 thumb flexion, 2 index, 3 middle, 4 ring and
-    little. Positions 0 (open) .. 254 (closed). Every argument out of range is a ValueError before
-    any byte is sent. Every read has a time limit; see `line` for what follows a bad answer.
-    Commands are not acknowledged by the hand: poll the status to follow them. May be called from
-    several threads.
+    little. Positions are 0 (open) .. 254 (closed). An argument out of range raises ValueError before
+    any byte is sent. Every read has a time limit. Module `line` describes how bad answers are handled.
+    The hand does not acknowledge commands: poll its status to follow them. Thread-safe.
     """
 
     def __init__(
@@ -73,14 +71,14 @@ class HandSerialDriver:
         trace: TraceHook | None = None,
         read_timeout: float = WIRE.read_timeout_s,
     ):
-        """Open the port, bring the line in step, and ask the hand for one status.
+        """Open the port, synchronise with the hand's parser, and request one status.
 
-        `serial_port` is a device, a pty or `socket://host:port`; None takes the one serial device
-        there is. `dialect` is `legacy` or `v17` (W1). `preshapes` replaces grasps.yaml.
-        `send_preshape` False keeps set_grasp_mode from moving the fingers (W21). `transport`
-        replaces the port altogether. `read_timeout` (s) bounds each wait for an
-        answer. Opening stops the fingers (W10) but moves nothing.
-        Raises HandPortError when the port cannot be opened or no hand answers on it.
+        `serial_port` is a device, a pty or `socket://host:port`; None selects the only serial device
+        of the computer. `dialect` is `legacy` or `v17` (W1). `preshapes` replaces grasps.yaml.
+        With `send_preshape` False, set_grasp_mode does not move the fingers (W21). `transport`
+        replaces the serial port. `read_timeout` (s) limits each wait for an answer.
+        Opening the port stops the fingers (W10) and moves nothing.
+        Raises HandPortError if the port cannot be opened or no hand answers on it.
         """
         self.dialect = dialect if dialect is not None else WIRE.dialect
         if self.dialect not in DIALECTS:
@@ -114,7 +112,7 @@ class HandSerialDriver:
     # -- connection ------------------------------------------------------------------------------
 
     def close(self) -> None:
-        """Close the port. The fingers keep what they do; call stop_all first to stop them."""
+        """Close the port. Moving fingers keep moving; call stop_all first to stop them."""
         self.line.close()
 
     def __enter__(self) -> HandSerialDriver:
@@ -125,17 +123,17 @@ class HandSerialDriver:
 
     @property
     def counters(self) -> LineCounters:
-        """Requests, resynchronisations and failures since the port was opened."""
+        """Number of requests, resynchronisations and failures since the port was opened."""
         return self.line.counters
 
     @property
     def last_byte(self) -> int | None:
-        """Last byte received, None if none was."""
+        """Last byte received; None if none was received."""
         return self.line.transport.last_byte
 
     @property
     def calibrating(self) -> bool:
-        """Whether a calibration started here runs."""
+        """True while a calibration started by this driver runs."""
         return self._calibrating
 
     def _check_free(self) -> None:
@@ -161,11 +159,11 @@ class HandSerialDriver:
     # -- calibration and stop --------------------------------------------------------------------
 
     def calibration(self, data: str) -> None:
-        """Calibrate `fast` or `complete` and wait for the end; the hand opens.
+        """Calibrate and wait for the end. `data` is `fast` or `complete`. The hand opens.
 
-        Other requests raise HandCalibratingError meanwhile, except stop_all, whose byte the hand
-        discards like every other (W11). Raises HandCalibrationError when the hand does not answer
-        again in time (W12), or ends in another state than fully open (W13).
+        During a calibration other requests raise HandCalibratingError. Only stop_all is sent, but the
+        hand discards its byte (W11). Raises HandCalibrationError if the hand does not answer again in
+        time (W12), or if it is not fully open at the end (W13).
         """
         if data not in CALIBRATIONS:
             raise ValueError(f"calibration must be fast or complete; got {data!r}")
@@ -205,14 +203,14 @@ class HandSerialDriver:
             )
 
     def stop_all(self) -> None:
-        """Stop every motor where it is. Waits for no running request, only for a running frame."""
+        """Stop every motor where it is. Waits only until a frame in progress is sent, not for its answer."""
         self._something_changes()
         self.line.send(bytes((frames.STOP_ALL,)))
 
     # -- single motors ---------------------------------------------------------------------------
 
     def move_motor(self, motor: int, speed: int, is_close_direction: bool) -> None:
-        """Drive a motor at `speed` 0..511 until its end sensor or a resistance stops it."""
+        """Move a motor at `speed` 0..511 until its end sensor or a resistance stops it."""
         _motor(motor)
         _whole("speed", speed, WIRE.speed_max)
         if not isinstance(is_close_direction, (bool, int)) or is_close_direction not in (0, 1):
@@ -226,39 +224,39 @@ class HandSerialDriver:
         self._command(frames.set_finger_position(finger, position))
 
     def set_finger_force(self, motor: int, force: int) -> None:
-        """Pull a finger's tendon with `force` 0..254 (W5); motor 0 has no sensor (W6)."""
+        """Pull a finger's tendon with `force` 0..254 (W5). Motor 0 has no force sensor (W6)."""
         _sensed(motor)
         _whole("force", force, 254)
         self._command(frames.set_finger_tension(motor, force * WIRE.force_scale))
 
     def set_finger_current(self, motor: int, current: int) -> None:
-        """Close a motor with `current` 0..1023 counts (beyond Table 2)."""
+        """Close a motor with `current` 0..1023 counts (not in Table 2)."""
         _motor(motor)
         _whole("current", current, 1023)
         self._command(frames.set_finger_current(motor, current))
 
     def get_finger_position(self, finger: int) -> int:
-        """Position 0..254; valid after a calibration."""
+        """Position 0..254. Valid after a calibration."""
         return min(self.get_raw_position(finger), WIRE.position_max)
 
     def get_raw_position(self, finger: int) -> int:
-        """Position byte 0..255 as the hand sends it (beyond Table 2)."""
+        """Position byte 0..255 as the hand sends it (not in Table 2)."""
         _motor(finger)
         return self._value(_POSITION[finger], 1, POSITION_SLACK)
 
     def get_finger_force(self, finger: int) -> int:
-        """Tendon tension 0..254 (W5); NoForceSensorError for motor 0."""
+        """Tendon tension 0..254 (W5). Raises NoForceSensorError for motor 0."""
         _sensed(finger)
         tension = self._value(_FORCE[finger], 2, ANALOGUE_SLACK)
         return min(tension // WIRE.force_scale, 254)
 
     def get_motor_current(self, motor: int) -> int:
-        """Motor current in counts 0..1023; times MILLIAMPERE_PER_COUNT it is mA."""
+        """Motor current in counts 0..1023. Multiply by MILLIAMPERE_PER_COUNT for mA."""
         _motor(motor)
         return self._value(_CURRENT[motor], 2, ANALOGUE_SLACK)
 
     def get_finger_status(self, finger: int) -> dict[str, Any]:
-        """Status of one motor, see `status.decode_status`."""
+        """Status of one motor; see `status.decode_status`."""
         _motor(finger)
         raw = self._value(_STATUS[finger], 1, STATUS_SLACK)
         if not at_rest(raw):
@@ -271,11 +269,11 @@ class HandSerialDriver:
     # -- whole hand ------------------------------------------------------------------------------
 
     def get_all_finger_status(self) -> list[dict[str, Any]]:
-        """Status of the five motors, one request each (the hand has no bulk read)."""
+        """Status of the five motors, with one request each: the hand has no bulk read."""
         return [self.get_finger_status(motor) for motor in _MOTORS]
 
     def read_motors(self) -> list[dict[str, Any]]:
-        """Status, `position`, `force` (-1 where there is no sensor) and `current` of all motors."""
+        """Status of all motors with `position`, `force` (-1 without a sensor) and `current`."""
         readings = []
         for motor in _MOTORS:
             reading = self.get_finger_status(motor)
@@ -286,14 +284,14 @@ class HandSerialDriver:
         return readings
 
     def set_hand_posture(self, pos: Sequence[int]) -> None:
-        """Move the five motors to positions 0..254; spaced as the hand needs it."""
+        """Move the five motors to positions 0..254. The next command waits until the hand has executed it (3 ms)."""
         self._command(frames.set_hand_posture(_positions(pos)), WIRE.posture_spacing_s)
 
     def set_grasp_mode(self, mode: str, force_level: str, is_current: bool = True) -> None:
-        """Pre-shape the hand for a grasp and remember the grasp for grasp_mode_close (W21).
+        """Preshape the hand for a grasp (W21). grasp_mode_close closes to this grasp.
 
-        `is_current` True limits the grip by motor current, False by tendon tension; the v17
-        dialect has no such choice (W23). ValueError lists modes or levels that exist.
+        `is_current` True limits the grip by motor current, False by tendon tension. The v17 dialect
+        has no such choice (W23). A ValueError lists the modes or levels that exist.
         """
         grasps.check_grasp(mode, force_level, self.dialect)
         if not isinstance(is_current, bool):
@@ -305,7 +303,7 @@ class HandSerialDriver:
         self._grasp = frames.grasp(self.dialect, mode, force_level, is_current)
 
     def grasp_mode_close(self) -> None:
-        """Close to the grasp of the last set_grasp_mode; NoGraspModeError if there was none."""
+        """Close to the grasp of the last set_grasp_mode. Raises NoGraspModeError if there was none."""
         if self._grasp is None:
             raise NoGraspModeError("no grasp mode is set: call set_grasp_mode first")
         self._command(self._grasp, WIRE.posture_spacing_s)

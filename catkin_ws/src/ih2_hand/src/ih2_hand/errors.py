@@ -1,4 +1,4 @@
-"""What can go wrong between host and hand, one class per thing the caller can do about it."""
+"""Errors between host and hand. Each class needs another reaction of the caller."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from ih2_hand.reasons import Reason
 
 
 class HandError(Exception):
-    """Base of every error of the hand; `reason` says what it means."""
+    """Base of every error of the hand; `reason` is its code."""
 
     reason = Reason.UNEXPECTED
 
 
 class RefusedError(ValueError):
-    """A request that cannot be taken as it is; nothing was sent."""
+    """A request that is not accepted; nothing was sent."""
 
     def __init__(self, message: str, reason: Reason):
         super().__init__(message)
@@ -20,19 +20,19 @@ class RefusedError(ValueError):
 
 
 class HandPortError(HandError):
-    """The port cannot be opened: it does not exist, is not permitted, is busy, or is ambiguous."""
+    """The port cannot be opened: it does not exist, access is denied, it is busy, or it is ambiguous."""
 
     reason = Reason.HAND_LINK_LOST
 
 
 class HandConnectionLost(HandError):
-    """The port was open and is gone: cable pulled, adapter reset, peer closed."""
+    """The port was open and is lost: cable pulled, adapter reset, or peer closed."""
 
     reason = Reason.HAND_LINK_LOST
 
 
 class HandTimeoutError(HandError):
-    """No complete answer, neither at once nor after one resynchronisation and one retry."""
+    """No complete answer, not even after one resynchronisation and one retry."""
 
     reason = Reason.HAND_LINK_LOST
 
@@ -44,13 +44,13 @@ class HandInconsistentError(HandError):
 
 
 class HandCalibratingError(HandError):
-    """The hand calibrates and discards every request meanwhile."""
+    """The hand calibrates and discards every request until the end."""
 
     reason = Reason.HAND_CALIBRATING
 
 
 class HandCalibrationError(HandError):
-    """The calibration did not end in time, or not in the state it must end in (`reason`)."""
+    """The calibration did not end in time, or ended in a wrong state (`reason`)."""
 
     def __init__(self, message: str, reason: Reason):
         super().__init__(message)
@@ -58,12 +58,12 @@ class HandCalibrationError(HandError):
 
 
 class NoForceSensorError(HandError, ValueError):
-    """Motor 0 (thumb abduction) has no tension sensor: neither set nor read its force."""
+    """Motor 0 (thumb abduction) has no tension sensor: its force can neither be set nor read."""
 
     reason = Reason.NOT_SUPPORTED
 
 
 class NoGraspModeError(HandError):
-    """grasp_mode_close before set_grasp_mode: there is nothing to close to."""
+    """grasp_mode_close was called before set_grasp_mode."""
 
     reason = Reason.HAND_REFUSED

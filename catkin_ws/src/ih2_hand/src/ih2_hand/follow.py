@@ -1,4 +1,4 @@
-"""Run a hand movement to its end without ROS, with the same rules as the node's actions."""
+"""Runs a hand movement to its end without ROS, with the same rules as the node's actions."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from ih2_hand.driver import HandSerialDriver
 from ih2_hand.progress import RESENDS, Task, Verdict
 from ih2_hand.reasons import Reason
 
-PERIOD_S = 1.0 / 30.0
-"""Time between polls."""
+PERIOD_S = 1.0 / 30.0  # s between polls
 
 
 def follow(
@@ -21,11 +20,11 @@ def follow(
     period: float = PERIOD_S,
     on_poll: Callable[[Verdict, Sequence[Any]], bool] | None = None,
 ) -> Verdict:
-    """Begin `task` and poll every `period` s until it is done or its time limit is over.
+    """Begin `task` and poll every `period` (s) until it is done or its time limit has passed.
 
-    `on_poll` sees each verdict with the five readings; True from it breaks the movement off. The
-    fingers are stopped where the node would stop them. Time is the driver's clock. Errors of the
-    line are raised.
+    `on_poll` receives each verdict with the five readings. If it returns True, the movement is
+    cancelled. The fingers stop in the same cases as with the node. Time is the driver's clock.
+    Errors of the line are raised.
     """
     clock, resends = driver.line.clock, 0
     fillers = driver.counters.fillers

@@ -1,7 +1,7 @@
-"""Bytes of the host-to-hand frames: encoders, lengths by first byte, names.
+"""Frames from the host to the hand: encoders, lengths by first byte, names.
 
-Functions named after commands return the frame as bytes; arguments are already checked by the
-driver. Multi-byte values are sent with the most significant byte first.
+Functions with the name of a command return its frame as bytes. The driver has checked the arguments.
+Multi-byte values are sent with the most significant byte first.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ LLMC_DATA = {
     0x65: 0,
     0x66: 2,
 }
-"""Data bytes of each low-level command; an unknown one is framed as if it had none."""
+"""Number of data bytes of each low-level command. An unknown command is framed as if it had none."""
 
 LLMC_REPLY = {
     0x70: 1,
@@ -69,7 +69,7 @@ LLMC_REPLY = {
     0x62: WIRE.llmc_reading_bytes,
     0x65: 4,
 }
-"""Reply bytes of the low-level commands that answer."""
+"""Number of reply bytes of the low-level commands that are answered."""
 
 
 def move_motor(motor: int, speed: int, close: bool) -> bytes:
@@ -79,27 +79,27 @@ def move_motor(motor: int, speed: int, close: bool) -> bytes:
 
 
 def set_finger_position(motor: int, position: int) -> bytes:
-    """SetFingerPosition."""
+    """SetFingerPosition, position 0..254."""
     return bytes((SET_POSITION, motor, position))
 
 
 def set_finger_tension(motor: int, tension: int) -> bytes:
-    """SetFingerForce with the wire's tension 0..1023; bits 9 and 8 ride above the motor number."""
+    """SetFingerForce with tension 0..1023; bits 9 and 8 are sent in the byte of the motor number."""
     return bytes((SET_TENSION, ((tension >> 8) << 6) + motor, tension & 0xFF))
 
 
 def set_finger_current(motor: int, current: int) -> bytes:
-    """SetFingerCurrent, counts 0..1023, closing only."""
+    """SetFingerCurrent, 0..1023 counts; closes only."""
     return bytes((LLMC, motor, 0x61, current >> 8, current & 0xFF, motor))
 
 
 def set_hand_posture(positions: Sequence[int]) -> bytes:
-    """SetHandPosture, five positions between two equal bytes."""
+    """SetHandPosture: five positions between two equal bytes."""
     return bytes((SET_POSTURE, *positions, SET_POSTURE))
 
 
 def grasp(dialect: str, mode: str, level: str, is_current: bool) -> bytes:
-    """The automatic grasp of a dialect; KeyError where the table has no such pair (W22)."""
+    """Automatic grasp in a dialect. Raises KeyError if the table lacks this mode and level (W22)."""
     if dialect == "v17":
         return bytes((GRASP_V17, WIRE.v17_types[mode], WIRE.v17_force[level], WIRE.v17_step))
     return bytes((WIRE.legacy_grasps[mode, level][0 if is_current else 1],))
@@ -121,9 +121,9 @@ _LENGTHS = _fixed_lengths()
 
 
 def frame_length(start: bytes | bytearray, v17: bool = True) -> int | None:
-    """Length of the frame that begins with `start`, None while too few bytes are there to say.
+    """Length of the frame that begins with `start`; None if more bytes are needed to determine it.
 
-    With `v17` False the byte 6F is unknown, as firmware of 2013 sees it.
+    With `v17` False the byte 6F is unknown, as in firmware of 2013.
     """
     if not start:
         return None
@@ -136,7 +136,7 @@ def frame_length(start: bytes | bytearray, v17: bool = True) -> int | None:
 
 
 def is_known(first: int, dialects: Sequence[str] = ("legacy", "v17")) -> bool:
-    """Whether a first byte means a command in one of the given dialects."""
+    """True if a first byte is a command in one of the given dialects."""
     if first in LEGACY_GRASPS:
         return "legacy" in dialects
     if first == GRASP_V17:
@@ -147,7 +147,7 @@ def is_known(first: int, dialects: Sequence[str] = ("legacy", "v17")) -> bool:
 
 
 def reply_length(frame: bytes) -> int:
-    """Bytes the hand answers to a complete frame."""
+    """Number of bytes with which the hand answers a complete frame."""
     first = frame[0]
     if first < 0x40 or first == GET_CURRENT:
         return 2

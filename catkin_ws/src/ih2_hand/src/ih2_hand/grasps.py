@@ -1,4 +1,4 @@
-"""Grasp modes, force levels and preshapes by name, for every package that names a grasp."""
+"""Names of grasp modes and force levels, and the preshapes. Every package that names a grasp uses this table."""
 
 from __future__ import annotations
 
@@ -9,20 +9,16 @@ from ih2_hand.errors import RefusedError
 from ih2_hand.reasons import Reason
 from ih2_hand.wire_choices import WIRE
 
-LONGEST_QUOTE = 40
-"""Characters of a foreign text that a message repeats."""
+LONGEST_QUOTE = 40  # characters of a text from outside that a message repeats
 
 
 def quoted(text: str) -> str:
-    """A text from outside for a message, however long it is."""
+    """A text from outside, quoted for a message and shortened to LONGEST_QUOTE."""
     return repr(text if len(text) <= LONGEST_QUOTE else text[:LONGEST_QUOTE] + "...")
 
 
 MODES = ("cylindrical", "lateral", "tridigit", "bidigit", "tridigit2", "bidigit2")
-"""Grasp modes."""
-
-LEVELS = ("low", "medium", "high")
-"""Force levels."""
+LEVELS = ("low", "medium", "high")  # force levels
 
 CLOSING_MOTORS = {
     "cylindrical": (1, 2, 3, 4),
@@ -32,18 +28,18 @@ CLOSING_MOTORS = {
     "tridigit2": (1, 2, 3),
     "bidigit2": (1, 2),
 }
-"""Motors that close in each mode (EH1 guide 4.3 for the IH2's five motors)."""
+"""Motors that close in each mode (EH1 guide 4.3, for the IH2's five motors)."""
 
 
 def levels_of(mode: str, dialect: str) -> tuple[str, ...]:
-    """Force levels that `dialect` has for a mode (W22: the one-byte set has gaps)."""
+    """Force levels of a mode in `dialect` (W22: the one-byte commands lack some)."""
     if dialect == "v17":
         return LEVELS
     return tuple(level for level in LEVELS if (mode, level) in WIRE.legacy_grasps)
 
 
 def check_grasp(mode: str, level: str, dialect: str) -> None:
-    """RefusedError unless the dialect has this mode at this force level; it lists what exists."""
+    """Raise RefusedError unless the dialect has this mode at this force level. The message lists those that exist."""
     if mode not in MODES:
         raise RefusedError(f"grasp mode must be one of {', '.join(MODES)}; got {quoted(mode)}", Reason.UNKNOWN_NAME)
     existing = levels_of(mode, dialect)
@@ -55,7 +51,7 @@ def check_grasp(mode: str, level: str, dialect: str) -> None:
 
 
 def grasps_file() -> Path:
-    """Path of grasps.yaml: in the source tree, else in the install space's share folder."""
+    """Path of grasps.yaml: in the source tree, otherwise in the share folder of the install space."""
     here = Path(__file__).resolve()
     candidates = [here.parents[2] / "config" / "grasps.yaml"]
     candidates += [parent / "share" / "ih2_hand" / "config" / "grasps.yaml" for parent in here.parents]
@@ -69,10 +65,10 @@ def grasps_file() -> Path:
 
 
 def load_preshapes(path: str | Path | None = None) -> dict[str, tuple[int, ...]]:
-    """Preshapes by mode from a YAML file of the form `mode: [p0, p1, p2, p3, p4]`.
+    """Preshapes (five positions 0..254) by mode from a YAML file of lines `mode: [p0, p1, p2, p3, p4]`.
 
-    The reader takes this subset only, so that the driver needs no YAML library. ValueError names
-    file, line and field of the first thing that is wrong; every mode must be present once.
+    Only this form is read, so that the driver needs no YAML library. Every mode must be present once.
+    A ValueError names file, line and field of the first error.
     """
     file = Path(path) if path is not None else grasps_file()
     table: dict[str, tuple[int, ...]] = {}

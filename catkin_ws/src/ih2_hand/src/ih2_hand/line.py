@@ -1,17 +1,15 @@
 """Requests and answers on a line without checksums: time limits, resynchronisation, confirmation.
 
-The protocol has neither lengths nor checksums, so three rules stand in for them:
+The protocol has no lengths and no checksums. Three rules replace them:
 
-* more bytes than asked for, or bytes nobody asked for, make the answer worthless: the input is
-  flushed (a counted resynchronisation) and the request repeated;
-* an answer that does not come makes the hand's own parser suspect: it is filled with StopALL (W10,
-  counted, and it does stop the fingers), then the request is repeated once, then HandTimeoutError;
-* a value counts when AGREE readings agree, so that fewer corrupted bytes than that cannot make a
-  wrong one. While the hand is known to rest (`resting`), a reading that equals the value confirmed
-  before is enough and the confirmation costs nothing. Values that move under the readings settle by
-  their median while they stay within what a finger can do in that time; otherwise
-  HandInconsistentError. As many equal lies as readings look like the truth, whatever their number:
-  without a checksum no rule can tell the two apart.
+* Too many bytes, or bytes without a request, make the answer invalid. The input is flushed (counted as a
+  resynchronisation) and the request is repeated.
+* If an answer is missing, the hand's parser may still wait for bytes. It is filled with StopALL (W10, counted;
+  this stops the fingers). The request is repeated once; then HandTimeoutError is raised.
+* A value is valid if AGREE readings are equal, so that fewer corrupted bytes cannot produce a wrong value. While
+  the hand is at rest (`resting`), one reading that equals the last confirmed value is sufficient. A value that
+  changes between readings is their median, if the readings differ by no more than a finger can move in that time.
+  Otherwise HandInconsistentError is raised. AGREE equal wrong readings cannot be detected without a checksum.
 """
 
 from __future__ import annotations
@@ -27,55 +25,45 @@ from ih2_hand.transport import Transport, format_byte
 from ih2_hand.wire_choices import WIRE
 
 TraceHook = Callable[[str, bytes], None]
-"""Called with ">" (to the hand) or "<" (from the hand) and the bytes."""
+"""Called with the direction (">" to the hand, "<" from the hand) and the bytes."""
 
-AGREE = 3
-"""Equal readings that confirm a value: two corrupted bytes cannot make a wrong one."""
-
-READINGS = 5
-"""Readings taken of one value, without a slip between them, before their median has to do."""
-
-ATTEMPTS = 8
-"""Requests for one value, slips included, before its readings count as contradictory."""
-
-QUIET_S = 0.002
-"""After a flush the line must stay silent this long (20 byte times)."""
+AGREE = 3  # equal readings that confirm a value: two corrupted bytes cannot produce a wrong value
+READINGS = 5  # readings of one value, without resynchronisation between them, before the median is used
+ATTEMPTS = 8  # requests for one value, resynchronisations included, before its readings count as contradictory
+QUIET_S = 0.002  # s of silence on the line after a flush (20 byte times)
 
 
 @dataclass(frozen=True)
 class Slack:
-    """How far readings of one value may lie apart: `counts` + `rate` (counts/s) x elapsed time."""
+    """Largest accepted difference of readings of one value: `counts` + `rate` (counts/s) x elapsed time (s)."""
 
     counts: float
     rate: float
 
 
+# A finger moves 255 counts/s at full speed (W15); the rate includes a margin of half of that.
 POSITION_SLACK = Slack(2.0, 400.0)
-"""A finger does 255 counts/s at full speed (W15); half as much again as margin."""
-
+# Current and tension are noisy and rise quickly at contact.
 ANALOGUE_SLACK = Slack(24.0, 5000.0)
-"""Current and tension are noisy and rise fast on contact."""
-
-STATUS_SLACK = Slack(0.0, 0.0)
-"""Flags either agree or do not."""
+STATUS_SLACK = Slack(0.0, 0.0)  # flags must be equal
 
 
 @dataclass
 class LineCounters:
-    """What happened on the line since it was opened."""
+    """Events on the line since it was opened."""
 
     requests: int = 0
     resynchronisations: int = 0
-    """All of them: flushed input and refilled parser."""
+    """All resynchronisations: input flushed, or parser filled."""
     fillers: int = 0
-    """Resynchronisations by StopALL: these stopped the fingers."""
+    """Resynchronisations with StopALL; these stopped the fingers."""
     retries: int = 0
     failures: int = 0
     reasons: dict[str, int] = field(default_factory=dict)
 
 
 class HandLine:
-    """Thread-safe request and answer over a transport."""
+    """Thread-safe requests and answers on a transport."""
 
     def __init__(
         self,
@@ -91,7 +79,7 @@ class HandLine:
         self.trace = trace
         self.counters = LineCounters()
         self.lock = threading.RLock()
-        """Held during a request with its answer."""
+        """Held from a request to the end of its answer."""
         self._write_lock = threading.Lock()
         self._not_before = 0.0
         self._known: dict[bytes, int] = {}
@@ -101,7 +89,7 @@ class HandLine:
     # -- sending ---------------------------------------------------------------------------------
 
     def send(self, frame: bytes, busy_s: float = 0.0) -> None:
-        """Send a frame; nothing follows it for `busy_s` (s), the time the hand needs for it.
+        """Send a frame. The next frame waits for `busy_s` (s), the time that the hand needs for this one.
 
         Frames are never interleaved. Raises HandConnectionLost.
         """
@@ -120,8 +108,8 @@ class HandLine:
     def close(self) -> None:
         """Close the port; later requests raise HandConnectionLost.
 
-        A request under way ends first, within its read's time limit: its descriptor must not be
-        closed under it, as the number may belong to another file at once.
+        A request in progress ends first, within its read's time limit. Otherwise the operating system could
+        give its descriptor number to another file during the read.
         """
         with self._write_lock:
             self._closed = True
@@ -131,7 +119,7 @@ class HandLine:
     # -- one request -----------------------------------------------------------------------------
 
     def request(self, frame: bytes, length: int) -> bytes:
-        """Answer of exactly `length` bytes, after at most one resynchronisation and one retry."""
+        """Return an answer of exactly `length` bytes, after at most one resynchronisation and one retry."""
         with self.lock:
             if self.transport.pending():
                 self._flush("bytes nobody asked for")
@@ -159,7 +147,7 @@ class HandLine:
     # -- resynchronisation -----------------------------------------------------------------------
 
     def resynchronise(self, reason: str) -> None:
-        """Complete whatever the hand waits for with StopALL (W10), then flush the input."""
+        """Complete a frame that the hand may wait for with StopALL bytes (W10), then flush the input."""
         with self.lock:
             self.counters.fillers += 1
             self.send(WIRE.resync_filler)
@@ -174,13 +162,13 @@ class HandLine:
         for _ in range(50):
             self.transport.flush_input()
             self.clock.sleep(QUIET_S)
-            if self._closed or not self.transport.pending():  # who closes need not wait for quiet
+            if self._closed or not self.transport.pending():  # close() need not wait for silence
                 return
 
     def answers(self, frame: bytes, length: int) -> bool:
-        """Whether one request is answered with exactly `length` bytes; no retry, input flushed.
+        """True if one request is answered with exactly `length` bytes. No retry; the input is flushed.
 
-        For polls of a hand that discards requests while it calibrates (W11).
+        For polling a hand that discards requests while it calibrates (W11).
         """
         with self.lock:
             self.transport.flush_input()
@@ -195,17 +183,17 @@ class HandLine:
 
     @property
     def resting(self) -> bool:
-        """Whether nothing in the hand changes by itself, so that known values keep their worth."""
+        """True while no motor moves, so that confirmed values stay valid."""
         return self._resting
 
     @resting.setter
     def resting(self, resting: bool) -> None:
         if resting and not self._resting:
-            self._known.clear()  # read while things moved
+            self._known.clear()  # these values were read while motors moved
         self._resting = resting
 
     def value(self, frame: bytes, length: int, slack: Slack) -> int:
-        """Confirmed value of a reading: 8 bits of a one-byte answer, 10 bits of a two-byte one."""
+        """Confirmed value of a reading: 8 bits for a one-byte answer, 10 bits for a two-byte answer."""
         with self.lock:
             first = self._number(frame, length)
             if self._resting and first is not None and first == self._known.get(frame):
@@ -218,7 +206,7 @@ class HandLine:
         data = self.request(frame, length)
         if length == 1:
             return data[0]
-        # Ten bits were promised: more cannot be the answer to this request.
+        # The protocol allows ten bits: a larger number is not the answer to this request.
         return data[0] << 8 | data[1] if data[0] < 4 else None
 
     def _confirm(self, frame: bytes, length: int, slack: Slack, first: int | None) -> int:
@@ -229,7 +217,7 @@ class HandLine:
                 resynchronisations = self.counters.resynchronisations
                 number = self._number(frame, length)
                 if self.counters.resynchronisations != resynchronisations:
-                    readings.clear()  # what was read across a slip may belong to another request
+                    readings.clear()  # readings before a resynchronisation may belong to another request
                 if number is None:
                     continue
                 readings.append(number)
@@ -253,5 +241,5 @@ class HandLine:
 
 
 def status_request(motor: int) -> bytes:
-    """GetFingerStatus."""
+    """Frame of GetFingerStatus."""
     return bytes((frames.GET_STATUS, motor))

@@ -1,4 +1,4 @@
-"""What there is to remember between the requests to a hand, and which goals it takes in that state. No ROS here."""
+"""State of a hand between requests (calibration, preshape, grip), and the goals it accepts in that state. No ROS."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from ih2_hand.reasons import Reason
 
 
 class HandMemory:
-    """Calibration, preshape and grip of one hand. A hand that has just been connected may hold something.
+    """Calibration, preshape and grip of one hand. A hand that has just been connected may hold an object.
 
-    `is_current` closes by motor current instead of tension, `limit` (s) bounds preshape and grasp.
+    `is_current` True closes by motor current, False by tension. `limit` (s) is the time limit of preshape and grasp.
     """
 
     def __init__(self, is_current: bool, limit: float) -> None:
@@ -34,13 +34,12 @@ class HandMemory:
         self.forget()
 
     def forget(self) -> None:
-        """The hand was connected anew, or lost."""
+        """Reset the state: the hand was reconnected or lost."""
         self.calibrated, self.holding = False, True
         self._preshape: tuple[str, str] | None = None
 
     def task_for(self, name: str, goal: Any, driver: HandSerialDriver) -> Task:
-        """Task for an accepted goal, with the fields of its action; RefusedError or HandError with the reason to
-        refuse it."""
+        """Task for a goal with the fields of its action. RefusedError or HandError give the reason to refuse it."""
         if self.calibrating:
             raise HandCalibratingError("the hand calibrates; send the goal again afterwards")
         if name == "hand_open":
@@ -63,16 +62,16 @@ class HandMemory:
         return task
 
     def task_over(self, task: Task, verdict: Verdict) -> None:
-        """What a finished task tells about preshape and grip."""
+        """Update preshape and grip after a finished task."""
         if isinstance(task, PreshapeTask) and verdict.ok:
             self._preshape = (task.mode, task.level)
         if verdict.holding is not None:
             self.holding = verdict.holding
         elif isinstance(task, (CloseTask, GraspTask)) and not verdict.ok:
-            self.holding = True  # broken off on the way: something may be between the fingers
+            self.holding = True  # interrupted: an object may be between the fingers
 
     def look(self, motors: Sequence[Any]) -> bool:
-        """What a poll of the motors shows of the grip; whether it has shown the hand empty just now."""
+        """Update the grip from a poll of the motors. True if it is the first to show an empty hand."""
         if self.holding and shown_empty(motors):
             self.holding = False
             return True
@@ -80,10 +79,10 @@ class HandMemory:
         return False
 
     def why_not_calibrate(self, words: Sequence[str], busy: str | None) -> str | None:
-        """Reason to refuse a calibration request, or None; `busy` names the goal that runs."""
+        """Reason to refuse a calibration request, or None. `busy` names the running goal."""
         busy = f"{busy} runs" if busy else "a calibration runs" if self.calibrating else None
         return refuse_calibration(words, calibrated=self.calibrated, holding=self.holding, busy=busy)
 
     def calibration_began(self) -> None:
-        """The hand opens, and discards every request until it has ended."""
+        """Record the start of a calibration: the hand opens and discards every request until the end."""
         self.calibrating, self.calibrated, self._preshape = True, False, None

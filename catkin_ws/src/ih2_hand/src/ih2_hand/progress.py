@@ -1,7 +1,7 @@
-"""Whether a hand movement is done, read from the status of the motors alone (D4.10 section 2.2).
+"""Decides from the status of the motors whether a hand movement is done (D4.10 section 2.2). No ROS.
 
-The hand acknowledges nothing: a task sends its command once, then judges every poll of the five
-motors. Motor readings are objects with the fields of coglab_msgs/MotorStatus. No ROS here.
+The hand does not acknowledge commands. A task sends its command once, then evaluates every poll of the
+five motors. Motor readings are objects with the fields of coglab_msgs/MotorStatus.
 """
 
 from __future__ import annotations
@@ -17,32 +17,19 @@ from ih2_hand.grasps import quoted
 from ih2_hand.reasons import Reason
 from ih2_hand.wire_choices import WIRE
 
-FLEXION = (1, 2, 3, 4)
-"""Motors that bend fingers; motor 0 swings the thumb sideways."""
-
-POSITION_TOLERANCE = 12
-"""A reached preshape may read this many counts beside its target."""
-
-START_GRACE_S = 0.5
-"""A motor that still shows its old status this long after the command has not taken it."""
-
-STALL_S = 0.4
-"""A driven motor that reads the same position this long is stalled."""
-
-BLOCKED_S = 1.0
-"""A position move that stands this long before its target is blocked."""
-
-RESENDS = 2
-"""Times a command is repeated after a resynchronisation stopped the fingers."""
-
-LONGEST_S = 60.0
-"""No goal may last longer, whatever its speed."""
+FLEXION = (1, 2, 3, 4)  # motors that bend fingers; motor 0 moves the thumb sideways
+POSITION_TOLERANCE = 12  # counts between a target and a position that counts as reached
+START_GRACE_S = 0.5  # s after a command; a motor that still has its old mode did not accept the command
+STALL_S = 0.4  # s at one position after which a driven motor counts as stalled
+BLOCKED_S = 1.0  # s at one position before its target after which a position move counts as blocked
+RESENDS = 2  # repetitions of a command after resynchronisations, which stop the fingers
+LONGEST_S = 60.0  # s, upper bound of every goal's time limit
 
 MOTOR_NAMES = ("thumb abduction", "thumb", "index", "middle", "ring and little")
 
 
 class MotorReading(Protocol):
-    """The fields of coglab_msgs/MotorStatus that decide."""
+    """The fields of coglab_msgs/MotorStatus that the tasks evaluate."""
 
     motor: int
     mode: str
@@ -56,9 +43,11 @@ class MotorReading(Protocol):
 
 @dataclass(frozen=True)
 class Verdict:
-    """What one poll says: `done`, and then whether `ok` and what the fingers `holding` (None:
-    nothing learnt about the grip); `text` for feedback and result, `reason` what it means to a
-    program where it is not ok; `stop` asks for StopALL."""
+    """Result of one poll.
+
+    If `done`, `ok` is True for success, and `holding` states whether the fingers hold an object (None: the movement
+    does not show it). `text` is for feedback and result. `reason` is the code of a failure. `stop` requests StopALL.
+    """
 
     text: str
     done: bool = False
@@ -69,7 +58,7 @@ class Verdict:
 
     @property
     def status_code(self) -> Reason:
-        """What `text` means as feedback: the fingers move, or why they shall not any more."""
+        """Reason code of the feedback: HAND_MOVING, or the reason of the end."""
         return self.reason if self.done else Reason.HAND_MOVING
 
 
@@ -78,20 +67,20 @@ def _failed(text: str, reason: Reason) -> Verdict:
 
 
 class StallWatch:
-    """Since when each motor stands at its position."""
+    """Measures how long each motor has stood at its position."""
 
     def __init__(self) -> None:
         self._since: dict[int, tuple[int, float]] = {}
 
     def update(self, motors: Sequence[MotorReading], elapsed: float) -> None:
-        """Take a poll made `elapsed` s after the command."""
+        """Process a poll made `elapsed` s after the command."""
         for motor in motors:
             known = self._since.get(motor.motor)
             if known is None or known[0] != motor.position:
                 self._since[motor.motor] = (motor.position, elapsed)
 
     def standing(self, motor: int, elapsed: float) -> float:
-        """Seconds that the motor has not moved."""
+        """Time (s) since the motor moved last."""
         return elapsed - self._since[motor][1]
 
 
@@ -101,7 +90,7 @@ def _names(motors: Sequence[int]) -> str:
 
 @dataclass
 class Task(ABC):
-    """One goal: `begin` commands the hand, `judge` reads a poll, `limit` (s) bounds it."""
+    """One goal. `begin` sends the command, `judge` evaluates a poll, `limit` (s) is the time limit."""
 
     name: str
     limit: float
@@ -109,7 +98,7 @@ class Task(ABC):
 
     @abstractmethod
     def begin(self, driver: HandSerialDriver) -> None:
-        """Send the command; called again when a resynchronisation has stopped the fingers."""
+        """Send the command. Called again after a resynchronisation, which stops the fingers."""
 
     def judge(self, motors: Sequence[MotorReading], elapsed: float) -> Verdict:
         """Verdict on a poll that began `elapsed` s after the command."""
@@ -121,7 +110,7 @@ class Task(ABC):
 
     @abstractmethod
     def _judge(self, motors: Sequence[MotorReading], elapsed: float) -> Verdict:
-        """Verdict on motors that can be read."""
+        """Verdict on motors without bus errors."""
 
 
 def _speed_limit_s(speed: int) -> float:
@@ -130,7 +119,7 @@ def _speed_limit_s(speed: int) -> float:
 
 
 def check_speed(speed: int) -> None:
-    """RefusedError unless 1..511: the wire takes 0 too, but nothing would ever move."""
+    """Raise RefusedError unless `speed` is 1..511. The protocol permits 0, but then nothing moves."""
     if not 0 <= speed <= WIRE.speed_max:
         raise RefusedError(f"speed must be 0..{WIRE.speed_max}; got {speed}", Reason.OUT_OF_RANGE)
     if speed == 0:
@@ -138,7 +127,7 @@ def check_speed(speed: int) -> None:
 
 
 class SpeedTask(Task):
-    """Common to open and close: MoveMotor at the goal's speed until end sensor or resistance."""
+    """Base of open and close: MoveMotor at the goal's speed until an end sensor or a resistance."""
 
     close: bool
     motors: tuple[int, ...]
@@ -147,7 +136,7 @@ class SpeedTask(Task):
         check_speed(speed)
         super().__init__(name, _speed_limit_s(speed))
         self.speed = speed
-        # At low speed a count takes 2/speed seconds: four of them must pass to call it a stall.
+        # At low speed a count takes 2/speed seconds: a stall needs four of them without motion.
         self.stall_s = max(STALL_S, 8.0 / speed)
 
     def begin(self, driver: HandSerialDriver) -> None:
@@ -182,11 +171,11 @@ class SpeedTask(Task):
 
     @abstractmethod
     def _ended(self, at_end: list[int], met: list[int]) -> Verdict:
-        """Verdict when no finger moves any more: those at their end sensors, and those that met something."""
+        """Verdict when no finger moves: `at_end` reached their end sensors, `met` met an object."""
 
 
 class OpenTask(SpeedTask):
-    """hand_open: all five motors to their open ends."""
+    """hand_open: moves all five motors to their open ends."""
 
     close = False
     motors = (0, *FLEXION)
@@ -201,7 +190,7 @@ class OpenTask(SpeedTask):
 
 
 class CloseTask(SpeedTask):
-    """hand_close: the fingers (motors 1..4) to their closed ends or onto an object."""
+    """hand_close: closes the fingers (motors 1..4) to their closed ends or onto an object."""
 
     close = True
     motors = FLEXION
@@ -216,7 +205,7 @@ class CloseTask(SpeedTask):
 
 
 class PreshapeTask(Task):
-    """hand_preshape: every motor at the mode's preshape, in position mode with bit 4 set."""
+    """hand_preshape: moves every motor to the mode's preshape. Done in position mode with bit 4 set."""
 
     def __init__(self, mode: str, level: str, is_current: bool, limit: float):
         super().__init__("hand_preshape", limit)
@@ -263,7 +252,7 @@ class PreshapeTask(Task):
 
 
 class GraspTask(Task):
-    """hand_preshape_close: the closing motors of the mode up to force, object or closed end."""
+    """hand_preshape_close: closes the motors of the mode until their force, an object or their closed ends."""
 
     def __init__(self, closing: Sequence[int], limit: float):
         super().__init__("hand_preshape_close", limit)
@@ -305,7 +294,7 @@ class GraspTask(Task):
         return Verdict("closed without meeting an object", done=True, ok=True, holding=False)
 
     def _not_started(self, closing: Sequence[MotorReading], elapsed: float) -> Verdict:
-        # The hand takes the preshape first, so a motor may move in position mode for a while.
+        # The hand finishes the preshape first, so a motor may move in position mode for a while.
         if all(self._stall.standing(motor.motor, elapsed) >= BLOCKED_S for motor in closing):
             if all(motor.fully_closed for motor in closing):
                 return Verdict("closed without meeting an object", done=True, ok=True, holding=False)
@@ -317,13 +306,13 @@ class GraspTask(Task):
 
 
 def shown_empty(motors: Sequence[Any]) -> bool:
-    """Whether a poll proves that the hand holds nothing: every finger at its open end."""
+    """True if a poll proves that the hand holds nothing: every finger is at its open end."""
     flexion = [motor for motor in motors if motor.motor in FLEXION]
     return bool(flexion) and all(motor.fully_open and not motor.com_error for motor in flexion)
 
 
 def shown_holding(motors: Sequence[Any]) -> bool:
-    """Whether a poll proves a grip: a finger at its closing force before its closed end."""
+    """True if a poll proves a grip: a finger reached its closing force before its closed end."""
     return any(
         motor.motor in FLEXION
         and motor.target_reached
@@ -334,10 +323,10 @@ def shown_holding(motors: Sequence[Any]) -> bool:
 
 
 def refuse_calibration(words: Sequence[str], *, calibrated: bool, holding: bool, busy: str | None) -> str | None:
-    """Reason to refuse a calibration request (`fast` or `complete`, then maybe `force`), or None.
+    """Reason to refuse a calibration request, or None. `words` are `fast` or `complete`, then optionally `force`.
 
-    `busy` names what runs now. A second calibration, or one while the hand holds something (or may
-    hold something), opens the fingers and therefore needs ` force`.
+    `busy` names the running goal or calibration. Calibration opens the fingers. So it needs `force` if the hand
+    is calibrated already, or if it holds or may hold an object.
     """
     if not words or words[0] not in ("fast", "complete") or list(words[1:]) not in ([], ["force"]):
         return f"calibration must be fast, complete, fast force or complete force; got {quoted(' '.join(words))}"

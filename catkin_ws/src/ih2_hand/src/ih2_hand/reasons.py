@@ -1,4 +1,4 @@
-"""What the hand's sentences mean, for programs."""
+"""Reason codes of the hand, for programs."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ from enum import IntEnum
 
 
 class Reason(IntEnum):
-    """Those numbers of coglab_msgs/ReasonCode that the hand gives; without ROS, so that the driver
-    needs none."""
+    """The numbers of coglab_msgs/ReasonCode that the hand uses, copied so that the driver needs no ROS."""
 
     NONE = 0
     INVALID_ARGUMENT = 100
@@ -31,13 +30,13 @@ class Reason(IntEnum):
 
 
 NEUTRAL = (Reason.NONE, Reason.HAND_STARTED, Reason.HAND_ENDED, Reason.HAND_MOVING)
-"""What is no failure."""
+"""Codes that are not failures."""
 
 BROKEN = (Reason.DRIVE_ERROR, Reason.TIME_LIMIT, Reason.HAND_LINK_LOST, Reason.HAND_STALLED, Reason.UNEXPECTED)
-"""Failures of hand or line, other than of a request."""
+"""Failures of the hand or the line, but not of a request."""
 
 
 def reason_of(error: Exception) -> Reason:
-    """The reason that an error of this package carries."""
+    """Reason code of an error of this package."""
     unknown = Reason.INVALID_ARGUMENT if isinstance(error, ValueError) else Reason.UNEXPECTED
     return getattr(error, "reason", unknown)

@@ -7,7 +7,7 @@ from typing import Any
 from ih2_hand.wire_choices import WIRE
 
 MODES = ("stop", "speed", "position", "tension", "current", "unassigned", "current_position", "bus_error")
-"""Control mode by code (bits 7..5)."""
+"""Control mode by its code (bits 7..5)."""
 
 REACHED, OPEN_END, CLOSED_END, OVER_CURRENT = 0x10, 0x08, 0x04, 0x02
 
@@ -45,13 +45,13 @@ def decode_status(motor: int, raw: int) -> dict[str, Any]:
 
 
 def at_rest(raw: int) -> bool:
-    """Whether a motor with this STATUS byte changes nothing by itself: off, or at its position."""
+    """True if a motor with this STATUS byte stays as it is: switched off, or at its target position."""
     mode = MODES[raw >> 5]
     return mode == "stop" or (mode == "position" and bool(raw & REACHED) and not raw & WIRE.moving_bit)
 
 
 def describe_status(raw: int) -> str:
-    """One STATUS byte in words, for traces."""
+    """One STATUS byte as text, for traces."""
     status = _DECODED[raw]
     words = [status["mode"]]
     if not status["com_error"]:

@@ -1,4 +1,4 @@
-"""Every byte between host and hand as text: time, direction, hex, meaning."""
+"""Trace of every byte between host and hand as text: time, direction, hex, meaning."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _NAMES = {
 
 
 def describe_frame(frame: bytes) -> str:
-    """Meaning of one complete host-to-hand frame."""
+    """Meaning of one complete frame from the host to the hand."""
     first = frame[0]
     if first in _NAMES:
         return _NAMES[first]
@@ -50,7 +50,7 @@ def describe_frame(frame: bytes) -> str:
 
 
 def describe_answer(frame: bytes, answer: bytes) -> str:
-    """Meaning of the hand's answer to `frame`, which is complete."""
+    """Meaning of the hand's complete answer to `frame`."""
     first = frame[0]
     if first == frames.GET_STATUS or (first == frames.LLMC and frame[2] == 0x70):
         return f"status: {describe_status(answer[0])}"
@@ -64,7 +64,7 @@ def describe_answer(frame: bytes, answer: bytes) -> str:
 
 
 class Tracer:
-    """Turns the bytes of both directions into lines; follows incomplete frames and late answers."""
+    """Converts the bytes of both directions to lines of text. Handles incomplete frames and late answers."""
 
     def __init__(self) -> None:
         self._parser = FrameParser("both")
@@ -72,7 +72,7 @@ class Tracer:
         self._answer = b""
 
     def feed(self, direction: str, data: bytes, stamp: float) -> list[str]:
-        """Lines for bytes seen at `stamp` (s); direction ">" goes to the hand, "<" comes back."""
+        """Lines for bytes seen at `stamp` (s). Direction ">" is to the hand, "<" is from the hand."""
         lines = self._to_hand(data) if direction == ">" else self._to_host(data)
         return [f"{stamp:14.6f} {direction} {shown.hex(' '):<20} {meaning}" for shown, meaning in lines]
 

@@ -1,9 +1,4 @@
-"""The line to the hand: a serial device, a pty, or a `socket://host:port` URL.
-
-A transport has `port` (text for messages), `last_byte` (last byte received or None),
-`write(data)`, `read(count, timeout)` -> all bytes there (at least `count` unless the time ran out;
-more means stray bytes), `pending()`, `flush_input()` and `close()`.
-"""
+"""Transports to the hand: a serial device, a pty, or a `socket://host:port` URL."""
 
 from __future__ import annotations
 
@@ -20,42 +15,42 @@ from serial.tools import list_ports
 from ih2_hand.errors import HandConnectionLost, HandPortError
 from ih2_hand.wire_choices import WIRE
 
-WRITE_TIMEOUT_S = 0.5
-"""Longest wait for the line to take a frame."""
+WRITE_TIMEOUT_S = 0.5  # s, longest wait until the line accepts a frame
 
 
 PORT_ERRORS = (OSError, serial.SerialException, termios.error, TypeError, ValueError)
-"""What pyserial and the kernel raise when a port goes away at a bad moment; termios.error is no
-OSError, TypeError and ValueError come from a descriptor that has gone."""
+"""Errors of pyserial and the kernel when a port disappears during a call. termios.error is not an
+OSError; TypeError and ValueError come from a descriptor that is no longer valid."""
 
 
 class Transport(Protocol):
-    """What the driver needs of a line."""
+    """Interface of a line to the hand. `port` is a text for messages; `last_byte` is the last byte received or None."""
 
     port: str
     last_byte: int | None
 
     def write(self, data: bytes) -> None:
-        """Send a frame in one go, or raise HandConnectionLost."""
+        """Send a frame at once. Raises HandConnectionLost."""
 
     def read(self, count: int, timeout: float) -> bytes:
-        """At least `count` bytes, fewer when `timeout` (s) ran out; HandConnectionLost if gone."""
+        """Return all bytes that have arrived: at least `count`, fewer only after `timeout` (s). More than `count`
+        means stray bytes. Raises HandConnectionLost."""
 
     def pending(self) -> bool:
-        """Whether bytes wait to be read."""
+        """True if bytes wait to be read."""
 
     def flush_input(self) -> None:
-        """Forget the bytes that wait."""
+        """Discard the bytes that wait to be read."""
 
     def close(self) -> None:
-        """Let go of the line; harmless when already closed."""
+        """Close the line; no effect if it is closed."""
 
 
 class SerialTransport:
-    """A device, a pty or a URL, opened through pyserial.
+    """A device, a pty or a URL, opened by pyserial.
 
-    Devices are read by poll and read on pyserial's descriptor: that costs a third of
-    `serial.read` and shows bytes beyond the expected ones. URLs use pyserial's own reader.
+    Devices are read with poll and read on pyserial's descriptor. This takes a third of the time of
+    `serial.read` and shows bytes beyond the expected ones. URLs are read by pyserial.
     """
 
     def __init__(self, port: str | None):
@@ -79,7 +74,7 @@ class SerialTransport:
             raise self._lost(error) from error
 
     def _write_some(self, data: bytes) -> int:
-        """Number of bytes that the line took, maybe after a wait."""
+        """Number of bytes that the line accepted; may wait up to WRITE_TIMEOUT_S."""
         assert self._fd is not None
         try:
             return os.write(self._fd, data)
@@ -148,7 +143,7 @@ class SerialTransport:
         try:
             self._serial.close()
         except PORT_ERRORS:
-            pass  # a pulled device cannot be closed in order; nothing is left to do
+            pass  # the device was unplugged: nothing is left to close
 
     def _lost(self, error: Exception) -> HandConnectionLost:
         return HandConnectionLost(
@@ -159,17 +154,17 @@ class SerialTransport:
 
 
 def format_byte(value: int | None) -> str:
-    """A byte for messages."""
+    """A byte as text for messages, e.g. `0x4c`, or `none`."""
     return "none" if value is None else f"0x{value:02x}"
 
 
 def serial_ports() -> list[str]:
-    """Serial devices of this machine that have a driver behind them."""
+    """Serial devices of this computer that have a hardware driver."""
     return sorted(info.device for info in list_ports.comports() if info.hwid != "n/a")
 
 
 def find_port() -> str:
-    """The one serial device; HandPortError names what exists if there is not exactly one."""
+    """The only serial device. If there is none or more than one, HandPortError lists the devices."""
     ports = serial_ports()
     if len(ports) == 1:
         return ports[0]
@@ -199,11 +194,11 @@ def _open(port: str) -> Any:
 
 
 def _shorten_latency(device: serial.Serial) -> None:
-    """USB adapters may hold each answer back for 16 ms; ask the kernel for 1 ms instead."""
+    """USB adapters may delay each answer by 16 ms; request 1 ms from the kernel."""
     try:
         device.set_low_latency_mode(True)
     except (AttributeError, *PORT_ERRORS):
-        pass  # a pty, or an adapter without that knob
+        pass  # a pty, or an adapter without this setting
 
 
 def _why_not(port: str, error: Exception) -> str:

@@ -1,8 +1,8 @@
-"""The open points of the IH2 wire protocol, one table for driver and emulator alike.
+"""The open points of the IH2 wire protocol: one table for driver and emulator.
 
-The vendor's IH2 guide is not public. What follows rests on the EH1 guide of 2013 (sister hand of
-the same board family) and on what published IH2 drivers agree upon. Each row is one decision; a lab
-that holds the guide, or a hand, corrects the row here and nowhere else. `WIRE.<name>` is the value.
+The vendor's IH2 guide is not public. The table is based on the EH1 guide of 2013 (a related hand with
+the same board family) and on the common parts of published IH2 drivers. Each row is one decision. A
+laboratory that has the guide, or a hand, corrects the row only here. `WIRE.<name>` is the value.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ GUESS = "guess"
 
 @dataclass(frozen=True)
 class Choice:
-    """One row: `id` W1..W30, `name` of the value, the value, the point, its basis, the risk."""
+    """One row: `id` W1..W30, `name` of the value, the value, the open point, its basis, the risk if it is wrong."""
 
     id: str
     name: str
@@ -321,7 +321,7 @@ WIRE = SimpleNamespace(**{choice.name: choice.value for choice in TABLE})
 
 
 def as_markdown() -> str:
-    """The table as the README shows it."""
+    """The table as Markdown, as in the README."""
     lines = ["| id | value of `WIRE.` | value | point | rests on | if wrong |", "| --- | --- | --- | --- | --- | --- |"]
     for row in TABLE:
         if isinstance(row.value, bytes):

@@ -1,6 +1,7 @@
 /// @file
-/// A node does not take the place of a living one of its name: roscpp would end that one, roslaunch
-/// would start it again, and two launches on one ROS master would end each other's nodes for ever.
+/// Ensures that a node does not replace a running node of the same name. Otherwise roscpp would end
+/// the running node, roslaunch would restart it, and two launches on one ROS master would end each
+/// other's nodes again and again.
 #pragma once
 
 #include <chrono>
@@ -18,7 +19,7 @@
 
 namespace coglab_rt {
 
-/// Who has this node's name with the ROS master, in words; empty where nobody lives.
+/// The running node that has this node's name, as text; empty if there is none.
 inline std::string livingNamesake() {
   XmlRpc::XmlRpcValue who, response, uri;
   who[0] = who[1] = ros::this_node::getName();
@@ -44,9 +45,9 @@ inline std::string livingNamesake() {
   return "process " + std::to_string(static_cast<int>(process[2])) + " at " + address;
 }
 
-/// To be called after ros::init and before the first NodeHandle. False, with a sentence on the
-/// error output, where a living node has this name, also after 2 s, in which one that is being
-/// started again may end.
+/// Call it after ros::init and before the first NodeHandle. Returns false, with a sentence on the
+/// error output, if a running node has this name for 2 s. During this time a node that is being
+/// restarted may end.
 inline bool nameIsFree() {
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(2);
   for (;;) {

@@ -1,5 +1,5 @@
 /// @file
-/// A process that says goodbye to the ROS master ends, whether the master answers or not.
+/// Ends a process that unregisters from the ROS master even if the master does not answer.
 #pragma once
 
 #include <chrono>
@@ -9,9 +9,9 @@
 
 namespace coglab_rt {
 
-/// Ends the process with status 0 after this time, if nothing ended it before. Call it when the arm
-/// stands and every thread that it needs is stopped: what is left is to unregister from the ROS
-/// master, and roscpp waits for its answer without a limit.
+/// Ends the process with status 0 after this time, unless it ended before. Call it when the arm
+/// stands and all threads that the arm needs are stopped. Only the process's registration at the
+/// ROS master is left then, and roscpp waits for the master's answer without a limit.
 inline void endProcessWithin(std::chrono::milliseconds limit) {
   std::thread([limit] {
     std::this_thread::sleep_for(limit);

@@ -1,5 +1,5 @@
 /// @file
-/// The table of joint limits that two ROS parameters name.
+/// Reads the table of joint limits that two ROS parameters name.
 #pragma once
 
 #include <ros/node_handle.h>
@@ -14,8 +14,8 @@
 namespace coglab_rt {
 
 /// Reads the table.
-/// @param file name of the parameter with its path; unset or empty: the table of the package
-/// `description`, config/joint_limits.yaml, than which a file may not be wider without saying so.
+/// @param file name of the parameter with its path; unset or empty: config/joint_limits.yaml of the
+/// package `description`. A file may be wider than that table only if it declares this.
 /// @param profile name of the parameter with the profile; unset: "default".
 /// @throws std::invalid_argument naming the parameter, std::runtime_error naming file and line.
 inline JointLimits readJointLimits(const ros::NodeHandle& node, const char* file,

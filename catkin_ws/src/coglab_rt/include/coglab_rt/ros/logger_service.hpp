@@ -1,9 +1,8 @@
 /// @file
-/// The services ~get_loggers and ~set_logger_level of roscpp, for calls at any time and of any
-/// content.
+/// The services ~get_loggers and ~set_logger_level of roscpp, safe for any call at any time.
 ///
-/// Debian 12's rosconsole (1.14.3 with log4cxx 1.0.0) frees the list of loggers in each
-/// get_loggers(); the next message that is logged ends the process. So nothing here asks for that
+/// rosconsole of Debian 12 (1.14.3 with log4cxx 1.0.0) frees the list of loggers in each
+/// get_loggers(). The next log message then ends the process. So this code never requests that
 /// list.
 #pragma once
 
@@ -20,10 +19,10 @@
 
 namespace coglab_rt {
 
-/// The two services with a table of the loggers of a node: `ros` and that of its package.
+/// The two services, with a table of the loggers of a node: `ros` and that of its package.
 class LoggerServices {
  public:
-  /// Takes the place of roscpp's own services; lasts as long as this object.
+  /// Replaces roscpp's own services during the life of this object.
   LoggerServices() : node_("~") {
     node_.setCallbackQueue(&queue_);
     for (const char* name : {"get_loggers", "set_logger_level"}) {
@@ -65,7 +64,7 @@ class LoggerServices {
     return true;
   }
 
-  ros::CallbackQueue queue_;  // of its own: whatever else the node does, its loggers can be set
+  ros::CallbackQueue queue_;  // separate, so that the levels can be set while the node is busy
   ros::AsyncSpinner spinner_{1, &queue_};
   ros::NodeHandle node_;
   std::map<std::string, std::string> levels_{{ROSCONSOLE_ROOT_LOGGER_NAME, "info"},

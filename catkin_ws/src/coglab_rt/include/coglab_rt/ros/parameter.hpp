@@ -1,6 +1,6 @@
 /// @file
-/// Reading a ROS parameter: one of another type is an error and not silently the default. For nodes
-/// alone, which depend on roscpp; outside of this folder coglab_rt knows no ROS.
+/// Reads a ROS parameter. A value of another type is an error and not silently the default. Only
+/// for nodes that depend on roscpp: outside of this folder coglab_rt is independent of ROS.
 #pragma once
 
 #include <ros/node_handle.h>
@@ -11,9 +11,9 @@
 
 namespace coglab_rt {
 
-/// The parameter, or `otherwise` where there is none.
-/// @param expected what it has to be, in words.
-/// @throws std::invalid_argument naming the parameter where it has another type.
+/// The parameter, or `otherwise` if it is not set.
+/// @param expected description of the expected value.
+/// @throws std::invalid_argument naming the parameter if it has another type.
 template <typename T>
 T readParameter(const ros::NodeHandle& node, const char* name, const T& otherwise,
                 const char* expected) {
@@ -24,9 +24,9 @@ T readParameter(const ros::NodeHandle& node, const char* name, const T& otherwis
   return value;
 }
 
-/// The parameter of that name in the nearest namespace above the node, or `otherwise` where there
-/// is none.
-/// @throws std::invalid_argument naming the parameter where it has another type.
+/// The parameter with this name in the nearest namespace above the node, or `otherwise` if there is
+/// none.
+/// @throws std::invalid_argument naming the parameter if it has another type.
 template <typename T>
 T readNearest(const ros::NodeHandle& node, const char* name, const T& otherwise,
               const char* expected) {

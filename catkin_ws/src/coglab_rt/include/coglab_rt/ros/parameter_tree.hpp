@@ -1,5 +1,5 @@
 /// @file
-/// All ROS parameters below a namespace as one tree, for what is read without ROS.
+/// All ROS parameters below a namespace as one tree, for code that is independent of ROS.
 #pragma once
 
 #include <ros/node_handle.h>
@@ -13,7 +13,7 @@ namespace coglab_rt {
 
 namespace detail {
 
-/// A value of the parameter server as YAML; what YAML cannot say (dates, bytes) is empty.
+/// A value of the parameter server as YAML. Types that YAML lacks (dates, bytes) become empty.
 inline YAML::Node toYaml(XmlRpc::XmlRpcValue& value) {
   YAML::Node node;
   switch (value.getType()) {
@@ -40,7 +40,7 @@ inline YAML::Node toYaml(XmlRpc::XmlRpcValue& value) {
 
 }  // namespace detail
 
-/// Everything below a namespace; an empty map if there is nothing.
+/// All parameters below a namespace; an empty map if there are none.
 inline YAML::Node readParameterTree(const ros::NodeHandle& node) {
   XmlRpc::XmlRpcValue value;
   if (!node.getParam("", value) && !node.getParam(node.getNamespace(), value)) {

@@ -1,8 +1,8 @@
 /// @file
-/// Between the stamps of ROS messages and the steady clock, for any stamp that a wire can carry.
+/// Conversion between the stamps of ROS messages and the steady clock, for every possible stamp.
 ///
-/// The difference of two ros::Time throws when it does not fit into 32 bits of seconds; here it is
-/// taken in 64 bits of nanoseconds, which hold every one.
+/// The difference of two ros::Time throws if its seconds do not fit into 32 bits. Here it is
+/// computed in 64 bits of nanoseconds, which are always sufficient.
 #pragma once
 
 #include <cstdint>
@@ -13,24 +13,24 @@
 
 namespace coglab_rt {
 
-/// A ROS time in ns, whatever its fields hold.
+/// A ROS time in ns, for any values of its fields.
 inline std::int64_t nanoseconds(const ros::Time& time) {
   return static_cast<std::int64_t>(time.sec) * 1'000'000'000 + static_cast<std::int64_t>(time.nsec);
 }
 
-/// Age of a stamp now, ns; negative: it lies in the future.
+/// Current age of a stamp, ns; negative if it lies in the future.
 inline std::int64_t ageOf(const ros::Time& stamp) {
   return nanoseconds(ros::Time::now()) - nanoseconds(stamp);
 }
 
-/// A ROS time on the steady clock; zero stays zero. Two readings of the clocks differ by their
-/// jitter: map a stamp once, and never tell two stamps apart by what they map to.
+/// A ROS time on the steady clock, ns; zero stays zero. Two conversions differ by the jitter of the
+/// clocks' readings: convert a stamp once, and do not distinguish stamps by their conversions.
 inline std::int64_t toSteady(const ros::Time& time, std::int64_t steady_now = steadyNow()) {
   return time.isZero() ? 0 : steady_now - ageOf(time);
 }
 
-/// A time of the steady clock (ns) as ROS time, through both clocks' present readings; what lies
-/// before the beginning of ROS time becomes the present, because a stamp of zero means none.
+/// A time of the steady clock (ns) as ROS time, by the current readings of both clocks. A time
+/// before the beginning of ROS time becomes the present, because a zero stamp means none.
 inline ros::Time toRos(std::int64_t steady_ns) {
   const std::int64_t now = nanoseconds(ros::Time::now());
   const std::int64_t stamp = now - (steadyNow() - steady_ns);

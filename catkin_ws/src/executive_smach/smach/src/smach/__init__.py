@@ -1,7 +1,7 @@
 """Hierarchical state machines in Python.
 
-A state has outcomes; a container of states turns the outcome of one into the start of the next; a
-container is itself a state. See the README beside this package for how to write a machine.
+A state has outcomes. A container of states maps the outcome of one state to the start of the next. A
+container is also a state. The README beside this package explains how to write a machine.
 
 Example::
 
@@ -21,7 +21,7 @@ Example::
     assert machine.execute() == "end"
 """
 
-# The loggers come first: every other module looks them up here each time it logs.
+# The loggers come first: the other modules look them up here at each message.
 from smach.concurrence import Concurrence
 from smach.container import Container
 from smach.exceptions import (

@@ -1,4 +1,4 @@
-"""Callbacks of containers: at the start of a run, at transitions, with an outcome, at the end."""
+"""Callbacks of containers: at the start of a run, at transitions, at an outcome, and at the end."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import smach
 
 
 class Callbacks:
-    """What a Container offers to who wants to know of its runs. One that raises is logged, and the
-    run goes on.
+    """Callbacks on the start, the transitions and the end of a container's runs. An exception in a
+    callback is logged, and the run continues.
     """
 
     userdata: Any
@@ -33,24 +33,22 @@ class Callbacks:
         self._start_cbs.append(_callback("start_cb", start_cb, cb_args))
 
     def register_transition_cb(self, transition_cb: Callable, cb_args: Sequence = ()) -> None:
-        """Call `transition_cb(userdata, active_states, *cb_args)` at each transition between
-        children.
+        """Call `transition_cb(userdata, active_states, *cb_args)` at each transition between children.
 
         Example: `machine.register_transition_cb(lambda ud, labels: print(labels))`.
         """
         self._transition_cbs.append(_callback("transition_cb", transition_cb, cb_args))
 
     def register_termination_cb(self, termination_cb: Callable, cb_args: Sequence = ()) -> None:
-        """Call `termination_cb(userdata, terminal_states, outcome, *cb_args)` when a run ends with
-        an outcome.
+        """Call `termination_cb(userdata, terminal_states, outcome, *cb_args)` when a run ends with an
+        outcome.
 
         Example: `machine.register_termination_cb(lambda ud, labels, outcome: print(outcome))`.
         """
         self._termination_cbs.append(_callback("termination_cb", termination_cb, cb_args))
 
     def register_end_cb(self, end_cb: Callable, cb_args: Sequence = ()) -> None:
-        """Call `end_cb(userdata, outcome, *cb_args)` when a run is over in whatever way, the
-        container being idle.
+        """Call `end_cb(userdata, outcome, *cb_args)` after every run, when the container is idle.
 
         `outcome` is None if the run ended with an error or at shutdown.
         Example: `machine.register_end_cb(lambda ud, outcome: print(machine.get_active_states()))`.
@@ -58,7 +56,7 @@ class Callbacks:
         self._end_cbs.append(_callback("end_cb", end_cb, cb_args))
 
     def unregister_cb(self, cb: Callable) -> None:
-        """Never call `cb` again, however it was registered.
+        """Remove `cb` from all kinds of callbacks.
 
         Example: `machine.unregister_cb(my_start_cb)`.
         """
@@ -68,7 +66,7 @@ class Callbacks:
     def call_start_cbs(self) -> None:
         """Call the start callbacks.
 
-        Example: `self.call_start_cbs()` in an `execute` of your own.
+        Example: `self.call_start_cbs()` in your own `execute`.
         """
         self._call("start", self._start_cbs, self.get_initial_states)
 

@@ -1,4 +1,4 @@
-"""A container whose children run at the same time, each in its own thread."""
+"""A container whose children run at the same time, each in its thread."""
 
 from __future__ import annotations
 
@@ -15,20 +15,21 @@ from smach.user_data import Remapper, UserData
 
 Outcomes = dict[str, Any]
 
-#: s between two looks at `smach.is_shutdown()` while children run.
+#: Interval (s) at which `smach.is_shutdown()` is checked while children run.
 SHUTDOWN_POLL = 0.2
 
 
 class Concurrence(Container):
-    """States that are started together; the container ends when all of them have ended.
+    """A container that starts all of its states together and ends when all of them have ended.
 
-    `outcome_map` {outcome: {label: child's outcome}}: of the entries that hold in full the one with
-    most conditions gives the outcome. `outcome_cb({label: outcome})` comes first if it returns a
-    string. Else `default_outcome`. `child_termination_cb({label: outcome or None})` is called after
-    each child's end; if it returns something true, the children that still run are preempted.
+    `outcome_map` is {outcome: {label: child's outcome}}. An entry matches if all of its conditions
+    hold; the matching entry with most conditions determines the outcome. Before that,
+    `outcome_cb({label: outcome})` determines the outcome if it returns a string. If neither applies,
+    the outcome is `default_outcome`. `child_termination_cb({label: outcome or None})` is called after
+    the end of each child; if it returns a true value, the running children are preempted.
 
-    A preempted concurrence has the outcome 'preempted' unless a child has ignored the request:
-    register it.
+    The outcome of a preempted concurrence is 'preempted', unless a child ignored the request. Register
+    this outcome.
 
     Example::
 
@@ -75,11 +76,11 @@ class Concurrence(Container):
         self._callback_lock = threading.Lock()
         self._child_outcomes: Outcomes = {}
         self._live: dict[str, None] = {}  # children of this run that have not ended
-        self._told: set[str] = set()  # those that were passed a request to the container
-        self._ignored: set[str] = set()  # those that did not take it or ended without serving it
+        self._told: set[str] = set()  # children that received the container's preempt request
+        self._ignored: set[str] = set()  # children that did not accept it, or ended without serving it
         self._errors: list[Exception] = []
         self._pending = 0  # threads that have not ended
-        self._abandoned = False  # the threads could not all be started: let no child begin
+        self._abandoned = False  # a thread could not be started: no child may begin
 
     def __setstate__(self, state: dict) -> None:
         super().__setstate__(state)
@@ -89,11 +90,9 @@ class Concurrence(Container):
 
     @staticmethod
     def add(label: str, state: State, remapping: Mapping[str, str] | None = None) -> State:
-        """Add a child to the concurrence that is open, and return it; `remapping` {its key: the
-        container's key}.
+        """Add a child to the open concurrence and return it; `remapping` is {its key: the container's key}.
 
-        Raises InvalidStateError for a label that is taken. Example: `Concurrence.add("WATCH",
-        Watch())`.
+        Raises InvalidStateError if the label exists. Example: `Concurrence.add("WATCH", Watch())`.
         """
         concurrence = Concurrence._currently_opened()
         concurrence._check_new_child(label, state, concurrence._states)
@@ -112,7 +111,7 @@ class Concurrence(Container):
             ) from None
 
     def get_children(self) -> dict[str, State]:
-        """The children by label, in the order they were added. Example: `both.get_children()`."""
+        """The children by label, in the order of addition. Example: `both.get_children()`."""
         return dict(self._states)
 
     def get_initial_states(self) -> list[str]:
@@ -120,8 +119,7 @@ class Concurrence(Container):
         return list(self._states)
 
     def set_initial_state(self, initial_states: Sequence[str], userdata: UserData | None = None) -> None:
-        """Merge `userdata`; every run begins with all children, so labels have no effect beyond a
-        warning.
+        """Merge `userdata`. Every run begins with all children, so other labels only cause a warning.
 
         Example: `both.set_initial_state([], userdata)`.
         """
@@ -141,7 +139,7 @@ class Concurrence(Container):
             return list(self._live)
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
-        """(child's outcome, label, container's outcome) from the outcome map.
+        """The outcome map as (child's outcome, label, container's outcome).
 
         Example: `both.get_internal_edges()`.
         """
@@ -152,8 +150,7 @@ class Concurrence(Container):
         ]
 
     def check_consistency(self) -> None:
-        """Raise InvalidTransitionError if the outcome map names labels or child outcomes that do
-        not exist.
+        """Raise InvalidTransitionError if the outcome map names unknown labels or child outcomes.
 
         Example: `both.check_consistency()`.
         """
@@ -175,10 +172,9 @@ class Concurrence(Container):
     def execute(self, parent_ud: Any = None) -> str:
         """Run all children to their ends and return the outcome.
 
-        Raises InvalidStateError without children, or if a child raises or returns no outcome of its
-        own (after the others were preempted and have ended); InvalidUserCodeError if a callback
-        raises; InvalidTransitionError if the outcome map is wrong. Example: `outcome =
-        both.execute()`.
+        Raises InvalidStateError without children, or if a child raises or returns an unregistered outcome
+        (after the other children were preempted and have ended); InvalidUserCodeError if a callback
+        raises; InvalidTransitionError if the outcome map is wrong. Example: `outcome = both.execute()`.
         """
         if not self._states:
             raise InvalidStateError("concurrence not executed: it has no children; add at least one")
@@ -210,7 +206,7 @@ class Concurrence(Container):
     def _run_children(self) -> None:
         released, all_ended = threading.Event(), threading.Event()
         with self._preempt_lock:
-            if self._preempt_requested:  # asked before the start: each child sees it when it begins
+            if self._preempt_requested:  # requested before the start: each child sees it when it begins
                 self._forward_preempt()
         threads = []
         for label in self._states:
@@ -221,7 +217,7 @@ class Concurrence(Container):
             )
             try:
                 thread.start()
-            except RuntimeError as error:  # the system gives no more threads
+            except RuntimeError as error:  # the system cannot create more threads
                 with self._preempt_lock:
                     self._abandoned = True
                     self._errors.append(
@@ -239,7 +235,7 @@ class Concurrence(Container):
         released.set()
         try:
             self._await_children(all_ended)
-        except BaseException:  # Ctrl-C in the main thread: take the children along
+        except BaseException:  # Ctrl-C in the main thread: end the children, too
             self._preempt_children()
             self._await_children(all_ended)
             raise
@@ -285,7 +281,7 @@ class Concurrence(Container):
                 all_ended.set()
 
     def _execute_child(self, label: str, state: State) -> tuple[Any, Exception | None]:
-        """The child's outcome, or the error with which the container has to end."""
+        """The child's outcome, or the error with which the container must end."""
         ud = Remapper(
             self.userdata,
             state.get_registered_input_keys(),
@@ -304,7 +300,7 @@ class Concurrence(Container):
             )
         registered = state.get_registered_outcomes()
         if outcome is None and smach.is_shutdown():
-            return None, None  # an inner container that stopped for the same reason
+            return None, None  # an inner container that stopped because of the same shutdown
         if outcome not in registered:
             return None, _error(
                 InvalidStateError,
@@ -328,7 +324,7 @@ class Concurrence(Container):
 
     def _choose_outcome(self) -> str:
         with self._preempt_lock:
-            # Also where it came after the last child's end: nobody is left who could ignore it.
+            # Also valid for a request after the last child's end: no child is left that could ignore it.
             if self._preempt_requested and not self._ignored:
                 self._preempt_requested = False
                 return "preempted"
@@ -352,7 +348,7 @@ class Concurrence(Container):
             if all(self._child_outcomes[label] == wanted for label, wanted in conditions.items())
         ]
         if satisfied:
-            return max(satisfied, key=lambda entry: entry[0])[1]  # the first declared, among equals
+            return max(satisfied, key=lambda entry: entry[0])[1]  # among equals the first declared
         return self._default_outcome
 
     # Preemption.
@@ -362,7 +358,7 @@ class Concurrence(Container):
             (self._told if self._tell(label, self._states[label]) else self._ignored).add(label)
 
     def _preempt_children(self) -> None:
-        """Ask the children that run to end, without the container itself having been asked."""
+        """Request the running children to end, without a request to the container itself."""
         with self._preempt_lock:
             for label in self._live:
                 self._tell(label, self._states[label])

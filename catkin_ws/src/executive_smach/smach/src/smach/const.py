@@ -1,4 +1,4 @@
-"""A read-only view of an object: what a state gets for a key it declared as input only."""
+"""A read-only view of an object. A state receives it for a key that it declared only as input."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import copy
 import weakref
 from typing import Any, SupportsIndex
 
-# Special methods Python looks up on the type, never on the instance: each needs its own forwarder.
+# Python looks up special methods on the type, never on the instance: each needs its own forwarder.
 _FORWARDED = """
 __call__ __len__ __iter__ __next__ __reversed__ __contains__ __bool__ __int__ __float__
 __complex__ __index__ __round__ __trunc__ __floor__ __ceil__ __abs__ __neg__ __pos__ __invert__
@@ -22,21 +22,21 @@ _classes: weakref.WeakKeyDictionary[type, type] = weakref.WeakKeyDictionary()
 
 
 def unwrap(value: Any) -> Any:
-    """The object behind a `Const`, or `value` itself. Example: `pickle.dumps(unwrap(ud.pose))`."""
+    """The object of a `Const`, or `value` itself. Example: `pickle.dumps(unwrap(ud.pose))`."""
     return _target(value, "_const_obj") if issubclass(type(value), Const) else value
 
 
 def is_wrapped_kind(value: Any) -> bool:
-    """Whether reading `value` through an input-only key gives a `Const`: objects with a `__dict__`.
+    """True if reading `value` through an input-only key returns a `Const`: objects with a `__dict__`.
 
-    Classes are left alone: `isinstance(x, wrapped_class)` could not work. Example:
+    Classes are excluded: `isinstance(x, wrapped_class)` would not work. Example:
     `is_wrapped_kind(3)` is False.
     """
     return not isinstance(value, type) and not issubclass(type(value), Const) and hasattr(value, "__dict__")
 
 
 def const(value: Any) -> Any:
-    """`value` made read-only if it is of a kind that can be assigned to, else `value` itself.
+    """A read-only view of `value` if it has attributes that can be assigned, otherwise `value` itself.
 
     Example::
 
@@ -50,14 +50,13 @@ def const(value: Any) -> Any:
 
 
 class Const:
-    """Read-only view of `obj`: calls, comparison, text and `isinstance` act as on the object;
-    assignment and `del`
-    raise TypeError. Attributes and items read through it are read-only in turn; what a call returns
-    is the caller's.
+    """Read-only view of `obj`. Calls, comparison, text and `isinstance` act as on the object.
+    Assignment and `del` raise TypeError. Attributes and items read through the view are read-only,
+    too. The return value of a call is not.
 
-    A method that changes its own object does change it: the view forbids assignment, it cannot see
-    into methods. `copy.copy` and `copy.deepcopy` give a free copy of the object. Example: see
-    `const`.
+    A method that changes its object does change it: the view prevents assignments, but not changes
+    inside of methods. `copy.copy` and `copy.deepcopy` return a writable copy of the object. Example:
+    see `const`.
     """
 
     __slots__ = ("_const_obj", "__weakref__")
@@ -122,7 +121,7 @@ def _refusal(view: Const, what: str) -> str:
 
 def _forwarder(name: str) -> Any:
     def forward(self: Const, *args: Any, **kwargs: Any) -> Any:
-        # Through the type, as Python itself does; a NotImplemented comes back as it is.
+        # Look the method up on the type, as Python does. A NotImplemented is returned unchanged.
         obj = _target(self, "_const_obj")
         return getattr(type(obj), name)(obj, *map(unwrap, args), **kwargs)
 
@@ -143,16 +142,12 @@ def _getitem(self: Const, key: Any) -> Any:
 
 
 def _has(kind: type, name: str) -> bool:
-    """Whether instances have the special method; `getattr(kind, name)` would also find the
-    metaclass's.
-    """
+    """True if instances have the special method; `getattr(kind, name)` would also find the metaclass's."""
     return any(vars(base).get(name) is not None for base in kind.__mro__)
 
 
 def _view_class(kind: type) -> type:
-    """A Const class with just the special methods `kind` has, so that e.g. `callable(view)` is
-    right.
-    """
+    """A Const class with exactly the special methods of `kind`, so that e.g. `callable(view)` is correct."""
     members: dict[str, Any] = {"__slots__": (), "__doc__": Const.__doc__}
     members.update({name: _forwarder(name) for name in _FORWARDED if _has(kind, name)})
     members.update({name: _refuser(name) for name in _REFUSED if _has(kind, name)})

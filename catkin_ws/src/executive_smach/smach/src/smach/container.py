@@ -1,4 +1,4 @@
-"""What all containers have in common: construction, user data and the bookkeeping of a run."""
+"""The common base of all containers: construction, user data and the state of a run."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ _STATE_METHODS = (
 
 
 class Container(Callbacks, State):
-    """A state that holds states. Base of StateMachine, Concurrence and Iterator.
+    """A state that contains states. Base of StateMachine, Concurrence and Iterator.
 
-    `userdata` is the store its children share; it is kept between runs. On entry every registered
-    input key is copied into it from the parent, on exit every output key back.
+    The children share `userdata`, which is kept between runs. At the start of a run every registered
+    input key is copied into it from the parent; at the end every output key is copied back.
 
-    Containers of your own override `__getitem__`, `get_children`, `get_initial_states`,
+    User-defined containers override `__getitem__`, `get_children`, `get_initial_states`,
     `set_initial_state`, `get_active_states`, `get_internal_edges`, `check_consistency` and
     `execute`, and run inside `self._run()`.
 
@@ -42,7 +42,7 @@ class Container(Callbacks, State):
             smach.StateMachine.add("A", A(), transitions={"ok": "done"})
     """
 
-    #: Containers open for construction, innermost last, and the lock their thread holds meanwhile.
+    #: Containers open for construction, innermost last, and the lock that their thread holds meanwhile.
     _construction_stack: list[Container] = []
     _construction_lock = threading.RLock()
     _construction_thread: int | None = None
@@ -61,7 +61,7 @@ class Container(Callbacks, State):
         self._init_callbacks()
 
     def __getstate__(self) -> dict:
-        # Locks cannot be pickled; __setstate__ makes them anew.
+        # Locks cannot be pickled; __setstate__ creates new ones.
         locks = ("_preempt_lock", "_callback_lock")
         return {key: value for key, value in self.__dict__.items() if key not in locks}
 
@@ -69,10 +69,10 @@ class Container(Callbacks, State):
         self.__dict__.update(state)
         self._preempt_lock = threading.RLock()
 
-    # What a container has to offer.
+    # Methods that a container must override.
 
     def __getitem__(self, key: str) -> State:
-        """The child with this label. Example: `machine["GRASP"]`. KeyError if there is none."""
+        """The child with this label. Raises KeyError if there is none. Example: `machine["GRASP"]`."""
         raise NotImplementedError(f"{type(self).__name__} must override __getitem__(label)")
 
     def get_children(self) -> dict[str, State]:
@@ -80,18 +80,18 @@ class Container(Callbacks, State):
         raise NotImplementedError(f"{type(self).__name__} must override get_children()")
 
     def get_initial_states(self) -> list[str]:
-        """Labels with which a run begins. Example: `machine.get_initial_states()`."""
+        """Labels of the states with which a run begins. Example: `machine.get_initial_states()`."""
         raise NotImplementedError(f"{type(self).__name__} must override get_initial_states()")
 
     def set_initial_state(self, initial_states: Sequence[str], userdata: UserData | None = None) -> None:
-        """Begin the next run elsewhere, with this merged into the user data.
+        """Begin the next run with these states, and merge `userdata` into the container's user data.
 
         Example: `m.set_initial_state(["B"])`.
         """
         raise NotImplementedError(f"{type(self).__name__} must override set_initial_state(labels, userdata)")
 
     def get_active_states(self) -> list[str]:
-        """Labels of the children that run now. Example: `machine.get_active_states()`."""
+        """Labels of the running children. Example: `machine.get_active_states()`."""
         raise NotImplementedError(f"{type(self).__name__} must override get_active_states()")
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
@@ -109,13 +109,13 @@ class Container(Callbacks, State):
         raise NotImplementedError(f"{type(self).__name__} must override check_consistency()")
 
     def is_running(self) -> bool:
-        """Whether `execute` is going on. Example: `while machine.is_running(): ...`."""
+        """True while `execute` runs. Example: `while machine.is_running(): ...`."""
         return self._is_running
 
     # Construction.
 
     def open(self) -> None:
-        """Begin to add children; pair with `close`. Prefer `with container:`.
+        """Open the container for adding children; pair with `close`. Prefer `with container:`.
 
         Example: `machine.open()`.
         """
@@ -124,7 +124,7 @@ class Container(Callbacks, State):
         Container._construction_stack.append(self)
 
     def close(self) -> None:
-        """End construction and log what is inconsistent. Example: `machine.close()`.
+        """End the construction and log inconsistencies. Example: `machine.close()`.
 
         Raises InvalidStateError if another container was opened later and is still open.
         """
@@ -140,7 +140,7 @@ class Container(Callbacks, State):
             smach.logerr(f"{self._name()} is inconsistent and will not run as it is: {error}")
 
     def is_opened(self) -> bool:
-        """Whether this is the innermost container open for construction.
+        """True if this is the innermost container open for construction.
 
         Example: `machine.is_opened()`.
         """
@@ -171,7 +171,7 @@ class Container(Callbacks, State):
         if not isinstance(error, logged_when_made):
             text = "".join(traceback.format_exception(kind, error, trace))
             smach.logerr(f"construction of {self._name()} failed: {text}")
-        # Whatever happened inside, nobody else may find the construction lock taken.
+        # After any error inside, the construction lock must be free for other threads.
         if any(container is self for container in Container._construction_stack):
             while not self.is_opened():
                 self._pop()
@@ -179,7 +179,7 @@ class Container(Callbacks, State):
 
     @contextmanager
     def opened(self, **_kwargs: Any) -> Iterator[Container]:
-        """The same as `with machine:`; keyword arguments are accepted and have no effect.
+        """Same as `with machine:`. Keyword arguments are accepted and ignored.
 
         Example: `with machine.opened() as m: ...`.
         """
@@ -188,7 +188,7 @@ class Container(Callbacks, State):
 
     @staticmethod
     def _pop() -> None:
-        """Close the innermost open container, whichever it is."""
+        """Close the innermost open container."""
         Container._construction_stack.pop()
         if not Container._construction_stack:
             Container._construction_thread = None
@@ -196,7 +196,7 @@ class Container(Callbacks, State):
 
     @classmethod
     def _currently_opened(cls) -> Any:
-        """The innermost container that this thread has open, which must be of this class."""
+        """The innermost container that this thread has open. It must be of this class."""
         stack = Container._construction_stack
         if not stack or Container._construction_thread != threading.get_ident():
             raise InvalidStateError(
@@ -243,7 +243,7 @@ class Container(Callbacks, State):
 
     @contextmanager
     def _run(self) -> Iterator[dict[str, Any]]:
-        """Surrounds one run: flags, and the end callbacks with `result["outcome"]`."""
+        """Context of one run: sets the flags and calls the end callbacks with `result["outcome"]`."""
         result: dict[str, Any] = {"outcome": None}
         with self._preempt_lock:
             if self._is_running:
@@ -264,10 +264,9 @@ class Container(Callbacks, State):
             self._call_end_cbs(result["outcome"])
 
     def request_preempt(self) -> None:
-        """Ask the container, and with it the children that run, to end early. Example:
-        `machine.request_preempt()`.
+        """Request the container and its running children to end early. Example: `machine.request_preempt()`.
 
-        Before a run the request waits for its first children. Thread-safe.
+        A request before a run applies to the first children of the run. Thread-safe.
         """
         with self._preempt_lock:
             super().request_preempt()
@@ -275,11 +274,11 @@ class Container(Callbacks, State):
                 self._forward_preempt()
 
     def _forward_preempt(self) -> None:
-        """Tell the running children. The preempt lock is held."""
+        """Pass the request to the running children. The caller holds the preempt lock."""
 
     @staticmethod
     def _tell(label: str, state: State) -> bool:
-        """Pass the request to a child; whether the child has taken it."""
+        """Pass the request to a child. True if the child accepted it."""
         try:
             state.request_preempt()
         except Exception:
@@ -293,9 +292,7 @@ class Container(Callbacks, State):
 
     @staticmethod
     def _take_back(label: str, state: State) -> bool:
-        """At the end of a child's run, lower its flag; whether it was up, that is, the request was
-        ignored.
-        """
+        """Clear a child's request flag at the end of its run. True if it was set: the child ignored the request."""
         try:
             if not state.preempt_requested():
                 return False
@@ -305,12 +302,12 @@ class Container(Callbacks, State):
         return True
 
     def _copy_input_keys(self, parent_ud: Any, keys: Iterable[str]) -> None:
-        """Copy `keys` from the parent's user data, of which there may be none."""
+        """Copy `keys` from the parent's user data, if there is a parent."""
         if parent_ud is not None:
             _copy(parent_ud, self.userdata, keys, f"input of {self._name()}")
 
     def _copy_output_keys(self, parent_ud: Any, keys: Iterable[str]) -> None:
-        """Copy `keys` to the parent's user data, of which there may be none."""
+        """Copy `keys` to the parent's user data, if there is a parent."""
         if parent_ud is not None:
             _copy(self.userdata, parent_ud, keys, f"output of {self._name()}")
 

@@ -1,6 +1,4 @@
-"""The errors of the engine. Each is written to `smach.logerr` when it is made, so none passes
-unseen.
-"""
+"""The errors of the engine. Each error is written to `smach.logerr` when it is created, so that none is lost."""
 
 from __future__ import annotations
 
@@ -25,29 +23,28 @@ class SmachError(Exception):
 
 
 class InvalidStateError(SmachError):
-    """A state or container is missing, doubled, of the wrong kind, or in no condition to do what is
-    asked.
+    """A state or container is missing, exists twice, has the wrong type, or cannot do this now.
 
     Example: adding a second state under the label of the first raises it.
     """
 
 
 class InvalidTransitionError(SmachError):
-    """An outcome nobody registered, or a transition that leads nowhere.
+    """An unregistered outcome, or a transition to an unknown target.
 
     Example: `StateMachine.add("A", A(), transitions={"no_such_outcome": "B"})` raises it.
     """
 
 
 class InvalidConstructionError(SmachError):
-    """A container was used as if it were open for construction, and it is not.
+    """A container was used as if it were open for construction, but it is closed.
 
     Example: `machine.assert_opened()` outside of `with machine:` raises it.
     """
 
 
 class InvalidUserCodeError(SmachError):
-    """Code of the user (a state, a callback) raised, or touched user data it had not declared.
+    """User code (a state, a callback) raised an exception or accessed user data that it had not declared.
 
     Example: reading `ud.x` in a state without `x` among its input keys raises it.
     """

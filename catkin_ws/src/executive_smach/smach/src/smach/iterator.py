@@ -1,4 +1,4 @@
-"""A container that runs one state again and again, once per item."""
+"""A container that runs one state repeatedly, once per item."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from smach.user_data import UserData
 
 
 class Iterator(Container):
-    """Runs the contained state for each item of `it`, an iterable or a function that returns one.
+    """Runs the contained state for each item of `it`: an iterable, or a function that returns one.
 
-    The item is in the user data under `it_label`. The state gets the iterator's own user data,
-    without key checks.
+    The item is stored in the user data under `it_label`. The state receives the iterator's user data
+    directly, without key checks.
 
     Example::
 
@@ -47,7 +47,7 @@ class Iterator(Container):
         self._loop_outcomes: tuple[str, ...] = ()
         self._break_outcomes: tuple[str, ...] = ()
         self._final_outcome_map: dict[str, str] = {}
-        self._executing = False  # the contained state is, this moment
+        self._executing = False  # True while the contained state executes
 
     # Construction.
 
@@ -59,11 +59,12 @@ class Iterator(Container):
         break_outcomes: Iterable[str] = (),
         final_outcome_map: Mapping[str, str] | None = None,
     ) -> State:
-        """Set the state to run in the iterator that is open, and return it.
+        """Set the state of the open iterator and return it.
 
-        With `break_outcomes` all others go on with the next item; else `loop_outcomes` do and all
-        others end the iteration; with neither it ends after the first item. `final_outcome_map`
-        translates the last outcome of the state into the iterator's. Example: see the class.
+        With `break_outcomes` these outcomes end the iteration and all others continue with the next
+        item. With `loop_outcomes` alone these continue and all others end it. With neither it ends after
+        the first item. `final_outcome_map` maps the last outcome of the state to that of the iterator.
+        Example: see the class.
         """
         iterator = Iterator._currently_opened()
         iterator._check_new_child(label, state, [iterator._label] if iterator._label is not None else [])
@@ -83,7 +84,7 @@ class Iterator(Container):
 
     @staticmethod
     def set_iteritems(it: Iterable | Callable[[], Iterable], it_label: str = "it_data") -> None:
-        """Set the items of the iterator that is open.
+        """Set the items of the open iterator.
 
         Example: `Iterator.set_iteritems([1, 2, 3], "number")`.
         """
@@ -106,7 +107,7 @@ class Iterator(Container):
         return list(self.get_children())
 
     def set_initial_state(self, initial_states: Sequence[str], userdata: UserData | None = None) -> None:
-        """Merge `userdata`; there is only one state to begin with.
+        """Merge `userdata`. The contained state is the only initial state.
 
         Example: `each.set_initial_state([], ud)`.
         """
@@ -116,11 +117,11 @@ class Iterator(Container):
             self.userdata.update(userdata)
 
     def get_active_states(self) -> list[str]:
-        """The label while the iterator runs, else []. Example: `each.get_active_states()`."""
+        """`[label]` while the iterator runs, else []. Example: `each.get_active_states()`."""
         return self.get_initial_states() if self._is_running else []
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
-        """Loop outcomes lead back to the state, the others out of the iterator.
+        """Edges of loop outcomes back to the state, and of the other outcomes out of the iterator.
 
         Example: see the name.
         """
@@ -131,8 +132,7 @@ class Iterator(Container):
         ]
 
     def check_consistency(self) -> None:
-        """Raise InvalidStateError without a contained state, InvalidTransitionError for outcomes
-        that do not exist.
+        """Raise InvalidStateError without a contained state, InvalidTransitionError for unknown outcomes.
 
         Example: `each.check_consistency()`.
         """
@@ -155,11 +155,10 @@ class Iterator(Container):
     # Running.
 
     def execute(self, parent_ud: Any = None) -> str | None:
-        """Run the state for each item; return the mapped last outcome, or the exhausted outcome;
-        None at shutdown.
+        """Run the state for each item. Return the mapped last outcome or the exhausted outcome; None at shutdown.
 
         Raises InvalidStateError without a contained state, InvalidUserCodeError if the state or the
-        function that gives the items raises, InvalidTransitionError for an outcome the state has
+        function that returns the items raises, InvalidTransitionError for an outcome that the state has
         not registered. Example: `outcome = each.execute()`.
         """
         if self._state is None:
@@ -195,8 +194,7 @@ class Iterator(Container):
             if asked or outcome in self._break_outcomes:
                 result = self._final_outcome_map.get(outcome, outcome)
                 if asked and result not in self._outcomes:
-                    # A loop outcome, cut short by a request: no outcome of ours, so say what
-                    # happened.
+                    # A loop outcome that was interrupted by a preempt request is not an outcome of the iterator.
                     result = "preempted" if "preempted" in self._outcomes else self._exhausted_outcome
                 break
             self.call_transition_cbs()
@@ -215,7 +213,7 @@ class Iterator(Container):
             ) from error
 
     def _execute_state(self) -> tuple[str | None, bool]:
-        """Outcome of the state for the current item, and whether the iterator was asked to end."""
+        """Outcome of the state for the current item, and True if the iterator was requested to end."""
         label, state = str(self._label), self._state
         assert state is not None
         with self._preempt_lock:
@@ -239,7 +237,7 @@ class Iterator(Container):
                 asked = self._preempt_requested
                 self._preempt_requested = False
         if outcome is None and smach.is_shutdown():
-            return None, asked  # an inner container that stopped for the same reason
+            return None, asked  # an inner container that stopped because of the same shutdown
         if outcome not in state.get_registered_outcomes():
             raise InvalidTransitionError(
                 f"state '{label}' ({type(state).__name__}) of an iterator returned {outcome!r}, "

@@ -1,7 +1,7 @@
-"""Where the engine's messages go, and how it learns that the process is shutting down.
+"""Log functions of the engine, and its check for a shutdown of the process.
 
-The engine never keeps a reference to a logger: it looks the functions up as attributes of the
-package (`smach.logerr(...)`) each time, so that `set_loggers` takes effect at once and everywhere.
+The engine keeps no reference to a logger. It looks the functions up as attributes of the package
+(`smach.logerr(...)`) at each call, so that `set_loggers` takes effect everywhere at once.
 
 Example::
 
@@ -24,27 +24,27 @@ def _write(level: str, message: object, stream: TextIO) -> None:
 
 
 def loginfo(message: object) -> None:
-    """Print what goes on, to stdout. Example: `smach.loginfo("started")`."""
+    """Print information to stdout. Example: `smach.loginfo("started")`."""
     _write("INFO", message, sys.stdout)
 
 
 def logwarn(message: object) -> None:
-    """Print something doubtful, to stderr. Example: `smach.logwarn("key 'x' is missing")`."""
+    """Print a warning to stderr. Example: `smach.logwarn("key 'x' is missing")`."""
     _write("WARN", message, sys.stderr)
 
 
 def logdebug(message: object) -> None:
-    """Print a detail, to stdout. Example: `smach.logdebug("released the children")`."""
+    """Print a debug message to stdout. Example: `smach.logdebug("released the children")`."""
     _write("DEBUG", message, sys.stdout)
 
 
 def logerr(message: object) -> None:
-    """Print a fault, to stderr. Example: `smach.logerr("state 'A' raised")`."""
+    """Print an error to stderr. Example: `smach.logerr("state 'A' raised")`."""
     _write("ERROR", message, sys.stderr)
 
 
 def is_shutdown() -> bool:
-    """Whether the process is shutting down; without ROS never. See `set_shutdown_check`.
+    """True while the process shuts down. Always False without ROS. See `set_shutdown_check`.
 
     Example: `while not smach.is_shutdown(): ...`.
     """
@@ -52,10 +52,10 @@ def is_shutdown() -> bool:
 
 
 def set_loggers(info: Logger, warn: Logger, debug: Logger, error: Logger) -> None:
-    """Send the engine's messages elsewhere; mind the order of the four.
+    """Replace the engine's log functions. Note the order of the four.
 
     Example: `set_loggers(rospy.loginfo, rospy.logwarn, rospy.logdebug, rospy.logerr)`.
-    Raises TypeError if one of them cannot be called (then nothing has changed).
+    Raises TypeError if one of them is not callable; then no function is replaced.
     """
     functions = {"loginfo": info, "logwarn": warn, "logdebug": debug, "logerr": error}
     for name, function in functions.items():
@@ -65,9 +65,9 @@ def set_loggers(info: Logger, warn: Logger, debug: Logger, error: Logger) -> Non
 
 
 def set_shutdown_check(check: Callable[[], bool]) -> None:
-    """Replace `smach.is_shutdown`; machines ask it between states and while they wait.
+    """Replace `smach.is_shutdown`. Machines call it between states and while they wait.
 
-    Example: `set_shutdown_check(rospy.is_shutdown)`. Raises TypeError if `check` cannot be called.
+    Example: `set_shutdown_check(rospy.is_shutdown)`. Raises TypeError if `check` is not callable.
     """
     if not callable(check):
         raise TypeError(f"set_shutdown_check: expected a callable, got {type(check).__name__}")

@@ -1,4 +1,4 @@
-"""A set that keeps the order in which its elements came."""
+"""A set that keeps the order in which its elements were added."""
 
 from __future__ import annotations
 
@@ -6,10 +6,9 @@ from collections.abc import Hashable, Iterable, Iterator, MutableSet
 
 
 class OrderedSet(MutableSet):
-    """Outcomes and keys in the order of their declaration, so that pictures and messages stay
-    stable.
+    """Outcomes and keys in the order of their declaration, so that pictures and messages are stable.
 
-    Behaves like `set` (operators, `update`, `union`), iterates in order of first insertion.
+    Behaves like `set` (operators, `update`, `union`); iterates in the order of first insertion.
 
     Example::
 
@@ -30,11 +29,11 @@ class OrderedSet(MutableSet):
         return len(self._items)
 
     def add(self, value: Hashable) -> None:
-        """Append `value` unless it is there. Example: `s.add("done")`."""
+        """Append `value` unless it is present. Example: `s.add("done")`."""
         self._items[value] = None
 
     def discard(self, value: Hashable) -> None:
-        """Remove `value` if it is there. Example: `s.discard("done")`."""
+        """Remove `value` if it is present. Example: `s.discard("done")`."""
         self._items.pop(value, None)
 
     def update(self, *others: Iterable[Hashable]) -> None:
@@ -43,7 +42,7 @@ class OrderedSet(MutableSet):
             self._items.update(dict.fromkeys(other))
 
     def union(self, *others: Iterable[Hashable]) -> OrderedSet:
-        """A new set: this one's elements, then those of `others`. Example: `s.union(["a"])`."""
+        """New set of this set's elements, followed by those of `others`. Example: `s.union(["a"])`."""
         result = OrderedSet(self)
         result.update(*others)
         return result
@@ -53,7 +52,7 @@ class OrderedSet(MutableSet):
 
 
 def names(what: str, items: Iterable[str]) -> tuple[str, ...]:
-    """`items` as a tuple; a lone string, the usual slip, is a TypeError that says so.
+    """`items` as a tuple. Raises a TypeError with an explanation for a single string, a frequent mistake.
 
     Example: `names("outcomes", ["done", "failed"])`.
     """

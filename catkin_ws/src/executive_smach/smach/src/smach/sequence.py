@@ -1,4 +1,4 @@
-"""A state machine whose states follow each other in the order in which they are added."""
+"""A state machine whose states run in the order in which they are added."""
 
 from __future__ import annotations
 
@@ -10,10 +10,9 @@ from smach.state_machine import StateMachine
 
 
 class Sequence(StateMachine):
-    """Each state's connector outcome leads to the next state, unless it has a transition of its
-    own.
+    """The connector outcome of each state leads to the next state, unless the state has its own transition for it.
 
-    The connector outcome of the last one is an outcome of the sequence.
+    The connector outcome of the last state is an outcome of the sequence.
 
     Example::
 
@@ -41,9 +40,9 @@ class Sequence(StateMachine):
         transitions: Mapping[str, str | None] | None = None,
         remapping: Mapping[str, str] | None = None,
     ) -> State:
-        """Add a state behind the last one of the sequence that is open, and return it.
+        """Add a state at the end of the open sequence and return it.
 
-        Errors as with StateMachine.add. Example: `Sequence.add("MOVE", Move())`.
+        Raises the errors of StateMachine.add. Example: `Sequence.add("MOVE", Move())`.
         """
         sequence = Sequence._currently_opened()
         previous = sequence._last_label

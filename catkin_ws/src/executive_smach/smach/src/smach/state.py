@@ -1,4 +1,4 @@
-"""The smallest part of a machine: something with outcomes and keys that can be executed."""
+"""The smallest part of a machine: an executable object with outcomes and keys."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from smach.util import has_smach_interface
 class State:
     """Base of all states. Declare outcomes and keys, override `execute`.
 
-    Nothing interrupts a running `execute`: a state that takes long polls `preempt_requested()`, and
-    if asked calls `service_preempt()` and returns. A request it does not serve is passed on by its
-    container to the next state.
+    Nothing interrupts a running `execute`. A state that takes long polls `preempt_requested()`; if True
+    it calls `service_preempt()` and returns. If a state does not serve a request, its container passes
+    it to the next state.
 
     Example::
 
@@ -27,7 +27,7 @@ class State:
                 return "done" if ud.n >= 3 else "again"
     """
 
-    # Also for subclasses that never call State.__init__.
+    # Class attributes, so that subclasses need not call State.__init__.
     _preempt_flag = False
     _preempt_spent = False
 
@@ -45,9 +45,9 @@ class State:
         self._preempt_requested = False
 
     def execute(self, ud: Any) -> str | None:
-        """Do the state's work and return one of its outcomes; `ud` is its view of the user data.
+        """Do the work of the state and return one of its outcomes; `ud` is the state's view of the user data.
 
-        Example: see the class. The base raises NotImplementedError.
+        Example: see the class. The base class raises NotImplementedError.
         """
         raise NotImplementedError(f"{type(self).__name__} must override execute(self, ud)")
 
@@ -60,30 +60,30 @@ class State:
         return tuple(self._outcomes)
 
     def register_io_keys(self, keys: Iterable[str]) -> None:
-        """Add keys that are read and written. Example: `self.register_io_keys(["n"])`."""
+        """Add keys for reading and writing. Example: `self.register_io_keys(["n"])`."""
         keys = names("io_keys", keys)
         self._input_keys.update(keys)
         self._output_keys.update(keys)
 
     def register_input_keys(self, keys: Iterable[str]) -> None:
-        """Add keys that are read. Example: `self.register_input_keys(["goal"])`."""
+        """Add keys for reading. Example: `self.register_input_keys(["goal"])`."""
         self._input_keys.update(names("input_keys", keys))
 
     def get_registered_input_keys(self) -> tuple[str, ...]:
-        """The keys that may be read, in order. Example: `state.get_registered_input_keys()`."""
+        """The keys for reading, in order. Example: `state.get_registered_input_keys()`."""
         return tuple(self._input_keys)
 
     def register_output_keys(self, keys: Iterable[str]) -> None:
-        """Add keys that are written. Example: `self.register_output_keys(["result"])`."""
+        """Add keys for writing. Example: `self.register_output_keys(["result"])`."""
         self._output_keys.update(names("output_keys", keys))
 
     def get_registered_output_keys(self) -> tuple[str, ...]:
-        """The keys that may be written, in order. Example: `state.get_registered_output_keys()`."""
+        """The keys for writing, in order. Example: `state.get_registered_output_keys()`."""
         return tuple(self._output_keys)
 
-    # Preemption. `_preempt_requested` is the flag under the name that user code touches. A flag
-    # that is still up when its run ends is "spent": it shows that the run ignored a request, and
-    # the next run drops it. A new request, also by assignment, makes it fresh again.
+    # Preemption. `_preempt_requested` is the name of the flag that user code accesses. If the flag is still
+    # set at the end of a run, it is "spent": the run ignored a request, and the next run clears it. A new
+    # request, also by assignment, replaces a spent one.
 
     @property
     def _preempt_requested(self) -> bool:
@@ -95,44 +95,44 @@ class State:
         self._preempt_flag = bool(value)
 
     def request_preempt(self) -> None:
-        """Ask the state to end early. May come from any thread.
+        """Request the state to end early. Thread-safe.
 
         Example: `machine.request_preempt()`.
         """
         self._preempt_requested = True
 
     def service_preempt(self) -> None:
-        """Say that the request has been served.
+        """Clear the request flag: the state serves the request.
 
         Example: `self.service_preempt(); return "preempted"`.
         """
         self._preempt_requested = False
 
     def recall_preempt(self) -> None:
-        """Take the request back. Example: `state.recall_preempt()`."""
+        """Cancel the request. Example: `state.recall_preempt()`."""
         self._preempt_requested = False
 
     def preempt_requested(self) -> bool:
-        """Whether the state has been asked to end early.
+        """True if the state has been requested to end early.
 
         Example: `if self.preempt_requested(): ...`.
         """
         return self._preempt_requested
 
     def _drop_spent_preempt(self) -> None:
-        """At the start of a run: forget a request that an earlier run has ignored."""
+        """At the start of a run, clear a request that an earlier run ignored."""
         if self._preempt_spent:
             self._preempt_requested = False
 
     def _spend_preempt(self) -> None:
-        """At the end of a run: a request still up belongs to this run, not to the next."""
+        """At the end of a run, mark a remaining request as spent: it does not apply to the next run."""
         self._preempt_spent = self._preempt_flag
 
 
 class CBState(State):
-    """A state made of a function: `execute` returns `cb(ud, *cb_args, **cb_kwargs)`.
+    """A state from a function: `execute` returns `cb(ud, *cb_args, **cb_kwargs)`.
 
-    Outcomes and keys of a `cb_interface`-decorated function are merged in. Example::
+    The outcomes and keys of a function decorated with `cb_interface` are added. Example::
 
         @smach.cb_interface(outcomes=["done"], input_keys=["x"])
         def show(ud):

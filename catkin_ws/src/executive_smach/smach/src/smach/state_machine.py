@@ -1,4 +1,4 @@
-"""A container whose children run one after another, each outcome leading to the next."""
+"""A container whose children run one after another; each outcome leads to the next child."""
 
 from __future__ import annotations
 
@@ -16,9 +16,8 @@ from smach.user_data import Remapper, UserData
 class StateMachine(Container):
     """States and the transitions between them.
 
-    A transition leads to the label of a sibling, or to an outcome of the machine; None, or no
-    entry, means that the state's outcome is the machine's outcome. The first state added is the
-    initial one.
+    A transition leads to the label of a sibling or to an outcome of the machine. If it is None or
+    missing, the state's outcome is the machine's outcome. The first state added is the initial state.
 
     Example::
 
@@ -45,7 +44,7 @@ class StateMachine(Container):
         self._connector_label: str | None = None
         self._current_label: str | None = None
         self._current_state: State | None = None  # only while it executes
-        self._current_told = False  # whether that one has been passed the request now up
+        self._current_told = False  # True if that state has received the current preempt request
 
     # Construction.
 
@@ -57,12 +56,12 @@ class StateMachine(Container):
         remapping: Mapping[str, str] | None = None,
         constants: Mapping[str, Any] | None = None,
     ) -> State:
-        """Add a state to the machine that is open, and return it.
+        """Add a state to the open machine and return it.
 
-        `transitions` {outcome: label, machine outcome or None}; `remapping` {the state's key: the
-        machine's key}; `constants` {the machine's key: value}, written each time before the state
-        runs. Raises InvalidTransitionError for an outcome the state lacks, InvalidStateError for a
-        label that is taken.
+        `transitions` is {outcome: label, machine outcome or None}. `remapping` is {the state's key: the
+        machine's key}. `constants` is {the machine's key: value}, written before each run of the state.
+        Raises InvalidTransitionError for an outcome that the state lacks, InvalidStateError if the label
+        exists.
 
         Example: `StateMachine.add("A", A(), transitions={"ok": "B"}, remapping={"x": "count"})`.
         """
@@ -77,7 +76,7 @@ class StateMachine(Container):
         remapping: Mapping[str, str] | None = None,
         constants: Mapping[str, Any] | None = None,
     ) -> State:
-        """As `add`; each connector outcome leads to whatever is added next.
+        """Like `add`, but each connector outcome leads to the state that is added next.
 
         Raises InvalidStateError for a connector outcome that the state lacks.
         Example: `StateMachine.add_auto("A", A(), connector_outcomes=["ok"])`.
@@ -135,15 +134,15 @@ class StateMachine(Container):
             raise KeyError(f"no state {key!r} in this machine; labels: {', '.join(self._states) or 'none'}") from None
 
     def get_children(self) -> dict[str, State]:
-        """The states by label, in the order they were added. Example: `machine.get_children()`."""
+        """The states by label, in the order of addition. Example: `machine.get_children()`."""
         return dict(self._states)
 
     def get_initial_states(self) -> list[str]:
-        """The label with which a run begins, as a list. Example: `machine.get_initial_states()`."""
+        """`[label]` of the state with which a run begins. Example: `machine.get_initial_states()`."""
         return [str(self._initial_state_label)]
 
     def set_initial_state(self, initial_states: Sequence[str], userdata: UserData | None = None) -> None:
-        """Begin with the first label given ([]: leave it), and merge `userdata`.
+        """Begin with the first label ([]: no change), and merge `userdata`.
 
         Example: `machine.set_initial_state(["GRASP"])`. Labels are checked by `check_consistency`.
         """
@@ -156,14 +155,14 @@ class StateMachine(Container):
             self.userdata.update(userdata)
 
     def get_active_states(self) -> list[str]:
-        """`[label]` of the state that runs, `['None']` when idle.
+        """`[label]` of the running state, `['None']` when idle.
 
         Example: `machine.get_active_states()`.
         """
         return [str(self._current_label)]
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
-        """(outcome, from, to) of every transition, None where it falls through.
+        """(outcome, from, to) of every transition; `to` is None if the outcome is the machine's outcome.
 
         Example: see the name.
         """
@@ -174,10 +173,9 @@ class StateMachine(Container):
         ]
 
     def check_consistency(self) -> None:
-        """Raise InvalidTransitionError if there is nothing to begin with or a transition leads
-        nowhere.
+        """Raise InvalidTransitionError without an initial state or if a transition has an unknown target.
 
-        Example: `machine.check_consistency()`. All faults found are in the message.
+        Example: `machine.check_consistency()`. The message lists all faults.
         """
         faults = []
         if not self._states:
@@ -204,9 +202,9 @@ class StateMachine(Container):
     # Running.
 
     def execute(self, parent_ud: Any = None) -> str | None:
-        """Run from the initial state until an outcome; None if inconsistent or at shutdown.
+        """Run from the initial state to an outcome of the machine. Return None if inconsistent or at shutdown.
 
-        Raises InvalidUserCodeError if a state raises, InvalidTransitionError if it returns an
+        Raises InvalidUserCodeError if a state raises, InvalidTransitionError if a state returns an
         outcome that it has not registered. Example: `outcome = machine.execute()`.
         """
         try:
@@ -229,7 +227,7 @@ class StateMachine(Container):
         while not smach.is_shutdown():
             outcome = self._execute_state(label)
             if outcome is None and smach.is_shutdown():
-                break  # an inner container that stopped for the same reason
+                break  # an inner container that stopped because of the same shutdown
             target = self._target(label, outcome)
             if target not in self._states:
                 smach.loginfo(f"State machine terminating '{label}':'{outcome}':'{target}'")
@@ -268,7 +266,7 @@ class StateMachine(Container):
             with self._preempt_lock:
                 self._current_state = None
                 if not self._take_back(label, state) and self._current_told:
-                    self._preempt_requested = False  # served below, so not for the next state nor for the parent
+                    self._preempt_requested = False  # served below: neither the next state nor the parent gets it
                 self._current_told = False
 
     def _target(self, label: str, outcome: Any) -> str:
@@ -280,7 +278,7 @@ class StateMachine(Container):
             if outcome in self._states[label].get_registered_outcomes() and outcome in self._outcomes:
                 return outcome  # registered after the state was added
         except TypeError:
-            pass  # not even hashable
+            pass  # not hashable
         raise InvalidTransitionError(
             f"state '{label}' ({type(self._states[label]).__name__}) returned {outcome!r}, which "
             "is not among its "

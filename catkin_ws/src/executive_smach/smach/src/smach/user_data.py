@@ -1,4 +1,4 @@
-"""The data states share: a store per container, and the restricted view of it each state gets."""
+"""The data that states share: one store per container, and a restricted view of it for each state."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ __all__ = ["Const", "Remapper", "UserData", "locked"]
 
 
 class MissingKeyError(KeyError, AttributeError):
-    """A key that is not in the user data. Both kinds of error, so that `hasattr(ud, "x")` is simply
-    False.
+    """A key that is not in the user data. It is both a KeyError and an AttributeError, so that `hasattr(ud, "x")`
+    is False.
 
     Example: `UserData().x` raises it, and `except KeyError` catches it.
     """
@@ -27,10 +27,9 @@ class MissingKeyError(KeyError, AttributeError):
 
 
 class UserData:
-    """Named values, as attributes or as items; names with a leading underscore are plain
-    attributes.
+    """Named values, accessible as attributes or as items. Names with a leading underscore are plain attributes.
 
-    Each single access is atomic; for several at once use `locked`.
+    Each single access is atomic; for several accesses use `locked`.
 
     Example::
 
@@ -71,20 +70,20 @@ class UserData:
         return key in self._data
 
     def keys(self) -> list[str]:
-        """The names present, oldest first. Example: `ud.keys()`."""
+        """The names, oldest first. Example: `ud.keys()`."""
         with self._lock:
             return list(self._data)
 
     def update(self, ud: UserData | Mapping[str, Any]) -> None:
-        """Take over every value of another store or of a dict. Example: `ud.update(other)`."""
+        """Copy every value of another store or of a dict into this one. Example: `ud.update(other)`."""
         data = dict(ud) if isinstance(ud, Mapping) else ud._data
         with self._lock:
             self._data.update(data)
 
     def extract(self, keys: Iterable[str], remapping: Mapping[str, str]) -> UserData:
-        """A new store with shallow copies of the values `keys` under their local names.
+        """New store with shallow copies of the values `keys`, under their local names.
 
-        `keys` are names of this store, `remapping` is {local name: name here}. KeyError if one is
+        `keys` are names of this store, `remapping` is {local name: name here}. Raises KeyError if a key is
         absent. Example: `ud.extract(["a"], {"x": "a"}).x` is a copy of `ud.a`.
         """
         local_names: dict[str, list[str]] = {}
@@ -97,8 +96,7 @@ class UserData:
         return result
 
     def merge(self, ud: UserData, keys: Iterable[str], remapping: Mapping[str, str]) -> None:
-        """The way back: copy the values `keys` (local names) of `ud` into this store, renamed by
-        `remapping`.
+        """Inverse of `extract`: copy the values `keys` (local names) of `ud` into this store, renamed by `remapping`.
 
         Example: `ud.merge(local, ["x"], {"x": "a"})` sets `ud.a` to a copy of `local.x`.
         """
@@ -119,11 +117,11 @@ class UserData:
 
 
 class Remapper:
-    """What a state sees of its container's user data: its own names, its declared keys only.
+    """A state's view of its container's user data: with the state's own names, and only its declared keys.
 
     `remapping` is {the state's name: the container's name}. Reading a key outside of `input_keys`
-    raises InvalidUserCodeError; writing one outside of `output_keys` is logged and ignored; an
-    object read through a key that is not also an output key is read-only (`Const`).
+    raises InvalidUserCodeError. Writing a key outside of `output_keys` is logged and ignored. An
+    object that is read through a key that is not also an output key is read-only (`Const`).
 
     Example::
 
@@ -182,11 +180,11 @@ class Remapper:
         return key in self._input_keys and self._remap(key) in self._ud  # type: ignore
 
     def keys(self) -> list[str]:
-        """The state's own names of the input keys that are present. Example: `ud.keys()`."""
+        """Names of the existing input keys, as the state uses them. Example: `ud.keys()`."""
         return [key for key in sorted(self._input_keys) if key in self]
 
     def update(self, ud: UserData | Mapping[str, Any]) -> None:
-        """Write every value of `ud` through to the container's store, unchecked.
+        """Write every value of `ud` to the container's store, without key checks.
 
         Example: `ud.update(other)`.
         """
@@ -198,10 +196,10 @@ class Remapper:
 
 @contextmanager
 def locked(ud: UserData | Remapper) -> Iterator[UserData | Remapper]:
-    """Several accesses as one: nobody else writes to this user data meanwhile.
+    """Group several accesses: no other thread writes to this user data until the end of the block.
 
-    Keep it short, and do not wait inside. Concurrent children share one store, so this also serves
-    among them.
+    Keep the block short and do not wait in it. Concurrent children share one store, so this also
+    protects them from each other.
 
     Example::
 

@@ -1,4 +1,4 @@
-"""Callbacks that declare outcomes and keys the way states do."""
+"""Callbacks that declare outcomes and keys like states."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from smach.ordered_set import OrderedSet, names
 
 
 class CBInterface:
-    """A callable with outcomes and keys. Usually made by the decorator `cb_interface`.
+    """A callable with outcomes and keys. Usually created by the decorator `cb_interface`.
 
     Example::
 
@@ -39,7 +39,7 @@ class CBInterface:
         return self._cb(*args, **kwargs)
 
     def __get__(self, instance: Any, owner: type | None = None) -> Any:
-        """A decorated method is bound like any other method."""
+        """Bind a decorated method like any other method."""
         if instance is None or not hasattr(self._cb, "__get__"):
             return self
         return CBInterface(self._cb.__get__(instance, owner), self._outcomes, self._input_keys, self._output_keys)
@@ -49,16 +49,16 @@ class CBInterface:
         return tuple(self._outcomes)
 
     def get_registered_input_keys(self) -> tuple[str, ...]:
-        """The keys the callback reads. Example: `check.get_registered_input_keys()`."""
+        """The keys that the callback reads. Example: `check.get_registered_input_keys()`."""
         return tuple(self._input_keys)
 
     def get_registered_output_keys(self) -> tuple[str, ...]:
-        """The keys the callback writes. Example: `check.get_registered_output_keys()`."""
+        """The keys that the callback writes. Example: `check.get_registered_output_keys()`."""
         return tuple(self._output_keys)
 
 
 class cb_interface:
-    """Decorator: declares outcomes and keys of a callback.
+    """Decorator that declares the outcomes and keys of a callback.
 
     Example::
 
@@ -82,7 +82,7 @@ class cb_interface:
 
 
 def has_smach_interface(obj: Any) -> bool:
-    """Whether `obj` declares outcomes and keys: states and decorated callbacks do.
+    """True if `obj` declares outcomes and keys, as states and decorated callbacks do.
 
     Example: `has_smach_interface(smach.State())` is True.
     """

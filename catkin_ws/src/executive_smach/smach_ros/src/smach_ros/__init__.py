@@ -1,6 +1,6 @@
-"""smach on ROS: states for actions, services and topics, a machine as action server, introspection.
+"""smach for ROS: states for actions, services and topics, an action server for machines, introspection.
 
-Importing it sends smach's messages to rospy's loggers and lets machines end when rospy shuts down.
+The import connects smach's messages to rospy's loggers. Machines then end when rospy shuts down.
 
 Example::
 

@@ -1,4 +1,4 @@
-"""A container of states offered as an action server."""
+"""Offers a container of states as an action server."""
 
 from __future__ import annotations
 
@@ -15,18 +15,17 @@ from actionlib.simple_action_server import SimpleActionServer
 
 
 class ActionServerWrapper:
-    """Each goal is one execution of `wrapped_container`.
+    """Runs `wrapped_container` once for each goal.
 
-    The goal is put into user data `goal_key` (and each field under its own name with
-    `expand_goal_slots`, or under another with `goal_slots_map` {field: key}); the container must
-    have these among its input keys. The result is what it leaves in `result_key` (and
-    `result_slots_map` {field: key}, and with `pack_result_slots` each field under its own name),
-    its output keys; a fresh result is there from the start, for containers that have it among their
-    input keys too. `feedback_key` (and `feedback_slots_map` {field: key}) in its own user data is
-    published at each transition.
+    The goal is stored in user data `goal_key`. With `expand_goal_slots` each field is also stored under
+    its own name, with `goal_slots_map` {field: key} under another name. All of these must be input keys
+    of the container. The result is read from `result_key`, from `result_slots_map` {field: key}, and with
+    `pack_result_slots` from the names of the fields. These must be output keys. An empty result is
+    stored at the start, for containers that also have it as an input key. `feedback_key` and
+    `feedback_slots_map` {field: key} in the container's user data are published at each transition.
 
-    The outcome decides how the goal ends; what is in none of the three lists aborts it, as does an
-    error. A cancel asks the container to end early.
+    The outcome determines how the goal ends. An outcome in none of the three lists, or an error, aborts
+    the goal. A cancel requests the container to end early.
 
     Example::
 
@@ -104,7 +103,7 @@ class ActionServerWrapper:
 
     def _on_cancel(self) -> None:
         with self._lock:
-            # A cancel before the start is seen by _execute; one after the end is for nobody.
+            # _execute handles a cancel before the start. A cancel after the end has no effect.
             if self._executing:
                 self.wrapped_container.request_preempt()
 
@@ -113,7 +112,7 @@ class ActionServerWrapper:
         assert server is not None
         ud = smach.UserData()
         ud[self._goal_key] = goal
-        # A machine with the result among its input keys may fill in this one field by field.
+        # A machine that has the result as an input key may fill it field by field.
         ud[self._result_key] = self._result_class()
         if self._expand_goal_slots:
             for slot in goal.__slots__:
@@ -135,7 +134,7 @@ class ActionServerWrapper:
         finally:
             with self._lock:
                 self._executing = False
-                container.recall_preempt()  # a cancel belongs to its goal, not to the next
+                container.recall_preempt()  # a cancel applies to its goal, not to the next one
         if outcome in self._succeeded:
             server.set_succeeded(result, f"outcome {outcome}")
         elif outcome in self._preempted:
@@ -177,11 +176,11 @@ class ActionServerWrapper:
 
 
 class _SteadyActionServer(ActionServer):
-    """Publishes its status by the steady clock: a step of `/clock` backwards ends actionlib's timer."""
+    """Publishes its status by the steady clock: actionlib's timer ends when `/clock` steps back."""
 
     @property
     def status_frequency(self) -> float:
-        """0, for which actionlib makes no timer."""
+        """0, so that actionlib creates no timer."""
         return 0.0
 
     @status_frequency.setter

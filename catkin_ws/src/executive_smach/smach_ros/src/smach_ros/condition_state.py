@@ -1,4 +1,4 @@
-"""A state that asks a function again and again."""
+"""A state that evaluates a condition repeatedly."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ _POLL_RATE = rospy.Duration(0.05)
 class ConditionState(smach.State):
     """Outcomes true, false and preempted.
 
-    `cond_cb(ud)` is asked every `poll_rate`; true as soon as it holds; false after `max_checks` + 1
-    askings in vain (as users of the original have it; -1: no limit), or when `timeout` is over
-    (rospy.Duration or seconds; None: none). At shutdown it ends with preempted. Raises
+    `cond_cb(ud)` is called every `poll_rate`. The outcome is true as soon as it returns true. It is
+    false after `max_checks` + 1 calls (as in the original smach; -1: no limit), or after `timeout`
+    (rospy.Duration or seconds; None: no limit). At shutdown the outcome is preempted. Raises
     InvalidUserCodeError if the function raises.
 
     Example::
@@ -44,12 +44,12 @@ class ConditionState(smach.State):
         self._wake = threading.Event()
 
     def request_preempt(self) -> None:
-        """End early. Example: `state.request_preempt()`."""
+        """Request the state to end early. Example: `state.request_preempt()`."""
         super().request_preempt()
         self._wake.set()
 
     def execute(self, ud: Any) -> str:
-        """Ask until the condition holds or a limit is over. Example: by a state machine."""
+        """Evaluate the condition until it holds or a limit is reached. Called by a state machine."""
         self._drop_spent_preempt()
         view = callback_userdata(ud, self._cond_cb, self)
         limit = TimeLimit(self._timeout)

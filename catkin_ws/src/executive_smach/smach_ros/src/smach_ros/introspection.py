@@ -1,13 +1,13 @@
-"""Shows running machines to viewers, and lets them choose where a machine begins.
+"""Shows running machines to viewers, and lets viewers set the initial states of machines.
 
 Topics of a server, in the namespace of its node unless its name begins with '/':
 
-* `<server>/smach/container_structure`: the graph of every container, again every 2 s;
-* `<server>/smach/container_status`: what every container does, at start, at each transition, at
+* `<server>/smach/container_structure`: the graph of every container, repeated every 2 s;
+* `<server>/smach/container_status`: the status of every container: at the start, at each transition, at
   the end, and every 2 s;
-* `<server>/smach/container_init`: takes commands that set initial states.
+* `<server>/smach/container_init`: subscribed; commands that set initial states.
 
-The path of a container is that of its parent, a slash and its label; that of the outermost is by
+The path of a container is the path of its parent, a slash and its label. The outermost container is by
 convention /SM_ROOT.
 """
 
@@ -46,17 +46,17 @@ __all__ = [
     "IntrospectionServer",
 ]
 
-#: Seconds of wall time between two heartbeats: visible also while simulated time stands still.
+#: Seconds of wall time between two heartbeats, which also continue while simulated time stands still.
 HEARTBEAT = 2.0
-#: Seconds for which heartbeats spare a new viewer: one that subscribes before its window exists
-#: loses what comes meanwhile, and some then show nothing for good.
+#: Seconds after its connection in which a viewer receives no heartbeat. A viewer that subscribes before its
+#: window exists loses earlier messages, and some viewers then never show anything.
 WELCOME_DELAY = 1.5
-#: Statuses that may wait for the publishing thread; beyond it the oldest is dropped and counted.
+#: Statuses that may wait for the publishing thread. If more wait, the oldest is dropped and counted.
 BACKLOG = 20_000
 
 
 class _Watched:
-    """One container under its path: takes statuses of it, and hands them to the server."""
+    """One container with its path: records its statuses and passes them to the server."""
 
     def __init__(self, server: IntrospectionServer, path: str, container: smach.Container) -> None:
         self.server, self.path, self.container = server, path, container
@@ -72,7 +72,7 @@ class _Watched:
         for cb in callbacks:
             self.container.unregister_cb(cb)
 
-    # The container calls these in its own thread: take a snapshot and be gone.
+    # The container calls these in its own thread: record a snapshot and return at once.
 
     def on_start(self, _userdata: Any, initial_states: Sequence[str]) -> None:
         self.server._enqueue(self.snapshot(f"START {list(initial_states)}"))
@@ -87,7 +87,7 @@ class _Watched:
         self.server._enqueue(self.snapshot(f"END {outcome}"))
 
     def snapshot(self, info: str) -> tuple[SmachContainerStatus, dict]:
-        """A status without its user data, and the user data as it is now."""
+        """A status without user data, and the current user data."""
         message = SmachContainerStatus(
             path=self.path,
             initial_states=list(self.container.get_initial_states()),
@@ -112,13 +112,14 @@ class _Watched:
 
 
 class _Beat:
-    """When the next heartbeat is due, in seconds of wall time."""
+    """Time of the next heartbeat, in seconds of wall time."""
 
     def __init__(self, now: float, period: float) -> None:
         self.period, self.last, self.due = period, now, now
 
     def done(self, now: float, spared_until: float | None = None) -> None:
-        """A beat was sent, but to who is spared until then. Missed ones are not made up for."""
+        """Record that a heartbeat was sent, except to viewers that connected less than WELCOME_DELAY ago. They get
+        one at `spared_until`. Missed heartbeats are not repeated."""
         self.last = now
         self.due += self.period
         if self.due < now:
@@ -127,12 +128,12 @@ class _Beat:
             self.due = min(self.due, spared_until)
 
     def newcomer(self, now: float) -> None:
-        """A viewer has connected, and gets a beat when it is not spared any more."""
+        """Schedule a heartbeat for a new viewer, WELCOME_DELAY after its connection."""
         self.due = min(self.due, now + WELCOME_DELAY)
 
 
 class _Viewers:
-    """The connections of a publisher, and when each was seen first, in seconds of wall time."""
+    """The connections of a publisher with their start, in seconds of wall time."""
 
     def __init__(self, publisher: rospy.Publisher) -> None:
         self.publisher = publisher
@@ -140,17 +141,17 @@ class _Viewers:
         self._lock = threading.Lock()
 
     def look(self, now: float) -> None:
-        """Whoever is there now."""
+        """Update the connections."""
         with self._lock:
             self._since = {c: self._since.get(c, now) for c in self.publisher.impl.connections}
 
     def spared_until(self, now: float) -> float | None:
-        """When the next one of those that are spared now will not be; None: nobody is."""
+        """Earliest time at which a new viewer may receive a heartbeat; None if no viewer is new."""
         self.look(now)
         return min((s + WELCOME_DELAY for s in self._since.values() if now < s + WELCOME_DELAY), default=None)
 
     def publish(self, message: Any, now: float) -> None:
-        """To all that are not spared."""
+        """Publish to all viewers that are connected for at least WELCOME_DELAY."""
         self.look(now)
         for connection in [c for c, since in self._since.items() if now >= since + WELCOME_DELAY]:
             topic = self.publisher.impl
@@ -162,7 +163,7 @@ class _Viewers:
 
 
 class _Newcomers(rospy.SubscribeListener):
-    """Tells the server when a viewer has connected."""
+    """Notifies the server when a viewer has connected."""
 
     def __init__(self, server: IntrospectionServer) -> None:
         super().__init__()
@@ -175,8 +176,8 @@ class _Newcomers(rospy.SubscribeListener):
 class IntrospectionServer:
     """Publishes structure and status of a machine and all containers in it, from one thread.
 
-    User data is shown as plain data; what is not plain shows as its repr. Neither viewers nor user
-    data can hold up or stop the machine.
+    User data is shown as plain data; other values are shown by their repr. Neither viewers nor user
+    data can block or stop the machine.
 
     Example::
 
@@ -201,7 +202,7 @@ class IntrospectionServer:
         self._init_sub: rospy.Subscriber | None = None
 
     def start(self) -> None:
-        """Begin to publish.
+        """Start publishing.
 
         Example: `server.start()` after `rospy.init_node`. A second start has no effect.
         """
@@ -223,7 +224,7 @@ class IntrospectionServer:
         self._thread.start()
 
     def stop(self) -> None:
-        """Send what is left, and leave no publisher, callback or thread behind.
+        """Send the waiting messages, then remove all publishers, callbacks and threads.
 
         Example: `server.stop()`.
         """
@@ -244,7 +245,7 @@ class IntrospectionServer:
         self._viewers = []
 
     def construct(self, server_name: str, state: smach.State, path: str) -> None:
-        """Watch `state` under `path`, and the containers in it. `start` calls it if nobody has.
+        """Watch `state` under `path`, and the containers in it. `start` calls it if it has not been called.
 
         Example: `server.construct("executive", machine, "/SM_ROOT")`.
         """
@@ -266,7 +267,7 @@ class IntrospectionServer:
         return True
 
     def clear(self) -> None:
-        """Watch nothing any more.
+        """Stop watching all containers.
 
         Example: `server.clear(); server.construct(name, other, "/SM_ROOT")`.
         """
@@ -310,7 +311,7 @@ class IntrospectionServer:
         return True
 
     def _welcome(self) -> None:
-        """Somebody has just subscribed: show everything when they are ready for it."""
+        """A viewer has connected: schedule a heartbeat for it."""
         with self._changed:
             now = time.monotonic()
             for viewers in self._viewers:
@@ -346,7 +347,7 @@ class IntrospectionServer:
             smach.logerr(f"introspection: {what} not published:\n{traceback.format_exc()}")
 
     def _on_init(self, msg: SmachContainerInitialStatusCmd) -> None:
-        """A command from outside: believe nothing in it."""
+        """Process a command from outside after checking all of its values."""
         for watched in self._watched:
             if watched.path != msg.path:
                 continue
@@ -367,8 +368,7 @@ class IntrospectionServer:
 
 
 class ContainerProxy:
-    """Shows one container, without the containers in it. `update_rate` (rospy.Duration): time
-    between two heartbeats.
+    """Shows one container, without the containers in it. `update_rate` (rospy.Duration): interval of heartbeats.
 
     Example::
 
@@ -390,9 +390,9 @@ class ContainerProxy:
         self._server._watch(container, path)
 
     def start(self) -> None:
-        """Begin to publish. Example: `proxy.start()`."""
+        """Start publishing. Example: `proxy.start()`."""
         self._server.start()
 
     def stop(self) -> None:
-        """End it, with nothing left behind. Example: `proxy.stop()`."""
+        """Stop publishing and remove everything. Example: `proxy.stop()`."""
         self._server.stop()

@@ -1,4 +1,4 @@
-"""Finds introspection servers, and sets initial states of their containers."""
+"""Finds introspection servers and sets initial states of their containers."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ INIT_TOPIC = "/smach/container_init"
 
 
 class IntrospectionClient:
-    """Finds introspection servers, and sets initial states of their containers.
+    """Finds introspection servers and sets initial states of their containers.
 
     Example::
 
@@ -47,11 +47,11 @@ class IntrospectionClient:
         initial_userdata: smach.UserData | None = None,
         timeout: Any = None,
     ) -> bool:
-        """Ask the container at `path` to begin with these states and this user data.
+        """Request the container at `path` to begin with these states and this user data.
 
-        With a `timeout` (rospy.Duration or seconds) the command is repeated every 0.3 s until a
-        status of the container shows it: True; else False. Without one it is sent once a server is
-        connected, for which 2 s are allowed: True if it was sent. Example: see the class.
+        With a `timeout` (rospy.Duration or seconds) the command is repeated every 0.3 s until a status of
+        the container confirms it (True) or the time has passed (False). Without a `timeout` it is sent once
+        when a server is connected; True if one connects within 2 s. Example: see the class.
         """
         data = initial_userdata._data if initial_userdata is not None else {}
         wanted = to_plain(dict(data))
@@ -72,8 +72,8 @@ class IntrospectionClient:
             wait = float(timeout.to_sec()) if hasattr(timeout, "to_sec") else float(timeout)
             deadline = time.monotonic() + wait
             while time.monotonic() < deadline and not rospy.is_shutdown():
-                # Only a status after a command counts: the container may have begun there anyway,
-                # with other data.
+                # Only a status after a command confirms it: the container may have had these initial states
+                # before, with other data.
                 if publisher.get_num_connections() > 0:
                     publisher.publish(command)
                 if shown.wait(min(0.3, max(0.0, deadline - time.monotonic()))):
@@ -105,7 +105,7 @@ def _shows(local_data: str, wanted: dict) -> bool:
 
 
 def drain(topic: Any) -> None:
-    """Let a publisher's connections send what they hold, for at most half a second."""
+    """Wait until a publisher's connections have sent their queues, at most 0.5 s."""
     limit = time.monotonic() + 0.5
     waiting = True
     while waiting and time.monotonic() < limit:

@@ -16,8 +16,8 @@ from smach_ros.util import POLL, callback_userdata, register_callback
 class MonitorState(smach.State):
     """Outcomes valid, invalid and preempted.
 
-    `cond_cb(ud, msg)` is asked about each message: false, or an error, ends with invalid; after
-    `max_checks` times true it ends with valid; -1: only false ends it. At shutdown it ends with
+    `cond_cb(ud, msg)` is called for each message. If it returns false or raises, the outcome is invalid.
+    After `max_checks` true results the outcome is valid (-1: no limit). At shutdown the outcome is
     preempted.
 
     Example::
@@ -41,14 +41,14 @@ class MonitorState(smach.State):
         self._wake = threading.Event()
 
     def request_preempt(self) -> None:
-        """End early. Example: `state.request_preempt()`."""
+        """Request the state to end early. Example: `state.request_preempt()`."""
         super().request_preempt()
         self._wake.set()
 
     def execute(self, ud: Any) -> str:
-        """Watch until the condition decides.
+        """Watch the topic until the condition determines the outcome.
 
-        Example: by a state machine, or `state.execute(smach.UserData())`.
+        Example: called by a state machine, or `state.execute(smach.UserData())`.
         """
         self._drop_spent_preempt()
         run = _Watch(self, ud)
@@ -69,7 +69,7 @@ class MonitorState(smach.State):
 
 
 class _Watch:
-    """One execution of a MonitorState: counts, and the outcome once it is known."""
+    """One execution of a MonitorState: counts the results and stores the outcome."""
 
     def __init__(self, state: MonitorState, ud: Any) -> None:
         self.outcome: str | None = None

@@ -1,8 +1,8 @@
-"""User data on the wire: base64 text of a pickled dict, which existing viewers expect.
+"""User data as a message field: base64 text of a pickled dict, the format that existing viewers expect.
 
-Pickle can carry code. So only plain data is ever written (None, bool, int, float, str, bytes, list,
-tuple, dict; all else as its repr), and text is read by a decoder that can build nothing but these.
-It is the only use of pickle here.
+Pickle can contain code. So only plain data is written (None, bool, int, float, str, bytes, list, tuple,
+dict; everything else as its repr), and text is read by a decoder that can only construct these types.
+Pickle is used nowhere else here.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ import pickletools
 from collections.abc import Mapping
 from typing import Any
 
-MAX_TEXT = 1 << 20  # characters of local_data that are looked at
+MAX_TEXT = 1 << 20  # characters of local_data that are read
 MAX_STEPS = 20_000  # opcodes of one pickle
-MAX_NODES = 20_000  # values inside of one dict, shared ones counted each time
-MAX_DEPTH = 64  # of nesting
+MAX_NODES = 20_000  # values in one dict; shared values count each time
+MAX_DEPTH = 64  # levels of nesting
 MAX_REPR = 2_000  # characters of a repr
 MAX_STRING = 100_000  # characters of a string, bytes of a byte string
 
-# Opcodes that build plain values. Everything that names, calls or restores anything is missing.
+# Opcodes that construct plain values. All opcodes that name, call or restore objects are missing.
 _ALLOWED = frozenset(
     """
     PROTO FRAME STOP MARK POP POP_MARK DUP MEMOIZE PUT BINPUT LONG_BINPUT GET BINGET LONG_BINGET
@@ -36,17 +36,17 @@ _LEAVES = (type(None), bool, int, float, str, bytes)
 
 
 class InvalidDataError(ValueError):
-    """Text that is no plain dict in the form the wire needs.
+    """Text that is not a plain dict in the expected format.
 
     Example: `decode("hello")` raises it.
     """
 
 
 def encode(data: Mapping[Any, Any]) -> str:
-    """The text for `local_data`. Never raises for the sake of a value: what is not plain shows as
-    its repr.
+    """The text for `local_data`. A value never causes an exception: values that are not plain are written as
+    their repr.
 
-    Protocol 2, for old viewers; 3 if there are byte strings, which protocol 2 can only write as a
+    Protocol 2, for old viewers; protocol 3 if there are byte strings, which protocol 2 can only write as a
     function call. Example: `status.local_data = encode({"count": 3})`.
     """
     plain = to_plain(dict(data))
@@ -55,8 +55,7 @@ def encode(data: Mapping[Any, Any]) -> str:
 
 
 def decode(text: str) -> dict[str, Any]:
-    """The dict in `local_data`; empty text is the empty dict. Raises InvalidDataError, and runs no
-    code ever.
+    """The dict in `local_data`; {} for empty text. Raises InvalidDataError. Never executes code.
 
     Example: `decode(encode({"count": 3})) == {"count": 3}`.
     """
@@ -80,7 +79,7 @@ def decode(text: str) -> dict[str, Any]:
 
 
 class _PlainUnpickler(pickle.Unpickler):
-    """An unpickler that knows no class and no function."""
+    """An unpickler without classes and functions."""
 
     def find_class(self, module_name: str, global_name: str) -> Any:
         raise pickle.UnpicklingError(f"{module_name}.{global_name} is refused: only plain data is read")
@@ -90,9 +89,7 @@ class _PlainUnpickler(pickle.Unpickler):
 
 
 def _check_opcodes(raw: bytes) -> None:
-    """Refuse before anything is built; also memo indices that would make the unpickler reserve
-    gigabytes.
-    """
+    """Refuse bad opcodes before anything is built, and memo indices that would make the unpickler reserve gigabytes."""
     try:
         for step, (opcode, argument, _position) in enumerate(pickletools.genops(raw)):
             if opcode.name not in _ALLOWED:
@@ -108,9 +105,7 @@ def _check_opcodes(raw: bytes) -> None:
 
 
 def _check_values(data: Any) -> None:
-    """Refuse other types, cycles and depth; shared parts count each time, so that nothing explodes
-    later.
-    """
+    """Refuse other types, cycles and deep nesting. Shared values count each time, so that the data stays small."""
     nodes = 0
     todo: list[tuple[Any, int]] = [(data, 0)]
     while todo:
@@ -127,8 +122,7 @@ def _check_values(data: Any) -> None:
 
 
 def to_plain(value: Any) -> Any:
-    """A copy of `value` in plain types; what is not plain, too large or too deep is replaced by its
-    repr.
+    """A plain copy of `value`. Parts that are not plain, too large or too deep are replaced by their repr.
 
     Example: `to_plain({"lock": threading.Lock()})` is `{"lock": "<unlocked ...>"}`.
     """
@@ -151,13 +145,13 @@ def _to_plain(value: Any, depth: int, nodes: list[int]) -> Any:
         if not isinstance(value, (list, tuple, dict)):
             return _repr(value)
         if depth >= MAX_DEPTH // 2 or nodes[0] + len(value) > MAX_NODES // 4:
-            # Not its repr, which may be longer than any memory: parts can be shared many times.
+            # Not the repr, which may exceed the memory: parts can be shared many times.
             return f"<{type(value).__name__} of {len(value)} items, too large or too deep to show>"
         if isinstance(value, dict):
             return {_to_key(key, depth, nodes): _to_plain(item, depth + 1, nodes) for key, item in list(value.items())}
         items = [_to_plain(item, depth + 1, nodes) for item in list(value)]
         return items if isinstance(value, list) else tuple(items)
-    except Exception:  # a property or conversion of the value itself
+    except Exception:  # raised by a property or conversion of the value
         return _repr(value)
 
 

@@ -14,21 +14,21 @@ import smach
 
 from smach_ros.util import POLL, callback_userdata, check_slots, register_callback, service_answers
 
-#: How often (s) the master is asked for a service that is not there yet.
+#: Interval (s) at which the master is queried for a service that does not exist yet.
 SERVICE_POLL = 0.2
 
 
 class ServiceState(smach.State):
-    """Outcomes succeeded, aborted and preempted, and those a `response_cb` returns.
+    """Outcomes succeeded, aborted and preempted, and the outcomes that `response_cb` returns.
 
-    The request is made of `request` (copied each time), then user data `request_key` (a whole
-    request), `request_slots` (user data keys named like its fields), then `request_cb(ud, request,
-    *args, **kwargs)`, whose return value replaces it if not None. `response_cb(ud, response, *args,
-    **kwargs)` may return an outcome; then user data `response_key` and `response_slots` are
+    The request is built in this order: `request` (copied each time), user data `request_key` (a whole
+    request), `request_slots` (user data keys with the names of its fields), `request_cb(ud, request,
+    *args, **kwargs)`, whose return value replaces it unless None. `response_cb(ud, response, *args,
+    **kwargs)` may return an outcome. Then user data `response_key` and `response_slots` are
     written.
 
-    It waits for the service until preempted or shut down. A call under way cannot be taken back; at
-    shutdown it is abandoned.
+    The state waits for the service until it is preempted or rospy shuts down. A running call cannot be
+    cancelled; at shutdown it is abandoned.
 
     Example::
 
@@ -74,7 +74,7 @@ class ServiceState(smach.State):
         self._response_cb_kwargs = dict(response_cb_kwargs or {})
 
     def execute(self, ud: Any) -> str:
-        """Call the service. Example: by a state machine, or `state.execute(smach.UserData())`."""
+        """Call the service. Called by a state machine. Example: `state.execute(smach.UserData())`."""
         self._drop_spent_preempt()
         try:
             return self._execute(ud)
@@ -103,7 +103,7 @@ class ServiceState(smach.State):
             return "aborted"
 
     def _await_service(self) -> str | None:
-        """None when the service is there, else the outcome."""
+        """None when the service exists, otherwise the outcome."""
         said = False
         while not service_answers(self._service_name):
             if self.preempt_requested():
@@ -135,7 +135,7 @@ class ServiceState(smach.State):
         return request
 
     def _call_service(self, request: Any) -> Any:
-        """The response, or None if the call failed or rospy shut down meanwhile."""
+        """The response, or None if the call failed or rospy shut down."""
         answer: list[Any] = []
         done = threading.Event()
 
@@ -146,8 +146,7 @@ class ServiceState(smach.State):
                 answer.append(error)
             done.set()
 
-        # A call blocks until the server answers; in a thread of its own it cannot keep us from
-        # shutting down.
+        # A call blocks until the server answers. In a separate thread it cannot prevent the shutdown.
         threading.Thread(target=call, name=f"service_call:{self._service_name}", daemon=True).start()
         while not done.wait(POLL):
             if rospy.is_shutdown():

@@ -1,4 +1,4 @@
-"""A state that sends a goal to an action server and waits for its end."""
+"""A state that sends a goal to an action server and waits for its result."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ _STATUS_NAMES = {value: name for name, value in vars(GoalStatus).items() if name
 
 
 class SimpleActionState(smach.State):
-    """Outcomes succeeded, aborted and preempted, and those a `result_cb` returns.
+    """Outcomes succeeded, aborted and preempted, and the outcomes that `result_cb` returns.
 
-    The goal is made of `goal` (copied each time), then user data `goal_key` (a whole goal),
-    `goal_slots` (user data keys named like fields of the goal), then `goal_cb(ud, goal,
-    *goal_cb_args, **goal_cb_kwargs)`, whose return value replaces it if not None. Of the result,
-    `result_cb(ud, status, result, *result_cb_args, **result_cb_kwargs)` may return an outcome; then
-    user data `result_key` and `result_slots` are written.
+    The goal is built in this order: `goal` (copied each time), user data `goal_key` (a whole goal),
+    `goal_slots` (user data keys with the names of its fields), `goal_cb(ud, goal, *goal_cb_args,
+    **goal_cb_kwargs)`, whose return value replaces it unless None. `result_cb(ud, status, result,
+    *result_cb_args, **result_cb_kwargs)` may return an outcome. Then user data `result_key` and
+    `result_slots` are written.
 
-    It ends as aborted when the server is not there within `server_wait_timeout`, when the
-    connection to it is lost, when `exec_timeout` is over (the goal is cancelled), when a cancelled
-    goal has not ended within `preempt_timeout`, and at shutdown. Times are rospy.Duration or
-    seconds; None or 0: no limit. A request to end early cancels the goal.
+    The outcome is aborted if the server does not appear within `server_wait_timeout`, if the connection
+    to it is lost, after `exec_timeout` (the goal is cancelled), if a cancelled goal does not end within
+    `preempt_timeout`, and at shutdown. Times are rospy.Duration or seconds; None or 0: no limit. A
+    preempt request cancels the goal.
 
     Example::
 
@@ -42,18 +42,18 @@ class SimpleActionState(smach.State):
         StateMachine.add("CLOSE", close, transitions={"succeeded": "LIFT"})
     """
 
-    # What the state is about, in the attribute `status`.
+    # Values of the attribute `status`.
     WAITING_FOR_SERVER = 0
     INACTIVE = 1
     ACTIVE = 2
     PREEMPTING = 3
     COMPLETED = 4
 
-    #: How long (s) the connection to the server may be down while a goal is under way.
+    #: Seconds without a connection to the server, during a goal, after which the server counts as lost.
     LOST_AFTER = 1.0
 
-    #: How long (s) a cancel waits for the goal's acknowledgement. A client that cancels earlier
-    #: takes a status sent meanwhile, in which the goal is not listed yet, as its loss.
+    #: Seconds that a cancel waits for the acknowledgement of the goal. If a client cancels earlier, a status
+    #: that does not list the goal yet makes it count the goal as lost.
     ACKNOWLEDGED_WITHIN = 1.0
 
     def __init__(
@@ -109,11 +109,11 @@ class SimpleActionState(smach.State):
         self._server_wait_timeout = server_wait_timeout
         self._wake = threading.Event()
         self.status = self.WAITING_FOR_SERVER
-        # Connects in the background from now on, so that the first execution need not wait long.
+        # Connects in the background, so that the first execution need not wait long.
         self._action_client = ActionClient(action_name, action_spec)
 
     def request_preempt(self) -> None:
-        """Cancel the goal, if one is under way, and end early.
+        """Cancel the running goal, if there is one, and request the state to end early.
 
         Example: `state.request_preempt()`.
         """
@@ -121,9 +121,9 @@ class SimpleActionState(smach.State):
         self._wake.set()
 
     def execute(self, ud: Any) -> str:
-        """Send the goal and wait for its end.
+        """Send the goal and wait for its result.
 
-        Example: by a state machine, or `state.execute(smach.UserData())`.
+        Example: called by a state machine, or `state.execute(smach.UserData())`.
         """
         self._drop_spent_preempt()
         try:
@@ -148,7 +148,7 @@ class SimpleActionState(smach.State):
         self.status = self.ACTIVE
         try:
             handle = self._action_client.send_goal(goal, lambda _handle: self._wake.set())
-        except Exception as error:  # what rospy raises for fields of a wrong type, or when shut down
+        except Exception as error:  # raised by rospy for fields of a wrong type, or at shutdown
             smach.logerr(f"goal of action '{self._action_name}' could not be sent: {error}")
             return "aborted"
         if not self._await_end(handle):
@@ -173,7 +173,7 @@ class SimpleActionState(smach.State):
         self._wake.clear()
 
     def _await_server(self) -> str | None:
-        """None when the server is there, else the outcome."""
+        """None when the server is connected, otherwise the outcome."""
         limit = TimeLimit(self._server_wait_timeout)
         while not self._server_is_there():
             if self.preempt_requested():
@@ -211,7 +211,7 @@ class SimpleActionState(smach.State):
         return goal
 
     def _await_end(self, handle: ClientGoalHandle) -> bool:
-        """Whether the goal has come to an end that its server has told us."""
+        """True if the server has reported the end of the goal."""
         name = f"action '{self._action_name}'"
         exec_limit, cancel_limit = TimeLimit(self._exec_timeout), None
         sent_at = time.monotonic()

@@ -1,6 +1,4 @@
-"""Small things the ROS states share: time limits, callbacks' user data, and the handler for
-shutdown.
-"""
+"""Common helpers of the ROS states: time limits, user data of callbacks, and the shutdown handler."""
 
 from __future__ import annotations
 
@@ -14,14 +12,14 @@ import rosgraph
 import rospy
 import smach
 
-#: How often (s) waits look at shutdown, connections and time limits. Requests wake them at once.
+#: Interval (s) at which waiting states check shutdown, connections and time limits. Requests wake them at once.
 POLL = 0.05
-#: A ROS clock that has not moved for this long (s) is taken as dead: the steady clock counts.
+#: Seconds without a change after which a ROS clock counts as stopped; then the steady clock is used.
 CLOCK_SILENCE = 1.0
 
 
 def seconds(duration: Any) -> float | None:
-    """A duration given as rospy.Duration, number or None, in seconds.
+    """Seconds of a duration given as rospy.Duration, number or None.
 
     Example: `seconds(rospy.Duration(2))`.
     """
@@ -31,9 +29,9 @@ def seconds(duration: Any) -> float | None:
 
 
 class TimeLimit:
-    """A limit by the steady clock; with simulated time, by `/clock` while that runs.
+    """A time limit by the steady clock; with simulated time, by `/clock` while it runs.
 
-    Steps of the wall clock, and of `/clock` backwards or at its first message, count nothing.
+    Steps of the wall clock do not count, nor does a step of `/clock` backwards or at its first message.
     `limit`: rospy.Duration or seconds; None or 0: no limit.
 
     Example::
@@ -49,7 +47,7 @@ class TimeLimit:
         self._ros, self._moved = _simulated_time(), time.monotonic()
 
     def expired(self) -> bool:
-        """Whether the limit is over; to be asked regularly. Example: `if limit.expired(): ...`."""
+        """True if the limit has passed. Call it regularly. Example: `if limit.expired(): ...`."""
         if self.limit <= 0.0:
             return False
         ros, steady = _simulated_time(), time.monotonic()
@@ -61,14 +59,14 @@ class TimeLimit:
 
 
 def _simulated_time() -> float:
-    """The time on `/clock`, s; 0 before its first message, and without simulated time."""
+    """Time of `/clock` (s); 0 before its first message and without simulated time."""
     return 0.0 if rospy.rostime.is_wallclock() else float(rospy.get_time())
 
 
 def service_answers(name: str) -> bool:
-    """Whether a service is registered and its node takes connections.
+    """True if a service is registered and its node accepts connections.
 
-    rospy.wait_for_service measures its time-out by the wall clock, which may step.
+    rospy.wait_for_service is not used: it measures its time-out by the wall clock, which may step.
     """
     caller, name = rospy.get_name(), rospy.resolve_name(name)
     try:
@@ -77,12 +75,12 @@ def service_answers(name: str) -> bool:
             header = {"probe": "1", "md5sum": "*", "callerid": caller, "service": name}
             rosgraph.network.write_ros_handshake_header(link, header)
         return True
-    except Exception:  # of the socket, of XML-RPC, or of the master that does not know it
+    except Exception:  # of the socket, of XML-RPC, or of a master without this service
         return False
 
 
 def callback_userdata(ud: Any, cb: Callable | None, state: smach.State) -> smach.Remapper:
-    """What a callback of a state sees: the keys it declares itself, else those of the state.
+    """User data for a callback of a state: with the keys that the callback declares, otherwise those of the state.
 
     Example: `goal_cb(callback_userdata(ud, goal_cb, self), goal)`.
     """
@@ -91,10 +89,9 @@ def callback_userdata(ud: Any, cb: Callable | None, state: smach.State) -> smach
 
 
 def register_callback(state: smach.State, what: str, cb: Callable | None) -> None:
-    """Check a callback and take over the outcomes and keys it declares.
+    """Check a callback and add the outcomes and keys that it declares to the state.
 
-    Raises InvalidStateError if it cannot be called. Example: `register_callback(self, "goal_cb",
-    goal_cb)`.
+    Raises InvalidStateError if it is not callable. Example: `register_callback(self, "goal_cb", goal_cb)`.
     """
     if cb is None:
         return
@@ -121,7 +118,7 @@ def check_slots(state: smach.State, what: str, slots: Any, message_class: Any) -
 
 
 def set_preempt_handler(container: smach.Container) -> None:
-    """At shutdown of rospy ask `container` to end, and wait for it (at most 60 s).
+    """At the shutdown of rospy, request `container` to end and wait for it, at most 60 s.
 
     Example: `smach_ros.set_preempt_handler(machine)` before `machine.execute()`.
     """
@@ -132,7 +129,7 @@ def set_preempt_handler(container: smach.Container) -> None:
         next_log = 1.0
         while container.is_running():
             if container._run_thread == threading.get_ident():
-                return  # we have interrupted the very thread that runs it: let it go on
+                return  # the handler interrupted the thread that runs the container: let it continue
             waited = time.monotonic() - started
             if waited > 60.0:
                 rospy.logerr("the state machine has not ended within 60 s of shutdown; giving up")

@@ -1,4 +1,4 @@
-"""Faults on demand: what can be wrong on the line and in the hand, as one-line commands."""
+"""Faults of the line and the hand, switched on by one-line commands."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ clear           undo every fault (and replug)"""
 
 @dataclass
 class Faults:
-    """State of the line faults; the motor faults live in the motors."""
+    """State of the line faults. The motor faults are stored in the motors."""
 
     hand: EmulatedHand
     seed: int = 1
@@ -45,7 +45,7 @@ class Faults:
         self._random = random.Random(self.seed)
 
     def command(self, text: str) -> str:
-        """Carry out one command of HELP; what was done, in words. ValueError lists them."""
+        """Execute one command of HELP and return a text that describes it. A ValueError lists the commands."""
         words = text.split()
         try:
             return self._run(words[0], words[1:])
@@ -98,13 +98,13 @@ class Faults:
         return "no faults"
 
     def incoming(self, data: bytes) -> bytes:
-        """Host bytes that arrive."""
+        """Bytes from the host that arrive at the hand."""
         lost = min(self.lose_in, len(data))
         self.lose_in -= lost
         return data[lost:]
 
     def outgoing(self, answer: bytes) -> bytes:
-        """Answer bytes that leave."""
+        """Bytes of an answer that leave the hand."""
         if self.mute:
             return b""
         if answer and self.double:

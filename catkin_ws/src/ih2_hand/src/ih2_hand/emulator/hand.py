@@ -1,4 +1,4 @@
-"""The simulated hand: executes frames on five motors and answers as the firmware does."""
+"""The simulated hand: executes frames with five motors and answers like the firmware."""
 
 from __future__ import annotations
 
@@ -13,25 +13,20 @@ from ih2_hand.emulator.parser import FrameParser
 from ih2_hand.emulator.physical_motor import MotorState, PhysicalMotor
 from ih2_hand.wire_choices import WIRE
 
-STIFFEST = 1e6
-"""Counts of current per count of position, of what a finger meets: no object is stiffer."""
+STIFFEST = 1e6  # counts of current per count of position, upper bound of an object's stiffness
+STEP_S = 0.002  # s, longest integration step
 
-STEP_S = 0.002
-"""Longest integration step."""
-
+# Closing current and tension of the automatic grasps in counts. The values are guesses: those of the factory are not
+# public.
 GRASP_CURRENT = {"low": 120, "medium": 240, "high": 420}
-"""Closing current of the automatic grasps, counts; guesses, the factory values are not public."""
-
 GRASP_TENSION = {"low": 100, "medium": 200, "high": 350}
-"""Closing tension of the automatic grasps, counts."""
 
-V17_CURRENT_PER_GF = 2
-"""Closing current for each unit of GF."""
+V17_CURRENT_PER_GF = 2  # counts of closing current per unit of GF
 
 
 @dataclass
 class HandCounters:
-    """What the hand noticed about its host."""
+    """Events that the hand counted."""
 
     requests: int = 0
     wrong_motor: int = 0
@@ -39,19 +34,18 @@ class HandCounters:
     discarded: int = 0
     """Bytes that arrived during a calibration."""
     too_fast: int = 0
-    """Frames that came before the last posture was executed, and were lost."""
+    """Frames that arrived before the last posture was executed, and were lost."""
 
 
 class EmulatedHand:
-    """Five motors, one parser, one clock. Not thread-safe: the caller serialises.
+    """Five motors, one parser, one clock. Not thread-safe: the caller must use a lock.
 
-    `calibration_scale` multiplies the calibration times of W12 (0 ends them at once; above 1.2 the
-    fast one outlasts the 2.0 s that published drivers wait), `greeting` starts
-    calibrated as the EH1 does, `dialect` is `both`, `legacy` or `v17` (strict), `strict_force`
-    leaves a force read of motor 0 unanswered (W6), `enforce_spacing` loses commands that come
-    before a posture is executed (for virtual time: a pty does not tell when bytes arrived).
-    `physical`: the motors are turned by the physics of the cell, see `follow` and `orders`;
-    otherwise by the emulator itself, against the contacts of `set_contacts`.
+    `calibration_scale` multiplies the calibration times of W12. 0 ends calibrations at once; above 1.2 the
+    fast calibration lasts longer than the 2.0 s that published drivers wait. `greeting` starts calibrated, as
+    the EH1 does. `dialect` is `both`, `legacy` or `v17` (strict). `strict_force` leaves a force read of motor 0
+    unanswered (W6). `enforce_spacing` loses commands that arrive before a posture is executed (only in virtual
+    time: a pty has no arrival times). With `physical` the simulated cell moves the motors, see `follow` and
+    `orders`; otherwise the emulator moves them, against the contacts of `set_contacts`.
     """
 
     def __init__(
@@ -89,15 +83,15 @@ class EmulatedHand:
         self._after_preshape: list[tuple[int, str, int]] = []
         self._now = self.clock.monotonic()
 
-    # -- what the cell sees ----------------------------------------------------------------------
+    # -- interface to the cell -------------------------------------------------------------------
 
     @property
     def calibrating(self) -> bool:
-        """Whether a calibration runs."""
+        """True while a calibration runs."""
         return self._calibration_end is not None
 
     def set_contacts(self, positions: Sequence[float], stiffness: Sequence[float]) -> None:
-        """Where the object is for each motor: contact position 0..254 (255 free) and stiffness."""
+        """Set the object for each motor: contact position 0..254 (255: no object) and stiffness (counts per count)."""
         if len(positions) != WIRE.motors or len(stiffness) != WIRE.motors:
             raise ValueError(
                 f"contact needs {WIRE.motors} positions and stiffnesses; got {len(positions)} and {len(stiffness)}"
@@ -111,7 +105,7 @@ class EmulatedHand:
             motor.contact = Contact(float(position), float(stiff))
 
     def follow(self, states: Sequence[MotorState]) -> None:
-        """What the physics says of the five motors; ValueError for other numbers than it can say."""
+        """Take the simulated states of the five motors. Raises ValueError for impossible values."""
         physical = self._physical_motors
         if len(states) != len(physical) or not physical:
             raise ValueError(f"states of {WIRE.motors} motors turned by the physics are expected; got {len(states)}")
@@ -121,16 +115,16 @@ class EmulatedHand:
             motor.follow(state)
 
     def orders(self) -> list[tuple[float, float, float]]:
-        """What the physics is to do with each motor: share of the full speed, share of the stroke
-        to go to, counts of current at which to stop."""
-        if self.calibrating:  # all open, at full speed
+        """Commands to the simulation for each motor: share of the full speed, target as share of the stroke, and
+        counts of current at which it stops."""
+        if self.calibrating:  # all motors open at full speed
             return [(1.0, 0.0, 0.0)] * WIRE.motors
         return [motor.order() for motor in self._physical_motors]
 
     # -- time ------------------------------------------------------------------------------------
 
     def advance(self) -> None:
-        """Bring motors and calibration up to the clock."""
+        """Advance motors and calibration to the current time."""
         now = self.clock.monotonic()
         if self._calibration_end is not None and now >= self._calibration_end:
             self._end_calibration()
@@ -176,7 +170,7 @@ class EmulatedHand:
     # -- bytes -----------------------------------------------------------------------------------
 
     def receive(self, data: bytes) -> list[tuple[bytes, bytes]]:
-        """Take bytes from the host; the frames executed, each with its answer (may be empty).
+        """Process bytes from the host. Returns the executed frames, each with its answer (may be empty).
 
         Bytes that arrive during a calibration are discarded (W11).
         """
@@ -260,7 +254,7 @@ class EmulatedHand:
             motor.drive((frame[0] & 1) << 8 | frame[1], (frame[0] >> 6 & 1) == WIRE.close_direction)
 
     def _position_command(self, frame: bytes) -> None:
-        """Commands that need a calibrated hand (W14)."""
+        """Execute a command that needs a calibrated hand (W14)."""
         first = frame[0]
         if first == frames.SET_TENSION:
             motor = self._motor(frame[1])

@@ -8,15 +8,14 @@ from ih2_hand import frames
 from ih2_hand.emulator.motor import Motor
 from ih2_hand.wire_choices import WIRE
 
-RAW_PER_COUNT = 400
-"""Raw encoder counts for each position count; the real figure is unknown, 17 bits are promised."""
+RAW_PER_COUNT = 400  # raw encoder counts per position count; the real value is unknown, 17 bits are specified
 
 _STORES = {0x24: 0x25, 0x44: 0x45, 0x64: 0x65, 0x72: 0x76, 0x73: 0x77}
-"""Store command -> the command that reads the stored value back."""
+"""Store command -> command that reads the stored value."""
 
 
 class LowLevel:
-    """Executes low-level frames on the motors and keeps what they store."""
+    """Executes low-level frames on the motors and stores their values."""
 
     def __init__(self, motors: Sequence[Motor]):
         self._stored = {
@@ -32,7 +31,7 @@ class LowLevel:
         self._raw_zero = {motor.number: 0.0 for motor in motors}
 
     def execute(self, motor: Motor, frame: bytes) -> bytes:
-        """Run one frame whose addresses already match; its answer, empty for commands."""
+        """Execute one frame whose addresses match. Returns its answer, which is empty for commands."""
         command, data = frame[2], frame[3:-1]
         number = motor.number
         value = int.from_bytes(data, "big")

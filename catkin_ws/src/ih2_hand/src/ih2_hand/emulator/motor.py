@@ -1,7 +1,7 @@
 """One simulated motor of the hand: position, control modes, contact, current, STATUS byte.
 
 Plausible, not validated: real speeds and currents of the IH2 are not public. Positions are counts
-0..255, currents and tensions counts 0..1023, times seconds.
+0..255, currents and tensions are counts 0..1023, times are seconds.
 """
 
 from __future__ import annotations
@@ -11,38 +11,31 @@ from dataclasses import dataclass
 from ih2_hand.status import CLOSED_END, MODES, OPEN_END, OVER_CURRENT, REACHED
 from ih2_hand.wire_choices import WIRE
 
-FULL_SCALE = 255.0
-FREE_CURRENT = 40.0
-"""Counts that a motor draws when it moves slowly and freely; more with speed."""
-SPEED_CURRENT = 60.0
-"""Counts added at full speed."""
-STALL_CURRENT = 1000.0
-"""Counts at standstill under full PWM; in proportion to the speed setting."""
+FULL_SCALE = 255.0  # counts
+FREE_CURRENT = 40.0  # counts of current of a slow, free motion
+SPEED_CURRENT = 60.0  # counts added at full speed
+STALL_CURRENT = 1000.0  # counts at standstill under full PWM; proportional to the speed setting
+# Counts at standstill in position mode. Below the over-current limit, so a blocked posture keeps pushing.
 POSITION_STALL_CURRENT = 640.0
-"""Counts at standstill in position mode: below the trip: a blocked posture keeps pushing."""
+# Over-current limit in counts by motor: 0.41 A x 1230 for the abduction, 0.81 A x 901 for flexion.
 TRIP_COUNTS = (504.0, 730.0, 730.0, 730.0, 730.0)
-"""Over-current limit by motor: 0.41 A x 1230 for the abduction, 0.81 A x 901 for flexion."""
-TRIP_TIME_S = 1.0
-REACHED_HOLD_S = 0.2
-"""How long current/position mode reports D0 before the motor is switched off (10)."""
-TENSION_PER_CURRENT = 0.8
-"""Tendon tension counts for each count of contact current."""
-DEFAULT_STIFFNESS = 25.0
-"""Counts of current for each count of penetration, where none is given."""
-FREE = 255
-"""Contact position that means: nothing to meet."""
+TRIP_TIME_S = 1.0  # s
+REACHED_HOLD_S = 0.2  # s for which current/position mode reports D0 before the motor is switched off (10)
+TENSION_PER_CURRENT = 0.8  # counts of tendon tension per count of contact current
+DEFAULT_STIFFNESS = 25.0  # counts of current per count of penetration
+FREE = 255  # contact position that means: no object
 
 
 @dataclass
 class Contact:
-    """Where a finger meets the object: position (255: free) and stiffness (counts per count)."""
+    """Contact of a finger with an object: position (255: no object) and stiffness (counts per count)."""
 
     position: float = FREE
     stiffness: float = DEFAULT_STIFFNESS
 
 
 class Motor:
-    """State and motion of one motor; `advance` integrates it over a stretch of time."""
+    """State and motion of one motor. `advance` integrates the motion."""
 
     def __init__(self, number: int, position: float = 0.0):
         self.number = number
@@ -72,12 +65,12 @@ class Motor:
         self._moving = True
 
     def stop(self) -> None:
-        """Switch off; the finger keeps its place (W29)."""
+        """Switch the motor off. The finger keeps its place (W29)."""
         self.mode, self.reached, self._moving, self.current = "stop", False, False, 0.0
         self.over_current = False
 
     def drive(self, speed: int, close: bool) -> None:
-        """PWM `speed` 0..511 in one direction; 0 stops the motor."""
+        """Drive with PWM `speed` 0..511 in one direction; 0 stops the motor."""
         if speed == 0:
             self.stop()
             return
@@ -85,18 +78,18 @@ class Motor:
         self._begin("speed")
 
     def go_to(self, target: int) -> None:
-        """Position control to 0..255."""
+        """Start position control to `target` 0..255."""
         self.target, self.speed = float(target), WIRE.position_speed
         self._begin("position")
         self._settle_position()
 
     def pull(self, tension: int) -> None:
-        """Tension control to 0..1023."""
+        """Start tension control to `tension` 0..1023."""
         self.goal_effort, self.speed = float(tension), WIRE.position_speed
         self._begin("tension")
 
     def close_to_current(self, current: int, stop_after: bool) -> None:
-        """Close until `current` 0..1023; `stop_after` is current/position mode."""
+        """Close until `current` 0..1023. `stop_after` selects current/position mode."""
         self.goal_effort, self.speed = float(current), WIRE.position_speed
         self._begin("current_position" if stop_after else "current")
 
@@ -104,22 +97,22 @@ class Motor:
 
     @property
     def penetration(self) -> float:
-        """Counts by which the finger is pressed into the object."""
+        """Counts by which the finger presses into the object."""
         return max(0.0, self.position - self.contact.position)
 
     @property
     def effort(self) -> float:
-        """Contact effort as counts of motor current; it stays when the motor is switched off."""
+        """Contact effort as counts of motor current. It remains when the motor is switched off."""
         return self.penetration * self.contact.stiffness
 
     @property
     def tension(self) -> int:
-        """Tendon tension, counts 0..1023."""
+        """Tendon tension, 0..1023 counts."""
         return min(1023, int(self.effort * TENSION_PER_CURRENT))
 
     @property
     def position_byte(self) -> int:
-        """Position as read back, with the end faults seen on real hands (W16)."""
+        """Position as the hand sends it, with the errors at the ends that real hands have (W16)."""
         if self.wrapped:
             return 0
         return max(0, min(255, round(self.position)))
@@ -137,7 +130,7 @@ class Motor:
     # -- motion ----------------------------------------------------------------------------------
 
     def advance(self, dt: float) -> None:
-        """Let `dt` (s) pass; small steps follow contact and trip times closely."""
+        """Advance by `dt` (s). Small steps resolve contact and over-current times."""
         if self.mode == "stop":
             return
         before = self.position
@@ -153,14 +146,14 @@ class Motor:
         self._end_current_position(dt)
 
     def _end_current_position(self, dt: float) -> None:
-        """Current/position mode switches the motor off a while after its goal."""
+        """In current/position mode, switch the motor off REACHED_HOLD_S after it reached its goal."""
         if self.mode == "current_position" and self.reached:
             self._reached_s += dt
             if self._reached_s >= REACHED_HOLD_S:
                 self.mode, self.current, self._moving = "stop", 0.0, False
 
     def _move(self, step: float, limit_effort: float) -> None:
-        """Move by `step` counts, no farther into the object than `limit_effort` allows."""
+        """Move by `step` counts, but only until `limit_effort` presses the finger into the object."""
         if self.stuck:
             return
         position = self.position + step
@@ -178,8 +171,8 @@ class Motor:
 
     @property
     def aim(self) -> float:
-        """Where position control goes; not the exact target with the fault "short": real hands
-        stop up to 4 counts before it."""
+        """Position at which position control ends. The fault "short" moves it: real hands stop up to 4 counts
+        before the target."""
         target = self.target + (self.short_by if self.target < self.position else -self.short_by)
         return max(0.0, min(FULL_SCALE, target))
 

@@ -1,4 +1,4 @@
-"""Cuts the bytes that arrive at the hand into frames, as its firmware does: no time limit."""
+"""Divides the bytes that arrive at the hand into frames, without a time limit, like the firmware."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 from ih2_hand import frames
 
 DIALECTS = {"both": ("legacy", "v17"), "legacy": ("legacy",), "v17": ("v17",)}
-"""Grasp dialects that each setting accepts."""
+"""Grasp dialects accepted with each setting."""
 
 
 @dataclass
 class ParserCounters:
-    """What the parser saw."""
+    """Frames and errors that the parser counted."""
 
     frames: int = 0
     unknown: int = 0
@@ -21,10 +21,10 @@ class ParserCounters:
 
 @dataclass
 class FrameParser:
-    """Collects bytes and gives back complete frames that are to be executed.
+    """Collects bytes and returns complete frames for execution.
 
-    An unknown first byte is dropped alone (W9); a frame with a wrong closing byte is dropped whole
-    (W8); an incomplete one is waited for without limit (W10).
+    An unknown first byte is dropped alone (W9). A frame with a wrong closing byte is dropped as a whole
+    (W8). An incomplete frame is waited for without a time limit (W10).
     """
 
     dialect: str = "both"
@@ -37,15 +37,15 @@ class FrameParser:
 
     @property
     def waiting(self) -> bytes:
-        """Bytes of a frame that is not complete."""
+        """Bytes of an incomplete frame."""
         return bytes(self._waiting)
 
     def clear(self) -> None:
-        """Forget an incomplete frame (power cycle)."""
+        """Discard an incomplete frame (power cycle)."""
         self._waiting.clear()
 
     def feed(self, byte: int) -> bytes | None:
-        """Take one byte; the frame to execute if it completes one, else None."""
+        """Process one byte. Returns the frame to execute if the byte completes one, else None."""
         waiting = self._waiting
         waiting.append(byte)
         dialects = DIALECTS[self.dialect]

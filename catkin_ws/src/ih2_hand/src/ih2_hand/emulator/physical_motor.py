@@ -1,5 +1,5 @@
-"""A motor of the simulated hand whose motion is computed elsewhere: the physics of the cell turns it, winds its tendon
-and stops at contact; what the electronics make of that stays here."""
+"""A motor of the simulated hand in the simulated cell. The simulation moves it, winds its tendon and stops it at
+contact. The electronics are simulated here."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from typing import NamedTuple
 from ih2_hand.emulator.motor import FREE_CURRENT, FULL_SCALE, POSITION_STALL_CURRENT, STALL_CURRENT, Motor
 from ih2_hand.wire_choices import WIRE
 
-END_SHARE = 0.001
-"""Share of the stroke within which an end sensor sees the end."""
+END_SHARE = 0.001  # share of the stroke within which an end sensor detects the end
 
 
 class MotorState(NamedTuple):
-    """What the physics says of one motor.
+    """Simulated state of one motor.
 
-    ``position``: share of the stroke, 0 open .. 1 closed; ``current`` and ``effort``: counts of motor current, now and
-    as the tension of the tendon stands for; ``locked``: it met resistance and stands until the next command.
+    ``position``: share of the stroke, 0 open .. 1 closed. ``current``: counts of motor current. ``effort``: counts of
+    motor current that correspond to the tendon's tension. ``locked``: it met resistance and stands until the next
+    command.
     """
 
     position: float
@@ -26,7 +26,7 @@ class MotorState(NamedTuple):
     locked: bool
 
     def check(self) -> None:
-        """ValueError unless every figure is one that a motor can have."""
+        """Raise ValueError unless every value is possible for a motor."""
         for name, value, most in (
             ("position", self.position, 1.0),
             ("current", self.current, 1e4),
@@ -37,25 +37,25 @@ class MotorState(NamedTuple):
 
 
 class PhysicalMotor(Motor):
-    """The electronics of a motor in the cell. ``follow`` before ``advance``; ``order`` goes back to the physics."""
+    """The electronics of a motor in the cell. Call ``follow`` before ``advance``; send ``order`` to the simulation."""
 
     def __init__(self, number: int, position: float = 0.0):
         super().__init__(number, position)
         self.state = MotorState(position / FULL_SCALE, 0.0, 0.0, False, False)
 
     def follow(self, state: MotorState) -> None:
-        """Take over what the physics says."""
+        """Take over the simulated state."""
         self.state = state
         share = state.position
         self.position = FULL_SCALE * (0.0 if share < END_SHARE else 1.0 if share > 1.0 - END_SHARE else share)
 
     @property
     def effort(self) -> float:
-        """Counts of current that the tension stands for; it stays when the motor is switched off."""
+        """Counts of current that correspond to the tension. They remain when the motor is switched off."""
         return self.state.effort
 
     def order(self) -> tuple[float, float, float]:
-        """(share of the full speed, share of the stroke to go to, counts of current at which to stop)."""
+        """(share of the full speed, target as share of the stroke, counts of current at which it stops)."""
         share = self.position / FULL_SCALE
         if self.mode == "stop" or self.stuck:
             return 0.0, share, 0.0
@@ -70,7 +70,7 @@ class PhysicalMotor(Motor):
         return 1.0, 1.0, FREE_CURRENT + goal
 
     def advance(self, dt: float) -> None:
-        """Judge after `dt` (s) what the physics has done."""
+        """Update mode and flags from the simulated state after `dt` (s)."""
         if self.mode == "stop":
             return
         self.current = self.state.current

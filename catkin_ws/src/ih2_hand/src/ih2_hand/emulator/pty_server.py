@@ -1,4 +1,4 @@
-"""The emulated hand behind a pseudo-terminal that can be unplugged and plugged in again."""
+"""The emulated hand on a pseudo-terminal that can be unplugged and plugged in again."""
 
 from __future__ import annotations
 
@@ -14,15 +14,14 @@ from pathlib import Path
 from ih2_hand.emulator.faults import Faults
 from ih2_hand.emulator.hand import EmulatedHand
 
-IDLE_S = 1.0
-"""Longest sleep of the serving loop."""
+IDLE_S = 1.0  # s, longest sleep of the serving loop
 
 
 class PtyServer:
-    """Serves one EmulatedHand on a pty; `serve` blocks, the rest may be called from any thread.
+    """Serves one EmulatedHand on a pty. `serve` blocks. The other methods are thread-safe.
 
-    `link` is a symlink kept on the pty's path; `on_port` is told the path whenever it changes
-    (empty while unplugged); `trace` gets (direction, bytes, time) as the hand sees them.
+    `link` is a symlink that always points to the pty. `on_port` is called with the path whenever it changes
+    (empty while unplugged). `trace` is called with direction, bytes and time of everything the hand receives or sends.
     """
 
     def __init__(
@@ -37,7 +36,7 @@ class PtyServer:
         self.faults = faults or Faults(hand)
         self.faults.on_unplug, self.faults.on_replug = self.unplug, self.replug
         self.lock = threading.RLock()
-        """Held while the hand is touched."""
+        """Held during every access to the hand."""
         self.path = ""
         self._link = Path(link) if link else None
         self._on_port = on_port
@@ -54,14 +53,14 @@ class PtyServer:
     # -- plug ------------------------------------------------------------------------------------
 
     def replug(self) -> None:
-        """Open a pty, raw and without echo; nothing happens when it is open."""
+        """Open a pty, raw and without echo; no effect if it is open."""
         with self.lock:
             self._replug_at = None
             if self._master >= 0:
                 return
             self._master, self._slave = pty.openpty()
             self._plugs += 1
-            # The slave stays open here too: without a reader the master would report an error.
+            # The slave stays open in this process, too: without a reader the master would report an error.
             tty.setraw(self._slave)
             os.set_blocking(self._master, False)
             self.path = os.ttyname(self._slave)
@@ -73,7 +72,7 @@ class PtyServer:
         self._wake()
 
     def unplug(self, seconds: float | None = None) -> None:
-        """Close the pty: readers see the device vanish. Plugs in again after `seconds`."""
+        """Close the pty: readers see the device vanish. It is plugged in again after `seconds` (None: never)."""
         with self.lock:
             if self._master < 0:
                 return
@@ -93,7 +92,7 @@ class PtyServer:
     # -- serving ---------------------------------------------------------------------------------
 
     def serve(self, ended: Callable[[], bool] = lambda: False) -> None:
-        """Answer until `shutdown`, or until `ended` says so: it is asked once a second."""
+        """Answer until `shutdown`, or until `ended()` returns True. It is called at least once a second."""
         while self._running and not ended():
             with self.lock:
                 master, plug = self._master, self._plugs
@@ -104,7 +103,7 @@ class PtyServer:
             self._serve_port(poll, master, plug, ended)
 
     def _serve_port(self, poll: select.poll, master: int, plug: int, ended: Callable[[], bool]) -> None:
-        """Serve while the same pty is open. Its number alone does not tell: numbers return."""
+        """Serve while the same pty is open. `plug` identifies it, because descriptor numbers are reused."""
         while self._running and self._master == master and self._plugs == plug and not ended():
             events = poll.poll(self._wait_s() * 1000.0)
             with self.lock:
@@ -147,12 +146,12 @@ class PtyServer:
         try:
             os.write(self._master, answer)
         except BlockingIOError:
-            return  # nobody reads and the line's buffer is full: a wire would lose the bytes too
+            return  # nobody reads and the buffer is full: a cable would lose the bytes, too
         if self._trace:
             self._trace("<", answer, time.time())
 
     def fault(self, command: str) -> str:
-        """Carry out a fault command; what was done."""
+        """Execute a fault command and return a text that describes it."""
         with self.lock:
             done = self.faults.command(command)
         self._wake()
@@ -162,18 +161,18 @@ class PtyServer:
         os.write(self._wake_write, b"x")
 
     def request_shutdown(self) -> None:
-        """Make `serve` return; safe in a signal handler."""
+        """Make `serve` return. Safe in a signal handler."""
         self._running = False
         self._wake()
 
     def shutdown(self) -> None:
-        """End `serve` and take the port away."""
+        """End `serve` and close the port."""
         self.request_shutdown()
         self.unplug()
 
 
 def _read(descriptor: int) -> bytes:
-    """What is there; nothing when an event was for a descriptor since closed and reused."""
+    """Bytes that can be read; empty if the event belonged to a descriptor that was closed and reused."""
     try:
         return os.read(descriptor, 4096)
     except BlockingIOError:

@@ -14,10 +14,10 @@ Tamper = Callable[[bytes], bytes]
 
 
 class VirtualLink:
-    """A `transport.Transport` whose other end is an EmulatedHand.
+    """A `transport.Transport` to an EmulatedHand.
 
-    `to_hand` and `to_host` tamper with the bytes on their way. A read that finds too few bytes lets
-    its time-out pass on the clock, so that a SteppedClock makes silence cost nothing.
+    `to_hand` and `to_host` change the bytes on their way. A read that finds too few bytes lets its
+    time limit pass on the clock. With a SteppedClock this costs no real time.
     """
 
     def __init__(
@@ -36,7 +36,7 @@ class VirtualLink:
         self.to_hand = to_hand
         self.to_host = to_host
         self.sent = bytearray()
-        """Every byte written, before tampering."""
+        """Every byte written, before `to_hand` changes it."""
         self.plugged = True
         self._clock = clock
         self._input = bytearray()

@@ -1,4 +1,4 @@
-"""/diagnostics of the hand: once a second and at every event."""
+"""/diagnostics of the hand: every second and at every event."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ PERIOD_S = 1.0
 class Diagnostics:
     """Publishes the state of `node` (a HandNode).
 
-    The updater is asked by the steady clock: by its own it would follow ROS time, and a silent
-    /clock would silence the hand as well.
+    The steady clock triggers the updater. The updater's own timer follows ROS time and would stop
+    with /clock.
     """
 
     def __init__(self, node: Any):
@@ -29,7 +29,7 @@ class Diagnostics:
         self._next = 0.0
 
     def tick(self) -> None:
-        """Publish when a second has passed."""
+        """Publish if PERIOD_S has passed."""
         self._clock.look()
         if time.monotonic() >= self._next:
             self.publish()

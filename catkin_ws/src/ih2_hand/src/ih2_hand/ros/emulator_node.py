@@ -1,4 +1,4 @@
-"""The emulated hand as a ROS node: meets the simulated object, tells its fingers and its port."""
+"""The emulated hand as a ROS node: connects it to the simulated object, publishes its fingers and its port."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ PUBLISH_HZ = 50.0
 
 
 class EmulatorNode:
-    """Topics `finger_positions` (out, 50 Hz), `hand_fault` (in: commands of `emulator.faults`); in the cell
-    `motor_states` (in) and `motor_commands` (out, at once), without a cell `finger_contact` (in: what stands in for an
-    object). Parameter `hand_port` holds the pty's path. All names are relative."""
+    """Publishes `finger_positions` (50 Hz) and subscribes to `hand_fault` (commands of `emulator.faults`). In the
+    cell it subscribes to `motor_states` and answers each with `motor_commands`. Without a cell it subscribes to
+    `finger_contact`, which replaces an object. Parameter `hand_port` holds the pty's path. All names are relative."""
 
     def __init__(self, server: PtyServer):
         self._server = server
@@ -28,22 +28,22 @@ class EmulatorNode:
             rospy.Subscriber("finger_contact", FingerContact, self._on_contact, queue_size=5)
         rospy.Subscriber("hand_fault", String, self._on_fault, queue_size=5)
         self._timer = SteadyTimer(1.0 / PUBLISH_HZ, self._publish, "finger_positions")
-        # rospy may end without a signal (rosnode kill): the process ends with it.
+        # rospy may shut down without a signal (rosnode kill): then the process ends, too.
         rospy.on_shutdown(server.request_shutdown)
 
     def stop(self) -> None:
-        """Publish no more: to be called before rospy shuts down."""
+        """Stop publishing. Call it before rospy shuts down."""
         self._timer.shutdown()
 
     @staticmethod
     def announce(path: str) -> None:
-        """Set (or, while unplugged, remove) the parameter with the pty's path."""
+        """Set the parameter with the pty's path; remove it while the hand is unplugged."""
         try:
             if path:
                 rospy.set_param("hand_port", path)
             elif rospy.has_param("hand_port"):
                 rospy.delete_param("hand_port")
-        except Exception as error:  # whatever the master's absence raises; the hand lives on
+        except Exception as error:  # any error of an absent master; the hand continues
             rospy.logwarn("parameter hand_port not updated, the ROS master does not answer: %s", error)
 
     def _on_contact(self, contact: FingerContact) -> None:

@@ -1,9 +1,9 @@
-"""The four hand actions on one mailbox: at most one goal moves the fingers.
+"""The four hand actions with one mailbox: at most one goal moves the fingers.
 
-Four SimpleActionServers would each run their own goal, could move the fingers against each other,
+Four SimpleActionServers would run their goals independently, move the fingers against each other,
 and lose a cancel that arrives between two goals. Here every goal, cancel, stop, calibration request
-and hand_status lands in one queue and one thread works it off, so their order is fixed; goal
-handles are touched by that thread alone.
+and hand_status enters one queue. One thread processes it, so their order is fixed. Only this thread
+uses the goal handles.
 """
 
 from __future__ import annotations
@@ -39,20 +39,12 @@ from ih2_hand.errors import HandError
 from ih2_hand.progress import RESENDS, Task, Verdict
 from ih2_hand.reasons import Reason, reason_of
 
-SETTLE_S = 0.02
-"""Polls begun earlier than this after a command may still show the status before it."""
-
+SETTLE_S = 0.02  # s after a command in which a poll may still show the status before it
+# s, longest time between two polls that counts: on a busy computer a finger may have moved in a longer gap
 LONGEST_GAP_S = 0.1
-"""What lies between two polls counts as no more: on a busy computer nobody looked, and a finger may have moved."""
-
-BACKLOG = 50
-"""Requests that may wait besides goals."""
-
-SENDING_S = 0.1
-"""A result published at shutdown needs this long to leave the process."""
-
-SILENCE_S = 1.5
-"""Without a hand_status for this long a goal is aborted."""
+BACKLOG = 50  # waiting requests other than goals
+SENDING_S = 0.1  # s that a result published at shutdown needs to leave the process
+SILENCE_S = 1.5  # s without hand_status after which a goal is aborted
 
 SPECS: dict[str, tuple[Any, Any, Any]] = {
     "hand_open": (HandOpenAction, HandOpenResult, HandOpenFeedback),
@@ -60,13 +52,13 @@ SPECS: dict[str, tuple[Any, Any, Any]] = {
     "hand_preshape": (HandPreshapeAction, HandPreshapeResult, HandPreshapeFeedback),
     "hand_preshape_close": (HandPreshapeCloseAction, HandPreshapeCloseResult, HandPreshapeCloseFeedback),
 }
-"""Action, result and feedback type by action name."""
+"""Types of action, result and feedback by action name."""
 
 
 @dataclass(frozen=True)
 class Item:
-    """One entry of the mailbox: `kind` goal, cancel, stop, status, call or quit; `name` is the
-    action's, or why to stop."""
+    """One entry of the mailbox. `kind` is goal, cancel, stop, status, call or quit. `name` is the name
+    of the action, or the reason of a stop."""
 
     kind: str
     name: str = ""
@@ -75,7 +67,7 @@ class Item:
 
 @dataclass
 class Running:
-    """The goal that moves the fingers now."""
+    """The goal that moves the fingers. Times are monotonic (s)."""
 
     name: str
     handle: Any
@@ -86,23 +78,23 @@ class Running:
     driver: Any = None
     fillers: int = 0
     resends: int = 0
-    looked: float = 0.0  # when the last poll began
-    watched: float = 0.0  # s after the command, LONGEST_GAP_S at most of each gap between polls
+    looked: float = 0.0  # start of the last poll
+    watched: float = 0.0  # s since the command; each gap between polls counts at most LONGEST_GAP_S
 
 
 class HandActionServer(actionlib.ActionServer):
-    """An action server that no cancel and no step of the clock can close for the future.
+    """An action server that keeps accepting goals after any cancel and any step of the clock.
 
-    actionlib refuses every goal that is older than the newest stamp of a cancel request: one
-    request with a stamp of the year 2106 and no goal is ever taken again. Its timer publishes no
-    status while /clock stands still, and ends for good when it goes back.
+    actionlib refuses every goal that is older than the newest stamp of a cancel request: after one
+    request with a stamp of the year 2106 it accepts no goal any more. Its timer publishes no status
+    while /clock stands still, and ends when /clock steps back.
     """
 
     last_cancel: Any
 
     @property
     def status_frequency(self) -> float:
-        """0, for which actionlib makes no timer of its own."""
+        """0, so that actionlib creates no timer."""
         return 0.0
 
     @status_frequency.setter
@@ -116,7 +108,7 @@ class HandActionServer(actionlib.ActionServer):
             self.status_timer = SteadyTimer(period, lambda: self.publish_status_async(None), "action_status")
 
     def internal_goal_callback(self, goal: Any) -> None:
-        if self.last_cancel > rospy.Time.now():  # the clock went back
+        if self.last_cancel > rospy.Time.now():  # the clock stepped back
             self.last_cancel = rospy.Time()
         super().internal_goal_callback(goal)
 
@@ -126,13 +118,13 @@ class HandActionServer(actionlib.ActionServer):
 
 
 class GoalQueue:
-    """Runs goals one after another; `owner` is the hand node (driver, preshape and events)."""
+    """Runs one goal at a time. `owner` is the hand node (driver, preshape and events)."""
 
     def __init__(self, owner: Any):
         self._owner = owner
         self._mailbox: queue.Queue[Item] = queue.Queue()
         self._running: Running | None = None
-        self._newest: Any = None  # the goal that came last
+        self._newest: Any = None  # the last goal that arrived
         self._servers = {}
         for name, (action, _, _) in SPECS.items():
             self._servers[name] = HandActionServer(
@@ -145,13 +137,13 @@ class GoalQueue:
         self._thread = worker(self._work, "goals")
 
     def start(self) -> None:
-        """Offer the actions."""
+        """Start the action servers."""
         self._thread.start()
         for server in self._servers.values():
             server.start()
 
     def shutdown(self) -> None:
-        """Abort what runs and end the thread, bounded; the results are sent before it returns."""
+        """Abort the running goal and end the thread, within 1.1 s. Sends the result before it returns."""
         was_running = self._running is not None
         self._mailbox.put(Item("quit"))
         if threading.current_thread() is not self._thread:
@@ -161,23 +153,23 @@ class GoalQueue:
 
     @property
     def active(self) -> str | None:
-        """Name of the action that runs."""
+        """Name of the running action, or None."""
         running = self._running
         return running.name if running else None
 
     def stop(self, reason: str) -> None:
-        """Abort the running goal; the fingers are stopped."""
+        """Abort the running goal and stop the fingers."""
         self._mailbox.put(Item("stop", reason))
 
     def call(self, function: Callable[[], None]) -> None:
-        """Run a function between goals' steps, in the goals' thread; dropped if too many wait."""
+        """Run a function in the goals' thread, between the steps of goals. Dropped if BACKLOG requests wait."""
         if self._mailbox.qsize() < BACKLOG:
             self._mailbox.put(Item("call", content=function))
         else:
             rospy.logwarn_throttle(1.0, "hand: %d requests wait; further ones are dropped", BACKLOG)
 
     def polled(self, status: HandStatus, begun: float) -> None:
-        """The goal under way takes a poll of the hand, which began at `begun` (monotonic s)."""
+        """Pass a poll of the hand, which began at `begun` (monotonic, s), to the running goal."""
         if self._running:
             self._mailbox.put(Item("status", content=(status, begun)))
 
@@ -200,9 +192,9 @@ class GoalQueue:
                 self._handle(item)
             except HandError as error:
                 self._fail(f"{error}", error.reason)
-            except Exception as error:  # a goal must end whatever happens
+            except Exception as error:  # a goal must end after any error
                 if ending():
-                    continue  # the topics are closed; what remains is to quit
+                    continue  # the topics are closed; only `quit` is left
                 rospy.logerr("hand action: unexpected %s: %s", type(error).__name__, error)
                 self._fail(f"internal error: {error}", Reason.UNEXPECTED)
 
@@ -213,7 +205,7 @@ class GoalQueue:
                 self._cancel("replaced by a new goal; fingers stopped", Reason.SUPERSEDED)
             if item.content is self._newest:
                 self._accept(item.name, item.content)
-            else:  # a flood of goals must not keep the hand busy with those that are replaced already
+            else:  # newer goals wait: a flood of goals must not make the hand execute replaced ones
                 item.content.set_accepted()
                 replaced = Verdict("replaced by a new goal before it began", reason=Reason.SUPERSEDED)
                 item.content.set_canceled(_result(item.name, replaced), replaced.text)
@@ -253,7 +245,7 @@ class GoalQueue:
     def _begin(self, running: Running) -> None:
         driver = self._owner.connected_driver()
         running.driver = driver
-        running.fillers = driver.counters.fillers  # before: a stop during the command counts too
+        running.fillers = driver.counters.fillers  # before the command, so that a StopALL during it counts
         running.task.begin(driver)
         running.sent = time.monotonic()
         if not running.resends:
@@ -287,7 +279,7 @@ class GoalQueue:
             self._finish(verdict)
 
     def _resend(self, running: Running) -> None:
-        """A resynchronisation has sent StopALL: the fingers stand; go on with the goal."""
+        """A resynchronisation sent StopALL and stopped the fingers: send the goal's command again."""
         if running.resends >= RESENDS:
             self._stop_fingers()
             self._fail(

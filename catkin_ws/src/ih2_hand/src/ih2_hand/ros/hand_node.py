@@ -1,4 +1,4 @@
-"""The hand node, D4.10 Table 3: polls the hand, publishes it, and offers its actions."""
+"""The hand node, D4.10 Table 3: polls the hand, publishes its status, and serves its actions."""
 
 from __future__ import annotations
 
@@ -40,19 +40,12 @@ from ih2_hand.trace import Tracer
 from ih2_hand.wire_choices import WIRE
 
 ONLY_DEVICE = "(the only serial device)"
-"""What messages call the port while none is named and none was found."""
+"""Name of the port in messages while no port is set and none was found."""
 
-RECONNECT_S = 0.5
-"""Pause between attempts to open the port."""
-
-SHORTEST_GOAL_S = 0.001
-"""Least time limit of a goal."""
-
-CONTRADICTIONS = 3
-"""Polls in a row with contradicting readings before the connection counts as lost."""
-
-STOP_CHECKS = 5
-"""Rounds in which the stop service looks whether the motors stand."""
+RECONNECT_S = 0.5  # s between attempts to open the port
+SHORTEST_GOAL_S = 0.001  # s, lower bound of the parameter goal_time_limit
+CONTRADICTIONS = 3  # consecutive polls with contradicting readings after which the connection counts as lost
+STOP_CHECKS = 5  # times that the stop service checks whether the motors stand
 
 
 class TracePublisher:
@@ -64,7 +57,7 @@ class TracePublisher:
         self._tracer: Tracer | None = None
 
     def hook(self, direction: str, data: bytes) -> None:
-        """For `HandSerialDriver(trace=...)`."""
+        """Callback for `HandSerialDriver(trace=...)`."""
         if not self._publisher.get_num_connections():
             self._tracer = None
             return
@@ -76,12 +69,12 @@ class TracePublisher:
 
 
 class HandNode(HandMemory):
-    """Owns the driver; one thread polls, one works the goals off, one calibrates when asked.
+    """Owns the driver. One thread polls, one executes the goals, one runs a requested calibration.
 
-    Parameters (private): `serial_port` (device, pty, socket:// URL, `param:NAME` to read it from
-    another parameter, empty for the one serial device there is), `rate` (Hz, 30), `dialect`
-    (legacy), `read_timeout` (s, 0.05: longest wait for an answer), `use_tension` (false: grip by
-    motor current), `goal_time_limit` (s, 10), `grasps_file` (empty: the package's grasps.yaml).
+    Private parameters: `serial_port` (device, pty, socket:// URL, `param:NAME` for the value of
+    another parameter, or empty for the only serial device), `rate` (Hz, 30), `dialect` (legacy),
+    `read_timeout` (s, 0.05: longest wait for an answer), `use_tension` (false: the motor current
+    limits the grip), `goal_time_limit` (s, 10), `grasps_file` (empty: the package's grasps.yaml).
     """
 
     def __init__(self) -> None:
@@ -101,7 +94,7 @@ class HandNode(HandMemory):
         self._event = (Reason.HAND_LINK_LOST, "not connected yet")
         self._last_status = HandStatus()
         self._last_begun = 0.0
-        """When the poll behind it began, monotonic s."""
+        """Time at which the last poll began (monotonic, s)."""
         self._contradictions = 0
         self._lost_lock = threading.Lock()
         self._ended = threading.Event()
@@ -115,9 +108,9 @@ class HandNode(HandMemory):
         self._thread = steady.worker(self._poll, "poll")
 
     def run(self) -> int:
-        """Work until the node is shut down: a goal under way is aborted and the fingers stopped;
-        without one they keep what they do. The exit status."""
-        # Before rospy closes the topics, so that who waits for the goal learns how it ended.
+        """Run until the node is shut down; return the exit status. A running goal is aborted and the
+        fingers are stopped. Without a goal no command is sent."""
+        # Before rospy closes the topics, so that action clients receive the result.
         rospy.on_shutdown(self.goals.shutdown)
         self._thread.start()
         self.goals.start()
@@ -131,7 +124,7 @@ class HandNode(HandMemory):
     # -- connection ------------------------------------------------------------------------------
 
     def connected_driver(self) -> HandSerialDriver:
-        """The driver, or HandConnectionLost with the reason in words."""
+        """The driver. Raises HandConnectionLost with the reason if there is none."""
         driver = self.driver
         if driver is None:
             raise HandConnectionLost(f"the hand is not connected: {self.message}")
@@ -139,30 +132,30 @@ class HandNode(HandMemory):
 
     @property
     def event_code(self) -> Reason:
-        """What the last event means to a program."""
+        """Reason code of the last event."""
         return self._event[0]
 
     @property
     def message(self) -> str:
-        """The last event in words."""
+        """Text of the last event."""
         return self._event[1]
 
     def event(self, text: str, reason: Reason = Reason.NONE) -> None:
-        """Something happened: into the log, hand_status (at once, so that no event is lost to the
-        one after it) and diagnostics."""
+        """Report an event: log it, publish it in hand_status at once (so that the next event does not
+        replace it unseen), and in the diagnostics."""
         self._event = (reason, text)
         (rospy.loginfo if reason in NEUTRAL else rospy.logwarn)("hand: %s", text)
         self._tell_again()
         self._diagnostics.publish()
 
     def _tell_again(self) -> None:
-        """The last poll once more, with what was learnt since."""
+        """Publish the last poll again with the current flags and event."""
         self._fill_and_send(copy.copy(self._last_status))
 
     def _connect(self) -> None:
         try:
             self._open()
-        except Exception as error:  # whatever a port can raise: it is tried again
+        except Exception as error:  # any error of the port: the next attempt follows
             text = (
                 str(error)
                 if isinstance(error, HandError)
@@ -198,7 +191,7 @@ class HandNode(HandMemory):
             port = parameters.read(name, str, "")
         except parameters.ParameterError as error:
             raise HandPortError(str(error)) from None
-        except Exception as error:  # whatever the master's absence raises: try again later
+        except Exception as error:  # any error of an absent master: the next attempt follows
             raise HandPortError(f"parameter {name} cannot be read ({error}): is the ROS master there?") from error
         if not port:
             raise HandPortError(
@@ -207,8 +200,8 @@ class HandNode(HandMemory):
         return port
 
     def lost(self, error: Exception, driver: HandSerialDriver | None = None) -> None:
-        """The connection is lost: close it and say so at once; polling reopens it. Nothing happens
-        if it is another one than `driver`'s by now."""
+        """Close the lost connection and report it at once; polling reopens the port. No effect if
+        `driver` is given and is no longer the current driver."""
         with self._lost_lock:
             if self.driver is None or driver not in (None, self.driver):
                 return
@@ -235,7 +228,7 @@ class HandNode(HandMemory):
                     return
                 rospy.logerr("hand: unexpected %s: %s", type(error).__name__, error)
                 self.lost(HandError(f"internal error: {error}"))
-            # A late round moves the grid: there is no use in catching up on polls.
+            # After a late poll the next ones shift: missed polls are not repeated.
             next_time = max(next_time + period, time.monotonic())
             self._ended.wait(next_time - time.monotonic())
 
@@ -271,12 +264,12 @@ class HandNode(HandMemory):
         self._fill_and_send(status)
 
     def _fill_and_send(self, status: HandStatus) -> None:
-        # What ends a calibration sets this flag last: who reads False finds the outcome told.
+        # The end of a calibration clears this flag last: a reader that sees False also sees the outcome.
         status.calibrating = self.calibrating
         status.calibrated, status.holding = self.calibrated, self.holding
         status.connected = self.driver is not None
         if status.calibrating or not status.connected:
-            status.motors = []  # read before it began
+            status.motors = []  # these readings are from before the calibration or the loss
         status.event_code, status.message = self._event
         self._publisher.publish(status)
         self.goals.polled(status, self._last_begun)
@@ -284,14 +277,14 @@ class HandNode(HandMemory):
     # -- goals -----------------------------------------------------------------------------------
 
     def make_task(self, name: str, goal: Any) -> Task:
-        """Task for an accepted goal; RefusedError or HandError with the reason to refuse it."""
+        """Task for an accepted goal. RefusedError or HandError give the reason to refuse it."""
         return self.task_for(name, goal, self.connected_driver())
 
     def task_ended(self, task: Task, verdict: Verdict) -> None:
-        """Remember what a finished task tells about preshape and grip, and tell it."""
+        """Store what the finished task shows about preshape and grip, and publish it."""
         self.task_over(task, verdict)
         self._event = (verdict.reason, f"{task.name}: {verdict.text}")
-        self._tell_again()  # who acts on the result finds the grip told with it
+        self._tell_again()  # before the result, so that the client finds the grip published
 
     # -- calibration and stop --------------------------------------------------------------------
 
@@ -299,7 +292,7 @@ class HandNode(HandMemory):
         self.goals.call(lambda: self._calibrate(request.data.split()))
 
     def _calibrate(self, words: list[str]) -> None:
-        """Start a calibration, or say why not; runs in the goals' thread, so no goal can begin."""
+        """Start a calibration, or report why not. Runs in the goals' thread, so no goal can begin meanwhile."""
         reason = self.why_not_calibrate(words, self.goals.active)
         driver = self.driver
         if reason is None and driver is None:
@@ -315,7 +308,7 @@ class HandNode(HandMemory):
         failure: Exception | None = None
         try:
             driver.calibration(kind)
-        except Exception as error:  # whatever it is: the hand must not count as calibrating for ever
+        except Exception as error:  # any error, so that the hand does not count as calibrating forever
             failure = error
         if failure is None and self.driver is driver:
             self.calibrated = True
@@ -329,7 +322,7 @@ class HandNode(HandMemory):
             self.lost(failure, driver)
 
     def _on_stop(self, _: Any) -> TriggerResponse:
-        """Stop every motor; true only when the motors say that they stand."""
+        """Stop every motor. Success is true only if the motors report that they stand."""
         self.goals.stop("stopped by the stop service")
         driver = self.driver
         if driver is None:
@@ -344,7 +337,7 @@ class HandNode(HandMemory):
             for attempt in range(STOP_CHECKS):
                 if all(status["mode"] == "stop" for status in driver.get_all_finger_status()):
                     return TriggerResponse(True, "every motor stands")
-                if attempt:  # a frame may have been cut: complete it, which stops as well
+                if attempt:  # a frame may be incomplete: filling the parser also stops the motors
                     driver.line.resynchronise("stop not taken")
                 driver.stop_all()
         except HandError as error:

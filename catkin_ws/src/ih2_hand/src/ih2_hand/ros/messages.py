@@ -1,4 +1,4 @@
-"""Translation between driver readings and ROS messages."""
+"""Conversion of driver readings to ROS messages."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FULL_SCALE = 254.0
 
 
 def motor_status(reading: dict[str, Any]) -> MotorStatus:
-    """MotorStatus of one reading of `HandSerialDriver.read_motors`."""
+    """MotorStatus from one reading of `HandSerialDriver.read_motors`."""
     return MotorStatus(
         motor=reading["motor"],
         raw=reading["raw"],
@@ -44,7 +44,7 @@ def motor_status(reading: dict[str, Any]) -> MotorStatus:
 
 
 def joint_state(readings: Sequence[dict[str, Any]], stamp: rospy.Time) -> JointState:
-    """Angles of the hand's joints, proportional to the motor positions."""
+    """Angles (rad) of the hand's joints, proportional to the motor positions."""
     state = JointState(
         name=list(JOINTS),
         position=[reading["position"] / FULL_SCALE * JOINT_RANGES[reading["motor"]] for reading in readings],
