@@ -26,9 +26,13 @@ breathe_default_project = PACKAGES[0]
 
 
 def plain(_app, _what, _name, _obj, _options, lines):
-    """Escape the markup of docstrings: they are plain text with names in backticks."""
-    text = []
+    """Escape the markup of docstrings: they are plain text with names in backticks, and examples after `::`."""
+    text, example = [], False
     for line in lines:
+        if example and (not line.strip() or line.startswith(" ")):
+            text.append(line)
+            continue
+        example = line.rstrip().endswith("::")
         parts = re.split(r"(`+[^`]+`+)", line.strip())
         text.append("".join(_name_or_text(part) for part in parts))
     lines[:] = text
