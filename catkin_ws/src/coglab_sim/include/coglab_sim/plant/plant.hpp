@@ -129,8 +129,8 @@ class Plant {
   const Vector3d& objectForce() const { return object_force_; }  ///< N, object on the robot's hand
   /// Force of all contacts on palm and fingers, N, world axes; contacts between them do not count.
   const Vector3d& touchForce() const { return touch_force_; }
-  /// Force of the object on the person's hand, N, world axes, mean over 20 ms: load of the grip
-  /// without the force that accelerates the hand. Zero without a grip.
+  /// Force of the object on the person's hand, N, world axes, mean over 20 ms: load of the grip,
+  /// minus the force that accelerates the object with the hand. Zero without a grip.
   const Vector3d& personForce() const { return person_force_; }
   double robotShare() const { return robot_share_; }  ///< of the weight, 0..1
   double personShare() const { return person_share_; }
