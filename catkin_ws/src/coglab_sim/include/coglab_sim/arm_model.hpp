@@ -30,6 +30,7 @@ struct ModelErrors {
 };
 
 /// Rigid-body model between two links of a URDF with seven joints in between.
+///
 /// Links beside the chain (fingers) add their mass, with their joints at zero. Links behind fixed
 /// joints are merged, so that the recursion has seven bodies.
 class ArmModel {

@@ -19,10 +19,9 @@ struct CellTruth {
   double time = 0.0;  ///< s, simulated
   Pose object, human_hand, robot_hand;
   Twist object_twist;
-  double hand_closure = 0.0;               ///< 0 open .. 1 closed, see Plant::handClosure()
-  Vector3d palm_force = Vector3d::Zero();  ///< N, of the object on the robot hand
-  Vector3d touch_force =
-      Vector3d::Zero();  ///< N, all contacts of the robot hand: Plant::touchForce()
+  double hand_closure = 0.0;                ///< 0 open .. 1 closed, see Plant::handClosure()
+  Vector3d palm_force = Vector3d::Zero();   ///< N, of the object on the robot hand
+  Vector3d touch_force = Vector3d::Zero();  ///< N, of all contacts: Plant::touchForce()
   Vector3d human_force = Vector3d::Zero();  ///< N, on the person's hand: Plant::personForce()
   double robot_load_share = 0.0, human_load_share = 0.0;
   std::string held_by;

@@ -8,11 +8,10 @@ namespace coglab_sim {
 
 /// Load measured over the last second. Shares are 0..1.
 struct ComputerLoad {
-  double late_steps = 0.0;  ///< share of periods that began more than a fifth of a period late
-  double latest = 0.0;      ///< s, largest delay of a period
-  double lost_answers =
-      0.0;               ///< share of measurements sent in time but not answered within a period
-  double missing = 0.0;  ///< share of missing hand messages; other nodes were not scheduled
+  double late_steps = 0.0;    ///< share of periods that began more than a fifth of a period late
+  double latest = 0.0;        ///< s, largest delay of a period
+  double lost_answers = 0.0;  ///< share of timely measurements without an answer in a period
+  double missing = 0.0;       ///< share of missing hand messages; other nodes were not scheduled
 
   bool tooBusy() const;
 };
@@ -30,8 +29,7 @@ class Pace {
   /// True if the computer is too busy now, or the cell still runs slower than wanted.
   bool busy() const { return factor_ < wanted_ || busy_ >= kBusySeconds; }
 
-  static constexpr int kBusySeconds =
-      2;  ///< s, too busy without a break, until the factor is halved
+  static constexpr int kBusySeconds = 2;  ///< too busy for so long (s): the factor is halved
 
  private:
   double wanted_, factor_;

@@ -4,6 +4,7 @@
 ///   measured = ideal joint torque + offset + noise
 ///   external = estimate from ideal torques - offset + bias(q) + hysteresis sign(dq) + noise,
 ///   noise AR(1) with deviation sigma (1 + k |dq|)
+///
 /// The estimate keeps an offset that depends on the posture, and at 1 rad/s its noise is about
 /// eight times larger. Contact must therefore be detected from changes, while the arm stands still.
 #pragma once

@@ -1,6 +1,7 @@
 /// @file
 /// The whole robot in virtual time: simulated cell, FRI bridge and controller manager in one
 /// process and one thread.
+///
 /// It uses the same libraries as on the real clock, in the same order: measurement, answer, control
 /// cycle, next period. Only tick() advances time. Trials therefore run as fast as the machine can,
 /// and the same requests give the same bytes.

@@ -15,10 +15,11 @@ struct Overlap {
 };
 
 /// The deepest overlap of two geoms of different bodies that `counts` accepts. The contacts must be
-/// up to date (mj_step1). Contacts alone miss one solid deep inside another: if their middles
-/// coincide, MuJoCo finds no separating direction, and some pairs never collide. Therefore balls
-/// inside one solid are also tested against the other. This depth is a lower bound, so that no
-/// valid pose is refused.
+/// up to date (mj_step1).
+///
+/// Contacts alone miss one solid deep inside another: if their middles coincide, MuJoCo finds no
+/// separating direction, and some pairs never collide. Therefore balls inside one solid are also
+/// tested against the other. This depth is a lower bound, so that no valid pose is refused.
 Overlap deepestOverlap(const mjModel* m, const mjData* d,
                        const std::function<bool(int one, int two)>& counts);
 

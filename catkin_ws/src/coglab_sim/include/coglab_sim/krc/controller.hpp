@@ -1,5 +1,6 @@
 /// @file
 /// The robot controller (KRC) behind FRI: session state, statistics, checks, drives, KRL program.
+///
 /// Per FRI period: call `receive()` for every datagram, then `tick()`. It checks the answer to the
 /// last measurement and returns the servo command for the next period. After the arm has moved,
 /// `measure()` returns the next measurement.

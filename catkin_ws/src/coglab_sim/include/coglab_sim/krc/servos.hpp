@@ -1,5 +1,6 @@
 /// @file
 /// The controller's model of the arm, and its joint servos.
+///
 /// The model is KDL's on the robot description, with the errors of a real controller: the mass of
 /// the hand and the inertias are wrong by a few percent, friction and loads are unknown. The arm
 /// itself is simulated in plant/.

@@ -26,6 +26,7 @@ struct MotorState {
 };
 
 /// With the current of a free-running motor as limit, a motor does not wind against resistance.
+///
 /// Motors wind tendons. Their speed falls to zero over the last fifth below the tension at which
 /// they stop. A load never drives a motor backward. A motor that is nearly stopped for some time is
 /// locked until the next command; otherwise shaking would tighten it step by step.

@@ -1,8 +1,10 @@
 /// @file
 /// The physics of the cell: arm, hand with fingers, object, person's hand, board and floor. MuJoCo
-/// moves them in steps of 1 ms. The robot grasps by contact and friction only. The person holds an
-/// object by a compliant, limited spring, and the person's hand is a body on another such spring. A
-/// diverging simulation stops with an error that names seed and time.
+/// moves them in steps of 1 ms.
+///
+/// The robot grasps by contact and friction only. The person holds an object by a compliant,
+/// limited spring, and the person's hand is a body on another such spring. A diverging simulation
+/// stops with an error that names seed and time.
 #pragma once
 
 #include <array>
@@ -144,8 +146,7 @@ class Plant {
   Model& model() { return *model_; }
 
  private:
-  static constexpr double kHolds =
-      0.5;  // N, smallest force of fingers and of thumb or palm that counts as holding
+  static constexpr double kHolds = 0.5;  // N, smallest holding force, also of thumb and palm
 
   /// Forces between the robot's hand and the object in one step.
   struct Pressing {
@@ -212,8 +213,7 @@ class Plant {
   bool on_board_ = false, on_floor_ = false, dropped_ = false;
   int contacts_ = 0;
   double time_ = 0.0;
-  double reach_ = 0.0,
-         finger_reach_ = 0.0;  // m, upper bound behind a joint of the arm, of a finger
+  double reach_ = 0.0, finger_reach_ = 0.0;  // m, bound behind a joint of the arm, of a finger
 };
 
 /// Distance of a point of the object's frame from its surface, m, negative inside.
