@@ -11,8 +11,7 @@ constexpr double kLostAnswers = 0.1;  // likewise; at 0.2 the controller leaves 
 constexpr double kMissing = 0.3;      // likewise
 constexpr double kSlowest = 0.25;     // of the wanted factor
 constexpr int kPatienceMax = 60;      // s
-constexpr int kTooEarly =
-    15;  // s; a slowdown within this time after a raise means that it was too early
+constexpr int kTooEarly = 15;  // s; a raise was too early if a slowdown follows within this time
 
 }  // namespace
 

@@ -20,8 +20,7 @@ using Clock = std::chrono::steady_clock;
 constexpr double kLateShare = 0.2;
 // Number of late periods after which the schedule restarts instead of catching up.
 constexpr int kGiveUp = 5;
-constexpr double kPatience =
-    0.9;  // s, longest time between two answers while the cell waits for them
+constexpr double kPatience = 0.9;  // s, longest time between two answers while the cell waits
 constexpr std::size_t kMaxRecords = 100000, kMaxSnapshots = 2000;  // kept if they are not taken
 
 }  // namespace

@@ -15,6 +15,6 @@ def plausible(poses: Iterable[Pose], numbers: Iterable[float] = ()) -> bool:
     """True if all numbers are finite and below LARGEST, and no quaternion is zero."""
     poses = list(poses)
     values = [*numbers, *(value for pose in poses for value in (*pose.position, *pose.orientation))]
-    if not np.all(np.abs(values) < LARGEST):  # not finite either
+    if not np.all(np.abs(values) < LARGEST):  # also rejects NaN and infinity
         return False
     return all(np.linalg.norm(pose.orientation) > 1e-6 for pose in poses)

@@ -23,7 +23,7 @@ constexpr double kFastestSpin = 1000.0;  // rad/s, of a free body
 
 constexpr double kShareTime = 0.02;  // s, averaging time of load shares and squeeze
 constexpr double kPersonAge = 0.05;  // s after a message during which the hand keeps its velocity
-constexpr double kGripBegins = 0.05, kGripEnds = 0.02;
+constexpr double kGripBegins = 0.05, kGripEnds = 0.02;  // grip 0..1 of the person's hand
 // m that an object may slide in the person's hand beyond the grip's reach before the fingers lose
 // it: about the length of a fingertip.
 constexpr double kSlidOut = 0.02;
@@ -42,9 +42,8 @@ constexpr std::array<double, kMotors> kPreshape = {245 / 255.0, 5 / 255.0, 30 / 
                                                    50 / 255.0};
 constexpr double kCloseCurrent = 240.0;                         // counts
 constexpr int kOpening = 300, kClosing = 2500, kHanging = 300;  // steps
-constexpr double kCarries =
-    1.5;  // smallest ratio of friction to weight at which the object hangs in the fingers
-constexpr double kStays = 0.02;  // m, largest motion of the hanging object in the palm
+constexpr double kCarries = 1.5;  // smallest ratio of friction to weight of a hanging object
+constexpr double kStays = 0.02;   // m, largest motion of the hanging object in the palm
 
 SceneDescription sceneOf(const PlantConfig& config) {
   return {config.urdf, config.hand, config.object, config.surroundings,

@@ -189,7 +189,7 @@ def _read_bag(path: str, world: str, topic: str) -> Rows:
                     stamp = item.header.stamp.to_sec()
                     if len(track) >= MOST_SAMPLES:
                         raise RecordingError(f"{path}: more than {MOST_SAMPLES} samples")
-                    if not track or stamp != track[-1][0]:  # tf repeats itself
+                    if not track or stamp != track[-1][0]:  # tf repeats transforms
                         track.append((stamp, p.x, p.y, p.z, q.x, q.y, q.z, q.w))
     except rosbag.ROSBagException as error:
         raise RecordingError(f"{path}: not a readable bag ({error}); try `rosbag reindex`") from None

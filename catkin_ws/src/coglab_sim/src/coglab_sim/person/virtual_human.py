@@ -145,7 +145,7 @@ class VirtualHuman:
         shown = Pose(self._hand + involuntary(self.participant, self._noise_phase, t), self._turn.as_quat())
         return HandSample(shown, self._velocity.copy(), self._grip, force, self.phase, self._spin.copy())
 
-    # -- what to do ---------------------------------------------------------------------------------------------
+    # -- choice of the task --------------------------------------------------------------------------------------
 
     def _understand(self, t: float) -> None:
         """Acts on speech that is older than the hearing delay."""

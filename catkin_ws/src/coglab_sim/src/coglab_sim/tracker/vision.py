@@ -116,7 +116,7 @@ class Vision:
             self._trackers[name] = Tracker(name, self.settings, self.seed)
         return self._trackers[name].step(now, frame, robot, others)
 
-    # -- answers ---------------------------------------------------------------------------------
+    # -- queries ---------------------------------------------------------------------------------
 
     def init_vision(self, timeout: float) -> str:
         """Waits until the world is visible and returns a message. Raises NotSeen."""
@@ -177,7 +177,7 @@ class Vision:
             )
         return [(name, self.board.slots[name]) for name in free]
 
-    # -- judging ---------------------------------------------------------------------------------
+    # -- checks ----------------------------------------------------------------------------------
 
     def _world_is_visible(self) -> bool:
         return self.clock() - self._visible < OLDEST
