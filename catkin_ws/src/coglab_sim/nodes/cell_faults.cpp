@@ -13,7 +13,7 @@ constexpr double kReopenPause = 0.5;  // s between friClose and friOpen
 
 using Action = std::function<void(Cell&)>;
 
-/// What to do, and what undoes it (empty if it passes by itself).
+/// Action of a fault, and the action that undoes it (empty if it ends by itself).
 struct Fault {
   Action make, undo;
 };

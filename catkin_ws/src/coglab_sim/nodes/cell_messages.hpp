@@ -1,5 +1,5 @@
 /// @file
-/// Between the cell's types and ROS messages.
+/// Conversions between the cell's types and ROS messages.
 #pragma once
 
 #include <coglab_msgs/CellTruth.h>
@@ -20,15 +20,15 @@ Vector3d vectorOf(const Message& m) {
   return {m.x, m.y, m.z};
 }
 
-/// Whether a vector is finite and not longer than `most`: what is beyond it would end the physics.
+/// True if a vector is finite and not longer than `most`; others would make the physics fail.
 inline bool isWithin(const Vector3d& vector, double most) {
   return vector.allFinite() && vector.cwiseAbs().maxCoeff() <= most;
 }
 
-constexpr double kFarthest = 100.0;  // m, of anything in the cell
+constexpr double kFarthest = 100.0;  // m, largest distance in the cell
 
-/// False if a number is not finite or farther than kFarthest, or the quaternion is not of length 1
-/// within 1 %.
+/// False if a number is not finite, a position is beyond kFarthest, or the quaternion's length
+/// differs from 1 by more than 1 %.
 inline bool poseOf(const geometry_msgs::Pose& message, Pose& pose) {
   const auto& q = message.orientation;
   pose.position = vectorOf(message.position);
@@ -95,7 +95,7 @@ inline coglab_msgs::MotorStates motorsMessage(const MotorStates& motors, const r
   return message;
 }
 
-/// Touch without noise, as the physics has it.
+/// Contact forces of the physics, without noise.
 inline coglab_msgs::FingertipForces touchMessage(const plant::Touch& touch,
                                                  const plant::HandTable& hand,
                                                  const ros::Time& stamp) {
@@ -111,7 +111,7 @@ inline coglab_msgs::FingertipForces touchMessage(const plant::Touch& touch,
   return message;
 }
 
-/// @throws std::invalid_argument with what was expected and what came.
+/// @throws std::invalid_argument with expected and received value.
 inline MotorCommands motorsOf(const coglab_msgs::MotorCommands& message) {
   MotorCommands commands;
   const auto check = [&](const std::vector<double>& list, const char* name, double most) {

@@ -1,12 +1,12 @@
-/// The node /coglab_sim/cell: the simulated cell in real time, behind UDP and topics.
+/// The node /coglab_sim/cell: the simulated cell in real time, with UDP and topics.
 ///
 /// Subscribes (relative names) human_hand, motor_commands, ~push (geometry_msgs/Wrench on the palm,
 /// world axes). Publishes truth/cell, motor_states, ~messages (the controller's message window),
 /// /clock if ~publish_clock, fingertip_forces if ~tactile, real_time_factor (std_msgs/Float64,
-/// latched) and, on /diagnostics, whether this computer keeps real time; if not and ~slow_down, the
-/// cell slows. What the cell measures is stamped with the time of its physics step. Serves ~fault,
-/// ~place_object. Parameters: every row of parameter_table.inc under the private namespace;
-/// fri_period and seed of the parent namespace.
+/// latched) and, on /diagnostics, whether this computer keeps real time. If it does not and
+/// ~slow_down is set, the cell slows down. Stamps are the times of the physics steps. Serves
+/// ~fault, ~place_object. Parameters: all rows of parameter_table.inc in the private namespace;
+/// fri_period and seed in the parent namespace.
 #include <fstream>
 #include <memory>
 
@@ -34,23 +34,23 @@
 namespace coglab_sim {
 namespace {
 
-constexpr int kQueue = 100;  // messages of truth and touch that wait for a slow subscriber
+constexpr int kQueue = 100;  // length of the queues for truth and touch
 
-/// Full name of the parameter with the bridge's port. A relative one counts from the namespace
-/// above the cell's own: the bridge /a/lwr and the cell /a/coglab_sim/cell belong to one robot.
+/// Full name of the parameter with the bridge's port. A relative name starts at the namespace above
+/// the cell's: the bridge /a/lwr and the cell /a/coglab_sim/cell belong to one robot.
 std::string portParameter(const std::string& name) {
   if (!name.empty() && name[0] == '/') return name;
   return ros::names::append(ros::names::parentNamespace(ros::this_node::getNamespace()), name);
 }
 
-/// The port that the bridge has published; 0 if none yet.
+/// Port that the bridge has published; 0: none yet.
 std::uint16_t publishedPort(const std::string& parameter) {
   int port = 0;
   if (!ros::param::get(parameter, port) || port <= 0 || port > 65535) return 0;
   return static_cast<std::uint16_t>(port);
 }
 
-/// Waits for it. @throws std::runtime_error after `limit` s or at shutdown.
+/// Waits for the bridge's port. @throws std::runtime_error after `limit` s or at shutdown.
 std::uint16_t waitForPort(const std::string& parameter, double limit) {
   const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(limit);
   ROS_INFO("waiting up to %.0f s for the bridge's port in parameter %s", limit, parameter.c_str());
@@ -130,7 +130,7 @@ class CellNode {
     writeLog();
   }
 
-  /// Whether the simulation has ended by itself, for a reason that was said.
+  /// True if the simulation has ended by itself; the reason has been logged.
   bool failed() const { return failed_; }
 
  private:
@@ -255,7 +255,7 @@ class CellNode {
     }
     if (!snapshot.refused_hand.empty())
       ROS_WARN_THROTTLE(5.0, "human_hand ignored: %s", snapshot.refused_hand.c_str());
-    // All of them: where this timer comes late, nothing that happened meanwhile is lost.
+    // All snapshots, so that a late timer loses none.
     for (const CellSnapshot& each : cell_->takeSnapshots()) {
       ros::Time stamp;
       if (clock_) {
@@ -277,7 +277,7 @@ class CellNode {
     }
   }
 
-  /// A bridge that was started again listens elsewhere.
+  /// Follows a restarted bridge to its new port.
   void checkPort() {
     const CellSnapshot snapshot = cell_->snapshot();
     const bool silent = snapshot.answers == answers_seen_;
@@ -288,7 +288,7 @@ class CellNode {
       ROS_WARN_THROTTLE(10.0, "no FRI answer for 1 s; is the bridge running?");
   }
 
-  /// Whether this computer keeps up, over the last second; slows the cell down if not.
+  /// Evaluates the computer's load over the last second and slows the cell down if necessary.
   void checkPace() {
     const CellSnapshot now = cell_->snapshot();
     const auto share = [](std::uint64_t part, std::uint64_t of) {
@@ -299,9 +299,9 @@ class CellNode {
     ComputerLoad load;
     load.latest = cell_->takeLatest();
     load.late_steps = share(now.late_ticks - measured_.late_ticks, now.tick - measured_.tick);
-    if (now.answers > measured_.answers)  // without any, the bridge is not there
+    if (now.answers > measured_.answers)  // without answers there is no bridge
       load.lost_answers = share(now.unanswered - measured_.unanswered, now.sent - measured_.sent);
-    // The person sends at a constant rate: the highest that was seen.
+    // The person sends at a constant rate; use the highest seen.
     const double rate = seconds > 0.5 * pace_.factor() ? hand_messages_ / seconds : hand_rate_;
     hand_messages_ = 0;
     hand_rate_ = std::max(hand_rate_, std::min(rate, kHandRate));
@@ -309,7 +309,7 @@ class CellNode {
       load.missing = 1.0 - std::min(1.0, rate / hand_rate_);
     const bool first = measured_.tick == 0;
     measured_ = now;
-    if (first) return;  // no whole second yet
+    if (first) return;  // no full second yet
 
     const bool before = pace_.busy();
     const double factor = pace_.factor();
@@ -367,7 +367,7 @@ class CellNode {
   std::string port_parameter_;
   bool follow_port_ = false, failed_ = false;
   std::uint64_t answers_seen_ = 0;
-  CellSnapshot measured_;  // at the last look at the pace
+  CellSnapshot measured_;  // at the last evaluation of the load
   ros::WallTime measured_at_ = ros::WallTime::now();
   double hand_messages_ = 0.0, hand_rate_ = 0.0;
   std::ofstream log_;
@@ -383,7 +383,7 @@ class CellNode {
 int main(int argc, char** argv) {
   ros::init(argc, argv, "cell");
   if (!coglab_rt::nameIsFree()) return 1;
-  const ros::NodeHandle keep;  // the last handle that goes would take the log along
+  const ros::NodeHandle keep;  // destroying the last handle would end logging
   coglab_rt::LoggerServices logger_services;
   try {
     const coglab_sim::CellNode node;

@@ -17,7 +17,7 @@
 namespace coglab_sim {
 namespace {
 
-/// What a value is expected to be, in words.
+/// Description of the expected value.
 template <typename T>
 constexpr const char* expected() {
   if constexpr (std::is_same_v<T, bool>) return "true or false";
@@ -26,8 +26,8 @@ constexpr const char* expected() {
   return "a number";
 }
 
-/// Sets a row of the table from the parameter `key` under the node, if it is there: as the type
-/// that the row has. @throws std::invalid_argument naming parameter, value and range.
+/// Sets a row of the table from the node's parameter `key`, if it exists, converted to the row's
+/// type. @throws std::invalid_argument naming parameter, value and range.
 void take(CellConfig& config, const ros::NodeHandle& node, const CellParameter& row,
           const std::string& key) {
   if (!node.hasParam(key)) return;
@@ -38,7 +38,7 @@ void take(CellConfig& config, const ros::NodeHandle& node, const CellParameter& 
   row.set(config, std::visit(read, row.get(config)));
 }
 
-/// A number within the range of the schema. @throws std::invalid_argument naming the field.
+/// Reads a number within the range of the schema. @throws std::invalid_argument naming the field.
 double numberOf(const YAML::Node& entry, const std::string& field, const YAML::Node& schema) {
   const auto value = entry.as<double>(std::nan(""));
   if (!std::isfinite(value)) throw std::invalid_argument(field + ": expected a number");
@@ -46,11 +46,11 @@ double numberOf(const YAML::Node& entry, const std::string& field, const YAML::N
   return value;
 }
 
-/// The box around a shape that has lengths of its own. @throws std::invalid_argument with both
-/// where `size` is another one than the shape's, as the database does.
+/// Box around a shape that has its own lengths. @throws std::invalid_argument with both sizes if
+/// `size` differs from the shape's, like the database.
 void requireSolid(const YAML::Node& shape, const YAML::Node& length,
                   const std::vector<double>& size) {
-  constexpr double kSame = 1e-6;  // m, what rounding leaves
+  constexpr double kSame = 1e-6;  // m, rounding error
   const auto type = shape["type"].as<std::string>();
   if (type != "cylinder" && type != "sphere") return;
   const double radius = numberOf(shape["radius"], "shape.radius", length);
@@ -71,7 +71,7 @@ void requireSolid(const YAML::Node& shape, const YAML::Node& length,
   throw std::invalid_argument(text.str());
 }
 
-/// Mass, size, shape and friction of an entry, within the ranges that the database checks, too.
+/// Mass, size, shape and friction of an entry, within the same ranges as in the database.
 plant::Object objectOf(const YAML::Node& entry) {
   const YAML::Node schema =
       YAML::LoadFile(ros::package::getPath("coglab_objects") + "/config/object_schema.json");
@@ -97,7 +97,7 @@ CellConfig readCellConfig(const ros::NodeHandle& node) {
   const ros::NodeHandle above;
   config.object =
       readObject(node, coglab_rt::readParameter(node, "object/id", config.object.id, "a name"));
-  config.object_position[2] = -config.object.center[2];  // held at the height of its middle
+  config.object_position[2] = -config.object.center[2];  // held at its middle
   for (const CellParameter& row : cellParameters()) {
     if (row.name == "krc/period") take(config, above, row, "fri_period");
     if (row.name == "seed") take(config, above, row, "seed");

@@ -12,7 +12,7 @@ namespace {
 
 using Rgb = std::array<float, 3>;
 
-/// The camera with the cell that it looks at.
+/// The camera and its cell.
 struct CellCamera {
   CellCamera(PyCell& cell, int width, int height)
       : cell(cell), camera(*cell.cell().plant().model().get(), width, height) {}
@@ -31,7 +31,7 @@ struct CellCamera {
 PYBIND11_MODULE(_camera, m) {
   m.doc() =
       "Pictures of a simulated cell, drawn without a screen. Colours: red, green, blue, 0..1.";
-  py::module_::import("coglab_sim._cell");  // knows the type of the cell
+  py::module_::import("coglab_sim._cell");  // registers the type of the cell
 
   py::class_<CellCamera>(
       m, "Camera",

@@ -1,5 +1,5 @@
-/// Part of the Python module coglab_sim._cell: the physics of the cell by itself, one step of at
-/// most 1 ms per call.
+/// Part of the Python module coglab_sim._cell: the physics alone, one step of at most 1 ms per
+/// call.
 #include "py_cell.hpp"
 
 namespace coglab_sim::python {
@@ -72,7 +72,7 @@ py::dict termsOf(const Plant& plant) {
   return result;
 }
 
-/// The whole state of the simulation, to be compared byte by byte.
+/// The whole state of the simulation, for comparison byte by byte.
 py::bytes bytesOf(Plant& plant) {
   const mjModel* m = plant.model().get();
   const mjData* d = plant.model().data();
@@ -101,7 +101,7 @@ void definePlant(py::module_& m) {
       .def(
           "hold",
           [](Plant& plant, const Vector7& target, const Vector7& speed, int steps) {
-            // Critically damped servos at 60 rad/s with the bias carried, as in the cell.
+            // Critically damped servos at 60 rad/s with compensated bias forces, as in the cell.
             constexpr double kBandwidth = 60.0;
             for (int i = 0; i < steps; ++i) {
               const Plant::Terms terms = plant.terms();

@@ -1,5 +1,5 @@
 /// @file
-/// The cell in Python terms; shared by the modules coglab_sim._cell and coglab_sim._virtual.
+/// Python interface of the cell, for the modules coglab_sim._cell and coglab_sim._virtual.
 #pragma once
 
 #include <pybind11/eigen.h>
@@ -33,7 +33,7 @@ inline CellConfig configFrom(const std::string& urdf, const py::dict& parameters
   return config;
 }
 
-/// What the hand's five motors do.
+/// States of the hand's five motors.
 inline py::list motorList(const plant::Plant& plant) {
   py::list list;
   for (int i = 0; i < plant::kMotors; ++i) {
@@ -50,7 +50,7 @@ inline py::list motorList(const plant::Plant& plant) {
   return list;
 }
 
-/// Forces by the names of phalanges and palm.
+/// Contact forces by the names of phalanges and palm.
 inline py::dict touchDict(const plant::Plant& plant, const plant::Touch& touch) {
   const auto& phalanges = plant.config().hand.phalanges;
   py::dict result;
@@ -63,12 +63,12 @@ inline py::dict touchDict(const plant::Plant& plant, const plant::Touch& touch) 
 /// Defines Plant and Drives in the module.
 void definePlant(py::module_& m);
 
-/// Lockstep in Python terms: bytes in, bytes out; None where nothing is sent.
+/// Lockstep for Python: bytes in, bytes out; None if nothing is sent.
 class PyCell {
  public:
   PyCell(const std::string& urdf, const py::dict& parameters)
       : own_(std::make_unique<Cell>(configFrom(urdf, parameters))), cell_(*own_) {}
-  /// A view on somebody else's cell.
+  /// A view of a cell with another owner.
   explicit PyCell(Cell& cell) : cell_(cell) {}
 
   py::object step(const py::object& answer) {

@@ -12,7 +12,7 @@ using coglab_controllers::DmpRequest;
 
 namespace {
 
-/// The robot with the code of the newest answer, which the tuples do not carry.
+/// The robot with the code of the newest answer, which is not in the returned tuples.
 class Robot : public LockstepRobot {
  public:
   using LockstepRobot::LockstepRobot;
@@ -123,7 +123,7 @@ PYBIND11_MODULE(_virtual, m) {
   m.doc() =
       "Cell, bridge and controller manager in one thread and in virtual time. SI units, "
       "quaternions x y z w.";
-  py::module_::import("coglab_sim._cell");  // knows the type of LockstepRobot.cell
+  py::module_::import("coglab_sim._cell");  // registers the type of LockstepRobot.cell
 
   py::class_<coglab_controllers::CancelOrder>(m, "CancelOrder", "A cancel on its way.");
 

@@ -11,16 +11,15 @@ import sys
 
 from coglab_sim.person.participant import BEHAVIOURS, PROFILES
 
-SHIPPED = "mug"
-"""object of config/cell.yaml, which a launch without one takes"""
+SHIPPED = "mug"  # object of config/cell.yaml, used by a launch without an object
 
 
 def complaints(behaviour: str, profile: str, recording: str, way: str, object_id: str, source: str) -> list[str]:
-    """What cannot be used, and what there is. ``object_id``: that the person holds, empty for the shipped one;
-    ``source``: where it comes from in a recording, see open_recorded_hand."""
+    """Returns one sentence per setting that cannot be used. ``object_id``: object in the person's hand, empty for the
+    shipped one. ``source``: its source in a recording, see open_recorded_hand."""
     judged = [("behaviour", behaviour, BEHAVIOURS), ("profile", profile, PROFILES)]
     unreadable = []
-    if recording or way != "wait":  # what reads recordings takes long to import
+    if recording or way != "wait":  # slow imports, for recordings only
         from coglab_sim.person.recorded_person import WAYS, open_recorded_hand
 
         judged.append(("recorded_person", way, WAYS))
@@ -38,7 +37,7 @@ def complaints(behaviour: str, profile: str, recording: str, way: str, object_id
 
 
 def main(words: list[str]) -> int:
-    """Exit status: 0 usable, 1 not, 2 usage."""
+    """Returns the exit status: 0 usable, 1 not usable, 2 wrong usage."""
     if len(words) != 6:
         print(__doc__, file=sys.stderr)
         return 2

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
-"""check_physics.py: whether the physics of the simulated cell can be loaded.
+"""check_physics.py: checks that the physics library of the simulated cell can be loaded.
 
-For launch files (<param command=...>): a program whose library is missing prints nothing but the loader's line.
-Prints "usable", or ends with 1 and a sentence on the error output.
+For launch files (<param command=...>), because a program with a missing library prints only the loader's line.
+Prints "usable", or writes a sentence to stderr and exits with 1.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ import sys
 
 
 def complaint() -> str:
-    """Why not, with what to do; empty if it can."""
+    """Returns the reason and the remedy if the library cannot be loaded, else an empty string."""
     try:
-        ctypes.CDLL("libcoglab_sim_plant.so")  # with what the cell is linked with
+        ctypes.CDLL("libcoglab_sim_plant.so")  # also loads the libraries that the cell links
     except OSError as error:
         return (
             f"the simulated cell cannot be loaded ({error}): its library is missing or was not built; "
@@ -24,7 +24,7 @@ def complaint() -> str:
 
 
 def main() -> int:
-    """Exit status: 0 usable, 1 not."""
+    """Returns the exit status: 0 usable, 1 not usable."""
     found = complaint()
     if found:
         print(found, file=sys.stderr)

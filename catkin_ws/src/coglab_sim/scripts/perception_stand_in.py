@@ -1,15 +1,14 @@
 #!/usr/bin/python3
-"""The node /perception: stands in for a tracker and for the perception modules.
+"""The node /perception: simulates a tracker and the perception modules.
 
-Subscribes coglab_sim/truth/cell and broadcasts the tf frames of frames.yaml: human_hand,
-object_<id>, board. Serves ~init_vision, ~locate_object, ~free_places. Topic ~people
-(std_msgs/UInt8): how many people are in view from now on. Or plays recorded motion: frames in the
-recording take the place of the cell's.
+Subscribes coglab_sim/truth/cell and ~people (std_msgs/UInt8, number of people in view). Broadcasts the tf frames of
+frames.yaml: human_hand, object_<id>, board. Serves ~init_vision, ~locate_object, ~free_places. It can play recorded
+motion: frames of the recording replace those of the cell.
 
-Parameters (private): frames (mapping of frames.yaml), settings (mapping, see PerceptionSettings),
-perfect, seed, board (xyz m, yaw_deg, slots: name -> [x, y, z] in the board frame), people (1),
-others (places of the other people's hands, m), partner_margin (m, see PartnerChoice), recording
-(mapping, see PlaybackSettings; without a file nothing is played). Names are relative.
+Parameters (private): frames (mapping of frames.yaml), settings (mapping, see PerceptionSettings), perfect, seed, board
+(xyz m, yaw_deg, slots: name -> [x, y, z] in the board frame), people (1), others (positions of the other people's
+hands, m), partner_margin (m, see PartnerChoice), recording (mapping, see PlaybackSettings; without a file nothing is
+played). Names are relative.
 """
 
 from __future__ import annotations
@@ -42,14 +41,12 @@ from geometry_msgs.msg import PoseStamped, Quaternion, TransformStamped, Vector3
 from std_msgs.msg import UInt8
 
 PLAYBACK_HZ = 100.0
-LONGEST_WAIT = 10.0
-"""s, longest time-out of a service"""
-OTHERS = [[1.05, 0.45, 0.35], [1.05, -0.45, 0.35]]
-"""m, where the other people's hands are unless ~others says otherwise."""
+LONGEST_WAIT = 10.0  # s, longest time-out of a service
+OTHERS = [[1.05, 0.45, 0.35], [1.05, -0.45, 0.35]]  # m, default of ~others: hands of the other people
 
 
 class PerceptionNode:
-    """Thin node over Vision and Playback."""
+    """ROS interface of Vision and Playback."""
 
     def __init__(self) -> None:
         names = FrameNames.from_mapping(parameters.read("~frames", dict, {}), rospy.resolve_name("~frames"))
@@ -98,7 +95,7 @@ class PerceptionNode:
     # -- seeing ----------------------------------------------------------------------------------
 
     def on_truth(self, message: CellTruth) -> None:
-        """The cell as it is now; the capture time is this node's, as a camera's would be."""
+        """Takes the true state of the cell. The capture time is this node's clock, like a camera's."""
         seen = [message.human_hand, message.robot_hand, *([message.object] if message.object_id else [])]
         if not plausible(map(pose_of, seen)):
             rospy.logwarn_throttle(5.0, f"perception: truth/cell ignored: {IMPLAUSIBLE}")
@@ -108,12 +105,12 @@ class PerceptionNode:
             self.see()
 
     def on_people(self, message: UInt8) -> None:
-        """Somebody comes into view, or leaves."""
+        """Sets the number of people in view."""
         self.people = message.data
         rospy.loginfo("perception: %d people in view", message.data)
 
     def see(self) -> None:
-        """Everything in view, through noise and latency to tf."""
+        """Broadcasts the frames in view to tf, with the tracker's errors."""
         names, truth = self.vision.names, self.truth
         hand, robot, objects = None, None, {}
         if truth is not None:
@@ -134,10 +131,10 @@ class PerceptionNode:
                 self.broadcaster.sendTransform([self.transform(sight) for sight in sights])
         except rospy.ROSException:
             if not rospy.core.is_shutdown_requested():
-                raise  # else: rospy has closed tf under a last sight
+                raise  # during shutdown, rospy has already closed tf
 
     def transform(self, sight: Sight) -> TransformStamped:
-        """A sight as a tf message, stamped with its capture time."""
+        """Converts a sight to a tf message, stamped with its capture time."""
         message = TransformStamped()
         message.header.stamp = self.stamps.stamp(sight.captured)
         message.header.frame_id = self.vision.names.world
@@ -149,14 +146,14 @@ class PerceptionNode:
     # -- services --------------------------------------------------------------------------------
 
     def on_init(self, request):
-        """Ready once the cell's world is visible."""
+        """Succeeds once the cell is visible."""
         try:
             return InitVisionResponse(success=True, message=self.vision.init_vision(request.timeout))
         except NotSeen as reason:
             return InitVisionResponse(False, reason.code, str(reason))
 
     def on_locate(self, request):
-        """Newest sight of an object, of the partner's hand or of the board; else why not."""
+        """Returns the newest sight of an object, of the partner's hand or of the board, or a reason."""
         try:
             frame, sight, age = self.vision.locate(request.object_id, bounded(request.timeout))
         except NotSeen as reason:
@@ -166,7 +163,7 @@ class PerceptionNode:
         )
 
     def on_places(self, request):
-        """Slots of the board without an object on them; else why there is none."""
+        """Returns the free slots of the board, or a reason."""
         try:
             places = self.vision.free_places(request.object_id, bounded(request.timeout))
         except NotSeen as reason:
@@ -178,7 +175,7 @@ class PerceptionNode:
         )
 
     def pose(self, parent: str, captured: float, frame: Pose) -> PoseStamped:
-        """PoseStamped of a frame that was seen at ``captured`` (monotonic s)."""
+        """Converts a frame seen at ``captured`` (monotonic clock, s) to PoseStamped."""
         message = PoseStamped()
         message.header.frame_id = parent
         message.header.stamp = self.stamps.stamp(captured)
@@ -187,12 +184,12 @@ class PerceptionNode:
 
 
 def bounded(timeout: float) -> float:
-    """A time-out as asked for, s, where a service can keep it: 0 to LONGEST_WAIT."""
+    """Requested time-out (s), limited to 0..LONGEST_WAIT; 0 for NaN."""
     return min(max(timeout, 0.0), LONGEST_WAIT) if timeout == timeout else 0.0
 
 
 def main() -> int:
-    """Entry point; exit status 1 where parameters or recording cannot be used."""
+    """Entry point. Exit status 1 if the parameters or the recording cannot be used."""
     init_node("perception")
     try:
         PerceptionNode()

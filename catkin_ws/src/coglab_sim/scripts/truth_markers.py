@@ -1,10 +1,10 @@
 #!/usr/bin/python3
-"""The node /coglab_sim/truth_markers: shows person and object as they really are, for rviz alone.
+"""The node /coglab_sim/truth_markers: shows the true poses of person and object in rviz.
 
 Subscribes truth/cell. Publishes truth/markers (visualization_msgs/MarkerArray, 10 Hz) and truth/tf (tf2_msgs/TFMessage:
-frames truth/human_hand, truth/object_<id>, truth/robot_hand; a topic of its own, so that no tf listener of the control
-side can look them up). Names are relative to the node's namespace. Sizes come from the object's file in the
-folder of the parameter cell/objects.
+frames truth/human_hand, truth/object_<id>, truth/robot_hand). The topic is not /tf, so that control code cannot look
+these frames up. Names are relative to the node's namespace. Sizes come from the object's file in the folder of the
+parameter cell/objects.
 """
 
 import sys
@@ -27,18 +27,16 @@ from std_msgs.msg import ColorRGBA
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
-PERIOD = 0.1
-"""s between two publications"""
+PERIOD = 0.1  # s between two publications
 KINDS = {"box": Marker.CUBE, "cylinder": Marker.CYLINDER, "sphere": Marker.SPHERE}
 ORANGE, RED, SKIN = (0.90, 0.62, 0.0, 1.0), (0.84, 0.37, 0.0, 1.0), (0.80, 0.58, 0.46, 0.9)
 HAND_SIZE = (0.16, 0.09, 0.03)
 CLOTH, DARK = (0.35, 0.45, 0.60, 1.0), (0.25, 0.27, 0.30, 1.0)
-FLOOR = -0.75
-"""m, of the cell"""
+FLOOR = -0.75  # m, height of the cell's floor in world
 
 
 class TruthMarkers:
-    """Redraws the newest truth ten times a second."""
+    """Publishes markers of the newest true state at 10 Hz."""
 
     def __init__(self) -> None:
         self.markers = rospy.Publisher("truth/markers", MarkerArray, queue_size=1, latch=True)
@@ -48,7 +46,7 @@ class TruthMarkers:
         rospy.Subscriber("truth/cell", CellTruth, self.on_truth, queue_size=1, tcp_nodelay=True)
 
     def on_truth(self, truth: CellTruth) -> None:
-        """Draw, if it is time."""
+        """Publishes markers and frames if a publication is due."""
         now = time.monotonic()
         if now < self.due:
             return
@@ -67,7 +65,7 @@ class TruthMarkers:
         self.frames.publish(TFMessage([self.transform(truth, name, pose) for name, pose in poses.items()]))
 
     def marker(self, truth: CellTruth, name: str, kind: int, pose, size, colour) -> Marker:
-        """One marker in the frame of the truth."""
+        """Creates a marker in the frame of the message."""
         marker = Marker(
             ns=name, id=0, type=kind, action=Marker.ADD, pose=pose, scale=Vector3(*size), color=ColorRGBA(*colour)
         )
@@ -80,7 +78,7 @@ class TruthMarkers:
         return self.marker(truth, "human_hand", Marker.CUBE, truth.human_hand, HAND_SIZE, SKIN)
 
     def person(self, truth: CellTruth) -> list[Marker]:
-        """Arm, trunk and head of the person whose hand this is."""
+        """Arm, trunk, legs and head of the person."""
         p = truth.human_hand.position
         hand = np.array([p.x, p.y, p.z])
         shoulder, elbow = arm_of(hand)
@@ -99,13 +97,13 @@ class TruthMarkers:
         length = float(np.linalg.norm(along))
         marker = self.marker(truth, name, Marker.CYLINDER, at((begin + end) / 2), (width, width, length), colour)
         x, y, z = along
-        # A cylinder lies along z: tilted about y by the angle to the vertical, then turned about the vertical.
+        # A cylinder lies along z. It is tilted about y by the angle to the vertical, then turned about the vertical.
         turn = Rotation.from_euler("yz", [np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)])
         marker.pose.orientation = Quaternion(*turn.as_quat())
         return marker
 
     def object(self, truth: CellTruth) -> Marker:
-        """The object in its shape; another colour once it has fallen."""
+        """The object in its shape, red after it has been dropped."""
         shape = self.shape(truth.object_id)
         middle = pose_message(pose_of(truth.object) * Frame(np.array(shape.get("center", (0.0, 0.0, 0.0)))))
         marker = self.marker(
@@ -119,7 +117,7 @@ class TruthMarkers:
         return marker
 
     def shape(self, object_id: str) -> dict:
-        """Shape, size and centre of an object of the database."""
+        """Returns shape, size and centre of an object in the database."""
         if object_id not in self.shapes:
             folder = Path(parameters.read("cell/objects", str, str(objects_folder())))
             try:
@@ -131,7 +129,7 @@ class TruthMarkers:
 
     @staticmethod
     def transform(truth: CellTruth, name: str, pose) -> TransformStamped:
-        """A pose of the truth as a frame truth/<name>."""
+        """Converts a true pose to the frame truth/<name>."""
         out = TransformStamped(child_frame_id=f"truth/{name}")
         out.header.frame_id = truth.header.frame_id or "world"
         out.header.stamp = truth.header.stamp
@@ -141,7 +139,7 @@ class TruthMarkers:
 
 
 def at(point: np.ndarray) -> Pose:
-    """A pose that is not turned."""
+    """Pose at a point (m) without rotation."""
     return Pose(Point(*point), Quaternion(w=1.0))
 
 

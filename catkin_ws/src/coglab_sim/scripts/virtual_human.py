@@ -1,15 +1,15 @@
 #!/usr/bin/python3
-"""The node /coglab_sim/virtual_human: a seeded person who gives and takes, or whose hand goes as recorded.
+"""The node /coglab_sim/virtual_human: a seeded person who gives and takes, or whose hand follows a recording.
 
-Subscribes truth/cell (what there is to be seen and felt; the person perceives it late and noisily), human_command
-(std_msgs/String: give <id>, receive <id>, rest) and, in the namespace above this one, say (coglab_msgs/Say: what the
-robot tells the person, who acts on it unless ~react is false). Publishes human_hand (coglab_msgs/HumanHand, 100 Hz) and
-human_state (std_msgs/String). Names are relative to the node's namespace.
-Parameters (private): say (the topic, where it is another), seed, behaviour, profile (drawn, patient, accustomed),
+Subscribes truth/cell (the person perceives it with delay and noise), human_command (std_msgs/String: give <id>,
+receive <id>, rest) and, in the parent namespace, say (coglab_msgs/Say: the robot's speech; the person reacts unless
+~react is false). Publishes human_hand (coglab_msgs/HumanHand, 100 Hz) and human_state (std_msgs/String). Names are
+relative to the node's namespace.
+Parameters (private): say (topic name, if different), seed, behaviour, profile (drawn, patient, accustomed),
 participant (mapping, overrides), holds_object, react, rest, handover_object, object_in_hand (three numbers each, m),
-object_mass (kg; by default that of the cell's object in the folder cell/objects), recording (mapping, see
-recorded_person; without a file nothing is played). object_in_hand and object_mass are those of the object that the cell
-begins with; of another one that comes later (place_object) the person knows what its file says.
+object_mass (kg; default: that of the cell's object in the folder cell/objects), recording (mapping, see
+recorded_person; without a file nothing is played). object_in_hand and object_mass apply to the first object of the
+cell. For a later one (place_object) the person uses the values of its file.
 """
 
 import sys
@@ -36,20 +36,18 @@ from coglab_sim.plausible import IMPLAUSIBLE, plausible
 from geometry_msgs.msg import Vector3
 from std_msgs.msg import String
 
-OLDEST_WORDS = 30.0
-"""s after which a person who comes late does not act on what the robot has said"""
-CELL_LIMIT = 30.0
-"""s for which the cell may take to put a recorded object into the hand"""
+OLDEST_WORDS = 30.0  # s; the person ignores older speech of the robot
+CELL_LIMIT = 30.0  # s, longest wait for the cell's service that puts a recorded object into the hand
 
 
 def object_of(object_id: str) -> dict:
-    """An object of the cell, from its file."""
+    """Reads the entry of an object of the cell from its file."""
     folder = Path(parameters.read("cell/objects", str, str(objects_folder())))
     return read_object(folder / f"{object_id}.yaml")[0]
 
 
 def scene_with(entry: dict, *fields: str) -> Scene:
-    """The scene with an object, and those of its fields that parameters set."""
+    """Returns the scene with an object; private parameters override the given fields."""
     scene = Scene.of(entry)
     for name in fields:
         if rospy.has_param(f"~{name}"):
@@ -58,7 +56,7 @@ def scene_with(entry: dict, *fields: str) -> Scene:
 
 
 class VirtualHumanNode:
-    """Thin node over VirtualHuman."""
+    """ROS interface of VirtualHuman."""
 
     def __init__(self) -> None:
         self.object_id = parameters.read("cell/object/id", str, "mug")
@@ -77,7 +75,7 @@ class VirtualHumanNode:
 
     @staticmethod
     def person(entry: dict) -> VirtualHuman:
-        """Whom the parameters describe."""
+        """Creates the person that the parameters describe."""
         fields = parameters.read("~participant", dict, {})
         fields.setdefault("seed", parameters.read("~seed", int, parameters.read("seed", int, 7)))
         fields.setdefault("behaviour", parameters.read("~behaviour", str, "normal"))
@@ -93,7 +91,7 @@ class VirtualHumanNode:
         return RecordedPerson(Participant.from_mapping(fields), scene, hand, way)
 
     def put_into_hand(self) -> None:
-        """The recorded object lies in the hand as it was recorded. ROSException if the cell does not answer."""
+        """Puts the object into the hand at its recorded pose. ROSException if the cell does not answer."""
         scene = self.human.scene
         wait_for_service("cell/place_object", CELL_LIMIT)
         place = pose_message(Pose(scene.object_in_hand, scene.object_turn))
@@ -102,7 +100,7 @@ class VirtualHumanNode:
             raise ValueError(f"the cell refuses the object in the recorded hand: {answer.message}")
 
     def on_truth(self, message: CellTruth) -> None:
-        """What there is to be seen and felt now."""
+        """Takes the true state of the cell as the person's view."""
         robot, held = pose_of(message.robot_hand), pose_of(message.object)
         force = message.human_force
         load = np.array([force.x, force.y, force.z])
@@ -115,7 +113,7 @@ class VirtualHumanNode:
             self.view = WorldView(robot, message.hand_closure, held, load)
 
     def meet(self, message: CellTruth) -> None:
-        """Another object has been put into the cell: the person has that one in mind from now on."""
+        """The cell has another object: the person uses its data from now on."""
         self.object_id = message.object_id
         try:
             scene = scene_with(object_of(message.object_id), "rest", "handover_object")
@@ -126,7 +124,7 @@ class VirtualHumanNode:
             self.human.meets(scene, message.held_by in ("human", "both"))
 
     def on_command(self, message: String) -> None:
-        """A command for the person."""
+        """Passes a command to the person."""
         try:
             with self.lock:
                 self.human.command(message.data)
@@ -134,14 +132,14 @@ class VirtualHumanNode:
             rospy.logwarn("virtual human: %s", error)
 
     def on_say(self, message: Say) -> None:
-        """The robot speaks. What it said long before this node started is latched, and not heard."""
+        """Passes the robot's speech to the person, except old latched messages."""
         if message.header.stamp and (rospy.Time.now() - message.header.stamp).to_sec() > OLDEST_WORDS:
             return
         with self.lock:
             self.human.hear(self.pace.now(), message.code)
 
     def run(self) -> None:
-        """100 Hz, as time passes in the cell."""
+        """Steps the person at 100 Hz in the time of the cell."""
         period = 0.01
         due = self.pace.now()
         while not rospy.is_shutdown():
@@ -152,7 +150,7 @@ class VirtualHumanNode:
             time.sleep(max(0.0, due - self.pace.now()) / self.pace.factor)
 
     def publish(self, sample) -> None:
-        """Publish the hand for the cell, and the phase."""
+        """Publishes the hand, and the phase when it changes."""
         message = HumanHand(grip=sample.grip, grip_force=sample.grip_force)
         message.header.stamp = rospy.Time.now()
         message.header.frame_id = "world"

@@ -13,14 +13,14 @@ namespace {
 
 constexpr int kJoints = 7;
 
-/// Inertia of a side branch, seen from its parent's frame, with all its joints at zero.
+/// Inertia of a side branch in its parent's frame, with all its joints at zero.
 KDL::RigidBodyInertia branchInertia(const KDL::TreeElement& element) {
   KDL::RigidBodyInertia inertia = element.segment.getInertia();
   for (const auto& child : element.children) inertia = inertia + branchInertia(child->second);
   return element.segment.pose(0.0) * inertia;
 }
 
-/// The same mass with its inertia about the centre of mass taken by a share.
+/// Scales the inertia about the centre of mass; the mass stays.
 KDL::RigidBodyInertia scaled(const KDL::RigidBodyInertia& inertia, double share) {
   if (inertia.getMass() <= 0.0) return inertia;
   KDL::RigidBodyInertia about_origin = inertia;
@@ -29,8 +29,8 @@ KDL::RigidBodyInertia scaled(const KDL::RigidBodyInertia& inertia, double share)
                                share * centred.getRotationalInertia());
 }
 
-/// The chain with side branches added to their parents and bodies behind fixed joints merged into
-/// the moving ones.
+/// Returns the chain with side branches added to their parents, and with bodies behind fixed joints
+/// merged into the moving ones.
 KDL::Chain condensed(const KDL::Tree& tree, const KDL::Chain& chain, const ModelErrors& errors) {
   std::set<std::string> on_chain;
   for (const auto& segment : chain.segments) on_chain.insert(segment.getName());
@@ -62,7 +62,7 @@ KDL::Chain condensed(const KDL::Tree& tree, const KDL::Chain& chain, const Model
 
 KDL::Chain readChain(const std::string& urdf, const ModelErrors& errors, const std::string& base,
                      const std::string& tip) {
-  // Not by treeFromFile(), which takes it for granted that a robot was found.
+  // Not treeFromFile(): it does not check that the file has a robot.
   const auto robot = urdf::parseURDFFile(urdf);
   KDL::Tree tree;
   if (!robot || !kdl_parser::treeFromUrdfModel(*robot, tree)) {

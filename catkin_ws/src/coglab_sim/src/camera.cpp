@@ -11,8 +11,8 @@
 namespace coglab_sim {
 namespace {
 
-constexpr std::array<std::uint8_t, 3> kBackground{232, 238, 244};  // where nothing is seen
-constexpr double kLit = 2.0;  // m around the view's middle in which shadows fall
+constexpr std::array<std::uint8_t, 3> kBackground{232, 238, 244};  // colour without objects
+constexpr double kLit = 2.0;  // m, radius with shadows around the view's middle
 
 [[noreturn]] void fail(const std::string& what) {
   throw std::runtime_error("no picture without a screen: " + what +
@@ -29,7 +29,7 @@ mjtGeom shapeOf(const std::string& name) {
                               "'; expected sphere, capsule, ellipsoid, cylinder or box");
 }
 
-/// A lamp above and behind the camera, which casts shadows.
+/// A light above and behind the camera, with shadows.
 mjvLight lampOf(const mjvCamera& camera) {
   const double azimuth = camera.azimuth * M_PI / 180.0;
   const Vector3d ahead(std::cos(azimuth), std::sin(azimuth), 0.0);
@@ -52,7 +52,7 @@ mjvLight lampOf(const mjvCamera& camera) {
 
 }  // namespace
 
-/// A context of EGL that is current in this thread, and MuJoCo's scene and renderer in it.
+/// An EGL context, current in this thread, with MuJoCo's scene and renderer.
 struct Camera::Context {
   explicit Context(const mjModel& model) {
     setenv("EGL_PLATFORM", "surfaceless", 0);
@@ -77,9 +77,9 @@ struct Camera::Context {
     mjr_freeContext(&renderer);
     mjv_freeScene(&scene);
     eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
-    eglDestroyContext(display, egl);  // the display is shared by all cameras of the process
+    eglDestroyContext(display, egl);  // all cameras of the process share the display
   }
-  /// Before each use: other cameras of this thread have contexts of their own.
+  /// Call before each use, because other cameras of this thread have other contexts.
   void makeCurrent() const {
     if (eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, egl) != EGL_TRUE)
       fail("EGL gives no context without a surface");
@@ -168,7 +168,7 @@ const std::vector<std::uint8_t>& Camera::draw(mjData& data) {
     if (depth_[pixel] >= 1.0F) std::copy_n(kBackground.begin(), 3, rows_.begin() + 3 * pixel);
   }
   const auto row = static_cast<std::ptrdiff_t>(3 * width_);
-  for (std::ptrdiff_t y = 0; y < height_; ++y)  // OpenGL has the bottom row first
+  for (std::ptrdiff_t y = 0; y < height_; ++y)  // OpenGL stores the bottom row first
     std::copy_n(rows_.begin() + y * row, row, pixels_.begin() + (height_ - 1 - y) * row);
   return pixels_;
 }

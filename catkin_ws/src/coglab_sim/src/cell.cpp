@@ -8,7 +8,7 @@
 namespace coglab_sim {
 namespace {
 
-constexpr std::uint64_t kFrictionStream = 13;  // of the seed
+constexpr std::uint64_t kFrictionStream = 13;  // random stream of the friction
 
 plant::PlantConfig plantConfig(const CellConfig& config) {
   plant::PlantConfig plant;
@@ -97,7 +97,8 @@ const MeasurementBytes& Cell::advance(bool on_time, bool anew) {
   servo.frame_velocity.linear = (command.frame_to.position - command.frame_from.position) / period;
   servo.frame_velocity.angular =
       rotationBetween(command.frame_from.rotation, command.frame_to.rotation) / period;
-  // Torque signals are means over the period: an impact is shorter than the sensors are fast.
+  // Torque signals are means over the period, because impacts are shorter than the sensors'
+  // response.
   Vector7 torque = Vector7::Zero(), acceleration = Vector7::Zero();
   for (int i = 1; i <= steps; ++i) {
     const double share = static_cast<double>(i) / steps;
@@ -131,7 +132,7 @@ const MeasurementBytes& Cell::advance(bool on_time, bool anew) {
   return bytes_;
 }
 
-/// Takes one physics step into the means of the forces: a touch may last a single step.
+/// Adds one physics step to the means of the forces, because a touch can last a single step.
 void Cell::averageForces(double dt) {
   averaged_for_ += dt;
   const double share = dt / averaged_for_;

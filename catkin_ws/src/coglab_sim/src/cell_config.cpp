@@ -19,7 +19,7 @@ constexpr std::pair<OperatingMode, const char*> kModes[] = {
   throw std::invalid_argument("parameter " + name + ": expected " + expected);
 }
 
-/// The value as the type that the parameter has. Throws with what was expected.
+/// Converts a value to the parameter's type. Throws with the expected type.
 template <typename T>
 const T& valueAs(const std::string& name, const ParameterValue& value, const char* expected) {
   const T* given = std::get_if<T>(&value);
@@ -36,7 +36,7 @@ Vector vectorOf(const std::string& name, const ParameterValue& value) {
   return Eigen::Map<const Vector>(list->data());
 }
 
-// How each type of field is read and written.
+// Read and write access to each type of field.
 template <typename Field>
 ParameterValue read(const Field& field) {
   if constexpr (std::is_same_v<Field, Vector7> || std::is_same_v<Field, Vector3d>) {
@@ -88,7 +88,7 @@ void write(Field& field, const std::string& name, const Range& range, const Para
   }
 }
 
-/// One row; `field` returns a reference to what it is about.
+/// One row; `field` returns a reference to its value in the configuration.
 template <typename Access>
 CellParameter row(Access field, bool node_only, const char* name, double low, double high,
                   const char* unit, const char* source, const char* text) {

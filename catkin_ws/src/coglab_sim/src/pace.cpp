@@ -6,12 +6,12 @@
 namespace coglab_sim {
 namespace {
 
-constexpr double kLateSteps = 0.3;    // share beyond which the computer is too busy
-constexpr double kLostAnswers = 0.1;  // likewise: from 0.2 on the controller leaves command mode
+constexpr double kLateSteps = 0.3;    // share above which the computer is too busy
+constexpr double kLostAnswers = 0.1;  // likewise; at 0.2 the controller leaves command mode
 constexpr double kMissing = 0.3;      // likewise
 constexpr double kSlowest = 0.25;     // of the wanted factor
 constexpr int kPatienceMax = 60;      // s
-constexpr int kTooEarly = 15;         // s after a raise in which it counts as too early
+constexpr int kTooEarly = 15;  // s; a raise was too early if a slowdown follows within this time
 
 }  // namespace
 

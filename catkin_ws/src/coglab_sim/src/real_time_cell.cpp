@@ -15,13 +15,13 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// A measurement that left later than this share of a period leaves the PC too little time to be
-// blamed.
+// After a measurement later than this share of a period, a missing answer does not count against
+// the PC.
 constexpr double kLateShare = 0.2;
-// Periods behind schedule after which the schedule starts anew instead of catching up.
+// Number of late periods after which the schedule restarts instead of catching up.
 constexpr int kGiveUp = 5;
-constexpr double kPatience = 0.9;  // s from one answer to the next, where the cell waits for them
-constexpr std::size_t kMaxRecords = 100000, kMaxSnapshots = 2000;  // if nobody takes them
+constexpr double kPatience = 0.9;  // s, longest time between two answers while the cell waits
+constexpr std::size_t kMaxRecords = 100000, kMaxSnapshots = 2000;  // kept if they are not taken
 
 }  // namespace
 
@@ -82,14 +82,14 @@ void RealTimeCell::run() {
         cell_.receive(buffer.data(), static_cast<std::size_t>(size), latency);
         answered = true;
         answered_at = Clock::now();
-        // A flood of datagrams does not stop the clock.
+        // A flood of datagrams must not stop the clock.
         if (for_one || Clock::now() >= until) return;
       }
     };
     listenUntil(deadline, false);
-    const bool expected = cell_.sent() && !sent_late;  // an answer, within the period that ends
+    const bool expected = cell_.sent() && !sent_late;  // expects an answer within this period
     const bool unanswered = expected && !answered;
-    // The PC answers, but this computer is too busy: simulated time stands until it does.
+    // The PC answers, but late because this computer is busy: simulated time waits for the answer.
     if (waits_ && cell_.sent() && !answered)
       listenUntil(answered_at + std::chrono::duration_cast<Clock::duration>(
                                     std::chrono::duration<double>(kPatience)),
@@ -104,13 +104,13 @@ void RealTimeCell::run() {
     sent_at = Clock::now();
     if (cell_.sent()) socket_.send(cell_.measurement().data(), cell_.measurement().size(), port_);
     sent_late = late;
-    period = periodNow();  // the KRL program may have opened FRI anew
+    period = periodNow();  // the KRL program may have reopened FRI
     const double time = cell_.controller().time();
     kept = time > next_snapshot_ - 1e-9;
     if (kept) next_snapshot_ = std::max(next_snapshot_, time - cell_.period()) + interval_;
     leaveResults(answered, expected, unanswered, late ? behind : 0.0, kept);
     deadline += period;
-    // Where simulated time may stand, no more than a period has to be caught up with.
+    // If simulated time may wait, it catches up at most one period.
     if (now - deadline > (waits_ ? 1 : kGiveUp) * period) deadline = now + period;
   }
 }
@@ -124,7 +124,7 @@ void RealTimeCell::applyInputs() {
       try {
         cell_.setHuman(human_);
         snapshot_.refused_hand.clear();
-      } catch (const std::invalid_argument& error) {  // where it cannot be, it is not there yet
+      } catch (const std::invalid_argument& error) {  // a hand at an impossible place is left out
         snapshot_.refused_hand = error.what();
       }
     }
@@ -209,7 +209,7 @@ void RealTimeCell::apply(std::function<void(Cell&)> action, double limit) {
   }
   const auto wait = std::chrono::duration<double>(limit);
   if (done.wait_for(wait) != std::future_status::ready) {
-    // Withdrawn, so that it does not act later on; unless the thread has just begun with it.
+    // Withdraw the action, so that it never runs, unless the thread has just begun it.
     if (!asked->taken.exchange(true)) {
       throw std::runtime_error("the simulated cell did not react within " + std::to_string(limit) +
                                " s; nothing was changed");

@@ -21,7 +21,7 @@ void TorqueSensor::advance(const Vector7& velocity, double dt) {
   for (int i = 0; i < 7; ++i) {
     measured_noise_[i] = keep * measured_noise_[i] + fresh * random_.normal();
     external_noise_[i] = keep * external_noise_[i] + fresh * random_.normal();
-    // The sign of the last movement stays when the joint stops: that is what makes it a hysteresis.
+    // Hysteresis: the sign of the last movement stays when the joint stops.
     const double drive = velocity[i] / noise_.hysteresis_speed;
     const double target = std::tanh(drive);
     friction_[i] += (target - friction_[i]) * std::fmin(1.0, std::abs(drive));

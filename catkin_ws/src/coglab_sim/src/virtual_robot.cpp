@@ -71,7 +71,7 @@ LockstepRobot::LockstepRobot(const LockstepRobotConfig& config)
                                                           textOf(config.cell.urdf),
                                                           bridge_.config().limits, true);
   settings.clock = [this] { return now_ns_; };
-  // The controllers are linked into this library; no shared object with a ROS side is needed.
+  // The controllers are linked into this library, so that no plug-in library with ROS is needed.
   settings.types.erase("coglab/DmpController");
   settings.types.erase("coglab/PtpController");
   settings.logger = &logger_;

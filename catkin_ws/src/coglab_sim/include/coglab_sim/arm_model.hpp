@@ -1,5 +1,5 @@
 /// @file
-/// Kinematics and rigid-body terms of the arm with its hand, from the URDF, by KDL.
+/// Kinematics and rigid-body terms of the arm with its hand. KDL computes them from the URDF.
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@
 
 namespace coglab_sim {
 
-/// Everything the cell needs at one joint configuration.
+/// Kinematics and dynamics at one joint configuration.
 struct ArmTerms {
   Matrix7 mass;       ///< link side, kg m^2
   Vector7 coriolis;   ///< C(q, dq) dq, Nm
@@ -23,16 +23,16 @@ struct ArmTerms {
   Pose tip;           ///< ih2_palm in the world
 };
 
-/// By which shares a model differs from the robot description.
+/// Factors by which a model differs from the robot description; 1 is exact.
 struct ModelErrors {
-  double payload = 1.0;  ///< of the mass of all that is fixed behind the last joint
-  std::array<double, 7> inertia = {1, 1, 1, 1, 1, 1, 1};  ///< of the moving links' inertias
+  double payload = 1.0;  ///< on the mass of all links fixed behind the last joint
+  std::array<double, 7> inertia = {1, 1, 1, 1, 1, 1, 1};  ///< on the inertias of the moving links
 };
 
 /// Rigid-body model between two links of a URDF with seven joints in between.
 ///
-/// Links that hang beside the chain (fingers) count with their mass in the position zero of their
-/// joints. Links behind fixed joints are merged, so that the recursion runs over seven bodies.
+/// Links beside the chain (fingers) add their mass, with their joints at zero. Links behind fixed
+/// joints are merged, so that the recursion has seven bodies.
 class ArmModel {
  public:
   /// @param urdf  path of the robot description

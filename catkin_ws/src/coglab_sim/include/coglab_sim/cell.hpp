@@ -13,15 +13,15 @@ namespace coglab_sim {
 
 using MeasurementBytes = std::array<std::uint8_t, lwr_fri_bridge::fri::kMeasurementSize>;
 
-/// What really happens in the cell. Nothing in control may read it. Forces and torques are means
-/// over the last period: a touch can be shorter than a period.
+/// True state of the cell. Control code must not read it. Forces and torques are means over the
+/// last period, because a touch can be shorter than a period.
 struct CellTruth {
   double time = 0.0;  ///< s, simulated
   Pose object, human_hand, robot_hand;
   Twist object_twist;
-  double hand_closure = 0.0;                ///< of the robot's fingers, see Plant::handClosure()
+  double hand_closure = 0.0;                ///< 0 open .. 1 closed, see Plant::handClosure()
   Vector3d palm_force = Vector3d::Zero();   ///< N, of the object on the robot hand
-  Vector3d touch_force = Vector3d::Zero();  ///< N, of all that touches it: Plant::touchForce()
+  Vector3d touch_force = Vector3d::Zero();  ///< N, of all contacts: Plant::touchForce()
   Vector3d human_force = Vector3d::Zero();  ///< N, on the person's hand: Plant::personForce()
   double robot_load_share = 0.0, human_load_share = 0.0;
   std::string held_by;
@@ -33,23 +33,23 @@ struct CellTruth {
 using MotorCommands = std::array<plant::MotorCommand, plant::kMotors>;
 using MotorStates = std::array<plant::MotorState, plant::kMotors>;
 
-/// One FRI period at a time; no clock, no thread, no socket of its own. The same configuration and
+/// Simulates one FRI period per call. It has no clock, thread or socket. The same configuration and
 /// inputs give the same bytes.
 class Cell {
  public:
-  /// @throws std::invalid_argument or std::runtime_error with what is wrong in the configuration.
+  /// @throws std::invalid_argument or std::runtime_error naming the error in the configuration.
   explicit Cell(const CellConfig& config);
 
   /// Lockstep: takes the answer to the last measurement (none: null and 0), advances one period and
-  /// returns the next measurement. Look at `sent()`: the controller does not send while FRI is
-  /// closed or its packet got lost.
+  /// returns the next measurement. `sent()` is false if FRI is closed or the packet got lost.
   const MeasurementBytes& step(const std::uint8_t* answer, std::size_t size);
 
-  /// The same in two parts for a real clock: hand over datagrams as they come, `latency` s after
-  /// the measurement...
+  /// step() in two parts, for a real clock. First: takes one datagram that arrived `latency` s
+  /// after the measurement.
   void receive(const std::uint8_t* bytes, std::size_t size, double latency);
-  /// ...and advance when the period is over. `on_time` false: the caller was late, a missing answer
-  /// is not the PC's fault. `anew` false: means of forces go on from the period before.
+  /// Second: advances one period. `on_time` false: the caller was late, so that a missing answer
+  /// does not count against the PC. `anew` false: the means of forces continue from the period
+  /// before.
   const MeasurementBytes& advance(bool on_time = true, bool anew = true);
 
   bool sent() const { return sent_; }
@@ -58,31 +58,31 @@ class Cell {
   // Inputs, valid until changed
   /// @throws std::invalid_argument as Plant::setPerson() does.
   void setHuman(const plant::PersonInput& human) { plant_.setPerson(human); }
-  /// What the hand's electronics ask of the five motors.
+  /// Commands of the hand's electronics to the five motors.
   void setMotors(const MotorCommands& commands);
-  /// On the palm about its origin, besides what touches it.
+  /// Adds a wrench on the palm about its origin, besides the contacts.
   void setPush(const Wrench& push) { plant_.setPush(push); }
   /// @throws std::invalid_argument as Plant::place() does.
   void place(plant::Place place, const Pose& pose) { plant_.place(place, pose); }
-  /// Exchanges the object; it is then to be placed. @throws std::invalid_argument
+  /// Exchanges the object. Call place() afterwards. @throws std::invalid_argument
   void setObject(const plant::Object& object);
 
   // Faults
   void setBlock(bool on) { plant_.setBlock(on); }
   /// Share of lost packets, 0..1, to and from the PC.
   void setLoss(double to_pc, double from_pc);
-  /// Loses the next packets, both ways.
+  /// Loses the next packets in both directions.
   void loseNext(int packets) { lose_next_ = packets; }
   krc::Controller& controller() { return controller_; }
   const krc::Controller& controller() const { return controller_; }
 
-  /// FRI period now, s; friOpen may change it.
+  /// Present FRI period, s; friOpen may change it.
   double period() const { return controller_.parameters().period; }
   CellTruth truth() const;
   MotorStates motors() const;
-  /// On the robot's hand, mean over the last period.
+  /// Contact forces on the robot's hand, means over the last period.
   const plant::Touch& touch() const { return touch_; }
-  /// rad/s, largest speed of each joint in any step of the last period.
+  /// Largest speed of each joint within the last period, rad/s.
   const Vector7& fastest() const { return fastest_; }
   const plant::Plant& plant() const { return plant_; }
   plant::Plant& plant() { return plant_; }
@@ -112,7 +112,7 @@ class Cell {
   MeasurementBytes bytes_{};
 };
 
-/// @throws std::invalid_argument for anything but human_hand, robot_hand, world.
+/// Place by name: human_hand, robot_hand or world. @throws std::invalid_argument for others.
 plant::Place placeOf(const std::string& name);
 
 }  // namespace coglab_sim

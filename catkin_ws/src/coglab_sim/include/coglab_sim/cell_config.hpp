@@ -1,6 +1,5 @@
 /// @file
-/// Everything that can be set about the simulated cell, by name. The rows are in
-/// parameter_table.inc.
+/// All parameters of the simulated cell, by name. Their rows are in parameter_table.inc.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +15,7 @@
 
 namespace coglab_sim {
 
-/// What cell_node alone reads: where the bridge is, how fast it goes, what it publishes.
+/// Parameters of cell_node only: address of the bridge, pace and publications.
 struct NodeParameters {
 #define NODE(type, field, value, ...) type field = value;
 #include "coglab_sim/parameter_table.inc"
@@ -35,7 +34,7 @@ struct CellConfig {
   NodeParameters node;
 };
 
-/// A value as it comes from ROS parameters or Python.
+/// Value of a parameter, as ROS or Python passes it.
 using ParameterValue = std::variant<bool, int, double, std::string, std::vector<double>>;
 
 /// One row of the table.
@@ -44,18 +43,18 @@ struct CellParameter {
   std::string unit;
   std::string source;  ///< "published", "ours" or "set-up"
   std::string text;
-  double low = 0.0, high = 0.0;  ///< range of numbers, also of each one in a list; equal: no number
-  bool node_only = false;        ///< of cell_node; the cell without ROS does not have it
+  double low = 0.0, high = 0.0;  ///< range of a number or of each list element; equal: not a number
+  bool node_only = false;        ///< true: only cell_node has it, the cell without ROS does not
   std::function<ParameterValue(const CellConfig&)> get;
-  /// @throws std::invalid_argument with name, value and range, or what was expected.
+  /// @throws std::invalid_argument with name, value and range, or the expected type.
   std::function<void(CellConfig&, const ParameterValue&)> set;
 };
 
 /// All rows, in the order of the table.
 const std::vector<CellParameter>& cellParameters();
 
-/// Sets one parameter of the cell. @throws std::invalid_argument if the name is unknown, is one of
-/// cell_node alone, or if the value does not fit.
+/// Sets one parameter of the cell. @throws std::invalid_argument if the name is unknown, belongs to
+/// cell_node only, or if the value does not fit.
 void setCellParameter(CellConfig& config, const std::string& name, const ParameterValue& value);
 
 }  // namespace coglab_sim

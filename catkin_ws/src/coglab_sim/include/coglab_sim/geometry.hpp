@@ -1,6 +1,6 @@
 /// @file
-/// Vectors, poses and wrenches of the simulated cell. World axes are those of `lwr_base_link`; SI
-/// units.
+/// Vectors, poses and wrenches of the simulated cell. The world axes are those of `lwr_base_link`.
+/// All units are SI.
 #pragma once
 
 #include <Eigen/Core>
@@ -43,7 +43,8 @@ struct Twist {
   Vector3d linear = Vector3d::Zero();   ///< m/s, of the frame's origin
   Vector3d angular = Vector3d::Zero();  ///< rad/s
 
-  /// Velocity of a point that moves with the frame; `arm` is the vector from the origin to it.
+  /// Velocity of a point that moves with the frame; `arm` is the vector from the frame's origin to
+  /// the point.
   Vector3d at(const Vector3d& arm) const { return linear + angular.cross(arm); }
 };
 
@@ -52,7 +53,7 @@ struct Wrench {
   Vector3d force = Vector3d::Zero();   ///< N
   Vector3d torque = Vector3d::Zero();  ///< Nm
 
-  /// Adds a force that acts at `arm` from the point of reference.
+  /// Adds a force `f` that acts at `arm` (m) from the reference point.
   void add(const Vector3d& f, const Vector3d& arm) {
     force += f;
     torque += arm.cross(f);
@@ -64,8 +65,7 @@ struct Wrench {
   }
 };
 
-/// Rotation vector (rad) that turns `from` into `to`, the short way round, in the axes both are
-/// given in.
+/// Rotation vector (rad) of the shortest rotation from `from` to `to`, in their common axes.
 inline Vector3d rotationBetween(const Quaterniond& from, const Quaterniond& to) {
   Quaterniond difference = to * from.conjugate();
   if (difference.w() < 0.0) difference.coeffs() = -difference.coeffs();

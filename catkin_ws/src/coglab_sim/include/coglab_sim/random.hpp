@@ -1,6 +1,5 @@
 /// @file
-/// The random numbers of the simulated cell: one small generator, so that a seed gives the same
-/// numbers on every machine.
+/// Random numbers of the simulated cell. A seed gives the same numbers on every machine.
 #pragma once
 
 #include <cmath>
@@ -9,8 +8,8 @@
 namespace coglab_sim {
 
 /// PCG-XSH-RR 64/32 (O'Neill, "PCG: A Family of Simple Fast Space-Efficient Statistically Good
-/// Algorithms", 2014). The standard library's distributions differ between implementations, so the
-/// two that are needed are here too.
+/// Algorithms", 2014). The distributions of the standard library differ between implementations, so
+/// this class has its own uniform and normal ones.
 class Random {
  public:
   /// Generators with the same seed and different streams are independent.

@@ -16,17 +16,18 @@ struct Range {
   bool holds(double value) const { return value >= low && value <= high; }
 };
 
-/// Range of a parameter of the cell or of cell_node, or of a fault's value (`fault/…`); low == high
-/// if it is none of those, or no number.
+/// Range of a parameter of the cell, of cell_node or of a fault (`fault/…`). low == high if the
+/// name is unknown or the parameter is not a number.
 Range rangeOf(const std::string& name);
 
 /// Throws std::invalid_argument "parameter <shown> = <value> is outside its range <low>..<high>"
-/// unless the range holds it.
+/// if the value is outside the range.
 void requireWithin(const Range& range, const std::string& shown, double value);
-/// The same with the range of that name.
+/// The same, with the range of the parameter `name`.
 void requireWithin(const std::string& name, double value);
 
-/// The same for the field of a row: each number of a list; anything that is no number passes.
+/// The same for a field of a row: checks a number, or each element of a vector, and accepts all
+/// other types.
 template <typename Field>
 void requireFieldWithin(const Range& range, const std::string& name, const Field& field) {
   if constexpr (std::is_base_of_v<Eigen::MatrixBase<Field>, Field>) {

@@ -1,5 +1,5 @@
 /// @file
-/// The cell on a clock: one thread that paces the FRI periods and speaks UDP. No ROS here.
+/// The cell on a real clock: one thread runs the FRI periods and the UDP socket. No ROS here.
 #pragma once
 
 #include <atomic>
@@ -17,27 +17,27 @@
 
 namespace coglab_sim {
 
-/// One FRI period for the log.
+/// Log record of one FRI period.
 struct TickRecord {
   double time = 0.0;  ///< s, simulated, at the end of the period
   int state = 0, quality = 0, power = 0, control = 0;
-  bool answered = false;        ///< the last measurement got its answer in time
+  bool answered = false;        ///< true: the last measurement was answered in time
   Vector7 commanded, measured;  ///< rad
 };
 
-/// What the thread leaves for others to look at.
+/// Copy of the cell's state, for other threads.
 struct CellSnapshot {
   CellTruth truth;
   MotorStates motors;
   plant::Touch touch;
-  std::int64_t stepped_ns = 0;   ///< steady clock, when the last physics step was made
+  std::int64_t stepped_ns = 0;   ///< steady clock, time of the last physics step
   std::uint64_t tick = 0;        ///< number of periods so far
-  std::uint64_t late_ticks = 0;  ///< periods that the thread itself began too late
+  std::uint64_t late_ticks = 0;  ///< periods that the thread began too late
   std::uint64_t answers = 0;     ///< datagrams received so far
-  std::uint64_t sent = 0;        ///< measurements that left in time
-  std::uint64_t unanswered = 0;  ///< those of them without an answer within their period
-  double latest = 0.0;           ///< s, by which the latest period since takeLatest() began late
-  /// Why the person's hand was refused; empty: it was not.
+  std::uint64_t sent = 0;        ///< measurements sent in time
+  std::uint64_t unanswered = 0;  ///< of these: not answered within the period
+  double latest = 0.0;           ///< s, largest delay of a period since takeLatest()
+  /// Reason why the person's hand was refused; empty: accepted.
   std::string refused_hand;
 };
 
@@ -45,7 +45,7 @@ struct CellSnapshot {
 class RealTimeCell {
  public:
   /// @param factor  simulated over real time, 0.01 .. 100
-  /// @param source_port  from which the controller sends, 0: any free one
+  /// @param source_port  UDP port of the controller, 0: any free port
   /// @throws what Cell and FriSocket throw, std::invalid_argument for the factor
   RealTimeCell(const CellConfig& config, const std::string& host, std::uint16_t port, double factor,
                std::uint16_t source_port = 0);
@@ -53,49 +53,48 @@ class RealTimeCell {
   RealTimeCell(const RealTimeCell&) = delete;
   RealTimeCell& operator=(const RealTimeCell&) = delete;
 
-  /// Starts the thread, named `cell`: a robot controller is a real-time computer of its own, so
-  /// that it gets SCHED_FIFO with `priority` (0: none) where that is granted. Faster than real time
-  /// it is a normal thread: it would leave nothing to others. Returns an empty string, or why it is
-  /// one.
+  /// Starts the thread `cell`. It gets SCHED_FIFO with `priority` (0: none) if the system grants
+  /// it, because a real controller is a separate real-time computer. Faster than real time it stays
+  /// a normal thread; otherwise other programs would starve. Returns an empty string, or why the
+  /// thread is a normal one.
   /// @pre not running
   std::string start(int priority = 0);
   void stop();
-  /// Simulated over real time from the next period on.
+  /// Sets the factor (simulated over real time) from the next period on.
   void setFactor(double factor) { factor_ = factor; }
-  /// Whether simulated time stands while an answer of a PC that answers is late, up to 0.9 s after
-  /// the one before.
+  /// True: simulated time stops while an answer of the PC is late, up to 0.9 s after its last
+  /// answer.
   void waitForAnswers(bool waits) { waits_ = waits; }
-  /// Where the PC listens from now on.
+  /// Sets the PC's port from now on.
   void setPort(std::uint16_t port) { port_ = port; }
 
   // From any thread
   void setHuman(const plant::PersonInput& human);
   void setMotors(const MotorCommands& motors);
   void setPush(const Wrench& push);
-  /// Runs `action` between two periods. It has to own what it uses: when the thread has begun with
-  /// it but does not end it in time, it may outlive the call. @throws what it throws,
-  /// std::runtime_error if the thread does not get to it within `limit` s; then it is withdrawn and
+  /// Runs `action` between two periods. The action must own its data: if the thread has begun it
+  /// and does not finish in time, it outlives the call. @throws the exception of the action;
+  /// std::runtime_error if the thread does not begin it within `limit` s; it is then withdrawn and
   /// never runs.
   void apply(std::function<void(Cell&)> action, double limit = 1.0);
-  /// Runs `action` after so many simulated seconds.
+  /// Runs `action` after `delay` simulated seconds.
   void applyLater(double delay, std::function<void(Cell&)> action);
 
   CellSnapshot snapshot() const;
   double takeLatest();  ///< CellSnapshot::latest since the last call
   /// Simulated seconds between the snapshots that takeSnapshots() returns; forces are means over
-  /// them. @pre not running
+  /// this interval. @pre not running
   void setSnapshotInterval(double interval) { interval_ = interval; }
-  std::vector<CellSnapshot>
-  takeSnapshots();                           ///< since the last call, oldest first, of 2000 at most
-  std::vector<TickRecord> takeRecords();     ///< since the last call
-  std::vector<krc::Message> takeMessages();  ///< of the controller, since the last call
-  /// The thread ended by itself with this error; empty while it runs.
+  std::vector<CellSnapshot> takeSnapshots();  ///< since the last call, oldest first, at most 2000
+  std::vector<TickRecord> takeRecords();      ///< since the last call
+  std::vector<krc::Message> takeMessages();   ///< of the controller, since the last call
+  /// Error that ended the thread; empty while it runs.
   std::string failure() const;
 
  private:
   struct Action {
     std::packaged_task<void(Cell&)> task;
-    std::atomic<bool> taken{false};  // by the thread, or back by the caller
+    std::atomic<bool> taken{false};  // by the thread, or withdrawn by the caller
   };
   struct Delayed {
     double time;

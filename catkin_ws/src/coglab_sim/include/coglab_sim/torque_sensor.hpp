@@ -1,13 +1,12 @@
 /// @file
-/// Joint torque signals as imperfect as D4.10 describes those of the real arm.
+/// Joint torque signals with the errors that D4.10 describes for the real arm.
 ///
 ///   measured = ideal joint torque + offset + noise
 ///   external = estimate from ideal torques - offset + bias(q) + hysteresis sign(dq) + noise,
 ///   noise AR(1) with deviation sigma (1 + k |dq|)
 ///
-/// An offset that depends on the posture stays in the estimate and the noise grows about eightfold
-/// at 1 rad/s: this is why contact has to be detected from changes, and only while the arm stands
-/// still.
+/// The estimate keeps an offset that depends on the posture, and at 1 rad/s its noise is about
+/// eight times larger. Contact must therefore be detected from changes, while the arm stands still.
 #pragma once
 
 #include "coglab_sim/geometry.hpp"
@@ -21,7 +20,7 @@ struct TorqueNoise {
 #include "coglab_sim/parameter_table.inc"
 };
 
-/// Adds the errors. One instance per arm; the same seed gives the same errors.
+/// Adds the errors. Use one instance per arm; the same seed gives the same errors.
 class TorqueSensor {
  public:
   TorqueSensor(const TorqueNoise& noise, std::uint64_t seed);
@@ -29,10 +28,10 @@ class TorqueSensor {
   /// Draws the noise of the next `dt` seconds.
   void advance(const Vector7& velocity, double dt);
 
-  /// Torque as measured, Nm.
+  /// Measured torque, Nm.
   Vector7 measured(const Vector7& ideal) const { return ideal + offset_ + measured_noise_; }
 
-  /// External torque as the controller estimates it, Nm.
+  /// External torque estimated by the controller, Nm.
   Vector7 external(const Vector7& ideal, const Vector7& position) const;
 
   const TorqueNoise& noise() const { return noise_; }

@@ -2,8 +2,8 @@
 /// The whole robot in virtual time: simulated cell, FRI bridge and controller manager in one
 /// process and one thread.
 ///
-/// The same libraries as on the real clock, coupled in the same order: measurement, answer, control
-/// cycle, next period. Time advances only by tick(), so that trials run as fast as the machine can
+/// It uses the same libraries as on the real clock, in the same order: measurement, answer, control
+/// cycle, next period. Only tick() advances time. Trials therefore run as fast as the machine can,
 /// and the same requests give the same bytes.
 #pragma once
 
@@ -23,10 +23,10 @@
 
 namespace coglab_sim {
 
-/// Frames as a table, in place of tf2. All poses are in `world`, which is `lwr_base_link`.
+/// A table of frames that replaces tf2. All poses are in `world`, which is `lwr_base_link`.
 class WorldFrames : public coglab_controllers::GoalSource {
  public:
-  /// Tells where a frame was seen, at a time of the robot's clock, ns.
+  /// Stores the pose of a frame, seen at `stamp_ns` (ns, robot's clock).
   void set(const std::string& frame, const Pose& in_world, std::int64_t stamp_ns);
   void forget(const std::string& frame) { frames_.erase(frame); }
   bool lookup(const std::string& reference, const std::string& frame,
@@ -59,8 +59,8 @@ class LockstepRobot {
   double now() const { return 1e-9 * static_cast<double>(now_ns_); }  ///< s
   std::int64_t nowNs() const { return now_ns_; }
 
-  /// Whether the process of bridge and manager stands still, as after SIGSTOP: the cell goes on and
-  /// gets no answers.
+  /// True stops bridge and manager, like SIGSTOP on their process. The cell goes on without
+  /// answers.
   void setFrozen(bool frozen) { frozen_ = frozen; }
   bool frozen() const { return frozen_; }
 
@@ -85,10 +85,10 @@ class LockstepRobot {
   bool measured_ = false;
   bool frozen_ = false;
   int since_cycle_ = 0;
-  std::int64_t last_controller_ns_ = 0;  // of the sample of the last control cycle
+  std::int64_t last_controller_ns_ = 0;  // stamp of the last control cycle's sample
   WorldFrames frames_;
   ctrl_more::Logger
-      logger_;  // of the feedback stage; without a sink: the answers of requests say what matters
+      logger_;  // of the feedback stage; has no sink, because requests return their errors
   std::unique_ptr<coglab_controllers::ControllerManager> manager_;
   std::vector<coglab_controllers::DmpController*> dmps_;
 };

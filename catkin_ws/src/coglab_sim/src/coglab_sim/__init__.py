@@ -1,1 +1,1 @@
-"""The simulated cell of CogLab: what answers behind the wires when no robot is there."""
+"""The simulated cell of CogLab: it replaces robot and people behind the wire protocols."""

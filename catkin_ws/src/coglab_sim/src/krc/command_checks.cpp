@@ -27,7 +27,7 @@ bool allWithin(const float (&values)[N], std::size_t first, std::size_t last, do
   return true;
 }
 
-/// Values that no strategy accepts, whether the command is the first one or not.
+/// Values that no strategy accepts, in the first command and later.
 std::string checkValues(const CheckContext& context, const fri::CommandDatagram& command) {
   const Parameters& p = context.parameters;
   const std::uint32_t flags = command.flags;

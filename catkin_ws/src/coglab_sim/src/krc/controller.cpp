@@ -85,8 +85,8 @@ PeriodCommand Controller::tick(const Servos& arm, bool on_time) {
   if (time_ >= krl_due_ && time_ >= opens_at_) krl_due_ = time_ + program_->poll(*this);
   answered_ = false;
 
-  // After a fall-back or a change of strategy the set-point was re-anchored: nothing to interpolate
-  // from.
+  // A fall-back or a change of strategy has reset the set-point, so that there is no start to
+  // interpolate from.
   if (brakesWanted()) period.from = setPoint();
   period.to = setPoint();
   period.frame_to = frame_;
@@ -105,7 +105,7 @@ void Controller::judgeAnswer(const Servos& arm, bool on_time) {
   }
   if (power() != fri::kAllDrivesOn) {
     entry_pending_ =
-        true;  // the PC mirrors while the drives are off and enters anew when they return
+        true;  // the PC mirrors the position while the drives are off and enters again afterwards
     missed_in_row_ = 0;
     return;
   }
@@ -134,7 +134,7 @@ void Controller::judgeAnswer(const Servos& arm, bool on_time) {
   entry_pending_ = false;
   follow(answer_);
   if ((flags_ & fri::kJointPosition) == 0) {
-    // Cartesian impedance without joint command: the joint set-point goes where the arm goes.
+    // Cartesian impedance without joint command: the joint set-point follows the arm.
     offset_ = arm.position() - own_;
     last_step_.setZero();
   }
@@ -181,7 +181,7 @@ fri::MeasurementDatagram Controller::measure(const Servos& arm, const ArmSignals
   measured_once_ = true;
   m.krl = krl_out_;
   m.timestamp = static_cast<float>(time_);
-  // Measurements that follow friClose still say monitor mode: OFF is never on the wire.
+  // Measurements after friClose still report monitor mode: OFF is never sent.
   m.state = static_cast<std::uint16_t>(state_ == FriState::Command ? state_ : FriState::Monitor);
   m.quality = static_cast<std::uint16_t>(statistics_.quality());
   m.measurement_period = m.command_period = static_cast<float>(parameters_.period);
@@ -218,7 +218,7 @@ fri::MeasurementDatagram Controller::measure(const Servos& arm, const ArmSignals
   fri::wrenchToWire(wrench, m.external_wrench);
 
   for (int row = 0; row < 6; ++row) {
-    const int source = row < 3 ? row : 8 - row;  // the wire's rotation rows are z y x
+    const int source = row < 3 ? row : 8 - row;  // the wire's order of rotations is z y x
     for (int column = 0; column < 7; ++column) {
       m.jacobian[7 * row + column] = static_cast<float>(jacobian(source, column));
     }
@@ -336,7 +336,7 @@ void Controller::restartProgram(double period, double pause) {
   requireWithin("krc/period", period);
   if (!(pause >= 0.0)) throw std::invalid_argument("pause must not be negative");
   friClose();
-  lingers_until_ = time_;  // the program was cancelled and did not run to its end
+  lingers_until_ = time_;  // the program was cancelled before its end
   parameters_.period = period;
   program_ = makeKrlProgram(parameters_.convention);
   krl_out_ = {};
@@ -344,7 +344,7 @@ void Controller::restartProgram(double period, double pause) {
 }
 
 // --------------------------------------------------------------------------------------------------------------
-// what the KRL program can see and do
+// interface of the KRL program
 
 void Controller::setToBool(int index, bool value) {
   const auto bit = static_cast<std::uint16_t>(1U << (index - 1));

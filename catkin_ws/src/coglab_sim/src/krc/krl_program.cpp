@@ -15,7 +15,7 @@ constexpr std::array<const char*, 7> kNames = {
 
 bool isStrategy(std::int32_t value) { return value == 10 || value == 20 || value == 30; }
 
-/// The part every program shares: open FRI once, open the brakes, wait for a quality, start.
+/// Common part of all programs: open FRI once, open the brakes, wait for a quality, start.
 class StartSequence {
  public:
   enum class Outcome { Working, Started, NoDrives, PoorQuality, NotEntered };
@@ -25,7 +25,8 @@ class StartSequence {
     nudged_ = false;
   }
 
-  /// One poll; `wait` receives the time until the next one. Working until the outcome is known.
+  /// One poll; sets `wait` to the time until the next one. Returns Working until the outcome is
+  /// known.
   Outcome poll(KrlInterface& krl, lwr_fri_bridge::fri::Quality needed, double& wait) {
     wait = krl.parameters().krl_poll;
     waited_ += wait;
@@ -46,7 +47,7 @@ class StartSequence {
   bool nudged_ = false;
 };
 
-/// Opens FRI and the brakes, then does what the convention does.
+/// Opens FRI and the brakes, then runs the convention.
 class BasicProgram : public KrlProgram {
  public:
   double poll(KrlInterface& krl) final {
@@ -75,7 +76,7 @@ class BasicProgram : public KrlProgram {
 class Coglab : public BasicProgram {
  protected:
   void begin(KrlInterface& krl) override {
-    done_ = krl.frmInt(3);  // what an earlier run left behind is not a request
+    done_ = krl.frmInt(3);  // ignore the value of an earlier run
     krl.setToInt(1, done_);
     krl.setToInt(16, 4010);
   }
@@ -159,7 +160,7 @@ class CentroEpiaggio : public BasicProgram {
       if (isStrategy(krl.frmInt(1))) krl.setKrlStrategy(krl.frmInt(1));
       sequence_.begin();
       starting_ = true;
-      armed_ = false;  // after a fall-back the script wants to see the stop before the next start
+      armed_ = false;  // after a fall-back the script needs a stop before the next start
       wait = krl.parameters().krl_message_wait;
     }
     return wait;
@@ -170,8 +171,8 @@ class CentroEpiaggio : public BasicProgram {
   bool armed_ = false;
 };
 
-/// Stanford FRIControl.src: levels in INT[16], does not wait for a quality, starts again as long as
-/// 10 is asked.
+/// Stanford FRIControl.src: levels in INT[16], does not wait for a quality, starts again while the
+/// PC requests 10.
 class Stanford : public BasicProgram {
  protected:
   void begin(KrlInterface& krl) override {
@@ -215,7 +216,7 @@ class Stanford : public BasicProgram {
 };
 
 /// RCPRG / TUM fri_start.src: a flag in BOOL[1] with a code in INT[1]; always joint impedance;
-/// wants a free arm.
+/// needs a free arm.
 class RcprgTum : public BasicProgram {
  protected:
   void begin(KrlInterface& krl) override { krl.setKrlStrategy(30); }
@@ -305,9 +306,9 @@ class RttLwr : public BasicProgram {
   bool armed_ = false, ended_ = false;
 };
 
-/// OpenKC, as public clients and emulators of its program speak it: BOOL[1] with a command in
-/// INT[16]; TO_INT[15] echoes it, TO_INT[14] counts, TO_INT[16] is the result, TO_BOOL[1] says so
-/// until the PC has taken BOOL[1] back. Impedances: stiffness in INT, damping in REA.
+/// OpenKC, by its public clients and emulators: BOOL[1] with a command in INT[16]. TO_INT[15]
+/// echoes the command, TO_INT[14] counts, TO_INT[16] is the result. TO_BOOL[1] signals it until the
+/// PC clears BOOL[1]. Impedances: stiffness in INT, damping in REA.
 class OpenKc : public BasicProgram {
  protected:
   double run(KrlInterface& krl) override {
@@ -356,7 +357,7 @@ class OpenKc : public BasicProgram {
   void setCartesianImpedance(KrlInterface& krl) {
     Vector6 stiffness, damping;
     for (int i = 0; i < 6; ++i) {
-      const int axis = i < 3 ? i : 8 - i;  // KRL's A B C turn about z y x
+      const int axis = i < 3 ? i : 8 - i;  // KRL's angles A B C rotate about z y x
       stiffness[axis] = krl.frmInt(10 + i);
       damping[axis] = static_cast<double>(krl.frmReal(11 + i));
     }
@@ -408,8 +409,8 @@ class OpenKc : public BasicProgram {
   bool served_ = false, ended_ = false;
 };
 
-/// KUKA's own sample application: the PC shows 10 in INT[1] once it is content; one run, then
-/// INT[1] = -1 ends it.
+/// KUKA's sample application: the PC sets INT[1] to 10 when it is ready. There is one run; INT[1] =
+/// -1 ends it.
 class KukaSample : public BasicProgram {
  protected:
   double run(KrlInterface& krl) override {

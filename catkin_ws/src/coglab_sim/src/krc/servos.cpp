@@ -12,7 +12,7 @@ using lwr_fri_bridge::fri::ControlStrategy;
 
 namespace {
 
-constexpr std::uint64_t kStream = 11;  // of the seed, for the errors of the model
+constexpr std::uint64_t kStream = 11;  // random stream of the model's errors
 
 double share(Random& random, double largest) {
   return 1.0 + largest * (2.0 * random.uniform() - 1.0);
@@ -64,7 +64,7 @@ Servos::Law Servos::jointLaw(const ServoCommand& command, const Vector7& stiffne
 
 Servos::Law Servos::frameLaw(const ServoCommand& command, double dt) const {
   const Matrix67& jacobian = terms_.jacobian;
-  // Mass of each tip direction on its own: 1 / (J (M+B)^-1 J^T)_ii.
+  // Effective mass of each tip direction alone: 1 / (J (M+B)^-1 J^T)_ii.
   Matrix7 total = terms_.mass;
   total.diagonal() += rotor_inertia_;
   const Eigen::LLT<Matrix7> factor(total);
@@ -86,8 +86,8 @@ Servos::Law Servos::frameLaw(const ServoCommand& command, double dt) const {
       jacobian.transpose() * (damping + dt * command.frame_stiffness).asDiagonal() * jacobian;
   law.pull = jacobian.transpose() * (damping + dt * command.frame_stiffness).cwiseProduct(wanted);
 
-  // Posture of the redundant joint: a soft spring to the joint set-point, filtered so that the tip
-  // does not feel it.
+  // Posture of the redundant joint: a soft spring to the joint set-point, projected so that it
+  // exerts no force at the tip.
   Eigen::Matrix<double, 6, 6> gram = jacobian * jacobian.transpose();
   gram.diagonal().array() += 1e-6;
   const Eigen::LLT<Eigen::Matrix<double, 6, 6>> gram_factor(gram);
@@ -123,8 +123,7 @@ const Vector7& Servos::command(const ServoCommand& command, double dt) {
   }
   const Vector7 push = system * velocity_ + dt * law.pull;
   const Vector7 after = (system + dt * law.damping).llt().solve(push);
-  // The controller carries the arm's own weight and velocity forces in every strategy; it does not
-  // know of loads.
+  // Every strategy compensates the arm's own gravity and Coriolis forces, but not loads.
   const Vector7& limit = parameters_.torque_limit;
   motor_torque_ = (law.constant - law.damping * after + terms_.gravity + terms_.coriolis)
                       .cwiseMax(-limit)

@@ -5,7 +5,7 @@
 
 namespace coglab_sim::plant {
 namespace {
-// The last share of the tension limit over which a motor slows down.
+// Last share of the tension limit, over which a motor slows down.
 constexpr double kSlowing = 0.2;
 // Share of the stroke at which a target counts as reached.
 constexpr double kThere = 1e-6;

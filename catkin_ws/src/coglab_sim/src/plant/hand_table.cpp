@@ -15,7 +15,7 @@ namespace {
 const std::array<const char*, kFingers> kFingerNames = {"thumb", "index", "middle", "ring",
                                                         "little"};
 
-/// A map of the file with the words that its errors begin with.
+/// A map of the file, with the prefix of its error messages.
 class Section {
  public:
   Section(YAML::Node node, std::string where) : node_(std::move(node)), where_(std::move(where)) {

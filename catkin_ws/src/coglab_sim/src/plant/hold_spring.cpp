@@ -17,7 +17,7 @@ Wrench HoldSpring::evaluate(const Pose& hand, const Twist& hand_twist, const Fre
   Vector3d force = share * (spring + 2.0 * w * body.mass * (speed - body.twist.linear));
   if (const double size = force.norm(); size > limits.force) {
     force *= limits.force / size;
-    // The place follows so far that the spring alone carries what the limit can.
+    // The target follows the body until the spring force equals the limit.
     const double carried = share * spring.norm();
     if (carried > limits.force)
       in_hand_.position -= hand.rotation.conjugate() * (stretch * (1.0 - limits.force / carried));

@@ -10,7 +10,7 @@ namespace {
 [[noreturn]] void throwError(const char* text) {
   throw std::runtime_error(std::string("MuJoCo: ") + text);
 }
-void dropWarning(const char*) {}  // the plant reads them from mjData
+void dropWarning(const char*) {}  // the plant reads warnings from mjData
 
 void checkLibrary() {
   // By default MuJoCo ends the process on an error and writes a file on a warning.

@@ -10,10 +10,10 @@
 namespace coglab_sim::plant {
 namespace {
 
-// Collision groups: one bit each, and the groups that it meets. Fingers pass through
-// each other and through the palm. The object has two shapes, since a cylinder meets a capsule in
-// one point only: what hands meet is round (a capsule with the cylinder's side), what planes meet
-// is the solid itself.
+// Collision groups: one bit each, and the groups it collides with. Fingers pass through each other
+// and through the palm. The object has two shapes, because a cylinder touches a capsule in one
+// point only: hands collide with a round shape (a capsule with the cylinder's side), planes with
+// the solid itself.
 struct Group {
   int own, meets;
 };
@@ -25,8 +25,8 @@ constexpr Group kSolidGroup{kSolid, kGround};
 constexpr Group kGroundGroup{kGround, kArm | kHand | kSolid};
 constexpr Group kPersonGroup{kPerson, kArm | kHand};
 
-// Impratio 30 holds friction grasps; fewer than about 5 iterations, impratio 1 or condim 3 lose
-// round objects (measured). Euler treats joint damping implicitly.
+// With impratio 30 friction grasps hold. With fewer than about 5 iterations, impratio 1 or condim 3
+// the hand loses round objects (measured). Euler treats joint damping implicitly.
 constexpr const char* kHead = R"(
   <compiler angle="radian" autolimits="false" inertiafromgeom="false"/>
   <option timestep="0.001" gravity="0 0 -9.81" integrator="Euler" solver="Newton" cone="elliptic"
@@ -46,7 +46,7 @@ class Writer {
                                ": expected 7 joints to the hand's palm " + scene.hand.palm +
                                ", found " + std::to_string(arm_.size()));
     const double hand = robot_.links.at(scene.hand.palm).mass;
-    if (scene.hand.phalangesMass() >= hand)  // what the palm itself would be left with
+    if (scene.hand.phalangesMass() >= hand)  // the palm would have no mass left
       throw std::invalid_argument("hand table: the phalanges weigh " +
                                   std::to_string(scene.hand.phalangesMass()) +
                                   " kg, more than the whole hand " + scene.hand.palm + " in " +
@@ -107,8 +107,8 @@ class Writer {
                 << i(0, 1) << ' ' << i(0, 2) << ' ' << i(1, 2) << '"';
   }
 
-  /// The palm is what is left of the description's hand without the phalanges, so that mass and
-  /// centre of mass of the whole open hand stay.
+  /// The palm gets the inertia of the description's hand minus the phalanges. Mass and centre of
+  /// mass of the whole open hand stay the same.
   void palmInertial(const Link& palm) {
     MassMoment rest = robot_.withMovableLinks(palm.name);
     Vector3d pivot = Vector3d::Zero();
@@ -135,11 +135,11 @@ class Writer {
          << scene_.hand.rolling << '"';
   }
 
-  /// A link with everything below it; the palm carries the fingers of the table.
+  /// Writes a link with all links behind it; the palm gets the fingers of the table.
   void link(const std::string& name, const Joint* joint = nullptr) {
     const Link& link = robot_.links.at(name);
     const bool palm = name == scene_.hand.palm;
-    if (name == "world") {  // MuJoCo's own name of what stands still
+    if (name == "world") {  // MuJoCo's name of the fixed body
       for (const Joint* next : robot_.below(name)) this->link(next->child, next);
       return;
     }
@@ -191,7 +191,7 @@ class Writer {
     out_ << "<body name=\"" << p.name << '"';
     vector("pos", p.pivot) << ">\n<inertial mass=\"" << p.mass << '"';
     vector("pos", 0.5 * p.length * p.along);
-    // A solid cylinder of the capsule's length and radius.
+    // Inertia of a solid cylinder with the capsule's length and radius.
     const double across = p.mass * (3.0 * p.radius * p.radius + p.length * p.length) / 12.0;
     const double about = 0.5 * p.mass * p.radius * p.radius;
     const Matrix3d i =
@@ -226,7 +226,7 @@ class Writer {
       out_ << "<geom type=\"" << (round ? "capsule" : object.shape) << '"';
       vector("size", size);
       vector("pos", object.center);
-      // Priority: the friction of a contact is the object's, whatever it touches.
+      // Priority: contacts always use the friction of the object.
       out_ << " priority=\"1\" friction=\"" << object.friction << ' ' << scene_.hand.torsional
            << ' ' << scene_.hand.rolling << '"';
       if (round) out_ << " group=\"3\"";  // not drawn: MuJoCo shows groups 0 to 2
@@ -235,8 +235,8 @@ class Writer {
     out_ << "</body>\n";
   }
 
-  /// Fist and forearm of the person behind the frame human_hand, x toward the person; the inertia
-  /// is that of the forearm about the hand.
+  /// Fist and forearm of the person behind the frame human_hand, x toward the person. The inertia
+  /// is the forearm's about the hand.
   void person() {
     out_ << "<body name=\"" << kPersonBody << "\" pos=\"5 0 5\">\n<freejoint name=\"person\"/>\n"
          << "<inertial pos=\"0 0 0\" mass=\"" << kPersonMass
@@ -245,7 +245,8 @@ class Writer {
     group(kPersonGroup, 3) << "/>\n</body>\n";
   }
 
-  /// Solids of links that are at most two joints apart overlap by the way they are drawn.
+  /// Excludes contacts between links at most two joints apart, because their solids overlap in the
+  /// description.
   void neighbours() {
     std::vector<std::string> bodies;
     for (const Joint* joint : robot_.chainTo(scene_.hand.palm)) {
@@ -259,7 +260,7 @@ class Writer {
         out_ << "<exclude body1=\"" << bodies[i] << "\" body2=\"" << bodies[j] << "\"/>\n";
       }
     }
-    // Fingers stand on the wrist, whose solids reach into the hand.
+    // Fingers do not collide with the wrist, whose solids reach into the hand.
     for (const Phalanx& phalanx : scene_.hand.phalanges) {
       for (std::size_t i = bodies.size() - 3; i < bodies.size() - 1; ++i)
         out_ << "<exclude body1=\"" << bodies[i] << "\" body2=\"" << phalanx.name << "\"/>\n";

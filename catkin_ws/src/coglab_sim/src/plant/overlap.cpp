@@ -8,7 +8,7 @@
 namespace coglab_sim::plant {
 namespace {
 
-/// m from a point in the geom's frame to its surface, negative inside.
+/// Distance (m) from a point in the geom's frame to its surface, negative inside.
 double distanceFrom(const mjModel* m, int geom, const Vector3d& p) {
   const Eigen::Map<const Vector3d> size(m->geom_size + 3 * geom);
   Vector3d beyond;
@@ -37,7 +37,7 @@ Pose poseOf(const mjData* d, int geom) {
   return {Eigen::Map<const Vector3d>(d->geom_xpos + 3 * geom), Quaterniond(Matrix3d(turn))};
 }
 
-/// m by which balls inside `inner` stand in `outer`, largest.
+/// Largest depth (m) of balls inside `inner` in `outer`.
 double depthOf(const mjModel* m, const mjData* d, int inner, int outer) {
   if (m->geom_type[inner] == mjGEOM_PLANE) return 0.0;
   constexpr int kSteps = 4;  // from the middle outward

@@ -1,5 +1,5 @@
 /// @file
-/// How deep solids of a model stand in each other, for poses that are to be refused.
+/// Overlap of solids in a model, to refuse such poses.
 #pragma once
 
 #include <functional>
@@ -8,19 +8,18 @@
 
 namespace coglab_sim::plant {
 
-/// Two geoms and how deep (m) one stands in the other; depth 0: none does.
+/// Two geoms and the depth (m) of their overlap; 0: none.
 struct Overlap {
   int one = -1, two = -1;
   double depth = 0.0;
 };
 
-/// The deepest overlap of two geoms of different bodies that `counts` accepts. The contacts have to
-/// be those of the state as it is (mj_step1).
+/// The deepest overlap of two geoms of different bodies that `counts` accepts. The contacts must be
+/// up to date (mj_step1).
 ///
-/// Contacts alone miss one solid deep inside another: where their middles coincide MuJoCo finds no
-/// direction that parts them, and some pairs do not collide at all. So balls inside the one are
-/// held against the other besides; that depth is a lower bound, so that nothing is refused by
-/// mistake.
+/// Contacts alone miss one solid deep inside another: if their middles coincide, MuJoCo finds no
+/// separating direction, and some pairs never collide. Therefore balls inside one solid are also
+/// tested against the other. This depth is a lower bound, so that no valid pose is refused.
 Overlap deepestOverlap(const mjModel* m, const mjData* d,
                        const std::function<bool(int one, int two)>& counts);
 

@@ -14,36 +14,36 @@
 namespace coglab_sim::plant {
 namespace {
 
-constexpr double kLockSpeed = 0.005;     // rad/s at which closed brakes hold
+constexpr double kLockSpeed = 0.005;     // rad/s below which closed brakes hold
 constexpr double kBrakeSpeed = 0.02;     // rad/s over which the brake torque reverses
-constexpr double kLockInertia = 1e6;     // kg m^2 of a joint on its brake, as contacts feel it
-constexpr double kFastest = 10.0;        // m/s of a free body: nothing in this cell is so fast
+constexpr double kLockInertia = 1e6;     // kg m^2, effective inertia of a braked joint in contacts
+constexpr double kFastest = 10.0;        // m/s, plausible limit of a free body
 constexpr double kFastestJoint = 100.0;  // rad/s
-constexpr double kFastestSpin = 1000.0;  // rad/s of a free body
+constexpr double kFastestSpin = 1000.0;  // rad/s, of a free body
 
-constexpr double kShareTime = 0.02;  // s over which load shares and the squeeze are averaged
-constexpr double kPersonAge = 0.05;  // s for which the hand goes on as it went after its message
-constexpr double kGripBegins = 0.05, kGripEnds = 0.02;
-// m by which an object may slide in the person's hand, beyond where the grip reaches, before it is
-// out of the fingers: about the length of a fingertip.
+constexpr double kShareTime = 0.02;  // s, averaging time of load shares and squeeze
+constexpr double kPersonAge = 0.05;  // s after a message during which the hand keeps its velocity
+constexpr double kGripBegins = 0.05, kGripEnds = 0.02;  // grip 0..1 of the person's hand
+// m that an object may slide in the person's hand beyond the grip's reach before the fingers lose
+// it: about the length of a fingertip.
 constexpr double kSlidOut = 0.02;
-// What an arm follows: m that a person's hand lags at most behind where it is wanted, m/s and rad/s
-// of a person's fastest reach and turn. Messages may ask for more; no arm does it.
+// Limits of a person's arm: largest lag behind the commanded hand (m), fastest reach (m/s) and turn
+// (rad/s). Messages beyond them are limited.
 constexpr double kLag = 0.15, kFastestReach = 5.0, kFastestTurn = 20.0;
 
-constexpr double kInside = 0.003;  // m by which anything may stand in something at a start
-// m by which the object may stand in a phalanx, which gives way: less than half of its thickness.
+constexpr double kInside = 0.003;  // m, largest overlap in a start state
+// m, largest overlap of the object with a phalanx, which yields: less than half of its thickness.
 constexpr double kInFinger = 0.008;
 
-// How the robot's hand takes an object at a start: the shape of the cylindrical grasp, bytes of the
-// five motors (thumb opposed, all others nearly open), and the current at which they stop, half of
-// what the tension limit adds. Ours.
+// Grasp of the robot's hand in a start state: positions (bytes) of the five motors for the
+// cylindrical grasp (thumb opposed, all others nearly open), and the current at which they stop,
+// half of the current that the tension limit adds. Our choice.
 constexpr std::array<double, kMotors> kPreshape = {245 / 255.0, 5 / 255.0, 30 / 255.0, 50 / 255.0,
                                                    50 / 255.0};
 constexpr double kCloseCurrent = 240.0;                         // counts
 constexpr int kOpening = 300, kClosing = 2500, kHanging = 300;  // steps
-constexpr double kCarries = 1.5;  // friction over weight from which on it hangs in the fingers
-constexpr double kStays = 0.02;   // m that it may move in the palm once it hangs in the fingers
+constexpr double kCarries = 1.5;  // smallest ratio of friction to weight of a hanging object
+constexpr double kStays = 0.02;   // m, largest motion of the hanging object in the palm
 
 SceneDescription sceneOf(const PlantConfig& config) {
   return {config.urdf, config.hand, config.object, config.surroundings,
@@ -63,9 +63,9 @@ Plant::Plant(const PlantConfig& config)
       motors_(config.hand),
       position_(config.home) {
   arm_of_person_.engageAt(Pose{});
-  person_.hand.position = Vector3d(1.30, 0.20, 0.15);  // where a person's hand rests
+  person_.hand.position = Vector3d(1.30, 0.20, 0.15);  // rest position of a person's hand
   put(model_->person_position, model_->person_velocity, person_.hand, {});
-  // Until it is placed, the object is where a person would carry it.
+  // Until the object is placed, it is where a person would carry it.
   place_ = Place::PersonHand;
   placed_ = true;
   in_hand_.position = Vector3d(-0.08, 0.0, -0.05);
@@ -116,7 +116,7 @@ void Plant::setObject(const Object& object) {
   changed.object = object;
   auto fresh = std::make_unique<Model>(sceneOf(changed));
   mjData *to = fresh->data(), *from = model_->data();
-  // The models differ in the object's figures alone.
+  // The models differ only in the values of the object.
   std::copy(from->qpos, from->qpos + model_->get()->nq, to->qpos);
   std::copy(from->qvel, from->qvel + model_->get()->nv, to->qvel);
   std::copy(model_->get()->opt.gravity, model_->get()->opt.gravity + 3, fresh->get()->opt.gravity);
@@ -125,8 +125,8 @@ void Plant::setObject(const Object& object) {
   mj_step1(model_->get(), model_->data());
 }
 
-/// Torques of motors, friction, brakes and block on the joints; what resists with the speed goes
-/// into the joints' damping, which the integrator treats implicitly.
+/// Applies torques of motors, friction, brakes and block to the joints. Resistance that depends on
+/// speed becomes joint damping, which the integrator treats implicitly.
 void Plant::applyArm(const Vector7& motor_torque) {
   mjModel* m = model_->get();
   mjData* d = model_->data();
@@ -182,7 +182,7 @@ void Plant::step(const Vector7& motor_torque, double dt) {
   applyArm(motor_torque);
   const bool stiff = brakes_ || blocked_;
   if (stiff || was_stiff_) {
-    // The inertias, dampers and springs of the joints that step1 has used were those of before.
+    // step1 has used the previous inertias, dampers and springs of the joints.
     mj_crb(m, d);
     mj_factorM(m, d);
     mj_passive(m, d);
@@ -199,7 +199,7 @@ void Plant::step(const Vector7& motor_torque, double dt) {
   mj_step1(m, d);
 }
 
-/// Nms/rad: critical for the inertia that the joint has by itself.
+/// Critical damping for the joint's own inertia, Nms/rad.
 double Plant::blockDamping(int dof) const {
   const mjModel* m = model_->get();
   const double stiffness = config_.drives.block_stiffness;
@@ -207,7 +207,7 @@ double Plant::blockDamping(int dof) const {
          m->opt.timestep * stiffness;
 }
 
-/// Torque of the push and of the load that nobody knows of on the joints of the arm, Nm.
+/// Torque of the push and of the unknown load on the joints of the arm, Nm.
 Vector7 Plant::pushedTorque() const {
   const mjModel* m = model_->get();
   const mjData* d = model_->data();
@@ -261,11 +261,11 @@ void Plant::readArm(const Vector7& before, double dt) {
   }
 }
 
-/// The body of the arm or the hand that is faster than anything here can be; 0: none is.
+/// Body of the arm or the hand that is faster than plausible; 0: none.
 int Plant::tooFast() {
   const mjModel* m = model_->get();
   mjData* d = model_->data();
-  mj_step1(m, d);  // the velocities of bodies are those of the step before
+  mj_step1(m, d);  // body velocities are those of the previous step
   const int arm = m->body_rootid[model_->palm];
   for (int body = 1; body < m->nbody; ++body) {
     if (m->body_rootid[body] != arm) continue;
@@ -276,8 +276,8 @@ int Plant::tooFast() {
   return 0;
 }
 
-/// What was left out of the last step for want of room, in words; empty: nothing. A contact that is
-/// not there lets hands and objects pass through each other.
+/// Message about contacts or constraints that MuJoCo left out of the last step for lack of room;
+/// empty: none. Without a contact, hands and objects pass through each other.
 std::string Plant::leftOut() const {
   const mjWarningStat* warnings = model_->data()->warning;
   if (warnings[mjWARN_CONTACTFULL].number > 0)
@@ -303,7 +303,7 @@ void Plant::check() {
     fingers += std::abs(d->qvel[dof]);
     fingers_fastest = std::max(fingers_fastest, std::abs(d->qvel[dof]));
   }
-  // No sum is finite with a number in it that is not.
+  // A sum is finite only if all its terms are.
   const double all = Eigen::Map<const Eigen::VectorXd>(d->qpos, m->nq).sum();
   bool warned = !std::isfinite(all) || !std::isfinite(arm + fingers);
   for (const int kind : {mjWARN_BADQPOS, mjWARN_BADQVEL, mjWARN_BADQACC})
@@ -315,7 +315,7 @@ void Plant::check() {
                      : !(fingers_fastest < kFastestJoint) ? "a joint of a finger"
                                                           : "";
   const std::string left_out = leftOut();
-  // Nothing is farther from any joint than these reaches, so that nothing is faster than this.
+  // Upper bound of the speed: nothing is farther from any joint than these reaches.
   if (what.empty() && left_out.empty() && !(reach_ * arm + finger_reach_ * fingers < kFastest)) {
     if (const int body = tooFast(); body != 0) what = mj_id2name(m, mjOBJ_BODY, body);
   }
@@ -339,7 +339,7 @@ Twist Plant::twistOf(int body) const {
 
 Plant::Terms Plant::terms() const {
   const mjModel* m = model_->get();
-  auto* d = const_cast<mjData*>(model_->data());  // the calls below only read it
+  auto* d = const_cast<mjData*>(model_->data());  // the calls below do not change it
   Terms terms;
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> mass(m->nv, m->nv),
       linear(3, m->nv), angular(3, m->nv);
@@ -356,7 +356,7 @@ Plant::Terms Plant::terms() const {
 }
 
 double Plant::energy() {
-  // Without the flag MuJoCo leaves the energy at 0; with it every step would compute it.
+  // Without the flag MuJoCo leaves the energy at 0; with it, every step computes the energy.
   int& flags = model_->get()->opt.enableflags;
   const int before = std::exchange(flags, flags | mjENBL_ENERGY);
   mj_energyPos(model_->get(), model_->data());
@@ -426,7 +426,8 @@ void Plant::setPerson(const PersonInput& person) {
   person_age_ = 0.0;
 }
 
-/// The person's hand is there from now on, with what was put into it; or not, if it cannot be.
+/// Adds the person's hand with the object placed in it. Leaves it out if it would overlap
+/// something.
 void Plant::addPerson(const PersonInput& person) {
   const State before = state();
   put(model_->person_position, model_->person_velocity, person.hand, person.twist);
@@ -441,8 +442,8 @@ void Plant::addPerson(const PersonInput& person) {
   }
 }
 
-/// Before the person has come, their hand and what is in it stand still; what fingers are just
-/// closing around stays in their palm.
+/// Keeps hand and object still until the person comes, and keeps an object in the robot's palm
+/// while the fingers close.
 void Plant::keepPlaced() {
   if (!person_present_) put(model_->person_position, model_->person_velocity, person_.hand, {});
   if (!placed_) return;
@@ -456,8 +457,8 @@ void Plant::keepPlaced() {
       {twist.at(object.position - hand.position), twist.angular});
 }
 
-/// Whether the person's grip has the object: from where it was put, from where the fingers find it,
-/// or not any more, since they have opened or it has slid out of them.
+/// Starts or ends the person's grip. It starts where the object was placed or where the fingers
+/// meet it. It ends when the fingers open or the object slides out.
 void Plant::updateGrip(const FreeBody& held, const Pose& hand) {
   const double away = distanceFrom(config_.object, object().inverse() * hand.position);
   const bool open = person_.grip<kGripEnds, closed = person_.grip> kGripBegins;
@@ -500,7 +501,7 @@ void Plant::applyPerson(double dt) {
   const PersonParameters& p = config_.person;
   Wrench hold = arm_of_person_.evaluate(wanted, person_.twist, hand,
                                         {p.arm_bandwidth, p.arm_force, p.arm_torque}, 1.0);
-  arm_of_person_.engageAt(Pose{});  // an arm that was pushed aside comes back
+  arm_of_person_.engageAt(Pose{});  // a displaced arm comes back
 
   const double friction = 2.0 * object.friction * person_.grip * person_.grip_force;
   updateGrip(held, hand_frame);
@@ -519,7 +520,7 @@ void Plant::applyPerson(double dt) {
   std::copy(hold.torque.data(), hold.torque.data() + 3, on_hand + 3);
 }
 
-/// Adds what one body of a contact feels, in world axes; `normal` is the pressing part, N.
+/// Adds the contact force on one body, world axes; `normal` is its pressing part, N.
 void Plant::addContact(int body, int other, const Vector3d& force, double normal,
                        Pressing& pressing) {
   const auto phalanx = std::find(model_->phalanges.begin(), model_->phalanges.end(), body);
@@ -533,7 +534,7 @@ void Plant::addContact(int body, int other, const Vector3d& force, double normal
   (finger ? pressing.fingers : pressing.opposing) += normal;
 }
 
-/// Reads the contacts: forces on fingers and palm, and what carries the object.
+/// Reads the contacts: forces on fingers and palm, and shares of the object's weight.
 void Plant::readContacts(double dt) {
   const mjModel* m = model_->get();
   const mjData* d = model_->data();
@@ -553,7 +554,7 @@ void Plant::readContacts(double dt) {
     }
     mjtNum local[6];
     mj_contactForce(m, d, i, local);
-    // Rows of the frame are normal and tangents; the force acts on the second body.
+    // The rows of the frame are normal and tangents. The force acts on the second body.
     const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> frame(contact.frame);
     const Vector3d force = frame.transpose() * Vector3d(local[0], local[1], local[2]);
     addContact(one, two, -force, local[0], pressing);
@@ -576,7 +577,8 @@ void Plant::readContacts(double dt) {
   average(person_share_, std::clamp(grip_force_.z() / weight, 0.0, 1.0));
   average(squeeze_, opposed);
   average(grasp_force_, opposed > 0.0 ? pressing.fingers + pressing.opposing : 0.0);
-  // People know how their own hand moves: what that alone asks of the grip is not felt as a load.
+  // People know the motion of their own hand: the force that accelerates the object is not felt as
+  // load.
   Vector3d felt = Vector3d::Zero();
   if (grip_.engaged())
     felt = config_.object.mass * Eigen::Map<const Vector3d>(d->qacc + model_->person_velocity) -
@@ -595,7 +597,7 @@ std::string Plant::heldBy() const {
 }
 
 // ------------------------------------------------------------------------------------------------
-// what may stand where: an object that is placed, the surroundings, the person's hand
+// overlap checks: placed object, surroundings, person's hand
 
 std::string Plant::nameOf(int geom) const {
   const mjModel* m = model_->get();
@@ -606,15 +608,16 @@ std::string Plant::nameOf(int geom) const {
   return name != nullptr ? name : "something";
 }
 
-/// Whether two geoms must not stand in each other: they collide, or are object and forearm.
+/// True if two geoms must not overlap: they collide, or are object and forearm.
 bool Plant::excludeEachOther(int one, int two) const {
   const mjModel* m = model_->get();
   const int first = m->geom_bodyid[one], second = m->geom_bodyid[two];
   const auto root = [&](int body) { return m->body_rootid[body] == m->body_rootid[model_->palm]; };
   if (m->body_weldid[first] == m->body_weldid[second]) return false;
-  // The arm folded onto itself is found by its guard; neighbours overlap by the way they are drawn.
+  // The arm's guard detects an arm that touches itself; neighbouring links overlap in the
+  // description.
   if (root(first) && root(second)) return false;
-  // The person's fingers close on the object, and do not collide; the forearm behind them is solid.
+  // The person's fingers close on the object without collision; the forearm is solid.
   if ((first == model_->object && second == model_->person) ||
       (second == model_->object && first == model_->person))
     return true;
@@ -622,7 +625,7 @@ bool Plant::excludeEachOther(int one, int two) const {
          (m->geom_contype[two] & m->geom_conaffinity[one]) != 0;
 }
 
-/// Throws if a body (-1: anything but the object) stands in something too deep.
+/// Throws if a body (-1: any except the object) overlaps something too deeply.
 void Plant::refuseOverlap(int body, const char* where) const {
   const mjModel* m = model_->get();
   const auto deepest = [&](bool in_finger) {
@@ -658,8 +661,8 @@ Plant::State Plant::state() const {
   return {{d->qpos, d->qpos + m->nq}, {d->qvel, d->qvel + m->nv}};
 }
 
-/// Computes everything for the positions as they are now; where a body would stand in something,
-/// they become again what they were before, and it throws.
+/// Updates all quantities for the present positions. If a body overlaps something, restores the
+/// previous state and throws.
 void Plant::acceptOrRestore(const State& before, int body, const char* where) {
   mjData* d = model_->data();
   mj_step1(model_->get(), d);
@@ -694,7 +697,7 @@ void Plant::place(Place place, const Pose& pose) {
   placed_ = in_hand;
 }
 
-/// Forgets who held the object: it has just been placed.
+/// Resets the holders of an object that has just been placed.
 void Plant::resetObject() {
   grip_.release();
   placed_ = grip_lost_ = false;
@@ -704,8 +707,8 @@ void Plant::resetObject() {
   person_force_.setZero();
 }
 
-/// Tries it on a copy of the plant first: there the arm stands on its brakes in the same posture
-/// and the fingers close on the object. Only what they hold in the end is taken over.
+/// Tries the grasp on a copy of the plant: the arm stands on its brakes in the same posture, and
+/// the fingers close on the object. The result is adopted only if they hold it.
 void Plant::placeInRobotHand(const Pose& in_palm) {
   PlantConfig config = config_;
   config.home = position_;
@@ -736,8 +739,8 @@ void Plant::placeInRobotHand(const Pose& in_palm) {
   object_force_ = copy.object_force_;
 }
 
-/// Closes the hand of a plant that nobody else uses on the object, which is kept where it is to be
-/// in the palm, and lets it hang. Throws if the fingers do not hold it there.
+/// Closes the hand of this (temporary) plant on the object, which is kept at its pose in the palm,
+/// and then lets it hang. Throws if the fingers do not hold it there.
 void Plant::closeAround(const Pose& in_palm) {
   const Vector7 off = Vector7::Zero();
   setBrakes(true);

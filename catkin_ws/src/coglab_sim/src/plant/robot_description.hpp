@@ -1,5 +1,5 @@
 /// @file
-/// Links and joints of a URDF, as far as the plant needs them.
+/// Links and joints of a URDF that the plant needs.
 #pragma once
 
 #include <map>
@@ -12,7 +12,7 @@ namespace coglab_sim::plant {
 
 struct Solid {
   std::string kind;  ///< box, cylinder, sphere
-  Vector3d size;     ///< half extents; radius, half length; radius (m)
+  Vector3d size;     ///< m: half extents; radius, half length; radius
   Pose pose;         ///< in its link
 };
 
@@ -47,7 +47,7 @@ struct RobotDescription {
   std::vector<Joint> joints;  ///< in the order of the file
 
   std::vector<const Joint*> below(const std::string& link) const;
-  /// A link with all that hangs on it by movable joints, these at zero.
+  /// Moments of a link with all links on its movable joints, with these at zero.
   MassMoment withMovableLinks(const std::string& link) const;
   /// Movable joints from the root to a link. @throws std::runtime_error if there is no such link.
   std::vector<const Joint*> chainTo(const std::string& link) const;

@@ -1,5 +1,5 @@
 /// @file
-/// The controller's statistics over the last 100 packets, and the quality it concludes from them.
+/// The controller's statistics over the last 100 packets, and the resulting quality.
 #pragma once
 
 #include <array>
@@ -10,20 +10,20 @@
 
 namespace coglab_sim::krc {
 
-/// Counts answered and missed packets. Packets from before the first one count as missed, so
-/// quality has to be earned.
+/// Counts answered and missed packets. At the start the last 100 packets count as missed, so
+/// quality rises only with answers.
 class AnswerStatistics {
  public:
   explicit AnswerStatistics(const Parameters& parameters) : parameters_(parameters) {}
 
-  /// Notes one packet: whether its answer came in time and the round trip it took, s.
+  /// Records one packet: answered in time or not, and the round trip, s.
   void add(bool answered, double latency);
-  /// Forgets everything but the absolute number of misses.
+  /// Clears everything except the total number of misses.
   void clear();
 
   double answerRate() const { return answered_ / static_cast<double>(kWindow); }
   double missRate() const { return 1.0 - answerRate(); }
-  double latency() const;  ///< mean round trip of the answered ones, s
+  double latency() const;  ///< mean round trip of answered packets, s
   double jitter() const;   ///< mean absolute difference of successive round trips, s
   std::uint32_t missCounter() const { return misses_; }
   lwr_fri_bridge::fri::Quality quality() const;

@@ -1,5 +1,5 @@
 /// @file
-/// What the controller refuses in a command, with the words users know from its message window.
+/// Checks of commands. The texts are those of the controller's message window.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace coglab_sim::krc {
 
-/// What a command is judged against.
+/// State of the controller that a command is checked against.
 struct CheckContext {
   const Parameters& parameters;
   lwr_fri_bridge::fri::ControlStrategy strategy;
@@ -17,25 +17,26 @@ struct CheckContext {
   Pose frame_set_point;         ///< of the tip, before this command
   Vector7 last_torque;          ///< added torque in force, Nm
   Vector7 speed_limit;          ///< rad/s
-  std::uint32_t latched_flags;  ///< of entry; only for checkCyclic
+  std::uint32_t latched_flags;  ///< flags at entry; only for checkCyclic
 };
 
-/// A 3x4 frame of the wire as pose; false if it is not a rotation within `tolerance` or not finite.
+/// Converts a 3x4 frame of the wire to a pose. False if it is not finite or not a rotation within
+/// `tolerance`.
 bool poseFromWire(const float (&wire)[lwr_fri_bridge::fri::kFrameValues], double tolerance,
                   Pose& pose);
-/// A pose as 3x4 frame of the wire.
+/// Converts a pose to a 3x4 frame of the wire.
 void poseToWire(const Pose& pose, float (&wire)[lwr_fri_bridge::fri::kFrameValues]);
 
-/// The first joint (0..6) whose software limit switch this set-point (rad) lies beyond; -1: none.
+/// First joint (0..6) whose set-point (rad) is beyond its software limit switch; -1: none.
 int jointPastLimitSwitch(const Parameters& parameters, const Vector7& set_point);
-/// The line of the message window about it.
+/// Its line in the message window.
 std::string limitSwitchMessage(int joint);
 
-/// Sentence why the command cannot start command mode; empty if it can.
+/// Reason why the command cannot start command mode; empty if it can.
 std::string checkEntry(const CheckContext& context,
                        const lwr_fri_bridge::fri::CommandDatagram& command);
 
-/// Sentence why the command ends command mode; empty if it is followed.
+/// Reason why the command ends command mode; empty if it is accepted.
 std::string checkCyclic(const CheckContext& context,
                         const lwr_fri_bridge::fri::CommandDatagram& command);
 

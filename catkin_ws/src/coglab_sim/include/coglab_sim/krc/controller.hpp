@@ -1,10 +1,9 @@
 /// @file
-/// The robot controller (KRC) as seen through FRI: session state, statistics, checks, drives, KRL
-/// program.
+/// The robot controller (KRC) behind FRI: session state, statistics, checks, drives, KRL program.
 ///
-/// Per FRI period: `receive()` every datagram that came, then `tick()`, which judges the answer to
-/// the last measurement and returns the command of the servos for the next period; after the arm
-/// has moved, `measure()` writes the next measurement.
+/// Per FRI period: call `receive()` for every datagram, then `tick()`. It checks the answer to the
+/// last measurement and returns the servo command for the next period. After the arm has moved,
+/// `measure()` returns the next measurement.
 #pragma once
 
 #include <deque>
@@ -25,22 +24,22 @@ struct Message {
   std::string text;
 };
 
-/// Datagrams that were no answer, by reason.
+/// Numbers of rejected datagrams, by reason.
 struct Rejections {
   std::uint64_t wrong_size = 0;    ///< datagram is not 376 bytes
   std::uint64_t wrong_header = 0;  ///< id or size field
-  std::uint64_t stale = 0;         ///< reflects another counter than that of the last measurement
+  std::uint64_t stale = 0;         ///< does not reflect the last measurement's counter
   std::uint64_t repeated = 0;      ///< counter did not advance
 };
 
-/// Set-point movement of one FRI period for the joint servos.
+/// Set-points of one FRI period for the joint servos.
 struct PeriodCommand {
   Vector7 from, to;    ///< rad, interpolated linearly over the period
   ServoCommand servo;  ///< everything but position and velocity
   Pose frame_from, frame_to;
 };
 
-/// Measured quantities that go into a measurement.
+/// Signals of the arm for a measurement.
 struct ArmSignals {
   Vector7 position;         ///< rad
   Vector7 torque;           ///< measured, Nm
@@ -54,15 +53,15 @@ class Controller : private KrlInterface {
   Controller(const Controller&) = delete;
   Controller& operator=(const Controller&) = delete;
 
-  /// A datagram arrived `latency` s after the last measurement went out.
+  /// Takes a datagram that arrived `latency` s after the last measurement.
   void receive(const std::uint8_t* bytes, std::size_t size, double latency);
 
-  /// Ends the waiting for an answer. `on_time`: the stand-in itself was; if not, a missing answer
-  /// is bridged but not counted.
+  /// Ends the time for an answer. `on_time` false: the simulation itself was late, so that a
+  /// missing answer is bridged but not counted.
   /// @param arm  state of the arm now
   PeriodCommand tick(const Servos& arm, bool on_time);
 
-  /// The next measurement, with its counters.
+  /// Returns the next measurement with its counters.
   lwr_fri_bridge::fri::MeasurementDatagram measure(const Servos& arm, const ArmSignals& signals);
 
   bool brakesWanted() const { return !drives_on_; }
@@ -71,16 +70,16 @@ class Controller : private KrlInterface {
     return open && silent_until_ <= time_;
   }
 
-  // What people and faults do to a controller
+  // Actions of people, and faults
   void setEnablingSwitch(
       bool pressed);  ///< in T1/T2; stands for the operator safety gate in Automatic
   void setDriveError(int joint, bool on);            ///< joint 0..6; switches all drives off
-  void setSilent(double duration);                   ///< sends nothing for so long, s
-  void leaveCommandMode(const std::string& reason);  ///< fall-back as after a fault
+  void setSilent(double duration);                   ///< sends nothing for `duration` s
+  void leaveCommandMode(const std::string& reason);  ///< as after a fault
   void acknowledge();  ///< operator acknowledges messages; drives may be switched on again
-  /// The operator starts the KRL program anew, with another FRI period (s): FRI is closed, nothing
-  /// is sent for `pause` s, then the program opens it. @throws std::invalid_argument naming value
-  /// and range of the period.
+  /// Restarts the KRL program with another FRI period (s). FRI closes, nothing is sent for `pause`
+  /// s, then the program opens FRI again. @throws std::invalid_argument naming value and range of
+  /// the period.
   void restartProgram(double period, double pause);
 
   double time() const { return time_; }
@@ -88,12 +87,12 @@ class Controller : private KrlInterface {
   lwr_fri_bridge::fri::Quality friQuality() const { return statistics_.quality(); }
   lwr_fri_bridge::fri::ControlStrategy strategy() const { return strategy_; }
   std::uint16_t power() const;
-  /// Commanded total: own interpolator plus FRI offset, rad.
+  /// Commanded position: own interpolator plus FRI offset, rad.
   Vector7 setPoint() const { return own_ + offset_; }
   const AnswerStatistics& statistics() const { return statistics_; }
   const Rejections& rejections() const { return rejections_; }
-  /// How often a set-point in command mode lay beyond a software limit switch: one that was
-  /// commanded, or one that this controller went on to where an answer was missing.
+  /// Number of set-points in command mode beyond a software limit switch: commanded ones, and ones
+  /// extrapolated for missing answers.
   std::uint64_t limitSwitches() const { return limit_switches_; }
   const std::deque<Message>& messages() const { return messages_; }  ///< newest last, at most 200
   std::uint64_t messageCount() const { return message_count_; }
@@ -140,10 +139,10 @@ class Controller : private KrlInterface {
   lwr_fri_bridge::fri::FriState state_ = lwr_fri_bridge::fri::FriState::Off;
   lwr_fri_bridge::fri::ControlStrategy strategy_ = lwr_fri_bridge::fri::ControlStrategy::Position;
   double start_scale_ = 1.0;
-  // $STIFFNESS: what counts where the PC gives no value.
+  // Defaults of $STIFFNESS, used where the PC gives no value.
   Vector7 joint_stiffness_, joint_damping_;
   Vector6 frame_stiffness_, frame_damping_;
-  double opens_at_ = 0.0;  // the program is not started again before
+  double opens_at_ = 0.0;  // earliest time of the program's restart
 
   // Wire
   std::uint16_t counter_ = 0;  // of the last measurement
@@ -160,15 +159,15 @@ class Controller : private KrlInterface {
 
   // Set-points
   Vector7 own_, offset_ = Vector7::Zero(), last_step_ = Vector7::Zero();
-  Pose frame_own_, frame_;                          // set-point of the tip: KRC's own, and with FRI
+  Pose frame_own_, frame_;  // set-point of the tip: of the KRC alone, and with FRI
   lwr_fri_bridge::fri::CommandDatagram latched_{};  // impedance values in force
-  std::uint32_t flags_ = 0;                         // latched on entry
+  std::uint32_t flags_ = 0;                         // latched at entry
 
   // Drives
   bool drives_on_ = false, enabled_ = true, error_latched_ = false, entry_pending_ = false;
   double drives_on_at_ = -1.0;  // time at which a running nudge ends; < 0: none runs
   std::uint16_t drive_error_ = 0;
-  Vector7 saturated_ = Vector7::Zero();  // s each motor has been at its limit
+  Vector7 saturated_ = Vector7::Zero();  // s, time of each motor at its limit
   Vector7 temperature_;
 
   std::deque<Message> messages_;

@@ -1,9 +1,9 @@
 /// @file
-/// The programs that run on the controller and start and stop FRI on the PC's request.
+/// KRL programs of the controller. They start and stop FRI when the PC requests it.
 ///
-/// KRL indices count from 1. TO = controller to PC, FRM = PC to controller. Existing PC stacks
-/// bring their own program; each convention here answers the same requests at the same array places
-/// as that stack's script.
+/// KRL indices count from 1. TO = controller to PC, FRM = PC to controller. Each existing PC stack
+/// has its own program. A convention here answers the same requests at the same array indices as
+/// the script of that stack.
 #pragma once
 
 #include <memory>
@@ -14,7 +14,7 @@
 
 namespace coglab_sim::krc {
 
-/// What a KRL program can see and do.
+/// Interface of a KRL program to the controller.
 class KrlInterface {
  public:
   virtual ~KrlInterface() = default;
@@ -30,33 +30,33 @@ class KrlInterface {
   virtual lwr_fri_bridge::fri::Quality quality() const = 0;
   virtual int krlStrategy() const = 0;  ///< `$STIFFNESS.STRATEGY`: 10, 20 or 30
   virtual bool setKrlStrategy(
-      int strategy) = 0;  ///< false, with a message, if unknown or not in monitor mode
-  /// Defaults of $STIFFNESS, for values that the PC does not give: Nm/rad, N/m; damping normalised.
+      int strategy) = 0;  ///< false, with a message, if unknown or outside monitor mode
+  /// Sets the defaults of $STIFFNESS, used where the PC gives no value: Nm/rad, N/m; damping is
+  /// normalised.
   virtual void setJointImpedance(const Vector7& stiffness, const Vector7& damping) = 0;
   virtual void setCartesianImpedance(const Vector6& stiffness, const Vector6& damping) = 0;
   virtual bool drivesReady() const = 0;  ///< power on all joints and brakes open
 
   virtual void friOpen(double period) = 0;  ///< OFF -> MON; a period <= 0 keeps the present one
   virtual lwr_fri_bridge::fri::FriState friStart(
-      double scale) = 0;  ///< tries MON -> CMD, returns the state then
+      double scale) = 0;  ///< tries MON -> CMD, returns the new state
   virtual void friStop() = 0;
   virtual void friClose() = 0;
-  /// Acknowledges messages if the program may, and starts the tiny motion that opens the brakes;
-  /// see drivesReady().
+  /// Acknowledges messages if the program is allowed to, and starts the small motion that opens the
+  /// brakes; see drivesReady().
   virtual void nudge() = 0;
   virtual void show(const std::string& message) = 0;
   virtual const Parameters& parameters() const = 0;
 };
 
-/// One of the programs. `poll()` runs until the program's next WAIT and returns how long that is,
-/// s.
+/// One KRL program. `poll()` runs until the next WAIT and returns its duration, s.
 class KrlProgram {
  public:
   virtual ~KrlProgram() = default;
   virtual double poll(KrlInterface& krl) = 0;
 };
 
-/// The program for a convention.
+/// Creates the program of a convention.
 std::unique_ptr<KrlProgram> makeKrlProgram(KrlConvention convention);
 
 /// @throws std::invalid_argument naming the known conventions.

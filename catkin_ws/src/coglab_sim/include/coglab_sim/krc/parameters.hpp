@@ -1,16 +1,16 @@
 /// @file
-/// What the stand-in has to choose about the robot controller's behaviour.
+/// Parameters of the simulated robot controller.
 #pragma once
 
 #include "coglab_sim/geometry.hpp"
 
 namespace coglab_sim::krc {
 
-/// Operating modes of a KRC that matter here.
+/// Simulated operating modes of the KRC.
 enum class OperatingMode { T1, T2, Automatic };
 
-/// Which KRL program runs on the controller, i.e. how PC and program talk through the exchange
-/// arrays.
+/// KRL program on the controller. It defines the meaning of the exchange arrays between PC and
+/// controller.
 enum class KrlConvention { Coglab, CentroEpiaggio, Stanford, RcprgTum, RttLwr, OpenKc, KukaSample };
 
 /// Defaults, units and texts are in parameter_table.inc.

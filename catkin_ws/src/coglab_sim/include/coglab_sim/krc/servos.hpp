@@ -1,9 +1,9 @@
 /// @file
-/// What the robot controller knows of its arm, and its joint servos.
+/// The controller's model of the arm, and its joint servos.
 ///
-/// The controller's model is KDL's on the robot description, with errors as a real one has them:
-/// the mass of the hand and the inertias are off by a few percent, friction and loads are unknown.
-/// The arm itself moves elsewhere (plant/).
+/// The model is KDL's on the robot description, with the errors of a real controller: the mass of
+/// the hand and the inertias are wrong by a few percent, friction and loads are unknown. The arm
+/// itself is simulated in plant/.
 #pragma once
 
 #include <cstdint>
@@ -35,25 +35,25 @@ struct ServoCommand {
   Vector6 frame_damping = Vector6::Zero();    ///< normalised
 };
 
-/// Servos of the three strategies on a model of the arm. Dampers are linearly implicit in the
-/// velocity that the model expects after the step, so that a stiff servo is stable at 1 ms.
+/// Servos of the three strategies, with a model of the arm. Dampers are linearly implicit: they use
+/// the velocity that the model predicts after the step. A stiff servo is therefore stable at 1 ms.
 class Servos {
  public:
-  /// @param rotor_inertia  true ones, kg m^2; the servos know them with an error drawn by `seed`
+  /// @param rotor_inertia  true values, kg m^2; the servos use them with an error drawn with `seed`
   /// @throws std::runtime_error from ArmModel
   Servos(const std::string& urdf, const ServoParameters& parameters, const Vector7& rotor_inertia,
          std::uint64_t seed);
 
-  /// The encoders' newest values, rad and rad/s.
+  /// Takes the newest encoder values, rad and rad/s.
   void observe(const Vector7& position, const Vector7& velocity);
 
-  /// Motor torques for the next `dt` s, within the limits, Nm.
+  /// Returns the limited motor torques for the next `dt` s, Nm.
   const Vector7& command(const ServoCommand& command, double dt);
-  /// The motors are off.
+  /// Switches the motors off.
   void off() { motor_torque_.setZero(); }
 
-  /// Torque of the surroundings on the joints, Nm: what the torque sensors read, less what the
-  /// model says that the arm itself needs at this acceleration (rad/s^2).
+  /// External torque on the joints, Nm: the torque that the model needs at this acceleration
+  /// (rad/s^2) minus the measured torque.
   Vector7 external(const Vector7& joint_torque, const Vector7& acceleration) const {
     return terms_.mass * acceleration + terms_.coriolis + terms_.gravity - joint_torque;
   }
@@ -65,9 +65,9 @@ class Servos {
   const ServoParameters& parameters() const { return parameters_; }
 
  private:
-  /// Linear law: torque = constant - damping * velocity after the step. That velocity is expected
-  /// from the dampers alone (`pull`: what they do where the arm stands still), since an arm that
-  /// something else holds does not follow its springs.
+  /// Linear law: torque = constant - damping * velocity after the step. That velocity is predicted
+  /// from the dampers only (`pull`: their torque on a standing arm), because an arm that something
+  /// holds does not follow its springs.
   struct Law {
     Vector7 constant = Vector7::Zero(), pull = Vector7::Zero();
     Matrix7 damping = Matrix7::Zero();

@@ -1,5 +1,5 @@
 /// @file
-/// The five motors of the hand: what each winds up, and what it draws for it.
+/// The five motors of the hand: tendon travel and motor current.
 #pragma once
 
 #include <array>
@@ -8,48 +8,48 @@
 
 namespace coglab_sim::plant {
 
-/// What a motor does until the next command.
+/// Command of a motor, valid until the next one.
 struct MotorCommand {
   double speed = 0.0;    ///< share of the full speed, 0 .. 1; 0: off
-  double target = 0.0;   ///< share of the stroke to go to, 0 open .. 1 closed
-  double current = 1e3;  ///< counts of motor current at which it stops winding
+  double target = 0.0;   ///< target as share of the stroke, 0 open .. 1 closed
+  double current = 1e3;  ///< counts, motor current at which winding stops
 };
 
-/// What a motor is doing.
+/// State of a motor.
 struct MotorState {
   double position = 0.0;  ///< share of the stroke, 0 open .. 1 closed
   double tension = 0.0;   ///< N
-  double effort = 0.0;    ///< counts of current that the tension stands for
+  double effort = 0.0;    ///< counts, current that corresponds to the tension
   double current = 0.0;   ///< counts as on the wire; 0 when off, at its target or locked
   bool moving = false;
-  bool locked = false;  ///< it met resistance and stands; its gear holds what it has wound
+  bool locked = false;  ///< stopped by resistance; the gear holds the tendon
 };
 
-/// A command whose current is that of a motor running free winds nothing that resists.
+/// With the current of a free-running motor as limit, a motor does not wind against resistance.
 ///
-/// Motors wind tendons at a speed that falls to nothing over the last fifth before the tension at
-/// which they are to stop. A load never drives one backward. One that is nearly stopped for a
-/// while is locked until the next command, else shaking would ratchet it tighter.
+/// Motors wind tendons. Their speed falls to zero over the last fifth below the tension at which
+/// they stop. A load never drives a motor backward. A motor that is nearly stopped for some time is
+/// locked until the next command; otherwise shaking would tighten it step by step.
 class HandMotors {
  public:
   explicit HandMotors(const HandTable& table) : table_(table) {}
 
-  /// A command that differs from the one before unlocks the motor.
+  /// Sets the command. A changed command unlocks the motor.
   void command(int motor, const MotorCommand& command);
-  /// Puts a motor somewhere, off.
+  /// Switches a motor off and sets its position (share of the stroke).
   void set(int motor, double position);
   /// Advances by `dt` s under the tensions (N) of the tendons.
   void step(const std::array<double, kMotors>& tension, double dt);
 
   const MotorState& state(int motor) const { return states_[static_cast<std::size_t>(motor)]; }
-  /// m, what the tendon's servo is to hold.
+  /// Target of the tendon's servo, m.
   double wound(int motor) const;
 
  private:
   HandTable table_;
   std::array<MotorCommand, kMotors> commands_;
   std::array<MotorState, kMotors> states_;
-  std::array<double, kMotors> slow_{};  // s for which it has been nearly stopped
+  std::array<double, kMotors> slow_{};  // s, time nearly stopped
 };
 
 }  // namespace coglab_sim::plant

@@ -1,5 +1,5 @@
 /// @file
-/// The hand as the table `config/hand_model.yaml` describes it: phalanges, tendons, motors.
+/// The hand's table `config/hand_model.yaml`: phalanges, tendons, motors.
 #pragma once
 
 #include <array>
@@ -12,28 +12,28 @@ namespace coglab_sim::plant {
 
 constexpr int kMotors = 5;  ///< thumb abduction, thumb, index, middle, ring with little
 
-/// Fingers in the order in which touch is reported.
+/// Fingers, in the order of the touch report.
 enum class Finger { Thumb, Index, Middle, Ring, Little };
 constexpr int kFingers = 5;
 
-/// One capsule on one joint. SI units; vectors in the frame of the body before it.
+/// One capsule on one joint. SI units; vectors are in the frame of the parent body.
 struct Phalanx {
   std::string name;
   Finger finger = Finger::Thumb;
-  int motor = 0;       ///< whose tendon bends it
-  bool first = false;  ///< of its finger: the body before it is the palm
+  int motor = 0;       ///< motor whose tendon bends the phalanx
+  bool first = false;  ///< first of its finger: its parent body is the palm
   Vector3d pivot, axis, along;
-  double lower = 0.0, upper = 0.0;  ///< rad; `lower` is open and where the spring rests
+  double lower = 0.0, upper = 0.0;  ///< rad; `lower` is open and the spring's rest angle
   double spring = 0.0;              ///< Nm/rad
-  double arm = 0.0;                 ///< m, of the tendon
+  double arm = 0.0;                 ///< m, lever arm of the tendon
   double length = 0.0, radius = 0.0, mass = 0.0;
 };
 
 struct MotorRow {
   std::string name;
   double limit = 0.0;      ///< N, largest tension
-  bool both_ways = false;  ///< pushes as well as it pulls
-  /// m of tendon from open to closed; from the arms and ranges of what it bends.
+  bool both_ways = false;  ///< true: also pushes
+  /// m of tendon from open to closed, from the lever arms and ranges of its phalanges.
   double stroke = 0.0;
   double open_length = 0.0;  ///< m, length of the tendon with the finger open
 };
@@ -52,10 +52,10 @@ struct HandTable {
   double phalangesMass() const;
 };
 
-/// Reads a table. @throws std::invalid_argument naming file, field and what was expected.
+/// Reads a table. @throws std::invalid_argument naming file, field and expected value.
 HandTable readHandTable(const std::string& path);
 
-/// The table that the package comes with.
+/// The table in this package.
 const HandTable& builtInHandTable();
 
 }  // namespace coglab_sim::plant

@@ -1,12 +1,12 @@
 /// @file
-/// A compliant and limited hold of a free body: a spring and a damper in six directions.
+/// Compliant, limited hold of a free body: spring and damper in six directions.
 #pragma once
 
 #include "coglab_sim/geometry.hpp"
 
 namespace coglab_sim::plant {
 
-constexpr double kGravity = 9.81;  ///< m/s^2, along -z, as the model has it
+constexpr double kGravity = 9.81;  ///< m/s^2, along -z, as in the model
 
 /// A free body about its centre of mass.
 struct FreeBody {
@@ -16,26 +16,26 @@ struct FreeBody {
   Vector3d inertia = Vector3d::Ones();  ///< diagonal in the body's axes, kg m^2
 };
 
-/// How stiff and how strong a hold is.
+/// Stiffness and strength of a hold.
 struct HoldLimits {
   double bandwidth = 60.0;  ///< rad/s, critically damped
   double force = 40.0;      ///< N, largest
   double torque = 2.0;      ///< Nm, largest
 };
 
-/// The gains follow from the mass and from each axis's own inertia, so that a light body is held
-/// as steadily as a heavy one. The weight of a body that belongs to the hand is carried ahead of
-/// the error; of one that is taken where another holds it, the hold carries only what the hand
-/// lifts. What the limits do not carry slips: the place where the hold would have the body follows
-/// it.
+/// Gains follow from the mass and the inertia about each axis, so that light and heavy bodies are
+/// held equally steadily. After engageAt() the hold carries the full weight as feed-forward. After
+/// engage() another holder carries the weight, and the hold carries only the part that the hand
+/// lifts. Beyond the limits the body slips: the target pose follows the body.
 class HoldSpring {
  public:
-  /// The body, held by another or at rest, is to stay where it is now in the frame of the hand.
+  /// Holds the body at its present pose in the hand. Another holder or a support carries its
+  /// weight.
   void engage(const Pose& hand, const Pose& center) {
     engageAt(hand.inverse() * center);
     carries_ahead_ = false;
   }
-  /// The body belongs to the hand, there in its frame.
+  /// Holds the body at the pose `in_hand` in the hand's frame, with its whole weight.
   void engageAt(const Pose& in_hand) {
     in_hand_ = in_hand;
     engaged_ = carries_ahead_ = true;
@@ -50,7 +50,7 @@ class HoldSpring {
 
  private:
   bool engaged_ = false, carries_ahead_ = false;
-  Pose in_hand_;  // where the body's centre belongs
+  Pose in_hand_;  // target pose of the body's centre
 };
 
 }  // namespace coglab_sim::plant

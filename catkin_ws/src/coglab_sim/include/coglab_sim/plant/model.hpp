@@ -1,5 +1,5 @@
 /// @file
-/// A compiled model of MuJoCo with its state, and the numbers of what the plant asks for by name.
+/// A compiled MuJoCo model with its state and the indices of the parts that the plant uses.
 #pragma once
 
 #include <array>
@@ -13,11 +13,11 @@
 
 namespace coglab_sim::plant {
 
-/// Owns mjModel and mjData; the numbers below are indices into their arrays.
+/// Owns mjModel and mjData. The integers below are indices into their arrays.
 class Model {
  public:
-  /// @throws std::invalid_argument or std::runtime_error with file and reason: what writeModel()
-  /// finds, what MuJoCo refuses, or a library that does not fit its headers.
+  /// @throws std::invalid_argument or std::runtime_error with file and reason: an error of
+  /// writeModel(), a model that MuJoCo refuses, or a library that does not fit its headers.
   explicit Model(const SceneDescription& scene);
 
   const mjModel* get() const { return model_.get(); }
@@ -26,17 +26,17 @@ class Model {
   const mjData* data() const { return data_.get(); }
 
   std::array<int, 7> arm_position, arm_velocity;  ///< of the joints in wire order, in qpos and qvel
-  int object_position = 0, object_velocity = 0;   ///< first of 7 and of 6
+  int object_position = 0, object_velocity = 0;   ///< first of 7 in qpos, first of 6 in qvel
   int person_position = 0, person_velocity = 0;
   int object = 0, person = 0, palm_frame = 0, palm = 0;  ///< bodies
-  int board = -1, floor = -1;                            ///< geoms; board -1: there is none
+  int board = -1, floor = -1;                            ///< geoms; board -1: no board
   std::vector<int> phalanges;  ///< bodies, in the order of the hand's table
   std::vector<int> phalanx_position, phalanx_velocity;  ///< of their joints
   std::array<int, kMotors> tendons;
 
-  /// Pose of a body in the world as of the last forward computation.
+  /// World pose of a body at the last forward computation.
   Pose poseOf(int body) const;
-  /// m that the middle of no link or phalanx can be away from any joint before it.
+  /// Upper bound (m) of the distance from any joint to the middle of any link or phalanx behind it.
   double reach() const;
 
  private:

@@ -1,10 +1,10 @@
 /// @file
-/// Everything in the cell that has mass: arm, hand with fingers, object, the person's hand, board
-/// and floor, moved by MuJoCo in steps of 1 ms.
+/// The physics of the cell: arm, hand with fingers, object, person's hand, board and floor. MuJoCo
+/// moves them in steps of 1 ms.
 ///
-/// The robot's grasp is contact and friction alone. The person holds an object by a compliant and
-/// limited spring on it, and their own hand is a body on such a spring. A simulation that diverges
-/// stops with its seed and time.
+/// The robot grasps by contact and friction only. The person holds an object by a compliant,
+/// limited spring, and the person's hand is a body on another such spring. A diverging simulation
+/// stops with an error that names seed and time.
 #pragma once
 
 #include <array>
@@ -35,7 +35,7 @@ struct PersonParameters {
 
 struct PlantConfig {
   std::string urdf;        ///< path of the robot description
-  std::uint64_t seed = 1;  ///< of the run, for messages: the plant draws nothing
+  std::uint64_t seed = 1;  ///< seed of the run, for messages; the plant uses no random numbers
   Vector7 home = Vector7::Zero();
   HandTable hand = builtInHandTable();
   Object object;
@@ -44,7 +44,7 @@ struct PlantConfig {
   PersonParameters person;
 };
 
-/// What the person's hand does.
+/// Motion and grip of the person's hand.
 struct PersonInput {
   Pose hand;
   Twist twist;
@@ -52,15 +52,15 @@ struct PersonInput {
   double grip_force = 20.0;  ///< N, normal force at full grip
 };
 
-/// Where the object can be put. From then on nothing but contacts and the person's grip moves it.
+/// Places for the object. Afterwards only contacts, gravity and the person's grip move it.
 enum class Place {
-  /// Pose is that of the object in human_hand. The person's grip begins there, with the force that
-  /// it has; before their hand has moved for the first time, hand and object stand still.
+  /// Pose of the object in human_hand. The person's grip begins there with its present force. Hand
+  /// and object stand still until the hand moves for the first time.
   PersonHand,
-  /// Pose is that of the object in ih2_palm. A start state: the open hand closes around it while it
-  /// is kept there and the arm stands, then lets it hang in the fingers.
+  /// Pose of the object in ih2_palm. A start state: object and arm are kept still while the open
+  /// hand closes, then the object hangs in the fingers.
   RobotHand,
-  World  ///< pose is that of the object in the world, let go at once
+  World  ///< pose of the object in the world; it is free at once
 };
 
 /// Forces of the surroundings on the hand, N, axes of ih2_palm.
@@ -71,46 +71,45 @@ struct Touch {
 
 class Plant {
  public:
-  /// @throws std::invalid_argument or std::runtime_error with a sentence on what does not fit, or
-  /// on which two bodies would stand in each other by more than 3 mm.
+  /// @throws std::invalid_argument or std::runtime_error naming the value that does not fit, or two
+  /// bodies that overlap by more than 3 mm.
   explicit Plant(const PlantConfig& config);
 
-  /// Advances by `dt` s, at most kStep, under the motors' torques (Nm at the joints).
+  /// Advances by `dt` s (at most kStep) with the motor torques (Nm at the joints).
   /// @throws std::runtime_error with seed and time when the simulation diverges.
   void step(const Vector7& motor_torque, double dt = kStep);
 
   // Inputs, valid until changed
-  /// @throws std::invalid_argument if the hand is seen for the first time and stands inside
-  /// something by more than 3 mm; it is then not there.
+  /// @throws std::invalid_argument if the hand appears for the first time and overlaps something by
+  /// more than 3 mm; it is then left out.
   void setPerson(const PersonInput& person);
   void setPush(const Wrench& push) { push_ = push; }  ///< on ih2_palm about its origin
   void setBrakes(bool on);                            ///< motors without torque, brakes closed
-  void setBlock(bool on);                             ///< somebody holds all joints where they are
+  void setBlock(bool on);                             ///< somebody holds all joints in place
   HandMotors& motors() { return motors_; }
   const HandMotors& motors() const { return motors_; }
-  /// @throws std::invalid_argument if the object would stand inside something by more than 3 mm, or
-  /// the robot's fingers would not hold it where it is to be in their hand; nothing has changed
-  /// then.
+  /// @throws std::invalid_argument if the object would overlap something by more than 3 mm, or the
+  /// robot's fingers would not hold it at this pose. Nothing is changed then.
   void place(Place place, const Pose& pose);
-  /// Exchanges the object; it is then to be placed. The robot stays as it is.
+  /// Exchanges the object. Call place() afterwards. The robot does not change.
   void setObject(const Object& object);
-  /// Gravity in the world, m/s^2, for tests.
+  /// Sets gravity (world, m/s^2), for tests.
   void setGravity(const Vector3d& gravity);
-  /// Puts the arm somewhere, at rest.
+  /// Sets joint positions (rad) and velocities (rad/s) of the arm.
   void setArm(const Vector7& position, const Vector7& velocity = Vector7::Zero());
 
   // The arm
   Vector7 position() const { return position_; }
   Vector7 velocity() const { return velocity_; }
   bool locked() const { return locked_; }  ///< stands still on its brakes
-  /// What ideal torque sensors between motor and link read, Nm.
+  /// Ideal torque between motor and link, Nm.
   const Vector7& jointTorque() const { return joint_torque_; }
-  /// Torque of everything outside the arm on its joints, Nm.
+  /// External torque on the joints, Nm.
   const Vector7& externalTorque() const { return external_torque_; }
   Vector7 acceleration() const { return acceleration_; }  ///< over the last step, rad/s^2
   Pose palm() const { return model_->poseOf(model_->palm_frame); }
   Twist palmTwist() const { return twistOf(model_->palm_frame); }
-  /// Terms of the whole mechanism, all degrees of freedom: see Terms.
+  /// Dynamic terms of the whole mechanism, for all degrees of freedom.
   struct Terms {
     Eigen::MatrixXd mass;                   ///< with the reflected inertias of motors and gears
     Eigen::VectorXd bias;                   ///< C(q, dq) dq + g(q)
@@ -125,15 +124,15 @@ class Plant {
   Pose object() const { return model_->poseOf(model_->object); }
   Twist objectTwist() const { return twistOf(model_->object); }
   Pose personHand() const { return model_->poseOf(model_->person); }
-  /// How far the fingers but the thumb are bent, 0 open .. 1: the angles of their joints, each as
-  /// share of its range, on average.
+  /// Closure of the fingers without the thumb, 0 open .. 1 closed: mean joint angle, as share of
+  /// the range.
   double handClosure() const;
   const Touch& touch() const { return touch_; }
-  const Vector3d& objectForce() const { return object_force_; }  ///< N, of it on the robot's hand
-  /// N, of all that touches palm and fingers, world axes; where these touch one another, nothing.
+  const Vector3d& objectForce() const { return object_force_; }  ///< N, object on the robot's hand
+  /// Force of all contacts on palm and fingers, N, world axes; contacts between them do not count.
   const Vector3d& touchForce() const { return touch_force_; }
-  /// N, of the object on the person's hand, world axes: what their grip carries, less what the
-  /// acceleration of their own hand asks for; zero without a grip. A mean over 20 ms.
+  /// Force of the object on the person's hand, N, world axes, mean over 20 ms: load of the grip,
+  /// minus the force that accelerates the object with the hand. Zero without a grip.
   const Vector3d& personForce() const { return person_force_; }
   double robotShare() const { return robot_share_; }  ///< of the weight, 0..1
   double personShare() const { return person_share_; }
@@ -147,7 +146,7 @@ class Plant {
   Model& model() { return *model_; }
 
  private:
-  static constexpr double kHolds = 0.5;  // N that fingers and what opposes them press at least
+  static constexpr double kHolds = 0.5;  // N, smallest holding force, also of thumb and palm
 
   /// Forces between the robot's hand and the object in one step.
   struct Pressing {
@@ -191,30 +190,30 @@ class Plant {
   HandMotors motors_;
   PersonInput person_;
   bool person_present_ = false;
-  double person_age_ = 0.0;  // s since its last message
+  double person_age_ = 0.0;  // s since the last setPerson()
   HoldSpring arm_of_person_, grip_;
   double grip_distance_ = 0.0;  // m, hand to the object's surface when the grip began
-  bool grip_lost_ = false;      // the object slid out; the fingers have to open first
+  bool grip_lost_ = false;      // the object slid out; the fingers must open first
   Wrench push_;
   bool brakes_ = false, locked_ = false, blocked_ = false;
-  bool was_stiff_ = false;  // brakes or block in the step before
+  bool was_stiff_ = false;  // brakes or block in the last step
   Vector7 position_, velocity_ = Vector7::Zero(), block_position_ = Vector7::Zero();
   Vector7 friction_ = Vector7::Zero(), motor_torque_ = Vector7::Zero();
   Vector7 joint_torque_ = Vector7::Zero(), external_torque_ = Vector7::Zero(),
           acceleration_ = Vector7::Zero();
   Place place_ = Place::World;
-  bool placed_ = false;  // kept where it was put: the person has not come yet, or fingers close
-  Pose in_hand_;         // where it was put
+  bool placed_ = false;  // kept in place until the person comes or the fingers have closed
+  Pose in_hand_;         // pose given to place()
   Touch touch_;
   Vector3d object_force_ = Vector3d::Zero();
-  Vector3d touch_force_ = Vector3d::Zero();  // of everything
+  Vector3d touch_force_ = Vector3d::Zero();  // of all contacts
   double robot_share_ = 0.0, person_share_ = 0.0;
   Vector3d grip_force_ = Vector3d::Zero(), person_force_ = Vector3d::Zero();
   double squeeze_ = 0.0, grasp_force_ = 0.0;  // N, averaged
   bool on_board_ = false, on_floor_ = false, dropped_ = false;
   int contacts_ = 0;
   double time_ = 0.0;
-  double reach_ = 0.0, finger_reach_ = 0.0;  // m, of anything from a joint of the arm, of a finger
+  double reach_ = 0.0, finger_reach_ = 0.0;  // m, bound behind a joint of the arm, of a finger
 };
 
 /// Distance of a point of the object's frame from its surface, m, negative inside.

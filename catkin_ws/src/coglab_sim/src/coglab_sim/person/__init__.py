@@ -1,1 +1,1 @@
-"""The simulated person: who they are, what they perceive, what their hand does."""
+"""The simulated person: character, perception and motion of the hand."""

@@ -1,17 +1,16 @@
-"""Where the arm of the person is whose hand is simulated; for pictures alone, it touches nothing."""
+"""Arm of the simulated person, for pictures only: it has no contacts."""
 
 from __future__ import annotations
 
 import numpy as np
 
-SHOULDER = np.array([1.42, 0.20, 0.50])
-"""m in the world: where the person stands; the shoulder comes forward where the hand is out of reach"""
-UPPER_ARM, FOREARM = 0.33, 0.36
-"""m; the forearm up to the palm"""
+SHOULDER = np.array([1.42, 0.20, 0.50])  # m, world; the shoulder moves forward if the hand is out of reach
+UPPER_ARM = 0.33  # m
+FOREARM = 0.36  # m, up to the palm
 
 
 def arm_of(hand: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Shoulder and elbow (m, world) of an arm whose palm is at `hand`; the elbow hangs down."""
+    """Returns shoulder and elbow (m, world) for a palm at `hand` (m, world); the elbow points down."""
     away = SHOULDER - hand
     distance = float(np.linalg.norm(away))
     reach = min(distance, 0.98 * (UPPER_ARM + FOREARM))

@@ -1,7 +1,4 @@
-"""The person in the simulated cell: what the cell gives eyes and hand, and what the hand does there.
-
-This is all that person and physics know of each other.
-"""
+"""Interface between the person and the physics of the simulated cell: view of the world in, motion of the hand out."""
 
 from __future__ import annotations
 
@@ -15,13 +12,13 @@ from coglab_sim.person.scene import HandSample, WorldView
 
 
 def pose_of_truth(pose: Mapping[str, Any]) -> Pose:
-    """A pose of the cell's truth."""
+    """Converts a pose of the cell's truth."""
     return Pose(np.asarray(pose["position"]), np.asarray(pose["rotation"]))
 
 
 def view_of(truth: Mapping[str, Any]) -> WorldView:
-    """What there is to be seen and felt in the cell's truth. What is felt of the object is the force that the person's
-    own grip carries, even where the robot holds it, too."""
+    """Returns the person's view of the cell's truth. The felt load is the force on the person's own grip, even while
+    the robot holds the object as well."""
     return WorldView(
         pose_of_truth(truth["robot_hand"]),
         float(truth["hand_closure"]),
@@ -31,5 +28,5 @@ def view_of(truth: Mapping[str, Any]) -> WorldView:
 
 
 def move_person(cell: Any, hand: HandSample) -> None:
-    """The person's hand, for the cell."""
+    """Moves the person's hand in the cell."""
     cell.set_human(hand.frame.position, hand.frame.orientation, hand.velocity, hand.spin, hand.grip, hand.grip_force)

@@ -1,7 +1,6 @@
-"""Seeded virtual participants: everything that differs between people, drawn once per person.
+"""Seeded virtual participants. Everything that differs between people is drawn once per person.
 
-docs/people.md lists every parameter with its distribution and where that comes from. Nothing is clipped: a draw
-outside its range is drawn again.
+docs/people.md lists each parameter with its distribution and source. A draw outside its range is repeated, not clipped.
 """
 
 from __future__ import annotations
@@ -28,8 +27,9 @@ BEHAVIOURS = (
 )
 
 PROFILES = ("drawn", "patient", "accustomed")
-"""drawn: a person as people are; patient: the same person, who trusts after 1.0 s of rest, holds upright and stays
-inside the box; accustomed: a patient one as all were in the first versions of this cell, with the habits of HABITS."""
+"""drawn: a person with drawn parameters. patient: the same person, but trusts the robot's hand after 1.0 s of rest,
+holds the object upright and stays inside the box. accustomed: a patient person with HABITS, right-handed and with less
+scatter, as in the first versions of this cell."""
 
 HABITS: Mapping[str, Any] = {
     "presses_again": 4,
@@ -38,12 +38,12 @@ HABITS: Mapping[str, Any] = {
     "aligns_within": 0.010,
     "relaxes": True,
 }
-"""What a giver may do to make a handover easier for the robot: only `accustomed` people do it."""
+"""Habits of a giver that make a handover easier for the robot. Only `accustomed` people have them."""
 
 
 @dataclass(frozen=True)
 class Participant:
-    """One person. Times in s, lengths in m, forces in N, angles in deg."""
+    """Parameters of one person. Times in s, lengths in m, forces in N, angles in deg."""
 
     seed: int = 0
     behaviour: str = "normal"
@@ -51,73 +51,73 @@ class Participant:
     """rest and handover are mirrored to the other side"""
     reaction_median: float = 0.35
     reaction_sigma: float = 0.30
-    """of the logarithm"""
+    """standard deviation of the logarithm"""
     learning: float = 0.08
-    """share by which the reaction gets shorter per trial, for the first three"""
+    """share by which the reaction time falls per trial, in the first three trials"""
     reach_time: float = 1.1
-    """of a reach of 0.45 m"""
+    """duration of a reach over 0.45 m"""
     reach_sigma: float = 0.12
-    """of the logarithm, from trial to trial"""
+    """standard deviation of the logarithm, from trial to trial"""
     bow: float = 0.0
-    """height of a conic reach's arc; 0: straight"""
+    """height of the arc of a conic reach; 0: straight"""
     point_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """of this person's handover point: distance, side, height"""
+    """offset of this person's handover point: distance, side, height"""
     point_sigma: tuple[float, float, float] = (0.02, 0.04, 0.03)
     """scatter of the handover point from trial to trial, world axes"""
     inside_box: bool = False
     """True: the handover point is brought into the scene's box"""
     tilt: float = 12.0
-    """standard deviation of the turn of hand and object about each world axis, from trial to trial"""
+    """standard deviation of the orientation of hand and object about each world axis, from trial to trial"""
     seeing_delay: float = 0.20
-    """from what happens to what is seen and acted on"""
+    """from an event to the reaction to its sight"""
     seen_noise: float = 0.003
     """standard deviation per axis of a seen position"""
     seen_turn: float = 2.0
     """standard deviation per axis of a seen orientation"""
     seen_speed: float = 0.10
-    """standard deviation of a seen speed as share of it; below 0.005 m/s nothing is seen to move"""
+    """standard deviation of a seen speed as share of it; a speed below 0.005 m/s is not seen"""
     feeling_delay: float = 0.125
-    """from a force at the hand to what the hand does about it"""
+    """from a force at the hand to the reaction of the hand"""
     felt_threshold: float = 0.4
     """smallest change of force that is felt"""
     felt_share: float = 0.08
-    """and smallest change as share of the force that is felt already"""
+    """smallest change that is felt, as share of the present force"""
     hearing_delay: float = 0.5
-    """from the beginning of a spoken sentence to its being understood"""
+    """from the beginning of a spoken sentence until the person understands it"""
     trust: float = 0.5
-    """for which the robot's hand has to be seen at rest before the person places or takes"""
+    """time that the robot's hand must be seen at rest before the person places or takes"""
     places_while_moving: bool = False
-    """True: places as soon as the robot's hand is seen near, moving or not"""
+    """True: places as soon as the robot's hand is seen near, even while it moves"""
     place_speed: float = 0.10
-    """m/s at which the object is brought into the robot's palm"""
+    """m/s, speed of the object toward the robot's palm"""
     press: float = 1.5
-    """force felt beyond first contact with which the object is pressed into the palm"""
+    """felt force, beyond first contact, that presses the object into the palm"""
     release_share: float = 0.3
-    """share of the weight whose loss alone makes the person let go"""
+    """the person lets go when this share of the weight is gone, without other signs"""
     assurance: float = 0.2
-    """for which the signs of a firm hold must last before the person lets go"""
+    """time that the signs of a firm hold must last before the person lets go"""
     release_time: float = 0.35
-    """in which the fingers open, without the look in between whether the robot holds"""
+    """time in which the fingers open, without the pause that checks whether the robot holds"""
     grip_safety: float = 2.0
-    """grip force over the one at which the object would slip"""
+    """grip force as multiple of the force at which the object slips"""
     grip_limit: float = 40.0
     """largest grip force"""
     weight_error: float = 0.0
-    """of the logarithm of the weight expected before an object was ever held"""
+    """error of the logarithm of the expected weight, before the person has held the object"""
     grip_time: float = 0.25
-    """in which the fingers close"""
+    """time in which the fingers close"""
     patience: float = 12.0
-    """how long the person waits for the robot before giving up"""
+    """time that the person waits for the robot before giving up"""
     presses_again: int = 0
-    """how often an object is pressed again into an open hand that has backed away"""
+    """number of times that the person presses again after the open hand backed away"""
     used_to_touch: bool = False
     """True: a touch by the open hand while the person waits does not count as placing the object"""
     believes_closed: float = math.inf
-    """s after which a hand that is seen closed is believed to hold, felt or not"""
+    """s after which the person believes that a closed hand holds, even without feeling it"""
     aligns_within: float = math.inf
-    """m off the palm's middle, along the fingers, from which on the person corrects while placing"""
+    """m, distance from the palm's middle along the fingers above which the person corrects while placing"""
     relaxes: bool = False
-    """True: with half of the grip the arm sinks, so that the robot, if it holds, gets the weight"""
+    """True: at half grip the arm sinks, so that a robot that holds gets the weight"""
     sway: float = 0.002
     tremor: float = 0.0003
 
@@ -135,7 +135,7 @@ class Participant:
 
     @staticmethod
     def from_mapping(data: Mapping[str, Any]) -> Participant:
-        """A participant file: ``seed`` and ``profile`` draw the person, every other field overrides what was drawn."""
+        """Reads a participant file. ``seed`` and ``profile`` draw the person, other fields override drawn values."""
         known = {f.name for f in fields(Participant)} | {"profile"}
         unknown = sorted(set(data) - known)
         if unknown:
@@ -149,7 +149,7 @@ class Participant:
 
 
 def within(low: float, high: float, draw: Callable[[], float]) -> float:
-    """The first of the draws that lies in the range; its middle if none of a hundred does."""
+    """Returns the first of up to 100 draws inside the range, else the middle of the range."""
     for _ in range(100):
         value = float(draw())
         if low <= value <= high:
@@ -195,13 +195,13 @@ def _drawn(seed: int, behaviour: str) -> Participant:
 
 
 def _patient(person: Participant) -> Participant:
-    """The same person: trusts after 1.0 s, holds upright, stays inside the box; all else as it was drawn."""
+    """The same person, who trusts after 1.0 s, holds upright and stays inside the box."""
     return replace(person, trust=1.0, places_while_moving=False, tilt=0.0, inside_box=True)
 
 
 def _accustomed(person: Participant) -> Participant:
-    """The same person, as considerate toward the robot as all were in the first versions of this cell: patient, with
-    habits, right-handed, always nearly in the same place."""
+    """The same person as in the first versions of this cell: patient, with HABITS, right-handed, and with less scatter
+    of the handover point."""
     x, y, z = person.point_offset
     return replace(
         _patient(person),

@@ -1,8 +1,8 @@
-"""How a hand moves from here to there: decoupled minimum jerk and a conic (elliptic) path.
+"""Reaches of a hand: decoupled minimum jerk and a conic (elliptic) path.
 
-Minimum jerk: Flash and Hogan's fifth-order polynomial. Decoupled: the vertical part is a little quicker than the
-horizontal one. Conic: the same timing along an ellipse arc, as unconstrained handovers show. Corrections on the way are
-superposed.
+Minimum jerk: Flash and Hogan's fifth-order polynomial. Decoupled: the vertical part is a little faster than the
+horizontal one. Conic: the same timing along an arc of an ellipse, as in unconstrained handovers. Corrections during the
+reach are superposed.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 
 def min_jerk(x: float) -> tuple[float, float]:
-    """Share of the way and its derivative at share x of the duration; constant outside 0..1."""
+    """Returns share of the path and its derivative at share x of the duration; constant outside 0..1."""
     if x <= 0.0:
         return 0.0, 0.0
     if x >= 1.0:
@@ -33,65 +33,65 @@ class Reach:
     vertical_share: float = 0.85
     """the vertical part takes this share of the duration"""
     bow: float = 0.0
-    """m, largest deviation from the straight line, upward; makes the path an arc of an ellipse"""
+    """m, largest upward deviation from the straight line; the path is then an arc of an ellipse"""
 
     def at(self, t: float) -> tuple[np.ndarray, np.ndarray]:
-        """Position (m) and velocity (m/s) at time t."""
+        """Position (m) and velocity (m/s) at time t (s)."""
         way = self.end - self.start
         s, ds = min_jerk((t - self.begin) / self.duration)
         sz, dsz = min_jerk((t - self.begin) / (self.duration * self.vertical_share))
         position = self.start + way * np.array([s, s, sz])
         velocity = way * np.array([ds, ds, dsz / self.vertical_share]) / self.duration
         if self.bow != 0.0:
-            # Half an ellipse over the chord, its height reached in the middle: y = bow * sin(pi s).
+            # Half an ellipse over the chord, highest in the middle: y = bow * sin(pi s).
             position[2] += self.bow * np.sin(np.pi * s)
             velocity[2] += self.bow * np.pi * np.cos(np.pi * s) * ds / self.duration
         return position, velocity
 
     def over(self, t: float) -> bool:
-        """Whether the reach has ended."""
+        """True if the reach has ended."""
         return t >= self.begin + self.duration
 
 
 class CorrectedReach:
-    """A reach whose end may be moved on the way: each correction is a minimum-jerk displacement on top of what runs
-    already (superposition, Flash and Henis 1991), so that position and velocity have no step."""
+    """A reach whose end can change while it runs. Each correction adds a minimum-jerk displacement (superposition,
+    Flash and Henis 1991), so that position and velocity have no step."""
 
     def __init__(self, reach: Reach) -> None:
         self.parts = [reach]
 
     @property
     def end(self) -> np.ndarray:
-        """m, where the hand is going now"""
+        """m, present target of the hand"""
         return self.parts[0].end + sum((part.end for part in self.parts[1:]), np.zeros(3))
 
     @property
     def duration(self) -> float:
-        """s, from the beginning to the end of the last correction"""
+        """s, from the beginning of the reach to the end of the last correction"""
         return max(part.begin + part.duration for part in self.parts) - self.parts[0].begin
 
     @property
     def begin(self) -> float:
-        """s"""
+        """s, time of the reach's beginning"""
         return self.parts[0].begin
 
     def retarget(self, t: float, end: np.ndarray, duration: float) -> None:
-        """From time t on go to ``end``; the correction takes ``duration`` s."""
+        """Changes the target to ``end`` (m) at time t (s); the correction takes ``duration`` s."""
         self.parts.append(Reach(np.zeros(3), end - self.end, t, duration, vertical_share=1.0))
 
     def at(self, t: float) -> tuple[np.ndarray, np.ndarray]:
-        """Position (m) and velocity (m/s) at time t."""
+        """Position (m) and velocity (m/s) at time t (s)."""
         samples = [part.at(t) for part in self.parts]
         return sum((p for p, _ in samples), np.zeros(3)), sum((v for _, v in samples), np.zeros(3))
 
     def over(self, t: float) -> bool:
-        """Whether the reach and all its corrections have ended."""
+        """True if the reach and all its corrections have ended."""
         return all(part.over(t) for part in self.parts)
 
 
 @dataclass(frozen=True)
 class Turn:
-    """The hand's turn beside a reach: about one axis, with minimum jerk, from ``start`` to ``end``."""
+    """Rotation of the hand during a reach: about one axis, with minimum jerk, from ``start`` to ``end``."""
 
     start: Rotation
     end: Rotation
@@ -106,5 +106,5 @@ class Turn:
 
 
 def duration_for(distance: float, base: float) -> float:
-    """Duration (s) of a human reach over ``distance`` m; ``base`` is that of 0.45 m. Grows with the power 0.3."""
+    """Duration (s) of a human reach: ``base`` (s) at 0.45 m, proportional to ``distance`` (m) to the power 0.3."""
     return base * max(0.3, (max(distance, 1e-3) / 0.45) ** 0.3)

@@ -1,12 +1,12 @@
-"""Recorded motion in the place of the simulated person: reading CSV, bag and npz, and playing it back.
+"""Recorded motion that replaces the simulated person: reads CSV, npz and bag files and plays them.
 
-A recording holds, for each frame, stamps (s, increasing), positions (m, world axes) and
-orientations (unit quaternions x y z w). All three kinds of file say the same:
+A recording holds stamps (s, increasing), positions (m, world axes) and orientations (unit quaternions x y z w) of each
+frame. The three file formats hold the same data:
 
-* CSV: a header line with `t,x,y,z`, maybe `qx,qy,qz,qw`, maybe `frame`; one line per sample;
-* npz: arrays `t`, `position` (N, 3), maybe `orientation` (N, 4); for several frames each name with
-  the frame before it, as in `human_hand.t`; nothing pickled is ever read;
-* bag: the transforms of `/tf` whose parent is the world frame, stamped in their headers.
+* CSV: a header line with `t,x,y,z`, optionally `qx,qy,qz,qw` and `frame`; then one line per sample;
+* npz: arrays `t`, `position` (N, 3), optionally `orientation` (N, 4). With several frames, each array name begins with
+  its frame, as in `human_hand.t`. Pickled data is never read;
+* bag: the transforms of `/tf` whose parent is the world frame, with the stamps of their headers.
 """
 
 from __future__ import annotations
@@ -21,26 +21,24 @@ import numpy as np
 from coglab_py.pose import IDENTITY, Pose, about_z
 from scipy.spatial.transform import Rotation
 
-MOST_SAMPLES = 1_000_000
-"""Samples that are read of one file; a day at 10 Hz."""
-FASTEST = 10.0
-"""m/s between two samples; a tracked hand or object that is faster was lost, or is another one."""
+MOST_SAMPLES = 1_000_000  # largest number of samples in one file: a day at 10 Hz
+FASTEST = 10.0  # m/s between two samples; at a higher speed the tracker lost the frame or confused it with another
 
 
 class RecordingError(ValueError):
-    """A recording that cannot be used; the sentence names file, place and what was expected."""
+    """A recording cannot be used. The message names file, place in the file and expected value."""
 
 
 @dataclass(frozen=True)
 class Track:
-    """One recorded frame: stamps (N,), positions (N, 3), orientations (N, 4)."""
+    """One recorded frame: stamps (N,) in s, positions (N, 3) in m, orientations (N, 4) as x y z w."""
 
     stamps: np.ndarray
     positions: np.ndarray
     orientations: np.ndarray
 
     def at(self, t: float) -> Pose:
-        """The frame at time t (s of the recording), interpolated; the ends are held."""
+        """Returns the frame at time t (s of the recording), interpolated. Outside the track its first or last pose."""
         t = min(max(t, float(self.stamps[0])), float(self.stamps[-1]))
         i = min(max(int(np.searchsorted(self.stamps, t, side="right")) - 1, 0), max(0, len(self.stamps) - 2))
         j = min(i + 1, len(self.stamps) - 1)
@@ -54,21 +52,21 @@ class Track:
 
 @dataclass(frozen=True)
 class Recording:
-    """Tracks by frame name; time begins with the first sample of any."""
+    """Tracks by frame name. Time 0 is the first sample of all tracks."""
 
     tracks: dict[str, Track]
 
     @property
     def duration(self) -> float:
-        """s, to the last sample of any track."""
+        """s, time of the last sample of all tracks."""
         return max(float(track.stamps[-1]) for track in self.tracks.values())
 
 
 def load_recording(path: str, frame: str = "human_hand", world: str = "world", topic: str = "/tf") -> Recording:
-    """Read a .csv, .npz or .bag file.
+    """Reads a .csv, .npz or .bag file.
 
-    `frame` names the track of a file that does not name its own; `world` is the parent frame, and
-    `topic` the topic, of transforms in a bag. Raises RecordingError.
+    `frame`: name of the track if the file has no frame names. `world` and `topic`: parent frame and topic of the
+    transforms in a bag. Raises RecordingError.
     """
     readers = {
         ".csv": lambda: _read_csv(path, frame),
@@ -99,7 +97,7 @@ def _require_no_jump(where: str, track: Track) -> None:
 
 
 Rows = dict[str, list[tuple[float, ...]]]
-"""By frame: (t, x, y, z, qx, qy, qz, qw)."""
+"""Samples by frame: (t, x, y, z, qx, qy, qz, qw)."""
 
 
 def _track(where: str, rows: list[tuple[float, ...]], begin: float) -> Track:
@@ -191,7 +189,7 @@ def _read_bag(path: str, world: str, topic: str) -> Rows:
                     stamp = item.header.stamp.to_sec()
                     if len(track) >= MOST_SAMPLES:
                         raise RecordingError(f"{path}: more than {MOST_SAMPLES} samples")
-                    if not track or stamp != track[-1][0]:  # tf repeats itself
+                    if not track or stamp != track[-1][0]:  # tf repeats transforms
                         track.append((stamp, p.x, p.y, p.z, q.x, q.y, q.z, q.w))
     except rosbag.ROSBagException as error:
         raise RecordingError(f"{path}: not a readable bag ({error}); try `rosbag reindex`") from None
@@ -205,31 +203,31 @@ def _read_bag(path: str, world: str, topic: str) -> Rows:
 
 @dataclass(frozen=True)
 class PlaybackSettings:
-    """How a recording is played. Times in s, lengths in m."""
+    """Settings of the playback of a recording. Times in s, lengths in m."""
 
     file: str = ""
     frame: str = "human_hand"
-    """name of the track of a file that names none"""
+    """name of the track if the file has no frame names"""
     rename: Mapping[str, str] = field(default_factory=dict)
-    """recorded frame: frame to show; others keep their names"""
+    """new names by recorded frame; other frames keep their names"""
     time_scale: float = 1.0
-    """2.0 takes twice as long"""
+    """factor on the duration: 2.0 takes twice as long"""
     mirror: bool = False
-    """left and right exchanged (y of world)"""
+    """True: exchanges left and right (y of world)"""
     turn_deg: float = 0.0
-    """about the vertical, after mirroring: into the robot's axes"""
+    """rotation about the vertical into the robot's axes, after mirroring"""
     end_at: tuple[float, float, float] | None = None
-    """where the first frame ends, in the robot's world; None leaves the recording where it was"""
+    """end position of the first frame in the robot's world; None: the recording is not moved"""
     at_end: str = "hold"
-    """hold: the last frames stay; loop: from the start; vanish: nothing is seen any more"""
+    """hold: the last poses stay; loop: starts again; vanish: no frame is visible any more"""
     wait_at: float | None = None
-    """s of the recording at which it waits for the robot; None: it does not"""
+    """time of the recording at which playback waits for the robot; None: no waiting"""
     wait_distance: float = 0.15
-    """it goes on when the robot's hand is this near to the first frame"""
+    """playback continues when the robot's hand is this near to the first frame"""
     wait_limit: float = 10.0
-    """or after so long"""
+    """longest waiting"""
     allow_jumps: bool = False
-    """frames may be faster than FASTEST between two samples"""
+    """True: frames may be faster than FASTEST"""
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.time_scale) and self.time_scale > 0.0):
@@ -243,7 +241,7 @@ class PlaybackSettings:
 
     @staticmethod
     def from_mapping(data: Mapping[str, Any]) -> PlaybackSettings:
-        """Read a parameter mapping; RecordingError names unknown fields."""
+        """Reads a parameter mapping. RecordingError for unknown fields."""
         known = [f.name for f in fields(PlaybackSettings)]
         unknown = sorted(set(data) - set(known))
         if unknown:
@@ -252,7 +250,7 @@ class PlaybackSettings:
 
 
 class Playback:
-    """Frames of a recording as time goes on, in the robot's world."""
+    """Plays the frames of a recording in the robot's world."""
 
     def __init__(self, recording: Recording, settings: PlaybackSettings = PlaybackSettings()):
         self.settings = settings
@@ -270,7 +268,7 @@ class Playback:
     def open(
         settings: PlaybackSettings, world: str = "world", wanted: Callable[[str], bool] = lambda name: True
     ) -> Playback:
-        """Load the settings' file; of its frames, under their new names, those that are `wanted`.
+        """Loads the file of the settings. Keeps the frames whose new name is `wanted`.
 
         A bag also holds frames that no tracker sees. Raises RecordingError.
         """
@@ -289,11 +287,11 @@ class Playback:
 
     @property
     def names(self) -> Iterable[str]:
-        """The frames that are played."""
+        """Names of the played frames."""
         return self.recording.tracks.keys()
 
     def frames(self, now: float, robot: Pose | None = None) -> dict[str, Pose]:
-        """The frames at time `now` (s, any origin, not decreasing); `robot` is the robot's hand."""
+        """Returns the frames at time `now` (s, any origin, not decreasing); `robot`: pose of the robot's hand."""
         dt = max(0.0, now - self._then) if self._then is not None else 0.0
         self._then = now
         self._advance(dt, robot)
@@ -307,7 +305,7 @@ class Playback:
         return {name: self.at(name, self._playhead) for name in self.names}
 
     def at(self, name: str, seconds: float) -> Pose:
-        """A frame at a time of the recording (s), in the robot's world."""
+        """Returns a frame at a time of the recording (s), in the robot's world."""
         return self._placed(self.recording.tracks[name].at(seconds))
 
     def _advance(self, dt: float, robot: Pose | None) -> None:

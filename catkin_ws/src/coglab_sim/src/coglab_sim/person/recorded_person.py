@@ -1,9 +1,12 @@
-"""A person whose hand goes as one was recorded, with the object in it, through a whole handover to the robot.
+"""A person whose hand follows a recording, with the object in it, through a whole handover to the robot.
 
-The reach is the recorded one. After it there are three ways: ``wait``: the hand waits at the end of its reach until it
-trusts the robot's hand, then places and lets go as the simulated person does; ``no_wait``: it goes on as recorded to
-where the object was let go, and holds it there until load and grip say that the robot has it; ``leave``: everything
-happens at its recorded time, and an object that the robot does not hold then goes away with the hand.
+The reach is the recorded one. Three variants follow:
+
+* ``wait``: the hand waits at the end of its reach until the person trusts the robot's hand. Then it places and lets go
+  like the simulated person.
+* ``no_wait``: the hand follows the recording to the point of release. It holds the object there until load and felt
+  grip show that the robot has it.
+* ``leave``: the hand follows the recording to its end. If the robot does not hold the object, it leaves with the hand.
 """
 
 from __future__ import annotations
@@ -23,28 +26,22 @@ from coglab_sim.person.virtual_human import CLOSING, VirtualHuman
 
 WAYS = ("wait", "no_wait", "leave")
 HAND = "human_hand"
-SLOW = 0.05
-"""m/s below which the recorded hand has arrived"""
-STEP = 0.02
-"""s, at which a recording is looked through"""
-LEFT = 0.05
-"""m by which the recorded object has moved in the hand when it was let go"""
-FARTHEST = 0.30
-"""m between hand and object at the beginning: farther away it is in nobody's hand"""
-SHORTEST = 0.10
-"""m, of a reach"""
-LEAVES_CLOSED = 0.05
-"""share of their way that the robot's fingers are seen to close before a person lets go who leaves as recorded"""
+SLOW = 0.05  # m/s; a slower recorded hand has arrived
+STEP = 0.02  # s, sampling period for the analysis of a recording
+LEFT = 0.05  # m; an object that moved farther in the recorded hand was let go
+FARTHEST = 0.30  # m, largest distance between hand and held object at the beginning
+SHORTEST = 0.10  # m, shortest reach
+LEAVES_CLOSED = 0.05  # with `leave`: seen change of the fingers' closure (0..1) above which they count as closed
 
 
 class RecordedHand:
-    """The recorded hand in the robot's world: poses, and when it arrived and let go (s of the recording).
+    """The recorded hand in the robot's world: poses, times of arrival and release (s of the recording).
 
-    Raises RecordingError where there is no hand, no object in it, or no reach.
+    Raises RecordingError if the recording has no hand, no object in it, or no reach.
     """
 
     def __init__(self, playback: Playback, object_frame: str | None) -> None:
-        """``object_frame``: of the object that is handed over; None: the recording is of a hand alone."""
+        """``object_frame``: frame of the object that is handed over; None: the recording has the hand only."""
         file, names = playback.settings.file, sorted(playback.names)
         for name in (HAND, object_frame):
             if name is not None and name not in names:
@@ -77,15 +74,16 @@ class RecordedHand:
                 self.released = max(self.arrived, float(times[moved.index(True)]))
 
     def at(self, seconds: float) -> Pose:
-        """The hand at a time of the recording (s)."""
+        """Returns the hand's pose at a time of the recording (s)."""
         return self.playback.at(HAND, seconds)
 
 
 def open_recorded_hand(settings: Mapping[str, Any], object_frame: str) -> tuple[RecordedHand, str]:
-    """The hand of a recording and which of the three ways it goes. RecordingError for anything that cannot be used.
+    """Returns the hand of a recording and its variant. RecordingError for settings that cannot be used.
 
-    ``settings``: fields of PlaybackSettings, ``person`` (wait, no_wait, leave), ``object`` (recorded: the recording has
-    to have it; in_hand: a hand alone, the object is put into it as the simulated person holds it).
+    ``settings``: fields of PlaybackSettings; ``person`` (wait, no_wait, leave); ``object``: with `recorded` the
+    recording must contain the object, with `in_hand` it has the hand only, which holds the object like the simulated
+    person.
     """
     rest = dict(settings)
     way, source = str(rest.pop("person", "wait")), str(rest.pop("object", "recorded"))
@@ -98,14 +96,14 @@ def open_recorded_hand(settings: Mapping[str, Any], object_frame: str) -> tuple[
 
 
 def scene_of(scene: Scene, hand: RecordedHand) -> Scene:
-    """The scene with the object in the hand as it was recorded, where it was."""
+    """Returns the scene with the recorded pose of the object in the hand, if the object was recorded."""
     if hand.object_in_hand is None:
         return scene
     return replace(scene, object_in_hand=hand.object_in_hand.position, object_turn=hand.object_in_hand.orientation)
 
 
 class RecordedPerson(VirtualHuman):
-    """VirtualHuman whose reach is a recorded one; it gives, and does not take."""
+    """VirtualHuman with a recorded reach. It gives objects but does not take them."""
 
     def __init__(self, participant: Participant, scene: Scene, hand: RecordedHand, way: str = "wait") -> None:
         super().__init__(replace(participant, sway=0.0, tremor=0.0, behaviour="normal"), scene_of(scene, hand), True)
@@ -125,7 +123,7 @@ class RecordedPerson(VirtualHuman):
             self._pending = None
 
     def _reacting(self, t: float, dt: float, seen: Percept) -> None:
-        self._go("reaching", t)  # the recording has a reaction of its own
+        self._go("reaching", t)  # the recording includes the reaction time
 
     def _reaching(self, t: float, dt: float, seen: Percept) -> None:
         seconds = (t - self._since) / self._scale
@@ -143,13 +141,13 @@ class RecordedPerson(VirtualHuman):
             self._go("idle", t)
 
     def _leave_it(self, t: float, dt: float, seen: Percept) -> None:
-        """On the way back: the fingers open if the robot has the object, now or never."""
+        """On the way back: the fingers open if the robot has the object."""
         closed = seen.hand_closure > self._closure + LEAVES_CLOSED and seen.closing_speed < CLOSING
         if self._grip < 1.0 or self._signs(t, seen, closed) >= 1.0:
             self._grip = max(0.0, self._grip - dt / self.participant.release_time)
 
     def _show(self, seconds: float) -> None:
-        """The hand as it was recorded, and as fast as it went."""
+        """Sets pose and velocity of the hand from the recording at ``seconds``."""
         pose, next_pose = self.recorded.at(seconds), self.recorded.at(seconds + STEP)
         pace = STEP * self._scale
         self._hand, self._turn = pose.position.copy(), pose.rotation

@@ -1,7 +1,4 @@
-"""What the virtual human is put into, what there is to be seen and felt, and what the hand shows: plain data.
-
-All frames in world, SI units.
-"""
+"""Plain data of the virtual human: scene, view of the world and state of the hand. Frames in world, SI units."""
 
 from __future__ import annotations
 
@@ -13,25 +10,23 @@ import numpy as np
 from coglab_objects.database import objects_folder, read_object
 from coglab_py.pose import IDENTITY, Pose
 
-FROM_HAND = 0.04
-"""m between the middle of the person's palm and the surface of what it holds"""
-HANDOVER = np.array([0.78, 0.03, 0.44])
-"""m, nominal place of the object's middle at a handover"""
+FROM_HAND = 0.04  # m between the middle of the person's palm and the surface of the held object
+HANDOVER = np.array([0.78, 0.03, 0.44])  # m, nominal position of the object's middle at a handover
 BOX = np.array([[0.72, -0.12, 0.34], [0.81, 0.16, 0.51]])
-"""m, within which people of the profiles patient and accustomed hand over: opposite corners for the object's middle"""
+"""m, opposite corners of the handover region (object's middle) of people with the profiles patient and accustomed"""
 
 
 def shipped(object_id: str) -> dict[str, Any]:
-    """Entry of an object of the database that is shipped."""
+    """Returns the entry of an object in the shipped database."""
     return read_object(objects_folder() / f"{object_id}.yaml")[0]
 
 
 @dataclass
 class Scene:
-    """Where things are and what is handed over.
+    """Places and the object of a handover.
 
-    The hand frame is world-aligned at rest; a held object sits at ``object_in_hand`` in it and is taken at
-    ``taken_in_hand``. The object frame lies in the middle of the underside.
+    The hand frame is parallel to world at rest. In it the person holds an object at ``object_in_hand`` and takes one at
+    ``taken_in_hand`` (m). The object frame lies in the middle of the underside.
     """
 
     rest: np.ndarray = field(default_factory=lambda: np.array([1.30, 0.20, 0.15]))
@@ -49,18 +44,18 @@ class Scene:
     object_size: np.ndarray = field(default_factory=lambda: np.array([0.08, 0.08, 0.10]))
     """m, along the axes of the object frame"""
     other_side: float = -0.16
-    """m, lateral shift of the handover point by a person who changes side"""
+    """m, lateral shift of the handover point with the behaviour `change_side`"""
 
     @property
     def object_middle(self) -> np.ndarray:
-        """m, middle of the object in its frame"""
+        """m, middle of the object in its own frame"""
         return np.array([0.0, 0.0, self.object_size[2] / 2])
 
     @staticmethod
     def of(entry: Mapping[str, Any], mass: float = 1.0, friction: float = 1.0) -> Scene:
-        """The scene with an object of the database; ``mass`` and ``friction`` are factors on the entry's.
+        """Returns the scene with an object of the database; ``mass`` and ``friction`` are factors on its values.
 
-        People give an object by its middle and take it by the part that is left free, as the entry's delivery says.
+        People hold an object at its middle and take it at the part that the entry's default delivery leaves free.
         """
         size = np.array([float(v) for v in entry["size"]])
         half = size[2] / 2
@@ -80,11 +75,11 @@ class Scene:
 
 @dataclass(frozen=True)
 class WorldView:
-    """What there is to be seen and felt at one moment, as it is: senses.Senses turns it into what is perceived."""
+    """True state of the world at one moment. senses.Senses converts it into the person's percept."""
 
     robot_hand: Pose = field(default_factory=Pose)
     hand_closure: float = 0.0
-    """of the robot's fingers as their joints are bent, 0 open .. 1 closed"""
+    """closure of the robot's fingers by their joint angles, 0 open .. 1 closed"""
     object: Pose = field(default_factory=Pose)
     load: np.ndarray = field(default_factory=lambda: np.zeros(3))
     """N, force of the held object on the person's hand, world axes"""
@@ -92,7 +87,7 @@ class WorldView:
 
 @dataclass
 class HandSample:
-    """The person's hand now: frame, velocity (m/s), spin (rad/s), grip 0..1, grip force at full closure (N), phase."""
+    """State of the person's hand: frame, velocity (m/s), spin (rad/s), grip 0..1, force at full grip (N), phase."""
 
     frame: Pose
     velocity: np.ndarray

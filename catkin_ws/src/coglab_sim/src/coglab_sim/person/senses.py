@@ -1,6 +1,6 @@
-"""What a person perceives of the cell: everything seen late and noisy, everything felt late and above a threshold.
+"""Perception of the simulated person: sight with delay and noise, touch with delay and threshold.
 
-Nothing else reaches the simulated person but what is said to them.
+The person has no other inputs except the robot's speech.
 """
 
 from __future__ import annotations
@@ -18,30 +18,26 @@ from scipy.spatial.transform import Rotation
 from coglab_sim.person.participant import Participant
 from coglab_sim.person.scene import WorldView
 
-NOISE_TIME = 0.3
-"""s, correlation time of what is seen wrongly"""
-SPEED_TIME = 0.05
-"""s over which a speed is seen"""
-SLOWEST = 0.005
-"""m/s, standard deviation of a seen speed beside its share"""
+NOISE_TIME = 0.3  # s, correlation time of the visual error
+SPEED_TIME = 0.05  # s, time over which a speed is seen
+SLOWEST = 0.005  # m/s, constant part of the standard deviation of a seen speed
 FINGERTIP_WAY = 0.19
-"""m that a fingertip goes from open to closed (middle finger of coglab_sim/config/hand_model.yaml): what is seen of the
-fingers is seen of their tips"""
-FINGERS = 4
-"""whose tips are seen, each by itself: the mean of all is more exact than one"""
+"""m, path of a fingertip from open to closed (middle finger of coglab_sim/config/hand_model.yaml). People see the
+closure by the fingertips."""
+FINGERS = 4  # number of fingertips that are seen independently; their mean is more exact than one
 
 Value = TypeVar("Value")
 
 
 class Delayed(Generic[Value]):
-    """Gives back what was put in a fixed time ago (s); before that, the first value."""
+    """Delays values by a fixed time (s). Until then it returns the first value."""
 
     def __init__(self, delay: float) -> None:
         self.delay = delay
         self._values: deque[tuple[float, Value]] = deque()
 
     def step(self, t: float, value: Value) -> Value:
-        """Put in the value of time t (s, increasing); returns the newest one that is old enough."""
+        """Stores the value of time t (s, increasing). Returns the newest value that is old enough."""
         self._values.append((t, value))
         while len(self._values) > 1 and self._values[1][0] <= t - self.delay + 1e-9:
             self._values.popleft()
@@ -49,14 +45,14 @@ class Delayed(Generic[Value]):
 
 
 class SlowNoise:
-    """Correlated Gaussian noise of given standard deviations."""
+    """Correlated Gaussian noise with the given standard deviations."""
 
     def __init__(self, rng: np.random.Generator, sigma: np.ndarray) -> None:
         self._rng, self._sigma = rng, sigma
         self._value = sigma * rng.normal(size=len(sigma))
 
     def step(self, dt: float) -> np.ndarray:
-        """The noise ``dt`` s later."""
+        """Returns the noise ``dt`` s later."""
         keep = float(np.exp(-dt / NOISE_TIME))
         fresh = self._rng.normal(size=len(self._sigma))
         self._value = keep * self._value + np.sqrt(1.0 - keep**2) * self._sigma * fresh
@@ -65,35 +61,35 @@ class SlowNoise:
 
 @dataclass(frozen=True)
 class Percept:
-    """What the person takes for the state of the cell."""
+    """State of the cell as the person perceives it."""
 
     true_hand: Pose
     hand_error: np.ndarray
-    """m and rad, by which it is seen elsewhere than it is"""
+    """visual error, m (3) and rad (3)"""
     robot_speed: float
     """m/s"""
     hand_closure: float
     closing_speed: float
-    """1/s, of the robot's fingers"""
+    """1/s, closing speed of the robot's fingers"""
     true_object: Pose
     object_error: np.ndarray
     load: np.ndarray
     """N, of the object on the person's hand, world axes"""
 
-    # Most phases look at one of the two frames or at none.
+    # Computed on demand: most phases use one of the two frames or none.
     @cached_property
     def robot_hand(self) -> Pose:
-        """As it is seen."""
+        """Seen pose of the robot's hand."""
         return _moved(self.true_hand, self.hand_error)
 
     @cached_property
     def object(self) -> Pose:
-        """As it is seen."""
+        """Seen pose of the object."""
         return _moved(self.true_object, self.object_error)
 
 
 class Senses:
-    """Eyes and touch of one person. Step it with the time and the world as it is."""
+    """Eyes and touch of one person. Input of step(): time and true state of the world."""
 
     def __init__(self, person: Participant, rng: np.random.Generator) -> None:
         self.person, self._rng = person, rng
@@ -110,7 +106,7 @@ class Senses:
         self._last: float | None = None
 
     def step(self, t: float, view: WorldView) -> Percept:
-        """What is perceived at time t (s, increasing)."""
+        """Returns the percept at time t (s, increasing)."""
         dt = 0.0 if self._last is None else max(0.0, t - self._last)
         self._last = t
         seen, speed, closing = self._eyes.step(t, (view, *self._speeds(t, view)))
@@ -127,8 +123,8 @@ class Senses:
         )
 
     def _speeds(self, t: float, view: WorldView) -> tuple[float, float]:
-        """Of the robot's palm (m/s) and of its fingers (1/s), over the last moment; a robot that was never seen before
-        is not at rest."""
+        """Speeds of the robot's palm (m/s) and fingers (1/s) over SPEED_TIME. A robot that was just seen for the first
+        time counts as moving."""
         before = self._before
         before.append((t, view.robot_hand.position, view.hand_closure))
         while len(before) > 2 and before[1][0] <= t - SPEED_TIME:
@@ -142,7 +138,7 @@ class Senses:
         )
 
     def _feel(self, load: np.ndarray) -> np.ndarray:
-        """The force that is felt stays until the change is noticeable."""
+        """Returns the felt force (N). It keeps its value until the change is noticeable."""
         noticeable = max(self.person.felt_threshold, self.person.felt_share * length(self._felt))
         if length(load - self._felt) > noticeable:
             self._felt = load.copy()

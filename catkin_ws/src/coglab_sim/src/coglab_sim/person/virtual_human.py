@@ -1,9 +1,9 @@
-"""The virtual human: gives objects to the robot and takes them, with the timing, scatter and slips of people.
+"""The virtual human: gives objects to the robot and takes them, with the timing, scatter and errors of people.
 
-Phases: idle, reacting, reaching, waiting (hand at the handover point, the robot comes), placing (the object is brought
-gently into the robot's palm; for receiving: the hand closes and lifts), holding, releasing, retreating. The person
-knows the cell through eyes and hand (senses), and the robot's intention through its words (coglab_msgs/Say).
-All frames in world, SI units.
+Phases of both tasks: idle, reacting, reaching, hesitating, waiting (at the handover point, for the robot's hand),
+releasing, retreating. Giving: placing (moves the object gently into the robot's palm), holding. Taking: grasping,
+lifting. The person perceives the cell by sight and touch (senses), and the robot's intention by its speech
+(coglab_msgs/Say). All frames are in world, SI units.
 """
 
 from __future__ import annotations
@@ -21,56 +21,56 @@ from coglab_sim.person.senses import Percept, Senses
 
 # Seeing and reaching
 NEAR = 0.10  # m, gap below which the robot's hand, or the object in it, counts as arrived
-STILL = 0.02  # m/s below which the robot's hand looks still
-REPLAN_PERIOD = 0.10  # s between two corrections of where the reach ends
+STILL = 0.02  # m/s; a slower robot hand looks still
+REPLAN_PERIOD = 0.10  # s between two corrections of the reach's target
 CORRECTION_TIME = 0.45  # s, shortest duration of a correction
-GONE = 0.35  # m, gap at which a robot's hand that has been near counts as gone
-WITHDRAWALS = 5  # trials in which a person with the behaviour `withdraws` takes the offer back
-COMES = 0.25  # m, gap at which they do
+GONE = 0.35  # m; beyond this gap, a robot hand that was near counts as gone
+WITHDRAWALS = 5  # a person with the behaviour `withdraws` takes the offer back in this many first trials
+COMES = 0.25  # m, gap at which this person takes the offer back
 # Giving
-BEYOND = 0.05  # m past the palm as it was seen; there the person stops
-PLACES_WITHIN = 4.0  # s after which placing stops where nothing was felt
-AFTER_TOUCH = 0.02  # m/s with which the object is pressed on from first touch
-RAMP = 0.15  # s in which the hand reaches its speed of placing
-FOLLOW_UP = 0.015  # m, longest way after first touch
-CLOSED = 0.08  # share of their way that the robot's fingers are seen to close before they count as closed
-CLOSING = 0.1  # 1/s of their way below which they look as if they had closed
-TOUCH_PART = 0.7  # what a closed hand whose grip is felt counts; 1 lets go
-TOLD_PART = 0.4  # what the words "I have it" count
-AGAIN = 0.5  # s without enough touch after which a person with that habit presses again
-REGRIPS = 0.10  # s in which fingers that had begun to open close again
-LOOSE = 0.5  # grip at which the fingers stop opening until the person feels who carries
-FEELS = 0.5  # s, longest duration of that
-SINK_SPEED = 0.03  # m/s with which an arm that relaxes sinks meanwhile
-CARRIES = 0.7  # share of the weight below which the robot carries
+BEYOND = 0.05  # m; the person stops this far beyond the seen palm
+PLACES_WITHIN = 4.0  # s, longest placing without touch
+AFTER_TOUCH = 0.02  # m/s, pressing speed after first touch
+RAMP = 0.15  # s until the hand reaches its placing speed
+FOLLOW_UP = 0.015  # m, longest path after first touch
+CLOSED = 0.08  # seen change of the fingers' closure (0..1) above which they count as closed
+CLOSING = 0.1  # 1/s; slower fingers look as if they had finished closing
+TOUCH_PART = 0.7  # weight of the sign "closed hand and felt grip"; the person lets go at a sum of 1
+TOLD_PART = 0.4  # weight of the sign "I have it" was heard
+AGAIN = 0.5  # s without enough touch, after which a person with this habit presses again
+REGRIPS = 0.10  # s in which partly opened fingers close again
+LOOSE = 0.5  # grip at which the fingers stop opening until the person feels that the robot carries
+FEELS = 0.5  # s, longest duration of this pause
+SINK_SPEED = 0.03  # m/s, sinking speed of a relaxed arm during the pause
+CARRIES = 0.7  # if the person feels less than this share of the weight, the robot carries
 # Taking
-THERE = 0.010  # m between hand and object below which the fingers close
+THERE = 0.010  # m; the fingers close when the object is nearer than this
 LIFT_SPEED = 0.03  # m/s
 LIFT = 0.03  # m
-MORE_THAN_WEIGHT = 1.2  # share of the expected weight at which the hand rises no further
-OPENED = 0.08  # share of their way that the robot's fingers are seen to open before they count as open
-OPEN_FOR = 0.2  # s for which they have to
-GRASPS_WITHIN = 4.0  # s after which a person who has not come to the object gives up
+MORE_THAN_WEIGHT = 1.2  # share of the expected weight at which the hand stops rising
+OPENED = 0.08  # seen change of the fingers' closure (0..1) above which they count as open
+OPEN_FOR = 0.2  # s that they must count as open
+GRASPS_WITHIN = 4.0  # s, longest time to get to the object
 # Losing an object
-LOST = 0.2  # share of the weight below which the object is not felt any more
-AWAY = 0.35  # m from the hand at which it is seen elsewhere
-LOST_FOR = 0.3  # s of both after which it is lost
+LOST = 0.2  # share of the weight below which the person does not feel the object any more
+AWAY = 0.35  # m, distance from the hand at which the object is seen elsewhere
+LOST_FOR = 0.3  # s of both conditions after which the object is lost
 
 TASKS = {Say.READY_TO_RECEIVE: "give", Say.READY_TO_GIVE: "receive", Say.GIVEN_UP: "rest", Say.PLEASE_STEP_BACK: "rest"}
-"""what a prompt asks of the person"""
+"""task that each prompt of the robot gives to the person"""
 
 
 def involuntary(p: Participant, f: np.ndarray, t: float) -> np.ndarray:
-    """Displacement (m) by sway (0.3-1 Hz) and tremor (8-12 Hz) at time t: sums of sines with the phases ``f`` (3 x 4),
-    bounded and smooth."""
+    """Displacement (m) by sway (0.3-1 Hz) and tremor (8-12 Hz) at time t (s): bounded, smooth sums of sines with the
+    phases ``f`` (3 x 4, rad)."""
     sway = np.sin(2 * np.pi * 0.35 * t + f[:, 0]) + 0.5 * np.sin(2 * np.pi * 0.8 * t + f[:, 1])
     tremor = np.sin(2 * np.pi * 9.1 * t + f[:, 2]) + 0.6 * np.sin(2 * np.pi * 11.3 * t + f[:, 3])
     return p.sway / 1.5 * sway + p.tremor / 1.6 * tremor
 
 
 class VirtualHuman:
-    """Step it with the time and the view; it answers with its hand. Deterministic for a seed and a sequence
-    of steps."""
+    """The simulated person. step() takes time and view and returns the hand. The same seed and steps give the same
+    result."""
 
     def __init__(self, participant: Participant, scene: Scene | None = None, holds_object: bool = True) -> None:
         self.participant = participant
@@ -110,28 +110,28 @@ class VirtualHuman:
         self._travelled = self._sunk = 0.0
 
     def command(self, text: str) -> None:
-        """'give <object>', 'receive <object>' or 'rest'; taken up at the next step."""
+        """Sets the task 'give <object>', 'receive <object>' or 'rest' for the next step. ValueError for others."""
         task = text.split()[0] if text.split() else "rest"
         if task not in ("give", "receive", "rest"):
             raise ValueError(f"a person can be asked to give, receive or rest, not '{text}'")
         self._pending = task
 
     def hear(self, t: float, code: int) -> None:
-        """Something is said to the person at time t (s); ``code`` of coglab_msgs/Say."""
+        """The robot says ``code`` (of coglab_msgs/Say) to the person at time t (s)."""
         self._heard.append((t + self.participant.hearing_delay, int(code)))
 
     def holds(self) -> bool:
-        """Whether the person's hand is closed on something."""
+        """True if the person's hand is closed on an object."""
         return self._grip > 0.5
 
     def meets(self, scene: Scene, knows_weight: bool) -> None:
-        """Another object is there: what it weighs, how smooth and large it is, where it is held and taken; the place
-        of rest stays. ``knows_weight``: it lies in the person's hand."""
+        """Another object is in the cell: takes its mass, friction, size and grips from ``scene``, keeps the rest pose.
+        ``knows_weight``: the object lies in the person's hand."""
         self.scene = scene
         self.grip_force = GripForce(self.participant, scene, knows_weight)
 
     def step(self, t: float, view: WorldView) -> HandSample:
-        """One step at time t (s, increasing)."""
+        """Makes one step at time t (s, increasing)."""
         dt = 0.0 if self._last is None else max(0.0, t - self._last)
         self._last = t
         seen = self.senses.step(t, view)
@@ -145,10 +145,10 @@ class VirtualHuman:
         shown = Pose(self._hand + involuntary(self.participant, self._noise_phase, t), self._turn.as_quat())
         return HandSample(shown, self._velocity.copy(), self._grip, force, self.phase, self._spin.copy())
 
-    # -- what to do ---------------------------------------------------------------------------------------------
+    # -- choice of the task --------------------------------------------------------------------------------------
 
     def _understand(self, t: float) -> None:
-        """Act on what was said long enough ago."""
+        """Acts on speech that is older than the hearing delay."""
         while self._heard and self._heard[0][0] <= t:
             code = self._heard.pop(0)[1]
             self._told = code
@@ -193,14 +193,14 @@ class VirtualHuman:
         self._target, self._target_turn = target, turn
 
     def _follow(self, t: float) -> None:
-        """The hand goes on along the reach."""
+        """Moves the hand along the reach."""
         assert self._reach is not None and self._turning is not None
         self._hand, self._velocity = self._reach.at(t)
         self._turn, self._spin = self._turning.at(t)
 
     def _correct(self, t: float, seen: Percept) -> None:
-        """On-line correction while receiving: toward the object in the robot's hand when that is nearer than the place
-        the person had in mind."""
+        """Corrects a reach to receive toward the object in the robot's hand if the object is nearer than the planned
+        target."""
         reach = self._reach
         assert reach is not None
         if self._task != "receive" or t < self._replan_at or t - reach.begin < self.participant.seeing_delay:
@@ -214,7 +214,7 @@ class VirtualHuman:
             self._target = offered
 
     def _handover_pose(self) -> tuple[np.ndarray, Rotation]:
-        """Where the hand goes: the handover point with this person's habits and this trial's scatter and turn."""
+        """Target of the hand (m, orientation): handover point with this person's offset and this trial's scatter."""
         p, s = self.participant, self.scene
         point = (
             s.handover_object * self._side
@@ -224,12 +224,12 @@ class VirtualHuman:
         if p.inside_box:
             point = np.clip(point, s.region_low, s.region_high)
         turn = Rotation.from_rotvec(np.radians(p.tilt) * self.rng.normal(0, 1, 3))
-        # The middle of the object comes to the handover point, however it is turned.
+        # The middle of the object comes to the handover point in any orientation.
         in_hand = s.object_in_hand if self._task == "give" else s.taken_in_hand
         return point + s.object_middle - turn.apply(in_hand + s.object_middle), turn
 
     def _middle(self) -> np.ndarray:
-        """Where the middle of the object is that the hand holds: the person knows it without looking."""
+        """Middle (m) of the held object. The person knows it without looking."""
         turned = Rotation.from_quat(self.scene.object_turn).apply(self.scene.object_middle)
         middle: np.ndarray = self._hand + self._turn.apply(self.scene.object_in_hand + turned)
         return middle
@@ -241,18 +241,18 @@ class VirtualHuman:
         return length(np.maximum(beyond, 0.0))
 
     def _way_to(self, place: Pose) -> float:
-        """m that the object at ``place`` is from where the hand would take it."""
+        """Distance (m) from the hand to the pose where it takes the object at ``place``."""
         return length(place.position - self._turn.apply(self.scene.taken_in_hand) - self._hand)
 
     def _weight(self) -> float:
-        """N, what the person knows the object to weigh."""
+        """N, weight that the person expects."""
         return max(1e-3, self.grip_force.expected)
 
     def _load_share(self, seen: Percept) -> float:
-        """Share of the weight that the person's hand carries as felt."""
+        """Felt share of the weight on the person's hand."""
         return float(-seen.load[2]) / self._weight()
 
-    # -- until both are there -----------------------------------------------------------------------------------
+    # -- until both hands meet -----------------------------------------------------------------------------------
 
     def _idle(self, t: float, dt: float, seen: Percept) -> None:
         self._velocity = np.zeros(3)
@@ -286,7 +286,7 @@ class VirtualHuman:
             self._go("waiting", t)
 
     def _withdraws(self, gap: float) -> bool:
-        """With the behaviour `withdraws`: take the offer back as the robot's hand comes, in the first trials."""
+        """True in the first trials of the behaviour `withdraws`, when the robot's hand comes near."""
         teases = self.participant.behaviour == "withdraws" and self._task == "give" and self.trial <= WITHDRAWALS
         return teases and gap < COMES
 
@@ -298,7 +298,7 @@ class VirtualHuman:
             self._plan(t, self._target, self._target_turn)
 
     def _waiting(self, t: float, dt: float, seen: Percept) -> None:
-        """Hold still until the robot's hand has come near and is trusted."""
+        """Holds still until the robot's hand is near and the person trusts it."""
         self._velocity = np.zeros(3)
         p = self.participant
         gap = self._gap(seen.robot_hand, seen.object) if self._task == "give" else self._way_to(seen.object)
@@ -318,7 +318,7 @@ class VirtualHuman:
             self._still_since = None
         elif self._still_since is None:
             self._still_since = t
-        # A person looks a moment before trusting that the robot has stopped.
+        # A person looks for a moment before trusting that the robot has stopped.
         if self._still_since is not None and t - self._still_since > p.trust:
             self._begin_exchange(t)
         elif t - self._since > p.patience or (self._met and gap > GONE):
@@ -334,7 +334,7 @@ class VirtualHuman:
     def _retreating(self, t: float, dt: float, seen: Percept) -> None:
         assert self._reach is not None
         self._follow(t)
-        if self._grip > 0.0:  # fingers that had begun to open close again
+        if self._grip > 0.0:  # partly opened fingers close again
             self._grip = min(1.0, self._grip + dt / REGRIPS)
         felt = length(seen.load) > LOST * self._weight()
         if self._grip == 0.0 or felt or length(seen.object.position - self._hand) < AWAY:
@@ -350,7 +350,7 @@ class VirtualHuman:
     # -- giving -------------------------------------------------------------------------------------------------
 
     def _taken_already(self, seen: Percept, near: bool) -> bool:
-        """While waiting: the robot's hand is seen to close on the object, or is felt to press on it already."""
+        """True if, during waiting, the person sees the robot's hand close or feels it press on the object."""
         if not near or self.participant.used_to_touch:
             self._held_load = seen.load
         self._closure = min(self._closure, seen.hand_closure) if near else seen.hand_closure
@@ -358,7 +358,7 @@ class VirtualHuman:
         return pressed or seen.hand_closure - self._closure > CLOSED
 
     def _placing(self, t: float, dt: float, seen: Percept) -> None:
-        """Bring the object into the palm, against the palm's outward axis, until it is felt; then press a little."""
+        """Moves the object into the palm, against the palm's outward axis, until the person feels it; then presses."""
         p = self.participant
         normal, along = seen.robot_hand.axis(0), seen.robot_hand.axis(2)
         to_object = self._middle() - seen.robot_hand.position
@@ -388,16 +388,16 @@ class VirtualHuman:
         self._travelled += length(self._velocity) * dt
 
     def _thickness(self, direction: np.ndarray) -> float:
-        """m, half of the object along a direction."""
+        """Half of the object's extent along a direction, m."""
         turned = self._turn * Rotation.from_quat(self.scene.object_turn)
         return float(np.abs(turned.inv().apply(direction)) @ self.scene.object_size) / 2
 
     def _holding(self, t: float, dt: float, seen: Percept) -> None:
-        """Hold on until load and grip say that the robot has it."""
+        """Holds the object until load and felt grip show that the robot has it."""
         self._velocity = np.zeros(3)
         p = self.participant
         self._grip = min(1.0, self._grip + dt / REGRIPS)
-        if self._sunk > 0.0:  # up again, after a try to let go
+        if self._sunk > 0.0:  # rise again after an attempt to let go
             self._sink(SINK_SPEED, dt)
         closed = seen.hand_closure - self._closure > CLOSED and seen.closing_speed < CLOSING
         if p.behaviour == "tug" and closed:
@@ -421,7 +421,7 @@ class VirtualHuman:
             self._retreat(t)
 
     def _lost_touch(self, t: float, seen: Percept) -> bool:
-        """The robot's open hand has backed away from the object: time to press again, if not tried too often."""
+        """True if the robot's open hand has backed away and the person has an attempt left to press again."""
         touch = length(seen.load - self._held_load)
         if touch >= 0.5 * self.participant.press or seen.robot_speed >= STILL or seen.closing_speed > CLOSING:
             self._still_since = None
@@ -431,7 +431,7 @@ class VirtualHuman:
         return away and self._tries < self.participant.presses_again and self._gap(seen.robot_hand, seen.object) < NEAR
 
     def _signs(self, t: float, seen: Percept, closed: bool) -> float:
-        """How surely the robot holds; the person lets go from 1 on."""
+        """Sum of the signs that the robot holds. The person lets go at 1 or more."""
         signs = max(0.0, 1.0 - self._load_share(seen)) / self.participant.release_share
         if not closed:
             self._felt_since = None
@@ -442,7 +442,7 @@ class VirtualHuman:
         return signs + TOUCH_PART * grip_felt + TOLD_PART * (self._told == Say.I_HAVE_IT)
 
     def _tug(self, t: float, dt: float) -> None:
-        """Pull to and fro before letting go."""
+        """Pulls to and fro before letting go."""
         if self._sure_since is None:
             self._sure_since = t
         since = t - self._sure_since
@@ -453,7 +453,7 @@ class VirtualHuman:
             self._go("releasing", t)
 
     def _releasing(self, t: float, dt: float, seen: Percept) -> None:
-        """Open the grip; halfway a giver waits to feel that the robot carries, else holds on again."""
+        """Opens the grip. Halfway, a giver waits to feel that the robot carries, and otherwise holds again."""
         self._velocity = np.zeros(3)
         p = self.participant
         careful = self._task == "give" and p.behaviour != "early_release"
@@ -465,8 +465,8 @@ class VirtualHuman:
             self._retreat(t)
 
     def _feel_who_carries(self, t: float, dt: float, seen: Percept) -> None:
-        """Less of the weight must be felt. An arm that relaxes sinks a little: what the robot holds does not sink with
-        it."""
+        """Checks that the felt weight has decreased. A relaxed arm sinks a little: an object that the robot holds does
+        not sink with it."""
         loosened = self.participant.release_time * (1.0 - LOOSE) + self.participant.feeling_delay
         self._checked = self._load_share(seen) < CARRIES and t - self._since > loosened
         if self._checked:
@@ -484,7 +484,7 @@ class VirtualHuman:
     # -- taking -------------------------------------------------------------------------------------------------
 
     def _grasping(self, t: float, dt: float, seen: Percept) -> None:
-        """Close the last way to the object as it is seen, and grip it."""
+        """Moves the hand to the seen object and grips it."""
         error = seen.object.position - self._turn.apply(self.scene.taken_in_hand) - self._hand
         distance = length(error)
         if self._grip == 0.0 and distance > THERE:
@@ -505,7 +505,7 @@ class VirtualHuman:
             self._go("lifting", t)
 
     def _lifting(self, t: float, dt: float, seen: Percept) -> None:
-        """Take the weight: the hand rises slowly until the robot's hand is seen to open."""
+        """Takes the weight: the hand rises slowly until the person sees the robot's hand open."""
         opened = self._closure - seen.hand_closure > OPENED or self._told == Say.YOU_HAVE_IT
         self._velocity = np.zeros(3)
         if opened:

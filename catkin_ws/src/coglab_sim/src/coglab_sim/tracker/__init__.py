@@ -1,1 +1,1 @@
-"""The simulated tracker: what perception delivers of the cell."""
+"""The simulated tracker: observations of the cell with the errors of perception."""

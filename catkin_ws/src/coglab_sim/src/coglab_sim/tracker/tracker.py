@@ -1,9 +1,8 @@
-"""Perception as a tracker delivers it: between the truth of the cell and the frames that control sees.
+"""Simulated tracker: converts true poses of the cell into the frames that control receives.
 
-Rate and its jitter, latency (stamp = capture time, delivered later), noise that is correlated like a tracker's, bursts
-of dropout (two-state Gilbert model), occlusion while the robot's hand is near, identity swaps, and the constant error
-of its calibration to the robot. Each can be switched off; ``perfect`` delivers the truth as it is at the same rate.
-docs/people.md says where the figures come from.
+It adds rate jitter, latency (stamp = capture time, delivered later), correlated noise, bursts of dropout (two-state
+Gilbert model), occlusion while the robot's hand is near, identity swaps, and a constant calibration error. Each error
+can be switched off; ``perfect`` delivers true poses at the same rate. docs/people.md gives the sources of the values.
 """
 
 from __future__ import annotations
@@ -17,13 +16,12 @@ import numpy as np
 from coglab_py.pose import Pose
 from scipy.spatial.transform import Rotation
 
-CALIBRATED_AT = np.array([0.75, 0.0, 0.40])
-"""m, world: where the calibration was made; an angle off turns everything about this point"""
+CALIBRATED_AT = np.array([0.75, 0.0, 0.40])  # m, world: place of the calibration; its angular error turns about it
 
 
 @dataclass(frozen=True)
 class PerceptionSettings:
-    """Of the stand-in. Times in s, lengths in m, angles in rad unless their names say degrees."""
+    """Settings of the simulated tracker. Times in s, rate in Hz, lengths in m, angles in rad (`_deg`: degrees)."""
 
     perfect: bool = False
     rate: float = 30.0
@@ -34,25 +32,25 @@ class PerceptionSettings:
     """standard deviation per world axis"""
     orientation_noise: float = 0.035
     correlation_time: float = 0.50
-    """of the noise: an AR(1) process, as a filtering tracker gives it"""
+    """of the noise: an AR(1) process, as from a tracker with a filter"""
     dropout_start: float = 0.02
     """probability per frame that a burst of dropout begins; 0 switches dropouts off"""
     dropout_end: float = 0.3
     occlusion_distance: float = 0.15
-    """a robot hand nearer than this hides the frame now and then; 0 switches occlusion off"""
+    """a robot hand nearer than this can hide the frame; 0 switches occlusion off"""
     occlusion_start: float = 0.08
     """probability per frame, while the robot's hand is near, that it begins to hide the frame"""
     occlusion_end: float = 0.25
     swap_probability: float = 0.002
-    """per frame: the tracker takes something else for it, the nearest other thing that it tracks; 0: never"""
+    """probability per frame that the tracker confuses it with the nearest other tracked thing; 0: never"""
     swap_jump: float = 0.08
-    """from the thing where there is no other one within swap_reach"""
+    """length of the jump if no other thing is within swap_reach"""
     swap_reach: float = 0.25
     swap_frames: int = 4
     calibration_offset: float = 0.005
-    """length of the constant error of all frames, its direction drawn by the seed; 0: none"""
+    """constant position error of all frames; the seed draws its direction; 0: none"""
     calibration_turn_deg: float = 1.0
-    """and of its angle, about the middle of the handover region"""
+    """constant angular error, about the middle of the handover region; the seed draws its axis"""
 
     def __post_init__(self) -> None:
         if not self.rate > 0.0 or self.latency < 0.0:
@@ -60,7 +58,7 @@ class PerceptionSettings:
 
     @staticmethod
     def from_mapping(data: Mapping[str, Any]) -> PerceptionSettings:
-        """Read a parameter mapping; ValueError names unknown fields."""
+        """Reads a parameter mapping. ValueError for unknown fields."""
         known = {f.name for f in fields(PerceptionSettings)}
         unknown = sorted(set(data) - known)
         if unknown:
@@ -70,7 +68,7 @@ class PerceptionSettings:
         return PerceptionSettings(**{k: tuple(v) if isinstance(v, list) else v for k, v in data.items()})
 
     def calibration(self, seed: int) -> Pose:
-        """The constant error of the tracker with this seed: every true frame is seen at this pose times itself."""
+        """Constant error of the tracker with this seed. Seen frame = this pose * true frame."""
         if self.perfect:
             return Pose()
         rng = np.random.default_rng([seed, 37])
@@ -82,7 +80,7 @@ class PerceptionSettings:
 
 @dataclass(frozen=True)
 class Sight:
-    """One delivered observation of a frame: when it was captured and what was seen."""
+    """One delivered observation of a frame: capture time (s) and seen pose."""
 
     name: str
     captured: float
@@ -90,7 +88,7 @@ class Sight:
 
 
 class Tracker:
-    """Observations of one frame. Feed it the truth; it returns what has been delivered by now."""
+    """Observes one frame. step() takes the true pose and returns the observations delivered so far."""
 
     def __init__(self, name: str, settings: PerceptionSettings, seed: int) -> None:
         self.name = name
@@ -109,9 +107,9 @@ class Tracker:
         self.newest: Sight | None = None
 
     def step(self, now: float, truth: Pose, robot_hand: Pose | None = None, others: Sequence[Pose] = ()) -> list[Sight]:
-        """At time ``now`` (s): capture if it is time, deliver what has arrived.
+        """Captures the frame at time ``now`` (s) if a capture is due, and returns the observations that arrived.
 
-        ``others``: true poses of the other things that are tracked, always in the same order.
+        ``others``: true poses of the other tracked things, always in the same order.
         """
         if now >= self._next:
             s = self.settings
@@ -121,7 +119,7 @@ class Tracker:
         delivered = []
         while self._queue and self._queue[0][0] <= now:
             sight = heapq.heappop(self._queue)[2]
-            # A frame that was overtaken by a newer one is worthless: tf would only complain about it.
+            # An observation older than a delivered one is dropped: tf would only warn about it.
             if self.newest is None or sight.captured > self.newest.captured:
                 self.newest = sight
                 delivered.append(sight)
@@ -143,7 +141,7 @@ class Tracker:
             self._push(now + delay, Sight(self.name, now, Pose(taken.position + noise[:3], turned.as_quat())))
 
     def _burst(self, lost: bool, start: float, end: float) -> bool:
-        """One frame of a two-state chain."""
+        """Next state of a two-state chain."""
         return bool(self.rng.random() >= end) if lost else bool(start > 0.0 and self.rng.random() < start)
 
     def _push(self, due: float, sight: Sight) -> None:
@@ -160,7 +158,7 @@ class Tracker:
         return self._noise
 
     def _swapped(self, truth: Pose, others: Sequence[Pose]) -> Pose:
-        """The pose of what the tracker takes for the frame now."""
+        """Pose of the thing that the tracker takes for the frame."""
         s = self.settings
         if self._swap_left == 0 and s.swap_probability > 0.0 and self.rng.random() < s.swap_probability:
             self._swap_left = s.swap_frames
@@ -178,13 +176,13 @@ class Tracker:
 
 @dataclass(frozen=True)
 class Board:
-    """The storage board: its frame in world and the places on it (object positions in the board frame, m)."""
+    """The storage board: its frame in world and its slots (object positions in the board frame, m)."""
 
     frame: Pose
     slots: dict[str, np.ndarray]
 
     def free(self, occupied: list[np.ndarray], clearance: float = 0.10) -> list[str]:
-        """Slots farther than ``clearance`` m from every object (world positions), best first."""
+        """Slots farther than ``clearance`` m from every object (world positions, m), best first."""
         return [
             name
             for name, place in self.slots.items()

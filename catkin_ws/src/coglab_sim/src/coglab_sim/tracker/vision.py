@@ -1,7 +1,6 @@
-"""The perception contract without ROS: what is in view, whose hand is the partner's, and answers.
+"""The perception contract without ROS: frames in view, choice of the partner's hand, and queries.
 
-Every answer comes within the time limit of its query and, where it is a refusal, is a sentence
-that says what was in view and what to do.
+Each query returns within its time limit. A refusal is a sentence that lists the frames in view and says what to do.
 """
 
 from __future__ import annotations
@@ -17,18 +16,15 @@ from coglab_py.pose import Pose
 
 from coglab_sim.tracker.tracker import Board, PerceptionSettings, Sight, Tracker
 
-OLDEST = 0.5
-"""s: an older sight is no answer to locate_object, and an older world is not visible."""
+OLDEST = 0.5  # s, largest age of a sight for locate_object, and of the last view of the world
 
-LONGEST_WAIT = 60.0
-"""s: longer time limits are cut to this."""
+LONGEST_WAIT = 60.0  # s, longest time limit; larger ones are reduced to it
 
-IN_HAND = 0.20
-"""m: an object so near to somebody's hand is held."""
+IN_HAND = 0.20  # m; an object nearer to a hand counts as held
 
 
 class NotSeen(Exception):
-    """Perception cannot answer; the text is the sentence of the answer, `code` its ReasonCode."""
+    """Perception cannot answer a query. The text is the message of the answer, `code` its ReasonCode."""
 
     def __init__(self, sentence: str, code: int) -> None:
         super().__init__(sentence)
@@ -36,11 +32,11 @@ class NotSeen(Exception):
 
 
 class PartnerChoice:
-    """Whose hand is the partner's when several are in view.
+    """Chooses the partner's hand when several are in view.
 
-    One hand is the partner's. Of several, the one nearer to the robot than every other by at least
-    `margin` (m) is; once chosen it stays so until another is nearer by the margin. With margin 0
-    nobody is ever chosen among several.
+    A single hand is the partner's. Of several, the hand that is nearer to the robot than all others by at least
+    `margin` (m) is chosen. It stays chosen until another is nearer by the margin. With margin 0, none of several hands
+    is ever chosen.
     """
 
     def __init__(self, margin: float = 0.0) -> None:
@@ -50,7 +46,7 @@ class PartnerChoice:
         self._chosen = ""
 
     def choose(self, hands: Mapping[str, Pose], robot: Pose | None) -> str:
-        """Name of the partner's hand, empty if it is not clear."""
+        """Returns the name of the partner's hand, or an empty string if the choice is not clear."""
         if len(hands) <= 1:
             self._chosen = next(iter(hands), "")
             return self._chosen
@@ -67,10 +63,10 @@ class PartnerChoice:
 
 
 class Vision:
-    """What the perception stand-in sees. Thread-safe.
+    """View of the simulated perception. Thread-safe.
 
-    `board`: as it is. It stands still and is seen once, as far off as everything that the tracker sees.
-    `clock` gives the time (s), for sights as well; it never goes back.
+    `board`: true pose. The board stands still and is seen once, with the tracker's calibration error.
+    `clock` returns the time (s), also of sights. It never goes back.
     """
 
     def __init__(
@@ -96,9 +92,9 @@ class Vision:
     # -- seeing ----------------------------------------------------------------------------------
 
     def see(self, hands: Mapping[str, Pose], objects: Mapping[str, Pose], robot: Pose | None = None) -> list[Sight]:
-        """The world as it is now: hands of people by any name, objects by frame name.
+        """Takes the true state of the world: hands of people by any name, objects by frame name.
 
-        Returns the sights that are to be broadcast: the partner's hand and the objects.
+        Returns the sights to be broadcast: the partner's hand and the objects.
         """
         now = self.clock()
         with self._changed:
@@ -120,10 +116,10 @@ class Vision:
             self._trackers[name] = Tracker(name, self.settings, self.seed)
         return self._trackers[name].step(now, frame, robot, others)
 
-    # -- answers ---------------------------------------------------------------------------------
+    # -- queries ---------------------------------------------------------------------------------
 
     def init_vision(self, timeout: float) -> str:
-        """Ready once the world is visible; a sentence. Raises NotSeen."""
+        """Waits until the world is visible and returns a message. Raises NotSeen."""
         limit = _limit(timeout)
         with self._changed:
             if self._changed.wait_for(self._world_is_visible, limit):
@@ -134,7 +130,7 @@ class Vision:
         )
 
     def locate(self, target: str, timeout: float) -> tuple[str, Sight, float]:
-        """Newest fresh sight of an object (by id), of the partner's hand or of the board.
+        """Waits for a fresh sight of an object (by id), of the partner's hand or of the board.
 
         Returns its frame, the sight, and its age (s). Raises NotSeen.
         """
@@ -154,9 +150,9 @@ class Vision:
             return name, sight, max(0.0, self.clock() - sight.captured)
 
     def free_places(self, object_id: str, timeout: float) -> list[tuple[str, np.ndarray]]:
-        """Slots of the board without an object on them, best first. Raises NotSeen.
+        """Returns the free slots of the board, best first. Raises NotSeen.
 
-        The object that is to be put, `object_id`, occupies no place.
+        The object to be placed, `object_id`, does not occupy a slot.
         """
         limit = _limit(timeout)
         own = self.names.object_frame(object_id)
@@ -181,7 +177,7 @@ class Vision:
             )
         return [(name, self.board.slots[name]) for name in free]
 
-    # -- judging ---------------------------------------------------------------------------------
+    # -- checks ----------------------------------------------------------------------------------
 
     def _world_is_visible(self) -> bool:
         return self.clock() - self._visible < OLDEST
@@ -193,7 +189,7 @@ class Vision:
         return self.clock() - tracker.newest.captured < OLDEST
 
     def _doubt(self, name: str) -> str:
-        """Sentence if the partner's hand is meant and it is not clear whose that is; else empty."""
+        """Reason if the query concerns the partner's hand and the partner is not clear; else empty."""
         if self.people <= 1 or self._partner or not self._world_is_visible():
             return ""
         if name != self.names.human_hand and not self._is_held(name):
@@ -216,5 +212,5 @@ class Vision:
 
 
 def _limit(timeout: float) -> float:
-    """A usable time limit; what is no number is no time at all."""
+    """Time limit in the range 0 to LONGEST_WAIT (s); 0 for NaN."""
     return 0.0 if math.isnan(timeout) else min(max(timeout, 0.0), LONGEST_WAIT)
