@@ -21,11 +21,11 @@ struct GoalObservation {
   /// Identifies the frame: its stamp as received, ns; later ones are larger. 0: it has none and is
   /// valid as long as it is received (a static transform).
   std::int64_t frame_ns = 0;
-  /// How often the clock of frame_ns has stepped back so far: after a step stamps begin anew.
+  /// Number of backward steps of the clock of frame_ns. After a step, stamps begin anew.
   std::uint32_t clock_steps = 0;
-  std::uint64_t request = 0;  ///< which request asked for this frame; set by GoalInput
+  std::uint64_t request = 0;  ///< number of the request for this frame; set by GoalInput
 
-  /// Whether this is a later frame than `other`, both with a stamp.
+  /// True if this is a later frame than `other`, both with a stamp.
   bool isLaterThan(const GoalObservation& other) const noexcept {
     return clock_steps != other.clock_steps || frame_ns > other.frame_ns;
   }
@@ -48,7 +48,7 @@ struct GoalBounds {
   double retreat = 0.0;  ///< m, how far it may go back from where it was nearest; 0: any way
   double drop = 0.0;     ///< m, how far it may sink below its average of kDropTime; 0: any way
 
-  /// What is wrong with them; empty: nothing.
+  /// Describes the first invalid limit; empty if all are valid.
   const char* wrong() const noexcept;
 };
 

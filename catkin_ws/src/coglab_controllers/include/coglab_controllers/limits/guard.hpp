@@ -1,6 +1,6 @@
 /// @file
-/// The last line between a controller and the robot: scales the whole velocity vector, keeping its
-/// direction.
+/// Last safety limit between controller and robot. It scales the whole velocity vector and keeps
+/// its direction.
 #pragma once
 
 #include "coglab_controllers/limits/workspace.hpp"

@@ -1,5 +1,5 @@
 /// @file
-/// Finds a motion that a joint's stop or a border of the workspace keeps from going on.
+/// Detects a motion that is blocked by a joint's stop or a border of the workspace.
 #pragma once
 
 #include "coglab_controllers/limits/guard.hpp"

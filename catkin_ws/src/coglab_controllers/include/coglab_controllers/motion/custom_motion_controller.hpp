@@ -1,6 +1,6 @@
 /// @file
-/// The motion controller around a motion that somebody wrote against motion/motion.hpp, and how
-/// such a motion is registered.
+/// Motion controller that runs a class derived from Motion<> (motion/motion.hpp), and the macro
+/// that registers such a class.
 #pragma once
 
 #include <memory>
@@ -14,18 +14,18 @@ namespace coglab_controllers {
 
 /// Arguments of start_motion.
 struct MotionRequestByName {
-  std::vector<std::string> names;  ///< arguments that are given; the others have their default
+  std::vector<std::string> names;  ///< given arguments; the others take their defaults
   std::vector<double> values;      ///< one for each name, in the unit that the motion declared
-  bool queue = false;  ///< wait for the end of the motion under way; false: take its place
+  bool queue = false;              ///< true: start after the current motion; false: replace it
 };
 
-/// Progress of the motion under way, for motion_feedback.
+/// Progress of the current motion, for motion_feedback.
 struct MotionProgress {
   std::int64_t stamp_ns = 0;
-  int id = -1;  ///< of the motion under way or the last one; -1: none yet
+  int id = -1;  ///< of the current or last motion; -1: none yet
   MotionState state = MotionState::Idle;
   Reason reason;
-  double time = 0.0;  ///< s since it began, on its own clock
+  double time = 0.0;  ///< s since the start, in motion time
   int queued = 0;
 };
 
@@ -42,16 +42,16 @@ class CustomMotionController : public MotionRunner<MotionArguments> {
  public:
   /// One for a motion of a library. Made here and not in the library, which may have been compiled
   /// when a controller had another size.
-  /// @param motion what it runs
-  /// @param library what the caller was compiled with; leave it out
-  /// @throws std::runtime_error if that is not what the program was compiled with
+  /// @param motion the motion to run
+  /// @param library ABI of the caller; use the default
+  /// @throws std::runtime_error if the program was compiled with another ABI
   static MotionController* make(std::unique_ptr<Motion<>> motion,
                                 const ctrl_more::Abi& library = customMotionAbi());
   ~CustomMotionController() override;
 
-  /// start_motion; any thread.
+  /// Handles start_motion. Any thread.
   MotionAnswer startMotion(const MotionRequestByName& request);
-  /// What start_motion may give: name, unit, default and range of each argument, one line each.
+  /// Name, unit, default and range of each argument of start_motion, one line each.
   std::string describeArguments() const;
   /// Newest progress; one reader thread.
   bool readProgress(MotionProgress& progress) { return progress_.read(progress); }

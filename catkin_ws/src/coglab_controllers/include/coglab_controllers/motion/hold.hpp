@@ -1,14 +1,13 @@
 /// @file
-/// What a motion controller does between motions: brake, then stand exactly still, open to feedback
-/// controllers.
+/// Behaviour between motions: the arm brakes, then stands exactly still. Feedback controllers may
+/// move it.
 #pragma once
 
 #include "coglab_controllers/manager/motion_controller.hpp"
 
 namespace coglab_controllers {
 
-/// Fades a difference away, so that a motion that begins somewhere else than measured begins
-/// without a step.
+/// Lets a motion start without a step if the commanded and the measured state differ.
 ///
 /// References begin at the commanded state, and loops close on the measured one. At the start of a
 /// motion the difference of the two counts as no error; it becomes one within about `blend`

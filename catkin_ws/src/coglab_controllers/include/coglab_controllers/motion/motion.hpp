@@ -1,7 +1,6 @@
 /// @file
-/// What somebody writes who wants the arm to move in a way of its own: one class of at most four
-/// methods, without ROS. Everything else (requests, queue, braking, holding, arriving, control of
-/// the joints) is MotionRunner's.
+/// Base class for new arm motions. A motion overrides four methods and needs no ROS. MotionRunner
+/// does the rest: requests, queue, braking, holding, arriving and joint control.
 #pragma once
 
 #include <array>
@@ -16,14 +15,14 @@
 
 namespace coglab_controllers {
 
-/// One number that a request for a motion may give, as start_motion takes it.
+/// One numeric argument of a motion request (service start_motion).
 struct MotionArgument {
   std::string name, unit;
-  double fallback = 0.0;           ///< used where a request does not name it
-  double least = 0.0, most = 0.0;  ///< a request outside of them is refused
+  double fallback = 0.0;           ///< value if the request does not give one
+  double least = 0.0, most = 0.0;  ///< range; a request outside it is refused
 };
 
-/// Which argument: what MotionConfiguration::argument() returns.
+/// Index of an argument, returned by MotionConfiguration::argument().
 struct ArgumentIndex {
   std::size_t value = 0;
 };
@@ -37,7 +36,7 @@ struct MotionArguments {
   double operator[](ArgumentIndex index) const noexcept { return values[index.value]; }
 };
 
-/// What configure() gets and declares.
+/// Input of configure(): robot and parameters. It also collects the declared arguments.
 class MotionConfiguration {
  public:
   explicit MotionConfiguration(const MotionSetup& motion_setup)
@@ -45,7 +44,7 @@ class MotionConfiguration {
         robot(*motion_setup.robot),
         parameters(motion_setup.parameters, motion_setup.id) {}
 
-  /// Declares a number that requests may give. A parameter of the same name changes its default.
+  /// Declares a numeric request argument. A parameter of the same name changes its default.
   /// @throws std::runtime_error if there are more than MotionArguments::kMost
   ArgumentIndex argument(const std::string& name, const std::string& unit, double fallback,
                          double least, double most) {
@@ -66,7 +65,7 @@ class MotionConfiguration {
   std::vector<MotionArgument> arguments_;
 };
 
-/// Where a motion begins: the state of the set-point, which the first reference must continue.
+/// State of the set-point at the start of a motion. The first reference must continue it.
 /// Poses and velocities are those of the tool frame in the robot's base frame; velocities are per
 /// second of the motion's own time.
 struct SetPoint {
@@ -77,7 +76,7 @@ struct SetPoint {
   Vector3 angular_velocity = Vector3::Zero();  ///< rad/s
 };
 
-/// What start() gets.
+/// Input of start().
 template <typename Request = MotionArguments>
 struct MotionStart {
   const Request& request;
@@ -85,50 +84,50 @@ struct MotionStart {
   const CycleInput& input;
 };
 
-/// What computeReference() gets. Time is the motion's own: it runs slower than the clock while
+/// Input of computeReference(). Its time is motion time: it runs slower than the clock while
 /// speed_scale or a limit slows the arm.
 struct MotionCycle {
   double time = 0.0;  ///< s since the motion began
-  double next = 0.0;  ///< s, the same in the next cycle
+  double next = 0.0;  ///< s, motion time of the next cycle
   const CycleInput& input;
   const IkResult& last;  ///< inverse kinematics of the last cycle (Cartesian references)
 };
 
 /// A motion of the arm, from its start to its end. configure() runs outside of the control cycle;
-/// the others run in it and must not allocate, lock, or call the system. What they throw is caught:
-/// the motion is given up, the arm brakes, the reason is published.
-/// @tparam Request what a request for it says; copied in the control cycle, so of fixed size
+/// the others run in it and must not allocate, lock, or call the system. Exceptions are caught:
+/// the motion is aborted, the arm brakes, and the reason is published.
+/// @tparam Request type of the requests; of fixed size, as the control cycle copies it
 template <typename Request = MotionArguments>
 class Motion {
  public:
   virtual ~Motion() = default;
 
-  /// Reads parameters and declares arguments. @throws std::runtime_error saying which parameter,
-  /// what was expected and what came
+  /// Reads parameters and declares arguments. @throws std::runtime_error with the parameter,
+  /// the expected and the received value
   virtual void configure(MotionConfiguration& configuration) = 0;
 
   /// A motion begins in this cycle; computeReference() follows at once.
   virtual void start(const MotionStart<Request>& start) = 0;
 
-  /// Where the arm shall be now and in the next cycle, or that it shall rest.
+  /// Sets the reference for this cycle and the next one, or rest.
   virtual void computeReference(const MotionCycle& cycle, MotionReference& reference) = 0;
 
-  /// Running or Holding while it is under way; Reached once its reference has come to its end (the
-  /// runner then waits until the arm is there too); Aborted if it gives up.
+  /// Running or Holding while it is under way; Reached once its reference has ended (the
+  /// runner then waits until the arm arrives); Aborted if it gives up.
   virtual MotionState state() const = 0;
 
   /// @name Seldom needed
   /// @{
 
-  /// Why it holds or gives up.
+  /// Reason for Holding or Aborted.
   virtual const Reason& reason() const {
     static const Reason none;
     return none;
   }
-  /// A limit keeps the motion from going on. Ends it as reached if the arm is at its goal.
-  /// @return whether it did; if not, the motion is aborted
+  /// Called if a limit blocks the motion. Ends it as reached if the arm is at its goal.
+  /// @return true if it ended the motion; on false the runner aborts it
   virtual bool endIfThere(const CycleInput& /*input*/) { return false; }
-  /// It was ended from outside: cancelled, replaced, or its controller is no longer the active one.
+  /// Called if the motion is cancelled or replaced, or if its controller becomes inactive.
   virtual void stop() noexcept {}
   /// @}
 };

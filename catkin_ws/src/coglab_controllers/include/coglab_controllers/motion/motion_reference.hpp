@@ -1,5 +1,5 @@
 /// @file
-/// What a motion asks of the arm in one cycle.
+/// Reference of a motion for one control cycle.
 #pragma once
 
 #include <cstdint>
@@ -9,9 +9,9 @@
 
 namespace coglab_controllers {
 
-/// The reference of one cycle: joints, a pose of the tool, or rest. A motion says where the arm
-/// shall be now and at the end of the cycle; the velocity between them follows from that, so that
-/// nothing has to be differentiated and a slowed clock slows the velocity too.
+/// The reference of one cycle: joints, a pose of the tool, or rest. A motion gives the
+/// position now and at the end of the cycle. The velocity is their difference divided by dt, so a
+/// slowed clock slows the velocity too.
 class MotionReference {
  public:
   enum class Space : std::uint8_t {
@@ -23,7 +23,7 @@ class MotionReference {
   /// @param dt of this cycle, s
   explicit MotionReference(double dt = 1.0) noexcept : dt_(dt) {}
 
-  /// The arm shall stand.
+  /// The arm brakes and stands.
   void rest() noexcept { space = Space::Rest; }
 
   /// @param now, next rad, seven joints in wire order
@@ -58,10 +58,10 @@ class MotionReference {
   JointVector joint_next = JointVector::Zero();      ///< rad, at the end of the cycle
   JointVector joint_velocity = JointVector::Zero();  ///< rad/s
   CartesianReference tool;
-  /// It does not continue the reference of the last cycle: the difference to the arm counts as no
-  /// error at first, and becomes one within `hold_blend`.
+  /// True if the reference does not continue that of the last cycle. Its difference to the arm then
+  /// fades in as an error within `hold_blend`.
   bool jumps = false;
-  /// 0..1 of the velocity that the control of the pose asks for: a motion fades out.
+  /// Factor 0..1 on the velocity of the pose control, to fade a motion out.
   double share = 1.0;
 
  private:

@@ -1,5 +1,5 @@
 /// @file
-/// The path that a motion is going to take, from the control cycle to whoever shows it.
+/// Predicted path of a motion, passed from the control cycle to the display.
 #pragma once
 
 #include <atomic>
@@ -14,18 +14,18 @@ namespace coglab_controllers {
 /// The path of the end-effector if nothing disturbs it.
 struct PredictedPath {
   std::int64_t stamp_ns = 0;  ///< time zero of the times in `path`, on the clock of the samples
-  std::string motion;         ///< what moves the arm: a primitive, or the id of a ptp motion
+  std::string motion;         ///< name of the primitive, or id of the ptp motion
   TimedPath path;
 };
 
-/// A copy of what the control cycle works on, made in the cycle when somebody outside has asked for
-/// it: one thread asks and reads, the control thread gives. Wait-free on both sides.
+/// Copies data out of the control cycle on request. One thread requests and reads; the control
+/// thread makes the copy. Wait-free on both sides.
 template <typename T>
 class CopyOnRequest {
  public:
   void ask() noexcept { asked_.store(true, std::memory_order_release); }
 
-  /// Control thread. @param make gives the copy; called only if one was asked for
+  /// Control thread. @param make returns the copy; called only after a request
   template <typename Make>
   void give(Make&& make) {
     if (!asked_.load(std::memory_order_relaxed)) return;
@@ -33,7 +33,7 @@ class CopyOnRequest {
     copies_.write(make());
   }
 
-  /// Whether a copy has come since the last call.
+  /// Returns true if a copy arrived since the last call.
   bool read(T& copy) { return copies_.read(copy); }
 
  private:
