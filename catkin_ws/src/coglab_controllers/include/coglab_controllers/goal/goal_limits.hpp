@@ -1,6 +1,6 @@
 /// @file
-/// What a goal may do (docs/reference.md has the limits): which of its frames a motion believes,
-/// and when the motion ends because the goal leaves, goes back or falls.
+/// Checks of a moving goal (limits in docs/reference.md): which goal frames a motion accepts, and
+/// when the motion ends because the goal leaves, retreats or drops.
 #pragma once
 
 #include <cstdint>
@@ -69,7 +69,7 @@ class GoalLimits {
 
   explicit GoalLimits(const GoalFrameLimits& frames = {}) : frames_(frames) {}
 
-  /// A motion begins with this goal, whatever came before.
+  /// Starts a motion with this goal and forgets the previous one.
   /// @param hand where the motion begins, m, in dmp_frame_name
   void begin(const GoalObservation& first, const Vector3& hand = Vector3::Zero(),
              const GoalBounds& bounds = {}) noexcept;
@@ -80,8 +80,8 @@ class GoalLimits {
   /// judged once
   State update(std::int64_t now_ns, const GoalObservation& newest) noexcept;
 
-  /// Whether the goal is still within the bounds of the motion; once per cycle of `dt` s.
-  /// @return why the motion has to end; empty: it may go on
+  /// Checks the goal against the bounds of the motion, once per cycle of `dt` s.
+  /// @return reason to end the motion; empty if it may continue
   Reason checkBounds(double dt) noexcept { return checkBounds(dt, goal_.position); }
   /// The same for a goal (m) that did not pass update().
   Reason checkBounds(double dt, const Vector3& goal) noexcept;

@@ -53,7 +53,7 @@ struct GuardResult {
 /// Towards a joint's stop the bound is the speed from which the interpolator can still stop in
 /// front of it, within its acceleration and jerk. A joint beyond its limits may only move back; if
 /// it asks for next to nothing outward (1e-3 of the fastest joint's speed, or 1e-5 rad/s), it alone
-/// is stopped. A restriction that is already violated lets pass what leads out of it.
+/// is stopped. A restriction that is already violated still allows motion out of it.
 class Guard {
  public:
   /// @throws std::invalid_argument naming joint and parameter.

@@ -1,6 +1,5 @@
 /// @file
-/// Slows the clock of a motion so that the reference waits for the arm instead of running away from
-/// it.
+/// Slows the clock of a motion so that the reference waits for the arm.
 #pragma once
 
 namespace coglab_controllers {
@@ -15,7 +14,7 @@ class PhaseGovernor {
   /// positive.
   explicit PhaseGovernor(double rise = 2.0, double fall = 10.0);
 
-  /// A new motion from rest begins; one that begins in motion begins with rate 1.
+  /// Resets for a new motion from rest. A motion that starts while moving begins with rate 1.
   void reset(double rate = 1.0) noexcept { rate_ = rate; }
 
   /// One cycle.

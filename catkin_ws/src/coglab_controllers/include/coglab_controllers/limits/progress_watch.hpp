@@ -7,14 +7,14 @@
 namespace coglab_controllers {
 
 /// Close to a stop or a border the allowed speed goes to zero smoothly, and the clock of the motion
-/// with it, so no single cycle shows a blocked motion. This looks at what a motion gained in a span
-/// of time. No allocation, no throw.
+/// with it, so no single cycle shows a blocked motion. This class measures progress over a
+/// time span. No allocation, no throw.
 class ProgressWatch {
  public:
   /// @param time s without progress after which a motion counts as blocked
   explicit ProgressWatch(double time) : time_(time) {}
 
-  /// Counts anew: another motion begins, or none is under way.
+  /// Restarts the count: a new motion begins, or none is active.
   void restart(const JointVector& set_point) noexcept {
     waited_ = own_ = 0.0;
     from_ = set_point;
@@ -23,8 +23,8 @@ class ProgressWatch {
 
   /// One cycle of a motion.
   /// @param dt s  @param speed_scale as requested; a paused motion (0) is not blocked
-  /// @param time_scale at which the motion's own clock runs  @param set_point of the joints, rad
-  /// @return the limit that blocks the motion; null: it goes on
+  /// @param time_scale rate of the motion's clock  @param set_point of the joints, rad
+  /// @return the limit that blocks the motion; null if none does
   const GuardResult* update(double dt, double speed_scale, double time_scale,
                             const JointVector& set_point, const GuardResult& guard) noexcept {
     if (guard.reason == GuardReason::JointPosition || guard.reason == GuardReason::WorkspaceBorder)

@@ -1,6 +1,6 @@
 /// @file
-/// Where the hand may be: a box, a sphere around the base, and the arm never fully stretched (D4.10
-/// section 3.1).
+/// Limits of the hand position: inside a box, outside a sphere around the base, arm never fully
+/// stretched (D4.10 section 3.1).
 #pragma once
 
 #include <array>
@@ -19,7 +19,7 @@ struct WorkspaceParameters {
       0.98;  ///< shoulder to wrist at most this share of the chain's reach; 1: no restriction
 };
 
-/// Which restriction is meant.
+/// Kind of restriction.
 enum class WorkspaceBorder { None, BoxMin, BoxMax, BaseSphere, Stretch };
 const char* describe(WorkspaceBorder border) noexcept;
 
@@ -44,8 +44,8 @@ class Workspace {
   void margins(const Chain& chain, const ChainState& state, const JointVector& velocity,
                std::array<Margin, kBorders>& margins) const noexcept;
 
-  /// Whether the hand may be at this point; the stretch of the arm does not enter. Names the first
-  /// border violated.
+  /// Checks a hand position (m) without the stretch of the arm. Returns the first violated
+  /// border.
   WorkspaceBorder violated(const Vector3& point) const noexcept;
   bool contains(const Vector3& point) const noexcept {
     return violated(point) == WorkspaceBorder::None;
