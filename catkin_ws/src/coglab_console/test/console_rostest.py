@@ -31,7 +31,7 @@ from std_msgs.msg import String
 # Of chromium about its own drawing, and its line about a command that was refused, whose reason the page tells: on a
 # busy machine the robot may stop by itself while a button is pressed.
 LIMIT = 60.0  # s, of every wait: the computer may be busy
-KNOWN = ("WebGL", "GPU stall", "willReadFrequently", "409 (Conflict)")
+KNOWN = ("WebGL", "GPU stall", "willReadFrequently", "409 (Conflict)", "points out of X bounds")
 
 
 class Console(unittest.TestCase):

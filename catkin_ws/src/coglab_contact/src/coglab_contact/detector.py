@@ -175,7 +175,7 @@ class ContactDetector:
         self._rest, self._gap = RestTorque(), 0.0  # gap: s between the last two samples
         self._unloaded: np.ndarray | None = None
         self.margin = 0.0
-        self._largest = np.zeros(7)
+        self._largest: np.ndarray = np.zeros(7)
 
     def arm(
         self,

@@ -132,9 +132,9 @@ class ReachBank:
         # The arrival of a hand that is observed for the first time was not observed. So rest at a handover gets half of
         # its probability.
         share = 0.5 * at_place / (at_place + elsewhere)
-        mean = np.zeros((2, 3, STATES))
+        mean: np.ndarray = np.zeros((2, 3, STATES))
         mean[..., POSITION] = mean[..., END] = position
-        cov = np.zeros((2, 3, STATES, STATES))
+        cov: np.ndarray = np.zeros((2, 3, STATES, STATES))
         for i in (POSITION, END):
             for j in (POSITION, END):
                 cov[..., i, j] = s.noise**2
@@ -142,10 +142,10 @@ class ReachBank:
         cov[..., ERROR, POSITION] = cov[..., POSITION, ERROR] = -0.5 * s.noise**2
         cov[..., ERROR, END] = cov[..., END, ERROR] = -0.5 * s.noise**2
         self._mean, self._cov = mean, cov
-        self._begin = np.full(2, stamp)
-        self._onset = np.full(2, stamp)
-        self._arrival = np.full((2, 3), NEVER)
-        self._toward = np.array([True, False])
+        self._begin: np.ndarray = np.full(2, stamp)
+        self._onset: np.ndarray = np.full(2, stamp)
+        self._arrival: np.ndarray = np.full((2, 3), NEVER)
+        self._toward: np.ndarray = np.array([True, False])
         self._log_weight = np.log(np.array([max(share, 1e-9), 1.0 - share]))
         self._place = np.array(s.place)
         scale = np.log(np.array(s.reach_times) / s.reach_time) / s.reach_time_deviation

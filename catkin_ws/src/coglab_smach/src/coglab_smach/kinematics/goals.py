@@ -43,8 +43,7 @@ def palm_at_grasp(grasp: Mapping[str, Any], standoff: float | None = None) -> Po
 def approach_of(grasp: Mapping[str, Any], length: float) -> list[float]:
     """Returns the last ``length`` m of the path to the grasp, along its approach axis (m, object frame)."""
     axis = np.asarray(grasp.get("approach", {}).get("axis", Pose.from_dict(grasp["pose"]).axis(0)), dtype=float)
-    way: list[float] = (length * axis / np.linalg.norm(axis)).tolist()
-    return way
+    return [float(value) for value in length * axis / np.linalg.norm(axis)]
 
 
 def grasp_goal(
