@@ -1,6 +1,6 @@
 /// @file
-/// From goals as received to the goal of eq. (1): g and g' without steps, without the lag of a
-/// ramp, and without the noise of the tracker.
+/// Estimates the goal of eq. (1) from received goals: g and g' without steps, without lag on a
+/// ramp, and with less tracker noise.
 #pragma once
 
 #include "coglab_controllers/kinematics/types.hpp"
@@ -10,51 +10,54 @@ namespace coglab_controllers {
 /// Parameters of GoalFilter.
 struct GoalFilterParameters {
   double time_constant = 0.06;  ///< s; 0 switches the filter off: g is the input, g' is zero
-  /// s; what it grows to when the goal is noisy; not below time_constant
+  /// s, time constant at full noise; not below time_constant
   double noisy_time_constant = 0.10;
-  /// The same for orientations: a tracker sees how an object is turned less well than where it is,
-  /// and what the wrist does about that costs the acceleration that the way needs.
+  /// s, the same for orientations. A tracker measures orientation less well than position, and the
+  /// wrist would use up acceleration that the translation needs.
   double noisy_turning_time_constant = 0.30;
-  /// m/s, rad/s: an estimated speed below this counts as noise when the noise is full
+  /// m/s and rad/s: at full noise, a lower estimated speed counts as noise
   double noisy_speed = 0.04;
   double noisy_turning = 2.0;
-  /// m/s below which the speed of a predicted goal counts as a change of the prediction
+  /// m/s: a lower speed of a predicted goal counts as a change of the prediction
   double predicted_speed = 0.08;
-  /// m/s that g' has at most: a goal that is faster is a hand on its way, or a prediction that has
-  /// changed, and will stop. It is neither led nor run after.
+  /// m/s, largest g'. A faster goal is a hand in transit or a changed prediction. It will stop, so
+  /// the arm does not follow it at full speed.
   double max_speed = 0.15;
   double max_innovation =
-      0.15;  ///< m: a goal further away pulls no harder, which bounds speed and acceleration
-  double max_angle_innovation = 0.6;  ///< rad, for orientations
+      0.15;  ///< m: larger differences to the input are clipped: bounds speed and acceleration
+  double max_angle_innovation = 0.6;  ///< rad, the same for orientations
 };
 
 /// Estimates goal position, velocity and orientation from goals as received (sample-and-hold
 /// between frames).
 ///
-/// Constant-velocity trackers of third order (three equal poles at 1/time_constant, solved exactly)
-/// with ramp compensation: g = p + 3 T g', so a steadily moving goal is met without lag, and g and
-/// g' have no step when the input has one. The noise is measured from the steps between frames: the
-/// change of the change of three successive steps is nearly zero for what a person's hand does
-/// between frames of 30 Hz (its jerk), and large for noise. g' is p', but as good as zero where the
-/// goal is noisy and p' is no faster than the noise makes it: a goal that rests is not led by its
-/// own noise. Nor is one led by the changes of a prediction, or by more than max_speed: a faster
-/// goal is met only once it is slower. No allocation, no throw but in the constructor.
+/// Third-order constant-velocity trackers (three equal poles at 1/time_constant, solved exactly)
+/// with ramp compensation g = p + 3 T g'. So a steadily moving goal is met without lag, and a step
+/// of the input makes no step of g or g'.
+///
+/// The noise is measured from the second difference of three successive steps between frames. It is
+/// nearly zero for a person's hand at 30 Hz (its jerk), and large for noise.
+///
+/// g' is p', but nearly zero if p' is no faster than the noise or the changes of a prediction. It
+/// is at most max_speed: a faster goal is met only once it slows down. Only the constructor
+/// allocates or throws.
 class GoalFilter {
  public:
   /// @throws std::invalid_argument unless time_constant is 0 or in [0.005, 2] and the others are
   /// positive.
   explicit GoalFilter(const GoalFilterParameters& parameters = {});
 
-  /// A motion begins: at rest at `goal`, and no noise is known.
+  /// Starts a motion: at rest at `goal`, with the noise estimate cleared.
   void begin(const Pose& goal) noexcept;
-  /// At rest at this position (m) or orientation; the noise stays known.
+  /// Sets the estimate to rest at this position (m) or orientation. The noise estimate is kept.
   void restAt(const Vector3& position) noexcept;
   void restAt(const Quaternion& orientation) noexcept;
 
-  /// One cycle of `dt` s of the noise, with the newest goal as received.
+  /// Updates the noise estimate, once per cycle of `dt` s, with the newest goal as received.
   void measureNoise(double dt, const Pose& goal) noexcept;
-  /// One cycle of `dt` s of the estimates, with the newest goal as received (finite).
-  /// @param predicted the goal tells where something will come to rest, not where it is
+  /// Updates the goal estimate, once per cycle of `dt` s, with the newest goal as received
+  /// (finite).
+  /// @param predicted true: the goal is a predicted rest position, not a present one
   void update(double dt, const Pose& goal, bool predicted = false) noexcept;
 
   bool enabled() const noexcept { return parameters_.time_constant > 0.0; }
@@ -63,15 +66,15 @@ class GoalFilter {
   const Quaternion& orientation() const noexcept { return orientation_; }  ///< of the target
   /// rad/s, base frame
   const Vector3& angularVelocity() const noexcept { return turn_.velocity; }
-  /// 0: none, to 1: full, of position and orientation.
+  /// Noise of position and of orientation, from 0 (none) to 1 (full).
   double noise() const noexcept;
   double turningNoise() const noexcept;
 
  private:
-  /// What position and orientation have in common. It works on the difference to the input, so
-  /// that the same code tracks points and, in the tangent space, rotations.
+  /// Tracker for position or orientation. It works on the difference to the input, so the same code
+  /// tracks points and, in the tangent space, rotations.
   struct Track {
-    double time_constant = 0.0;              // s, at present
+    double time_constant = 0.0;              // s, current value
     Vector3 rate = Vector3::Zero();          // per second
     Vector3 acceleration = Vector3::Zero();  // per second^2
     Vector3 velocity = Vector3::Zero();      // the part of the rate that is not noise

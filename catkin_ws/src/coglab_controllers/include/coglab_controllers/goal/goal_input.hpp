@@ -1,6 +1,6 @@
 /// @file
-/// Where the goals of a motion come from: a tf2 frame, or the topic dmp_goal; one of them at a
-/// time. Requests, topics and polls write; the control cycle reads.
+/// Source of a motion's goals: either a tf2 frame or the topic dmp_goal. Requests, topics and polls
+/// write the goals; the control cycle reads them.
 #pragma once
 
 #include <atomic>
@@ -17,24 +17,23 @@ namespace coglab_controllers {
 /// (s). @throws std::runtime_error naming the parameter
 GoalFrameLimits readGoalLimits(const Parameters& parameters);
 
-/// ns by which a stamp may be ahead of this computer's clock: what clocks that are synchronised
-/// differ by. A frame that is further ahead is refused, because it would count as fresh for longer
-/// than it is.
+/// Largest time (ns) by which a stamp may be ahead of this computer's clock. Synchronised clocks
+/// differ by less. A frame further ahead is refused, because it would count as fresh for too long.
 constexpr std::int64_t kClockTolerance_ns = 50'000'000;
 
-/// Poses of frames, looked up outside the control cycle: tf2, or a stand-in for it.
+/// Looks up poses of frames outside the control cycle: tf2, or a replacement for it.
 class GoalSource {
  public:
   virtual ~GoalSource() = default;
 
-  /// Newest pose of `frame` in `reference`, with its own stamp and with its time of capture in the
-  /// clock of the samples; a transform without a stamp counts as captured now.
+  /// Newest pose of `frame` in `reference`, with its own stamp and its time of capture on the clock
+  /// of the samples. A transform without a stamp counts as captured now.
   /// @param why set on failure: which frame is missing, or what is wrong with the transform
   virtual bool lookup(const std::string& reference, const std::string& frame,
                       GoalObservation& observation, std::string& why) = 0;
 
-  /// How far the newest transform of `frame` was ahead of the clock, s, if it was refused for that;
-  /// else 0.
+  /// Time (s) by which the newest transform of `frame` was ahead of the clock, if it was refused
+  /// for that; else 0.
   virtual double ahead(const std::string& /*frame*/) { return 0.0; }
 };
 
@@ -42,38 +41,38 @@ class GoalSource {
 /// others may be called from any other thread.
 class GoalInput {
  public:
-  /// @param frame in which goals are (dmp_frame_name)  @param host outlives this object
+  /// @param frame reference frame of the goals (dmp_frame_name)  @param host outlives this object
   void configure(const std::string& frame, const GoalFrameLimits& limits, const MotionHost& host);
 
-  /// Where poses of frames come from. Must outlive this object, or be taken away with null.
+  /// Sets the source of frame poses. It outlives this object, or is removed with null.
   void setSource(GoalSource* source);
 
-  /// Pose of `frame` in `reference`. @param what name of the parameter that names it
+  /// Pose of `frame` in `reference`. @param what parameter that holds the frame's name, for errors
   Answer transform(const std::string& reference, const std::string& frame, const char* what,
                    Pose& pose);
 
-  /// The goal as it is now, for a motion that is asked for; refused if there is none, or it is old.
-  /// @param frame that owns the goal; empty: dmp_goal
+  /// Current goal for a requested motion. Refused if there is no goal or it is too old.
+  /// @param frame tf2 frame of the goal; empty: dmp_goal
   Answer first(const std::string& frame, GoalObservation& goal);
-  /// The motion that was asked for is on its way: from now on goals of this owner are for it.
+  /// From now on, goals of `frame` belong to the requested motion. @param first from first()
   void follow(const std::string& frame, const GoalObservation& first);
 
-  /// A goal from the topic dmp_goal. One that is not newer than the last one is refused, unless
-  /// the clock of its stamps has stepped back.
-  /// @param stamp_ns on the clock of the samples, 0: now
-  /// @param frame_ns the stamp as received, 0: as stamp_ns
+  /// Receives a goal from the topic dmp_goal. A goal that is not newer than the last one is
+  /// refused, unless the clock of its stamps has stepped back.
+  /// @param stamp_ns time on the clock of the samples; 0: now
+  /// @param frame_ns stamp as received; 0: the same as stamp_ns
   Answer offer(const std::string& frame, const Vector3& position, std::int64_t stamp_ns,
                std::int64_t frame_ns);
 
-  /// Asks the source for the frame that owns the goal.
+  /// Looks up the goal frame of the current motion in the source.
   void poll();
 
   /// @name Control thread
   /// @{
 
-  /// The newest goal of the motion whose number is in it.
+  /// Reads the newest goal. Its field `request` is the number of the motion that it belongs to.
   void read(GoalObservation& newest) { newest_.read(newest); }
-  /// How far the newest goal is ahead of the clock if it was refused for that, s; else 0.
+  /// Time (s) by which the newest goal is ahead of the clock, if it was refused for that; else 0.
   double ahead() const { return ahead_.load(std::memory_order_relaxed); }
   /// @}
 
@@ -87,9 +86,9 @@ class GoalInput {
 
   std::mutex mutex_;
   GoalSource* source_ = nullptr;
-  std::string owner_;                 // frame of the motion; empty: dmp_goal
+  std::string owner_;                 // goal frame of the motion; empty: dmp_goal
   std::uint64_t request_number_ = 0;  // of the motion whose goals are written
-  GoalObservation polled_;            // newest sight of that frame
+  GoalObservation polled_;            // newest pose of that frame
   GoalObservation topic_goal_;        // newest dmp_goal
   bool topic_goal_known_ = false;
   std::atomic<double> ahead_{0.0};

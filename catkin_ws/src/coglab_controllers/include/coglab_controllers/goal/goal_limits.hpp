@@ -10,18 +10,19 @@
 
 namespace coglab_controllers {
 
-/// A goal frame as received: from tf2 its pose, from dmp_goal its position with the identity as
+/// A goal frame as received: a pose from tf2, or a position from dmp_goal with the identity as
 /// orientation.
 struct GoalObservation {
   Vector3 position = Vector3::Zero();               ///< m, in dmp_frame_name
   Quaternion orientation = Quaternion::Identity();  ///< of the goal frame, in dmp_frame_name
-  /// Time of capture, clock of the samples. It gives the age of the frame and does not identify
-  /// it: mapped from another clock twice, one frame has two of them.
+  /// Time of capture, clock of the samples. It gives the age of the frame. It does not identify the
+  /// frame: a stamp that is mapped twice from another clock gives two values.
   std::int64_t stamp_ns = 0;
-  /// Identifies the frame: its stamp as received, ns; later ones are larger. 0: it has none and is
-  /// valid as long as it is received (a static transform).
+  /// Stamp as received, ns. It identifies the frame; later frames have larger stamps. 0: no stamp;
+  /// the frame is valid as long as it is received (a static transform).
   std::int64_t frame_ns = 0;
-  /// Number of backward steps of the clock of frame_ns. After a step, stamps begin anew.
+  /// Number of backward steps of the clock of frame_ns. Stamps from before and after a step are not
+  /// comparable.
   std::uint32_t clock_steps = 0;
   std::uint64_t request = 0;  ///< number of the request for this frame; set by GoalInput
 
@@ -35,34 +36,34 @@ struct GoalObservation {
 struct GoalFrameLimits {
   double max_age =
       0.2;  ///< s: an older frame holds the last goal; 0: a goal stays valid until replaced
-  double max_jump = 0.15;    ///< m from one frame to the next; a larger one holds the last goal …
+  double max_jump = 0.15;  ///< m from one frame to the next; a larger jump holds the last goal …
   int frames_to_accept = 3;  ///< … until this many frames in a row agree within `agreement`
   double agreement = 0.05;   ///< m
   double lost_time = 1.0;  ///< s without a believable frame after which the goal is lost; 0: never
 };
 
-/// Limits of a request: where the goal may go during the motion. The defaults allow any way.
+/// Limits of a request: where the goal may go during the motion. The defaults allow everything.
 struct GoalBounds {
   Vector3 region_low = Vector3::Zero();   ///< m, corners of a box in dmp_frame_name that a goal
   Vector3 region_high = Vector3::Zero();  ///< which was inside may not leave; equal: anywhere
-  double retreat = 0.0;  ///< m, how far it may go back from where it was nearest; 0: any way
-  double drop = 0.0;     ///< m, how far it may sink below its average of kDropTime; 0: any way
+  double retreat = 0.0;  ///< m, largest retreat from its point nearest to the hand; 0: no limit
+  double drop = 0.0;     ///< m, largest sinking below its average over kDropTime; 0: no limit
 
   /// Describes the first invalid limit; empty if all are valid.
   const char* wrong() const noexcept;
 };
 
-/// Holds the last believable goal and watches where it goes. Before begin() there is no goal: one
-/// is believed once frames_to_accept frames agree, or at once if it is static. No allocation, no
-/// throw.
+/// Holds the last accepted goal and checks its motion. Before begin() there is no goal: the first
+/// one is accepted once frames_to_accept frames agree, or at once if it is static. No allocation,
+/// no throw.
 class GoalLimits {
  public:
   static constexpr double kDropTime = 0.15;  ///< s
 
   enum class State : std::uint8_t {
-    Unsettled,  ///< no goal is believed yet
+    Unsettled,  ///< no goal is accepted yet
     Fresh,      ///< the newest frame is followed
-    Old,        ///< no frame young enough: the last goal is held
+    Old,        ///< the newest frame is too old: the last goal is held
     Jumped,     ///< the newest frames are too far away: the last goal is held
     Lost        ///< held for longer than lost_time
   };
@@ -76,7 +77,7 @@ class GoalLimits {
 
   /// One cycle.
   /// @param now_ns clock of the samples
-  /// @param newest the newest frame received, again and again while no newer one comes; each is
+  /// @param newest the newest frame received, the same one until a newer one comes; each frame is
   /// judged once
   State update(std::int64_t now_ns, const GoalObservation& newest) noexcept;
 
@@ -102,7 +103,7 @@ class GoalLimits {
   GoalObservation candidate_;
   GoalObservation last_;  // the newest frame judged
   int agreeing_ = 0;      // frames in a row that agree, but not with the goal
-  bool settled_ = false;  // a goal is believed
+  bool settled_ = false;  // a goal is accepted
   bool seen_ = false;     // a frame was judged
   std::int64_t believed_ns_ = 0;
   double age_ = 0.0;

@@ -1,6 +1,6 @@
 /// @file
-/// The motion controller around a motion: requests, queue, start, end, abort and stand-still, once
-/// for all. Where it stands in the control cycle: docs/architecture.md.
+/// Base class of motion controllers that run a Motion<>. It handles requests, queue, start, end,
+/// abort and standstill. Its place in the control cycle: docs/architecture.md.
 #pragma once
 
 #include <algorithm>
@@ -34,29 +34,29 @@ struct MotionAnswer : Answer {
 /// A motion that ended.
 struct EndedMotion {
   int id = -1;
-  bool executed = false;  ///< false: given up before its end
-  Reason reason;          ///< why it was given up
+  bool executed = false;  ///< false: aborted before its end
+  Reason reason;          ///< reason of the abort; else empty
 };
 
-/// How a runner runs its motions.
+/// Settings of a runner.
 struct RunnerPolicy {
-  /// The motion goes on after it was reached (a goal may leave again) until something ends it.
+  /// true: the motion continues after it has reached its goal, because the goal may move again.
   bool open_end = false;
-  const char* id_name = "motion_id";  ///< of motions in reasons; null: they are not named
+  const char* id_name = "motion_id";  ///< name of the motion ids in reasons; null: no ids there
   int longest_queue = 64;             ///< largest max_queue; 0: no queue
 };
 
-/// What a runner does at the moment.
+/// Stage of a runner.
 enum class RunnerStage : std::uint8_t {
-  Rest,      ///< no motion; the arm brakes to, or is at, stand-still
-  Starting,  ///< one was adopted and begins with the next joint state that allows it
-  Moving,    ///< one is under way
-  Replacing  ///< one is under way until the next one begins
+  Rest,      ///< no motion; the arm brakes or stands
+  Starting,  ///< a motion was adopted; it begins with the next joint state that allows motion
+  Moving,    ///< a motion runs
+  Replacing  ///< a motion runs until the adopted one begins
 };
 
-/// Runs motions of one kind, one after another. A motion that begins while the arm moves goes on
-/// from its set-point; one that ends leaves the arm standing. The real-time side is the interface
-/// of MotionController; offer() is for requests.
+/// Runs motions of one kind, one after another. A motion that begins while the arm moves continues
+/// from the current set-point. After the last motion the arm stands. The control cycle calls the
+/// interface of MotionController; requests call offer().
 ///
 /// Parameters: those of ReferenceLoop, `settle_time` (s) and, with a queue, `max_queue`.
 template <typename Request>
@@ -65,7 +65,7 @@ class MotionRunner : public MotionController {
   MotionRunner(std::unique_ptr<Motion<Request>> motion, const RunnerPolicy& policy)
       : policy_(policy), motion_(std::move(motion)) {}
 
-  /// Motions that ended since the last call; one reader thread.
+  /// Reads the next motion that ended; false if there is none. One reader thread.
   bool readEnd(EndedMotion& end) { return ends_.pop(end); }
   const std::string& id() const { return setup_.id; }
 
@@ -87,14 +87,15 @@ class MotionRunner : public MotionController {
   const Reason& reason() const override { return reason_; }
 
  protected:
-  /// Hands a checked request to the cycle and waits until it is adopted.
-  /// @param begun from MotionHost::beginRequest(), welcome
-  /// @param queue wait for the end of the motion under way; false: replace it, and what waits
+  /// Passes a checked request to the cycle and waits until the cycle adopts it.
+  /// @param begun an accepted result of MotionHost::beginRequest()
+  /// @param queue true: start after the current motion; false: replace it and the queue
   MotionAnswer offer(const MotionRequest& begun, const Request& request, bool queue);
 
-  /// Why this request cannot be adopted now; empty: it can. Control thread.
+  /// Returns why this request cannot be adopted now; empty: it can. Control thread.
   virtual Reason unwelcome(const Request& /*request*/) const { return {}; }
-  /// Tells what the cycle did, at its end and when the controller starts and stops. Control thread.
+  /// Reports the result of a cycle. Called at the end of each cycle and when the controller
+  /// starts and stops. Control thread.
   virtual void report(std::int64_t stamp_ns) = 0;
 
   Motion<Request>& inner() { return *motion_; }
@@ -102,12 +103,12 @@ class MotionRunner : public MotionController {
   const ReferenceLoop& loop() const { return loop_; }  ///< control thread
   const MotionSetup& setup() const { return setup_; }
   const std::vector<MotionArgument>& arguments() const { return arguments_; }
-  int runningId() const { return current_.id; }  ///< control thread; of the last motion
+  int runningId() const { return current_.id; }  ///< control thread; of the current or last motion
   int queued() const { return queued_; }         ///< control thread
-  double time() const { return time_; }          ///< control thread; s, of the motion's own
+  double time() const { return time_; }          ///< control thread; s, motion time
 
  private:
-  /// One request on its way into the cycle, and there.
+  /// One request, passed to the cycle and kept there.
   struct Plan {
     int id = -1;
     Request request;
@@ -137,8 +138,8 @@ class MotionRunner : public MotionController {
   RunnerStage stage_ = RunnerStage::Rest;
   MotionState state_ = MotionState::Idle;
   Reason reason_;
-  Plan current_, next_;      // the motion under way, and the one that begins
-  std::vector<Plan> queue_;  // a ring; its size is fixed by configure()
+  Plan current_, next_;      // the running motion, and the one that begins next
+  std::vector<Plan> queue_;  // ring buffer; configure() fixes its size
   std::size_t first_ = 0;
   int queued_ = 0, unfinished_ = 0;
   double time_ = 0.0;
@@ -253,8 +254,7 @@ void MotionRunner<Request>::place(Plan& plan) {
     tell(stage_ == RunnerStage::Moving ? current_.id : next_.id, why, told);
     endQueued(why, told);
   }
-  // It begins with the next joint state: in a cycle without one, the commanded state is that of
-  // the last.
+  // The motion begins with the next joint state. Without a new one, the commanded state is old.
   next_ = plan;
   stage_ = stage_ == RunnerStage::Rest || stage_ == RunnerStage::Starting ? RunnerStage::Starting
                                                                           : RunnerStage::Replacing;
@@ -275,7 +275,7 @@ void MotionRunner<Request>::begin(const CycleInput& input, bool at_rest) {
   motion_->start({current_.request, from, input});
 }
 
-/// The reference has come to its end; the motion has when the arm is there too.
+/// The reference has ended. The motion ends when the measured arm arrives too.
 template <typename Request>
 void MotionRunner<Request>::arrive(const CycleInput& input) {
   switch (arrival_.update(input.dt, loop_.error(input), loop_.allowedError())) {
@@ -335,7 +335,7 @@ void MotionRunner<Request>::computeReference(const CycleInput& input, References
   loop_.write(input, reference, references);
 }
 
-/// Takes over what the motion says of itself.
+/// Takes over the motion's state and reason.
 template <typename Request>
 void MotionRunner<Request>::follow() {
   const MotionState state = motion_->state();

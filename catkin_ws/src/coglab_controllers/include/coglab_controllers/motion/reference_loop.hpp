@@ -1,6 +1,6 @@
 /// @file
-/// From the reference of a motion to joint velocities: one control law for joints, one for poses,
-/// and standing still between motions.
+/// Computes joint velocities from the reference of a motion: one control law for joints, one for
+/// poses, and standstill between motions.
 #pragma once
 
 #include <memory>
@@ -12,7 +12,7 @@
 
 namespace coglab_controllers {
 
-/// Whether the arm, as measured, comes to where its reference has ended.
+/// Checks whether the measured arm arrives at the end of its reference.
 class Arrival {
  public:
   enum class State : std::uint8_t {
@@ -26,22 +26,23 @@ class Arrival {
     settle_time_ = parameters.number("settle_time", 2.0, 0.0, 60.0);
   }
   void begin() noexcept { waited_ = 0.0; }
-  /// @param error of the arm, m or rad  @param allowed for There
+  /// @param error distance of the arm from the end of the reference, m or rad
+  /// @param allowed largest error that counts as There, same unit
   State update(double dt, double error, double allowed) noexcept {
     if (error <= allowed) return State::There;
     waited_ += dt;
     return waited_ > settle_time_ ? State::Stuck : State::Waiting;
   }
-  /// The reason of a hand that is stuck.  @param away m
+  /// Reason for a hand that is stuck.  @param away distance to the goal, m
   static Reason handStuck(double away) noexcept;
 
  private:
   double settle_time_ = 2.0, waited_ = 0.0;
 };
 
-/// Writes the reference that feedback controllers see, and turns what they leave of it into joint
-/// velocities. Where a motion begins, the difference between set-point and measurement is blended
-/// in. No allocation, no throw but in configure().
+/// Writes the reference, which feedback controllers may modify, and computes joint velocities from
+/// the result. When a motion begins, the difference between set-point and measurement is blended
+/// in. Only configure() allocates or throws.
 ///
 /// Parameters: `Kp` (1/s, joints), `pos_clik_gain`, `rot_clik_gain` (1/s),
 /// `correction_speed` (m/s), `singularity_threshold`, `rotation_first_scaling` (poses, eq. 6-12),
@@ -51,24 +52,25 @@ class ReferenceLoop {
   /// @throws std::runtime_error naming the parameter
   void configure(const MotionSetup& setup);
 
-  /// The motion has ended: the arm brakes and stands.
+  /// Ends the motion: the arm brakes and stands.
   void open() noexcept;
 
   /// Writes the reference of this cycle.
   void write(const CycleInput& input, const MotionReference& reference,
              References& references) noexcept;
-  /// From the references, perhaps modified, to joint velocities.
+  /// Computes joint velocities from the references, which feedback controllers may have modified.
   void resolve(const CycleInput& input, References& references) noexcept;
 
-  /// Where a motion begins: on the reference of the one that it follows, else on the commanded
-  /// state.
-  /// @param at_rest the one before has come to its end
+  /// Set-point at which a motion begins: the last reference of the previous motion, else the
+  /// commanded state.
+  /// @param at_rest true: the previous motion has ended, so the velocities are zero
   SetPoint setPoint(const CycleInput& input, bool at_rest) const noexcept;
 
-  /// How far the arm is from the end of the last reference, rad or m, and what counts as there.
+  /// Distance of the arm from the end of the last reference, and the largest one that counts as
+  /// arrived; rad or m.
   double error(const CycleInput& input) const noexcept;
   double allowedError() const noexcept;
-  /// The reason of an arm that does not come there.
+  /// Reason for an arm that does not arrive.
   Reason stuck(const CycleInput& input) const noexcept;
 
   const IkResult& ik() const noexcept { return ik_result_; }  ///< of the last cycle
