@@ -1,6 +1,6 @@
 /// @file
-/// A whole Cartesian motion: goal filter, DMP, orientation curve and end of the motion in the order
-/// of the control cycle.
+/// A complete Cartesian motion. Each cycle runs the goal filter, the DMP, the orientation curve and
+/// the check for the end of the motion.
 #pragma once
 
 #include <vector>
@@ -11,33 +11,33 @@
 
 namespace coglab_controllers {
 
-/// When a motion is over, and when a goal that moves afterwards is followed again.
+/// Conditions for the end of a motion (all four), and for following a goal that moves afterwards.
 struct MotionEndParameters {
-  double phase = 0.012;  ///< the phase must be below this (0.01 is reached with the duration over),
-  double speed = 0.02;   ///< m/s, the set-point move slower than this,
-  double turning = 0.2;  ///< rad/s, and turn slower than this,
-  double distance = 0.005;         ///< m, and be closer to the goal than this
+  double phase = 0.012;            ///< largest phase (it is 0.01 when the duration is over)
+  double speed = 0.02;             ///< m/s, largest speed of the set-point
+  double turning = 0.2;            ///< rad/s, largest angular speed of the set-point
+  double distance = 0.005;         ///< m, largest distance from the goal
   double follow_distance = 0.030;  ///< m: a goal that leaves this ball around the latched one …
   double follow_time = 0.2;        ///< s: … for this long is followed again
 };
 
-/// Poses of the end-effector in order of time, and when it is there.
+/// Poses of the end-effector with their times, in order of time.
 struct TimedPath {
-  std::vector<double> times;  ///< s from now, growing, one for each pose
+  std::vector<double> times;  ///< s from now, increasing, one for each pose
   std::vector<Pose> poses;    ///< m and unit quaternions
 };
-inline constexpr int kPathPoints = 40;  ///< a path has at most one pose more
+inline constexpr int kPathPoints = 40;  ///< a path has at most kPathPoints + 1 poses
 
-/// The least speed of a clock that a prediction reckons with: one that stands has no end.
+/// Smallest clock rate (0..1) in a prediction. With a stopped clock a motion would never end.
 inline constexpr double kSlowestClock = 0.1;
 
-inline constexpr double kSlowWay = 0.02;         ///< m
-inline constexpr double kGentleBraking = 0.6;    ///< m/s^2
-inline constexpr double kFastestArrival = 0.45;  ///< m/s, on all of the way
+inline constexpr double kSlowWay = 0.02;         ///< m, final way at arrival_speed
+inline constexpr double kGentleBraking = 0.6;    ///< m/s^2, braking before it
+inline constexpr double kFastestArrival = 0.45;  ///< m/s, limit on the whole way with arrival_speed
 
-/// Runs a primitive towards a goal pose that may move. When it has arrived the goal is latched, so
-/// that a noisy goal does not move an arm that stands. The Python module runs the same code. No
-/// allocation, no throw but in the constructor and in rollOut().
+/// Runs a primitive towards a goal pose that may move. On arrival the goal is latched, so that a
+/// noisy goal does not move an arm that stands. The Python module runs the same code. Only the
+/// constructor and rollOut() allocate or throw.
 class CartesianMotion {
  public:
   enum class Phase {
@@ -48,61 +48,60 @@ class CartesianMotion {
 
   enum class Event { None, Ended, FollowsAgain };
 
-  /// @throws std::invalid_argument as the constructor of GoalFilter, or naming the parameter of the
-  /// end that is not finite and positive.
+  /// @throws std::invalid_argument as GoalFilter does, or if a parameter of `end` is not finite and
+  /// positive (the message names it).
   CartesianMotion(const GoalFilterParameters& filter = {}, const MotionEndParameters& end = {});
 
   /// Begins at phase 1 from the given pose and velocity (execute_dmp).
-  /// @param goal hand pose to reach, offset and target orientation already applied, goal as
-  /// received now.  @param approach as of step().
+  /// @param goal goal pose of the hand from the goal as received now; offset and target orientation
+  /// are already applied.  @param approach see step().
   void start(const DmpPlan& plan, const Pose& pose, const Vector3& velocity,
              const Vector3& angular_velocity, const Pose& goal,
              const Vector3& approach = Vector3::Zero()) noexcept;
 
-  /// Another primitive or ratio (switch_dmp): phase, position and velocity are kept, and the
-  /// orientation curve goes on from where it is.
+  /// Changes the primitive or the ratio (switch_dmp). Phase, position and velocity are kept. The
+  /// orientation curve continues from the present orientation.
   void switchTo(const DmpPlan& plan, const Pose& goal) noexcept;
 
   /// One cycle.
   /// @param goal as received, sample-and-hold.  @param rate 0..1 slows the clock (speed_scale), see
-  /// Dmp::step.  @param approach m, along which the hand comes to the goal at last: until half of
-  /// the motion is over the goal counts as drawn back by it, then less and less, at the end not at
-  /// all.
-  /// @return what the IK shall do in this cycle.
+  /// Dmp::step.  @param approach vector of the final approach, m. During the first half of the
+  /// motion the goal is shifted back by this vector. The shift then decreases to zero at the end.
+  /// @return reference for the IK in this cycle.
   const CartesianReference& step(double dt, const Pose& goal, double rate = 1.0,
                                  const Vector3& approach = Vector3::Zero()) noexcept;
 
-  /// Ends the motion as reached at this pose, where the hand stands; a goal that leaves it by more
-  /// than follow_distance is followed again.
+  /// Ends the motion as reached at this pose, the present one of the hand. A goal that moves away
+  /// from it by more than follow_distance is followed again.
   void endAt(const Pose& pose) noexcept;
 
-  /// Ends the motion where it is; the set-point rests at the present one.
+  /// Ends the motion; the set-point rests at its present pose.
   void stop() noexcept;
 
-  /// The set-points from where the motion is to its end, at most kPathPoints + 1, the first of them
-  /// now; none if it is idle. Allocates: not for the control cycle.
-  /// @param goal as received, taken to stay where it is
-  /// @param rate 0..1 of the clock, taken to stay as well, kSlowestClock at least
-  /// @param approach as of step()
+  /// Predicted set-points from now to the end of the motion, at most kPathPoints + 1; none if idle.
+  /// Allocates: not for the control cycle.
+  /// @param goal as received, assumed constant
+  /// @param rate clock rate 0..1, assumed constant; raised to kSlowestClock if lower
+  /// @param approach see step()
   TimedPath rollOut(const Pose& goal, double rate = 1.0,
                     const Vector3& approach = Vector3::Zero()) const;
 
   Phase phase() const noexcept { return phase_; }
-  /// Of the last step.
+  /// Event of the last step.
   Event event() const noexcept { return event_; }
   const Dmp& dmp() const noexcept { return dmp_; }
   const CartesianReference& reference() const noexcept { return reference_; }
   /// Goal position as used in eq. (1), m: the estimate, or the latched goal after the end.
   const Vector3& goal() const noexcept { return goal_; }
-  /// Target orientation as estimated; it does not matter without orientation control.
+  /// Estimated target orientation; unused without orientation control.
   const Quaternion& goalOrientation() const noexcept { return filter_.orientation(); }
-  /// Of the clock, 0..1, in the last step.
+  /// Clock rate in the last step, 0..1.
   double rate() const noexcept { return rate_; }
-  /// Of the set-point, m/s, on the clock of speed_scale: slowed for a slow arrival alone.
+  /// Velocity of the set-point, m/s. It includes the slow arrival, but not speed_scale.
   Vector3 velocity() const noexcept { return arrival_rate_ * dmp_.state().velocity; }
-  /// From the set-point to the goal as received, m.
+  /// Distance from the set-point to the goal as received, m.
   double remainingDistance() const noexcept { return remaining_distance_; }
-  /// Estimated from the phase and tau, s, at rate 1.
+  /// Remaining time at rate 1, s, from the phase and tau.
   double remainingTime() const noexcept {
     return phase_ == Phase::Running ? dmp_.remainingTime() : 0.0;
   }
@@ -119,15 +118,15 @@ class CartesianMotion {
   Phase phase_ = Phase::Idle;
   Event event_ = Event::None;
   Vector3 goal_ = Vector3::Zero();
-  double away_ = 0.0;  // s that the goal has been outside the ball around the latched one
+  double away_ = 0.0;  // s, time of the goal outside the ball around the latched one
   Quaternion orientation_ = Quaternion::Identity();  // set-point at the end of the last step
   double curve_begin_ = 0.0;                         // progress of the DMP at which the curve began
   double remaining_distance_ = 0.0;
   double rate_ = 1.0;           // of the last step
   double arrival_speed_ = 0.0;  // of the plan
-  bool predicted_ = false;      // of the plan that it began with
-  double arrival_rate_ = 1.0;   // share of the rate that it left in the last step
-  double drawn_ = 1.0;          // share of the approach by which the goal was drawn back then
+  bool predicted_ = false;      // of the plan at the start
+  double arrival_rate_ = 1.0;   // factor 0..1 on the clock for a slow arrival, last step
+  double drawn_ = 1.0;          // share of the approach by which the goal was shifted, last step
   bool settled_ = false;        // the set-point has come to rest at the latched goal
 };
 

@@ -10,7 +10,7 @@
 
 namespace coglab_controllers {
 
-/// How to learn; the defaults suit reaches of about a second.
+/// Options of learn(). The defaults suit reaches of about 1 s.
 struct LearningOptions {
   int basis_count = 20;  ///< N, 2..kMaxBasis
   double alpha = CanonicalSystem::kDefaultAlpha;
@@ -18,31 +18,31 @@ struct LearningOptions {
   GoalWeight goal_weight;
   ShapeMapping mapping = ShapeMapping::None;
   double regularisation = 1e-6;  ///< ridge, relative to the mean diagonal of the normal matrix
-  /// Faults of a demonstration (DemonstrationLimits) that are not refused.
+  /// Names of faults (DemonstrationLimits) that are accepted in a demonstration.
   std::vector<std::string> allow;
 };
 
-/// What a demonstration of one reach must be like; the names are those of LearningOptions::allow.
-/// The last two are judged from 20 samples on.
+/// Limits for the demonstration of one reach. The quoted names are those of LearningOptions::allow.
+/// The last two are checked only with 20 samples or more.
 struct DemonstrationLimits {
-  static constexpr double kShort = 0.05;     ///< "short": m, goes at least so far from its start
-  static constexpr double kBrief = 0.25;     ///< "brief": s, takes at least so long
-  static constexpr double kJump = 5.0;       ///< "jump": m/s between two samples, or one step so
-  static constexpr double kJumpShare = 6.0;  ///< many times as long as those around it
+  static constexpr double kShort = 0.05;     ///< "short": m, smallest way from the start
+  static constexpr double kBrief = 0.25;     ///< "brief": s, smallest duration
+  static constexpr double kJump = 5.0;       ///< "jump": m/s, largest speed between samples,
+  static constexpr double kJumpShare = 6.0;  ///< or largest ratio of a step to its neighbours
   static constexpr double kMoving = 0.5;     ///< "moving": largest speed at both ends, share of the
                                              ///< mean speed: a reach begins and ends at rest
-  static constexpr double kNoisy = 0.02;     ///< "noisy": largest noise, share of the way it goes
+  static constexpr double kNoisy = 0.02;     ///< "noisy": largest noise, share of the way
 };
 
-/// Learns from one or several demonstrations of one motion, which may differ in duration, start and
-/// goal.
+/// Learns a primitive from one or several demonstrations of one motion. They may differ in
+/// duration, start and goal.
 ///
-/// Eq. (1) is linear in the weights, so the *position* that the system runs through is linear in
-/// them too: the weights minimise the squared distance between demonstrated and reproduced path (in
-/// units of each path's length) and never need the second derivative of a noisy recording. The
-/// start velocity of the demonstration is kept.
-/// @throws std::invalid_argument for invalid demonstrations or options, saying which and why.
-/// Demonstrations outside of DemonstrationLimits are refused unless `options.allow` names the
+/// Eq. (1) is linear in the weights, so the reproduced *position* is linear in them too. The
+/// weights minimise the squared distance between demonstrated and reproduced path, in units of each
+/// path's length. So learning needs no second derivative of a noisy recording. The start velocity
+/// of the demonstration is kept.
+/// @throws std::invalid_argument for invalid demonstrations or options; the message names which and
+/// why. A demonstration outside of DemonstrationLimits is refused unless `options.allow` names the
 /// fault.
 Primitive learn(const std::string& id, const std::vector<Trajectory>& demonstrations,
                 const LearningOptions& options = {});

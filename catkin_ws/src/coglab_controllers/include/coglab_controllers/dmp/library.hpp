@@ -10,7 +10,7 @@
 ///         <goal position="0.5 0 0"/>
 ///         <basis centre="1" width="20.1" weight="0 0 0"/>   2 to kMaxBasis of them
 ///       </primitive>
-///       <primitive id="wave">                            learnt when the file is read
+///       <primitive id="wave">                            learnt while the file is loaded
 ///         <learn basis="20" alpha="4.605" stiffness="150"/>
 ///         <goal_weight kind="linear"/>
 ///         <shape mapping="none"/>
@@ -27,7 +27,7 @@
 
 namespace coglab_controllers {
 
-/// A library file that cannot be used; what() is "file:line: what was expected, what came".
+/// Error in a library file; what() is "file:line: expected value, received value".
 class LibraryError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -41,22 +41,22 @@ class Library {
   static constexpr int kMaxSamples = 20000;  ///< per trajectory
 
   /// Adds all primitives of a file, or none. An id that is already loaded is replaced.
-  /// @return how many the file holds.
+  /// @return number of primitives in the file.
   /// @throws LibraryError if the file cannot be used.
   int load(const std::string& path);
-  /// The same from text; `name` stands for the file in messages.
+  /// Loads primitives from text; error messages show `name` as the file.
   int parse(const std::string& text, const std::string& name);
-  /// Writes all primitives as weights, numbers so that reading gives the same bits. The file
-  /// appears whole or not at all.  @throws LibraryError if it cannot be written.
+  /// Writes all primitives as weights. Reading them gives bit-identical numbers. The write is
+  /// atomic: no partial file remains.  @throws LibraryError if the file cannot be written.
   void save(const std::string& path) const;
-  /// The text that `save` writes.
+  /// Returns the text that `save` writes.
   std::string format() const;
 
-  /// Adds or replaces one.  @throws std::invalid_argument if it is not valid.
+  /// Adds or replaces a primitive.  @throws std::invalid_argument if it is not valid.
   void add(const Primitive& primitive);
-  /// Null if unknown.
+  /// Returns the primitive, or null if the id is unknown.
   const Primitive* find(const std::string& id) const noexcept;
-  /// @throws std::invalid_argument naming the ids that are loaded.
+  /// Returns the primitive. @throws std::invalid_argument if unknown; it lists the loaded ids.
   const Primitive& at(const std::string& id) const;
   const std::map<std::string, Primitive>& primitives() const noexcept { return primitives_; }
 

@@ -9,21 +9,22 @@ namespace coglab_controllers {
 
 /// Quaternion Bezier curve of degree five in cumulative form.
 ///
-/// It begins with a given rotational velocity and no acceleration and ends at rest, so that a turn
-/// from rest follows the minimum-jerk profile. The target may be changed at any time: the curve
-/// then bends towards the new one, continuous as long as the target is, also through half a turn.
-/// No allocation, no throw.
+/// The curve begins with a given rotational velocity and zero acceleration and ends at rest. A turn
+/// from rest follows the minimum-jerk profile. The target may change at any time: the curve then
+/// bends towards the new target. It is continuous if the target is, also through half a turn. No
+/// allocation, no throw.
 class OrientationCurve {
  public:
-  /// @param start, angular_velocity at the beginning (unit; rad/s, base frame).
-  /// @param target unit.  @param duration s, positive.
+  /// Begins a curve.
+  /// @param start unit quaternion.  @param angular_velocity at the start, rad/s, base frame.
+  /// @param target unit quaternion.  @param duration s, positive.
   void start(const Quaternion& start, const Vector3& angular_velocity, const Quaternion& target,
              double duration) noexcept;
 
-  /// Moves the end of the curve.
+  /// Changes the target, a unit quaternion.
   void setTarget(const Quaternion& target) noexcept;
 
-  /// Orientation at `progress` 0..1 of the duration (values outside are clamped).
+  /// Orientation at `progress`, 0..1 of the duration; other values are clamped.
   Quaternion at(double progress) const noexcept;
 
  private:

@@ -1,5 +1,5 @@
 /// @file
-/// A motion primitive as it is learnt, stored in a library and chosen by its name. Not for the
+/// A motion primitive: it is learnt, stored in a library and selected by its id. Not for the
 /// control cycle.
 #pragma once
 
@@ -13,10 +13,10 @@
 namespace coglab_controllers {
 
 /// The clock of a motion, eq. (3): tau * s' = -alpha * s. The phase s falls from 1 at the start of
-/// a motion towards 0. Solved exactly, so that the step size does not matter.
+/// a motion towards 0. The solution is exact, so the step size does not matter.
 class CanonicalSystem {
  public:
-  /// ln(100): the phase is 0.01 when the duration of the demonstration is over.
+  /// ln(100): the phase is 0.01 at the end of the demonstrated duration.
   static constexpr double kDefaultAlpha = 4.605170185988091;
 
   /// @param alpha rate, dimensionless.  @throws std::invalid_argument unless 0 < alpha <= 50.
@@ -25,7 +25,7 @@ class CanonicalSystem {
   double alpha() const noexcept { return alpha_; }
   /// Phase after `dt` seconds at time constant `tau` (s).
   double advance(double s, double dt, double tau) const noexcept;
-  /// Seconds after the start at which the phase is s (s > 0).
+  /// Time after the start, s, at which the phase is `s` (> 0).
   double timeAt(double s, double tau) const noexcept;
 
  private:
@@ -49,25 +49,24 @@ struct GoalWeight {
   double operator()(double s) const noexcept;
 };
 
-/// What becomes of the learnt shape when start and goal differ from those of the demonstration.
+/// How the learnt shape adapts to a start and goal other than the demonstrated ones.
 enum class ShapeMapping {
-  None,        ///< eq. (5) as learnt, whatever the goal
-  Similarity,  ///< turned (smallest rotation) and scaled as the line from start to goal is against
-               ///< the demonstration's
-  Upright      ///< turned about the vertical and scaled; what the demonstration lifts stays lifted
+  None,        ///< eq. (5) as learnt, for any goal
+  Similarity,  ///< turned (smallest rotation) and scaled, from the demonstrated line (start to
+               ///< goal) to the present one
+  Upright  ///< turned about the vertical and scaled, so that upward stays upward
 };
 
-/// Lines shorter than this (m) have no direction, and shapes are not scaled with them.
+/// m; a shorter line has no direction, and shapes are not scaled with it.
 constexpr double kShortestLine = 1e-3;
 
-/// The linear map of a shape from the demonstration's line (start to goal, m) to the present one:
-/// it takes `demonstrated` to `line` (unless one is shorter than a millimetre). Eq. (1)-(5) are
-/// invariant under it.
+/// Linear map of a shape that takes the line `demonstrated` (start to goal, m) to the present
+/// `line`, unless one is shorter than kShortestLine. Eq. (1)-(5) are invariant under it.
 Matrix3 shapeMap(ShapeMapping mapping, const Vector3& demonstrated, const Vector3& line) noexcept;
 
-/// The words of library files: none, similarity, upright.
+/// Name of a mapping in library files: none, similarity, upright.
 const char* describe(ShapeMapping mapping) noexcept;
-/// @throws std::invalid_argument listing the words.
+/// The mapping of a name. @throws std::invalid_argument if unknown; it lists the names.
 ShapeMapping toShapeMapping(const std::string& word);
 
 /// One demonstrated path: equal numbers of times and positions, at least 5, times strictly
@@ -77,7 +76,7 @@ struct Trajectory {
   Eigen::Matrix3Xd positions;  ///< m, one column per time
 };
 
-/// A learnt primitive: everything eq. (1)-(5) need. A plain value; `validate` checks it.
+/// A learnt primitive: all parameters of eq. (1)-(5). A plain value; `validate` checks it.
 struct Primitive {
   std::string id;           ///< 1..64 letters, digits, '_', '-', '.'
   std::string description;  ///< free text for people, up to 500 characters
@@ -97,14 +96,14 @@ struct Primitive {
   int basisCount() const noexcept { return static_cast<int>(centres.size()); }
 };
 
-/// @throws std::invalid_argument naming the field, what was expected and what came.
+/// @throws std::invalid_argument with the field, the expected and the received value.
 void validate(const Primitive& primitive);
 
-/// @throws std::invalid_argument naming the sample or count, what was expected and what came.
+/// @throws std::invalid_argument with the sample or count, the expected and the received value.
 void validate(const Trajectory& trajectory);
 
-/// Centres equally spaced in time over the duration and the widths at which neighbours meet at a
-/// fixed height.
+/// Sets centres that are equally spaced in time over the duration, and widths at which neighbours
+/// intersect at a fixed height.
 void placeBasis(int count, double alpha, Eigen::VectorXd& centres, Eigen::VectorXd& widths);
 
 }  // namespace coglab_controllers
