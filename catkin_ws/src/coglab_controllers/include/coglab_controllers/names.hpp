@@ -1,5 +1,5 @@
 /// @file
-/// The names of coglab_rt in which this package, and controllers on top of it, are written.
+/// Names of coglab_rt that this package and its plug-ins use.
 #pragma once
 
 #include "coglab_rt/arm_port.hpp"

@@ -1,6 +1,5 @@
 /// @file
-/// What the arm does with the freedom that the translation leaves: one constraint among possible
-/// others (D4.10).
+/// Second task of the arm (D4.10): a constraint that uses the freedom left by the translation.
 #pragma once
 
 #include "coglab_controllers/kinematics/chain.hpp"
@@ -14,14 +13,15 @@ struct TaskConstraint {
   Eigen::Matrix<double, kMaxJoints, kMaxJoints> jacobian =
       Eigen::Matrix<double, kMaxJoints, kMaxJoints>::Zero();
   JointVector velocity = JointVector::Zero();
-  JointVector error = JointVector::Zero();  ///< what is still to go, in the same rows
-  double gain = 0.0;  ///< 1/s; TwoTaskIk takes less where the arm could not brake
-  /// true: near a singularity the task is rejected altogether, eq. (11). false: only the singular
-  /// directions are, as a task with more rows than the null space has dimensions needs.
+  JointVector error = JointVector::Zero();  ///< remaining error, in the same rows
+  double gain = 0.0;  ///< 1/s; TwoTaskIk reduces it so that the arm can brake in time
+  /// true: near a singularity the whole task is rejected, eq. (11). false: only the singular
+  /// directions are rejected. A task with more rows than the null space has dimensions needs false.
   bool reject_whole = true;
 };
 
-/// The second task of TwoTaskIk. Called in the control cycle: no allocation, no lock, no throw.
+/// Interface of the second task of TwoTaskIk. It runs in the control cycle: no allocation, no lock,
+/// no throw.
 class SecondTask {
  public:
   virtual ~SecondTask() = default;
@@ -43,7 +43,7 @@ class OrientationTask : public SecondTask {
   double gain_;
 };
 
-/// Draws the joints towards a posture: another second task, in place of the orientation.
+/// Second task that moves the joints towards a posture, instead of the orientation task.
 class PostureTask : public SecondTask {
  public:
   /// @param posture rad.  @param gain 1/s.  @throws std::invalid_argument unless finite, gain >= 0.

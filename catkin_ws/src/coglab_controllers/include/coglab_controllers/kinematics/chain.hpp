@@ -1,5 +1,5 @@
 /// @file
-/// The arm's kinematic chain: KDL parses the URDF at load, the control cycle runs fixed-size code.
+/// Kinematic chain of the arm. KDL parses the URDF at load; the control cycle runs fixed-size code.
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@ class Chain;
 
 namespace coglab_controllers {
 
-/// Forward kinematics of one joint configuration, all in the base frame.
+/// Forward kinematics of one joint configuration; everything is in the base frame.
 struct ChainState {
   Pose tool;                             ///< pose of the tip
   Jacobian jacobian = Jacobian::Zero();  ///< of the tip, eq. (8)
@@ -25,14 +25,12 @@ struct ChainState {
 
 /// A serial chain of 6 or 7 revolute joints from a base link to a tip link.
 ///
-/// Construction parses and may throw; everything else is free of allocation and never throws. Equal
-/// to KDL's solvers within 1e-12.
+/// Only the constructor allocates or throws. Results equal those of KDL's solvers within 1e-12.
 class Chain {
  public:
   /// Parses a URDF (the text, not a file name).
-  /// @throws std::invalid_argument naming the link or joint if the URDF does not parse, if there is
-  /// no chain between
-  ///         the links, or if it has not 6 or 7 movable joints, all revolute or continuous.
+  /// @throws std::invalid_argument with the link or joint if the URDF does not parse, if no chain
+  /// connects the links, or if it does not have 6 or 7 movable joints, all revolute or continuous.
   Chain(const std::string& urdf, const std::string& base_link, const std::string& tip_link);
 
   int joints() const noexcept { return joints_; }
@@ -54,9 +52,9 @@ class Chain {
     return state;
   }
 
-  /// The same for a cycle of `dt` s in which the joints move at about `velocity` (rad/s): the pose
-  /// is that at q, the rest that in the middle of the cycle, where a Jacobian leads to the pose at
-  /// its end with an error of third order in dt.
+  /// The same for a cycle of `dt` s in which the joints move at about `velocity` (rad/s). The pose
+  /// is that at q. All other values are those at the middle of the cycle: with that Jacobian the
+  /// pose at the end of the cycle has an error of third order in dt.
   void evaluate(const JointVector& q, const JointVector& velocity, double dt,
                 ChainState& state) const noexcept;
 
@@ -64,7 +62,7 @@ class Chain {
   static Vector3 originVelocity(const ChainState& state, int index,
                                 const JointVector& velocity) noexcept;
 
-  /// The chain as KDL read it, for comparison in tests and benches.
+  /// KDL's chain, for comparison in tests and benchmarks.
   const KDL::Chain& kdl() const noexcept { return *kdl_; }
 
  private:

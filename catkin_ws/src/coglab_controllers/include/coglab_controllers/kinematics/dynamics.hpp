@@ -1,5 +1,5 @@
 /// @file
-/// The arm's rigid-body terms for a momentum observer: KDL on the robot description.
+/// Rigid-body terms of the arm for a momentum observer, computed by KDL from the URDF.
 #pragma once
 
 #include <memory>
@@ -9,7 +9,7 @@
 
 namespace coglab_controllers {
 
-/// kg m^2; one row and column per joint.
+/// Mass matrix, kg m^2; one row and one column per joint.
 using MassMatrix = Eigen::Matrix<double, kMaxJoints, kMaxJoints>;
 
 /// Terms of M(q) q'' + C(q, q') q' + g(q) = torque + external torque at one posture and velocity.
@@ -21,26 +21,26 @@ struct DynamicTerms {
   JointVector gravity = JointVector::Zero();     ///< g, Nm
 };
 
-/// An arm of 7 revolute joints with all that hangs on it (hand and fingers, with their joints at
-/// zero) and a payload at its tip.
+/// Dynamics of an arm of 7 revolute joints with hand and fingers (their joints at zero) and a
+/// payload at its tip.
 ///
 /// Not for the control cycle: KDL's solvers allocate.
 class ArmDynamics {
  public:
-  /// Parses a URDF (the text, not a file name); gravity is 9.81 m/s^2 against z of the base.
-  /// @throws std::invalid_argument if it does not parse, has no such chain or not 7 joints in it.
+  /// Parses a URDF (the text, not a file name). Gravity is 9.81 m/s^2 along -z of the base.
+  /// @throws std::invalid_argument if it does not parse or has no such chain of 7 joints.
   ArmDynamics(const std::string& urdf, const std::string& base_link, const std::string& tip_link);
   ~ArmDynamics();
   ArmDynamics(ArmDynamics&&) noexcept;
   ArmDynamics& operator=(ArmDynamics&&) noexcept;
 
-  /// What the hand carries: a point of `mass` kg at `centre` (m, frame of the tip); 0 kg: nothing.
+  /// Sets the payload: a point of `mass` kg at `centre` (m, frame of the tip). 0 kg: no payload.
   /// @throws std::invalid_argument for a mass below 0 or a number that is not finite.
   void setPayload(double mass, const Vector3& centre);
 
   /// @param q   rad
   /// @param dq  rad/s
-  /// @throws std::runtime_error where a solver of KDL refuses.
+  /// @throws std::runtime_error if a solver of KDL fails.
   DynamicTerms evaluate(const JointVector& q, const JointVector& dq);
 
  private:

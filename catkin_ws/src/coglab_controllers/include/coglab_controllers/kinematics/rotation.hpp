@@ -12,12 +12,12 @@ Quaternion expRotation(const Vector3& r) noexcept;
 /// Rotation vector of a unit quaternion, angle in [0, pi]; q and -q give the same vector.
 Vector3 logRotation(const Quaternion& q) noexcept;
 
-/// Rotational velocity (rad/s, base frame) that brings `from` to `to` in one second: the diff of
-/// eq. (7), equal to KDL::diff(from, to).
+/// Rotational velocity (rad/s, base frame) that turns `from` into `to` in one second. It is diff of
+/// eq. (7) and equals KDL::diff(from, to).
 Vector3 rotationBetween(const Quaternion& from, const Quaternion& to) noexcept;
 
-/// The shortest rotation that turns the direction `from` into the direction `to`, neither of them
-/// zero; for opposite directions half a turn about some axis perpendicular to them.
+/// Smallest rotation from the direction `from` to the direction `to`, both nonzero. For opposite
+/// directions: half a turn about any axis perpendicular to them.
 Quaternion shortestTurn(const Vector3& from, const Vector3& to) noexcept;
 
 /// True if all four entries are finite and the norm is within 1e-3 of one.

@@ -1,6 +1,6 @@
 /// @file
-/// Fixed-size types that all cores of this package share. Units are SI; joint order is the wire
-/// order lwr_a1 lwr_a2 lwr_e1 lwr_a3 lwr_a4 lwr_a5 lwr_a6.
+/// Fixed-size types of this package. Units are SI. The joints are in wire order: lwr_a1 lwr_a2
+/// lwr_e1 lwr_a3 lwr_a4 lwr_a5 lwr_a6.
 #pragma once
 
 #include <Eigen/Core>
@@ -27,16 +27,16 @@ struct Pose {
   Quaternion orientation = Quaternion::Identity();  ///< unit
 };
 
-/// What a Cartesian motion asks of the inverse kinematics in one cycle.
+/// Reference of a Cartesian motion for the inverse kinematics in one cycle.
 ///
-/// The pose is the one desired *now*, at the time of the joint measurement; the velocities are the
-/// mean velocities that lead from it to the pose desired at the end of the cycle. So a robot that
-/// follows ideally has no tracking error, and eq. (6)-(7) close the loop on a true error.
+/// The pose is the desired one *now*, at the time of the joint measurement. The velocities are the
+/// mean velocities from it to the desired pose at the end of the cycle. So an ideal robot has no
+/// tracking error, and eq. (6)-(7) close the loop on a true error.
 struct CartesianReference {
   Pose pose;
   Vector3 velocity = Vector3::Zero();          ///< m/s
   Vector3 angular_velocity = Vector3::Zero();  ///< rad/s, base frame
-  bool orientation_control = true;             ///< false: the second task is left free
+  bool orientation_control = true;             ///< false: the orientation is free
 };
 
 }  // namespace coglab_controllers

@@ -15,60 +15,59 @@
 
 namespace coglab_controllers {
 
-/// How the cycle runs.
+/// Settings of the cycle.
 struct CycleSettings {
   double cycle_time = 0.005;    ///< intended period, s
-  double sample_timeout = 0.1;  ///< a joint state older than this gives zero velocity, s
-  double silent_time = 0.5;     ///< no joint state for this long ends a motion, s
+  double sample_timeout = 0.1;  ///< s; an older joint state gives zero velocity
+  double silent_time = 0.5;     ///< s without a joint state after which a motion ends
   double overrun_time =
-      0.004;  ///< a motion controller slower than this overruns, s; 0: not judged (lockstep)
-  double blocked_time =
-      0.5;  ///< a motion that a limit keeps from any progress for this long ends, s
-  int overruns_to_fault = 5;  ///< overruns in a row that fault it
+      0.004;                  ///< s; a slower motion controller overruns; 0: not checked (lockstep)
+  double blocked_time = 0.5;  ///< s without progress because of a limit, after which a motion ends
+  int overruns_to_fault = 5;  ///< overruns in a row after which the controller is at fault
 };
 
-/// What the cycle runs: the unit of adoption.
+/// Plan that the cycle adopts as a whole.
 struct CyclePlan {
   MotionController* motion =
       nullptr;  ///< the active motion controller, kept alive by the manager; null: none
-  MotionCancel* cancel = nullptr;  ///< its cancels; null only without a motion controller
-  Name id;                         ///< its id
+  MotionCancel* cancel = nullptr;  ///< cancels of `motion`; null only without a motion controller
+  Name id;                         ///< id of `motion`
 };
 
-/// What the manager as a whole does.
+/// State of the manager.
 enum class ManagerState : std::uint8_t { Idle, Running, Holding, Fault };
 
-/// idle, running, holding or fault.
+/// Returns idle, running, holding or fault.
 const char* nameOf(ManagerState state);
 
-/// What the cycle tells the outside world, once per cycle.
+/// Report of the cycle, written once per cycle.
 struct CycleReport {
-  std::uint64_t cycles = 0;      ///< cycles so far, idle ones included
-  std::uint64_t samples = 0;     ///< cycles with a new joint state
+  std::uint64_t cycles = 0;      ///< number of cycles, with idle ones
+  std::uint64_t samples = 0;     ///< number of cycles with a new joint state
   std::uint64_t generation = 0;  ///< plan in effect
   Name active;                   ///< id of the active motion controller
   ManagerState state = ManagerState::Idle;
   MotionState motion = MotionState::Idle;
-  Reason reason;       ///< why it holds, aborted or is at fault; empty while all is well
-  bool fault = false;  ///< the active controller is at fault until switched to again
-  /// The set-point of the arm stands: no velocity, no acceleration, and none was asked for by this
-  /// cycle and the one before. False without a usable joint state.
+  Reason reason;       ///< of holding, abort or fault; else empty
+  bool fault = false;  ///< the active controller is at fault until it is switched to again
+  /// True if the set-point of the arm stands: no velocity, no acceleration, and zero velocity was
+  /// sent in this cycle and the one before. False without a usable joint state.
   bool standing = false;
-  double time_scale = 1.0;                     ///< what the references run at
+  double time_scale = 1.0;                     ///< clock rate of the references, 0..1
   double speed_scale = 1.0;                    ///< as requested
   RobotSample robot;                           ///< the joint state used
   JointVector velocity = JointVector::Zero();  ///< as sent, rad/s
-  GuardResult guard;                           ///< what step 8 did
+  GuardResult guard;                           ///< result of step 8
   double dt = 0.0;                             ///< of the last cycle with a joint state, s
   double duration = 0.0;                       ///< of the last cycle, s; 0 in lockstep
   double longest = 0.0;                        ///< longest cycle so far, s
   std::uint64_t overruns = 0;                  ///< of motion controllers
   std::uint64_t faults = 0;                    ///< exceptions, NaN, overruns in a row
-  std::uint64_t stale = 0;                     ///< cycles whose joint state was not usable
+  std::uint64_t stale = 0;                     ///< number of cycles without a usable joint state
 };
 
-/// The control cycle without threads and without ROS. One thread at a time calls run() and idle():
-/// no allocation, no lock, no system call, no exception leaves.
+/// The control cycle without threads and without ROS. One thread at a time calls run() and idle().
+/// They do not allocate, lock, call the system or throw.
 class ControlCycle {
  public:
   /// @param robot model, limits, workspace; shared with the controllers
@@ -76,27 +75,26 @@ class ControlCycle {
   ControlCycle(std::shared_ptr<const RobotSetup> robot, FeedbackStage& feedback,
                const CycleSettings& settings);
 
-  /// A cycle with a new joint state.
+  /// Runs a cycle with a new joint state.
   /// @param sample measurement and commanded state
   /// @param dt true time since the last one, s, > 0
-  /// @param out velocity to send, stamped with the sample's stamp and epoch; zero when nothing may
-  /// move
+  /// @param out velocity to send, with the sample's stamp and epoch; zero if no motion is allowed
   void run(const RobotSample& sample, double dt, VelocityCommand& out) noexcept;
 
-  /// A cycle without one: plans are adopted, nothing is computed and nothing sent.
+  /// Runs a cycle without a joint state: adopts plans, but computes and sends nothing.
   void idle(std::int64_t now_ns) noexcept;
 
-  /// Plans for the cycle (built by the manager).
+  /// Plans for the cycle; the manager builds them.
   PlanExchange<CyclePlan>& plans() { return plans_; }
 
-  /// How fast references run, 0..1, any thread.
+  /// Sets the clock rate of the references, 0..1. Any thread.
   void setSpeedScale(double scale) { speed_scale_.store(scale, std::memory_order_relaxed); }
   double speedScale() const { return speed_scale_.load(std::memory_order_relaxed); }
 
-  /// Newest report; one reader at a time. Returns whether it is newer than the last one read.
+  /// Reads the newest report; returns true if it is newer than the last one read. One reader.
   bool readReport(CycleReport& report) { return reports_.read(report); }
 
-  /// Set while a plug-in's code runs; what a watchdog looks at together with the cycle counter.
+  /// True while code of a plug-in runs. A watchdog reads it together with heartbeat().
   bool inPlugin() const { return in_plugin_.load(std::memory_order_relaxed); }
   /// Counts up at the start of each cycle.
   std::uint64_t heartbeat() const { return heartbeat_.load(std::memory_order_relaxed); }
@@ -141,8 +139,8 @@ class ControlCycle {
   Reason fault_reason_;
   Reason input_reason_;
   double limit_scale_ = 1.0;
-  std::uint64_t numbers_ = 0;  // of cycles with a joint state
-  bool asked_still_ = false;   // the last cycle with a joint state asked for no velocity
+  std::uint64_t numbers_ = 0;  // number of cycles with a joint state
+  bool asked_still_ = false;   // the last cycle with a joint state sent zero velocity
   int overruns_in_row_ = 0;
   int watched_ = 0;  // id of the motion that progress_ watches
   coglab_rt::TripleBuffer<CycleReport> reports_;

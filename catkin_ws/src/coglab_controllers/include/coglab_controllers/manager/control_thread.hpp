@@ -1,6 +1,6 @@
 /// @file
-/// The thread that runs the control cycle, woken by the arriving measurements
-/// (docs/architecture.md, processes and threads).
+/// The thread that runs the control cycle. Arriving measurements wake it (docs/architecture.md,
+/// processes and threads).
 #pragma once
 
 #include <atomic>
@@ -15,21 +15,21 @@
 
 namespace coglab_controllers {
 
-/// How the thread runs.
+/// Settings of the thread.
 struct ControlThreadOptions {
-  int priority = 70;          ///< SCHED_FIFO, below the arm's thread; 0: leave the scheduling alone
-  double idle_period = 0.02;  ///< s: without measurements an idle cycle runs this often
+  int priority = 70;          ///< SCHED_FIFO, below the arm's thread; 0: scheduling unchanged
+  double idle_period = 0.02;  ///< s, period of idle cycles without measurements
   std::size_t stack_bytes = 1024 * 1024;
-  /// Called in this thread after each cycle that made a command, for a robot behind a topic. Not
+  /// Called in this thread after each cycle with a command, for a robot behind a topic. Not
   /// real-time.
   std::function<void(const VelocityCommand&)> after_cycle;
 };
 
-/// Reads the newest sample of the arm's mailboxes, runs the cycle, writes the velocity back.
+/// Reads the newest sample from the arm's mailboxes, runs the cycle and writes the velocity back.
 ///
 /// The period is the smallest whole number of measurement periods that is not shorter than
-/// cycle_time. Without measurements idle cycles run, so that controllers load before the robot is
-/// there.
+/// cycle_time. Without measurements, idle cycles run, so that controllers can load before the robot
+/// is connected.
 class ControlThread {
  public:
   ControlThread(ControlCycle& cycle, coglab_rt::ArmMailboxes& mailboxes,
@@ -39,14 +39,14 @@ class ControlThread {
   ControlThread& operator=(const ControlThread&) = delete;
 
   void start();
-  /// Ends the thread; waits for the cycle that runs.
+  /// Ends the thread after the running cycle.
   void stop();
 
-  /// From the thread that writes samples, after each: wakes the cycle when its period has come.
-  /// Wait-free.
+  /// Wakes the cycle when its period is over. The thread that writes samples calls it after each
+  /// sample. Wait-free.
   void wake(bool answered) noexcept;
 
-  /// Warning about scheduling once known; empty if all is well.
+  /// Warning about scheduling; empty if there is none or the thread has not set it yet.
   std::string warning() const;
 
  private:

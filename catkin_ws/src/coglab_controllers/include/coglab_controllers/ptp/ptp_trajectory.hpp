@@ -1,5 +1,5 @@
 /// @file
-/// Point-to-point motion in joint space (D4.10 Table 5): all joints arrive together.
+/// Point-to-point motion in joint space (D4.10 Table 5). All joints arrive at the same time.
 #pragma once
 
 #include <array>
@@ -8,7 +8,7 @@
 
 namespace coglab_controllers {
 
-/// Position and velocity on a point-to-point motion.
+/// Position, velocity and acceleration at one time of a point-to-point motion.
 struct PtpPoint {
   JointVector position = JointVector::Zero();      ///< rad
   JointVector velocity = JointVector::Zero();      ///< rad/s
@@ -17,18 +17,18 @@ struct PtpPoint {
 
 /// Synchronised trapezoidal motion from any position and velocity to rest at a target.
 ///
-/// The slowest joint moves as fast as its limits allow and the others arrive at the same time. From
-/// rest the path is a straight line in joint space. Planned at construction, which may throw; `at`
+/// The slowest joint moves as fast as its limits allow; the others arrive at the same time. From
+/// rest the path is a straight line in joint space. The constructor plans and may throw; `at`
 /// neither allocates nor throws.
 class PtpTrajectory {
  public:
   /// At rest at zero, duration 0.
   PtpTrajectory() = default;
 
-  /// @param position, velocity start, rad and rad/s; a start faster than max_velocity first brakes.
+  /// @param position, velocity start, rad and rad/s; a joint faster than max_velocity first brakes.
   /// @param target rad.  @param max_velocity, max_acceleration positive, rad/s and rad/s^2.
-  /// @param joints how many entries to use; the others stay where they are.
-  /// @throws std::invalid_argument naming joint and field that is not finite or not positive.
+  /// @param joints number of joints that move; the others keep their positions.
+  /// @throws std::invalid_argument with the joint and the field that is not finite or not positive.
   PtpTrajectory(const JointVector& position, const JointVector& velocity, const JointVector& target,
                 const JointVector& max_velocity, const JointVector& max_acceleration,
                 int joints = kMaxJoints);
@@ -36,8 +36,8 @@ class PtpTrajectory {
   double duration() const noexcept { return duration_; }  ///< s
   const JointVector& target() const noexcept { return target_; }
 
-  /// State `t` seconds after the start. Exactly the target, at rest, from duration() on; the start
-  /// before 0.
+  /// State at `t` s after the start. From duration() on: exactly the target, at rest. Before 0: the
+  /// start.
   void at(double t, PtpPoint& point) const noexcept;
 
  private:
