@@ -1,6 +1,6 @@
 /// @file
-/// What a request to the feedback controllers may carry, before Ctrl-MORE sees it
-/// (coglab_msgs/FeedbackSelect.srv is the page of it).
+/// Checks of requests to the feedback controllers, before they reach Ctrl-MORE. The request is
+/// documented in coglab_msgs/FeedbackSelect.srv.
 #pragma once
 
 #include <cstddef>
@@ -12,20 +12,20 @@
 
 namespace coglab_controllers {
 
-/// The longest reason of a request, in bytes of UTF-8.
+/// Largest length of a request's reason, bytes of UTF-8.
 inline constexpr std::size_t kLongestReason = 200;
 
-/// Refuses a reason that could not be shown as it is: UTF-8 of at most kLongestReason bytes without
-/// control characters, line breaks and marks of writing direction, and more than spaces; "" is
-/// fine.
+/// Refuses a reason that cannot be displayed. It must be UTF-8 of at most kLongestReason bytes,
+/// without control characters, line breaks or marks of writing direction, and not only spaces. ""
+/// is allowed.
 ctrl_more::Status judgeReason(const std::string& reason);
 
-/// Refuses an empty name among the names of controllers: a list without a name is all of them.
+/// Refuses an empty name in the list of controllers. An empty list means all controllers.
 ctrl_more::Status judgeNames(const std::vector<std::string>& names);
 
-/// Refuses to withdraw a reason that nothing is paused for: each of the controllers named must be,
-/// or any one if no name is given. "user" may be withdrawn at any time, and unknown names are left
-/// to whoever knows the loaded ones.
+/// Refuses to withdraw a reason that pauses no controller. Each named controller must be paused for
+/// it, or at least one if no name is given. "user" may be withdrawn at any time. Unknown names are
+/// not checked here.
 ctrl_more::Status judgeResume(const std::vector<ctrl_more::ControllerStatus>& controllers,
                               const std::vector<std::string>& names, const std::string& reason);
 

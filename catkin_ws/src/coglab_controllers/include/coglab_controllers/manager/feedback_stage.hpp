@@ -1,6 +1,6 @@
 /// @file
-/// Where Ctrl-MORE's feedback controllers meet the control cycle: the shared stores of the arm and
-/// their signals.
+/// Interface between Ctrl-MORE's feedback controllers and the control cycle: the shared stores of
+/// the arm and their signals.
 #pragma once
 
 #include <array>
@@ -14,11 +14,11 @@
 
 namespace coglab_controllers {
 
-/// Forces of the surroundings on thumb, index, middle, ring, little finger and palm, x y z each; N,
-/// axes of the tool.
+/// Contact forces on thumb, index, middle, ring, little finger and palm; x y z each, N, axes of the
+/// tool.
 using TouchForces = std::array<double, 18>;
 
-/// The stores that all controllers of the arm share, and the feedback manager over them.
+/// The stores that all controllers of the arm share, and their feedback manager.
 ///
 /// Signals. measuredData: `joint_position` (rad), `joint_velocity` (rad/s), `joint_torque`,
 /// `external_torque` (Nm), 7 each in wire order; `wrench` (N, Nm at the tool, in the base frame,
@@ -30,8 +30,8 @@ class FeedbackStage {
  public:
   /// @param setup orientation of the measured wrench
   /// @param period intended cycle time, s
-  /// @param lockstep simulated time: overruns of feedback controllers are not judged
-  /// @param logger where feedback controllers log; null: Logger::standard()
+  /// @param lockstep simulated time: overruns of feedback controllers are not checked
+  /// @param logger for feedback controllers; null: Logger::standard()
   FeedbackStage(const RobotSetup& setup, double period, bool lockstep,
                 ctrl_more::Logger* logger = nullptr);
 
@@ -39,7 +39,7 @@ class FeedbackStage {
   const ctrl_more::FeedbackControllersManager& manager() const { return manager_; }
   References& references() { return references_; }
   const ctrl_more::RobotStates& robot() const { return robot_; }
-  /// Leaves forces of touch sensors for the next cycle; wait-free, one thread at a time.
+  /// Stores forces of touch sensors for the next cycle. Wait-free; one thread at a time.
   /// @param stamp_ns monotonic nanoseconds
   /// @return false if the hand has no touch sensors
   bool postTouch(const TouchForces& forces, std::int64_t stamp_ns) noexcept {
@@ -51,12 +51,12 @@ class FeedbackStage {
 
   /// Adopts the newest plan of the feedback manager; called once per cycle, idle ones included.
   void begin(std::int64_t now_ns, double dt) noexcept;
-  /// The feedback profile of a motion controller begins in the cycle that switches to it.
+  /// Applies the feedback profile of a motion controller, in the cycle that switches to it.
   void switchProfile() noexcept { manager_.adoptPrepared(); }
-  /// Step 2: measurement to robot states. False if a number is not finite (then nothing was
-  /// written).
+  /// Step 2: writes the measurement to the robot states. If a number is not finite, it writes
+  /// nothing and returns false.
   bool fill(const CycleInput& input) noexcept;
-  /// Steps 5 and 7.
+  /// Runs the feedback controllers of a stage (steps 5 and 7).
   void run(ctrl_more::Stage stage) noexcept {
     manager_.updateStage(stage, robot_, references_.states);
   }

@@ -1,6 +1,6 @@
 /// @file
-/// How a motion is ended from outside the control cycle, and how requests made before that are told
-/// from those made after it.
+/// Ends a motion from outside the control cycle, and distinguishes requests made before the cancel
+/// from later ones.
 #pragma once
 
 #include <atomic>
@@ -13,14 +13,14 @@
 
 namespace coglab_controllers {
 
-/// The cancels of one motion controller, numbered from 1. Services ask, the cycle takes and
-/// confirms; the cycle never waits.
+/// The cancels of one motion controller, numbered from 1. Services call ask(); the cycle calls
+/// take() and confirm(). The cycle never waits.
 class MotionCancel {
  public:
   /// Number of the newest cancel; 0: none yet. Any thread.
   std::uint64_t newest() const { return newest_.load(std::memory_order_acquire); }
 
-  /// Asks the cycle to end what runs. @return number of this cancel
+  /// Requests the end of the running motion. @return number of this cancel
   std::uint64_t ask(const Reason& reason) {
     const std::lock_guard<std::mutex> lock(asking_);
     const std::uint64_t number = newest() + 1;
@@ -29,11 +29,11 @@ class MotionCancel {
     return number;
   }
 
-  /// Whether the cycle has served this cancel, or one after it. Any thread.
+  /// True if the cycle has served this cancel or a later one. Any thread.
   bool served(std::uint64_t number) const {
     return served_.load(std::memory_order_acquire) >= number;
   }
-  /// Whether this cancel, or one served together with it, ended a motion. Any thread, once served.
+  /// True if this cancel, or one served together with it, ended a motion. Any thread, once served.
   bool endedMotion(std::uint64_t number) const {
     return ended_.load(std::memory_order_acquire) >= number;
   }
@@ -41,7 +41,7 @@ class MotionCancel {
   /// @name Control thread
   /// @{
 
-  /// The newest cancel if it has not been taken yet. @param reason why the motion ends
+  /// Takes the newest cancel; false if it was taken already. @param reason why the motion ends
   bool take(Reason& reason) {
     Order order;
     if (!orders_.read(order)) return false;
@@ -49,7 +49,7 @@ class MotionCancel {
     reason = order.reason;
     return true;
   }
-  /// Number of the cancel taken last: requests made before it come too late.
+  /// Number of the cancel taken last. Requests made before it are refused.
   std::uint64_t taken() const { return taken_; }
   void confirm(bool ended_motion) {
     if (ended_motion) ended_.store(taken_, std::memory_order_release);

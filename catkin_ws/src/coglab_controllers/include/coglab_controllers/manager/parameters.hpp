@@ -1,5 +1,5 @@
 /// @file
-/// Checked reading of parameters, which come from ROS or from a YAML file alike.
+/// Checked reading of parameters from ROS or from a YAML file.
 #pragma once
 
 #include <string>
@@ -11,12 +11,12 @@
 
 namespace coglab_controllers {
 
-/// One block of parameters. Every read names its default and its range; what does not fit is
-/// refused with std::runtime_error: "parameter <block>/<name>: expected …, got …". Not for the
+/// One block of parameters. Every read has a default and a range. An invalid value throws
+/// std::runtime_error: "parameter <block>/<name>: expected …, got …". Not for the
 /// control cycle.
 class Parameters {
  public:
-  /// @param node a map, or nothing at all.  @param block what to call it in messages
+  /// @param node a map, or empty.  @param block name of the block in messages
   Parameters(const YAML::Node& node, std::string block);
 
   bool has(const std::string& name) const;
@@ -24,14 +24,14 @@ class Parameters {
   int whole(const std::string& name, int fallback, int least, int most) const;
   bool flag(const std::string& name, bool fallback) const;
   std::string text(const std::string& name, const std::string& fallback) const;
-  /// A text that must be one of `allowed`.
+  /// Reads a text that must be one of `allowed`.
   std::string choice(const std::string& name, const std::string& fallback,
                      const std::vector<std::string>& allowed) const;
   std::vector<std::string> texts(const std::string& name) const;
-  /// As many numbers as the fallback has, none larger than `most`, whatever its sign.
+  /// Reads as many numbers as the fallback has; the absolute values are at most `most`.
   Eigen::VectorXd numbers(const std::string& name, const Eigen::VectorXd& fallback,
                           double most = 1e6) const;
-  /// A block inside this one; empty if there is none.
+  /// Returns a block inside this one; empty if there is none.
   Parameters block(const std::string& name) const;
   const YAML::Node& node() const { return node_; }
 

@@ -1,6 +1,6 @@
 /// @file
-/// Which motion controller types exist in this process. Libraries with more of them are opened by
-/// ctrl_more::PluginLibrary, as those of feedback controllers are.
+/// Registry of the motion controller types in this process. ctrl_more::PluginLibrary opens
+/// libraries with further types, as for feedback controllers.
 #pragma once
 
 #include <string>
@@ -12,31 +12,32 @@ namespace coglab_controllers {
 
 class MotionControllerRos;
 
-/// How to make a controller of one type.
+/// Factory functions of one controller type.
 struct MotionMaker {
   MotionController* (*controller)() = nullptr;  ///< the caller owns the result
-  MotionControllerRos* (*ros)() = nullptr;      ///< its ROS side; null: it has none
+  MotionControllerRos* (*ros)() = nullptr;      ///< makes its ROS side; null: none
 
-  /// True if it makes the same.
+  /// True if the functions are the same.
   bool operator==(const MotionMaker& other) const {
     return controller == other.controller && ros == other.ros;
   }
 };
 
-/// The numbers of the file that is being compiled, for libraries of motion controllers. The first
-/// one is raised when classes or meanings change. Static, so that a library keeps its own.
+/// ABI numbers of the compiled file, for libraries of motion controllers. The first number is
+/// raised when classes or meanings change. The function is static, so that each library keeps its
+/// own.
 static inline constexpr ctrl_more::Abi motionAbi() {
   return ctrl_more::abiOf<MotionController, MotionSetup, CycleInput, References, MotionRequest,
                           RobotSample, RobotSetup, Reason>(3);
 }
 
-/// The types that libraries have registered; a name that is known is refused. Any thread.
+/// The types that libraries have registered. A name that exists is refused. Any thread.
 class MotionTypes : public ctrl_more::PluginTypesOf<MotionMaker> {
  public:
   static MotionTypes& instance();
 
-  /// Registers a type; returns false, and remembers the refusal, if the name is known or the
-  /// library was compiled with other headers.
+  /// Registers a type. Returns false, and stores the refusal, if the name exists or the library was
+  /// compiled with other headers.
   bool insert(const std::string& type, const MotionMaker& maker,
               const ctrl_more::Abi& abi = motionAbi()) {
     return add(type, maker, abi);

@@ -1,5 +1,5 @@
 /// @file
-/// What everybody in the controller manager knows of the robot: its chain, its limits, its frames.
+/// Robot data that the manager and all controllers share: chain, limits and frames.
 #pragma once
 
 #include <memory>
@@ -22,13 +22,13 @@ struct RobotSetup {
   bool tactile = false;           ///< the hand has touch sensors
 };
 
-/// Builds it from the robot's model, its table of limits, and the manager's parameters (D4.10 Table
-/// 6): `base_link` (lwr_base_link), `tool_link` (ih2_palm), `wrench_link` (ih2_palm; what the
-/// bridge's `tool_frame` says), `upper_joint_pos_limit`, `lower_joint_pos_limit`, `joint_vel_limit`
-/// (rad, rad, rad/s; seven each, wire order; default: the table), `position_margin` (rad),
-/// `hand_speed_limit`, `elbow_speed_limit` (m/s; 0: none), block `workspace`: `box_min`, `box_max`,
-/// `base_centre` (m), `base_radius` (m), `max_stretch` (share of the reach), `deceleration`
-/// (m/s^2); `tactile` (false).
+/// Builds the setup from the robot's model, its table of limits, and the manager's parameters
+/// (D4.10 Table 6): `base_link` (lwr_base_link), `tool_link` (ih2_palm), `wrench_link` (ih2_palm;
+/// the same as the bridge's `tool_frame`), `upper_joint_pos_limit`, `lower_joint_pos_limit`,
+/// `joint_vel_limit` (rad, rad, rad/s; seven each, wire order; default: the table),
+/// `position_margin` (rad), `hand_speed_limit`, `elbow_speed_limit` (m/s; 0: none), block
+/// `workspace`: `box_min`, `box_max`, `base_centre` (m), `base_radius` (m), `max_stretch` (share of
+/// the reach), `deceleration` (m/s^2); `tactile` (false).
 /// @param urdf text of the model
 /// @throws std::runtime_error or std::invalid_argument naming the parameter, link or joint
 std::shared_ptr<const RobotSetup> makeRobotSetup(const std::string& urdf,

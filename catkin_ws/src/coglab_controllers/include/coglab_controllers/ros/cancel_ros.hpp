@@ -15,8 +15,8 @@
 
 namespace coglab_controllers {
 
-/// `<id>/cancel` of every loaded motion controller. They have threads of their own, so that no
-/// request that waits for the cycle or for a library keeps a cancel waiting.
+/// Service `<id>/cancel` of every loaded motion controller. Separate threads serve it, so that
+/// requests that wait for the cycle or for a library do not delay a cancel.
 class CancelRos {
  public:
   /// @param node namespace of the manager  @param manager outlives this object
@@ -27,7 +27,7 @@ class CancelRos {
 
   /// Advertises the service of a motion controller. Any thread.
   void serve(const std::string& id);
-  /// Takes it away again, after calls that are under way.
+  /// Removes the service after the running calls have ended.
   void withdraw(const std::string& id);
 
  private:

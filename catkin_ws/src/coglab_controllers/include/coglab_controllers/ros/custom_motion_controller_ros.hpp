@@ -1,5 +1,5 @@
 /// @file
-/// The ROS side that every motion gets whose author wrote none: start_motion and motion_feedback.
+/// Default ROS side of a motion: service start_motion and topic motion_feedback.
 #pragma once
 
 #include <ros/ros.h>
@@ -10,8 +10,8 @@
 
 namespace coglab_controllers {
 
-/// `<id>/start_motion` (service) and `<id>/motion_feedback` (latched topic): 50 Hz while a motion
-/// is under way, 5 Hz otherwise, every change and the end of each motion at once.
+/// Service `<id>/start_motion` and latched topic `<id>/motion_feedback`. The topic has 50 Hz while
+/// a motion runs and 5 Hz otherwise. Every change and every end of a motion is published at once.
 class CustomMotionControllerRos : public MotionControllerRos {
  public:
   ~CustomMotionControllerRos() override { service_.shutdown(); }

@@ -24,23 +24,23 @@
 
 namespace coglab_controllers {
 
-/// Hands records of Ctrl-MORE's logger to rosconsole, with controller, place and cycle.
+/// Writes records of Ctrl-MORE's logger to rosconsole, with controller, source location and cycle.
 class RosLogSink : public ctrl_more::LogSink {
  public:
   void write(const ctrl_more::LogRecord& record) override;
 };
 
-/// enable, disable, pause, resume, set_execution_order, pause_by_signal, resume_by_signal,
-/// disable_by_signal, reload_gains, set_gains, describe, load, unload (names: one controller),
-/// apply_profile (names: one profile); the latched topic status, and state: what each controller
-/// shows of its inside, and who changed which reference by how much. Every service answers after
+/// Services: enable, disable, pause, resume, set_execution_order, pause_by_signal,
+/// resume_by_signal, disable_by_signal, reload_gains, set_gains, describe, load, unload (names: one
+/// controller), apply_profile (names: one profile). Topics: status (latched), and state with the
+/// internal values of each controller and its change of each reference. Every service answers after
 /// the cycle has adopted the change.
 class FeedbackRos {
  public:
   FeedbackRos(const ros::NodeHandle& node, ControllerManager& manager);
   ~FeedbackRos();
 
-  /// Publishes status if it changed, and state if somebody listens; publisher thread.
+  /// Publishes status if it changed, and state while it has a subscriber. Publisher thread.
   void publishStatus();
 
  private:

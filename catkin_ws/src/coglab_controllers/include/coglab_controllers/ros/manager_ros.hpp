@@ -34,45 +34,45 @@
 
 namespace coglab_controllers {
 
-/// Owns the manager and its control thread; the robot is behind mailboxes, whose
-/// other side is an arm in this process or topics.
+/// Owns the manager and its control thread. Mailboxes connect it to the robot: an arm in this
+/// process, or topics.
 class ManagerRos {
  public:
   struct Options {
-    /// Publish what the cycle sends, for others to see (one process); split, the control thread
-    /// publishes itself.
+    /// Publish the sent velocities for display (robot in this process). With split:=true the
+    /// control thread publishes them.
     bool publish_target = true;
     ros::Publisher target;  ///< lwr/target_joint_states
     ControlThreadOptions thread;
-    int highest_priority = 99;  ///< the control thread's is kept to it: below the arm's thread
-    /// Told after each switch whether a controller is active.
+    int highest_priority = 99;  ///< limit for the control thread, below the arm's thread
+    /// Called after each switch; true if a controller is active.
     std::function<void(bool)> controller_active;
   };
 
-  /// Reads parameters below `node` (…/controller_manager). @throws std::exception naming what is
-  /// wrong
+  /// Reads parameters below `node` (…/controller_manager). @throws std::exception with the
+  /// cause
   ManagerRos(const ros::NodeHandle& node, coglab_rt::ArmMailboxes& mailboxes, Options options);
   ~ManagerRos();
   ManagerRos(const ManagerRos&) = delete;
   ManagerRos& operator=(const ManagerRos&) = delete;
 
-  /// Starts the control thread, then the services, the publisher, and what `load` and `active` name
-  /// in the parameters.
+  /// Starts the control thread, the services and the publisher. Then it loads and activates the
+  /// controllers of the parameters `load` and `active`.
   void start();
   /// Ends services and publisher, then the control thread.
   void shutdown();
 
   ControllerManager& manager() { return *manager_; }
   ControlThread& controlThread() { return *thread_; }
-  /// Whether a controller is the active one. Any thread, wait-free.
+  /// True if a controller is active. Any thread, wait-free.
   bool controllerActive() const { return active_.load(std::memory_order_relaxed); }
 
  private:
-  /// The ROS side of a motion controller. Whoever holds it keeps both.
+  /// A motion controller and its ROS side. A pointer to it keeps both alive.
   struct Side {
     std::string id;
-    std::shared_ptr<const LoadedMotion> motion;  ///< once it is unloaded: until nobody uses it
-    std::unique_ptr<MotionControllerRos> ros;    ///< goes before the motion
+    std::shared_ptr<const LoadedMotion> motion;  ///< set on unloading; keeps it while in use
+    std::unique_ptr<MotionControllerRos> ros;    ///< destroyed before the motion
   };
 
   bool onLoad(coglab_msgs::LoadController::Request& request,

@@ -1,5 +1,5 @@
 /// @file
-/// The ROS side of a motion controller plug-in: its services and topics, below its id.
+/// ROS side of a motion controller plug-in: its services and topics below its id.
 #pragma once
 
 #include <ros/console.h>
@@ -17,7 +17,7 @@ using coglab_rt::nanoseconds;
 using coglab_rt::toRos;
 using coglab_rt::toSteady;
 
-/// Level at which the early end of a motion is logged: one that was asked for is no warning.
+/// Log level of the early end of a motion: Info if it was requested, else Warn.
 inline ros::console::Level endLevel(const Reason& why) {
   const ReasonCode code = why.code();
   const bool asked = code == ReasonCode::Cancelled || code == ReasonCode::Switched ||
@@ -25,13 +25,13 @@ inline ros::console::Level endLevel(const Reason& why) {
   return asked ? ros::console::levels::Info : ros::console::levels::Warn;
 }
 
-/// What every ROS side shares.
+/// Objects that all ROS sides share.
 struct RosContext {
   tf2_ros::Buffer* tf = nullptr;         ///< outlives the ROS sides
   const TfListener* listener = nullptr;  ///< fills the buffer
 };
 
-/// Made by the plug-in's library beside the controller
+/// Base class of ROS sides. The plug-in's library makes one with each controller
 /// (COGLAB_REGISTER_MOTION_CONTROLLER_WITH_ROS).
 class MotionControllerRos {
  public:
@@ -42,12 +42,12 @@ class MotionControllerRos {
   virtual void attach(MotionController& controller, const ros::NodeHandle& node,
                       const RosContext& context) = 0;
 
-  /// Called by the goal thread, 200 times a second: frames to mailboxes. A motion depends on it, so
-  /// it waits for nothing: it publishes nothing, logs nothing and never asks the ROS master.
+  /// Copies goal frames to mailboxes; the goal thread calls it at 200 Hz. A motion depends on it,
+  /// so it must not wait, publish, log or call the ROS master.
   virtual void pollGoal() {}
 
-  /// Called by the publisher thread, 200 times a second: queues and mailboxes to topics. It never
-  /// asks the ROS master, which may not answer: parameters come from getParamCached().
+  /// Publishes queues and mailboxes on topics; the publisher thread calls it at 200 Hz. It must not
+  /// call the ROS master, which may not answer: read parameters with getParamCached().
   virtual void spinOnce() = 0;
 };
 

@@ -1,5 +1,5 @@
 /// @file
-/// predicted_path of a motion controller: the way ahead of the arm, for pages and rviz.
+/// Topic predicted_path of a motion controller: the future path of the arm, for web pages and rviz.
 #pragma once
 
 #include <cstdint>
@@ -13,20 +13,20 @@
 
 namespace coglab_controllers {
 
-/// The message of a path whose poses are in `frame`.
+/// Returns the message of a path whose poses are in `frame`.
 coglab_msgs::PredictedPath toMessage(const PredictedPath& path, const std::string& frame);
 
 void write(const Pose& pose, geometry_msgs::Pose& message);
 
-/// The topic. Publisher thread alone.
+/// Publishes predicted_path. Publisher thread only.
 class PathTopic {
  public:
   /// @param frame of the poses
   void attach(ros::NodeHandle& node, const std::string& frame);
 
-  /// Called 200 times a second. While somebody listens: the path when a motion begins and every
-  /// 0.2 s while it runs, its goal as it is then, and a message without poses when it has ended.
-  /// Each roll-out costs about a millisecond of this thread, none of the control cycle.
+  /// Called at 200 Hz. While the topic has a subscriber, it publishes the path when a motion begins
+  /// and every 0.2 s while it runs, for the goal at that time. After the end it publishes a message
+  /// without poses. Each roll-out takes about 1 ms of this thread and no time of the control cycle.
   template <typename Controller>
   void spin(Controller& controller, bool moving) {
     if (due(moving)) controller.askPath();
@@ -41,7 +41,7 @@ class PathTopic {
   ros::Publisher publisher_;
   std::string frame_;
   std::uint64_t calls_ = 0;
-  bool shown_ = false;  // a path that has not been ended
+  bool shown_ = false;  // a path was published, its end was not
 };
 
 }  // namespace coglab_controllers

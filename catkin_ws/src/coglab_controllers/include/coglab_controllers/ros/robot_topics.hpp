@@ -1,6 +1,6 @@
 /// @file
-/// The robot behind topics (split:=true): joint_states in, target_joint_states out, as D4.10's
-/// Tables 1 and 6 have it.
+/// The robot behind topics (split:=true): joint_states in, target_joint_states out (D4.10, Tables 1
+/// and 6).
 #pragma once
 
 #include <array>
@@ -22,9 +22,9 @@ namespace coglab_controllers {
 /// Fills mailboxes from the topics of a robot interface in another process.
 ///
 /// Measured values come from `joint_states`, `external_torques` and `tool_wrench`, the permission
-/// to move from `state`. What is commanded cannot be seen from here: position counts as commanded
-/// where it is measured; velocity and acceleration are what the interface's interpolator makes of
-/// the velocities that were sent. Callbacks run in one thread; that thread writes the samples.
+/// to move from `state`. The commanded state is not on a topic. So the measured position counts as
+/// commanded; velocity and acceleration are computed from the sent velocities with the interface's
+/// interpolator. Callbacks run in one thread; that thread writes the samples.
 class RobotTopics {
  public:
   /// @param node namespace of the robot interface (…/lwr)

@@ -1,5 +1,5 @@
 /// @file
-/// The settings of the controller manager from ROS parameters.
+/// Reads the settings of the controller manager from ROS parameters.
 #pragma once
 
 #include <string>
@@ -10,8 +10,8 @@
 
 namespace coglab_controllers {
 
-/// The table of joint limits that the parameters below `node` name (`joint_limits_file`,
-/// `joint_limits_profile`).
+/// Reads the table of joint limits given by the parameters `joint_limits_file` and
+/// `joint_limits_profile` below `node`.
 coglab_rt::JointLimits readJointLimits(const ros::NodeHandle& node);
 
 /// Settings of the controller manager from the parameters below `node`: those of

@@ -1,6 +1,5 @@
 /// @file
-/// Transforms from /tf and /tf_static into a tf2 buffer, less those that would spoil it, and goals
-/// from that buffer.
+/// Copies valid transforms from /tf and /tf_static into a tf2 buffer, and reads goals from it.
 #pragma once
 
 #include <atomic>
@@ -23,12 +22,12 @@
 
 namespace coglab_controllers {
 
-/// Listens in a thread of its own, in place of tf2_ros::TransformListener.
+/// Replaces tf2_ros::TransformListener; it runs in a separate thread.
 ///
-/// A buffer keeps a transform from the future as its newest for as long as it is ahead, mixes it
-/// into those before it, and one that is further ahead than the buffer is long locks out all that
-/// come after. So a stamp more than kClockTolerance_ns ahead of this computer's clock, and numbers
-/// that are not finite, are refused, counted and logged with the frame and its publisher.
+/// A tf2 buffer keeps a transform from the future as its newest one and interpolates towards it. If
+/// it is further ahead than the length of the buffer, the buffer refuses all later transforms. So a
+/// stamp more than kClockTolerance_ns ahead of this computer's clock is refused, and so are numbers
+/// that are not finite. Refusals are counted and logged with the frame and its publisher.
 class TfListener {
  public:
   /// @param buffer outlives the listener
@@ -37,16 +36,16 @@ class TfListener {
 
   void start();
   void stop();  ///< calls the ROS master once per topic
-  /// One message, as from a topic. Any thread; throws nothing.
-  /// @param publisher name of the node it comes from
+  /// Receives one message. Any thread; throws nothing.
+  /// @param publisher name of the sending node
   void receive(const tf2_msgs::TFMessage& message, const std::string& publisher, bool is_static);
 
-  /// Transforms refused so far.
+  /// Number of refused transforms.
   std::uint64_t refused() const { return refused_.load(std::memory_order_relaxed); }
-  /// How often this computer's clock has stepped back, as far as messages have shown.
+  /// Number of backward steps of this computer's clock that were detected at messages.
   std::uint32_t clockSteps() const { return clock_steps_.load(std::memory_order_relaxed); }
-  /// How far the newest transform of this child frame was ahead of the clock, s, if it was refused
-  /// for that; else 0.
+  /// Time (s) by which the newest transform of this child frame was ahead of the clock, if it was
+  /// refused for that; else 0.
   double ahead(const std::string& frame) const;
 
  private:
@@ -60,17 +59,17 @@ class TfListener {
   std::atomic<std::uint64_t> refused_{0};
   std::atomic<std::uint32_t> clock_steps_{0};
   mutable std::mutex mutex_;
-  std::map<std::string, double> ahead_;  ///< s, by child frame; frames that were refused last
+  std::map<std::string, double> ahead_;  ///< s, by child frame; only frames refused last
   std::int64_t last_now_ns_ = 0;
   ros::CallbackQueue queue_;
   ros::Subscriber dynamic_, static_;
   std::unique_ptr<ros::AsyncSpinner> spinner_;
 };
 
-/// The newest transform of a tf2 buffer. Any thread but the control thread.
+/// Reads the newest transform from a tf2 buffer. Any thread but the control thread.
 class TfGoalSource : public GoalSource {
  public:
-  /// @param listener what fills the buffer; both outlive the source
+  /// @param listener fills the buffer; both outlive the source
   /// @param steady the clock of the samples, ns
   TfGoalSource(const tf2::BufferCore& buffer, const TfListener& listener,
                std::function<std::int64_t()> steady = steadyNow)

@@ -1,5 +1,5 @@
 /// @file
-/// Touch sensors of the hand on their way into the control cycle.
+/// Passes the hand's touch forces from a topic to the control cycle.
 #pragma once
 
 #include <string>
@@ -11,13 +11,13 @@
 
 namespace coglab_controllers {
 
-/// Sums the forces of a message finger by finger. @throws std::invalid_argument with what was
-/// expected and what came. @param tool frame that the forces have to be in
+/// Sums the forces of a message for each finger. @param tool required frame of the forces
+/// @throws std::invalid_argument with the expected and the received value
 TouchForces touchForcesOf(const coglab_msgs::FingertipForces& message, const std::string& tool);
 
-/// Subscribes the topic that the parameter `tactile_topic` names, by default
-/// `ih2_hand/fingertip_forces`, counted from the namespace above the manager's, and hands its
-/// forces to the manager as the signal `touch`.
+/// Subscribes to the topic in the parameter `tactile_topic` (default `ih2_hand/fingertip_forces`,
+/// relative to the namespace above the manager's). It passes the forces to the manager as the
+/// signal `touch`.
 class TouchTopic {
  public:
   /// @param node namespace of the manager; its callback queue is used
