@@ -1,6 +1,6 @@
 /// @file
-/// An ideal arm: it stands exactly where its commanded velocities lead, within the robot's limits.
-/// No robot controller, no physics, no ROS; for the development of controllers.
+/// An ideal arm: it follows its commanded velocities exactly, within the robot's limits. It has no
+/// robot controller, no physics and no ROS; for the development of controllers.
 #pragma once
 
 #include <atomic>
@@ -15,7 +15,7 @@
 
 namespace coglab_controllers {
 
-/// How the ideal arm is set up.
+/// Configuration of the ideal arm.
 struct IdealArmConfig {
   coglab_rt::JointLimits limits;
   /// rad, inside the limits; the default is the home posture of the simulated cell.
@@ -28,24 +28,23 @@ struct IdealArmConfig {
   void check() const;
 };
 
-/// What an ideal arm does at the moment.
+/// State of the ideal arm.
 enum class IdealArmState : std::uint8_t { Monitor, Command, Holding, Stopping };
 
-/// monitor, command, holding or stopping, as in coglab_msgs/LwrState.
+/// Returns monitor, command, holding or stopping, as in coglab_msgs/LwrState.
 const char* nameOf(IdealArmState state);
 
-/// The newest measurement with the state, for those who publish.
+/// The newest measurement with the state, for publishing.
 struct IdealArmView {
   coglab_rt::RobotSample sample;
   IdealArmState state = IdealArmState::Monitor;
   bool hold_latched = false;
 };
 
-/// Integrates the newest velocity command within the limits of velocity, acceleration and jerk, and
-/// stops before the ends of the joints' ranges with the same reserve as the real arm, so that
-/// a controller meets the same bounds here. What permits a motion is the same as there, too: it
-/// counts between `start` and `stop`, not while `hold` is latched, and only if it was computed in
-/// the present permission.
+/// Integrates the newest velocity command within the limits of velocity, acceleration and jerk. It
+/// stops before the ends of the joint ranges with the same reserve as the real arm. Motion is
+/// permitted as on the real arm, too: between `start` and `stop`, not while `hold` is latched, and
+/// only for commands that were computed in the present permission.
 class IdealArm {
  public:
   /// @throws std::invalid_argument as IdealArmConfig::check()
@@ -54,20 +53,20 @@ class IdealArm {
   coglab_rt::ArmMailboxes& mailboxes() { return mailboxes_; }
   const IdealArmConfig& config() const { return config_; }
 
-  /// The arm's thread, once per period: one step, one sample. No allocation, lock, system call,
-  /// exception. @param now_ns steady clock
+  /// Makes one step and one sample; the arm's thread calls it once per period. No allocation, lock,
+  /// system call or exception. @param now_ns steady clock
   void tick(std::int64_t now_ns) noexcept;
 
-  /// Any thread: start, stop, hold, reset or position (the only mode that this arm has). Acts with
-  /// the next tick(). @return refused with a reason, or accepted; `message` says so in words
+  /// Handles start, stop, hold, reset or position (the only mode of this arm). It takes effect at
+  /// the next tick(). Any thread. @return accepted or refused; `message` has the reason
   coglab_rt::Answer request(const std::string& event);
-  /// Number of requests so far, and of those that a tick has seen. Any thread.
+  /// Number of requests, and of requests that a tick has processed. Any thread.
   std::uint32_t requested() const { return requested_.load(std::memory_order_acquire); }
   std::uint32_t served() const { return served_.load(std::memory_order_acquire); }
-  /// Whether the arm stood at the end of the last tick. Any thread.
+  /// True if the arm stood at the end of the last tick. Any thread.
   bool stands() const { return stands_.load(std::memory_order_acquire); }
 
-  /// One reader at a time: the newest view; returns whether it is newer than the last one read.
+  /// Reads the newest view; returns true if it is newer than the last one read. One reader.
   bool newestView(IdealArmView& view) { return views_.read(view); }
 
  private:
@@ -88,7 +87,7 @@ class IdealArm {
   coglab_rt::VelocityCommand command_;
   IdealArmView view_;
   std::uint32_t holds_seen_ = 0;
-  bool brakes_ = false;  // for a hold, until the arm stands, even if reset came at once
+  bool brakes_ = false;  // for a hold, until the arm stands, even after an early reset
 };
 
 }  // namespace coglab_controllers

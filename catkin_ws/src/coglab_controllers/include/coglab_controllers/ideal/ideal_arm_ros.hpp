@@ -1,5 +1,5 @@
 /// @file
-/// The ideal arm as a back end of robot_node, with the names that the arm's interface has on ROS.
+/// The ideal arm as a back end of robot_node, with the ROS names of the arm's interface.
 #pragma once
 
 #include <atomic>
@@ -26,10 +26,10 @@ namespace coglab_controllers {
 IdealArmConfig readIdealArmConfig(const ros::NodeHandle& node);
 
 /// Publishes `joint_states` (at joint_states_rate or the arm's rate, the lower one) and `state`
-/// (latched, on change); subscribes `ros_events`; serves `command`. Velocities come from the
-/// controllers of this process alone: target_joint_states shows them and moves nothing.
+/// (latched, on change); subscribes to `ros_events`; serves `command`. Only the controllers of this
+/// process move the arm: target_joint_states only displays their velocities.
 ///
-/// Two threads besides those of ROS: the arm's (named `ideal_arm`) and a publisher.
+/// It has two threads besides those of ROS: the arm's (named `ideal_arm`) and a publisher.
 class IdealArmRos : public coglab_rt::ArmPort {
  public:
   /// @param node namespace of the arm's interface (…/lwr)
@@ -40,7 +40,7 @@ class IdealArmRos : public coglab_rt::ArmPort {
 
   coglab_rt::ArmMailboxes& mailboxes() override { return arm_.mailboxes(); }
   void start(Wake wake) override;
-  /// Nothing to do: no other source moves this arm.
+  /// Does nothing, because no other source moves this arm.
   void setControllerActive(bool) override {}
   void shutdown() override;
   void unregister() override;

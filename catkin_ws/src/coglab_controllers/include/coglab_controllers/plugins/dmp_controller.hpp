@@ -1,6 +1,6 @@
 /// @file
-/// The cognitive controller plug-in (D4.10, section 3.1, Table 4): DMP towards a goal that may
-/// move, two-task IK.
+/// The cognitive controller plug-in (D4.10, section 3.1, Table 4): a DMP towards a goal that may
+/// move, with two-task IK.
 #pragma once
 
 #include <atomic>
@@ -16,24 +16,24 @@
 
 namespace coglab_controllers {
 
-/// The requests of the plug-in, from any thread; each one that is accepted becomes a DmpPlan, which
-/// the cycle runs (DmpCycle). A newer request takes the place of the motion under way.
+/// Handles the requests of the plug-in, from any thread. An accepted request becomes a DmpPlan,
+/// which the cycle runs (DmpCycle). A newer request replaces the running motion.
 ///
-/// Each motion has one owner of its goal, which its request names: the tf2 frame `goal_frame`, or,
-/// with an empty one as in D4.10, whoever publishes dmp_goal.
+/// Each motion has one source of its goal: the tf2 frame `goal_frame` of its request, or the topic
+/// dmp_goal if `goal_frame` is empty, as in D4.10.
 ///
 /// Parameters: Table 4's `pos_clik_gain`, `rot_clik_gain` (1/s), `robot_base_frame_name`,
 /// `dmp_frame_name`, `enable_ik_debug`; and
 /// `goal_timeout` (s, dmp_goal; 0: never old), `goal_max_age` (s), `goal_max_jump` (m),
 /// `goal_lost_time` (s), `goal_finish_distance` (m), `goal_reach_margin` (m), `goal_time_constant`,
 /// `noisy_goal_time_constant` (s), `goal_max_speed`, `predicted_goal_speed` (m/s),
-/// `predicted_goals` (how the names of frames end that tell where something will rest),
+/// `predicted_goals` (name suffix of frames that are predicted rest positions),
 /// `max_initial_distance` (m), `max_scale` (largest distance of a goal, in distances of the
 /// demonstration), `end_phase`, `end_speed` (m/s), `end_turning` (rad/s),
 /// `end_distance` (m), `follow_distance` (m), `follow_time` (s), `arrive_distance` (m),
 /// `settle_time` (s), `correction_speed` (m/s), `singularity_threshold`,
-/// `rotation_first_scaling`, `hold_blend` (s), `dmp_file` (a library to load at once); on ROS also
-/// `goal_tf_frame` (name under which the estimated goal is broadcast; empty: it is not).
+/// `rotation_first_scaling`, `hold_blend` (s), `dmp_file` (a library to load at the start); on ROS
+/// also `goal_tf_frame` (tf2 frame of the estimated goal; empty: not broadcast).
 class DmpController : public MotionRunner<DmpPlan> {
  public:
   DmpController();
@@ -43,18 +43,18 @@ class DmpController : public MotionRunner<DmpPlan> {
   Answer loadDmps(const std::string& filename, int& loaded);
   Answer execute(const DmpRequest& request) { return ask(request, true); }
   Answer switchDmp(const DmpRequest& request) { return ask(request, false); }
-  /// What execute() would do now from where the arm is commanded to be, at rest: checked as that
-  /// does, but nothing is begun, and the controller need not be the active one.
+  /// Predicts the result of execute() now, from the commanded posture at rest. The checks are those
+  /// of execute(), but no motion begins, and the controller need not be active.
   Answer predict(const DmpRequest& request, PredictedPath& path);
-  /// dmp_goal, see GoalInput::offer(). `frame` must be dmp_frame_name.
+  /// Receives a goal from dmp_goal, see GoalInput::offer(). `frame` must be dmp_frame_name.
   Answer setGoal(const std::string& frame, const Vector3& goal, std::int64_t stamp_ns,
                  std::int64_t frame_ns = 0) {
     return goals_.offer(frame, goal, stamp_ns, frame_ns);
   }
-  /// Asks the goal source for the goal frame of the motion; call it often (the ROS side: 200 Hz;
+  /// Looks up the goal frame of the motion in the goal source. Call it often (ROS side: 200 Hz;
   /// lockstep: every tick).
   void pollGoal() { goals_.poll(); }
-  /// Where poses of frames come from. Must outlive the controller, or be taken away with null.
+  /// Sets the source of frame poses. It outlives the controller, or is removed with null.
   void setGoalSource(GoalSource* source) { goals_.setSource(source); }
   void setIkDebug(bool on) { ik_debug_.store(on, std::memory_order_relaxed); }
   bool ikDebug() const { return ik_debug_.load(std::memory_order_relaxed); }
@@ -64,9 +64,9 @@ class DmpController : public MotionRunner<DmpPlan> {
   /// @{
   bool readProgress(DmpProgress& progress) { return progress_.read(progress); }
   bool readIkDebug(IkDebugRecord& record) { return debug_.pop(record); }
-  /// Asks for the path of the motion under way; readPath() has it after the next cycle of one.
+  /// Requests the path of the running motion; readPath() returns it after the motion's next cycle.
   void askPath() { snapshots_.ask(); }
-  /// Rolls the motion out, in the frame dmp_frame_name. Whether one has come since the last call.
+  /// Rolls out the motion, in dmp_frame_name. False if there is no new path since the last call.
   bool readPath(PredictedPath& path);
   /// @}
 
@@ -94,7 +94,7 @@ class DmpController : public MotionRunner<DmpPlan> {
 
   // set once, by configure()
   std::string base_frame_, dmp_frame_, goal_tf_frame_;
-  std::string predicted_;  // end of the names of frames that tell where something will rest
+  std::string predicted_;  // name suffix of frames that are predicted rest positions
   double reach_margin_ = 0.5, max_initial_distance_ = 0.1, max_scale_ = 5.0;
   double arrive_distance_ = 0.01;
 
@@ -103,7 +103,7 @@ class DmpController : public MotionRunner<DmpPlan> {
   GoalInput goals_;
   DmpCycle* const cycle_;  // the motion that the base runs
   std::mutex predict_mutex_;
-  DmpCycle imagined_;  // begins motions that nothing runs
+  DmpCycle imagined_;  // begins motions only for prediction
   CopyOnRequest<DmpSnapshot> snapshots_;
   std::atomic<bool> ik_debug_{false};
   TripleBuffer<DmpProgress> progress_;

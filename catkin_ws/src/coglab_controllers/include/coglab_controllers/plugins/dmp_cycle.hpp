@@ -1,5 +1,6 @@
 /// @file
-/// The DMP plug-in in the control cycle: eq. (1)-(5) towards a goal that may move, jump or vanish.
+/// Part of the DMP plug-in that runs in the control cycle: eq. (1)-(5) towards a goal that may
+/// move, jump or vanish.
 #pragma once
 
 #include <cstdint>
@@ -20,10 +21,10 @@ struct DmpProgress {
   double phase = 0.0;
   double remaining_distance = 0.0;  ///< m, end-effector to goal as received
   double remaining_time = 0.0;      ///< s
-  Pose goal;  ///< of the hand in dmp_frame_name, as estimated, or as latched at the end
+  Pose goal;  ///< of the hand in dmp_frame_name: estimated, or latched at the end
 };
 
-/// One cycle, for dmp/ik_debug. Poses and vectors in the robot's base frame.
+/// Data of one cycle, for dmp/ik_debug. Poses and vectors in the robot's base frame.
 struct IkDebugRecord {
   std::int64_t stamp_ns = 0;
   double phase = 0.0;
@@ -34,7 +35,7 @@ struct IkDebugRecord {
   IkResult ik;
 };
 
-/// A motion as it is, for a roll-out of what is left of it.
+/// Present state of a motion, to roll out the rest of it.
 struct DmpSnapshot {
   std::int64_t stamp_ns = 0;
   Name primitive;
@@ -43,18 +44,18 @@ struct DmpSnapshot {
   Vector3 approach = Vector3::Zero();  ///< see CartesianMotion::step
 };
 
-/// Where a DMP motion is.
+/// Stage of a DMP motion.
 enum class DmpStage : std::uint8_t {
   Rest,    ///< no motion
-  Travel,  ///< the set-point is on its way
-  Arrive,  ///< the set-point is at the goal, the hand is not yet
+  Travel,  ///< the set-point moves to the goal
+  Arrive,  ///< the set-point is at the goal, the hand not yet
   Settle,  ///< reached; the hand comes to rest
   Watch,   ///< reached, the arm stands; a goal that leaves its ball is followed again
-  GivenUp  ///< the reason says why
+  GivenUp  ///< aborted, with a reason
 };
 
-/// The real-time half of the plug-in. Parameters: the goal's (GoalFrameLimits), the filter's
-/// and the end's (MotionEndParameters) as DmpController lists them.
+/// Real-time part of the plug-in. Parameters for goal (GoalFrameLimits), filter and end
+/// (MotionEndParameters): see the list at DmpController.
 class DmpCycle : public Motion<DmpPlan> {
  public:
   /// @param goals outlives this object
@@ -100,7 +101,7 @@ class DmpCycle : public Motion<DmpPlan> {
 
   DmpStage stage_ = DmpStage::Rest;
   Reason reason_;
-  DmpPlan plan_;  // of the motion under way, with what switch_dmp changed
+  DmpPlan plan_;  // of the running motion, with the changes of switch_dmp
   CartesianMotion motion_;
   GoalLimits limits_;
   Pose dmp_from_base_;
@@ -109,7 +110,7 @@ class DmpCycle : public Motion<DmpPlan> {
   CartesianReference in_base_;
   double remaining_distance_ = 0.0;
   bool projected_ = false;  // the goal is outside the workspace
-  bool jumps_ = false;      // the motion begins elsewhere than where the arm is
+  bool jumps_ = false;      // the motion does not begin at the arm's position
   Arrival arrival_;
   double since_reached_ = 0.0;  // s
 };

@@ -18,39 +18,39 @@ struct PtpRequest {
   std::vector<double> max_acc;   ///< rad/s^2; empty: the robot's limits times default_acceleration
 };
 
-/// The same, checked and complete.
+/// Checked and complete arguments of add_ptp.
 struct PtpTarget {
   JointVector position = JointVector::Zero();
   JointVector velocity = JointVector::Zero();
   JointVector acceleration = JointVector::Zero();
 };
 
-/// A motion as it is, for the rest of its path.
+/// Present state of a motion, to compute the rest of its path.
 struct PtpSnapshot {
   std::int64_t stamp_ns = 0;
   int id = -1;
   PtpTrajectory trajectory;
   double time = 0.0;  ///< s, on the trajectory
-  double rate = 1.0;  ///< 0..1, of its clock
+  double rate = 1.0;  ///< 0..1, clock rate
 };
 
-/// The plug-in. Parameters: Table 5's `Kp` (1/s) and `max_queue`; and `default_speed`,
-/// `default_acceleration` (shares of the robot's limits), `tolerance` (rad), `settle_time` (s),
-/// `hold_blend` (s).
+/// The point-to-point plug-in. Parameters: Table 5's `Kp` (1/s) and `max_queue`; and
+/// `default_speed`, `default_acceleration` (shares of the robot's limits), `tolerance` (rad),
+/// `settle_time` (s), `hold_blend` (s).
 class PtpController : public MotionRunner<PtpTarget> {
  public:
   PtpController();
 
-  /// add_ptp; any thread.
+  /// Handles add_ptp. Any thread.
   MotionAnswer add(const PtpRequest& request);
 
   /// @name Results, one reader thread
   /// @{
-  /// Asks for the path of the motion under way; readPath() has it after the next cycle of one.
+  /// Requests the path of the running motion; readPath() returns it after the motion's next cycle.
   void askPath() { snapshots_.ask(); }
-  /// Path of the hand in the robot's base frame. Whether one has come since the last call.
+  /// Reads the path of the hand, in the robot's base frame. False if there is no new path.
   bool readPath(PredictedPath& path);
-  /// Whether a motion is under way.
+  /// True if a motion runs.
   bool moving() const { return moving_.load(std::memory_order_relaxed); }
   const std::string& baseFrame() const { return setup().robot->chain.baseLink(); }
   /// @}
@@ -61,7 +61,7 @@ class PtpController : public MotionRunner<PtpTarget> {
   void report(std::int64_t stamp_ns) override;
   Answer readTarget(const PtpRequest& request, PtpTarget& target) const;
 
-  double tolerance_ = 0.002;  // rad, as ReferenceLoop has it
+  double tolerance_ = 0.002;  // rad, as in ReferenceLoop
   double default_speed_ = 0.3, default_acceleration_ = 0.2;
   std::atomic<bool> moving_{false};
   CopyOnRequest<PtpSnapshot> snapshots_;

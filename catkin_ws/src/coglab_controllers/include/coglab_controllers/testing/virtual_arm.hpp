@@ -1,6 +1,6 @@
 /// @file
-/// An arm in virtual time, for tests of motions: the controller manager as on the robot, and an arm
-/// that follows it. No ROS, no threads; a second takes a few milliseconds.
+/// An arm in virtual time, for tests of motions: the real controller manager, and an arm that
+/// follows it. No ROS, no threads; one simulated second takes a few milliseconds.
 #pragma once
 
 #include <cstdint>
@@ -26,12 +26,12 @@ inline std::string readText(const std::string& path) {
   return text.str();
 }
 
-/// Where the arm stands at first, rad: the home posture of the machines.
+/// Start posture of the arm, rad: the home posture of the robots.
 inline const JointVector kHome =
     (JointVector() << -1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782).finished();
 
-/// Manager, arm and clock. The arm follows velocities at once and exactly, or, after
-/// followWithinLimits(), as the robot's interface does. Time advances by tick() alone.
+/// Manager, arm and clock. The arm follows velocities at once and exactly; after
+/// followWithinLimits(), it follows like the robot's interface. Only tick() advances the time.
 class VirtualArm {
  public:
   /// @param description folder of the package lwr_description
@@ -52,7 +52,7 @@ class VirtualArm {
     sample.commanded_position = sample.position;
     sample.block = MotionBlock::None;
     sample.cycle_time = period;
-    sample.stop_delay = coglab_rt::lostTime(period);  // as the bridge has it
+    sample.stop_delay = coglab_rt::lostTime(period);  // as in the bridge
     sample.stop_rounding = 2.0 * coglab_rt::kWireRounding;
     tick();
   }
@@ -98,7 +98,7 @@ class VirtualArm {
     sample.commanded_position = sample.position;
     return command;
   }
-  /// So many seconds of cycles.
+  /// Runs cycles for a number of seconds.
   void run(double seconds) {
     for (double t = 0.0; t < seconds - 1e-9; t += period) tick();
   }
@@ -116,12 +116,12 @@ class VirtualArm {
   coglab_rt::JointLimits limits;
   ctrl_more::Logger logger;  // without sinks
   std::unique_ptr<ControllerManager> manager;
-  std::unique_ptr<coglab_rt::Interpolator> interpolator;  // null: velocities count at once
+  std::unique_ptr<coglab_rt::Interpolator> interpolator;  // null: the arm follows at once
   RobotSample sample;
   VelocityCommand command;
 
  private:
-  /// What others do between two cycles.
+  /// Callback between two cycles.
   virtual void beforeCycle() {}
 };
 
