@@ -54,7 +54,7 @@ enum class ShapeMapping {
   None,        ///< eq. (5) as learnt, for any goal
   Similarity,  ///< turned (smallest rotation) and scaled, from the demonstrated line (start to
                ///< goal) to the present one
-  Upright  ///< turned about the vertical and scaled, so that upward stays upward
+  Upright      ///< turned about the vertical and scaled, so that upward stays upward
 };
 
 /// m; a shorter line has no direction, and shapes are not scaled with it.
