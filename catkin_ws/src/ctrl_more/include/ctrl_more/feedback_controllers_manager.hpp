@@ -299,11 +299,9 @@ class FeedbackControllersManager : public Manager, public ControllerOwner {
   Logger* logger_;
   std::string name_ = "feedback";
   std::uint32_t next_owner_ = 1;
-  std::unique_ptr<CycleSide>
-      cycle_;  // declared before the list: its controllers log the cycle number
+  std::unique_ptr<CycleSide> cycle_;  // before the list: its controllers log the cycle number
   std::unique_ptr<ControllerList> list_;
-  std::unique_ptr<PendingChange>
-      before_last_;  // state that withdraw() restores; under list_->changes
+  std::unique_ptr<PendingChange> before_last_;  // for withdraw(); under list_->changes
 };
 
 }  // namespace ctrl_more

@@ -322,8 +322,7 @@ Status PendingChange::gains(const Change::Step& step) {
 }
 
 Status PendingChange::checkShared() const {
-  std::map<int, std::pair<std::string, bool>>
-      taken;  // by offset: controller, and true if exclusive
+  std::map<int, std::pair<std::string, bool>> taken;  // offset: controller, exclusive
   for (std::size_t i = 0; i < states.size(); ++i) {
     if (!states[i].enabled) continue;
     const std::string& name = list_->controllers[i]->name;
