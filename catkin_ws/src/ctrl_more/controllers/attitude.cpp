@@ -8,8 +8,8 @@
 
 namespace ctrl_more {
 
-/// Keeps the orientation of a body (pelvis, torso, hand) that carries an IMU: proportional,
-/// integral and damping action on SO(3).
+/// Controls the orientation of a body with an IMU (pelvis, torso, hand) by proportional, integral
+/// and damping action on SO(3).
 class Attitude : public FeedbackController {
  public:
   Description describe() const override;
@@ -21,7 +21,7 @@ class Attitude : public FeedbackController {
 
  private:
   struct Imu {
-    Eigen::Quaterniond orientation;  // of the IMU in the world
+    Eigen::Quaterniond orientation;  // orientation of the IMU in the world frame
     Eigen::Vector3d rate;            // angular velocity in the IMU frame [rad/s]
   };
   Imu read(const RobotStates& robot) const;
@@ -31,7 +31,7 @@ class Attitude : public FeedbackController {
   Eigen::Quaterniond mount_ = Eigen::Quaterniond::Identity();  // body to IMU
   Read<> imu_;
   Modify<> target_;
-  int first_ = 0;  // of the quaternion in the target
+  int first_ = 0;  // index of the quaternion in the target
   Gain kp_, ki_, kd_, max_angle_, dead_band_;
   LogThrottle said_{1'000'000'000};
   Eigen::Vector3d integral_ = Eigen::Vector3d::Zero();  // Ki times the integral of e [rad]
@@ -170,7 +170,7 @@ void Attitude::update(const Cycle& cycle, const RobotStates& robot, const Contro
   const Eigen::Quaterniond reference(original.view(target_).segment<4>(first_).data());
   const Eigen::Vector3d rate_world = imu.orientation.normalized() * imu.rate;
 
-  // Error and rate about the axes of the reference body.
+  // Error and rate in the frame of the reference body.
   Eigen::Vector3d error = reference.conjugate() * logOf(reference * body.conjugate());
   const double size = error.norm();
   const double dead_band = scalar(dead_band_);
@@ -188,7 +188,7 @@ void Attitude::update(const Cycle& cycle, const RobotStates& robot, const Contro
       CTRL_MORE_LOG(log(), Warning, "correction of {} rad is held at max_angle, {} rad", angle,
                     max_angle);
     }
-    // While saturated the integral may shrink, but not grow.
+    // Anti-windup: while saturated, the integral may decrease but not increase.
     if (grown.norm() < integral_.norm()) integral_ = grown;
   } else {
     integral_ = grown;

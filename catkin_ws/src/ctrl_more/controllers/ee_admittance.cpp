@@ -9,7 +9,7 @@
 
 namespace ctrl_more {
 
-/// Lets an end-effector yield to the hand that pushes or pulls it, around whatever motion runs.
+/// Lets an end-effector yield to a hand that pushes or pulls it, in addition to the current motion.
 class EeAdmittance : public FeedbackController {
  public:
   Description describe() const override;
@@ -38,20 +38,20 @@ class EeAdmittance : public FeedbackController {
   SecondOrderAxes<3> shift_, turn_;
   Vector6 offset_ = Vector6::Zero();                 // [m], [rad]
   Vector6 velocity_ = Vector6::Zero();               // [m/s], [rad/s]
-  Eigen::Vector3d force_ = Eigen::Vector3d::Zero();  // that moves it, base frame [N]
+  Eigen::Vector3d force_ = Eigen::Vector3d::Zero();  // force that moves it, base frame [N]
   LogThrottle said_{1'000'000'000};
 };
 
 namespace {
 
-// Without a step at its edge, and exactly zero inside.
+// Dead band without a step at its edge; exactly zero inside.
 Eigen::Vector3d withoutDeadBand(const Eigen::Vector3d& value, double dead_band) {
   const double size = value.norm();
   if (size <= dead_band) return Eigen::Vector3d::Zero();
   return (1.0 - dead_band / size) * value;
 }
 
-// Bounds an offset as a ball, and lets its velocity not point out of it.
+// Limits an offset to a ball of radius `limit`. At the limit it removes the outward velocity.
 template <typename Offset, typename Velocity>
 void bound(Offset offset, Velocity velocity, double limit) {
   const double size = offset.norm();
@@ -178,7 +178,7 @@ void EeAdmittance::update(const Cycle& cycle, const RobotStates& robot, const Co
   Eigen::Vector3d force = withoutDeadBand(wrench.head<3>(), scalar(force_dead_band_));
   Eigen::Vector3d torque = withoutDeadBand(wrench.tail<3>(), scalar(torque_dead_band_));
   if (in_tool_frame_) {
-    // The sensor has turned with the tool: the reference, and as far as this controller yielded.
+    // The sensor turns with the tool: by the reference and by this controller's own offset.
     const Eigen::Quaterniond reference(modified.view(pose_).tail<4>().data());
     const Eigen::Quaterniond tool = expOf(offset_.tail<3>()) * reference;
     force = tool * force;
@@ -191,7 +191,7 @@ void EeAdmittance::update(const Cycle& cycle, const RobotStates& robot, const Co
   const double speed = velocity_.head<3>().norm();
   const double max_velocity = scalar(max_velocity_);
   if (speed > max_velocity) {
-    // The offset goes as far as the velocity that is sent with it, and as it does with the force.
+    // The limited offset must match the velocity that is sent with it, in the direction of both.
     velocity_.head<3>() *= max_velocity / speed;
     offset_.head<3>() = before + cycle.dt * velocity_.head<3>();
   }
@@ -206,7 +206,7 @@ void EeAdmittance::update(const Cycle& cycle, const RobotStates& robot, const Co
                offset_.tail<3>(), velocity_.tail<3>());
     bound(offset_.tail<3>(), velocity_.tail<3>(), scalar(max_angle_));
   }
-  if (offset_.isZero(0.0) && velocity_.isZero(0.0)) return;  // every bit stays
+  if (offset_.isZero(0.0) && velocity_.isZero(0.0)) return;  // the references keep every bit
   auto pose = modified[pose_];
   pose.head<3>() += offset_.head<3>();
   if (rotates_) {

@@ -7,7 +7,7 @@
 
 namespace ctrl_more {
 
-/// Slows joints that approach the ends of their range.
+/// Slows joints near the ends of their range.
 class JointLimits : public FeedbackController {
  public:
   Description describe() const override;
@@ -25,13 +25,13 @@ class JointLimits : public FeedbackController {
   Modify<> velocity_;
   Gain influence_, safety_, xi_;
   std::vector<double> lower_, upper_;  // [rad]
-  int slowed_ = 0;                     // joints in this cycle
-  double nearest_ = 0.0;               // distance of any joint to an end of its range [rad]
+  int slowed_ = 0;                     // number of slowed joints in this cycle
+  double nearest_ = 0.0;               // smallest distance of a joint to an end of its range [rad]
   LogThrottle said_{1'000'000'000};
 };
 
 Description JointLimits::describe() const {
-  // 170 and 120 degrees, as the robot's own table has them.
+  // 170 and 120 degrees, as in the robot's table of joint limits.
   const double wide = 2.967059728390360, narrow = 2.094395102393195;
   Description d;
   d.type = "JointLimits";

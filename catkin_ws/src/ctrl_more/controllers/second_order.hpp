@@ -6,16 +6,15 @@
 
 namespace ctrl_more {
 
-/// Mass, damper and spring, M x'' + D x' + K x = f, stepped exactly for a force that is constant
-/// during the step (zero-order hold): at the samples there is no discretisation error, whatever
-/// the step and the stiffness. Units of one axis: M [kg], D [N s/m], K [N/m], or their rotational
-/// counterparts.
+/// Mass, damper and spring, M x'' + D x' + K x = f. The step is exact for a force that is constant
+/// during the step (zero-order hold): there is no discretisation error at the samples, for any step
+/// and stiffness. Units of one axis: M [kg], D [N s/m], K [N/m], or their rotational counterparts.
 class SecondOrder {
  public:
   /// Prepares a step. No allocation.
   /// @param mass > 0
   /// @param damping >= 0
-  /// @param stiffness >= 0; 0: the mass stays where it is left
+  /// @param stiffness >= 0; 0: no spring, the mass stays at its last position
   /// @param dt step [s], > 0
   void prepare(double mass, double damping, double stiffness, double dt) {
     if (mass == mass_ && damping == damping_ && stiffness == stiffness_ && dt == dt_) return;
@@ -73,7 +72,7 @@ class SecondOrder {
   double xx_ = 1.0, xv_ = 0.0, vx_ = 0.0, vv_ = 1.0, xf_ = 0.0, vf_ = 0.0;
 };
 
-/// N axes that do not disturb each other.
+/// N independent axes.
 template <int N>
 class SecondOrderAxes {
  public:

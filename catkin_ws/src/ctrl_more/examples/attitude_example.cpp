@@ -1,5 +1,5 @@
-// User code of the Ctrl-MORE paper, section VI-A: load the attitude controller, give it an IMU,
-// read the corrected pelvis orientation. Nothing in it depends on the robot; see README.md.
+// User code of the Ctrl-MORE paper, section VI-A: loads the attitude controller, writes IMU data,
+// and reads the corrected pelvis orientation. It does not depend on the robot; see README.md.
 #include <iostream>
 
 #include <Eigen/Core>

@@ -10,7 +10,7 @@
 namespace ctrl_more {
 namespace {
 
-// The uses as declared, before any key or size is known.
+// Declared uses, before their keys and sizes are known.
 template <typename Resolved, typename Uses>
 std::vector<Resolved> unresolved(const Uses& declared) {
   std::vector<Resolved> uses;

@@ -1,4 +1,4 @@
-// Writes the documentation page or the configuration template of a controller library, and tells
+// Writes the documentation page or the configuration template of a controller library, or checks
 // whether a list file can be loaded.
 #include <cstring>
 #include <iostream>
@@ -8,7 +8,7 @@
 
 namespace {
 
-// Loads a list file with empty stores: what cannot be loaded is said, one line each.
+// Loads a list file with empty stores. Prints one line for each error.
 int list(const char* file) {
   ctrl_more::Logger quiet;
   ctrl_more::RobotStates robot(&quiet);

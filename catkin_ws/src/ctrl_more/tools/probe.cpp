@@ -1,5 +1,5 @@
-// Tries a library of controllers in a process that may die of it. PluginLibrary runs this program
-// before it opens the library itself.
+// Tries a library of controllers in a separate process, which the library may crash. PluginLibrary
+// runs this program before it opens the library.
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -27,7 +27,7 @@ void report(const std::string& text) {
   _exit(1);
 }
 
-// What is thrown here is refused by the program that makes the controller, in words.
+// Exceptions are ignored here. The program that makes the controller reports them.
 void make(const std::string& type) {
   report("while controller '" + type + "' was made and described");
   try {

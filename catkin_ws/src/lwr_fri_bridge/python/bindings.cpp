@@ -33,8 +33,7 @@ void fromList(const py::dict& fields, const char* name, T (&values)[N]) {
   std::copy(list.begin(), list.end(), values);
 }
 
-/// One visitor for both directions and both datagrams, so that dict and struct cannot disagree on a
-/// name.
+/// One visitor for both directions and both datagrams, so that dict and struct have the same names.
 template <typename Visitor>
 void visitCommon(fri::Header& header, fri::UserData& krl, Visitor&& visit) {
   visit("counter", header.counter);
@@ -109,7 +108,7 @@ struct FromDict {
   const py::dict& fields;
   template <typename T>
   void operator()(const char* name, T& value) const {
-    if (!fields.contains(name)) return;  // what is left out stays zero
+    if (!fields.contains(name)) return;  // omitted fields stay zero
     if constexpr (std::is_array_v<T>) {
       fromList(fields, name, value);
     } else {

@@ -8,8 +8,8 @@
 
 namespace ctrl_more {
 
-/// Lets the centre of mass yield to pushes like a mass on a damper and a spring. See
-/// the page beside this file.
+/// Lets the centre of mass yield to pushes like a mass with damper and spring. See the page beside
+/// this file.
 class CompliantStabiliser : public FeedbackController {
  public:
   Description describe() const override;
@@ -129,8 +129,8 @@ void CompliantStabiliser::initialize(Setup& setup) {
 void CompliantStabiliser::update(const Cycle& cycle, const RobotStates& robot,
                                  const ControlStates& original, ModifiedControlStates& modified) {
   if (from_zmp_) {
-    // Where the robot has yielded to, its ZMP follows. Without the offset here each metre yielded
-    // would count as a push of m g / h more, and a heavy robot would never come back.
+    // The ZMP follows the offset. If the offset were not subtracted, each metre of it would count
+    // as an additional push of m g / h, and a heavy robot would never return.
     const Eigen::Vector2d distance =
         (robot.view(zmp_) - original.view(zmp_reference_)).head<2>() - offset_;
     const double share = -std::expm1(-cycle.dt / scalar(force_filter_));
@@ -148,7 +148,7 @@ void CompliantStabiliser::update(const Cycle& cycle, const RobotStates& robot,
                       force_estimate_[i], i, limit);
       }
       offset_[i] = std::copysign(limit, offset_[i]);
-      // By sign, since the bound may be 0.
+      // Compares signs, because the limit may be 0.
       if (std::signbit(offset_[i]) == std::signbit(velocity_[i])) velocity_[i] = 0.0;
     }
   }

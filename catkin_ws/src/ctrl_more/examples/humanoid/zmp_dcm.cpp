@@ -7,8 +7,8 @@
 
 namespace ctrl_more {
 
-/// Stabilises the divergent component of motion by the ZMP, or the ZMP by the centre of mass. See
-/// the page beside this file.
+/// Stabilises the divergent component of motion with the ZMP, or the ZMP with the centre of mass.
+/// See the page beside this file.
 class ZmpDcm : public FeedbackController {
  public:
   Description describe() const override;
@@ -40,9 +40,9 @@ class ZmpDcm : public FeedbackController {
   Reference<3> com_velocity_reference_;
   Modify<3> zmp_out_, com_out_;
   Gain k_, support_, kc_, ki_, max_offset_, zmp_filter_;
-  Eigen::Vector2d offset_ = Eigen::Vector2d::Zero();  // of the centre of mass, zmp_ip mode [m]
-  Eigen::Vector2d shift_ = Eigen::Vector2d::Zero();   // of the ZMP reference [m]
-  Eigen::Vector2d apart_ = Eigen::Vector2d::Zero();   // measured ZMP from its reference [m]
+  Eigen::Vector2d offset_ = Eigen::Vector2d::Zero();  // centre of mass, zmp_ip mode [m]
+  Eigen::Vector2d shift_ = Eigen::Vector2d::Zero();   // shift of the ZMP reference [m]
+  Eigen::Vector2d apart_ = Eigen::Vector2d::Zero();   // filtered measured ZMP minus reference [m]
   LogThrottle said_{1'000'000'000};
 };
 

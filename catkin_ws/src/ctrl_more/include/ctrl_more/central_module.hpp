@@ -15,10 +15,10 @@
 
 namespace ctrl_more {
 
-/// The managers of a robot in the order the user chose, over one pair of shared states
-/// (Ctrl-MORE paper, section VI).
+/// Runs the managers of a robot in the order that the user chose. All managers share one
+/// RobotStates and one ControlStates (Ctrl-MORE paper, section VI).
 ///
-/// Its file lists the managers and says for each what it is and which members it has:
+/// Its file lists the managers, and for each its type and parameters:
 ///
 ///     managers: [locomotion, feedback]
 ///     joints: 7                 # of the control states
@@ -26,8 +26,7 @@ namespace ctrl_more {
 ///     locomotion: {type: MyLocomotion, step_length: 0.2}
 ///     feedback: {type: Feedback, listFile: feedback.yaml}
 ///
-/// All managers are updated at once: in each stage every manager in turn, the first stage of all
-/// before the second stage of any.
+/// Each stage runs in all managers, in order, before the next stage begins.
 class CentralModule {
  public:
   /// Makes a manager from its block of the file. May throw ConfigError.
@@ -35,26 +34,26 @@ class CentralModule {
       const std::string& name, const ConfigNode& block, RobotStates& robot, ControlStates& control,
       Logger* logger)>;
 
-  /// Makes a type of manager known to all central modules of the program. `Feedback` is known
+  /// Registers a type of manager for all central modules of the program. `Feedback` is registered
   /// from the start.
-  /// @param type name for the file
-  /// @param maker makes one
-  /// @return false if the type is known already
+  /// @param type name in the file
+  /// @param maker makes a manager of this type
+  /// @return false if the type is already registered
   static bool registerManager(const std::string& type, ManagerMaker maker);
 
   /// Builds all managers of a file.
   /// @param file path
   /// @param logger null: Logger::standard()
-  /// @throws ConfigError naming file, line and field; controllers of a feedback manager that
-  ///         could not be loaded are reported on the logger and in loadErrors() instead
+  /// @throws ConfigError with file, line and field. A feedback controller that cannot be loaded
+  ///         does not throw: the logger and loadErrors() report it
   explicit CentralModule(const std::string& file, Logger* logger = nullptr);
 
   /// As above, from a parsed file or text.
   CentralModule(const ConfigNode& config, const std::string& base, Logger* logger = nullptr);
 
-  /// The shared robot states: the user fills them before update().
+  /// The shared robot states. The user fills them before update().
   RobotStates& robotStates() { return *robot_; }
-  /// The shared control states: the user reads them after update().
+  /// The shared control states. The user reads them after update().
   ControlStates& controlStates() { return *control_; }
   /// The feedback manager; throws std::logic_error if the file lists none.
   FeedbackControllersManager& feedbackControllers();
@@ -62,20 +61,20 @@ class CentralModule {
   Manager& manager(const std::string& name);
   /// Names of the managers in their order.
   std::vector<std::string> managers() const;
-  /// What could not be loaded, one sentence each.
+  /// Errors of loading, one sentence each.
   const std::vector<std::string>& loadErrors() const { return load_errors_; }
 
   /// One cycle of all managers. No allocation, no lock.
   /// @param cycle time
   void update(const Cycle& cycle) noexcept;
 
-  /// One cycle for users without a clock: now is the newest stamp of the robot states.
+  /// One cycle for users without a clock. The time is the newest stamp of the robot states.
   void update() noexcept;
 
-  /// The paper's form: the user's own states go in, and the modified references come out.
-  /// Outside the real-time path: keys that the shared states lack are added.
+  /// update() as in the paper, with the user's own states. Not real-time safe: it adds keys that
+  /// the shared states lack.
   /// @param robot all of its signals are copied into the shared robot states
-  /// @param control its references go in, the modified ones come out
+  /// @param control input: references; output: modified references
   /// @return failure if a signal does not fit the shared states
   Status update(const RobotStates& robot, ControlStates* control);
 

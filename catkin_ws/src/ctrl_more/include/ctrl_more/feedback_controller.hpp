@@ -1,7 +1,7 @@
 #pragma once
 
 /// @file
-/// For the author of a controller: the base class and its registration.
+/// Base class of feedback controllers, and their registration.
 
 #include <atomic>
 #include <map>
@@ -26,7 +26,7 @@
 
 namespace ctrl_more {
 
-/// What Table I's control methods of a controller need from whoever manages it.
+/// Interface of the manager to its controllers. The control methods of Table I use it.
 class ControllerOwner {
  public:
   virtual ~ControllerOwner() = default;
@@ -40,16 +40,16 @@ class ControllerOwner {
   virtual GainValues getGains(const std::string& name) const = 0;
 };
 
-/// A feedback controller: reads the robot's state and modifies references in the control cycle.
+/// Base class of a feedback controller, which reads robot states and modifies references.
 ///
-/// A developer writes a class with describe(), initialize() and update(), the other methods of the
-/// first group only where they are needed, registers it with CTRL_MORE_REGISTER_CONTROLLER (or with
-/// the paper's own maker, see FeedbackControllerPrototypes), and compiles it into a library of its
-/// own. Everything of Table I of the Ctrl-MORE paper is here; what only documents or administrates
-/// is implemented once, from the description.
+/// A developer overrides describe(), initialize() and update(). The other methods of the first
+/// group are optional. CTRL_MORE_REGISTER_CONTROLLER (or the paper's own maker, see
+/// FeedbackControllerPrototypes) registers the class, which is compiled into a separate library.
+/// The class has all methods of Table I of the Ctrl-MORE paper. Its documentation and control
+/// methods are already implemented; they use the description.
 ///
 /// Threads: update(), state(), reset() and gainsChanged() run in the control cycle: no allocation,
-/// no lock, no system call. Everything else runs outside of it.
+/// no lock, no system call. All other methods run outside the cycle.
 class FeedbackController {
  public:
   FeedbackController() = default;
@@ -57,53 +57,53 @@ class FeedbackController {
   FeedbackController& operator=(const FeedbackController&) = delete;
   virtual ~FeedbackController() = default;
 
-  /// @name What the developer writes
+  /// @name Methods that the developer overrides
   /// @{
 
-  /// The one declaration of the controller; see Description. Must not depend on the instance.
+  /// Declaration of the controller, see Description. It must not depend on the instance.
   virtual Description describe() const = 0;
 
-  /// Fetches handles and configuration; called once, outside the cycle. May allocate and throw:
-  /// an exception refuses the controller with its text.
-  /// @param setup gives handles for what describe() declares
+  /// Fetches handles and configuration. Called once, outside the cycle. May allocate and throw. If
+  /// it throws, the controller is refused with the text of the exception.
+  /// @param setup returns handles of the signals and gains that describe() declares
   virtual void initialize(Setup& setup) = 0;
 
-  /// Runs the controller once. May throw or call fail(): its writes are then
-  /// undone, its last correction is let go by policy, and it is paused with the reason.
+  /// Runs the controller once. May throw or call fail(). The manager then undoes its writes,
+  /// releases its last correction by its policy, and pauses it with the reason.
   /// @param cycle time
   /// @param robot robot states of this cycle
   /// @param original references at the start of the stage, before any feedback controller
-  /// @param modified references as the controllers before this one left them
+  /// @param modified references after the controllers before this one
   virtual void update(const Cycle& cycle, const RobotStates& robot, const ControlStates& original,
                       ModifiedControlStates& modified) = 0;
 
-  /// Forgets internal state (integrators, filters, previous values). Called in the cycle before
-  /// the first update() after enabling, after a fault, and at a switch of motion if the
-  /// description says so.
+  /// Clears internal state (integrators, filters, previous values). Called in the cycle before the
+  /// first update() after enabling or a fault, and, with SwitchPolicy::Reset, when the motion
+  /// controller changes.
   virtual void reset() {}
 
   /// Called in the cycle after gain values changed, before the next update().
   virtual void gainsChanged() {}
 
-  /// Judges gains together (each alone is judged by its range), outside the cycle, before they are
-  /// accepted.
-  /// @return "" if they fit, else one sentence
+  /// Checks a combination of gains before it is accepted, outside the cycle. The range of each
+  /// single gain is already checked.
+  /// @return "" if the gains are valid, else one sentence
   virtual std::string judgeGains(const GainValues& gains) const {
     static_cast<void>(gains);
     return "";
   }
 
   /// Writes the numbers that the description declares with Description::state(), in that order.
-  /// Called in the cycle after each update(), if any is declared; the manager shows them.
-  /// @param values as many as are declared
+  /// Called in the cycle after each update(), if any is declared. CycleRecord contains them.
+  /// @param values one element per declared state
   virtual void state(Numbers<> values) const { static_cast<void>(values); }
   /// @}
 
   /// @name Documentation methods (Table I)
   /// @{
 
-  /// Sets the name of the instance; refused once a manager has it, because names come from the
-  /// list file then.
+  /// Sets the name of the instance. Refused if a manager has loaded the controller: the name then
+  /// comes from the list file.
   Status setName(const std::string& name);
   /// Name of the instance, not of the class.
   const std::string& getName() const { return name_; }
@@ -116,13 +116,13 @@ class FeedbackController {
   /// Declares a measured robot signal (or `estimatedData/key`) in addition to describe().
   /// Only before initialize().
   Status addUsedRobotState(const std::string& name);
-  /// True if the robot signal is declared; by key, or by `measuredData/key`.
+  /// True if the robot signal is declared. `name` is `key` or `measuredData/key`.
   bool isUsingRobotState(const std::string& name) const;
-  /// True if the control signal is declared; by key, or by `container/key`.
+  /// True if the control signal is declared. `name` is `key` or `container/key`.
   bool isUsingControlState(const std::string& name) const;
   /// Declared control signals with key, size, unit and access.
   std::vector<ResolvedControlUse> getUsedControlState() const;
-  /// The same under the plural name.
+  /// Same as getUsedControlState().
   std::vector<ResolvedControlUse> getUsedControlStates() const { return getUsedControlState(); }
   /// Declared robot signals with key, size, unit and age.
   std::vector<ResolvedRobotUse> getUsedRobotStates() const;
@@ -130,18 +130,18 @@ class FeedbackController {
   std::map<std::string, std::vector<double>> getGains() const;
   /// The developer's additional information.
   std::string getInformation() const { return describe().information; }
-  /// describe() together with what addUsed...State() declared.
+  /// describe() plus the signals that addUsed...State() declared.
   Description declaration() const;
   /// @}
 
   /// @name Control methods (Table I), outside the cycle
-  /// With a manager they do what the manager's methods of the same name do; without one they act
-  /// on the instance.
+  /// With a manager they call the manager's methods of the same name. Without one they act on the
+  /// instance.
   /// @{
   Status enable();         ///< starts contributing
-  Status disable();        ///< stops contributing; identity on the control states
-  Status pause();          ///< stops running; the last correction follows its policy
-  Status resume();         ///< withdraws the pause of the user
+  Status disable();        ///< stops contributing; the control states pass unchanged
+  Status pause();          ///< stops running; the policy decides about the last correction
+  Status resume();         ///< ends the pause with the reason "user"
   bool isEnabled() const;  ///< true if enabled
   bool isPaused() const;   ///< true if paused for any reason
   /// Reads gains from a file; all or nothing. Errors name file, line and field.
@@ -151,14 +151,14 @@ class FeedbackController {
   /// @}
 
  protected:
-  /// Present value of a gain, in the cycle.
+  /// Current value of a gain, in the cycle.
   Eigen::Map<const Eigen::VectorXd> gain(Gain handle) const { return gains_[handle]; }
-  /// Present value of a scalar gain, in the cycle.
+  /// Current value of a scalar gain, in the cycle.
   double scalar(Gain handle) const { return gains_.scalar(handle); }
   /// Reports a fault from update() without the cost of an exception.
-  /// @param reason literal text; must stay valid
+  /// @param reason string literal; must stay valid
   void fail(const char* reason) { failure_ = reason; }
-  /// Log source of this controller: records carry its name and the cycle.
+  /// Log source of this controller. Its records contain the controller's name and the cycle.
   const LogSource& log() const { return log_; }
 
  private:
@@ -170,7 +170,7 @@ class FeedbackController {
   std::string name_;
   GainValues gains_;
   LogSource log_;
-  std::atomic<ControllerOwner*> owner_{nullptr};  // questions may come while it is (un)loaded
+  std::atomic<ControllerOwner*> owner_{nullptr};  // other threads may query during loading
   bool alone_enabled_ = false;
   bool alone_paused_ = false;
   bool initialized_ = false;
@@ -180,20 +180,20 @@ class FeedbackController {
   std::vector<ResolvedControlUse> control_uses_;
 };
 
-/// The numbers of the file that is being compiled, for libraries of feedback controllers. The first
-/// one is raised when classes or meanings change. Static, so that a library keeps its own.
+/// ABI of the file that is being compiled, for libraries of feedback controllers. Increase the
+/// interface number when classes or meanings change. Static, so that each library has its own copy.
 static inline constexpr Abi thisAbi() {
   return abiOf<FeedbackController, RobotStates, ControlStates, ModifiedControlStates, Description,
                RobotSignalUse, ControlSignalUse, GainSpec, SettingSpec, StateSpec, Setup, Numbers<>,
                Cycle>(5);
 }
 
-/// Makes one controller; the caller owns it. The paper's type for its prototypes.
+/// Makes a controller, which the caller owns. The paper's type for its prototypes.
 using FeedbackControllerMaker = FeedbackController* (*)();
 
-/// The shared map of controller types (Ctrl-MORE paper, section V-B): every plug-in library puts
-/// its makers in when it is loaded. Unlike a plain map it remembers refused insertions, so that a
-/// library which registers a known name is told so.
+/// The shared map of controller types (Ctrl-MORE paper, section V-B). Every plug-in library inserts
+/// its makers when it is loaded. The map also stores refused insertions, so that the loader can
+/// report a library that registers a known name.
 class FeedbackControllerPrototypes : public PluginTypesOf<FeedbackControllerMaker> {
  public:
   /// No types.
@@ -202,29 +202,28 @@ class FeedbackControllerPrototypes : public PluginTypesOf<FeedbackControllerMake
   /// Registers a maker under a type name, as the paper's listing does:
   /// `feedbackControllerPrototypes.insert({"MyController", feedbackExampleMaker});`
   /// @param entry type name and maker
-  /// @param abi what the caller was compiled with; leave it out
-  /// @return false, and a note for the loader, if the name is known already or the ABI is another
-  ///         one
+  /// @param abi ABI of the caller; use the default
+  /// @return false if the name is already registered or the ABI differs; the loader then reports it
   bool insert(const std::pair<const std::string, FeedbackControllerMaker>& entry,
               const Abi& abi = thisAbi());
 };
 
-/// The map itself, one per process. A function, so that it exists before any library's static
-/// objects run.
+/// The map, one per process. A function, so that the map exists before the static objects of any
+/// library.
 FeedbackControllerPrototypes& prototypes();
 
-/// The same under the name that the paper's listing uses.
+/// The map under the name in the paper's listing.
 [[maybe_unused]] static FeedbackControllerPrototypes& feedbackControllerPrototypes = prototypes();
 
-/// Registers for as long as the library is loaded. Used by the macro below.
+/// Registers a type while the library is loaded. Used by the macro below.
 class PrototypeRegistration {
  public:
-  /// Inserts.
+  /// Inserts the type.
   PrototypeRegistration(const char* type, FeedbackControllerMaker maker, const Abi& abi = thisAbi())
       : type_(type), maker_(maker) {
     prototypes().insert({type_, maker_}, abi);
   }
-  /// Erases.
+  /// Erases the type.
   ~PrototypeRegistration() { prototypes().erase(type_, maker_); }
   PrototypeRegistration(const PrototypeRegistration&) = delete;
   PrototypeRegistration& operator=(const PrototypeRegistration&) = delete;
@@ -237,8 +236,8 @@ class PrototypeRegistration {
 }  // namespace ctrl_more
 
 /// Registers a controller class from its source file:
-/// `CTRL_MORE_REGISTER_CONTROLLER(my_lab::WristDamper, "WristDamper")`. The name must be the one
-/// in describe().type. Use it once per library, outside of any namespace.
+/// `CTRL_MORE_REGISTER_CONTROLLER(my_lab::WristDamper, "WristDamper")`. The name must equal
+/// describe().type. Use it once per library, outside of any namespace.
 #define CTRL_MORE_REGISTER_CONTROLLER(Class, type)                                       \
   namespace {                                                                            \
   ::ctrl_more::FeedbackController* ctrlMoreMaker() { return new Class(); }               \

@@ -17,7 +17,7 @@ constexpr std::size_t kMaxBytes = 1 << 20;
 constexpr int kMaxDepth = 32;
 constexpr int kMaxNodes = 20000;
 
-// Printable and short, for messages about untrusted text.
+// Makes untrusted text printable and short, for messages.
 std::string shown(const std::string& text) {
   std::string result;
   for (const char c : text.substr(0, 60)) {
@@ -28,7 +28,7 @@ std::string shown(const std::string& text) {
 
 }  // namespace
 
-/// Turns yaml-cpp's nodes into ours, within the bounds.
+/// Converts nodes of yaml-cpp to ConfigNode and checks the limits.
 class ConfigReader {
  public:
   explicit ConfigReader(std::string file) : file_(std::move(file)) {}

@@ -10,7 +10,7 @@
 namespace ctrl_more {
 namespace {
 
-// "" if every number is finite and in the range of its declaration, else one sentence.
+// "" if every number is finite and in its declared range, else one sentence.
 template <typename Spec>
 std::string outOfRange(const std::string& what, const Spec& spec,
                        const std::vector<double>& values) {

@@ -14,7 +14,8 @@ std::string listOf(const std::vector<int>& sizes) {
   return text;
 }
 
-// The size a signal gets: asked for, else the one it has, else the only one declared.
+// Decides the size of a signal: the requested one, else the existing one, else the only declared
+// one.
 int decideSize(const std::string& what, const std::vector<int>& allowed, int asked, int existing) {
   const auto isAllowed = [&](int size) {
     return allowed.empty() || std::find(allowed.begin(), allowed.end(), size) != allowed.end();
@@ -62,7 +63,7 @@ std::string Setup::keyOf(const std::string& role, const std::string& key_setting
   return key_setting.empty() ? role : settings_.text(key_setting);
 }
 
-// Finds the size of a signal, declares it, and fetches its handle.
+// Decides the size of a signal, declares the signal and fetches its handle.
 template <typename Entry, typename Store, typename Group>
 void Setup::resolveIn(Store& store, Group group, Entry& entry, const std::vector<int>& allowed,
                       int size) {

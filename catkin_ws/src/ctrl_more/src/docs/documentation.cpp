@@ -13,7 +13,7 @@ std::string numberText(double value) {
   return out.str();
 }
 
-// As few digits as give back the same number.
+// The shortest text that converts back to the same number.
 std::string exactText(double value) {
   char text[32];
   const auto end = std::to_chars(text, text + sizeof text, value);

@@ -28,7 +28,7 @@ ControllerInstance makeController(const std::string& library_path, const std::st
   }
   const FeedbackControllerMaker maker = prototypes().find(wanted);
   if (!maker) throw std::runtime_error("controller type '" + wanted + "' was unloaded meanwhile");
-  // What the library throws lives in it, and may not leave this function.
+  // An exception of the library must not leave this function, because its code is in the library.
   std::string described;
   const std::string threw = "the controller of type '" + wanted + "' threw while it was made: ";
   try {

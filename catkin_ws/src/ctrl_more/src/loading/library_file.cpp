@@ -29,13 +29,13 @@ using std::chrono::steady_clock;
 namespace ctrl_more {
 namespace {
 
-constexpr std::chrono::seconds kProbeTime{5};  // the longest that opening and describing may take
+constexpr std::chrono::seconds kProbeTime{5};  // longest time for opening and describing
 
 [[noreturn]] void refuse(const std::string& file, const std::string& clause) {
   throw std::runtime_error("library " + file + " " + clause);
 }
 
-/// The program ctrl_more_probe while it runs.
+/// A running process of the program ctrl_more_probe.
 class Probe {
  public:
   explicit Probe(const std::string& library) {
@@ -50,7 +50,7 @@ class Probe {
                              "started: " + std::strerror(error) + "; build ctrl_more again");
   }
   ~Probe() {
-    kill(-pid_, SIGKILL);  // with all that the library may have started
+    kill(-pid_, SIGKILL);  // including all processes that the library started
     while (waitpid(pid_, nullptr, 0) < 0 && errno == EINTR) {
     }
     close(report_);
@@ -58,7 +58,7 @@ class Probe {
   Probe(const Probe&) = delete;
   Probe& operator=(const Probe&) = delete;
 
-  /// The last line it reports before its end or the deadline.
+  /// Last line of its report, at its end or at the deadline.
   std::string lastLine(steady_clock::time_point deadline) const {
     std::string text;
     const std::string end = std::string(kProbeDone) + "\n";
@@ -78,7 +78,7 @@ class Probe {
     return text.substr(text.rfind('\n') + 1);
   }
 
-  /// How it ended, as a clause; waits until the deadline.
+  /// Waits for its end, at most until the deadline. Returns how it ended, for an error message.
   std::string end(steady_clock::time_point deadline) const {
     siginfo_t info{};
     while (waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 &&
@@ -151,7 +151,7 @@ void LibraryCopy::check() const {
   probe();
 }
 
-// The linker maps what the headers announce. Beyond the end of the file that is deadly.
+// The linker maps the sizes in the headers. Access beyond the end of the file ends the process.
 void LibraryCopy::checkLength() const {
   std::ifstream in(path_, std::ios::binary);
   ElfW(Ehdr) header{};

@@ -6,39 +6,39 @@
 
 namespace ctrl_more {
 
-// What ctrl_more_probe writes, line by line: each step before it is taken, at last kProbeDone, or
-// kProbeError and what is wrong.
-inline constexpr int kProbeReport = 3;  ///< file descriptor it writes to
+// Report of ctrl_more_probe, line by line: each step before it begins, then kProbeDone, or
+// kProbeError with the error.
+inline constexpr int kProbeReport = 3;  ///< file descriptor of the report
 inline constexpr const char* kProbeDone = "done";
 inline constexpr const char* kProbeError = "error: ";
 
-/// dlopen() as it is: what constructors of static objects throw passes through it. Its declaration
-/// denies that, and the compiler would leave out the handlers.
+/// Calls dlopen() through a pointer. Constructors of static objects can throw through dlopen(), but
+/// its declaration excludes that, so the compiler would omit the exception handlers.
 inline void* openLibrary(const char* file) {
   void* (*const volatile open)(const char*, int) = dlopen;
-  // All functions are resolved at once: a missing one would end the process when it is called.
+  // Resolves all functions now, because a call of a missing one would end the process.
   return open(file, RTLD_NOW | RTLD_LOCAL);
 }
 
-/// A private copy of a library's file, for as long as it takes to open it. Later changes of the
-/// user's file, such as a rebuild that overwrites it, do not reach the running program.
+/// A private copy of a library's file, which exists while the library is opened. Later changes of
+/// the user's file, such as a rebuild, then do not affect the running program.
 class LibraryCopy {
  public:
-  /// Copies the file into a hidden file of the same folder, where `$ORIGIN` means the same. Where
+  /// Copies the file into a hidden file of the same folder, so that `$ORIGIN` stays the same. If
   /// that is not possible, path() is the file itself.
   explicit LibraryCopy(const std::string& file);
-  /// Removes the copy. What is mapped of it stays.
+  /// Removes the copy. Its mapped parts stay in memory.
   ~LibraryCopy();
   LibraryCopy(const LibraryCopy&) = delete;
   LibraryCopy& operator=(const LibraryCopy&) = delete;
 
-  /// What to open.
+  /// Path of the file to open.
   const std::string& path() const { return path_; }
 
-  /// Refuses a library that could end or block the program which opens it. The file has to be as
-  /// long as its headers claim. Then the program `ctrl_more_probe` opens and closes it, makes each
-  /// feedback controller of it and asks for its description.
-  /// @throws std::runtime_error what is wrong with the library
+  /// Refuses a library that could end or block the program. The file must have the length in its
+  /// headers. Then the program `ctrl_more_probe` opens it, makes each of its feedback controllers,
+  /// calls describe() and closes it.
+  /// @throws std::runtime_error with the error of the library
   void check() const;
 
  private:

@@ -51,7 +51,7 @@ std::recursive_mutex& loaderMutex() {
   return mutex;
 }
 
-// What tells a file from a later build under the same name.
+// Identifies a build of a file: device, inode, size and time of change.
 using Build = std::tuple<dev_t, ino_t, off_t, std::int64_t>;
 
 Build buildOf(const std::string& file) {
@@ -61,8 +61,8 @@ Build buildOf(const std::string& file) {
           info.st_mtim.tv_sec * 1'000'000'000LL + info.st_mtim.tv_nsec};
 }
 
-// The linker keeps its lock when an exception leaves it: from then on it blocks all other threads.
-// That a library was tried in another process before makes this very unlikely.
+// If an exception leaves the linker, it keeps its lock and blocks all other threads. This is very
+// unlikely, because each library is first tried in another process.
 bool linker_locked = false;  // under the loader's mutex
 const char* const kLinkerLocked =
     "No library can be opened or closed any more; start the program again";
@@ -75,9 +75,9 @@ bool isMapped(const std::string& file) {
 
 }  // namespace
 
-// A library that is in memory. The dynamic linker may keep one there after it was closed (unique
-// symbols, thread-local objects, -z nodelete): its static objects do not run again, so what it
-// registered once is remembered here.
+// A library in memory. The dynamic linker may keep it there after it was closed (unique symbols,
+// thread-local objects, -z nodelete). Its static objects then do not run again, so its registered
+// types are stored here.
 struct PluginLibrary::InMemory {
   std::weak_ptr<PluginLibrary> open;
   Build build;
@@ -142,7 +142,7 @@ void PluginLibrary::mapCopy(InMemory& memory, const std::string& copy) {
   expectTypes(refused);
 }
 
-// What static objects cannot do twice is done here: they do not register again.
+// Registers the types again, because static objects run only once.
 void PluginLibrary::mapAgain(const InMemory& memory) {
   if (!(memory.build == buildOf(path_))) {
     throw std::runtime_error(
@@ -183,8 +183,8 @@ void PluginLibrary::map(const std::string& file) {
 PluginLibrary::~PluginLibrary() {
   const std::lock_guard<std::recursive_mutex> lock(loaderMutex());
   if (!handle_ || linker_locked) return;
-  // Makers written as in the paper do not take themselves out, nor do those of a library that
-  // stays in memory.
+  // Makers written as in the paper do not unregister, nor do those of a library that stays in
+  // memory.
   list_.setAside(types_);
   dlclose(handle_);
   if (isMapped(mapped_)) return;

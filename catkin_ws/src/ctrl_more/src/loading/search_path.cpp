@@ -55,7 +55,7 @@ std::vector<std::string> SearchPath::candidates(const std::string& name) const {
     }
     return list;
   }
-  // Never relative to where the program happens to run.
+  // Never relative to the current folder.
   if (!base_.empty()) list.push_back((fs::path(base_) / name).string());
   for (const std::string& folder : extra_) {
     list.push_back((fs::path(base_) / folder / name).string());

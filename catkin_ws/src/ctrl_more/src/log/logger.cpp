@@ -74,8 +74,8 @@ void FileLogSink::write(const LogRecord& record) {
 
 void StreamLogSink::write(const LogRecord& record) { out_ << record.toLine() << '\n'; }
 
-// Bounded queue for many producers: each cell carries the position it is ready for, so that a
-// producer claims a position and a consumer knows when the record in it is complete.
+// Bounded queue for many producers. `turn` of a cell is the position for which the cell is ready.
+// It shows a producer that the cell is free, and the consumer that its record is complete.
 struct Logger::Ring {
   struct Cell {
     std::atomic<std::uint64_t> turn{0};

@@ -40,7 +40,7 @@ Status copySignals(const RobotStates& from, RobotStates& to) {
   return {};
 }
 
-// Copies what both have; adds what `to` lacks if it still can.
+// Copies all signals of `from`. Adds missing keys to `to`; fails if `to` is frozen.
 Status copySignals(const ControlStates& from, ControlStates& to) {
   for (int i = 0; i < kControlContainers; ++i) {
     const auto container = static_cast<ControlContainer>(i);

@@ -15,7 +15,7 @@ namespace {
 using Kind = Change::Kind;
 using Who = Change::Who;
 
-// What a controller has against gains; what it throws counts.
+// The controller's objection to gains, or the exception of judgeGains(); empty if there is none.
 std::string complaintOf(const FeedbackController& controller, const GainValues& gains) {
   try {
     return controller.judgeGains(gains);
@@ -26,7 +26,7 @@ std::string complaintOf(const FeedbackController& controller, const GainValues& 
   }
 }
 
-// The signals of a controller that match a key or map/key, each as map/key.
+// Signals of a controller that match `key` or `map/key`, as `map/key`.
 std::vector<std::string> matching(const Slot& slot, Who who, const std::string& signal) {
   std::vector<std::string> found;
   const auto search = [&](const auto& uses) {
@@ -184,7 +184,7 @@ Status PendingChange::step(const Change::Step& step) {
   return {};
 }
 
-// What was left as it was.
+// Lists the controllers that were skipped or are still paused.
 std::string PendingChange::note(const Change& change) const {
   std::string text;
   if (!spared_.empty()) {
@@ -298,7 +298,7 @@ Status PendingChange::profile(const std::string& name) {
   return {};
 }
 
-// Values are checked against the declaration of the controller, one by one and together.
+// Checks each value against the declaration of the controller, then all gains together.
 Status PendingChange::gains(const Change::Step& step) {
   const int i = list_->indexOf(step.name);
   if (i < 0) return Status::failure(list_->unknownName(step.name), Cause::UnknownName);
@@ -322,7 +322,7 @@ Status PendingChange::gains(const Change::Step& step) {
 }
 
 Status PendingChange::checkShared() const {
-  std::map<int, std::pair<std::string, bool>> taken;  // by offset: who, and whether alone
+  std::map<int, std::pair<std::string, bool>> taken;  // offset: controller, exclusive
   for (std::size_t i = 0; i < states.size(); ++i) {
     if (!states[i].enabled) continue;
     const std::string& name = list_->controllers[i]->name;

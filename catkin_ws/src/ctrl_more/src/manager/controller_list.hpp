@@ -13,10 +13,10 @@
 
 namespace ctrl_more {
 
-/// What services have requested of one controller.
+/// Requested state of one controller.
 struct RequestedState {
   bool enabled = false;
-  std::map<std::string, PauseCause> reasons;  ///< to be paused, the latched fault not among them
+  std::map<std::string, PauseCause> reasons;  ///< pause reasons, without the latched fault
   std::uint32_t fault_clears = 0;
   std::uint32_t resets = 0;
   std::uint32_t reorders = 0;
@@ -24,7 +24,7 @@ struct RequestedState {
   std::shared_ptr<const GainValues> gains;
 };
 
-/// One loaded controller, as services see it.
+/// One loaded controller, as seen by services.
 struct LoadedController {
   std::string name;
   ControllerEntry entry;
@@ -38,31 +38,31 @@ struct LoadedController {
 
 class PendingChange;
 
-/// The loaded controllers of a manager as the services see them. Readers hold one of the two
-/// mutexes; writers hold both, `changes` first.
+/// The loaded controllers of a manager, as seen by services. Readers lock one of the two mutexes.
+/// Writers lock both, `changes` first.
 class ControllerList {
  public:
   /// Controllers by profile.
   using Profiles = std::map<std::string, std::vector<std::string>>;
 
-  /// One change at a time, for as long as it takes: controllers' own code runs under it.
+  /// Locked during a whole change. Code of controllers may run under this lock.
   std::recursive_timed_mutex changes;
-  /// For short, never while a controller's own code runs.
+  /// Locked only for a short time, never while code of a controller runs.
   mutable std::mutex mutex;
   std::vector<std::unique_ptr<LoadedController>> controllers;  ///< load order
   std::vector<std::string> order;                              ///< execution order
   Profiles profiles;
   bool refuse_shared = false;  ///< two enabled controllers may not modify one signal
 
-  /// Place of a controller in `controllers`, -1 if it is not loaded.
+  /// Index of a controller in `controllers`; -1 if it is not loaded.
   int indexOf(const std::string& name) const;
-  /// A controller; throws std::invalid_argument with the nearest known name.
+  /// A controller. An unknown name throws std::invalid_argument with the nearest known name.
   const LoadedController& at(const std::string& name) const;
   /// Names in load order.
   std::vector<std::string> names() const;
-  /// The sentence about a name that is not loaded.
+  /// Error message for a name that is not loaded.
   std::string unknownName(const std::string& name) const;
-  /// Makes a change the truth.
+  /// Accepts a change as the current state.
   void accept(PendingChange change) noexcept;
   /// Sets or replaces a profile.
   Status setProfile(const std::string& profile, const std::vector<std::string>& names);
@@ -70,12 +70,12 @@ class ControllerList {
 
 using ListLock = std::lock_guard<std::mutex>;
 
-/// Holds `changes`. False if another change has not ended within 2 s.
+/// Locks `changes`. False if another change does not end within 2 s.
 class ChangeLock : public std::unique_lock<std::recursive_timed_mutex> {
  public:
   explicit ChangeLock(ControllerList& list)
       : std::unique_lock<std::recursive_timed_mutex>(list.changes, std::chrono::seconds(2)) {}
-  /// The refusal if it is false.
+  /// The refusal if the lock is false.
   static Status busy() {
     return Status::failure(
         "another change has not ended within 2 s: the code of a controller does "
@@ -84,19 +84,18 @@ class ChangeLock : public std::unique_lock<std::recursive_timed_mutex> {
   }
 };
 
-/// A copy of all that can be changed, on which a change is tried before the cycle sees it.
+/// A copy of the changeable state. A change is tried on it before the cycle receives it.
 class PendingChange {
  public:
-  /// Everything as it is.
+  /// Copies the current state.
   explicit PendingChange(const ControllerList& list);
 
-  /// Makes all steps of a change.
-  /// @return failure, after which this is of no use, or success with a note about what was left as
-  /// it was
+  /// Applies all steps of a change.
+  /// @return failure (the copy is then invalid), or success with a note about skipped controllers
   Status make(const Change& change);
-  /// Refuses two enabled controllers that modify a signal which cannot be shared.
+  /// Refuses two enabled controllers that modify the same unshareable signal.
   Status checkShared() const;
-  /// What the cycle is to do.
+  /// The plan for the cycle.
   std::unique_ptr<Plan> plan(std::uint64_t generation) const;
 
   std::vector<RequestedState> states;  ///< in load order
@@ -113,7 +112,7 @@ class PendingChange {
   std::string note(const Change& change) const;
 
   const ControllerList* list_;
-  std::vector<std::string> spared_;  // safety controllers that were left alone
+  std::vector<std::string> spared_;  // safety controllers that were skipped
 };
 
 }  // namespace ctrl_more

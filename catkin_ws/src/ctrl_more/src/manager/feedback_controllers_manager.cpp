@@ -18,9 +18,9 @@
 
 namespace ctrl_more {
 
-/// The cycle's side of a manager: adopts plans, and runs the controllers of a stage in order.
+/// The cycle's side of a manager. It adopts plans and runs the controllers of a stage in order.
 ///
-/// begin() to end() neither allocate nor lock nor throw.
+/// begin() to end() do not allocate, lock or throw.
 class CycleSide {
  public:
   CycleSide(RobotStates& robot, ControlStates& control, const ManagerOptions& options,
@@ -31,7 +31,7 @@ class CycleSide {
         log_(logger, "FeedbackControllersManager", &number),
         original_(0, control.controlPeriod(), logger) {}
 
-  /// Fixes the layout of both stores and allocates what the cycle needs.
+  /// Fixes the layout of both stores and allocates the memory of the cycle.
   void freeze() {
     if (laid_out_ && original_.dataSize() == control_.dataSize()) return;
     robot_.freeze();
@@ -50,18 +50,18 @@ class CycleSide {
     adopt(plans.take());
   }
 
-  /// Adopts what was prepared, if anything.
+  /// Adopts the prepared plan, if any.
   void adoptPrepared() noexcept {
     const Plan* first = plans.takePrepared();
     if (!first) return;
-    // An older one may have been offered since begin(): it must not come afterwards.
+    // An older plan may have been offered since begin(). It must be adopted first.
     const Plan* second = plans.take();
     if (second && second->generation < first->generation) std::swap(first, second);
     adopt(first);
     adopt(second);
   }
 
-  /// Keeps the references as `original`, then runs the controllers of a stage in order.
+  /// Copies the references to `original`, then runs the controllers of a stage in order.
   void runStage(Stage stage, const RobotStates& robot, ControlStates& control) noexcept {
     if (!plan_ || plan_->stages[static_cast<int>(stage)].empty()) return;
     if (control.dataSize() != original_.dataSize()) {
@@ -91,15 +91,15 @@ class CycleSide {
     recorded_ = false;
   }
 
-  /// A reader (one at a time): the newest complete buffer of records.
-  /// @param cycle number of the cycle it is of
+  /// Newest complete buffer of records. One reader at a time.
+  /// @param cycle receives the number of its cycle
   unsigned acquireRecords(std::uint64_t& cycle) {
     records_.take();
     cycle = records_.front();
     return records_.frontIndex();
   }
 
-  std::atomic<std::uint64_t> number{0};  ///< of the cycle; before the plans, whose slots log it
+  std::atomic<std::uint64_t> number{0};  ///< cycle number; before the plans, whose slots log it
   PlanQueue plans;
 
  private:
@@ -114,19 +114,19 @@ class CycleSide {
   ControlStates& control_;
   const ManagerOptions options_;
   LogSource log_;
-  // Cycle number of each of the three buffers that a slot has for its records.
+  // Cycle number of each of a slot's three record buffers.
   coglab_rt::TripleBuffer<std::uint64_t> records_{0};
-  bool recorded_ = false;  // anything in this cycle
-  bool laid_out_ = false;  // freeze() was here
+  bool recorded_ = false;  // true if this cycle has records
+  bool laid_out_ = false;  // freeze() was called
   const Plan* plan_ = nullptr;
   Cycle cycle_;
   ControlStates original_;
-  std::vector<double> compared_;  // of the test mode
+  std::vector<double> compared_;  // for the test mode
 };
 
 namespace {
 
-// The names of the signals in use, without doubles.
+// Names of the used signals, without duplicates.
 template <typename Uses>
 std::vector<std::string> namesOf(const ControllerList& list, bool enabled_only, Uses uses) {
   std::set<std::string> used;
@@ -191,7 +191,7 @@ Status FeedbackControllersManager::prepare(const Change& change) {
   return this->change(change, true);
 }
 
-// Everything that can fail comes before the publication: what fails has changed nothing.
+// All steps that can fail come before the publication, so a failure has no effect.
 Status FeedbackControllersManager::change(const Change& change, bool prepared) {
   const ChangeLock lock(*list_);
   if (!lock) return ChangeLock::busy();
@@ -206,15 +206,14 @@ Status FeedbackControllersManager::change(const Change& change, bool prepared) {
   return status;
 }
 
-// Makes a change the truth, and offers it to the cycle as a plan. If memory runs out, nothing has
-// changed.
+// Accepts a change and offers it to the cycle as a plan. If memory runs out, nothing changes.
 Status FeedbackControllersManager::publish(PendingChange change, bool prepared) {
   PlanQueue& plans = cycle_->plans;
   plans.store(change.plan(plans.generation() + 1));
   return commit(std::move(change), prepared);
 }
 
-// The part of publish() that cannot fail; the plan is stored.
+// The part of publish() that cannot fail. The plan is already stored.
 Status FeedbackControllersManager::commit(PendingChange change, bool prepared) noexcept {
   {
     const ListLock lock(list_->mutex);
@@ -268,9 +267,9 @@ LoadReport FeedbackControllersManager::load(const std::string& file, bool strict
   }
 }
 
-// Puts everything that loading changes back at its end, unless it is kept. A controller that is
-// refused half-way must not leave keys behind in the stores; once they are frozen it cannot, and
-// the cycle may be using them.
+// Restores the state before loading in its destructor, unless keep() was called. A refused
+// controller must not leave keys in the stores. Frozen stores are not restored: they cannot get new
+// keys, and the cycle may be using them.
 class FeedbackControllersManager::Undo {
  public:
   explicit Undo(FeedbackControllersManager& manager)
@@ -316,7 +315,7 @@ class FeedbackControllersManager::Undo {
   bool kept_ = false;
 };
 
-// The cycle is offered the whole list at once, or nothing of it.
+// Offers the whole list to the cycle at once, or nothing of it.
 LoadReport FeedbackControllersManager::load(const ConfigNode& list, const std::string& base,
                                             bool strict) {
   LoadReport report;
@@ -341,8 +340,7 @@ LoadReport FeedbackControllersManager::load(const ConfigNode& list, const std::s
   return report;
 }
 
-// Adds the controllers of a list; the cycle does not see them yet. What cannot be loaded is
-// reported.
+// Adds the controllers of a list without publishing them to the cycle. Reports the errors.
 void FeedbackControllersManager::readList(const ListFile& list, LoadReport& report) {
   if (list.refuseShared()) list_->refuse_shared = *list.refuseShared();
   for (const ConfigNode& item : list.items()) {
@@ -370,20 +368,20 @@ Status FeedbackControllersManager::loadController(const std::string& name,
   return loadNamed(name, entry, true);
 }
 
-// Without `offer` nothing is published: the caller does, and holds the lock of changes.
+// Without `offer` the caller publishes the change and holds the lock of changes.
 Status FeedbackControllersManager::loadNamed(const std::string& name, const ControllerEntry& entry,
                                              bool offer) {
   try {
     {
       const ChangeLock lock(*list_);
       if (!lock) return ChangeLock::busy();
-      // A library that only an outdated plan holds is closed, so that a new build of it is loaded.
+      // Closes libraries that only outdated plans use, so that a new build can be loaded.
       cycle_->plans.collect();
       if (list_->indexOf(name) >= 0) {
         return Status::failure("a controller named '" + name + "' is loaded already");
       }
     }
-    // Without the lock: a library may take seconds.
+    // Without the lock: loading a library may take seconds.
     ControllerInstance instance = makeController(entry.library, entry.type);
     const ChangeLock lock(*list_);
     if (!lock) return ChangeLock::busy();
@@ -410,7 +408,7 @@ Status FeedbackControllersManager::take(ControllerInstance instance, const std::
   if (list_->indexOf(name) >= 0) {
     return Status::failure("a controller named '" + name + "' is loaded already");
   }
-  // Until the end of this function: what initialize() throws may live in the library.
+  // Kept until the end of this function: the library may contain the exception of initialize().
   const std::shared_ptr<PluginLibrary> library = instance.library;
   Undo undo(*this);
   try {
@@ -495,7 +493,7 @@ Status FeedbackControllersManager::unload(const std::string& name) {
     return status;
   } catch (...) {
     const ListLock write(list_->mutex);
-    controllers.insert(controllers.begin() + i, std::move(out));  // its room is still there
+    controllers.insert(controllers.begin() + i, std::move(out));  // needs no allocation
     list_->order.swap(order);
     throw;
   }
@@ -509,7 +507,7 @@ Status FeedbackControllersManager::setProfile(const std::string& profile,
   return list_->setProfile(profile, controllers);
 }
 
-// Questions
+// Queries
 
 CycleRecord FeedbackControllersManager::lastCycle() const {
   const ListLock lock(list_->mutex);
@@ -597,14 +595,14 @@ void FeedbackControllersManager::plot(const std::string& name, std::ostream& out
     const ListLock lock(list_->mutex);
     slot = list_->at(name).slot;
   }
-  slot->controller().plot(out);  // its own code, which asks back through ControllerOwner
+  slot->controller().plot(out);  // code of the controller; it calls ControllerOwner
 }
 
 void FeedbackControllersManager::plotAll(std::ostream& out) const {
   for (const std::string& name : getExecutionOrder()) {
     try {
       plot(name, out);
-    } catch (const std::invalid_argument&) {  // unloaded meanwhile
+    } catch (const std::invalid_argument&) {  // unloaded in the meantime
     }
   }
 }

@@ -15,11 +15,11 @@
 #include "ctrl_more/states/signal.hpp"
 #include "ctrl_more/states/so3.hpp"
 
-/// Corrections of one signal, as plain doubles of the signal's size: a vector holds the sum, a
-/// pose holds position sum and left quaternion factor, a quaternion holds the left factor.
+/// Corrections of one signal, as doubles of the signal's size. Vector: the sum. Pose: the position
+/// sum and the left quaternion factor. Quaternion: the left factor.
 namespace ctrl_more::correction {
 
-/// Norm of a correction: of the sum (of the position for poses), and angle of its rotation [rad].
+/// Norm of a correction's sum (for poses: of the position), and its rotation angle [rad].
 struct Norms {
   double size = 0.0;
   double angle = 0.0;
@@ -28,12 +28,12 @@ struct Norms {
 using Quaternion = Eigen::Map<Eigen::Quaterniond>;
 using ConstQuaternion = Eigen::Map<const Eigen::Quaterniond>;
 
-/// Doubles before the quaternion; all of them for a vector.
+/// Number of doubles before the quaternion; all doubles for a vector.
 inline int linearPart(SignalKind kind, int size) {
   return kind == SignalKind::Vector ? size : size - 4;
 }
 
-/// True if a correction changes nothing.
+/// True if a correction has no effect.
 inline bool isIdentity(SignalKind kind, int size, const double* c) {
   const int n = kind == SignalKind::Vector ? size : size - 1;
   for (int i = 0; i < n; ++i) {
@@ -48,7 +48,7 @@ inline void setIdentity(SignalKind kind, int size, double* c) {
   if (kind != SignalKind::Vector) c[size - 1] = 1.0;
 }
 
-/// The correction that leads from `before` to `after`; exactly none for equal bits.
+/// Correction from `before` to `after`; exactly the identity for equal bits.
 inline void difference(SignalKind kind, int size, const double* before, const double* after,
                        double* c) {
   const int n = linearPart(kind, size);
@@ -62,10 +62,10 @@ inline void difference(SignalKind kind, int size, const double* before, const do
       (ConstQuaternion(after + n) * ConstQuaternion(before + n).conjugate()).normalized();
 }
 
-/// `out` = `before` with a correction applied; `out` may be `before`.
+/// Sets `out` to `before` with a correction applied. `out` may be `before`.
 inline void apply(SignalKind kind, int size, const double* before, const double* c, double* out) {
   if (isIdentity(kind, size, c)) {
-    // No correction keeps every bit: signs of zeros, and quaternions that are unit only nearly.
+    // Without a correction every bit stays: signs of zeros, and quaternions that are nearly unit.
     if (out != before) std::copy(before, before + size, out);
     return;
   }
@@ -76,7 +76,7 @@ inline void apply(SignalKind kind, int size, const double* before, const double*
   Quaternion(out + n) = q.normalized();
 }
 
-/// `out` between two corrections, `share` in [0, 1] on the shorter way; may alias either.
+/// Interpolates two corrections along the shorter way, `share` in [0, 1]. `out` may alias either.
 inline void between(SignalKind kind, int size, const double* from, const double* to, double share,
                     double* out) {
   const int n = linearPart(kind, size);
@@ -97,13 +97,13 @@ inline Norms norms(SignalKind kind, int size, const double* c) {
   if (kind != SignalKind::Vector) {
     const double* q = c + n;
     const double sine = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]);
-    // Most corrections do not turn anything.
+    // Most corrections have no rotation.
     if (sine != 0.0) result.angle = 2.0 * std::atan2(sine, std::abs(q[3]));
   }
   return result;
 }
 
-/// Zero for a finite number, other bits otherwise; without a branch.
+/// Zero for a finite number, otherwise not zero. Without a branch.
 inline std::uint64_t notFinite(double value) {
   const double zero = value - value;  // +0 for every finite number, NaN for others
   std::uint64_t bits = 0;
@@ -118,15 +118,15 @@ inline bool isFinite(int size, const double* values) {
   return collected == 0;
 }
 
-/// How far the square of a quaternion's norm may be from one: 1e-6 of the norm.
+/// Tolerance of a quaternion's squared norm, for 1e-6 of the norm.
 constexpr double kUnitTolerance = 2e-6;
 
-/// Square of a quaternion's norm, less one.
+/// Squared norm of a quaternion minus one.
 inline double squareOff(const double* q) {
   return (q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]) - 1.0;
 }
 
-/// True if the quaternion in the signal, if it has one, is unit within 1e-6.
+/// True if the signal has no quaternion or its quaternion is unit within 1e-6.
 inline bool isUnit(SignalKind kind, int size, const double* values) {
   return kind == SignalKind::Vector || std::abs(squareOff(values + size - 4)) <= kUnitTolerance;
 }
@@ -135,22 +135,22 @@ inline bool isUnit(SignalKind kind, int size, const double* values) {
 
 namespace ctrl_more {
 
-/// One signal that a controller modifies, as the cycle sees it.
+/// One signal that a controller modifies, for use in the cycle.
 struct WrittenSignal {
   ControlSignal signal;
-  int offset;  ///< in the control buffer
-  int local;   ///< in buffers of the controller's own numbers
+  int offset;  ///< offset in the control buffer
+  int local;   ///< offset in buffers of the controller's numbers
   int size;
   SignalKind kind;
   CorrectionLimit limit;
   StopPolicy on_pause;
-  bool limited;  ///< any finite limit
-  bool rated;    ///< a finite rate limit
+  bool limited;  ///< has a finite limit
+  bool rated;    ///< has a finite rate limit
 };
 
-/// Judges what a controller left in the references, and undoes it.
+/// Checks the references that a controller wrote, and can restore them.
 ///
-/// note(), judge() and the restore functions are for the cycle: no allocation, no exception.
+/// The cycle calls note(), judge() and the restore functions: no allocation, no exception.
 class Guard {
  public:
   /// @param uses the resolved signals of the controller
@@ -162,37 +162,37 @@ class Guard {
   /// Doubles that the controller modifies.
   int total() const { return total_; }
 
-  /// Keeps what the controller is about to find.
+  /// Stores the references before the controller runs.
   /// @param data the control buffer
   void note(const double* data) noexcept;
-  /// What it found; places as in WrittenSignal::local.
+  /// The stored references; offsets as in WrittenSignal::local.
   const double* found() const { return found_.data(); }
-  /// What is wrong with what it left, if anything.
+  /// Checks the references after the controller ran; None if they are valid.
   /// @param data the control buffer
   /// @param dt time since the last cycle [s]
   FaultKind judge(const double* data, double dt) noexcept;
-  /// Puts back what it found.
+  /// Restores the stored references.
   void restore(double* data) const noexcept;
-  /// Test mode: puts back what it did not declare and changed all the same.
+  /// Test mode: restores numbers that the controller changed without declaring them.
   /// @param data the control buffer
-  /// @param before all of it as it was
-  /// @param size doubles in it
-  /// @return true if there was anything
+  /// @param before copy of the control buffer before the controller
+  /// @param size number of doubles in it
+  /// @return true if it restored any number
   bool restoreUndeclared(double* data, const double* before, int size) const noexcept;
-  /// The next correction follows no other: its rate is not judged.
+  /// The rate of the next correction is not checked, because it follows no other.
   void forgetRate() { last_valid_ = false; }
 
  private:
   FaultKind judgeLimits(const WrittenSignal& w, const double* data, double dt) noexcept;
 
   std::vector<WrittenSignal> written_;
-  std::vector<bool> declared_;  // doubles of the control buffer it may change
+  std::vector<bool> declared_;  // doubles of the control buffer that it may change
   int total_ = 0;
   bool last_valid_ = false;
   std::vector<double> found_;
   std::vector<double> last_;  // correction of the last run, before blending
-  std::vector<double> now_;   // room for one correction
-  std::vector<double> step_;  // room for another
+  std::vector<double> now_;   // buffer for one correction
+  std::vector<double> step_;  // buffer for another one
 };
 
 }  // namespace ctrl_more

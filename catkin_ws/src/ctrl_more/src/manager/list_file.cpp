@@ -66,7 +66,7 @@ ControllerEntry readEntry(const std::string& name, const ConfigNode& block,
   return entry;
 }
 
-// The names of a list file that are blocks of controllers.
+// Names of the blocks of controllers in a list file.
 std::vector<std::string> blocksOf(const ConfigNode& list) {
   std::vector<std::string> blocks;
   for (const auto& entry : list.entries()) {

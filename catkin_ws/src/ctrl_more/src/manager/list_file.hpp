@@ -10,28 +10,28 @@
 
 namespace ctrl_more {
 
-/// A list file of controllers (Ctrl-MORE paper, section III-A), read against what it may hold.
-/// Errors are ConfigErrors, or sentences that name the controller.
+/// Reads and checks a list file of controllers (Ctrl-MORE paper, section III-A). Errors are
+/// ConfigErrors, or sentences with the name of the controller.
 class ListFile {
  public:
   /// One listed controller.
   struct Controller {
     std::string name;         ///< its name
-    ControllerEntry entry;    ///< how it is to be loaded
-    const ConfigNode* block;  ///< where the file says so
+    ControllerEntry entry;    ///< its options
+    const ConfigNode* block;  ///< its block in the file
   };
 
-  /// @param list the tree, which must outlive this
-  /// @param base folder that relative paths refer to
+  /// @param list parsed list, which must outlive this object
+  /// @param base folder for relative paths
   ListFile(const ConfigNode& list, const std::string& base);
 
   /// The items of `loadControllers`.
   const std::vector<ConfigNode>& items() const { return items_->items(); }
-  /// What the file says of one of them; throws.
+  /// Options of one item. Throws.
   Controller read(const ConfigNode& item) const;
-  /// `sharedSignals`, if it is there: true for `refuse`.
+  /// `sharedSignals`, if the file has it: true for `refuse`.
   std::optional<bool> refuseShared() const { return refuse_shared_; }
-  /// The map of profiles, null if there is none.
+  /// The map of profiles; null if there is none.
   const ConfigNode* profiles() const { return profiles_; }
 
  private:

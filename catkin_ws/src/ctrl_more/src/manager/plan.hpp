@@ -17,54 +17,55 @@ namespace ctrl_more {
 
 class Slot;
 
-/// What one controller is to do from the cycle that adopts the plan. Counters show the slot what
-/// is new, so that a plan which replaces an unread one loses nothing.
+/// Requested state of one controller from the cycle that adopts the plan. Counters show the slot
+/// which requests are new. A plan that replaces an unread one therefore loses no request.
 struct PlanEntry {
   std::shared_ptr<Slot> slot;  ///< keeps the instance and its library alive
   bool enabled = false;
   bool paused = false;
-  std::uint32_t fault_clears = 0;  ///< faults up to here are forgiven
-  std::uint32_t resets = 0;        ///< how often reset() was requested
-  std::uint32_t reorders = 0;      ///< how often its place in the order changed
+  std::uint32_t fault_clears = 0;  ///< number of requests to clear the fault
+  std::uint32_t resets = 0;        ///< number of requests to reset()
+  std::uint32_t reorders = 0;      ///< number of changes of its place in the order
   std::uint32_t gains_revision = 0;
   std::shared_ptr<const GainValues> gains;
 };
 
-/// Everything a manager is to do, immutable; see FeedbackControllersManager.
+/// Requested state of all controllers of a manager. Immutable; see FeedbackControllersManager.
 struct Plan {
   std::uint64_t generation = 0;
-  bool timed = false;                                ///< some controller's duration is judged
-  std::vector<PlanEntry> entries;                    ///< execution order
+  bool timed = false;              ///< the duration of at least one controller is checked
+  std::vector<PlanEntry> entries;  ///< execution order
   std::array<std::vector<Slot*>, kStages> stages{};  ///< the same, per stage
 };
 
-/// Hands plans from the services to the cycle. The cycle takes the newest by one atomic exchange at
-/// its start, and acknowledges its generation. The services free what the cycle has left behind.
-/// Unlike coglab_rt::PlanExchange, offering does not wait for the cycle, a newer plan replaces one
-/// that was not taken, and a plan can be prepared for a later point of the cycle.
+/// Transfers plans from the services to the cycle. The cycle takes the newest plan by one atomic
+/// exchange at its start and acknowledges its generation. The services free plans that the cycle no
+/// longer uses. Differences to coglab_rt::PlanExchange: offering does not wait for the cycle, a
+/// newer plan replaces one that was not taken, and a plan can be prepared for a later point of the
+/// cycle.
 ///
-/// store() to collect() are for services, one at a time; take() to acknowledge() for the cycle.
+/// Services call store() to collect(), one at a time. The cycle calls take() to acknowledge().
 class PlanQueue {
  public:
   /// Number of the newest plan that was offered.
   std::uint64_t generation() const { return generation_; }
 
-  /// Keeps a plan that is to be offered next; its generation must be generation() + 1.
+  /// Stores the plan to offer next. Its generation must be generation() + 1.
   void store(std::unique_ptr<const Plan> plan) { plans_.push_back(std::move(plan)); }
 
-  /// Offers the stored plan to the cycle, in place of what the cycle has not taken.
+  /// Offers the stored plan to the cycle. It replaces a plan that the cycle has not taken.
   /// @param prepared true: the cycle takes it only by takePrepared()
   void offer(bool prepared) noexcept {
     const Plan* const plan = plans_.back().get();
     generation_ = plan->generation;
-    // A plan says everything, what was prepared before included.
+    // A plan is complete: it includes what was prepared before.
     forget(prepared_.exchange(prepared ? plan : nullptr, std::memory_order_acq_rel));
     if (!prepared) forget(offered_.exchange(plan, std::memory_order_acq_rel));
     collect();
   }
 
-  /// Takes back the newest offered plan, and keeps the stored one to be offered instead.
-  /// @return false if the cycle has taken it; the stored one is dropped then
+  /// Withdraws the newest offered plan and keeps the stored one to be offered instead.
+  /// @return false if the cycle has taken it; the stored plan is then dropped
   bool retract() noexcept {
     const Plan* const newest = plans_.size() < 2 ? nullptr : plans_[plans_.size() - 2].get();
     const auto takeBack = [newest](std::atomic<const Plan*>& place) {
@@ -89,17 +90,17 @@ class PlanQueue {
     return true;
   }
 
-  /// Frees the plans that the cycle has left behind.
+  /// Frees the plans that the cycle no longer uses.
   void collect() {
     const std::uint64_t in_use = acknowledged_.load(std::memory_order_acquire);
     while (!plans_.empty() && plans_.front()->generation < in_use) plans_.pop_front();
   }
 
-  /// The newest ordinary plan, null if there is nothing new.
+  /// The newest ordinary plan; null if there is no new one.
   const Plan* take() noexcept { return takeFrom(offered_); }
-  /// The newest prepared plan, null if there is none.
+  /// The newest prepared plan; null if there is none.
   const Plan* takePrepared() noexcept { return takeFrom(prepared_); }
-  /// The cycle uses this plan from now on.
+  /// Acknowledges that the cycle uses this plan from now on.
   void acknowledge(const Plan& plan) noexcept {
     acknowledged_.store(plan.generation, std::memory_order_release);
   }
@@ -110,7 +111,7 @@ class PlanQueue {
     return place.exchange(nullptr, std::memory_order_acq_rel);
   }
 
-  // Frees a plan that the cycle never saw, and never will.
+  // Frees a plan that the cycle never took and cannot take any more.
   void forget(const Plan* untaken) {
     if (!untaken) return;
     for (auto it = plans_.begin(); it != plans_.end(); ++it) {
@@ -121,7 +122,7 @@ class PlanQueue {
   }
 
   std::uint64_t generation_ = 0;
-  std::deque<std::unique_ptr<const Plan>> plans_;  // what the cycle has or may still have
+  std::deque<std::unique_ptr<const Plan>> plans_;  // plans that the cycle may still use
 
   // shared
   std::atomic<const Plan*> offered_{nullptr};

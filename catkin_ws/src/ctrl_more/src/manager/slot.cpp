@@ -74,7 +74,7 @@ void Slot::configure(const GainValues& gains, const SettingValues& settings, Rob
   }
   now_ = from_;
   state_.assign(description.states.size(), 0.0);
-  // Before and after are equal and unit: the correction before the first run is the identity.
+  // Before and after are equal and unit, so the correction before the first run is the identity.
   for (Record& record : records_) {
     record.before = record.after = from_;
     record.state = state_;
@@ -114,7 +114,7 @@ void Slot::adopt(const PlanEntry& entry) noexcept {
     captureCorrection();
     guard_.forgetRate();
   } else if (!running && !enabled_ && activity_ != Activity::Off && why_ != Why::Disabled) {
-    captureCorrection();  // a held correction is let go once the controller is disabled
+    captureCorrection();  // disabling releases a held correction
     why_ = Why::Disabled;
     setActivity(Activity::Stopping);
   } else if (activity_ == Activity::Waiting && !wanted_) {
@@ -184,7 +184,7 @@ void Slot::run(StageRun& run) noexcept {
   if (!wanted_) {
     runStopped(run);
   } else if (findStale(run)) {
-    // What was held during a pause or a fault is let go as well.
+    // This also releases a correction that was held during a pause or a fault.
     if (activity_ != Activity::Waiting) stop(Why::Stale);
     runStopped(run);
   } else {
@@ -193,7 +193,7 @@ void Slot::run(StageRun& run) noexcept {
   }
 }
 
-// True if an input is missing or too old; remembers which one.
+// True if an input is missing or too old. Stores its index.
 bool Slot::findStale(const StageRun& run) noexcept {
   for (std::size_t i = 0; i < needed_.size(); ++i) {
     const Needed& need = needed_[i];
@@ -209,7 +209,7 @@ void Slot::runActive(StageRun& run) noexcept {
     const FaultKind kind = callController(run);
     if (kind != FaultKind::None) return takeFault(run, kind, nullptr);
   } catch (const std::exception& e) {
-    // The text dies with the exception: it is used before that.
+    // The text must be used before the exception is destroyed.
     return takeFault(run, FaultKind::Exception, e.what());
   } catch (...) {
     return takeFault(run, FaultKind::Exception, "it threw something that is not a std::exception");
@@ -220,7 +220,7 @@ void Slot::runActive(StageRun& run) noexcept {
   commit(run);
 }
 
-// Runs the controller, which may throw, and judges what it left.
+// Runs the controller, which may throw, and checks its writes.
 FaultKind Slot::callController(StageRun& run) {
   double* const data = run.control.data();
   const int size = run.control.dataSize();
@@ -247,7 +247,7 @@ FaultKind Slot::callController(StageRun& run) {
   return FaultKind::None;
 }
 
-// Undoes what the controller wrote, and lets its last correction go.
+// Undoes the controller's writes and releases its last correction.
 void Slot::takeFault(StageRun& run, FaultKind kind, const char* text) noexcept {
   guard_.restore(run.control.data());
   if (run.compared) {
@@ -262,7 +262,7 @@ void Slot::takeFault(StageRun& run, FaultKind kind, const char* text) noexcept {
   runStopped(run);
 }
 
-// One cycle of a controller that does not run: its last correction is held, or fades.
+// One cycle of a controller that does not run. Its last correction is held or fades.
 void Slot::runStopped(StageRun& run) noexcept {
   if (activity_ == Activity::Off) return;
   advanceBlend(run.cycle.dt);
@@ -284,7 +284,7 @@ void Slot::runStopped(StageRun& run) noexcept {
   }
   commit(run);
   if (blend_ >= 1.0 && !holding && activity_ == Activity::Stopping) setActivity(Activity::Off);
-  // What this took is not the next controller's.
+  // The duration of this function must not count for the next controller.
   if (run.timed) run.boundary_ns = coglab_rt::steadyNow();
 }
 
@@ -313,7 +313,7 @@ StopPolicy Slot::policyOf(const WrittenSignal& written) const {
   return StopPolicy::Fade;
 }
 
-// Records what the controller found and what is there now.
+// Records the references before the controller and now.
 void Slot::commit(const StageRun& run) noexcept {
   Record& record = records_[run.buffer];
   last_ = run.buffer;
@@ -327,7 +327,7 @@ void Slot::commit(const StageRun& run) noexcept {
   std::copy(state_.begin(), state_.end(), record.state.begin());
 }
 
-// One reading of the clock per controller: the end of one is the beginning of the next.
+// Reads the clock once per controller: the end of one is the start of the next.
 bool Slot::isLate(StageRun& run) noexcept {
   const std::int64_t now = coglab_rt::steadyNow();
   const std::int64_t duration_ns = now - run.boundary_ns;
@@ -339,7 +339,7 @@ bool Slot::isLate(StageRun& run) noexcept {
   return false;
 }
 
-// What it wrote came too late: the correction of the cycle before is used again.
+// The update was too slow: discards its writes and repeats the correction of the previous cycle.
 void Slot::overrun(StageRun& run) noexcept {
   overruns_.fetch_add(1, std::memory_order_relaxed);
   guard_.forgetRate();

@@ -17,38 +17,38 @@
 
 namespace ctrl_more {
 
-/// What the controllers of one stage share while they run one after another.
+/// Shared data of the controllers of one stage while they run one after another.
 struct StageRun {
   const Cycle& cycle;
   const RobotStates& robot;
   const ControlStates& original;  ///< references before the stage
   ControlStates& control;
-  std::vector<double>* compared;  ///< test mode: room for all of `control`; else null
+  std::vector<double>* compared;  ///< test mode: buffer for all of `control`; else null
   bool timed;
   unsigned buffer;           ///< the cycle's buffer of records
   std::int64_t boundary_ns;  ///< steady clock between the last controller and this one
 };
 
-/// One loaded controller in the control cycle: runs it under guard, blends its corrections, and
+/// One loaded controller in the control cycle. Runs it with a guard, blends its corrections, and
 /// publishes its state for other threads.
 ///
-/// A controller runs on the references themselves. What it left is judged, then either taken back,
-/// or blended and recorded, before and after, for attribution and for the next fade.
+/// A controller writes to the references directly. Its writes are checked, then undone or blended.
+/// The references before and after it are recorded for attribution and for the next fade.
 ///
-/// configure() and the const queries are for services; adopt() and run() are for the cycle and
-/// neither allocate nor lock nor throw.
+/// Services call configure() and the const queries. The cycle calls adopt() and run(), which do not
+/// allocate, lock or throw.
 class Slot {
  public:
   /// @param instance the controller and its library
   /// @param name its name
   /// @param entry overrun, blend time and fault policy
-  /// @param options of the manager
+  /// @param options options of the manager
   /// @param owner number for permissions
   Slot(ControllerInstance instance, const std::string& name, const ControllerEntry& entry,
        const ManagerOptions& options, std::uint32_t owner);
 
-  /// Gives the controller its configuration, and finds its signals. Throws what initialize()
-  /// throws, std::invalid_argument for a description that cannot be run.
+  /// Configures the controller and finds its signals. Throws the exceptions of initialize(), and
+  /// std::invalid_argument for an invalid description.
   void configure(const GainValues& gains, const SettingValues& settings, RobotStates& robot,
                  ControlStates& control, Logger* logger, const std::atomic<std::uint64_t>* cycle);
 
@@ -64,7 +64,7 @@ class Slot {
   /// @name The cycle
   /// @{
   void adopt(const PlanEntry& entry) noexcept;
-  /// One cycle.
+  /// Runs one cycle.
   void run(StageRun& run) noexcept;
   /// @}
 
@@ -73,17 +73,17 @@ class Slot {
   Activity activity() const { return shared_activity_.load(std::memory_order_acquire); }
   FaultKind fault() const { return shared_fault_.load(std::memory_order_acquire); }
   void fillStatus(ControllerStatus& status) const;
-  /// Adds what it changed, and its state, in the newest complete cycle.
-  /// @param names for the names of signals
+  /// Adds its changes and its state in the newest complete cycle.
+  /// @param names store for the names of signals
   /// @param buffer the reader's buffer of records
-  /// @param record of the cycle with its number; what is of another one is left out
+  /// @param record record with its cycle number; data of other cycles are omitted
   void addRecord(const ControlStates& names, unsigned buffer, CycleRecord& record) const;
-  /// True if the duration of its update() is judged.
+  /// True if the duration of its update() is checked.
   bool isTimed() const { return overrun_ns_ > 0 && !lockstep_; }
   /// @}
 
  private:
-  /// What it did in one cycle.
+  /// Record of one cycle.
   struct Record {
     bool any = false;
     std::uint64_t cycle = 0;
@@ -127,10 +127,10 @@ class Slot {
   Guard guard_;
   std::vector<Needed> needed_;
   std::array<Record, 3> records_;  // one for each buffer of the cycle
-  unsigned last_ = 0;              // the newer one
-  std::vector<double> state_;      // what state() wrote last
-  std::vector<double> from_;       // correction that the blend starts from
-  std::vector<double> now_;        // room for one correction
+  unsigned last_ = 0;              // index of the newest record
+  std::vector<double> state_;      // newest numbers of state()
+  std::vector<double> from_;       // correction at the start of the blend
+  std::vector<double> now_;        // buffer for one correction
   double blend_ = 1.0;
   GainValues gains_from_, gains_to_;
   double gain_weight_ = 1.0;
@@ -158,7 +158,7 @@ class Slot {
   std::atomic<std::int64_t> last_ns_{0};
   std::atomic<int> waiting_{-1};
   mutable coglab_rt::TripleBuffer<coglab_rt::FixedText<120>> fault_texts_;
-  mutable std::mutex fault_text_mutex_;  // of its readers; the cycle does not take it
+  mutable std::mutex fault_text_mutex_;  // for readers; the cycle does not lock it
 };
 
 }  // namespace ctrl_more

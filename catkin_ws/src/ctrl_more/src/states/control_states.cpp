@@ -31,7 +31,7 @@ ControlStates::ControlStates(int joints, double period_s, Logger* logger)
   add(C::PelvisOrientation, "pelvis", 4, "1");
 }
 
-// Every jointSpaceReference is of a known type and has one number for each joint.
+// Checks that a jointSpaceReference has a known type and one number per joint.
 Status ControlStates::checkJoints(ControlContainer container, const std::string& key, int size,
                                   const char* who) const {
   if (container != ControlContainer::JointSpaceReference) return {};

@@ -62,7 +62,7 @@ Status SignalTable::add(const SignalGroup& group, const std::string& key, int si
   index_[name] = static_cast<std::uint32_t>(entries_.size());
   entries_.push_back(entry);
   data_.resize(data_.size() + size, 0.0);
-  // A quaternion begins as the identity, not as zeros.
+  // The initial value of a quaternion is the identity, not zero.
   if (group.kind != SignalKind::Vector) data_.back() = 1.0;
   if (announce) {
     logger_->log(LogLevel::Info, store_,

@@ -1,5 +1,5 @@
 /// @file
-/// The names of coglab_rt in which this package is written, and those of the joints.
+/// Names of coglab_rt that this package uses, and joint names.
 #pragma once
 
 #include "coglab_rt/arm_port.hpp"

@@ -9,8 +9,8 @@
 namespace lwr_fri_bridge {
 namespace {
 
-constexpr double kCommandCycles = 2.5;     // FRI cycles that a command lives at least
-constexpr double kWaitBeyondLimits = 2.0;  // s that command() waits beyond the request's own limits
+constexpr double kCommandCycles = 2.5;     // minimum lifetime of a command, FRI cycles
+constexpr double kWaitBeyondLimits = 2.0;  // s, added to a request's time limits in command()
 constexpr std::size_t kKeptOutcomes = 64;
 
 double seconds(std::int64_t from_ns, std::int64_t to_ns) {
@@ -79,8 +79,8 @@ bool Bridge::compute(const std::uint8_t* datagram, std::size_t size, std::int64_
 
   const bool monitor = measurement_.state == static_cast<std::uint16_t>(fri::FriState::Monitor);
   if (first_contact && !monitor) {
-    // Somebody else brought the controller into command mode: its flags may not change now, so
-    // speak its strategy.
+    // Another program has started command mode. The flags must not change now, so use the
+    // controller's strategy.
     active_mode_ = wanted_mode_;
     active_mode_.strategy = static_cast<fri::ControlStrategy>(measurement_.control);
   }
@@ -91,7 +91,7 @@ bool Bridge::compute(const std::uint8_t* datagram, std::size_t size, std::int64_
   if (monitor) active_mode_ = wanted_mode_;
 
   answer = fri::CommandDatagram{};
-  // Before the answer is made, so that it is known when the answer is lost.
+  // Before move(), which records the answer under this counter: so a lost answer is known.
   answer.header = session_.nextHeader();
   move(reception, answer);
   fillMode(answer);
@@ -200,8 +200,7 @@ void Bridge::runSupervision(const Configurator::Observation& seen, bool fresh_se
   if (supervisor_.epoch() != epoch) permission_since_ns_ = seen.now_ns;
   if (supervisor_.fallBacks() != fall_backs) {
     configurator_.fellBack();
-    // Poor quality and errors of a drive leave command mode in force, and have sentences of their
-    // own.
+    // Poor quality and drive errors do not end command mode, and have separate messages.
     const bool still_there = input.command_mode && input.full_power && !fresh_session;
     loss_ = still_there && connected_
                 ? CommandModeLoss{}
@@ -211,8 +210,7 @@ void Bridge::runSupervision(const Configurator::Observation& seen, bool fresh_se
   }
   if (supervisor_.state() == SupervisorState::Command) loss_ = CommandModeLoss{};
 
-  // The first half of a stop is the supervisor's (brake), the second the configurator's (monitor
-  // mode).
+  // A stop has two parts: the supervisor brakes, then the configurator requests monitor mode.
   const bool brake_too_long = seconds(stop_.began_ns, seen.now_ns) > kBrakeTimeLimit;
   if (supervisor_.stopping() && !stop_.monitor_asked &&
       (supervisor_.readyForMonitor() || brake_too_long)) {
@@ -245,8 +243,8 @@ void Bridge::mirror(fri::CommandDatagram& answer) {
   session_.sent(fri::SentSetPoint());
 }
 
-/// The interpolator begins or goes on where the controller's set-point is, with the velocity and
-/// the acceleration that it has there.
+/// Starts or continues the interpolator at the controller's set-point, with its velocity and
+/// acceleration.
 void Bridge::takeOver(const fri::Reception& reception) {
   if (following_ && !reception.fresh_session && !reception.gap()) return;
   float frame[fri::kFrameValues];
@@ -285,7 +283,7 @@ void Bridge::follow(const fri::Reception& reception, fri::CommandDatagram& answe
   Vector7 target = wanted;
   const double excess = (target.cwiseAbs().array() / config_.limits.velocity.array()).maxCoeff();
   if (excess > 1.0)
-    target /= excess;  // the whole vector, so that the direction of the motion is kept
+    target /= excess;  // scales the whole vector to keep the direction of the motion
 
   const bool was_leashed = leash_.joint() >= 0;
   leash_.update(interpolator_, sample_.position, wanted, leashOf(active_mode_, config_.leash),
@@ -307,7 +305,7 @@ void Bridge::follow(const fri::Reception& reception, fri::CommandDatagram& answe
 Vector7 Bridge::targetVelocity() {
   const VelocitySource source = source_.load(std::memory_order_relaxed);
   const bool from_topic = source == VelocitySource::Topic;
-  if (source != target_.source) target_.command = VelocityCommand();  // nothing outlives its source
+  if (source != target_.source) target_.command = VelocityCommand();  // of the old source
   target_.source = source;
   VelocityCommand command;
   const bool fresh = from_topic ? topic_.read(command) : mailboxes_.takeVelocity(command);
@@ -322,7 +320,7 @@ Vector7 Bridge::targetVelocity() {
   }
 
   const double age = seconds(target_.command.stamp_ns, sample_.stamp_ns);
-  // With long FRI periods a command is two cycles old before its successor can be there.
+  // With long FRI periods a command is two cycles old before the next one can arrive.
   const double limit = std::max(from_topic ? config_.topic_timeout : config_.command_timeout,
                                 kCommandCycles * sample_.cycle_time);
   const bool current =
@@ -332,16 +330,15 @@ Vector7 Bridge::targetVelocity() {
     ++counters_.command_timeouts;
   }
   target_.expired = expired;
-  // While leashed the target is still looked at, to see when the outward motion is not asked for
-  // any more.
+  // While leashed the target is still read, to detect that no outward motion is requested.
   const bool allowed =
       supervisor_.block() == MotionBlock::None || supervisor_.block() == MotionBlock::Leashed;
   return current && !expired && allowed ? target_.command.velocity : Vector7::Zero();
 }
 
 void Bridge::fillMode(fri::CommandDatagram& answer) const {
-  // Added torques and forces stay 0: nothing here commands them, and a leap there makes the
-  // controller drop its contactors.
+  // Added torques and forces stay 0. The bridge does not command them, and a step in them makes the
+  // controller open its contactors.
   answer.flags = fri::flagsFor(active_mode_.strategy);
   fri::jointsToWire(active_mode_.joint_stiffness, answer.joint_stiffness);
   fri::jointsToWire(active_mode_.joint_damping, answer.joint_damping);
@@ -393,7 +390,7 @@ void Bridge::publish() {
   if (!(view == last_view_) && changes_.push(view)) last_view_ = view;
 }
 
-// other threads than the FRI thread
+// threads other than the FRI thread
 
 std::uint32_t Bridge::submit(const std::string& text) {
   const std::lock_guard<std::mutex> lock(mutex_);

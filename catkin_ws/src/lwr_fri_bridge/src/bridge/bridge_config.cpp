@@ -16,7 +16,7 @@ void checkParameter(const char* name, double value, double low, double high) {
 void BridgeConfig::check() const {
   checkParameter("tool_number", tool_number, 0, 16);
   checkParameter("position_margin", position_margin, 0.0, 0.5);
-  // What plans motions keeps the margin of the table: a wider one here would stop accepted motions.
+  // Motion planners use the margin of the table. A larger one here would stop accepted motions.
   checkParameter("position_margin (at most that of the joint limits table)", position_margin, 0.0,
                  limits.position_margin);
   checkParameter("set_point_leash/position", leash.position, 0.005, 0.5);

@@ -69,7 +69,7 @@ Diagnosis diagnoseConnection(const Snapshot& s, const FriThreadStatistics& threa
 Diagnosis diagnoseArm(const Snapshot& s, double hot) {
   if (s.supervisor == SupervisorState::Disconnected)
     return {Severity::Warning, "not connected", ReasonCode::RobotDisconnected};
-  // Only seven drives are there; the bits above them say nothing.
+  // There are only seven drives. Higher bits have no meaning.
   if (const unsigned drives = s.drive_error & fri::kAllDrivesOn; drives != 0)
     return {Severity::Error, "drive error: " + jointsIn(drives), ReasonCode::DriveError};
   unsigned hot_joints = 0;

@@ -19,7 +19,7 @@ namespace {
 
 constexpr int kBatch = 8;
 constexpr std::size_t kBuffer =
-    1024;  // larger than any valid datagram: what is cut off has a wrong size anyway
+    1024;  // larger than any valid datagram; a truncated one has a wrong size anyway
 constexpr std::int64_t kIdleTick_ns = 10'000'000;
 
 std::uint64_t endpointOf(const sockaddr_in& address) {
@@ -114,7 +114,8 @@ void FriThread::stop() {
   socket_ = -1;
 }
 
-/// Waits for datagrams, at most one idle tick. Returns their number; with 0, errno says why.
+/// Waits for datagrams, at most one idle tick. Returns their number. If it is 0, errno has the
+/// reason.
 int FriThread::receive(Batch& batch) {
   const auto take = [&](int slot, int flags) {
     socklen_t length = sizeof batch.from[slot];
@@ -126,13 +127,13 @@ int FriThread::receive(Batch& batch) {
   int received = take(0, 0) ? 1 : 0;
   const std::int64_t now = steadyNow();
   if (received == 0 && now - began > 2 * kIdleTick_ns) {
-    // This thread was not run when its time was over. What has come meanwhile is no silence.
+    // This thread ran too late after its time-out. If a datagram came meanwhile, there is no
+    // silence.
     bridge_.noteLate(1e-9 * static_cast<double>(now - began - kIdleTick_ns));
     received = take(0, MSG_DONTWAIT) ? 1 : 0;
   }
   if (received == 0) return 0;
-  // Only a datagram that comes off the beat may have others behind it; on the beat there is nothing
-  // to look for.
+  // More datagrams can wait only if this one did not arrive one cycle after the last one.
   const auto interval = static_cast<double>(now - last_receive_ns_);
   const double cycle_ns = 1e9 * bridge_.cycleTime();
   last_receive_ns_ = now;
@@ -164,14 +165,14 @@ void FriThread::run() {
       if (options_.after_answer) options_.after_answer(false);
     }
     if (error != 0 && error != EAGAIN && error != EWOULDBLOCK && error != EINTR) {
-      // Such as an unreachable port reported back by the network: nothing to do but not to spin.
+      // For example, the network reports an unreachable port. The pause avoids a busy loop.
       timespec pause{0, 1'000'000};
       nanosleep(&pause, nullptr);
     }
   }
 }
 
-/// Whether datagrams from there may be the controller's.
+/// True if datagrams from this endpoint can be the controller's.
 bool FriThread::isController(std::uint64_t endpoint) const {
   const std::uint64_t peer = peer_.load(std::memory_order_relaxed);
   if (peer != 0) return endpoint == peer;
@@ -180,7 +181,7 @@ bool FriThread::isController(std::uint64_t endpoint) const {
 
 void FriThread::serve(Batch& batch, int received, std::int64_t now_ns) {
   bool answered = false;
-  int waiting = -1;  // of the controller's, besides the newest
+  int waiting = -1;  // waiting datagrams of the controller, without the newest
   for (int i = 0; i < received; ++i) waiting += isController(endpointOf(batch.from[i])) ? 1 : 0;
   if (waiting > 0) bridge_.noteLate(waiting * bridge_.cycleTime());
   for (int i = received - 1; i >= 0; --i) {

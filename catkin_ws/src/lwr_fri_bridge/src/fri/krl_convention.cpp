@@ -9,7 +9,7 @@ namespace {
 constexpr std::array<const char*, 6> kNames = {"coglab",    "centro_epiaggio", "stanford",
                                                "rcprg_tum", "rtt_lwr",         "openkc"};
 
-// KRL counts from 1.
+// KRL indices begin at 1.
 std::int32_t& intAt(UserData& data, int krl_index) { return data.ints[krl_index - 1]; }
 std::int32_t intAt(const UserData& data, int krl_index) { return data.ints[krl_index - 1]; }
 bool boolAt(const UserData& data, int krl_index) {
@@ -23,7 +23,7 @@ void setBool(UserData& data, int krl_index, bool value) {
 
 bool isRequest(KrlPhase phase) { return phase == KrlPhase::Start || phase == KrlPhase::Stop; }
 
-/// The command of openkc that is next in this phase; 0: none is left.
+/// Next command of openkc in this phase; 0: none is left.
 std::int32_t openKcCommand(const KrlRequest& request) {
   constexpr std::int32_t kStart = 1, kStop = 2, kCartesian = 6, kJoint = 7, kPosition = 9;
   if (request.phase == KrlPhase::Stop) return request.acknowledged == 0 ? kStop : 0;
@@ -73,8 +73,7 @@ void writeRequest(KrlConvention convention, const KrlRequest& request, UserData&
       intAt(to, 2) = wants_command ? 1 : 0;
       break;
     case KrlConvention::Stanford:
-      // 20 also while idle: a 10 left over would restart the robot after a fall-back to monitor
-      // mode.
+      // 20 also while idle: an old 10 would restart the robot after a fall-back to monitor mode.
       intAt(to, 15) = strategy;
       intAt(to, 16) = wants_command ? 10 : 20;
       break;
@@ -113,7 +112,7 @@ KrlReply readReply(KrlConvention convention, const KrlRequest& request, const Us
     case KrlConvention::Stanford:
     case KrlConvention::RttLwr:
     case KrlConvention::OpenKc:
-      break;  // they show the mode they are in and nothing about a request
+      break;  // these programs show only their mode, not the state of a request
   }
   return reply;
 }

@@ -7,15 +7,14 @@
 namespace lwr_fri_bridge::fri {
 namespace {
 
-// A counter that runs this far ahead is not a gap any more: 1 s of silence at 1 kHz is a lost
-// connection.
+// A larger jump of the counter is no gap: 1 s of silence at 1 kHz is a lost connection.
 constexpr int kLargestGap = 1000;
-// Successive counters prove that the controller's counter began anew; fewer, or for a shorter time,
-// may be a replay.
+// So many successive counters over kProofTime prove that the controller's counter restarted. Fewer,
+// or a shorter time, may be a replay.
 constexpr int kProofOfRestart = 3;
 constexpr double kProofTime = 0.1;  // s
-// No joint is faster than the KRC's limits (rsidef7.dat: 120 120 160 160 250 220 220 deg/s), so
-// neither its set-point nor the arm is; with half as much again. rad/s
+// Largest speed of set-point and arm, rad/s: 1.5 times the KRC's limits (rsidef7.dat: 120 120 160
+// 160 250 220 220 deg/s).
 constexpr float kFastest[kJoints] = {3.15F, 3.15F, 4.2F, 4.2F, 6.6F, 5.8F, 5.8F};
 constexpr float kSetPointAllowance = 0.02F;                       // rad
 constexpr float kMeasuredAllowance = 0.005F;                      // rad, noise and rounding
@@ -41,8 +40,8 @@ bool validCycle(float seconds) { return seconds >= kShortestCycle && seconds <= 
 }  // namespace
 
 double cycleTimeOf(const MeasurementDatagram& m) {
-  // float32 of 0.001 is off by 5e-11: rounding to microseconds gives back what the KRL program
-  // asked for.
+  // float32 of 0.001 is off by 5e-11. Rounding to microseconds restores the value of the KRL
+  // program.
   const float seconds = validCycle(m.command_period) ? m.command_period : m.measurement_period;
   return std::round(static_cast<double>(seconds) * 1e6) * 1e-6;
 }
@@ -83,7 +82,7 @@ bool Session::newPeriod(const MeasurementDatagram& candidate) const {
 
 Verdict Session::checkOrder(const MeasurementDatagram& candidate, Reception& reception) {
   const std::uint16_t counter = candidate.header.counter;
-  // friOpen sets the period, and command mode has to be left for it.
+  // friOpen sets the period, which is not possible in command mode.
   reception.new_period = newPeriod(candidate);
   if (reception.new_period && candidate.state == static_cast<std::uint16_t>(FriState::Command))
     return Verdict::Implausible;
@@ -124,7 +123,8 @@ Verdict Session::checkForm(const std::uint8_t* bytes, std::size_t size,
   return verdict;
 }
 
-/// Datagrams that do not fit to what came before, but to each other: the controller began anew.
+/// True if the controller's counter restarted: several datagrams do not continue the old counter
+/// but follow each other.
 bool Session::provesRestart(const MeasurementDatagram& candidate) {
   const bool successive = static_cast<std::uint16_t>(suspect_ + 1) == candidate.header.counter;
   suspects_in_a_row_ = successive && suspects_in_a_row_ > 0 ? suspects_in_a_row_ + 1 : 1;

@@ -6,10 +6,10 @@
 namespace lwr_fri_bridge::fri {
 namespace {
 
-constexpr double kTolerance = 1e-4;       // rad; controllers allow as much on entry
-constexpr float kFrameTolerance = 1e-5F;  // of a frame that stood, m and parts of a unit vector
-constexpr double kSmallestStep = 1e-6;    // rad; below it float32 hides whether a joint moved
-constexpr double kOffTheWay = 1e-3;       // rad
+constexpr double kTolerance = 1e-4;       // rad; same tolerance as controllers have on entry
+constexpr float kFrameTolerance = 1e-5F;  // of an unmoved frame, m and parts of a unit vector
+constexpr double kSmallestStep = 1e-6;    // rad; float32 hides whether a joint moved less
+constexpr double kOffTheWay = 1e-3;       // rad, largest distance from the path of the last answer
 
 Vector7 reportedBy(const MeasurementDatagram& m) {
   float set_point[kJoints];
@@ -17,7 +17,7 @@ Vector7 reportedBy(const MeasurementDatagram& m) {
   return jointsFromWire(set_point);
 }
 
-/// Cycles that the controller had no new answer.
+/// Number of cycles in which the controller had no new answer.
 double missedCycles(const MeasurementDatagram& m, const SentSetPoint& seen) {
   return static_cast<std::uint16_t>(m.header.counter - seen.measurement - 1);
 }
@@ -92,7 +92,7 @@ SetPointState SetPointHistory::afterGap(const MeasurementDatagram& m, bool fresh
     state.position = seen->position;
     if (went_on) state.position += missed * step;
   } else if (step.cwiseAbs().maxCoeff() > kSmallestStep) {
-    // Steps that the reported set-point lies beyond the answer.
+    // Number of steps from the answer to the reported set-point.
     const Vector7 way = state.position - seen->position;
     const double steps = way.dot(step) / step.squaredNorm();
     went_on = steps > 0.5 * missed;

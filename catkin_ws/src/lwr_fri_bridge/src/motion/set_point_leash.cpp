@@ -8,15 +8,15 @@
 namespace lwr_fri_bridge {
 namespace {
 
-constexpr double kReturnSpeed = 0.3;   // rad/s: a blocked arm is relaxed within about a second
-constexpr double kReturnDelay = 0.05;  // s, time constant of the last bit of the return
+constexpr double kReturnSpeed = 0.3;   // rad/s; relaxes a blocked arm within about 1 s
+constexpr double kReturnDelay = 0.05;  // s, time constant of the end of the return
 constexpr double kReturned = 1e-3;     // rad
-constexpr double kNoticeable = 0.1;    // of the leash: joints ahead by less keep their set-point
+constexpr double kNoticeable = 0.1;    // share of the leash; joints less ahead do not return
 
 constexpr double kLongest = 0.5;  // rad
 constexpr double kLever[7] = {1.0, 1.0, 0.6, 0.6,
                               0.2, 0.2, 0.2};  // m, joint axis to hand, stretched
-constexpr double kReach = 0.4;      // m of hand displacement per rad of joint, in a usual posture
+constexpr double kReach = 0.4;      // m of hand displacement per rad of a joint, in a usual posture
 constexpr double kLoadLever = 0.1;  // m, from the tool's origin to the load
 
 }  // namespace
@@ -49,7 +49,7 @@ bool SetPointLeash::update(const Interpolator& interpolator, const Vector7& meas
   measured_ = measured;
   measured_once_ = true;
   if (joint_ < 0) {
-    // Of two measurements the one nearer to the set-point counts.
+    // Uses the measurement that is nearer to the set-point, of this tick and the previous one.
     const Vector7 position = interpolator.position();
     const auto newer_counts =
         (position - measured).array().abs() < (position - before).array().abs();

@@ -42,7 +42,7 @@ void CartesianSetPoint::frame(const Vector7& joints, float (&frame)[fri::kFrameV
 }
 
 Vector6 toolWrench(const fri::MeasurementDatagram& measurement, bool in_tool_axes) {
-  constexpr double kOrthonormal = 1e-3;  // float32 frames are good to 1e-6
+  constexpr double kOrthonormal = 1e-3;  // float32 frames have an error of 1e-6
   Vector6 wrench = fri::wrenchFromWire(measurement.external_wrench);
   if (in_tool_axes) return wrench;
   Eigen::Matrix3d tool;

@@ -3,11 +3,10 @@
 namespace lwr_fri_bridge {
 namespace {
 
-constexpr double kProgramMarkTime = 1.0;  // s, for a KRL program to show whose it is
+constexpr double kProgramMarkTime = 1.0;  // s, time in which the KRL program must show its mark
 constexpr double kRefusalTime =
-    0.5;  // s in monitor mode after the program stopped working on a start
-constexpr double kSettleTime =
-    0.5;  // s; KRL programs poll every 50 ms and may be just about to call friStart
+    0.5;  // s in monitor mode, after the program ended its work on a start
+constexpr double kSettleTime = 0.5;  // s; KRL programs poll every 50 ms and may still call friStart
 
 }  // namespace
 
@@ -16,7 +15,7 @@ void Configurator::setPhase(fri::KrlPhase phase, const Observation& seen) {
   request_.acknowledged = 0;
   request_.asserted = false;
   if (phase != fri::KrlPhase::Start && phase != fri::KrlPhase::Stop) return;
-  // A program that outlived the last run of the bridge has numbers of its own.
+  // A KRL program that ran before this bridge started may have used any number.
   const std::int32_t finished =
       seen.measurement != nullptr ? fri::lastFinished(*seen.measurement) : 0;
   do {
@@ -84,7 +83,7 @@ void Configurator::stepStart(const Observation& seen) {
   const bool late = elapsed(seen) > limits_.start_timeout;
   if (step_ == Step::WaitQuality) {
     if (command) {
-      step_ = Step::WaitPower;  // somebody entered command mode before: nothing to request
+      step_ = Step::WaitPower;  // already in command mode: no request
     } else if (seen.measurement->quality >= static_cast<std::uint16_t>(fri::Quality::Ok)) {
       setPhase(fri::KrlPhase::Start, seen);
       step_ = Step::WaitCommand;
@@ -99,7 +98,7 @@ void Configurator::stepStart(const Observation& seen) {
   if (step_ == Step::WaitPower) waitPower(seen, command, late);
 }
 
-/// Gives the start up: monitor mode is asked for.
+/// Cancels the start and requests monitor mode.
 void Configurator::giveUp(OutcomeCode code, const Observation& seen) {
   setPhase(fri::KrlPhase::Stop, seen);
   finish(code, seen);
@@ -111,8 +110,8 @@ void Configurator::waitCommand(const Observation& seen, bool late) {
   if (reply_.refused) return giveUp(OutcomeCode::ProgramRefused, seen);
   if (late) return giveUp(OutcomeCode::NotEntered, seen);
   if (convention_ != fri::KrlConvention::RcprgTum) return;
-  // Its flag is all it shows: worked on the request, is done with it, and still in monitor mode
-  // means no.
+  // This program shows only a busy flag. If the flag was set and cleared, and the controller is
+  // still in monitor mode, the program has refused the request.
   if (reply_.busy) {
     seen_busy_ = true;
     monitor_since_ns_ = seen.now_ns;

@@ -9,7 +9,7 @@
 namespace lwr_fri_bridge {
 namespace {
 
-// Ranges are ours: no public source gives those of the controller, which checks its own.
+// CogLab's own ranges. No public source gives the controller's ranges; it checks them itself.
 constexpr double kSoftest = 0.01, kStiffestJoint = 2000.0, kStiffestTranslation = 5000.0,
                  kStiffestRotation = 300.0;
 constexpr double kLeastDamping = 0.1, kMostDamping = 1.0;

@@ -14,7 +14,7 @@ std::string seconds(std::int64_t ns) {
   return text;
 }
 
-/// Sorts the velocities into wire order. Returns what is wrong, empty if nothing.
+/// Sorts the velocities into wire order. Returns an error message, empty if there is no error.
 std::string sorted(const TargetMessage& message, Vector7& velocity) {
   if (message.velocities.size() != 7)
     return "expected 7 velocities, got " + std::to_string(message.velocities.size());

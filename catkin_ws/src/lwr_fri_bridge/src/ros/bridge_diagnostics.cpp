@@ -9,11 +9,11 @@
 namespace lwr_fri_bridge {
 namespace {
 
-constexpr double kLateAnswers = 0.05;  // share from which the computer counts as too busy
+constexpr double kLateAnswers = 0.05;  // share of late answers of a computer that is too busy
 
 unsigned char levelOf(Severity severity) { return static_cast<unsigned char>(severity); }
 
-/// The sentence, and beside it what it means for programs.
+/// Adds the text of a diagnosis and its reason code.
 void say(diagnostic_updater::DiagnosticStatusWrapper& status, const Diagnosis& diagnosis) {
   status.summary(levelOf(diagnosis.severity), diagnosis.text);
   status.add("reason_code", static_cast<int>(diagnosis.code));
@@ -69,7 +69,8 @@ void BridgeDiagnostics::connection(diagnostic_updater::DiagnosticStatusWrapper& 
   status.add("send errors", thread.send_errors);
 }
 
-/// Whether this computer answers in time, over the last second. Nothing is slowed: a robot is not.
+/// Share of late answers of this computer in the last second. It only reports; the robot does not
+/// become slower.
 void BridgeDiagnostics::computer(diagnostic_updater::DiagnosticStatusWrapper& status) {
   const fri::SessionCounters session = owner_.bridge_.snapshot().session;
   const FriThreadStatistics thread = owner_.fri_thread_.statistics();

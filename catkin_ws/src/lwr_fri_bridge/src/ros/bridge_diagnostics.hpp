@@ -1,5 +1,5 @@
 /// @file
-/// /diagnostics of the bridge.
+/// The bridge's part of /diagnostics.
 #pragma once
 
 #include <diagnostic_updater/diagnostic_updater.h>
@@ -8,12 +8,12 @@
 
 namespace lwr_fri_bridge {
 
-/// Four statuses: connection, computer, arm, commands.
+/// Publishes four statuses: connection, computer, arm, commands.
 class BridgeDiagnostics {
  public:
   explicit BridgeDiagnostics(BridgeRos& owner);
 
-  /// Publishes now (the caller's timer sets the pace).
+  /// Publishes now. The caller's timer sets the rate.
   void publish() { updater_.force_update(); }
 
  private:

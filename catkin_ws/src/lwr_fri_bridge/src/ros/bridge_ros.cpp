@@ -24,10 +24,10 @@ namespace {
 using coglab_rt::readNumber;
 using coglab_rt::readParameter;
 
-// A start may occupy one of them for seconds; hold and stop must get through.
+// A start may occupy one thread for seconds. The others are for hold and stop.
 constexpr int kSpinnerThreads = 4;
-constexpr std::int64_t kLatencyPeriodNs = 50'000'000;  // between two fri_latency
-constexpr std::int64_t kStatePeriodNs = 250'000'000;   // between two states without a change
+constexpr std::int64_t kLatencyPeriodNs = 50'000'000;  // period of fri_latency
+constexpr std::int64_t kStatePeriodNs = 250'000'000;   // period of state without a change
 constexpr double kSilenceWarning = 5.0;                // s between warnings about silence
 
 void copyJoints(const Vector7& joints, std::vector<double>& values) {
@@ -51,8 +51,8 @@ BridgeRos::BridgeRos(const ros::NodeHandle& nh, bool one_process)
         };
         return thread;
       }()) {
-  // A little shorter than the period, so that an FRI period of the same length is not halved by
-  // jitter.
+  // A little shorter than the period. Otherwise jitter would halve the rate if the FRI period has
+  // the same length.
   publish_period_ns_ =
       static_cast<std::int64_t>(0.9e9 / readNumber(nh, "joint_states_rate", 200.0, 1.0, 1000.0));
   nh_.setCallbackQueue(&queue_);
@@ -76,7 +76,7 @@ void BridgeRos::start(Wake wake) {
   try {
     startThreads();
   } catch (...) {
-    endThreads();  // nothing may run on behind the caller's back, who frees what it uses
+    endThreads();  // the caller frees what the threads use
     throw;
   }
   started_ = true;
@@ -85,7 +85,7 @@ void BridgeRos::start(Wake wake) {
 void BridgeRos::startThreads() {
   stopping_ = false;
   started_ns_ = steadyNow();
-  // The port first: what takes long comes after the likeliest thing to fail.
+  // Binds the port first: it is the most likely step to fail, and the others take longer.
   const std::string warning =
       fri_thread_.start(readParameter(nh_, "fri_port_bound", 0, "a whole number"));
   if (!warning.empty()) ROS_WARN("lwr: %s", warning.c_str());
@@ -126,18 +126,18 @@ void BridgeRos::endThreads() {
 void BridgeRos::shutdown() {
   if (!started_) return;
   started_ = false;
-  // No request is taken from now on. The topics stay registered: unregistering waits for the ROS
-  // master, which may not answer, and the arm comes first.
+  // Refuses all requests from now on. The arm must stop first. The topics stay registered, because
+  // unregistering waits for the ROS master, which may not answer.
   closing_ = true;
   target_->close();
   Outcome outcome = bridge_.command("stop");
-  // Somebody else's stop may be in progress; it has time limits of its own.
+  // Another stop may be in progress. It has its own time limits.
   for (int i = 0; i < 100 && outcome.code == OutcomeCode::Busy; ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
     outcome = bridge_.command("stop");
   }
   if (!outcome.success() && outcome.code != OutcomeCode::Disconnected) {
-    // The log may be gone already when a node shuts down.
+    // The ROS log may no longer exist when a node shuts down.
     std::fprintf(stderr, "lwr: shutdown: %s\n", describe(outcome).c_str());
   }
   endThreads();
@@ -222,7 +222,7 @@ void BridgeRos::publishLoop() {
     }
     while (sem_clockwait(&new_sample_, CLOCK_MONOTONIC, &deadline) != 0 && errno == EINTR) {
     }
-    while (sem_trywait(&new_sample_) == 0) {  // several posts, one newest sample
+    while (sem_trywait(&new_sample_) == 0) {  // several posts for one newest sample
     }
     publishStates();
     const Snapshot now = bridge_.snapshot();
@@ -255,7 +255,7 @@ void BridgeRos::publishLoop() {
   }
 }
 
-/// Goes on after a loss of command mode that this computer caused, if the arm has not moved since.
+/// Restarts after a loss of command mode that this computer caused, if the arm has not moved since.
 void BridgeRos::restartQuietly(const Snapshot& now) {
   if (!restarts_quietly_) return;
   QuietRestart::View view;
@@ -277,7 +277,8 @@ void BridgeRos::publishSample(const Snapshot& snapshot) {
   const RobotSample& sample = snapshot.sample;
   const ros::Time stamp = coglab_rt::toRos(sample.stamp_ns);
   joint_message_.header.stamp = stamp;
-  // The stamp is the time of receipt, late on a busy computer; who differentiates needs this one.
+  // The stamp is the time of receipt, which is late on a busy computer. To differentiate, use the
+  // controller's time here.
   joint_message_.header.frame_id = std::to_string(sample.controller_ns);
   copyJoints(sample.position, joint_message_.position);
   copyJoints(sample.velocity, joint_message_.velocity);
@@ -304,8 +305,8 @@ void BridgeRos::publishSample(const Snapshot& snapshot) {
   fri_latency_.publish(latency);
 }
 
-/// Every change, and the newest state again after a while: who looks on knows from it that the
-/// node is not silent.
+/// Publishes every change, and repeats the newest state every 0.25 s, so that subscribers can
+/// detect a silent node.
 void BridgeRos::publishStates() {
   bool told = false;
   for (StateView view; bridge_.nextStateChange(view); told = true) {

@@ -1,7 +1,7 @@
 /// @file
-/// The bridge as a node of its own (split:=true): target velocities come over target_joint_states.
-/// The default is robot_node of coglab_controllers, which holds bridge and controller manager in
-/// one process.
+/// The bridge as a separate node (split:=true), with target velocities from target_joint_states.
+/// The default is robot_node of coglab_controllers, with bridge and controller manager in one
+/// process.
 #include <atomic>
 #include <chrono>
 #include <csignal>
@@ -24,12 +24,12 @@ void onSignal(int) { interrupted = true; }
 }  // namespace
 
 int main(int argc, char** argv) {
-  // Own handlers: the arm must come to rest before the node goes.
+  // Own signal handlers: the arm must come to rest before the node ends.
   ros::init(argc, argv, "lwr", ros::init_options::NoSigintHandler);
   if (!coglab_rt::nameIsFree()) return 1;
   std::signal(SIGINT, onSignal);
   std::signal(SIGTERM, onSignal);
-  // Lives longest, because ROS logs what goes wrong only as long as there is a handle.
+  // Destroyed last, because ROS logs errors only while a handle exists.
   const ros::NodeHandle own("~");
   coglab_rt::LoggerServices logger_services;
   try {

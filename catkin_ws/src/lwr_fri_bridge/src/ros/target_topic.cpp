@@ -24,8 +24,8 @@ bool TargetTopic::mayMove(const std::string& publisher) {
                       ros::names::resolve("controller_manager/switch_controller").c_str());
     return false;
   }
-  // Two publishers would pull the arm to and fro: the one whose velocities are followed keeps it
-  // until it pauses.
+  // Two publishers would move the arm to and fro. The current publisher keeps the arm until it
+  // pauses.
   const double pause = 1e-9 * static_cast<double>(steadyNow() - followed_ns_);
   if (publisher == publisher_ || followed_ns_ == 0 || pause >= bridge_.config().topic_timeout)
     return true;
@@ -58,7 +58,7 @@ void TargetTopic::countAndSay(const TargetVerdict& verdict, const std::string& p
 void TargetTopic::onMessage(const ros::MessageEvent<const sensor_msgs::JointState>& event) {
   if (closing_) return;
   const std::string& publisher = event.getPublisherName();
-  // In one process the controller manager publishes here what it sent already.
+  // In one process the controller manager also publishes here the velocities that it already sent.
   if (one_process_ && publisher == ros::this_node::getName()) return;
   if (!mayMove(publisher)) return;
 
@@ -78,8 +78,7 @@ void TargetTopic::onMessage(const ros::MessageEvent<const sensor_msgs::JointStat
     ++not_allowed_;
     ROS_WARN_THROTTLE(5.0, "lwr: target_joint_states of %s refused: %s", publisher.c_str(),
                       reasonOf(now.sample.block, now.sample.blocking_joint, now.loss).c_str());
-    // The leash lets go when the outward motion is not asked for any more, so it must hear what is
-    // asked for.
+    // The leash needs the requested velocity: it is released when no outward motion is requested.
     if (now.sample.block != MotionBlock::Leashed) return;
   }
   bridge_.sendTopicVelocity(verdict.command);

@@ -6,14 +6,14 @@
 namespace lwr_fri_bridge {
 namespace {
 
-constexpr double kFading = 1.0;       // s, time constant of what is remembered
-constexpr double kLateCycles = 3.0;   // lateness that may cost command mode
-constexpr double kLostPackets = 2.5;  // of packets lost on the way: three, of which the first fade
-constexpr double kRestSpeed = 0.02;   // rad/s; the velocity filter's noise lies far below
+constexpr double kFading = 1.0;       // s, time constant of recorded lateness and losses
+constexpr double kLateCycles = 3.0;   // cycles; lateness that may end command mode
+constexpr double kLostPackets = 2.5;  // packets: three lost ones, of which the first have faded
+constexpr double kRestSpeed = 0.02;   // rad/s; far above the noise of the velocity filter
 constexpr double kRestTime = 0.5;     // s at rest before the loss
 constexpr double kCalmTime = 0.1;     // s at rest before a restart
-constexpr double kMoved = 0.002;      // rad from where the arm stood
-constexpr std::int64_t kOften_ns = 60'000'000'000;  // no more than three restarts in that time
+constexpr double kMoved = 0.002;      // rad, largest motion since the loss
+constexpr std::int64_t kOften_ns = 60'000'000'000;  // at most three restarts in this time
 
 }  // namespace
 
@@ -62,7 +62,7 @@ CommandModeLoss CommandModeWatch::judge(const Facts& facts) const {
   const bool late = late_ > kLateCycles * facts.cycle_time;
   if (!facts.connected) {
     loss.seconds = facts.silence;
-    // A thread that slept through most of the silence cannot tell it from its own.
+    // A thread that was late for most of the silence cannot know whether the controller was silent.
     loss.cause = late && late_ > 0.5 * facts.silence ? LossCause::ComputerLate
                  : controller_here_                  ? LossCause::ControllerStalled
                                                      : LossCause::ControllerSilent;
@@ -81,7 +81,7 @@ CommandModeLoss CommandModeWatch::judge(const Facts& facts) const {
 bool QuietRestart::mayRestart(const View& view) const {
   return view.stopped && !view.held && view.may_command && view.loss.byComputer() &&
          view.loss.at_rest && !(view.loss == judged_) &&
-         view.timestamp > view.loss.timestamp &&  // the same controller, not one that began anew
+         view.timestamp > view.loss.timestamp &&  // the same controller, not restarted
          (view.position - view.loss.position).cwiseAbs().maxCoeff() < kMoved &&
          view.velocity.cwiseAbs().maxCoeff() < kRestSpeed;
 }

@@ -74,8 +74,7 @@ void Supervisor::update(const SupervisorInput& input) {
   at_rest_ = input.stands_still || !commanded;
 
   const MotionBlock block = judge(input);
-  // Every change of the permission starts a new epoch: commands computed before it do not count any
-  // more.
+  // Every change of the permission starts a new epoch. Commands from before it are ignored.
   if ((block == MotionBlock::None) != (block_ == MotionBlock::None)) ++epoch_;
   block_ = block;
   if (at_rest_) braking_ = false;

@@ -7,14 +7,15 @@
 
 namespace ctrl_more {
 
-/// Several changes that the control cycle adopts together, between two cycles. Either all of them
-/// are valid and happen, or none. They are applied in the order they were added.
+/// Several steps that the control cycle adopts together, between two cycles. If one step is
+/// invalid, none is applied. Steps are applied in the order of their addition.
 ///
-/// Steps that name no controller (name "") act on all; those that name a signal act on all that
-/// use it. Both leave safety controllers alone unless forced, and the status says so in its note.
+/// A step without a controller name ("") acts on all controllers. A step with a signal acts on all
+/// controllers that use it. Both skip safety controllers unless forced; the note of the status then
+/// lists them.
 class Change {
  public:
-  /// What one step does.
+  /// Action of a step.
   enum class Kind {
     Enable,
     Disable,
@@ -39,14 +40,14 @@ class Change {
 
   /// One step.
   struct Step {
-    Kind kind;                            ///< what to do
+    Kind kind;                            ///< action
     std::string name = {};                ///< controller, signal or profile
-    Who who = Who::Named;                 ///< what `name` names
-    std::string reason = {};              ///< of Pause and Resume by name
-    bool force = false;                   ///< also for safety controllers
-    std::vector<std::string> order = {};  ///< of Order
-    Gains gains = {};                     ///< of Gains
-    std::string file = {};                ///< of GainFile
+    Who who = Who::Named;                 ///< meaning of `name`
+    std::string reason = {};              ///< for Pause and Resume by name
+    bool force = false;                   ///< include safety controllers
+    std::vector<std::string> order = {};  ///< for Order
+    Gains gains = {};                     ///< for Gains
+    std::string file = {};                ///< for GainFile
   };
 
   /// Adds a step.
@@ -58,23 +59,23 @@ class Change {
   /// Enables one controller, or all.
   Change& enable(const std::string& name) { return add({Kind::Enable, name}); }
 
-  /// Disables one controller, or all; safety controllers only if forced.
+  /// Disables one controller, or all. Safety controllers only if forced.
   Change& disable(const std::string& name, bool force = false) {
     return add({Kind::Disable, name, Who::Named, "", force});
   }
 
-  /// Adds a reason to pause one controller, or all; safety controllers only if forced.
+  /// Adds a pause reason to one controller, or to all. Safety controllers only if forced.
   Change& pause(const std::string& name, const std::string& reason = "user", bool force = false) {
     return add({Kind::Pause, name, Who::Named, reason, force});
   }
 
-  /// Withdraws one reason to pause; the reason "fault" clears a latched fault.
+  /// Withdraws one pause reason. The reason "fault" clears a latched fault.
   Change& resume(const std::string& name, const std::string& reason = "user") {
     return add({Kind::Resume, name, Who::Named, reason});
   }
 
-  /// Disables, pauses or resumes all controllers that use a signal. The reason to pause is the
-  /// signal: `robot signal map/key` or `control signal container/key`.
+  /// Disables, pauses or resumes all controllers that use a signal. The pause reason is
+  /// `robot signal map/key` or `control signal container/key`.
   Change& bySignal(Kind kind, Who who, const std::string& signal, bool force = false) {
     return add({kind, signal, who, "", force});
   }
@@ -84,26 +85,26 @@ class Change {
     return add({Kind::Order, "", Who::Named, "", false, names});
   }
 
-  /// Replaces gains of one controller, blended in; those that are not given stay.
+  /// Replaces gains of one controller. The other gains stay. New values are blended in.
   Change& gains(const std::string& name, const Gains& values) {
     return add({Kind::Gains, name, Who::Named, "", false, {}, values});
   }
 
-  /// Replaces the gains of one controller by those of a file, blended in; "": its own file. Gains
-  /// that the file does not give get their initial values; a setting that differs is refused.
+  /// Replaces all gains of one controller by those of a file ("": its own file), blended in. Gains
+  /// that are not in the file get their initial values. A setting that differs is refused.
   Change& gainFile(const std::string& name, const std::string& file) {
     return add({Kind::GainFile, name, Who::Named, "", false, {}, {}, file});
   }
 
-  /// Enables exactly the controllers of a profile and disables all others, safety controllers
-  /// included. A name without a profile is refused.
+  /// Enables exactly the controllers of a profile and disables all others, including safety
+  /// controllers. An unknown profile is refused.
   Change& profile(const std::string& name) { return add({Kind::Profile, name}); }
 
-  /// Tells that another motion controller writes the references from now on: controllers whose
-  /// description says so are reset, and their corrections blended over.
+  /// Another motion controller writes the references from now on. Controllers with
+  /// SwitchPolicy::Reset are reset, and their corrections are blended.
   Change& motionSwitched() { return add({Kind::MotionSwitched}); }
 
-  /// The steps in order.
+  /// The steps, in order.
   const std::vector<Step>& steps() const { return steps_; }
 
  private:

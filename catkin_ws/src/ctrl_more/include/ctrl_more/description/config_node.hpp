@@ -7,19 +7,19 @@
 
 namespace ctrl_more {
 
-/// A configuration that cannot be used. The text is one sentence that starts with `file:line:`.
+/// Thrown for an invalid configuration. The text is one sentence that starts with `file:line:`.
 class ConfigError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// A parsed YAML file as a tree that knows its lines (Ctrl-MORE paper, section III-A).
+/// A parsed YAML file as a tree. Each node stores its line (Ctrl-MORE paper, section III-A).
 ///
-/// Files are bounded before they are trusted: 1 MB, depth 32, 20000 nodes with aliases counted
-/// each time they are used; duplicate keys are refused.
+/// Limits of a file: 1 MB, depth 32, 20000 nodes. Each use of an alias counts. Duplicate keys are
+/// refused.
 class ConfigNode {
  public:
-  /// What a node is.
+  /// Kind of a node.
   enum class Kind { Empty, Scalar, List, Map };
 
   /// Parses a file; throws ConfigError.
@@ -28,40 +28,40 @@ class ConfigNode {
 
   /// Parses a text; throws ConfigError.
   /// @param text YAML
-  /// @param name what to call it in messages, for example a file name
+  /// @param name name for messages, for example a file name
   static ConfigNode fromText(const std::string& text, const std::string& name);
 
-  /// What the node is.
+  /// Kind of the node.
   Kind kind() const { return kind_; }
-  /// Line in the file, from 1.
+  /// Line in the file, starting at 1.
   int line() const { return line_; }
   /// `file:line`.
   std::string place() const;
 
-  /// Text of a scalar; throws ConfigError naming `what` if it is not one.
+  /// Text of a scalar. Throws ConfigError with `what` if the node is no scalar.
   const std::string& text(const std::string& what) const;
-  /// Finite number of a scalar; throws ConfigError naming `what`.
+  /// Finite number of a scalar. Throws ConfigError with `what`.
   double number(const std::string& what) const;
-  /// `true` or `false`; throws ConfigError naming `what`.
+  /// `true` or `false`. Throws ConfigError with `what`.
   bool boolean(const std::string& what) const;
-  /// Finite numbers of a list, or of one scalar; throws ConfigError naming `what`.
+  /// Finite numbers of a list, or of one scalar. Throws ConfigError with `what`.
   std::vector<double> numbers(const std::string& what) const;
-  /// Texts of a list; throws ConfigError naming `what`.
+  /// Texts of a list. Throws ConfigError with `what`.
   std::vector<std::string> texts(const std::string& what) const;
 
   /// Elements of a list.
   const std::vector<ConfigNode>& items() const { return items_; }
   /// Entries of a map, in the order of the file.
   const std::vector<std::pair<std::string, ConfigNode>>& entries() const { return entries_; }
-  /// Entry of a map, null if there is none.
+  /// Entry of a map; null if the key is missing.
   const ConfigNode* find(const std::string& key) const;
   /// Keys of a map, in the order of the file.
   std::vector<std::string> keys() const;
-  /// Throws ConfigError if the node is not a map or has a key that is not known, with the nearest
-  /// known one.
+  /// Throws ConfigError if the node is not a map or has an unknown key. The text suggests the
+  /// nearest known key.
   void requireKeys(const std::string& what, const std::vector<std::string>& known) const;
 
-  /// A ConfigError at this node.
+  /// Returns a ConfigError with the place of this node.
   ConfigError error(const std::string& text) const;
 
  private:

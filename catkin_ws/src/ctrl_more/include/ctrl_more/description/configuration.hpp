@@ -27,8 +27,8 @@ class Gain {
   std::uint32_t size_ = 0;
 };
 
-/// All gains of one controller as one flat vector, so that a change can be blended in and handed
-/// to the control cycle as one object.
+/// All gains of one controller in one flat vector. The control cycle receives a change of gains as
+/// one object and blends it in.
 class GainValues {
  public:
   /// No gains.
@@ -37,7 +37,7 @@ class GainValues {
   /// Every gain at its initial value.
   explicit GainValues(const std::vector<GainSpec>& specs);
 
-  /// Handle of a gain; throws std::invalid_argument naming the known ones if there is none.
+  /// Handle of a gain. An unknown name throws std::invalid_argument with the known names.
   Gain find(const std::string& name) const;
 
   /// The elements of a gain.
@@ -48,22 +48,22 @@ class GainValues {
   /// The first (or only) element of a gain.
   double scalar(Gain gain) const { return values_[gain.offset_]; }
 
-  /// Sets one gain after checking name, size, range and finiteness.
+  /// Sets one gain. Checks name, size, range and that the numbers are finite.
   /// @param name gain
-  /// @param value as many numbers as the gain has, or one number for all elements
+  /// @param value one number per element, or one number for all elements
   Status set(const std::string& name, const std::vector<double>& value);
 
-  /// Name to elements, for messages and for users (the paper's getGains()).
+  /// Elements by gain name, for messages and users (the paper's getGains()).
   std::map<std::string, std::vector<double>> all() const;
 
-  /// What the gains are.
+  /// Declarations of the gains.
   const std::vector<GainSpec>& specs() const { return specs_; }
 
-  /// Becomes `from + weight (to - from)`, element by element; exactly `to` at weight 1.
+  /// Sets this to `from + weight (to - from)`, element by element; exactly `to` at weight 1.
   /// No allocation. All three belong to the same controller.
   void blend(const GainValues& from, const GainValues& to, double weight);
 
-  /// Copies the numbers of another set of the same controller. No allocation.
+  /// Copies the numbers of another GainValues of the same controller. No allocation.
   void assign(const GainValues& other);
 
   /// True if all numbers are the same.
@@ -81,19 +81,20 @@ class SettingValues {
   /// Every setting at its initial value.
   explicit SettingValues(const std::vector<SettingSpec>& specs = {});
 
-  /// Sets a text setting; refuses unknown names and texts that are not among the choices.
+  /// Sets a text setting. Refuses unknown names and texts that are not among the choices.
   Status set(const std::string& name, const std::string& text);
 
-  /// Sets a numeric setting; refuses unknown names, other sizes, ranges, numbers not finite.
+  /// Sets a numeric setting. Refuses an unknown name, a wrong size, and a number that is out of
+  /// range or not finite.
   Status set(const std::string& name, const std::vector<double>& numbers);
 
-  /// A text setting; throws std::invalid_argument if the description has none of this name.
+  /// A text setting. Throws std::invalid_argument if the description has none of this name.
   const std::string& text(const std::string& name) const;
 
-  /// A numeric setting; throws std::invalid_argument if the description has none of this name.
+  /// A numeric setting. Throws std::invalid_argument if the description has none of this name.
   const std::vector<double>& numbers(const std::string& name) const;
 
-  /// What the settings are.
+  /// Declarations of the settings.
   const std::vector<SettingSpec>& specs() const { return specs_; }
 
   /// True if all values are the same.
@@ -117,12 +118,12 @@ struct ControllerConfig {
   GainValues gains;
   SettingValues settings;
 
-  /// Everything at its initial value.
+  /// All gains and settings at their initial values.
   explicit ControllerConfig(const Description& description);
 };
 
-/// Reads a controller's configuration file against its description; throws ConfigError naming
-/// file, line and field.
+/// Reads a controller's configuration file and checks it against the description. Throws
+/// ConfigError with file, line and field.
 ControllerConfig readControllerConfig(const Description& description, const ConfigNode& file);
 
 }  // namespace ctrl_more

@@ -9,29 +9,28 @@
 
 namespace ctrl_more {
 
-/// What happens to a controller's last correction of a signal when it stops contributing.
+/// Policy for a controller's last correction of a signal when the controller stops.
 enum class StopPolicy : std::uint8_t {
   ByKind,  ///< Hold for poses and orientations, Fade for everything else
   Hold,    ///< keep applying the last correction (the difference, not the absolute value)
-  Fade,    ///< let it go to zero over the blend time
-  Zero,    ///< drop it at once
+  Fade,    ///< blend the correction to zero over the blend time
+  Zero,    ///< remove the correction at once
 };
 
 /// `by kind`, `hold`, `fade` or `zero`.
 const char* nameOf(StopPolicy policy);
 
-/// What a controller's integrators do when the active motion controller changes.
+/// Policy for a controller's integrators when the active motion controller changes.
 enum class SwitchPolicy : std::uint8_t {
   Hold,   ///< keep the internal state
-  Reset,  ///< reset(); the manager blends the correction over
+  Reset,  ///< call reset(); the manager blends the correction
 };
 
-/// What every declared thing has: a unit and a text, set by one call each. `Self` is the type that
-/// inherits, so that calls can follow one another.
+/// Unit and text of a declaration. `Self` is the derived type, so that calls can be chained.
 template <typename Self>
 struct Documented {
   std::string unit;  ///< SI unit or list of units; required, "1" for a pure number
-  std::string text;  ///< what it is, or what it does; required
+  std::string text;  ///< description for the reader; required
 
   /// Sets the unit.
   Self& in(const std::string& units) { return unit = units, self(); }
@@ -43,35 +42,35 @@ struct Documented {
   Self& self() { return static_cast<Self&>(*this); }
 };
 
-/// What every declared signal has besides.
+/// Common fields of every declared signal.
 template <typename Self>
 struct SignalUse : Documented<Self> {
   std::string role;         ///< name within the controller, and the default key
-  std::string key_setting;  ///< text setting that holds the key, "" if the key is `role`
+  std::string key_setting;  ///< text setting that contains the key; "": the key is `role`
   std::vector<int> sizes;   ///< allowed sizes; empty: the container's, or any
-  std::string frame;        ///< required
-  bool if_asked = false;    ///< used only if initialize() asks for it, by its settings
+  std::string frame;        ///< frame of the numbers; required
+  bool if_asked = false;    ///< used only if initialize() requests it, depending on settings
 
   /// Allows one more size.
   Self& size(int n) { return sizes.push_back(n), this->self(); }
   /// Sets the frame.
   Self& frameOf(const std::string& name) { return frame = name, this->self(); }
-  /// Names the text setting with the key.
+  /// Sets the text setting that contains the key.
   Self& keyFrom(const std::string& setting) { return key_setting = setting, this->self(); }
-  /// Makes the use depend on settings.
+  /// Uses the signal only if initialize() requests it.
   Self& ifAsked() { return if_asked = true, this->self(); }
 };
 
 /// One robot signal that a controller reads.
 struct RobotSignalUse : SignalUse<RobotSignalUse> {
-  RobotSource source = RobotSource::Measured;  ///< which map
-  double max_age_s = kUnlimited;  ///< older data stop the controller until fresh ones come
+  RobotSource source = RobotSource::Measured;  ///< map of the signal
+  double max_age_s = kUnlimited;               ///< [s]; older data stop the controller
 
   /// Sets the largest age [s].
   RobotSignalUse& maxAge(double seconds) { return max_age_s = seconds, *this; }
 };
 
-/// Bounds on what a controller may do to one signal; beyond them its writes are undone.
+/// Bounds of a controller's correction of one signal. Beyond them its writes are undone.
 struct CorrectionLimit {
   double size = kUnlimited;        ///< norm of the correction (for poses: of the position) [unit]
   double rate = kUnlimited;        ///< norm of its change per second [unit/s]
@@ -81,11 +80,11 @@ struct CorrectionLimit {
 
 /// One control signal that a controller reads or modifies.
 struct ControlSignalUse : SignalUse<ControlSignalUse> {
-  ControlContainer container = ControlContainer::OtherReference;  ///< where it belongs
+  ControlContainer container = ControlContainer::OtherReference;  ///< container of the signal
   bool modifies = false;                                          ///< false: read only
   bool exclusive = false;                    ///< no other enabled controller may modify the signal
   CorrectionLimit limit;                     ///< bounds on the correction
-  StopPolicy on_pause = StopPolicy::ByKind;  ///< the correction while paused
+  StopPolicy on_pause = StopPolicy::ByKind;  ///< policy while paused
 
   /// Makes the use exclusive.
   ControlSignalUse& alone() { return exclusive = true, *this; }
@@ -103,19 +102,19 @@ struct GainSpec : Documented<GainSpec> {
   double max = kUnlimited;      ///< largest value allowed, each element
   std::vector<double> initial;  ///< value if the file does not give one; `size` doubles
 
-  /// Makes it `n` elements, all `value` by default.
+  /// Sets the size to `n` and all initial values to `value`.
   GainSpec& vector(int n, double value) { return size = n, initial.assign(n, value), *this; }
   /// Sets min and max.
   GainSpec& range(double smallest, double largest) { return min = smallest, max = largest, *this; }
 };
 
-/// One setting: read once at initialize(), fixed until the controller is loaded again.
+/// One setting. It is read once at initialize() and fixed until the controller is loaded again.
 struct SettingSpec : Documented<SettingSpec> {
-  /// What a setting holds.
+  /// Type of a setting.
   enum class Kind : std::uint8_t { Text, Numbers };
 
   std::string name;                  ///< key in the configuration file
-  Kind kind = Kind::Text;            ///< text, or numbers (a unit is required for them only)
+  Kind kind = Kind::Text;            ///< text, or numbers (only numbers need a unit)
   std::string initial_text;          ///< text if the file does not give one
   std::vector<std::string> choices;  ///< allowed texts; empty: any
   std::vector<double> initial;       ///< numbers if the file does not give any
@@ -133,30 +132,30 @@ struct SettingSpec : Documented<SettingSpec> {
   SettingSpec& anySize() { return any_size = true, *this; }
 };
 
-/// One number of a controller's inside that is worth watching, see FeedbackController::state().
+/// One internal number of a controller for display, see FeedbackController::state().
 struct StateSpec : Documented<StateSpec> {
   std::string name;  ///< unique within the controller
 };
 
-/// The one declaration of a controller. The run-time checks, the schema of its configuration file,
-/// plot(), its generated page and the template of its configuration all come from here.
+/// Declaration of a controller. It is the source of the run-time checks, the schema and the
+/// template of the configuration file, plot() and the generated documentation page.
 struct Description {
   std::string type;           ///< name under which the class is registered
   std::string summary;        ///< one sentence
-  std::string use;            ///< how to use it: what must be connected to what
+  std::string use;            ///< how to use it: which signals to connect
   std::string when;           ///< when to apply it, and when not
-  std::string limitations;    ///< what it does not do
+  std::string limitations;    ///< known limitations
   std::string law;            ///< the control law, in LaTeX
-  std::string source;         ///< where the law comes from
-  std::string information;    ///< anything else the developer wants to say; may be empty
-  Stage stage = Stage::Task;  ///< where in the cycle it runs
+  std::string source;         ///< source of the law
+  std::string information;    ///< additional information; may be empty
+  Stage stage = Stage::Task;  ///< stage of the cycle in which it runs
   bool safety = false;        ///< true: refuses pause and disable unless they are forced
   SwitchPolicy on_switch = SwitchPolicy::Reset;   ///< when the motion controller changes
-  std::vector<RobotSignalUse> robot_signals;      ///< what it reads of the robot
-  std::vector<ControlSignalUse> control_signals;  ///< what it reads and modifies
+  std::vector<RobotSignalUse> robot_signals;      ///< robot signals that it reads
+  std::vector<ControlSignalUse> control_signals;  ///< control signals that it reads or modifies
   std::vector<GainSpec> gains;                    ///< changeable while running
   std::vector<SettingSpec> settings;              ///< fixed at load
-  std::vector<StateSpec> states;                  ///< what state() writes, in this order
+  std::vector<StateSpec> states;                  ///< numbers that state() writes, in this order
 
   /// Adds a signal of `measuredData`.
   RobotSignalUse& measured(const std::string& role);
@@ -175,18 +174,18 @@ struct Description {
 
   /// Adds a number that state() writes.
   StateSpec& state(const std::string& name);
-  /// Adds several with one unit and text.
+  /// Adds several states with the same unit and text.
   void addStates(const std::vector<std::string>& names, const std::string& units,
                  const std::string& words) {
     for (const std::string& name : names) state(name).in(units).about(words);
   }
 
-  /// What a manager needs to run the controller safely: names unique, sizes and ranges sensible,
-  /// stage and modified containers in agreement. Empty if all is well, else one sentence each.
+  /// Errors that prevent a safe run, one sentence each: names that are not unique, invalid sizes or
+  /// ranges, modified containers that do not fit the stage. Empty if there are none.
   std::vector<std::string> faults() const;
 
-  /// What a reader needs: every text, unit and frame filled in. Empty if all is well, else one
-  /// sentence per empty field. Tests fail on it.
+  /// One sentence for each empty text, unit or frame. The tests of the controller require that
+  /// there are none.
   std::vector<std::string> emptyFields() const;
 };
 

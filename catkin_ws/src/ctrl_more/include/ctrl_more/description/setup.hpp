@@ -13,12 +13,12 @@
 
 namespace ctrl_more {
 
-/// One declared signal of a controller with the key and size it got.
+/// One declared signal of a controller with its resolved key and handle.
 template <typename Use, typename Handle>
 struct ResolvedUse {
   Use use;             ///< the declaration
   std::string key;     ///< the key after settings
-  Handle signal = {};  ///< where it is; empty until it is resolved
+  Handle signal = {};  ///< handle; empty until it is resolved
 };
 
 /// One declared robot signal.
@@ -33,10 +33,10 @@ struct ResolvedControlUse : ResolvedUse<ControlSignalUse, ControlSignal> {
   std::string name() const { return nameOf(use.container) + ("/" + key); }
 };
 
-/// What a controller gets in initialize(): its configuration, and handles for what its
-/// description declares. Asking for anything else, or for another size, throws
-/// std::invalid_argument, which refuses the controller with that sentence. Keys that do not exist
-/// yet are added with the declared size, until the stores are frozen.
+/// Argument of initialize(). It returns the configuration, and handles of declared signals. A
+/// request for an undeclared signal, or with another size, throws std::invalid_argument. The
+/// controller is then refused with that sentence. Keys that do not exist yet are added with the
+/// declared size, until the stores are frozen.
 class Setup {
  public:
   /// Made by the manager.
@@ -53,15 +53,15 @@ class Setup {
 
   /// Handle of a declared robot signal of N numbers.
   /// @param role its name in the description
-  /// @param size of Read<AnySize>: expected size; 0: the declared one (if the description allows
-  ///        several: the size the key already has)
+  /// @param size expected size of a Read<AnySize>; 0: the declared size (if the description allows
+  ///        several sizes: the size of the existing key)
   template <int N = AnySize>
   Read<N> read(const std::string& role, int size = 0) {
     return Read<N>(robotSignal(role, N == AnySize ? size : N));
   }
 
   /// Handle of a declared control signal of N numbers, for reading.
-  /// @param role its name in the description, or `container/role` where a role appears twice
+  /// @param role its name in the description, or `container/role` if a role appears twice
   /// @param size as in read()
   template <int N = AnySize>
   Reference<N> reference(const std::string& role, int size = 0) {
@@ -69,7 +69,7 @@ class Setup {
   }
 
   /// Permission to modify a control signal of N numbers that the description declares as modified.
-  /// @param role its name in the description, or `container/role` where a role appears twice
+  /// @param role its name in the description, or `container/role` if a role appears twice
   /// @param size as in read()
   template <int N = AnySize>
   Modify<N> modify(const std::string& role, int size = 0) {
@@ -90,11 +90,11 @@ class Setup {
   /// Number of joints of the control states, 0 if undecided.
   int joints() const { return control_.joints(); }
 
-  /// Control period [s]; the true one of each cycle is in Cycle::dt.
+  /// Nominal control period [s]. Cycle::dt is the true one of each cycle.
   double period() const { return control_.controlPeriod(); }
 
-  /// Resolves everything that was declared and not asked for, and drops what is declared to be
-  /// used only if asked for and was not. Called by the manager afterwards.
+  /// Resolves the declared signals that initialize() did not request. Drops those with ifAsked().
+  /// Called by the manager after initialize().
   void resolveAll();
 
   /// All declared robot signals, in order of declaration; complete after resolveAll().

@@ -9,25 +9,25 @@
 
 namespace ctrl_more {
 
-/// One controller as plot() shows it: declaration, present state, signals, gains.
+/// Content of plot() for one controller: declaration, current state, signals, gains.
 struct ControllerPlot {
-  std::string name;                                  ///< of the instance
-  Description description;                           ///< what it declares
+  std::string name;                                  ///< name of the instance
+  Description description;                           ///< its declaration
   bool enabled = false;                              ///< as requested
   bool paused = false;                               ///< for any reason
-  std::vector<ResolvedRobotUse> robot;               ///< what it reads of the robot
-  std::vector<ResolvedControlUse> control;           ///< what it reads and modifies
-  std::map<std::string, std::vector<double>> gains;  ///< present values
+  std::vector<ResolvedRobotUse> robot;               ///< robot signals that it reads
+  std::vector<ResolvedControlUse> control;           ///< control signals that it reads or modifies
+  std::map<std::string, std::vector<double>> gains;  ///< current values
 };
 
-/// What plot() prints of one controller.
+/// Text that plot() prints for one controller.
 std::string plotText(const ControllerPlot& controller);
 
-/// The documentation page of a controller in Markdown, from its description alone.
+/// Documentation page of a controller in Markdown, made from its description.
 std::string documentationPage(const Description& description);
 
-/// A configuration file with every gain and setting at its initial value, each with unit, range
-/// and text as a comment.
+/// Configuration file with all gains and settings at their initial values. Comments give unit,
+/// range and text of each.
 std::string configurationTemplate(const Description& description);
 
 }  // namespace ctrl_more

@@ -8,23 +8,23 @@
 
 namespace ctrl_more {
 
-/// A controller together with the library its code lives in; destroyed in the right order.
+/// A controller and the library with its code. The controller is destroyed before the library.
 struct ControllerInstance {
   std::shared_ptr<PluginLibrary> library;          ///< null for code linked into the program
-  std::unique_ptr<FeedbackController> controller;  ///< declared after, so destroyed first
+  std::unique_ptr<FeedbackController> controller;  ///< declared second, so destroyed first
 
-  /// Holds nothing.
+  /// Empty.
   ControllerInstance() = default;
-  /// Takes over both.
+  /// Takes ownership of both.
   ControllerInstance(ControllerInstance&&) = default;
   ControllerInstance& operator=(ControllerInstance&&) = delete;
   ~ControllerInstance() { controller.reset(); }
 };
 
 /// Makes a controller of a type.
-/// @param library_path file; "": the type must be linked into the program already
+/// @param library_path file; "": the type is linked into the program
 /// @param type registered name; "": the only one in the library
-/// @throws std::runtime_error with a sentence
+/// @throws std::runtime_error with one sentence
 ControllerInstance makeController(const std::string& library_path, const std::string& type);
 
 }  // namespace ctrl_more

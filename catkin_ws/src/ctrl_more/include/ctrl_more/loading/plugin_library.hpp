@@ -8,28 +8,28 @@
 
 namespace ctrl_more {
 
-/// One loaded plug-in library, the same for every kind of plug-in. Stays loaded while anything
-/// holds it; objects made by it must be destroyed before.
+/// One loaded plug-in library, for every kind of plug-in. It stays loaded while a pointer to it
+/// exists. Objects that it made must be destroyed before it.
 ///
-/// A library that was built again is loaded anew once everything of the old build is gone; where
-/// the dynamic linker keeps the old code, loading is refused and says so.
+/// A library that was rebuilt is loaded again after all objects and pointers of the old build are
+/// gone. If the dynamic linker keeps the old code in memory, loading is refused with that reason.
 class PluginLibrary {
  public:
-  /// Loads a library, or returns the one that is loaded already.
+  /// Loads a library, or returns the one that is already loaded.
   /// @param path file
-  /// @param types where the library registers its types
-  /// @throws std::runtime_error with a sentence: file missing or not loadable, no type in it,
-  ///         compiled for other headers, a type name that is registered already
+  /// @param types list in which the library registers its types
+  /// @throws std::runtime_error with one sentence if the file is missing or cannot be loaded,
+  ///         registers no type or a known type name, or was compiled for other headers
   static std::shared_ptr<PluginLibrary> open(const std::string& path, PluginTypes& types);
 
   ~PluginLibrary();
   PluginLibrary(const PluginLibrary&) = delete;
   PluginLibrary& operator=(const PluginLibrary&) = delete;
 
-  /// File the library came from.
+  /// File of the library.
   const std::string& path() const { return path_; }
 
-  /// Types it registers, sorted.
+  /// Registered types, sorted.
   const std::vector<std::string>& types() const { return types_; }
 
  private:
@@ -44,7 +44,7 @@ class PluginLibrary {
   std::string path_, mapped_;  // the user's file, and the copy of it that was opened
   PluginTypes& list_;
   std::vector<std::string> types_;
-  void* handle_ = nullptr;  // of the dynamic linker
+  void* handle_ = nullptr;  // handle of the dynamic linker
 };
 
 }  // namespace ctrl_more

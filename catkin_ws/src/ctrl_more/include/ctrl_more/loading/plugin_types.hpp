@@ -12,15 +12,15 @@
 
 namespace ctrl_more {
 
-/// What a plug-in library and the program that loads it must have in common. The compiler fills it
-/// in on both sides; a library whose numbers differ would read and write in the wrong places, and
-/// is refused.
+/// Binary interface (ABI) that a plug-in library and the program must share. The compiler fills in
+/// the numbers on both sides. A library with other numbers would read and write at wrong addresses,
+/// so it is refused.
 struct Abi {
-  int interface = 0;     ///< version of the headers: raised when classes or meanings change
+  int interface = 0;     ///< version of the headers: increased when classes or meanings change
   int compiler_abi = 0;  ///< `__GXX_ABI_VERSION`
   int eigen = 0;         ///< Eigen's version, 10000 world + 100 major + minor
   int eigen_align = 0;   ///< alignment that Eigen assumes [bytes]; depends on `-march`
-  std::array<std::size_t, 16> sizes{};  ///< of the classes that both sides share [bytes]
+  std::array<std::size_t, 16> sizes{};  ///< sizes of the shared classes [bytes]
 
   /// True if every number is the same.
   bool operator==(const Abi& other) const {
@@ -39,17 +39,17 @@ struct Abi {
     return all;
   }
 
-  /// The clause about a library with these numbers, to which the program is a stranger.
-  /// @param package whose headers it was compiled with
-  /// @param program the numbers of the program that loads it
+  /// Part of the error message for a library whose ABI differs from the program's.
+  /// @param package package of the headers
+  /// @param program ABI of the program that loads the library
   std::string otherThan(const std::string& package, const Abi& program) const {
     return "compiled for another " + package + " (" + text() + "; this program has " +
            program.text() + "): build it again with the headers and the compiler of this program";
   }
 };
 
-/// The numbers of the file that is being compiled. Static, so that a library keeps its own.
-/// @tparam Shared the classes that libraries and the program share
+/// ABI of the file that is being compiled. Static, so that each library has its own copy.
+/// @tparam Shared classes that libraries and the program share
 /// @param interface version of the headers
 template <typename... Shared>
 static constexpr Abi abiOf(int interface) {
@@ -60,64 +60,64 @@ static constexpr Abi abiOf(int interface) {
           {sizeof(Shared)...}};
 }
 
-/// The types of one kind of plug-in (feedback controllers, motion controllers), as the loader sees
-/// them: libraries put their types in when they are loaded. A name that is known already is
-/// refused, and so is a library compiled for other headers; refusals are remembered, so that the
-/// whole library can be refused.
+/// Registered types of one kind of plug-in (feedback controllers, motion controllers), as seen by
+/// the loader. A library registers its types when it is loaded. A known name, or a library that was
+/// compiled for other headers, is refused. Refusals are stored, so that the loader can refuse the
+/// whole library.
 ///
 /// Any thread.
 class PluginTypes {
  public:
-  /// What a library did wrong.
+  /// Reason for which a type of a library was refused.
   struct Refusal {
-    std::string type;    ///< the name it registers
-    std::string clause;  ///< what is wrong, for a sentence that begins with the library
+    std::string type;    ///< name of the type
+    std::string clause;  ///< the error; follows the library's name in the message
   };
 
-  /// @param kind what the types are, for messages: "controller"
-  /// @param macro what registers one in a source file
-  /// @param package whose headers libraries are compiled with
-  /// @param abi what the program was compiled with
+  /// @param kind kind of the types for messages, such as "controller"
+  /// @param macro macro that registers a type
+  /// @param package package of the headers for libraries
+  /// @param abi ABI of the program
   PluginTypes(std::string kind, std::string macro, std::string package, const Abi& abi)
       : kind_(std::move(kind)), macro_(std::move(macro)), package_(std::move(package)), abi_(abi) {}
   virtual ~PluginTypes() = default;
   PluginTypes(const PluginTypes&) = delete;
   PluginTypes& operator=(const PluginTypes&) = delete;
 
-  /// What the types are.
+  /// Kind of the types.
   const std::string& kind() const { return kind_; }
-  /// What registers one in a source file.
+  /// Macro that registers a type.
   const std::string& macro() const { return macro_; }
   /// All known names, sorted.
   virtual std::vector<std::string> types() const = 0;
-  /// What was refused since the last call; the list is emptied.
+  /// Returns the refusals since the last call and clears the list.
   std::vector<Refusal> takeRefused();
 
   /// @name For the loader
   /// @{
 
-  /// The library of these types is closed: they are unknown from now on. Their makers are kept,
-  /// because the dynamic linker may keep the library in memory, where it never registers again.
+  /// The library of these types was closed. The types are unknown from now on. Their makers are
+  /// kept: if the dynamic linker keeps the library in memory, it does not register them again.
   virtual void setAside(const std::vector<std::string>& types) = 0;
-  /// The library of these types was in memory all the time, and is opened again. What cannot come
-  /// back is refused.
-  /// @return those that are known again
+  /// The library of these types stayed in memory and is opened again. Types that cannot be restored
+  /// are refused.
+  /// @return the restored types
   virtual std::vector<std::string> bringBack(const std::vector<std::string>& types) = 0;
-  /// The library of these types has left the memory: their makers are no longer kept.
+  /// The library of these types was removed from memory. Discards their makers.
   virtual void forget(const std::vector<std::string>& types) = 0;
   /// @}
 
  protected:
-  /// Says why a type cannot be taken, or nothing if it can; under the mutex.
+  /// Returns true if a type can be added; else stores the refusal. Needs the mutex.
   bool admit(const std::string& type, bool known, bool has_maker, const Abi& abi);
-  /// Remembers a refusal; under the mutex.
+  /// Stores a refusal. Needs the mutex.
   void refuse(const std::string& type, const std::string& clause);
-  /// The clause about a name that is known already.
+  /// Part of the error message for a name that is already registered.
   static const char* knownAlready() {
     return ", which is registered already; give its controller another name";
   }
 
-  mutable std::mutex mutex_;  ///< of everything here and below
+  mutable std::mutex mutex_;  ///< protects all members here and in derived classes
 
  private:
   std::string kind_, macro_, package_;
@@ -125,21 +125,21 @@ class PluginTypes {
   std::vector<Refusal> refused_;
 };
 
-/// The same with what makes an object of each type.
-/// @tparam Maker a value: `Maker{}` is an empty one; compared with ==
+/// PluginTypes with a maker for each type.
+/// @tparam Maker value type with ==; `Maker{}` is empty
 template <typename Maker>
 class PluginTypesOf : public PluginTypes {
  public:
   using PluginTypes::PluginTypes;
 
-  /// Removes a type, if its maker is this one.
+  /// Removes a type if it has this maker.
   void erase(const std::string& type, const Maker& maker) {
     const std::lock_guard<std::mutex> lock(mutex_);
     const auto found = makers_.find(type);
     if (found != makers_.end() && found->second == maker) makers_.erase(found);
   }
 
-  /// Maker of a type, an empty one if it is unknown.
+  /// Maker of a type; empty if the type is unknown.
   Maker find(const std::string& type) const {
     const std::lock_guard<std::mutex> lock(mutex_);
     const auto found = makers_.find(type);
@@ -159,7 +159,7 @@ class PluginTypesOf : public PluginTypes {
     const std::lock_guard<std::mutex> lock(mutex_);
     for (const std::string& type : types) {
       aside_.erase(type);
-      aside_.insert(makers_.extract(type));  // nothing that could fail: a destructor calls this
+      aside_.insert(makers_.extract(type));  // must not fail: a destructor calls this
     }
   }
 
@@ -188,10 +188,10 @@ class PluginTypesOf : public PluginTypes {
   }
 
  protected:
-  /// Takes a type, or remembers why not.
+  /// Adds a type, or stores the refusal.
   /// @param type its name
-  /// @param maker makes one
-  /// @param abi what the library was compiled with
+  /// @param maker makes an object of the type
+  /// @param abi ABI of the library
   bool add(const std::string& type, const Maker& maker, const Abi& abi) {
     const std::lock_guard<std::mutex> lock(mutex_);
     return admit(type, makers_.count(type) != 0, !(maker == Maker{}), abi) &&

@@ -16,37 +16,38 @@ enum class LogLevel : std::uint8_t { Debug, Info, Warning, Error };
 /// `DEBUG`, `INFO`, `WARN` or `ERROR`.
 const char* nameOf(LogLevel level);
 
-/// One record, of fixed size: texts are copied and cut, numbers are formatted when it is drained.
+/// One record of fixed size. Texts are copied and cut to fit. Numbers are formatted when the record
+/// is drained.
 struct LogRecord {
   LogLevel level = LogLevel::Info;  ///< severity
   std::int64_t time_ns = 0;         ///< steady clock [ns]
-  std::uint64_t cycle = 0;          ///< control cycle, 0 outside the cycle
+  std::uint64_t cycle = 0;          ///< control cycle; 0: outside the cycle
   int line = 0;                     ///< source line
-  int values = 0;                   ///< how many of `value` are used
-  std::array<double, 4> value{};    ///< numbers, put where the text says {}
+  int values = 0;                   ///< number of used elements of `value`
+  std::array<double, 4> value{};    ///< numbers that replace each {} of the text
   std::array<char, 48> source{};    ///< controller or module
   std::array<char, 48> file{};      ///< source file, without folders
   std::array<char, 208> text{};     ///< message with {} for each number
 
-  /// The message with its numbers put in.
+  /// The message with its numbers inserted.
   std::string message() const;
   /// `[WARN] attitude (attitude.cpp:41, cycle 17): message`.
   std::string toLine() const;
 };
 
-/// Where drained records go. Called by one thread at a time, never in the cycle.
+/// Destination of drained records. Called by one thread at a time, never in the cycle.
 class LogSink {
  public:
   virtual ~LogSink() = default;
-  /// Takes one record.
+  /// Writes one record.
   virtual void write(const LogRecord& record) = 0;
 };
 
 /// Writes records as lines to a file.
 class FileLogSink : public LogSink {
  public:
-  /// Opens the file for appending; throws std::runtime_error naming the path if it cannot.
-  /// @param path the file itself, as given
+  /// Opens the file for appending. Throws std::runtime_error with the path if that fails.
+  /// @param path path of the file
   explicit FileLogSink(const std::string& path);
   void write(const LogRecord& record) override;
 
@@ -54,7 +55,7 @@ class FileLogSink : public LogSink {
   std::ofstream stream_;
 };
 
-/// Writes records as lines to a stream that outlives it.
+/// Writes records as lines to a stream, which must outlive the sink.
 class StreamLogSink : public LogSink {
  public:
   /// @param out for example std::cerr
@@ -65,44 +66,43 @@ class StreamLogSink : public LogSink {
   std::ostream& out_;
 };
 
-/// Logger of Ctrl-MORE (paper, section III-B): any thread, the control cycle included, puts
-/// fixed-size records into a bounded lock-free ring; a thread that may block drains them into
-/// sinks. A full ring drops the newest record and counts it.
+/// Logger of Ctrl-MORE (paper, section III-B). Any thread, including the control cycle, writes
+/// fixed-size records into a bounded lock-free ring. A thread that may block drains them into
+/// sinks. If the ring is full, the newest record is dropped and counted.
 class Logger {
  public:
   /// A logger without sinks.
-  /// @param capacity number of records the ring holds; rounded up to a power of two
+  /// @param capacity number of records in the ring; rounded up to a power of two
   explicit Logger(std::size_t capacity = 1024);
   ~Logger();
   Logger(const Logger&) = delete;
   Logger& operator=(const Logger&) = delete;
 
-  /// The logger of programs that do not bring their own: writes to std::cerr from a thread of its
-  /// own that starts with the first use.
+  /// Default logger. It writes to std::cerr from a separate thread, which starts at the first use.
   static Logger& standard();
 
   /// Adds a sink (outside the cycle).
   void addSink(std::shared_ptr<LogSink> sink);
 
-  /// Records below this level are dropped at the source. Default Info.
+  /// Sets the level below which records are dropped at the source. Default: Info.
   void setLevel(LogLevel level) { level_.store(level, std::memory_order_relaxed); }
 
-  /// True if a record of this level would be kept.
+  /// True if a record of this level is kept.
   bool wants(LogLevel level) const { return level >= level_.load(std::memory_order_relaxed); }
 
-  /// Puts one record in the ring: no allocation, no lock, no system call.
+  /// Writes one record into the ring. No allocation, no lock, no system call.
   /// @return false if the ring was full
   bool push(const LogRecord& record);
 
-  /// Convenience for outside the cycle: text of any length (cut to the record).
+  /// Logs a text of any length, cut to the record (outside the cycle).
   void log(LogLevel level, const std::string& source, const std::string& text,
            const char* file = "", int line = 0);
 
-  /// Hands all waiting records to the sinks (outside the cycle).
+  /// Writes all waiting records to the sinks (outside the cycle).
   /// @return number of records
   std::size_t drain();
 
-  /// Starts a thread that drains every `period_ms`; stopped by the destructor.
+  /// Starts a thread that drains every `period_ms`. The destructor stops it.
   void startDraining(int period_ms = 50);
 
   /// Number of records dropped because the ring was full.
@@ -117,22 +117,22 @@ class Logger {
   std::atomic<std::uint64_t> dropped_{0};
 };
 
-/// Who logs: a logger, a name, and the cycle counter that its records carry.
+/// Source of records: a logger, a name, and the cycle counter for its records.
 class LogSource {
  public:
-  /// Logs nowhere.
+  /// A source without logger; it drops all records.
   LogSource() = default;
   /// @param logger destination; must outlive the source
   /// @param name controller or module
-  /// @param cycle counter to stamp records with, may be null
+  /// @param cycle cycle counter for the records; may be null
   LogSource(Logger* logger, const std::string& name,
             const std::atomic<std::uint64_t>* cycle = nullptr);
 
-  /// Puts a record with up to four numbers in the ring. Safe in the cycle.
+  /// Writes a record with up to four numbers into the ring. Safe in the cycle.
   /// @param level severity
   /// @param file source file (__FILE__)
   /// @param line source line (__LINE__)
-  /// @param text message; each {} takes one number
+  /// @param text message; each {} stands for one number
   /// @param value the numbers
   template <typename... Numbers>
   void write(LogLevel level, const char* file, int line, const char* text, Numbers... value) const {
@@ -150,10 +150,10 @@ class LogSource {
   const std::atomic<std::uint64_t>* cycle_ = nullptr;
 };
 
-/// Lets through at most one record per period at one place in the code.
+/// Limits the records of one place in the code to one per period.
 class LogThrottle {
  public:
-  /// @param period_ns smallest distance of two records [ns]
+  /// @param period_ns smallest time between two records [ns]
   explicit LogThrottle(std::int64_t period_ns) : period_ns_(period_ns) {}
   /// True if a record may be written at this time (steady clock) [ns].
   bool pass(std::int64_t now_ns) {

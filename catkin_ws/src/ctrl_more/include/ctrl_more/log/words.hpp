@@ -5,12 +5,12 @@
 
 namespace ctrl_more {
 
-/// The known name nearest to a wrong one, "" if none is near: letters swapped, missing or
-/// different, or one contained in the other.
+/// Known name that is similar to a wrong one: letters swapped, missing or different, or one name
+/// contained in the other. "" if there is none.
 std::string nearestName(const std::string& wrong, const std::vector<std::string>& known);
 
-/// What to add to the sentence about an unknown name: `; did you mean 'x'?` or, if no name is
-/// near, `; known: a, b, c`.
+/// End of the message about an unknown name: `; did you mean 'x'?` or, without a similar name,
+/// `; known: a, b, c`.
 std::string suggestion(const std::string& wrong, const std::vector<std::string>& known);
 
 /// Names separated by commas.

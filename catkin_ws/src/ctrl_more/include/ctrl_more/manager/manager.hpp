@@ -8,26 +8,26 @@
 
 namespace ctrl_more {
 
-/// A part of the control cycle that the central module runs: feedback controllers, locomotion, or
-/// whatever writes or modifies references (Ctrl-MORE paper, section VI).
+/// A part of the control cycle that writes or modifies references, such as feedback controllers or
+/// locomotion. The central module runs it (Ctrl-MORE paper, section VI).
 ///
-/// In the cycle a manager sees the shared states only through the calls below, which neither
-/// allocate nor lock nor throw.
+/// In the cycle a manager accesses the shared states only in the calls below. They do not allocate,
+/// lock or throw.
 class Manager {
  public:
   virtual ~Manager() = default;
 
-  /// Name under which the central module's file lists it.
+  /// Name in the central module's file.
   virtual const std::string& name() const = 0;
 
-  /// Start of a cycle: adopts what was requested since the last one.
+  /// Starts a cycle. Adopts the changes that were requested since the last one.
   virtual void beginCycle(const Cycle& cycle) noexcept = 0;
 
-  /// One stage of the cycle. A manager that has nothing to do in a stage does nothing.
+  /// Runs one stage of the cycle. May do nothing.
   virtual void updateStage(Stage stage, const RobotStates& robot,
                            ControlStates& control) noexcept = 0;
 
-  /// End of a cycle.
+  /// Ends a cycle.
   virtual void endCycle() noexcept {}
 };
 

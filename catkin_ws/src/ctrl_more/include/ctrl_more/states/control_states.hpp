@@ -14,39 +14,39 @@
 
 namespace ctrl_more {
 
-/// How the references are meant to be executed.
+/// Control mode in which the references are executed.
 enum class ControlMode : std::uint8_t { Task, JointPosition, JointVelocity, JointTorque };
 
-/// References and control efforts: what motion controllers write and feedback controllers modify
-/// (Ctrl-MORE paper, section IV-B).
+/// References and control efforts. Motion controllers write them and feedback controllers modify
+/// them (Ctrl-MORE paper, section IV-B).
 ///
-/// Every container of the paper has its own set and get by key, for outside the cycle; inside it
-/// signals are read and written by handle. Sizes are those of ControlContainer. Poses must have a
-/// unit quaternion (1e-6), every number must be finite; what is refused leaves the signal
-/// untouched. New keys are announced once; after freeze() a new key is an error.
+/// Outside the cycle, every container of the paper has a set and get method by key. Inside the
+/// cycle, signals are read and written by handle. ControlContainer lists the sizes. Poses must have
+/// a unit quaternion (1e-6), and every number must be finite. A refused value leaves the signal
+/// unchanged. A new key is logged once; after freeze() it is an error.
 ///
-/// All signals live in one contiguous buffer, so that the state at the start of a stage
-/// ("original") is one copy.
+/// All signals share one contiguous buffer, so the state at the start of a stage ("original") is a
+/// single copy.
 ///
 /// Threads: one thread at a time.
 class ControlStates {
  public:
-  /// A store with the well-known signals (com, momenta, zmp, pelvis) and no others.
-  /// @param joints number of joints; every jointSpaceReference has this size (0: the first one
-  ///        that is set decides)
+  /// A store with only the well-known signals (com, momenta, zmp, pelvis).
+  /// @param joints number of joints, the size of every jointSpaceReference (0: the first one that
+  ///        is set decides)
   /// @param period_s control period [s], > 0
-  /// @param logger where new keys and wrong accesses are reported; null: Logger::standard()
+  /// @param logger logs new keys and wrong accesses; null: Logger::standard()
   explicit ControlStates(int joints = 0, double period_s = 0.005, Logger* logger = nullptr);
 
   /// @name Declaring keys (outside the cycle, before freeze())
   /// @{
 
-  /// Declares a signal, or completes the unit and frame of one that exists with the same size.
-  /// @param container where it belongs
+  /// Declares a signal, or adds unit and frame to an existing signal of the same size.
+  /// @param container container of the signal
   /// @param key name within the container, not empty
-  /// @param size number of doubles; must agree with the container's fixed size if it has one
+  /// @param size number of doubles; must equal the container's fixed size, if it has one
   /// @param unit SI unit or list of units
-  /// @param frame frame the numbers are expressed in
+  /// @param frame frame of the numbers
   Status declare(ControlContainer container, const std::string& key, int size,
                  const std::string& unit = "", const std::string& frame = "");
 
@@ -59,7 +59,7 @@ class ControlStates {
 
   /// @name The paper's accessors, by key (outside the cycle)
   /// Setters refuse wrong sizes, numbers that are not finite and quaternions that are not unit.
-  /// Getters leave the output untouched on failure. `who` names the caller in messages.
+  /// Getters leave the output unchanged on failure. `who` is the caller's name in messages.
   /// @{
   using Values = Eigen::Ref<const Eigen::VectorXd>;
   using Vector3 = Eigen::Vector3d;
@@ -91,7 +91,7 @@ class ControlStates {
                                   const char* who = "user") const {
     return get(ControlContainer::TaskSpaceReferenceAcc, key, value, who);
   }
-  /// One per joint; Position, Velocity or Torque.
+  /// One number per joint; key Position, Velocity or Torque.
   Status setJointSpaceReference(const std::string& type, const Values& value,
                                 const char* who = "user") {
     return set(ControlContainer::JointSpaceReference, type, value, who);
@@ -100,7 +100,7 @@ class ControlStates {
                                 const char* who = "user") const {
     return get(ControlContainer::JointSpaceReference, type, value, who);
   }
-  /// Size fixed by its first writer.
+  /// The first writer sets the size.
   Status setOtherReference(const std::string& key, const Values& value, const char* who = "user") {
     return set(ControlContainer::OtherReference, key, value, who);
   }
@@ -151,22 +151,22 @@ class ControlStates {
     return set(ControlContainer::Zmp, key, value, who);
   }
   Status getZMP(const std::string& key, Vector3& value, const char* who = "user") const;
-  /// Re-orthonormalised; refused if the matrix is further than 1e-3 from a rotation.
+  /// Re-orthonormalised. Refused if the matrix differs from a rotation by more than 1e-3.
   Status setPelvisOrientation(const Eigen::Matrix3d& orientation, const char* who = "user");
   /// From roll, pitch, yaw [rad]: R = Rz(yaw) Ry(pitch) Rx(roll).
   Status setPelvisOrientation(double roll, double pitch, double yaw, const char* who = "user");
-  /// A rotation, identity until set.
+  /// A rotation; identity until it is set.
   Eigen::Matrix3d getPelvisOrientation() const;
   /// @}
 
   /// @name Access by handle (inside the cycle: no allocation, no lock)
   /// @{
 
-  /// Handle of a key; an invalid handle if there is none (outside the cycle).
+  /// Handle of a key; invalid if the key does not exist (outside the cycle).
   ControlSignal find(ControlContainer container, const std::string& key) const;
 
   /// Handle of a key that has N numbers (outside the cycle).
-  /// @throws std::invalid_argument if there is no such key, or it has another size
+  /// @throws std::invalid_argument if the key does not exist or has another size
   template <int N>
   Reference<N> find(ControlContainer container, const std::string& key) const {
     return Reference<N>(findSized(container, key, N));
@@ -177,8 +177,8 @@ class ControlStates {
     return Eigen::Map<const Eigen::VectorXd>(data() + signal.offset(), signal.size());
   }
 
-  /// The numbers of a signal, writable: for the host and its motion controllers, which own the
-  /// store. Unchecked; the host's final guard judges the result.
+  /// The numbers of a signal, writable, for the host and its motion controllers, which own the
+  /// store. They are not checked here; the host's final guard checks the result.
   Eigen::Map<Eigen::VectorXd> view(ControlSignal signal) {
     return Eigen::Map<Eigen::VectorXd>(data() + signal.offset(), signal.size());
   }
@@ -216,26 +216,26 @@ class ControlStates {
   void copyValuesFrom(const ControlStates& other);
   /// @}
 
-  /// Number of joints, 0 while undecided.
+  /// Number of joints; 0 until it is known.
   int joints() const { return joints_; }
   /// Control period [s].
   double controlPeriod() const { return period_s_; }
   /// Sets the control period [s]; refused unless 0 < period < 1.
   Status setControlPeriod(double period_s);
-  /// How the references are meant to be executed.
+  /// Control mode in which the references are executed.
   ControlMode controlMode() const { return mode_; }
-  /// Sets how the references are meant to be executed.
+  /// Sets the control mode.
   void setControlMode(ControlMode mode) { mode_ = mode; }
 
-  /// Table of one container, in order of declaration.
+  /// Signals of one container, in order of declaration.
   std::vector<SignalInfo> signals(ControlContainer container) const;
 
-  /// The row of a handle that find() made.
+  /// Table row of a handle from find().
   const SignalTable::Entry& entryOf(ControlSignal signal) const {
     return table_.entries()[signal.index()];
   }
 
-  /// Container and key of a handle, as `container/key`, for reports.
+  /// `container/key` of a handle, for reports.
   std::string nameOfSignal(ControlSignal signal) const;
 
   /// Prints every signal of every container.

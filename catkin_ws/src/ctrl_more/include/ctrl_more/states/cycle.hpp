@@ -4,9 +4,9 @@
 
 namespace ctrl_more {
 
-/// Where in the control cycle a controller runs.
+/// Stage of the control cycle in which a controller runs.
 enum class Stage : std::uint8_t {
-  Task,   ///< after the reference is computed, before inverse kinematics: task-space references
+  Task,   ///< between reference and inverse kinematics: task-space references
   Joint,  ///< after inverse kinematics: joint-space references
 };
 
@@ -20,7 +20,7 @@ const char* nameOf(Stage stage);
 struct Cycle {
   std::int64_t now_ns = 0;   ///< monotonic time at the start of the cycle [ns]
   double dt = 0.005;         ///< true time since the last cycle [s], > 0
-  std::uint64_t number = 0;  ///< counts up by one each cycle
+  std::uint64_t number = 0;  ///< increases by one each cycle
 };
 
 }  // namespace ctrl_more

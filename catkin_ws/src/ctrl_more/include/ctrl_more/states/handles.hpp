@@ -10,45 +10,45 @@
 
 namespace ctrl_more {
 
-/// Sizes that have a name, for the handles below: `Modify<Pose>` is `Modify<7>`.
+/// Named sizes for the handles below: `Modify<Pose>` is `Modify<7>`.
 enum SignalSize : int {
-  AnySize = Eigen::Dynamic,  ///< known at run time only
+  AnySize = Eigen::Dynamic,  ///< known only at run time
   Twist = 6,                 ///< linear, angular
   Wrench = 6,                ///< force, torque
   Pose = 7,                  ///< x y z, quaternion x y z w
 };
 
-/// Thrown when a controller uses a permission that is not its own. A fault: the manager undoes
-/// the controller's writes and pauses it.
+/// Thrown when a controller uses a permission of another controller. This is a fault: the manager
+/// undoes the controller's writes and pauses it.
 class UndeclaredWrite : public std::logic_error {
  public:
   using std::logic_error::logic_error;
 };
 
-/// Thrown when a handle is used that initialize() never fetched. A fault in a controller.
+/// Thrown when a controller uses a handle that it did not fetch in initialize(). This is a fault.
 class EmptyHandle : public std::logic_error {
  public:
   using std::logic_error::logic_error;
 };
 
-/// Thrown when a controller writes beside the numbers of a signal. A fault; the sentence names the
-/// signal, its size and what was given.
+/// Thrown when a controller writes outside the numbers of a signal. This is a fault. The sentence
+/// contains the signal, its size and the given size.
 class WrongSize : public std::length_error {
  public:
   using std::length_error::length_error;
 };
 
-/// Throws WrongSize: `given` numbers for a signal (or a part of one) that has `expected`. Null: the
-/// controller's state.
+/// Throws WrongSize for `given` instead of `expected` numbers of a signal or a part of it.
+/// `signal` null: the controller's state.
 [[noreturn, gnu::cold]] void refuseSize(const SignalTable::Entry* signal, int expected, int given);
 
-/// Throws WrongSize: `count` numbers from `start` on, of a signal (or a part of one) that has
-/// `size`.
+/// Throws WrongSize for an access to `count` numbers from `start` on, in a signal (or a part of it)
+/// of `size` numbers.
 [[noreturn, gnu::cold]] void refuseReach(const SignalTable::Entry* signal, int size,
                                          std::ptrdiff_t start, std::ptrdiff_t count);
 
-/// Handle of a robot signal of N numbers, for reading: `robot.view(handle)`. Only Setup makes one
-/// that is not empty, and has compared N with the signal's size then.
+/// Handle for reading a robot signal of N numbers: `robot.view(handle)`. Only Setup makes handles
+/// that are not empty; it checks that the signal has N numbers.
 template <int N = AnySize>
 class Read {
  public:
@@ -66,15 +66,15 @@ class Read {
   RobotSignal signal_;
 };
 
-/// Handle of a control signal of N numbers. A controller only sees constant stores, so for it this
-/// handle reads: `original.view(handle)`; the host may write by it. Setup and
-/// ControlStates::find<N>() make one, and have compared N with the signal's size then.
+/// Handle of a control signal of N numbers. A controller has constant stores and can only read with
+/// it: `original.view(handle)`. The host can also write. Setup and ControlStates::find<N>() make
+/// handles; they check that the signal has N numbers.
 template <int N = AnySize>
 class Reference {
  public:
   /// An empty handle; using it throws EmptyHandle.
   Reference() = default;
-  /// The same without its size, for queries.
+  /// The handle without the size, for queries.
   ControlSignal signal() const { return signal_; }
   /// Number of doubles.
   int size() const { return signal_.size(); }
@@ -89,14 +89,14 @@ class Reference {
 };
 
 /// Permission of one controller to modify a control signal of N numbers: `modified[handle]`. Only
-/// Setup issues it, only for a signal that the controller's description declares as modified, after
-/// comparing N with its size; only its owner can use it. It reads as well: `original.view(handle)`.
+/// Setup issues it, for signals that the description declares as modified, and checks that the
+/// signal has N numbers. Only its owner can use it. It also reads: `original.view(handle)`.
 template <int N = AnySize>
 class Modify {
  public:
   /// An empty permission; using it is a fault.
   Modify() = default;
-  /// The same signal without permission, for queries.
+  /// The handle of the signal without the permission, for queries.
   ControlSignal signal() const { return signal_; }
   /// Number of doubles.
   int size() const { return signal_.size(); }
@@ -112,10 +112,10 @@ class Modify {
   std::uint32_t owner_ = 0;
 };
 
-/// N numbers that may be written, and none beside them, in every build. For reading it is a
-/// constant Eigen vector. Written is by assignment, `+= -= *= /=`, numbers and parts of it; a size
-/// that can be compared by the compiler must fit, all others throw WrongSize. What Eigen offers
-/// besides for writing (`<<`, coeffRef, blocks, resize) does not compile or does nothing.
+/// Writable view of N numbers, with bounds checks in every build. For reading it is a constant
+/// Eigen vector. It is written by assignment, `+= -= *= /=`, single numbers and segments. The
+/// compiler checks fixed sizes; other wrong sizes throw WrongSize. Eigen's other ways of writing
+/// (`<<`, coeffRef, blocks, resize) do not compile or have no effect.
 template <int N = AnySize>
 class Numbers : public Eigen::Map<const Eigen::Matrix<double, N, 1>> {
   using Base = Eigen::Map<const Eigen::Matrix<double, N, 1>>;
@@ -123,8 +123,8 @@ class Numbers : public Eigen::Map<const Eigen::Matrix<double, N, 1>> {
 
  public:
   /// @param data first number
-  /// @param size how many there are; N if that is fixed
-  /// @param signal to which they belong, for messages; null: the controller's state
+  /// @param size number of doubles; N if N is fixed
+  /// @param signal signal of the numbers, for messages; null: the controller's state
   Numbers(double* data, int size, const SignalTable::Entry* signal = nullptr)
       : Base(data, size), begin_(data), signal_(signal) {}
   /// Another view of the same numbers.
@@ -155,11 +155,11 @@ class Numbers : public Eigen::Map<const Eigen::Matrix<double, N, 1>> {
   Numbers& operator*=(double factor) { return written() *= factor, *this; }
   /// Divides every number.
   Numbers& operator/=(double divisor) { return written() /= divisor, *this; }
-  /// Gives every number the same value.
+  /// Sets every number to `value`.
   Numbers& setConstant(double value) { return written().setConstant(value), *this; }
-  /// Gives every number the value 0.
+  /// Sets every number to 0.
   Numbers& setZero() { return setConstant(0.0); }
-  /// Nothing says how many numbers follow.
+  /// Deleted, because the count of the following numbers cannot be checked.
   template <typename Value>
   void operator<<(const Value&) = delete;
 

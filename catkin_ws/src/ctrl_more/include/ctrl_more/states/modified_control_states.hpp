@@ -9,8 +9,8 @@
 
 namespace ctrl_more {
 
-/// The references as modified so far in this cycle, as one controller may touch them: everything
-/// readable, writable only what it declared.
+/// One controller's view of the references as modified so far in this cycle. The controller can
+/// read all signals and write only those that it declared.
 class ModifiedControlStates {
  public:
   /// A view for one controller.
@@ -19,22 +19,22 @@ class ModifiedControlStates {
   ModifiedControlStates(ControlStates& control, std::uint32_t owner)
       : control_(control), owner_(owner) {}
 
-  /// The numbers of a signal, as left by the controllers before this one.
+  /// The numbers of a signal after the controllers before this one.
   /// @throws EmptyHandle
   template <int N>
   Eigen::Map<const Eigen::Matrix<double, N, 1>> view(const Reference<N>& handle) const {
     return states().view(handle);
   }
 
-  /// As above, of a signal that the controller modifies.
+  /// As above, for a signal that the controller modifies.
   /// @throws EmptyHandle
   template <int N>
   Eigen::Map<const Eigen::Matrix<double, N, 1>> view(const Modify<N>& handle) const {
     return states().view(handle);
   }
 
-  /// The numbers of a signal, writable; reaching beside them throws WrongSize.
-  /// @throws UndeclaredWrite if the permission is empty or another controller's
+  /// The numbers of a signal, writable. Access outside them throws WrongSize.
+  /// @throws UndeclaredWrite if the permission is empty or belongs to another controller
   template <int N>
   Numbers<N> operator[](const Modify<N>& handle) {
     if (handle.owner_ != owner_) refuse();

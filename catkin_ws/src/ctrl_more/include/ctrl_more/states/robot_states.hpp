@@ -14,30 +14,30 @@
 
 namespace ctrl_more {
 
-/// What the robot measures and what other modules estimate (Ctrl-MORE paper, section IV-A).
+/// Measurements of the robot and estimates of other modules (Ctrl-MORE paper, section IV-A).
 ///
 /// The paper's four maps are `measuredData` with `measurementTimeStamp` and `estimatedData` with
-/// `estimateTimeStamp`. Here all of them are one SignalTable with a stamp for each row: users read
-/// and write by key outside the cycle, controllers and the host by handle inside it. Stamps are
-/// monotonic nanoseconds; a signal that was declared but never written has the stamp kNeverWritten
-/// and reads as zeros.
+/// `estimateTimeStamp`. Here they are one SignalTable with a stamp for each row. Outside the cycle,
+/// users read and write by key. Inside it, controllers and the host use handles. Stamps are
+/// monotonic nanoseconds. A declared signal that was never written has the stamp kNeverWritten and
+/// contains zeros.
 ///
-/// Threads: one thread at a time. Data from other threads comes through SignalMailbox.
+/// Threads: one thread at a time. SignalMailbox transfers data from other threads.
 class RobotStates {
  public:
   /// An empty store.
-  /// @param logger where new keys and wrong accesses are reported; null: Logger::standard()
+  /// @param logger logs new keys and wrong accesses; null: Logger::standard()
   explicit RobotStates(Logger* logger = nullptr);
 
   /// @name Declaring keys (outside the cycle, before freeze())
   /// @{
 
-  /// Declares a signal, or completes the unit and frame of one that exists with the same size.
-  /// @param source which map
+  /// Declares a signal, or adds unit and frame to an existing signal of the same size.
+  /// @param source map of the signal
   /// @param key name, not empty
   /// @param size number of doubles, > 0
   /// @param unit SI unit or list of units
-  /// @param frame frame the numbers are expressed in
+  /// @param frame frame of the numbers
   Status declare(RobotSource source, const std::string& key, int size, const std::string& unit = "",
                  const std::string& frame = "");
 
@@ -49,12 +49,12 @@ class RobotStates {
   /// @}
 
   /// @name The paper's accessors, by key (outside the cycle)
-  /// Errors name the key, the expected size, the size that came and who asked.
+  /// Errors contain the key, the expected and the given size, and the caller.
   /// @{
 
   using Values = Eigen::Ref<const Eigen::VectorXd>;
 
-  /// Writes `measuredData[key]` and its stamp; a new key is added and announced.
+  /// Writes `measuredData[key]` and its stamp. A new key is added and logged.
   /// @param key name of the signal
   /// @param value all of its numbers, finite
   /// @param stamp_ns time of measurement, monotonic nanoseconds >= 0
@@ -68,12 +68,12 @@ class RobotStates {
                           const char* who = "user") {
     return set(RobotSource::Estimated, key, value, stamp_ns, who);
   }
-  /// Reads `measuredData[key]`; on failure `value` is untouched.
+  /// Reads `measuredData[key]`. On failure `value` is unchanged.
   Status getMeasuredData(const std::string& key, Eigen::VectorXd& value,
                          const char* who = "user") const {
     return get(RobotSource::Measured, key, value, nullptr, who);
   }
-  /// Reads `measuredData[key]` with its stamp; on failure both are untouched.
+  /// Reads `measuredData[key]` with its stamp. On failure both are unchanged.
   Status getMeasuredData(const std::string& key, Eigen::VectorXd& value, std::int64_t& stamp_ns,
                          const char* who = "user") const {
     return get(RobotSource::Measured, key, value, &stamp_ns, who);
@@ -88,12 +88,12 @@ class RobotStates {
                           const char* who = "user") const {
     return get(RobotSource::Estimated, key, value, &stamp_ns, who);
   }
-  /// Writes `measurementTimeStamp[key]`; refused when `measuredData` has no such key.
+  /// Writes `measurementTimeStamp[key]`. Refused if `measuredData` has no such key.
   Status setMeasurementTimeStamp(const std::string& key, std::int64_t stamp_ns,
                                  const char* who = "user") {
     return setStamp(RobotSource::Measured, key, stamp_ns, who);
   }
-  /// Writes `estimateTimeStamp[key]`; refused when `estimatedData` has no such key.
+  /// Writes `estimateTimeStamp[key]`. Refused if `estimatedData` has no such key.
   Status setEstimateTimeStamp(const std::string& key, std::int64_t stamp_ns,
                               const char* who = "user") {
     return setStamp(RobotSource::Estimated, key, stamp_ns, who);
@@ -103,7 +103,7 @@ class RobotStates {
   /// @name Access by handle (inside the cycle: no allocation, no lock)
   /// @{
 
-  /// Handle of a key; an invalid handle if there is none (outside the cycle).
+  /// Handle of a key; invalid if the key does not exist (outside the cycle).
   RobotSignal find(RobotSource source, const std::string& key) const;
 
   /// The numbers of a signal.
@@ -129,12 +129,11 @@ class RobotStates {
   /// Stamp of a signal, monotonic nanoseconds, or kNeverWritten.
   std::int64_t stamp(RobotSignal signal) const { return stamps_[signal.index()]; }
 
-  /// How far ahead of now a stamp may be [ns]: sensors and the cycle do not read the clock at the
-  /// same moment. What is further ahead comes from another clock, and is not fresh.
+  /// Largest time that a stamp may be ahead of now [ns], because sensors and the cycle read the
+  /// clock at different moments. A later stamp comes from another clock and is not fresh.
   static constexpr std::int64_t kMostAhead = 50'000'000;
 
-  /// True if the signal was written not longer than `max_age_ns` before `now_ns`, and not more than
-  /// kMostAhead after it.
+  /// True if the stamp is at most `max_age_ns` before `now_ns` and at most kMostAhead after it.
   bool isFresh(RobotSignal signal, std::int64_t now_ns, std::int64_t max_age_ns) const {
     const std::int64_t stamp = stamps_[signal.index()];
     // Too far ahead becomes a number larger than any age.
@@ -142,23 +141,23 @@ class RobotStates {
     return stamp != kNeverWritten && age <= static_cast<std::uint64_t>(max_age_ns) + kMostAhead;
   }
 
-  /// Writes a signal. Returns false, and leaves it untouched, if a number is not finite.
+  /// Writes a signal. If a number is not finite, returns false and leaves the signal unchanged.
   /// @param signal handle from find()
   /// @param values `signal.size()` doubles
   /// @param stamp_ns monotonic nanoseconds >= 0
   bool write(RobotSignal signal, const double* values, std::int64_t stamp_ns);
   /// @}
 
-  /// Newest stamp of any signal, kNeverWritten if none was written. This is "now" for users who
-  /// run a manager without a clock.
+  /// Newest stamp of all signals; kNeverWritten if none was written. A manager without a clock uses
+  /// it as the current time.
   std::int64_t newestStamp() const { return newest_; }
 
-  /// Table of one map, in order of declaration.
+  /// Signals of one map, in order of declaration.
   std::vector<SignalInfo> signals(RobotSource source) const;
 
   /// Prints every signal of both maps with its numbers, unit and age.
   /// @param out stream
-  /// @param now_ns time the ages refer to; kNeverWritten: newestStamp()
+  /// @param now_ns reference time of the ages; kNeverWritten: newestStamp()
   void print(std::ostream& out, std::int64_t now_ns = kNeverWritten) const;
 
  private:

@@ -22,7 +22,7 @@ enum class ControlContainer : std::uint8_t {
   CentreOfMass,            ///< 3 each; keys com, comVelocity, comAcceleration
   LinearMomentum,          ///< 3 [kg m/s]; key linearMomentum
   AngularMomentum,         ///< 3 [kg m^2/s]; key angularMomentum
-  Zmp,                     ///< 3 [m]; key zmp, and named ones
+  Zmp,                     ///< 3 [m]; key zmp and user-defined keys
   PelvisOrientation,       ///< 4: unit quaternion x y z w; key pelvis
 };
 
@@ -31,23 +31,23 @@ constexpr int kRobotSources = 2;
 /// Number of containers.
 constexpr int kControlContainers = 10;
 
-/// How corrections of a signal are combined, faded and checked.
+/// Rule for combining, fading and checking corrections of a signal.
 enum class SignalKind : std::uint8_t {
-  Vector,      ///< a correction is a sum
+  Vector,      ///< a correction is added
   Pose,        ///< 7: position adds, orientation multiplies from the left
   Quaternion,  ///< 4: x y z w, multiplies from the left
 };
 
-/// What the signals of one map or container have in common.
+/// Common properties of the signals of one map or container.
 struct SignalGroup {
   const char* name;                      ///< as in the paper
   SignalKind kind = SignalKind::Vector;  ///< algebra of corrections
-  int size = 0;                          ///< of every signal; 0: each key declares its own
+  int size = 0;                          ///< size of every signal; 0: each key has its own
 };
 
-/// What the signals of a source have in common.
+/// Common properties of the signals of a source.
 const SignalGroup& groupOf(RobotSource source);
-/// What the signals of a container have in common.
+/// Common properties of the signals of a container.
 const SignalGroup& groupOf(ControlContainer container);
 
 /// Name of a source as in the paper: `measuredData`, `estimatedData`.
@@ -56,7 +56,7 @@ inline const char* nameOf(RobotSource source) { return groupOf(source).name; }
 inline const char* nameOf(ControlContainer container) { return groupOf(container).name; }
 /// Kind of the signals of a container.
 inline SignalKind kindOf(ControlContainer container) { return groupOf(container).kind; }
-/// Size that every signal of a container has; 0 where each key declares its own.
+/// Size of every signal of a container; 0 if each key has its own.
 inline int fixedSizeOf(ControlContainer container) { return groupOf(container).size; }
 
 /// Stamp of a signal that was never written. All other stamps are monotonic nanoseconds >= 0.
@@ -65,17 +65,17 @@ constexpr std::int64_t kNeverWritten = -1;
 /// "No limit", for ages and corrections.
 constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 
-/// What a store knows of one signal.
+/// Properties of one signal in a store.
 struct SignalInfo {
-  std::string key;           ///< key within its map or container
-  std::string unit;          ///< SI unit or list of units, "" if the writer declared none
-  std::string frame;         ///< frame the numbers are expressed in, "" if not declared
-  std::uint32_t offset = 0;  ///< first double in the store's buffer
-  std::uint32_t size = 0;    ///< number of doubles
+  std::string key;                       ///< key within its map or container
+  std::string unit;                      ///< SI unit or list of units; "" if not declared
+  std::string frame;                     ///< frame of the numbers; "" if not declared
+  std::uint32_t offset = 0;              ///< first double in the store's buffer
+  std::uint32_t size = 0;                ///< number of doubles
   SignalKind kind = SignalKind::Vector;  ///< algebra of corrections
 };
 
-/// Handle of a signal, valid for every store with the same layout (copies included).
+/// Handle of a signal, valid for every store with the same layout, including copies.
 class Signal {
  public:
   /// An empty handle: no numbers.
@@ -84,7 +84,7 @@ class Signal {
   int size() const { return static_cast<int>(size_); }
   /// First double in the store's buffer.
   int offset() const { return static_cast<int>(offset_); }
-  /// Place in the store's table.
+  /// Row in the store's table.
   std::uint32_t index() const { return index_; }
   /// False for an empty handle.
   bool valid() const { return size_ != 0; }

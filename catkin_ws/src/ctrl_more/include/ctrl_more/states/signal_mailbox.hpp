@@ -9,16 +9,16 @@
 
 namespace ctrl_more {
 
-/// Carries one robot signal from another thread (a driver, a subscriber) into the control cycle.
-/// The cycle always finds the newest complete values, and neither side waits for the other. One
-/// writer, one reader.
+/// Transfers one robot signal from another thread (a driver, a subscriber) into the control cycle.
+/// The cycle reads the newest complete values. Neither side waits for the other. One writer, one
+/// reader.
 class SignalMailbox {
  public:
   /// @param signal handle from RobotStates::find()
   explicit SignalMailbox(RobotSignal signal)
       : signal_(signal), letters_({std::vector<double>(signal.size()), kNeverWritten}) {}
 
-  /// Leaves new values (writer's thread). No allocation.
+  /// Publishes new values (writer's thread). No allocation.
   /// @param values `size` doubles
   /// @param size must be the signal's size
   /// @param stamp_ns monotonic nanoseconds
@@ -31,8 +31,8 @@ class SignalMailbox {
     return true;
   }
 
-  /// Takes the newest values into the robot states (the cycle, at its start).
-  /// @return true if there were new ones and they were finite
+  /// Copies the newest values into the robot states (at the start of the cycle).
+  /// @return true if there were new, finite values
   bool deliver(RobotStates& robot) {
     return letters_.take() &&
            robot.write(signal_, letters_.front().values.data(), letters_.front().stamp_ns);

@@ -14,53 +14,52 @@ namespace ctrl_more {
 
 class Logger;
 
-/// The table of signals behind RobotStates and ControlStates: names, sizes and units, and all
-/// numbers in one contiguous buffer.
+/// Table of signals in RobotStates and ControlStates: names, sizes and units, and all numbers in
+/// one contiguous buffer.
 ///
-/// A key belongs to a group (a map or a container of the paper), and has one size for its whole
-/// life. New keys are announced once on the logger; after freeze() a new key is an error. Values
-/// that are not finite, and quaternions that are not unit (1e-6), are refused and leave the signal
-/// untouched.
+/// A key belongs to a group (a map or a container of the paper). Its size never changes. A new key
+/// is logged once; after freeze() it is an error. Values that are not finite and quaternions that
+/// are not unit (1e-6) are refused and leave the signal unchanged.
 ///
 /// Threads: one thread at a time.
 class SignalTable {
  public:
   /// One row.
   struct Entry {
-    const SignalGroup* group;  ///< where it belongs
-    SignalInfo info;           ///< the rest
+    const SignalGroup* group;  ///< group of the signal
+    SignalInfo info;           ///< its other properties
     /// `group/key`.
     std::string name() const { return group->name + ("/" + info.key); }
   };
 
   /// An empty table.
   /// @param store name of the store for messages
-  /// @param logger where new keys and wrong accesses are reported; null: Logger::standard()
+  /// @param logger logs new keys and wrong accesses; null: Logger::standard()
   SignalTable(const char* store, Logger* logger);
 
-  /// Adds a signal, or completes the unit and frame of one that exists with the same size.
-  /// @param group where it belongs
+  /// Adds a signal, or adds unit and frame to an existing signal of the same size.
+  /// @param group group of the signal
   /// @param key name within the group, not empty
   /// @param size number of doubles, > 0
   /// @param unit SI unit or list of units
-  /// @param frame frame the numbers are expressed in
-  /// @param announce false: the logger is not told of a new key
+  /// @param frame frame of the numbers
+  /// @param announce false: do not log a new key
   Status declare(const SignalGroup& group, const std::string& key, int size,
                  const std::string& unit, const std::string& frame, bool announce = true);
 
-  /// Writes a signal; a new key is added.
-  /// @param group where it belongs
+  /// Writes a signal. A new key is added.
+  /// @param group group of the signal
   /// @param key name within the group
   /// @param value its numbers
   /// @param who name of the writer for messages
   Status set(const SignalGroup& group, const std::string& key,
              const Eigen::Ref<const Eigen::VectorXd>& value, const char* who);
 
-  /// Reads a signal; on failure `value` is untouched.
+  /// Reads a signal. On failure `value` is unchanged.
   Status get(const SignalGroup& group, const std::string& key, Eigen::VectorXd& value,
              const char* who) const;
 
-  /// Handle of a key; an empty one if there is none.
+  /// Handle of a key; empty if the key does not exist.
   Signal find(const SignalGroup& group, const std::string& key) const;
 
   /// Forbids new keys from now on.
@@ -68,7 +67,7 @@ class SignalTable {
   /// True after freeze().
   bool frozen() const { return frozen_; }
 
-  /// All rows, in order of declaration; Signal::index() is the place here.
+  /// All rows, in order of declaration. Signal::index() is the index of a row.
   const std::vector<Entry>& entries() const { return entries_; }
   /// The rows of one group, in order of declaration.
   std::vector<SignalInfo> signals(const SignalGroup& group) const;
@@ -76,14 +75,14 @@ class SignalTable {
   const std::vector<double>& data() const { return data_; }
   /// All numbers, writable.
   std::vector<double>& data() { return data_; }
-  /// Key, size, unit and frame of a row, for people.
+  /// Key, size, unit and frame of a row as text.
   static std::string label(const SignalInfo& info);
   /// The numbers of a row, each after a space.
   std::string numbers(const SignalInfo& info) const;
 
-  /// Reports a refusal on the logger and returns it.
+  /// Logs a refusal and returns it.
   Status refuse(const std::string& text) const;
-  /// The sentence about a key that is not there.
+  /// Error message for a key that does not exist.
   std::string unknownKey(const SignalGroup& group, const std::string& key, const char* who) const;
 
  private:

@@ -32,7 +32,7 @@ inline Eigen::Quaterniond fromRollPitchYaw(double roll, double pitch, double yaw
          Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX());
 }
 
-/// The rotation between two at a share in [0, 1], along the shorter way.
+/// Interpolates two rotations along the shorter way; `share` in [0, 1].
 inline Eigen::Quaterniond between(const Eigen::Quaterniond& from, const Eigen::Quaterniond& to,
                                   double share) {
   return expOf(share * logOf(to * from.conjugate())) * from;

@@ -6,26 +6,26 @@
 
 namespace ctrl_more {
 
-/// What kind of failure a Status tells of, for programs; the sentence is for people.
+/// Kind of the failure of a Status, for programs. The sentence of the Status is for users.
 enum class Cause : std::uint8_t {
   None,             ///< success
   InvalidArgument,  ///< a value, size, name or combination that is not allowed
   UnknownName,      ///< no controller, gain, setting, signal or profile of that name
-  Busy,             ///< something has to end or to be undone first
+  Busy,             ///< another action must end or be undone first
   BadFile,          ///< a file was not read; the sentence names it
   Fault             ///< the controller's own code threw
 };
 
 /// Outcome of a request made outside the control cycle.
 ///
-/// A success carries no text and allocates nothing. A failure carries one sentence that says what
-/// was expected, what came and what to do next, ready to be shown to the user as it is.
+/// A success has no text and allocates nothing. A failure has one sentence for the user: the
+/// expected and the actual value, and what to do next.
 class Status {
  public:
   /// Success.
   Status() = default;
 
-  /// Success of a request that published a plan; `generation` is what to wait for.
+  /// Success of a request that published a plan. The caller can wait for its `generation`.
   /// @param generation plan number, see FeedbackControllersManager::waitAdopted()
   static Status published(std::uint64_t generation) {
     Status status;
@@ -34,8 +34,8 @@ class Status {
   }
 
   /// Failure with its sentence.
-  /// @param message expected, got, and what to do next; must not be empty
-  /// @param cause of which kind it is
+  /// @param message expected and actual value, and what to do next; must not be empty
+  /// @param cause kind of the failure
   static Status failure(std::string message, Cause cause = Cause::InvalidArgument) {
     Status status;
     status.cause_ = cause;
@@ -52,8 +52,8 @@ class Status {
   /// Kind of the failure; None for a success.
   Cause cause() const { return cause_; }
 
-  /// The sentence of a failure; for a success empty, or a note (for example which controllers a
-  /// request left alone).
+  /// The sentence of a failure. For a success: empty, or a note, such as the controllers that a
+  /// request skipped.
   const std::string& message() const { return message_; }
 
   /// Adds a note to a success.
@@ -64,7 +64,7 @@ class Status {
     return *this;
   }
 
-  /// Number of the plan this request published; 0 when it published none.
+  /// Number of the plan that this request published; 0 if none.
   std::uint64_t generation() const { return generation_; }
 
  private:

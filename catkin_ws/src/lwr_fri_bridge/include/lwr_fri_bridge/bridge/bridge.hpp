@@ -1,7 +1,7 @@
 /// @file
-/// The bridge: composes FRI session, Interpolator, VelocityFilter, Supervisor and Configurator
-/// (D4.10 Figure 1) into the answer to one datagram. It owns no socket and no thread, so the FRI
-/// thread, lockstep tests and a simulation in virtual time drive the same code. Threads:
+/// The bridge computes the answer to one datagram, with FRI session, Interpolator, VelocityFilter,
+/// Supervisor and Configurator (D4.10 Figure 1). It has no socket and no thread, so the FRI thread,
+/// lockstep tests and a simulation in virtual time run the same code. Threads:
 /// docs/architecture.md.
 #pragma once
 
@@ -21,14 +21,14 @@
 
 namespace lwr_fri_bridge {
 
-/// Whose target velocities are followed.
+/// Source of the target velocities that the bridge follows.
 enum class VelocitySource : std::uint8_t {
-  ControlThread,  ///< mailboxes(), in one process
+  ControlThread,  ///< mailboxes(), in the same process
   Topic           ///< sendTopicVelocity(), from target_joint_states
 };
 
-/// One thread at a time drives it by answer() or idle(); what else it offers says which thread may
-/// ask.
+/// One thread at a time calls answer() or idle(). The sections below give the threads of the other
+/// methods.
 class Bridge {
  public:
   /// @throws std::invalid_argument if a parameter is out of range.
@@ -36,79 +36,80 @@ class Bridge {
 
   // --- FRI thread (or lockstep). Real-time safe: no allocation, lock, syscall or exception.
 
-  /// One FRI tick: judges the datagram of `size` bytes received at `now_ns` (steady or simulated
-  /// clock) and fills `answer`. Returns false if the datagram deserves none (see fri::Verdict); it
-  /// is counted.
+  /// One FRI tick: checks the datagram of `size` bytes received at `now_ns` (steady or simulated
+  /// clock) and fills `answer`. Returns false if the datagram gets no answer (see fri::Verdict); it
+  /// is then counted.
   bool answer(const std::uint8_t* datagram, std::size_t size, std::int64_t now_ns,
               fri::CommandDatagram& answer);
 
-  /// answer() in two halves, so that the caller can send the datagram between them: compute() fills
-  /// the answer, publish() then shows the tick to the other threads. publish() only after a
-  /// compute() that returned true.
+  /// answer() in two halves, so that the caller can send the datagram between them. compute() fills
+  /// the answer. publish() then publishes the tick to the other threads. Call publish() only after
+  /// compute() returned true.
   bool compute(const std::uint8_t* datagram, std::size_t size, std::int64_t now_ns,
                fri::CommandDatagram& answer);
   void publish();
 
-  /// To be called when no datagram came for some time: time limits go on, silence becomes
-  /// `disconnected`.
+  /// Call this if no datagram came for some time. It checks time limits, and sets `disconnected`
+  /// after the receive time limit.
   void idle(std::int64_t now_ns);
 
-  /// The FRI thread came `seconds` too late to the datagram that it takes next, or to its time-out.
+  /// Records that the FRI thread was `seconds` late for its next datagram or its time-out.
   void noteLate(double seconds) { watch_.late(seconds); }
-  /// Whether the controller runs on this computer: then its silence is this computer's doing.
+  /// Set to true if the controller runs on this computer. Its silence is then caused by this
+  /// computer.
   void setControllerHere(bool here) { watch_.setControllerHere(here); }
 
-  /// Whether datagrams have come within the receive time limit, as of the last answer() or idle().
+  /// True if a datagram came within the receive time limit, at the last answer() or idle().
   bool connected() const { return connected_; }
   /// FRI period of the newest measurement, s; 0 before the first. FRI thread only.
   double cycleTime() const { return sample_.cycle_time; }
 
   // --- control thread
 
-  /// Mailboxes of the one control thread.
+  /// Mailboxes of the control thread.
   ArmMailboxes& mailboxes() { return mailboxes_; }
 
   // --- other threads
 
-  /// Accepts an event (see events.hpp) and returns a ticket for its outcome. Callable from any
-  /// thread but the FRI thread.
+  /// Accepts an event (see events.hpp) and returns a ticket for its outcome. Any thread except the
+  /// FRI thread.
   /// @throws std::invalid_argument if the event is unknown or its parameters are not valid.
   std::uint32_t submit(const std::string& event);
-  /// Outcome of a ticket, Pending until it ends. An outcome is kept until it has been fetched, at
-  /// most 64 of them.
+  /// Outcome of a ticket; Pending until the request ends. At most 64 outcomes are kept until they
+  /// are fetched.
   Outcome outcome(std::uint32_t ticket);
-  /// Submits and waits (steady clock, bounded by the request's own time limits plus 2 s); not for
-  /// lockstep.
+  /// Submits an event and waits for its outcome (steady clock, at most the time limits of the
+  /// request plus 2 s). Not for lockstep.
   Outcome command(const std::string& event);
 
-  /// A target velocity from target_joint_states. One thread. Followed if the source is Topic.
+  /// Sets a target velocity from target_joint_states. One thread. Used if the source is Topic.
   void sendTopicVelocity(const VelocityCommand& command) { topic_.write(command); }
   void setVelocitySource(VelocitySource source) {
     source_.store(source, std::memory_order_relaxed);
   }
 
-  /// Newest snapshot. Any thread but the FRI thread.
+  /// Newest snapshot. Any thread except the FRI thread.
   Snapshot snapshot();
-  /// Next change of the state that was not fetched yet. One thread.
+  /// Fetches the next change of the state. Returns false if there is none. One thread.
   bool nextStateChange(StateView& view) { return changes_.pop(view); }
 
   const BridgeConfig& config() const { return config_; }
 
  private:
-  /// s for the arm to come to rest before monitor mode is requested anyway
+  /// s; after this time monitor mode is requested even if the arm still moves
   static constexpr double kBrakeTimeLimit = 3.0;
 
   struct Request {
     std::uint32_t ticket = 0;
     Event event;
   };
-  /// A stop in progress: first the arm brakes, then monitor mode is requested.
+  /// A stop in progress. First the arm brakes, then monitor mode is requested.
   struct PendingStop {
     std::uint32_t ticket = 0;
     std::int64_t began_ns = 0;
     bool monitor_asked = false;
   };
-  /// The newest valid target velocity, where it came from, and whether it is too old.
+  /// Newest valid target velocity with its source; `expired` if it is too old.
   struct Target {
     VelocityCommand command;
     VelocitySource source = VelocitySource::ControlThread;

@@ -11,21 +11,20 @@ namespace lwr_fri_bridge {
 struct BridgeConfig {
   JointLimits limits;  ///< from coglab_rt::loadJointLimits()
   fri::KrlConvention krl_convention = fri::KrlConvention::Coglab;
-  int tool_number = 1;                  ///< told to the KRL program of rtt_lwr
+  int tool_number = 1;                  ///< sent to the KRL program of rtt_lwr
   bool lenient_headers = false;         ///< accept controllers that send zeros in the header
-  ControlMode mode;                     ///< control mode until an event sets another
-  double position_margin = 0.01;        ///< rad kept from both ends of every joint's range, 0..0.5
+  ControlMode mode;                     ///< initial control mode; events can change it
+  double position_margin = 0.01;        ///< rad from both ends of every joint's range, 0..0.5
   LeashLengths leash;                   ///< bound of |commanded - measured| per joint
-  bool wrench_in_tool_axes = false;     ///< the KRL program sets $STIFFNESS.TASKFRAME to #TOOL
+  bool wrench_in_tool_axes = false;     ///< true: KRL sets $STIFFNESS.TASKFRAME to #TOOL
   double velocity_filter_time = 0.008;  ///< s, time constant of the velocity filter, 0..0.2
-  double command_timeout =
-      0.05;                    ///< s, age at which a command of the control thread ends, 0.005..1
-  double topic_timeout = 0.1;  ///< s, the same for commands from target_joint_states
+  double command_timeout = 0.05;  ///< s, longest age of a command of the control thread, 0.005..1
+  double topic_timeout = 0.1;     ///< s, the same for commands from target_joint_states
   double receive_timeout =
-      0.25;  ///< s of silence that count as disconnected (at least 5 cycles), 0.05..5
+      0.25;  ///< s of silence (at least 5 cycles) until `disconnected`, 0.05..5
   ConfiguratorLimits requests;
 
-  /// @throws std::invalid_argument naming the parameter, its value and its range.
+  /// @throws std::invalid_argument with the parameter, its value and its range.
   void check() const;
 };
 

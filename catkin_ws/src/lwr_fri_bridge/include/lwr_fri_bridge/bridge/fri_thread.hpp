@@ -1,5 +1,5 @@
 /// @file
-/// The FRI thread: one UDP socket, and nothing but Bridge::answer() between receive and send.
+/// The FRI thread. It has one UDP socket, and runs only Bridge::compute() between receive and send.
 /// Threads: docs/architecture.md.
 #pragma once
 
@@ -17,19 +17,19 @@ struct FriThreadOptions {
   std::string address = "127.0.0.1";  ///< local address to bind; that of the network card towards
                                       ///< the cabinet, 0.0.0.0: all
   int port = fri::kDefaultPort;       ///< local UDP port, 0: any free one
-  std::string controller_address;     ///< of the robot controller; empty: the first that sends
-  int priority = 80;                  ///< SCHED_FIFO, 0: leave the scheduling alone
+  std::string controller_address;     ///< robot controller; empty: the first sender
+  int priority = 80;                  ///< SCHED_FIFO; 0: do not change the scheduling
   std::size_t stack_bytes = 256 * 1024;
-  /// Called in the FRI thread after each answer has been sent (and after each time-out without
-  /// datagrams, with answered = false): wakes the control thread. Must be real-time safe.
+  /// Wakes the control thread. Called in the FRI thread after each sent answer, and after each
+  /// time-out without datagrams (answered = false). Must be real-time safe.
   std::function<void(bool answered)> after_answer;
 };
 
-/// Times from receive to sent: an exponential mean over about 1000 answers, and the longest. One
-/// thread adds, any may read. No allocation, no lock.
+/// Times from receive to send: exponential mean over about 1000 answers, and the longest. One
+/// thread adds, any thread may read. No allocation, no lock.
 class AnswerTimes {
  public:
-  /// @param taken s
+  /// @param taken duration, s
   void add(float taken) noexcept {
     const float mean = mean_.load(std::memory_order_relaxed);
     mean_.store(mean == 0.0F ? taken : mean + 1e-3F * (taken - mean), std::memory_order_relaxed);
@@ -37,8 +37,8 @@ class AnswerTimes {
       longest_.store(taken, std::memory_order_relaxed);
     }
   }
-  double mean() const noexcept { return mean_; }  ///< s, 0: no answer yet
-  /// s, since the last call with restart
+  double mean() const noexcept { return mean_; }  ///< s; 0: no answer yet
+  /// Longest time since the last call with restart = true, s
   double longest(bool restart) noexcept {
     return restart ? longest_.exchange(0.0F) : longest_.load();
   }
@@ -47,22 +47,22 @@ class AnswerTimes {
   std::atomic<float> mean_{0.0F}, longest_{0.0F};
 };
 
-/// What the thread counts; readable from any thread.
+/// Counters of the thread. Any thread may read them.
 struct FriThreadStatistics {
   std::uint64_t answers = 0;
-  std::uint64_t superseded = 0;  ///< datagrams skipped because a newer one was waiting already
+  std::uint64_t superseded = 0;  ///< datagrams skipped because a newer one was waiting
   std::uint64_t foreign = 0;     ///< datagrams from a second sender, ignored
   std::uint64_t send_errors = 0;
-  std::string peer;               ///< "address:port" of the robot controller, empty if none
+  std::string peer;               ///< "address:port" of the robot controller; empty: none
   std::string last_foreign;       ///< "address:port" of the last second sender
-  double mean_answer_time = 0.0;  ///< s, receive to sent, exponential mean over about 1000 answers
+  double mean_answer_time = 0.0;  ///< s, receive to send, exponential mean over about 1000 answers
   double longest_answer_time = 0.0;  ///< s, since the last call of statistics(true)
   bool real_time = false;            ///< SCHED_FIFO was granted
 };
 
-/// Answers go to where the datagrams come from: the first sender of a valid datagram, from
-/// `controller_address` if that is set, is the peer until it falls silent. If several datagrams
-/// wait, only the newest is answered; the controller has given up the others.
+/// The peer is the first sender of a valid datagram, at `controller_address` if that is set. It
+/// receives the answers and stays the peer until it is silent. If several datagrams wait, only the
+/// newest is answered; the controller no longer expects answers to the others.
 class FriThread {
  public:
   FriThread(Bridge& bridge, FriThreadOptions options);
@@ -70,17 +70,17 @@ class FriThread {
   FriThread(const FriThread&) = delete;
   FriThread& operator=(const FriThread&) = delete;
 
-  /// Binds the socket and starts the thread. With options.port 0, `preferred_port` is tried first:
-  /// a node that was killed and started again is found where it was. Returns warnings (scheduling),
-  /// empty if none.
-  /// @throws std::runtime_error naming address and port if the socket cannot be bound, or the
-  /// address that is none.
+  /// Binds the socket and starts the thread. With options.port 0, `preferred_port` is tried first,
+  /// so that a restarted node has the same port as before. Returns warnings about scheduling; empty
+  /// if there are none.
+  /// @throws std::runtime_error with address and port if the socket cannot be bound, or with an
+  /// invalid address.
   std::string start(int preferred_port = 0);
-  /// Ends the thread at once; braking and leaving command mode (Bridge::command("stop")) is the
-  /// caller's matter.
+  /// Ends the thread at once. The caller must brake and leave command mode before
+  /// (Bridge::command("stop")).
   void stop();
 
-  int port() const { return bound_port_; }  ///< the one bound
+  int port() const { return bound_port_; }  ///< bound port
   int priority() const { return options_.priority; }
   const std::string& controllerAddress() const { return options_.controller_address; }
   FriThreadStatistics statistics(bool restart_longest = false);
@@ -101,7 +101,7 @@ class FriThread {
   int bound_port_ = 0;
   BoundedThread thread_;
   std::atomic<bool> stopping_{false};
-  std::atomic<int> scheduling_{0};  // 0 not known yet, 1 granted, 2 refused, 3 not wanted
+  std::atomic<int> scheduling_{0};  // 0 unknown, 1 granted, 2 refused, 3 not requested
   std::string scheduling_warning_;  // written before scheduling_
   std::atomic<std::uint64_t> answers_{0}, superseded_{0}, foreign_{0}, send_errors_{0};
   std::atomic<std::uint64_t> peer_{0}, last_foreign_{0};  // address << 16 | port, 0: none

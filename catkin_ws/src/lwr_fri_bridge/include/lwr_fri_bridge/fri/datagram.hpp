@@ -1,12 +1,12 @@
 /// @file
-/// The two datagrams of KUKA's Fast Research Interface, and the only place that knows their layout.
+/// The two datagrams of KUKA's Fast Research Interface. Only this file contains their layout.
 ///
-/// The robot controller (KRC) sends one measurement per cycle, the PC answers each with one
-/// command. Both are little endian with IEEE-754 float32 and natural alignment, which is the same
-/// as packed here: every offset and size is asserted at compile time. Joint arrays are in wire
+/// The robot controller (KRC) sends one measurement per cycle. The PC answers each with one
+/// command. Both are little endian with IEEE-754 float32 and natural alignment, which here equals
+/// the packed layout. Every offset and size is asserted at compile time. Joint arrays are in wire
 /// order A1 A2 E1 A3 A4 A5 A6. A frame is 3x4, row major (r11 r12 r13 px r21 r22 r23 py r31 r32 r33
-/// pz), m. Cartesian vectors carry the rotations reversed: x y z Rz Ry Rx; use `wrenchFromWire()` /
-/// `wrenchToWire()` and never index the last three by hand.
+/// pz), m. Cartesian vectors have reversed rotations: x y z Rz Ry Rx. Use `wrenchFromWire()` and
+/// `wrenchToWire()`; never index the last three directly.
 #pragma once
 
 #include <cstddef>
@@ -29,7 +29,7 @@ constexpr std::size_t kCartesian = 6;     ///< x y z Rz Ry Rx
 constexpr std::uint16_t kMeasurementId = 0x2006;
 constexpr std::uint16_t kCommandId = 0x1005;
 constexpr std::uint16_t kAllDrivesOn = 0x7F;  ///< `power` with one bit per joint
-/// Whether all seven drives have power; some controllers set higher bits too.
+/// True if all seven drives have power. Some controllers also set higher bits.
 constexpr bool allDrivesOn(std::uint16_t power) { return (power & kAllDrivesOn) == kAllDrivesOn; }
 constexpr std::uint16_t kDefaultPort = 49938;
 
@@ -47,7 +47,8 @@ enum class ControlStrategy : std::uint16_t {
   JointImpedance = 3
 };
 
-/// Bits of `flags` in a command: which of its fields count. They may change in monitor mode only.
+/// Bits of `flags` in a command. They select the fields that the controller uses, and may change
+/// only in monitor mode.
 enum CommandFlag : std::uint32_t {
   kJointPosition = 0x0001,
   kJointVelocity = 0x0002,  ///< reserved, not supported by any controller
@@ -61,7 +62,7 @@ enum CommandFlag : std::uint32_t {
   kCartesianDamping = 0x2000
 };
 
-/// The flags that existing clients set per strategy (Other: none).
+/// Flags of a strategy, as existing clients set them (Other: none).
 constexpr std::uint32_t flagsFor(ControlStrategy strategy) {
   switch (strategy) {
     case ControlStrategy::Position:
@@ -84,7 +85,7 @@ struct Header {
   std::uint16_t id;         ///< kMeasurementId or kCommandId
 };
 
-/// Values a KRL program and the PC show each other; the same layout in both directions.
+/// Values that the KRL program and the PC exchange. Both directions have the same layout.
 struct UserData {
   float reals[kUserValues];        ///< `$FRI_TO_REA[i+1]` or `$FRI_FRM_REA[i+1]`
   std::int32_t ints[kUserValues];  ///< `$FRI_TO_INT[i+1]` or `$FRI_FRM_INT[i+1]`
@@ -101,7 +102,7 @@ struct MeasurementDatagram {
   std::uint16_t quality;        ///< Quality
   float measurement_period;     ///< desired, s
   float command_period;         ///< desired, s
-  float safety_scale;           ///< what `friStart(x)` was given, 0..1
+  float safety_scale;           ///< argument of `friStart(x)`, 0..1
   float answer_rate;            ///< mean of the last 100 packets, ideal 1
   float latency;                ///< mean round trip, s
   float jitter;                 ///< mean, s
@@ -207,8 +208,8 @@ static_assert(sizeof(CommandDatagram) == kCommandSize, "command datagram has a w
 static_assert(std::is_trivially_copyable_v<MeasurementDatagram> &&
               std::is_trivially_copyable_v<CommandDatagram>);
 
-/// Copies a datagram out of `size` received bytes. Returns false and leaves `datagram` alone if the
-/// size is not exactly that of the type; the header is not looked at.
+/// Copies a datagram from `size` received bytes. If the size differs from that of the type, returns
+/// false and leaves `datagram` unchanged. The header is not checked.
 template <typename Datagram>
 bool decode(const std::uint8_t* bytes, std::size_t size, Datagram& datagram) {
   if (size != sizeof(Datagram)) return false;
@@ -216,7 +217,7 @@ bool decode(const std::uint8_t* bytes, std::size_t size, Datagram& datagram) {
   return true;
 }
 
-/// Writes sizeof(datagram) bytes as they go on the wire.
+/// Writes the sizeof(datagram) bytes of the wire format.
 template <typename Datagram>
 void encode(const Datagram& datagram, std::uint8_t* bytes) {
   static_assert(std::is_same_v<Datagram, MeasurementDatagram> ||
@@ -232,27 +233,27 @@ constexpr Header commandHeader(std::uint16_t counter, std::uint16_t reflected) {
   return {counter, reflected, static_cast<std::uint16_t>(kCommandSize), kCommandId};
 }
 
-/// Joint array of the wire as a vector; the order is the same.
+/// Converts a joint array of the wire to a vector in the same order.
 inline Vector7 jointsFromWire(const float (&wire)[kJoints]) {
   Vector7 joints;
   for (std::size_t i = 0; i < kJoints; ++i) joints[static_cast<Eigen::Index>(i)] = wire[i];
   return joints;
 }
 
-/// Vector as joint array of the wire, rounded to float32.
+/// Converts a vector to a joint array of the wire, rounded to float32.
 inline void jointsToWire(const Vector7& joints, float (&wire)[kJoints]) {
   for (std::size_t i = 0; i < kJoints; ++i)
     wire[i] = static_cast<float>(joints[static_cast<Eigen::Index>(i)]);
 }
 
-/// Fx Fy Fz Tz Ty Tx of the wire as Fx Fy Fz Tx Ty Tz.
+/// Converts Fx Fy Fz Tz Ty Tx of the wire to Fx Fy Fz Tx Ty Tz.
 inline Vector6 wrenchFromWire(const float (&wire)[kCartesian]) {
   Vector6 wrench;
   wrench << wire[0], wire[1], wire[2], wire[5], wire[4], wire[3];
   return wrench;
 }
 
-/// Fx Fy Fz Tx Ty Tz as Fx Fy Fz Tz Ty Tx of the wire; also for stiffness and damping.
+/// Converts Fx Fy Fz Tx Ty Tz to Fx Fy Fz Tz Ty Tx of the wire; also for stiffness and damping.
 inline void wrenchToWire(const Vector6& wrench, float (&wire)[kCartesian]) {
   for (int i = 0; i < 3; ++i) {
     wire[i] = static_cast<float>(wrench[i]);
@@ -260,20 +261,20 @@ inline void wrenchToWire(const Vector6& wrench, float (&wire)[kCartesian]) {
   }
 }
 
-/// Where the controller holds the robot now: its own command plus the offset that FRI added, summed
-/// in float32 as the controller compares it.
+/// Current set-point of the controller, rad: its own command plus the offset of FRI. The sum is in
+/// float32, as in the controller's own comparison.
 inline void setPointOf(const MeasurementDatagram& measurement, float (&set_point)[kJoints]) {
   for (std::size_t i = 0; i < kJoints; ++i) {
     set_point[i] = measurement.commanded_position[i] + measurement.commanded_position_offset[i];
   }
 }
 
-/// The Cartesian set-point: KRC's own command moved by the frame that FRI added (commanded_frame *
-/// commanded_frame_offset). An offset whose rotation is all zeros (controllers that do not fill it)
-/// counts as none.
+/// Cartesian set-point, m: KRC's own command times the frame of FRI (commanded_frame *
+/// commanded_frame_offset). An offset with an all-zero rotation (from controllers that do not fill
+/// it) is ignored.
 void cartesianSetPointOf(const MeasurementDatagram& measurement, float (&frame)[kFrameValues]);
 
-/// Words as the controller's own displays use them; "?" for numbers outside the enumeration.
+/// Names as on the controller's displays; "?" for numbers outside the enumeration.
 const char* nameOf(FriState state);
 const char* nameOf(Quality quality);
 const char* nameOf(ControlStrategy strategy);

@@ -1,10 +1,10 @@
 /// @file
-/// How a PC asks the KRL program on the robot controller to enter or leave command mode.
+/// Requests of the PC to the KRL program on the robot controller: enter or leave command mode.
 ///
-/// FRI itself has no such request: the PC can only write `$FRI_FRM_INT/REA/BOOL` and read
-/// `$FRI_TO_INT/REA/BOOL`, and every lab's KRL program gives them its own meaning. This file is the
-/// table of the meanings we speak. Indices in comments are KRL's, 1-based; on the wire they are one
-/// lower. Requests are levels: they stay until the phase changes.
+/// FRI has no such request. The PC can only write `$FRI_FRM_INT/REA/BOOL` and read
+/// `$FRI_TO_INT/REA/BOOL`. The KRL program of each lab gives them another meaning. This file lists
+/// the supported conventions. Indices in comments are 1-based as in KRL; on the wire they are one
+/// lower. A request is a level: it stays until the phase changes.
 ///
 // clang-format off
 /// | convention      | start (strategy s = 10, 20, 30)   | stop              | the program shows       |
@@ -17,16 +17,16 @@
 /// | openkc          | INT[16]=9, 6 or 7; then INT[16]=1 | INT[16]=2         | INT[15], BOOL[1]        |
 // clang-format on
 ///
-/// openkc takes one command after the other, each with BOOL[1]: it is over when the program shows
-/// the command in TO_INT[15] and sets TO_BOOL[1] (TO_INT[14] counts them); the PC then takes
-/// BOOL[1] back and waits for the program to do so too. Commands: 9 position, 6 Cartesian, 7 joint
-/// impedance, 1 friStart, 2 friStop. Source: public clients and emulators of that program.
+/// openkc executes one command after the other, each with BOOL[1]. A command is finished when the
+/// program shows it in TO_INT[15] and sets TO_BOOL[1] (TO_INT[14] counts commands). The PC then
+/// clears BOOL[1] and waits until the program clears TO_BOOL[1]. Commands: 9 position, 6 Cartesian,
+/// 7 joint impedance, 1 friStart, 2 friStop. Source: public clients and emulators of that program.
 ///
 /// Our own program (krl/coglab_fri.src) acts once per request number (1..32767, wraps to 1) and
 /// answers with
-///   TO_INT[1] number of the request finished last, TO_INT[2] its result (KrlResult),
-///   TO_INT[3] number of the request it works on (0: none), TO_INT[16] = 4010, so that the PC knows
-///   whom it talks to.
+///   TO_INT[1] number of the last finished request, TO_INT[2] its result (KrlResult),
+///   TO_INT[3] number of the current request (0: none), TO_INT[16] = 4010, so that the PC
+///   recognises the program.
 #pragma once
 
 #include <string>
@@ -44,19 +44,19 @@ enum class KrlConvention : std::uint8_t {
   OpenKc
 };
 
-/// What the PC wants from the KRL program at the moment.
+/// Current request of the PC to the KRL program.
 enum class KrlPhase : std::uint8_t {
-  Idle,     ///< monitor mode, nothing asked
+  Idle,     ///< monitor mode, no request
   Start,    ///< enter command mode
-  Running,  ///< command mode reached; nothing more asked
+  Running,  ///< command mode reached, no request
   Stop      ///< go to monitor mode
 };
 
 /// Results of our own KRL program in TO_INT[2].
 enum class KrlResult : std::int32_t {
   None = 0,             ///< no request finished yet
-  Done = 1,             ///< the controller is in the mode that was asked for
-  UnknownRequest = -1,  ///< request or strategy is not one the program knows
+  Done = 1,             ///< the controller is in the requested mode
+  UnknownRequest = -1,  ///< the program does not know the request or strategy
   PoorQuality = -2,     ///< the quality of the connection did not become good in time
   NotEntered = -3,      ///< `friStart` did not lead to command mode
   NoDrives = -4         ///< drives or brakes could not be switched on
@@ -69,45 +69,45 @@ constexpr std::uint16_t kMaxRequestNumber = 32767;
 struct KrlRequest {
   KrlPhase phase = KrlPhase::Idle;
   ControlStrategy strategy = ControlStrategy::Position;  ///< for Start
-  std::uint16_t number = 0;       ///< grows with every Start and Stop; coglab only
+  std::uint16_t number = 0;       ///< increases with every Start and Stop; coglab only
   std::int32_t tool = 0;          ///< tool number; rtt_lwr only
-  std::uint8_t acknowledged = 0;  ///< commands of this phase that are over; openkc only
-  bool asserted = false;          ///< the next one is asked for; openkc only
+  std::uint8_t acknowledged = 0;  ///< finished commands of this phase; openkc only
+  bool asserted = false;          ///< the next command is requested; openkc only
 };
 
-/// What the KRL program says about a request.
+/// Reply of the KRL program to a request.
 struct KrlReply {
-  bool known = true;     ///< false: the program shows none of this convention's marks (coglab only)
-  bool busy = false;     ///< it works on the request
-  bool refused = false;  ///< it will not fulfil the request
-  KrlResult result = KrlResult::None;  ///< why refused (coglab only)
+  bool known = true;     ///< false: no mark of this convention is visible (coglab only)
+  bool busy = false;     ///< the program works on the request
+  bool refused = false;  ///< the program refuses the request
+  KrlResult result = KrlResult::None;  ///< reason of a refusal (coglab only)
 };
 
-/// Writes the request into the fields the convention uses and leaves the other fields alone.
-/// Real-time safe.
+/// Writes the request into the fields of the convention. Other fields stay unchanged. Real-time
+/// safe.
 void writeRequest(KrlConvention convention, const KrlRequest& request, UserData& to_controller);
 
-/// Once per measurement: goes on to the next command of a phase that takes several, when the
-/// program has acknowledged the one before. Only openkc needs it. Real-time safe.
+/// Continues with the next command of a phase after the program has acknowledged the previous one.
+/// Call it once per measurement. Only openkc has phases of several commands. Real-time safe.
 void stepRequest(KrlConvention convention, KrlRequest& request, const UserData& from_controller);
 
-/// Reads what the program says about `request`. Real-time safe.
+/// Reads the program's reply to `request`. Real-time safe.
 KrlReply readReply(KrlConvention convention, const KrlRequest& request,
                    const UserData& from_controller);
 
-/// Number of the request that our own program finished last (TO_INT[1]): a new request needs
-/// another.
+/// Number of the last request that our own program finished (TO_INT[1]). A new request needs
+/// another number.
 inline std::int32_t lastFinished(const MeasurementDatagram& measurement) {
   return measurement.krl.ints[0];
 }
 
-/// Whether the convention's program can run this strategy (rcprg_tum fixes joint impedance).
+/// True if the convention's program can run this strategy (rcprg_tum: only joint impedance).
 bool supports(KrlConvention convention, ControlStrategy strategy);
 
 /// "coglab", "centro_epiaggio", "stanford", "rcprg_tum", "rtt_lwr", "openkc".
 const char* nameOf(KrlConvention convention);
 
-/// Inverse of nameOf(). @throws std::invalid_argument listing the known names.
+/// Inverse of nameOf(). @throws std::invalid_argument with the known names.
 KrlConvention krlConventionFromName(const std::string& name);
 
 }  // namespace lwr_fri_bridge::fri

@@ -1,10 +1,10 @@
 /// @file
-/// The FRI session: which datagrams count, what was lost between them, and the header of the
+/// The FRI session. It accepts or rejects datagrams, counts losses, and makes the header of the
 /// answer.
 ///
-/// Every datagram gets a verdict. Wrong size, wrong id, implausible content, doubled and
-/// out-of-order ones are counted and not answered: an answer to them would only disturb the
-/// controller's statistics. Lost ones show as gaps in the counter.
+/// Every datagram gets a verdict. Datagrams with wrong size, wrong id or implausible content,
+/// duplicates and out-of-order ones are counted and not answered: an answer would disturb the
+/// controller's statistics. Lost datagrams appear as gaps in the counter.
 #pragma once
 
 #include <cstddef>
@@ -16,16 +16,16 @@ namespace lwr_fri_bridge::fri {
 
 enum class Verdict : std::uint8_t {
   Accepted,
-  WrongSize,    ///< not 916 bytes, or the header says so
+  WrongSize,    ///< the datagram or the size in its header is not 916 bytes
   WrongId,      ///< not a measurement of the known version
-  Implausible,  ///< a value is not finite or outside of what a controller can send, the set-point
-                ///< does not follow from what was sent, the arm cannot have got where it was
-                ///< measured, or the period changes in command mode
+  Implausible,  ///< a value is not finite or out of the controller's range, the set-point does not
+                ///< follow from the sent answers, the arm cannot have reached the measured
+                ///< position, or the period changes in command mode
   Duplicate,    ///< same counter as the last accepted one
   OutOfOrder    ///< older than the last accepted one, or far ahead of it
 };
 
-/// What is counted, all since the bridge started.
+/// Counters since the start of the bridge.
 struct SessionCounters {
   std::uint64_t accepted = 0;
   std::uint64_t wrong_size = 0;
@@ -35,7 +35,7 @@ struct SessionCounters {
   std::uint64_t out_of_order = 0;
   std::uint64_t lost_measurements = 0;  ///< gaps in the controller's counter
   std::uint64_t lost_answers = 0;  ///< answers that the controller's next datagram does not reflect
-  std::uint64_t restarts = 0;      ///< the controller's counter began anew
+  std::uint64_t restarts = 0;      ///< the controller's counter restarted
   std::uint64_t new_periods = 0;   ///< FRI was opened again with another period
 
   std::uint64_t rejected() const {
@@ -43,37 +43,37 @@ struct SessionCounters {
   }
 };
 
-/// What an accepted datagram says about the connection.
+/// State of the connection after an accepted datagram.
 struct Reception {
   Verdict verdict = Verdict::WrongSize;
   std::uint32_t cycles = 1;     ///< cycles of the controller since the last accepted datagram, >= 1
-  bool fresh_session = false;   ///< first datagram, or the controller's counter began anew
+  bool fresh_session = false;   ///< first datagram, or the controller's counter restarted
   bool new_period = false;      ///< FRI was opened again with another period
-  bool answer_arrived = false;  ///< it reflects our last answer
+  bool answer_arrived = false;  ///< the datagram reflects our last answer
 
-  /// Whether the controller had to do without one of our answers, or we without a measurement.
+  /// True if an answer or a measurement was lost.
   bool gap() const { return cycles > 1 || !answer_arrived; }
 };
 
 /// Real-time safe, one thread.
 class Session {
  public:
-  /// `lenient`: controllers that send zeros in the header are accepted. Order, losses and
-  /// reflections cannot be told then.
+  /// `lenient`: accept controllers that send zeros in the header. Order, losses and reflections are
+  /// then unknown.
   explicit Session(bool lenient) : lenient_(lenient) {}
 
-  /// Judges a datagram; `measurement` is filled if and only if the verdict is Accepted.
+  /// Checks a datagram. `measurement` is filled if and only if the verdict is Accepted.
   Reception receive(const std::uint8_t* bytes, std::size_t size, MeasurementDatagram& measurement);
 
-  /// Header for the answer to the datagram accepted last; counts up.
+  /// Header for the answer to the last accepted datagram. Increases the counter.
   Header nextHeader();
 
-  /// Notes what the answer with that header told the controller; fills in the counters.
+  /// Records the set-point of the answer with that header. Fills in the counters.
   void sent(SentSetPoint set_point);
-  /// What was sent; it outlives a restart of the controller's counter.
+  /// Sent set-points. A restart of the controller's counter does not clear them.
   SetPointHistory& history() { return history_; }
 
-  /// After silence: the next datagram starts a fresh session, whatever its counter.
+  /// Call this after silence. The next datagram starts a fresh session with any counter.
   void forget();
 
   const SessionCounters& counters() const { return counters_; }
@@ -100,10 +100,10 @@ class Session {
   SessionCounters counters_;
 };
 
-/// FRI period in s from the datagram, which must be plausible.
+/// FRI period of a plausible datagram, s.
 double cycleTimeOf(const MeasurementDatagram& measurement);
 
-/// Whether all values that we use are finite and within what a controller can send.
+/// True if all used values are finite and within the range of a controller.
 bool plausible(const MeasurementDatagram& measurement);
 
 }  // namespace lwr_fri_bridge::fri

@@ -1,10 +1,10 @@
 /// @file
-/// Configurator (D4.10 Figure 1): the requests that take long, entering and leaving command mode,
-/// each with a time limit and an outcome.
+/// Configurator (D4.10 Figure 1): executes the slow requests, entering and leaving command mode.
+/// Each has a time limit and an outcome.
 ///
-/// It is stepped by every FRI tick (and by the FRI thread's time-outs when the controller is
-/// silent) and never waits itself, so it runs beside the supervisor in the same thread, and in
-/// lockstep it is as reproducible as the rest.
+/// Every FRI tick makes one step (time-outs of the FRI thread do so if the controller is silent).
+/// The configurator never waits, so it runs in the same thread as the supervisor and is
+/// reproducible in lockstep.
 #pragma once
 
 #include "lwr_fri_bridge/requests/events.hpp"
@@ -13,9 +13,9 @@ namespace lwr_fri_bridge {
 
 struct ConfiguratorLimits {
   double start_timeout = 10.0;  ///< s, from the request to command mode with power; KRL programs
-                                ///< need up to some seconds
+                                ///< may need some seconds
   double stop_timeout = 2.0;    ///< s, from the request to monitor mode
-  double silent_stop_timeout = 1.0;  ///< s, the same when the controller is silent
+  double silent_stop_timeout = 1.0;  ///< s, the same for a silent controller
 };
 
 /// Real-time safe, one thread.
@@ -26,28 +26,29 @@ class Configurator {
     request_.tool = tool;
   }
 
-  /// What one tick shows; `measurement` is the newest one, also when the controller is silent.
+  /// Observation of one tick. `measurement` is the newest one, also if the controller is silent.
   struct Observation {
     bool connected = false;
     const fri::MeasurementDatagram* measurement = nullptr;
     std::int64_t now_ns = 0;
   };
 
-  /// Begins to enter command mode with `strategy`. A request in progress is interrupted.
+  /// Begins to enter command mode with `strategy`. Interrupts a request in progress.
   void start(std::uint32_t ticket, fri::ControlStrategy strategy, const Observation& seen);
-  /// Begins to leave it.
+  /// Begins to leave command mode.
   void stop(std::uint32_t ticket, const Observation& seen);
-  /// Ends a start in progress with `code` and withdraws it at the KRL program.
+  /// Ends a start in progress with `code` and withdraws it from the KRL program.
   void abandon(OutcomeCode code, const Observation& seen);
-  /// The controller left command mode by itself: withdraws what would bring it back.
+  /// Call this if the controller left command mode by itself. Withdraws the request, which would
+  /// start command mode again.
   void fellBack() {
     if (request_.phase == fri::KrlPhase::Running) request_.phase = fri::KrlPhase::Idle;
   }
 
-  /// One step. Returns true if a request ended; `outcome` says how.
+  /// One step. Returns true if a request ended, and fills `outcome`.
   bool update(const Observation& seen, Outcome& outcome);
 
-  /// Writes the request of the moment for the KRL program.
+  /// Writes the current request for the KRL program.
   void write(fri::UserData& to_controller) const {
     fri::writeRequest(convention_, request_, to_controller);
   }
@@ -75,7 +76,7 @@ class Configurator {
   Step step_ = Step::Idle;
   std::int64_t began_ns_ = 0;
   bool seen_busy_ = false;
-  bool settle_ = false;  // a start was withdrawn: monitor mode must last before it counts
+  bool settle_ = false;  // after a withdrawn start, monitor mode must last for some time
   std::int64_t monitor_since_ns_ = 0;
   fri::KrlReply reply_;
   Outcome outcome_;

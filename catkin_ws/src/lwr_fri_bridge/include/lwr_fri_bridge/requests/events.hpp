@@ -1,5 +1,5 @@
 /// @file
-/// The events of `ros_events` and `command` (D4.10 Table 1), and how they end.
+/// Events of `ros_events` and `command` (D4.10 Table 1), and their outcomes.
 ///
 /// | event                                         | meaning                                   |
 /// | --------------------------------------------- | ----------------------------------------- |
@@ -12,7 +12,7 @@
 /// | cartesian_impedance [stiffness k] [damping d] | k in N/m and Nm/rad: translation rotation |
 /// |                                               | or x y z Rx Ry Rz; d one, two or six      |
 ///
-/// Values are separated by blanks or commas. What is left out keeps the value it had.
+/// Values are separated by blanks or commas. Omitted values stay unchanged.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,7 @@
 
 namespace lwr_fri_bridge {
 
-/// Control mode with its parameters. The defaults are those existing clients use (1000 Nm/rad, 2000
+/// Control mode with its parameters. The defaults are those of existing clients (1000 Nm/rad, 2000
 /// N/m, 200 Nm/rad, 0.7).
 struct ControlMode {
   fri::ControlStrategy strategy = fri::ControlStrategy::Position;
@@ -41,12 +41,12 @@ struct Event {
   ControlMode mode;  ///< for Mode
 };
 
-/// Reads an event. `current` gives the values that the text leaves out.
-/// @throws std::invalid_argument: unknown event (with the list of the known ones), wrong number or
-/// range of values.
+/// Parses an event. `current` provides the values that the text omits.
+/// @throws std::invalid_argument for an unknown event (with the list of known ones), or a wrong
+/// number or range of values.
 Event parseEvent(const std::string& text, const ControlMode& current);
 
-/// The known events with their parameters, for messages.
+/// Known events with their parameters, for messages.
 const char* knownEvents();
 
 enum class OutcomeCode : std::uint8_t {
@@ -55,7 +55,7 @@ enum class OutcomeCode : std::uint8_t {
   AlreadyThere,    ///< nothing to do
   Disconnected,    ///< no datagrams from the controller
   Held,            ///< refused: hold is latched
-  InCommandMode,   ///< refused: the control mode may change in monitor mode only
+  InCommandMode,   ///< refused: the control mode may change only in monitor mode
   NotSupported,    ///< the KRL convention cannot run this strategy
   PoorQuality,     ///< quality did not become OK in time
   NoKrlProgram,    ///< the controller shows no sign of the program of krl_convention
@@ -64,13 +64,13 @@ enum class OutcomeCode : std::uint8_t {
   NoPower,         ///< command mode came, but not all drives have power
   WrongStrategy,   ///< command mode came with another strategy
   NotLeft,         ///< monitor mode did not come in time
-  Interrupted,     ///< hold or stop came in between
+  Interrupted,     ///< interrupted by hold or stop
   Busy,            ///< refused: another start or stop is in progress
-  LostConnection,  ///< the controller fell silent in between
+  LostConnection,  ///< the controller became silent during the request
   NotServed        ///< the FRI thread did not take the request
 };
 
-/// How a request ended, with what was seen then.
+/// Outcome of a request, with the observations at its end.
 struct Outcome {
   std::uint32_t ticket = 0;
   EventKind kind = EventKind::Hold;
@@ -88,7 +88,7 @@ struct Outcome {
   bool success() const { return code == OutcomeCode::Done || code == OutcomeCode::AlreadyThere; }
 };
 
-/// The outcome in words: what was expected, what came, what to do next.
+/// Text of the outcome: expected and actual state, and what to do next.
 std::string describe(const Outcome& outcome);
 
 }  // namespace lwr_fri_bridge

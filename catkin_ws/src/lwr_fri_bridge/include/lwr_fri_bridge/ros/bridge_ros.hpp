@@ -1,6 +1,7 @@
 /// @file
-/// The bridge on ROS (D4.10 Table 1): topics, service, diagnostics and parameters of the namespace
-/// `/lwr`. Used by lwr_node and, in one process with the controller manager, by robot_node.
+/// ROS interface of the bridge (D4.10 Table 1): topics, service, diagnostics and parameters of the
+/// namespace `/lwr`. Used by lwr_node, and by robot_node in one process with the controller
+/// manager.
 #pragma once
 
 #include <atomic>
@@ -29,46 +30,48 @@ class BridgeDiagnostics;
 class TargetTopic;
 
 /// Reads the parameters of the bridge from the namespace of `nh` (README: table of parameters).
-/// @throws std::exception naming parameter, value and range, or file, line and field of the limits
-/// table.
+/// @throws std::exception with parameter, value and range, or with file, line and field of the
+/// limits table.
 BridgeConfig readBridgeConfig(const ros::NodeHandle& nh);
 FriThreadOptions readFriThreadOptions(const ros::NodeHandle& nh);
 
-/// Publishes joint_states, external_torques, tool_wrench (all at joint_states_rate or the FRI rate,
-/// the lower one) and state (latched, on change); subscribes target_joint_states and ros_events;
-/// serves command. Has its own callback queue and threads, so a long start does not delay a hold.
+/// Publishes joint_states, external_torques, tool_wrench (all at the lower of joint_states_rate and
+/// the FRI rate) and state (latched, on change). Subscribes to target_joint_states and ros_events.
+/// Provides the service command. It has its own callback queue and threads, so that a long start
+/// does not delay a hold.
 class BridgeRos : public coglab_rt::ArmPort {
  public:
   /// Reads the parameters under `nh` (normally ros::NodeHandle("lwr")).
-  /// @param one_process true: a control thread of this process feeds mailboxes();
-  /// target_joint_states is then accepted only while no controller is active
-  /// (setControllerActive). false: target_joint_states is the only source.
+  /// @param one_process true: a control thread of this process writes to mailboxes(), and
+  /// target_joint_states is accepted only while no controller is active (setControllerActive).
+  /// false: target_joint_states is the only source.
   /// @throws std::exception as readBridgeConfig().
   BridgeRos(const ros::NodeHandle& nh, bool one_process);
   ~BridgeRos() override;
   BridgeRos(const BridgeRos&) = delete;
   BridgeRos& operator=(const BridgeRos&) = delete;
 
-  /// Binds the socket, sets the parameter fri_port_bound, starts all threads. `wake` is called in
-  /// the FRI thread after each answer (true) and on idle ticks without datagrams (false); it may be
-  /// empty. @throws std::runtime_error if the socket cannot be bound, std::exception naming a
+  /// Binds the socket, sets the parameter fri_port_bound and starts all threads. `wake` is called
+  /// in the FRI thread after each answer (true) and on idle ticks without datagrams (false). It may
+  /// be empty. @throws std::runtime_error if the socket cannot be bound, std::exception with a
   /// parameter that is out of range.
   void start(Wake wake) override;
 
-  /// Brakes, requests monitor mode, keeps answering until it comes or its time limit is over, then
-  /// ends all threads. To be called on SIGINT, SIGTERM and at the end of main; works without a
-  /// roscore. Safe to call twice.
+  /// Brakes and requests monitor mode. Keeps answering until monitor mode or its time limit is
+  /// reached, then ends all threads. Call it on SIGINT, SIGTERM and at the end of main. It works
+  /// without a roscore and can be called twice.
   void shutdown() override;
-  /// After shutdown(): tells the ROS master, and waits for it; see endProcessWithin().
+  /// Unregisters from the ROS master after shutdown(), and waits for it; see endProcessWithin().
   void unregister() override;
 
   Bridge& bridge() { return bridge_; }
   ArmMailboxes& mailboxes() override { return bridge_.mailboxes(); }
-  /// Below that of the FRI thread; 0: none, because it has none itself.
+  /// Highest priority for other threads, below the FRI thread's. 0: none, if the FRI thread has no
+  /// real-time priority.
   int highestPriority() override;
 
-  /// One process only: whether the control thread's velocities count (true) or those of
-  /// target_joint_states (false).
+  /// Selects the velocities of the control thread (true) or of target_joint_states (false). Only in
+  /// one process.
   void setControllerActive(bool active) override;
 
  private:
@@ -95,9 +98,9 @@ class BridgeRos : public coglab_rt::ArmPort {
   std::unique_ptr<ros::AsyncSpinner> spinner_;
   std::unique_ptr<BridgeDiagnostics> diagnostics_;
   ros::Publisher joint_states_, external_torques_, tool_wrench_, state_, fri_latency_;
-  std::int64_t latency_told_ns_ = 0;  // stamp of the sample whose latency was published last
+  std::int64_t latency_told_ns_ = 0;  // stamp of the sample with the last published latency
   StateView newest_state_;
-  std::int64_t state_told_ns_ = 0;  // when it was published last
+  std::int64_t state_told_ns_ = 0;  // time of its last publication
   std::unique_ptr<TargetTopic> target_;
   ros::Subscriber events_;
   ros::ServiceServer command_;
@@ -109,12 +112,12 @@ class BridgeRos : public coglab_rt::ArmPort {
   std::int64_t started_ns_ = 0;
   std::uint64_t published_sequence_ = 0;
   std::atomic<bool> stopping_{false};
-  std::atomic<bool> closing_{false};  // the node ends: nothing is asked of the arm any more
+  std::atomic<bool> closing_{false};  // the node ends: no more requests to the arm
   bool started_ = false;
   bool restarts_quietly_ = true;
   QuietRestart quiet_restart_;  // publisher thread
   std::mutex tickets_mutex_;
-  std::vector<std::uint32_t> tickets_;  // of ros_events, whose outcomes go to the log
+  std::vector<std::uint32_t> tickets_;  // of ros_events; their outcomes are logged
   sensor_msgs::JointState joint_message_, torque_message_;
   geometry_msgs::WrenchStamped wrench_message_;
 };

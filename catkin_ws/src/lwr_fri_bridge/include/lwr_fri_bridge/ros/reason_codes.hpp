@@ -1,5 +1,5 @@
 /// @file
-/// The numbers of coglab_msgs/ReasonCode for what the bridge says in words.
+/// Codes of coglab_msgs/ReasonCode for the messages of the bridge.
 #pragma once
 
 #include <cstdint>
@@ -8,11 +8,11 @@
 
 namespace lwr_fri_bridge {
 
-/// Why motion is not allowed.
+/// Code of the reason why motion is not allowed.
 std::uint16_t reasonCode(MotionBlock block);
-/// The same, with how command mode was lost.
+/// The same, with the cause of a loss of command mode.
 std::uint16_t reasonCode(MotionBlock block, const CommandModeLoss& loss);
-/// How a request ended.
+/// Code of the outcome of a request.
 std::uint16_t reasonCode(OutcomeCode code);
 
 }  // namespace lwr_fri_bridge

@@ -1,9 +1,8 @@
 /// @file
-/// Why command mode was lost, as far as the PC's side can tell, and whether it may be entered again
-/// without asking anybody.
+/// Cause of a loss of command mode, as far as the PC can find it, and automatic restarts.
 ///
-/// FRI gives no reason for a fall-back. What this side sees just before it tells the usual causes
-/// apart: answers that left late, silence, packets lost on the way, power.
+/// FRI gives no reason for a fall-back. The usual causes differ in the PC's observations just
+/// before it: late answers, silence, lost packets, power.
 #pragma once
 
 #include <array>
@@ -16,24 +15,24 @@ namespace lwr_fri_bridge {
 
 enum class LossCause : std::uint8_t {
   None,               ///< command mode was not lost since the last start
-  ComputerLate,       ///< the FRI thread of this computer was not run in time
-  ControllerStalled,  ///< silence of a controller that runs on this computer itself
-  ControllerSilent,   ///< silence of a controller elsewhere
-  PacketsLost,        ///< datagrams got lost on the way
+  ComputerLate,       ///< the FRI thread of this computer ran too late
+  ControllerStalled,  ///< silence of a controller on this computer
+  ControllerSilent,   ///< silence of a controller on another computer
+  PacketsLost,        ///< datagrams were lost
   PowerLost,          ///< not all drives have power
-  BeganAnew,          ///< the controller's counter began anew
-  LeftByController    ///< none of these: the controller has its own reason
+  BeganAnew,          ///< the controller's counter restarted
+  LeftByController    ///< another reason, known only to the controller
 };
 
 /// One loss of command mode.
 struct CommandModeLoss {
   LossCause cause = LossCause::None;
-  double seconds = 0.0;    ///< how late, or how long silent
-  bool at_rest = false;    ///< the arm had stood still for some time, commanded and measured
-  float timestamp = 0.0F;  ///< the controller's clock then, s
-  Vector7 position = Vector7::Zero();  ///< measured then, rad
+  double seconds = 0.0;    ///< lateness or silence, s
+  bool at_rest = false;    ///< the arm stood still before the loss, commanded and measured
+  float timestamp = 0.0F;  ///< controller's clock at the loss, s
+  Vector7 position = Vector7::Zero();  ///< measured at the loss, rad
 
-  /// This computer caused it by running a program too late.
+  /// True if this computer caused the loss because it ran a program too late.
   bool byComputer() const {
     return cause == LossCause::ComputerLate || cause == LossCause::ControllerStalled;
   }
@@ -42,22 +41,22 @@ struct CommandModeLoss {
   }
 };
 
-/// The cause in words; empty for None.
+/// Text of the cause; empty for None.
 std::string describe(const CommandModeLoss& loss);
 
-/// Watches what may lead to a loss. FRI thread, real-time safe.
+/// Records events that may lead to a loss. FRI thread, real-time safe.
 class CommandModeWatch {
  public:
-  /// The FRI thread came so many seconds too late.
+  /// Records that the FRI thread was late, s.
   void late(double seconds) { late_ += seconds; }
-  /// The controller runs on this computer.
+  /// Sets whether the controller runs on this computer.
   void setControllerHere(bool here) { controller_here_ = here; }
 
-  /// After every accepted datagram: the seconds since the last one, packets lost between them, the
-  /// greatest joint speeds, rad/s.
+  /// Call this after every accepted datagram. `seconds` since the last one, number of packets
+  /// `lost` between them, largest joint speeds in rad/s.
   void tick(double seconds, std::uint32_t lost, double measured_speed, double commanded_speed);
 
-  /// What is known when command mode is lost.
+  /// Observations at the loss of command mode.
   struct Facts {
     bool connected = false, fresh_session = false, command_mode = false;
     double silence = 0.0;     ///< s
@@ -75,27 +74,27 @@ class CommandModeWatch {
   bool controller_here_ = false;
 };
 
-/// Decides about a restart that nobody asked for. It is allowed only after a loss that this
-/// computer caused, with an arm that stood still then and has not moved since, at the same
-/// controller, and not over and over. What was commanded before the loss does not count afterwards:
-/// a start begins a new epoch. One thread.
+/// Decides about an automatic restart. Conditions: this computer caused the loss; the arm stood
+/// still then and has not moved since; the controller is the same; the number of restarts is
+/// limited. Commands from before the loss are ignored, because a start begins a new epoch. One
+/// thread.
 class QuietRestart {
  public:
-  /// What is seen now.
+  /// Current observations.
   struct View {
     CommandModeLoss loss;
     bool stopped = false;      ///< supervisor: stopped
     bool held = false;         ///< hold is latched
     bool may_command = false;  ///< quality is OK or better, no drive error
-    float timestamp = 0.0F;    ///< the controller's clock, s
+    float timestamp = 0.0F;    ///< controller's clock, s
     Vector7 position = Vector7::Zero(), velocity = Vector7::Zero();  ///< measured
   };
-  /// One look. True: ask for a start now.
+  /// Checks the conditions. Returns true if a start should be requested now.
   bool due(const View& view, std::int64_t now_ns);
 
  private:
   bool mayRestart(const View& view) const;
-  CommandModeLoss judged_;                     // the loss that was decided about last
+  CommandModeLoss judged_;                     // last loss with a decision
   std::int64_t calm_since_ns_ = 0;             // 0: not calm
   std::array<std::int64_t, 3> restarts_ns_{};  // the last ones, oldest first; 0: none
 };
