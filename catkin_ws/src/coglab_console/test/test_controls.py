@@ -9,7 +9,7 @@ import pytest
 from coglab_console.browser import Browser, press_and_hold
 from coglab_console.desk.desk import Answer
 from coglab_console.desk.words import BUTTONS
-from coglab_console.page_check import PAGES, look
+from page_check import PAGES, look
 from page_double import STATUS, Desk
 
 pytestmark = pytest.mark.skipif(
