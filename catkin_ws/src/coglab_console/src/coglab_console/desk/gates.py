@@ -7,7 +7,8 @@ belongs to the console alone is added: who is the operator, what was not acknowl
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,6 +17,8 @@ from .words import action_of, button, phase, without_advice
 
 CALIBRATIONS = ("calibrate", "calibrate_complete", "calibrate_forced")
 STANDSTILL = ("stopped", "fault")
+HOLD_TIME = 0.8  # s that a button must be held
+LONGEST_GAP = 0.25  # s between two messages of a held button
 LONGEST = 28
 """characters of the arm's reason below a button, which has room for three lines; the status column has all of it"""
 SECOND_THOUGHT = ("feedback", "feedback_order", "contact_learn", "contact_arm", "objects_reload")
@@ -243,3 +246,30 @@ def control(name: str, arguments: Mapping[str, Any]) -> str:
     if name == "calibrate" and arguments.get("mode") == "complete":
         return "calibrate_complete"
     return "trial_done" if name == "trial_end" and arguments["outcome"] == "done" else name
+
+
+class HeldButton:
+    """The held button of one browser: a motion begins only after its button was held for HOLD_TIME.
+
+    The page sends a message ten times a second while the button is down. So nothing begins if the browser dies or loses
+    its connection. Times in s of the steady clock."""
+
+    def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
+        self._now = now
+        self._what: object = None
+        self._since = self._last = 0.0
+
+    def held(self, what: object) -> bool:
+        """One message of a held button; True exactly once, when `what` was held for long enough without a gap."""
+        now = self._now()
+        if what != self._what or now - self._last > LONGEST_GAP:
+            self._what, self._since = what, now
+        self._last = now
+        if now - self._since >= HOLD_TIME:
+            self._since = float("inf")  # until it was released
+            return True
+        return False
+
+    def unfinished(self) -> Any:
+        """What is held down and has not begun yet; None where nothing is."""
+        return self._what if self._since != float("inf") else None

@@ -6,7 +6,6 @@ import asyncio
 import os
 import secrets
 import signal
-import socket
 import sys
 import time
 from pathlib import Path
@@ -26,12 +25,10 @@ from ..web.access import Access, allowed_hosts
 from ..web.fan_out import Documents
 from ..web.page_files import load_all
 from ..web.server import ConsoleServer
-from . import versions
-from .alone import StartError, announce, look_for_another, only_one
-from .commands import RosBackend
+from .commands import RosBackend, StopPath
 from .graph import SmachGraphs
 from .knowledge import Knowledge
-from .stop import StopPath
+from .startup import StartError, announce, bind, exposure, look_for_another, only_one, versions
 from .tables import SILENT_DIAGNOSTICS
 from .view import RosView
 
@@ -42,32 +39,9 @@ HEALTH = 1.0  # s
 FRAMES = {"human_hand": "human_hand", "board": "board"}
 
 
-def bind(address: str, port: int, fixed: bool) -> socket.socket:
-    """A listening socket; where the port is taken and not `fixed`, on one of the next nine, or on any."""
-    wanted = [port] if fixed or port == 0 else [*range(port, port + 10), 0]
-    for number in wanted:
-        found = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-        found.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            found.bind((address, number))
-            found.listen(64)
-            return found
-        except OSError as error:
-            found.close()
-            problem = error.strerror
-    raise StartError(f"{address}:{port} cannot be used ({problem}); choose another console_port, or leave it out")
-
-
 def words_of_age(age: float) -> str:
     """Beside the diagnostics of a node that has fallen silent; empty beside others."""
     return f" (silent for {age:.0f} s)" if age >= SILENT_DIAGNOSTICS else ""
-
-
-def exposure(address: str) -> str:
-    """What is to be said of an address that others reach; empty for loopback."""
-    if address in ("127.0.0.1", "localhost"):
-        return ""
-    return f"the console listens on {address}: whoever gets the link can move the robot, and nothing is encrypted"
 
 
 class ConsoleNode:
@@ -176,7 +150,7 @@ class ConsoleNode:
             },
         )
         self.versions = {
-            **versions.of_everything(),
+            **versions(),
             "console": f"http://{self.address}:{self.port}",
             "ROS master": os.environ.get("ROS_MASTER_URI", ""),
             "packed page": f"{sum(len(file.packed) for file in files.values()) / 1e6:.2f} MB",

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import struct
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import rospy
@@ -29,8 +30,6 @@ from ..desk.gates import STANDSTILL, Standing, Standstills
 from ..desk.words import outcome, phase, plain, supervisor, transition
 from ..scene import path_ahead
 from ..scene.urdf_model import RobotModel
-from . import status, wire
-from .sources import SILENT, Sources
 from .tables import Tables
 
 PALM = "ih2_palm"
@@ -41,10 +40,66 @@ ASKED_FOR = (ReasonCode.CANCELLED, ReasonCode.SWITCHED, ReasonCode.SUPERSEDED)
 """a motion that ends for one of these ends because the brain or a person asked for it: no failure"""
 MOST_POSES = 200
 MOST_STATIC = 1000  # frames of /tf_static that are kept by name, as the object they belong to may be chosen later
+SILENT = 0.75  # s; each source sends at 4 Hz or more, and the page shows the silence within another 0.2 s
+ALL_DRIVES = 0x7F  # one bit a joint; further bits of LwrState.power mean something else
+LONGEST_NAME = 256  # bytes of a frame's name
+# ROS 1 serialisation: little-endian; strings and arrays begin with their length as uint32.
+_U32 = struct.Struct("<I")
+_STAMP = struct.Struct("<III")
+_POSE = struct.Struct("<7d")
 
 
 def _round(values: Any, digits: int = 4) -> list[float]:
     return [round(value, digits) if math.isfinite(value) else 0.0 for value in values]
+
+
+class BadBytes(ValueError):
+    """These bytes are no tf message."""
+
+
+def _name(data: bytes, at: int) -> tuple[str, int]:
+    (size,) = _U32.unpack_from(data, at)
+    if size > LONGEST_NAME:
+        raise BadBytes(f"a name of {size} bytes")
+    return data[at + 4 : at + 4 + size].decode("utf-8", "replace"), at + 4 + size
+
+
+def transforms(data: bytes) -> Iterator[tuple[str, str, float, tuple[float, ...]]]:
+    """Frames of a tf2_msgs/TFMessage: parent, child, stamp (s), pose (x, y, z, qx, qy, qz, qw). BadBytes if it is none.
+
+    Reading the bytes takes a tenth of the time of a whole decoding, and these messages come often."""
+    try:
+        (count,) = _U32.unpack_from(data, 0)
+        at = 4
+        for _ in range(count):
+            _, seconds, nanoseconds = _STAMP.unpack_from(data, at)
+            parent, at = _name(data, at + 12)
+            child, at = _name(data, at)
+            yield parent, child, seconds + nanoseconds * 1e-9, _POSE.unpack_from(data, at)
+            at += 56
+    except struct.error as error:
+        raise BadBytes(str(error)) from error
+
+
+class Sources:
+    """When each source was heard last. Called from any thread; `now` in s of the steady clock."""
+
+    def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
+        self._now = now
+        self._heard: dict[str, float] = {}
+
+    def heard(self, name: str) -> None:
+        """It has said something."""
+        self._heard[name] = self._now()
+
+    def speaks(self, name: str) -> bool:
+        """Whether it was heard a moment ago."""
+        return self._now() - self._heard.get(name, float("-inf")) < SILENT
+
+    def silent(self) -> dict[str, float]:
+        """For how long (s) each one that was heard before has been silent."""
+        now = self._now()
+        return {name: round(now - at, 1) for name, at in list(self._heard.items()) if now - at >= SILENT}
 
 
 class RosView:
@@ -213,8 +268,60 @@ class RosView:
         }
 
     def status(self) -> dict:
-        """What changes seldom."""
-        return status.document(self)
+        """What changes seldom: the document `status` of the page."""
+        now, machine, arm, hand = self.standing(), self.machine, self.arm, self.hand
+        return {
+            "machine": {
+                "alive": self.there("coglab/state"),
+                "state": machine.state,
+                "words": phase(machine.state),
+                "hub": machine.in_hub,
+                "actions": list(machine.actions),
+                "object": machine.object_id,
+                "why": plain(machine.why),
+                "fallback": str(self.config().get("default_object", "")),
+            },
+            "arm": {
+                "alive": self.there("lwr/state"),
+                "supervisor": arm.supervisor,
+                "words": supervisor(arm.supervisor),
+                "fri": arm.fri_state,
+                "quality": arm.quality,
+                "mode": arm.control_mode,
+                "power": arm.power & ALL_DRIVES == ALL_DRIVES,
+                "allowed": arm.motion_allowed,
+                "held": arm.hold_latched,
+                "reason": plain(arm.reason),
+                "cycle": arm.cycle_time,
+            },
+            "hand": {
+                "alive": self.there("ih2_hand/hand_status"),
+                "connected": hand.connected,
+                "calibrated": hand.calibrated,
+                "calibrating": hand.calibrating,
+                "holding": hand.holding,
+                "message": hand.message,
+                "motors": len(hand.motors),
+            },
+            "manager": {
+                "alive": self.there("controller_manager/status"),
+                "state": self.manager.state,
+                "active": self.manager.active_controller,
+                "reason": plain(self.manager.reason),
+                "scale": round(self.manager.speed_scale, 3),
+            },
+            "contact": {
+                "words": self.contact,
+                "stamp": round(self.contact_stamp, 1),
+                "alive": now.detector_alive,
+                "state": self.signal.state,
+                "mode": self.signal.mode,
+                "learnt": self.signal.learnt,
+                "samples": self.signal.rest_samples,
+                "k": round(self.signal.k, 3),
+                "window": round(self.signal.window, 4),
+            },
+        }
 
     # --- arm and hand -----------------------------------------------------------------------------------------
 
@@ -253,12 +360,12 @@ class RosView:
 
     def _on_tf(self, message: rospy.AnyMsg, static: bool = False) -> None:
         try:
-            for parent, child, stamp, pose in wire.transforms(message._buff):
+            for parent, child, stamp, pose in transforms(message._buff):
                 kept = child in self.named or (static and len(self.frames) < MOST_STATIC)
                 if kept and parent in FRAME_PARENTS and all(map(math.isfinite, pose)) and any(pose[3:]):
                     self.frames[child] = pose
                     self._stamps[child] = stamp
-        except wire.BadBytes:
+        except BadBytes:
             return
 
     def _on_arm(self, message: LwrState) -> None:
