@@ -1,6 +1,6 @@
-"""What the console does with a command, without ROS and without a web library: who may, when, and what is written down.
+"""Decides on each command of a browser: checks it, performs it and records it. Needs neither ROS nor a web library.
 
-The robot is reached through a Backend; the node has the real one, tests have a double.
+A Backend reaches the robot: the node has the real one, tests have a double.
 """
 
 from __future__ import annotations
@@ -19,8 +19,7 @@ from .gates import HeldButton, MotionGuard, Standing, control, reasons
 from .words import command as words_of
 from .words import plain
 
-UNKNOWN = "unknown"
-"""what the brain says of an object that was in the hand before it began"""
+UNKNOWN = "unknown"  # the brain's name of an object that was in the hand before the brain started
 NOTICE = 3.0  # s between the announcement of a new operator and the change
 ABSENCE = 10.0  # s without a connection after which nobody operates; longer than a page takes to load again
 
@@ -40,16 +39,16 @@ class Backend(Protocol):
     real: bool
 
     def standing(self) -> Standing:
-        """How it stands, from the newest messages; never waits."""
+        """State of the robot from the newest messages; never waits."""
 
     def stop(self, who: str) -> None:
-        """Brake, latch, end the action; returns at once, the outcome comes as events."""
+        """Brakes the arm, latches the hold and ends the action. Returns at once; the outcome comes as events."""
 
     def tell(self, name: str, text: str) -> None:
-        """Show a note, or the object of the next action, to everybody on ROS; returns at once."""
+        """Publishes a note, or the object of the next action, on ROS. Returns at once."""
 
     def call(self, name: str, arguments: dict) -> Awaitable[Answer]:
-        """A command of the list that needs the robot; ends within its time limit."""
+        """Runs a command that needs the robot. It ends within its time limit."""
 
 
 class Roles:
@@ -72,7 +71,7 @@ class Roles:
             self._make(name, f"{name} is the operator", "info")
 
     def disconnected(self, name: str) -> None:
-        """The last connection of a browser closed. The operator stays it for ABSENCE s."""
+        """The last connection of a browser closed. The operator keeps the role for ABSENCE s."""
         if name == self.operator:
             self._absent_since = self._now()
         if name == self.claimant:
@@ -80,7 +79,7 @@ class Roles:
             self._say(f"{name} went away and does not take over any more", "info")
 
     def take_over(self, name: str) -> str:
-        """`name` wants to be the operator; the answer in words."""
+        """The browser `name` requests to be the operator. Returns the answer in words."""
         if name == self.operator:
             return "you are the operator"
         if self.claimant and self.claimant != name:
@@ -97,7 +96,7 @@ class Roles:
         return f"{self.operator} was told; you are the operator in {NOTICE:.0f} s unless they keep the control"
 
     def keep(self, name: str) -> str:
-        """The operator refuses; the answer in words."""
+        """The operator refuses to hand over. Returns the answer in words."""
         if name != self.operator or not self.claimant:
             return "nobody is taking over from you"
         self._say(f"{name} keeps the control; {self.claimant} goes on watching", "warning")
@@ -105,7 +104,7 @@ class Roles:
         return "you keep the control"
 
     def tick(self) -> bool:
-        """Called several times a second; whether the operator changed."""
+        """Call this several times a second. Returns True if the operator changed."""
         absent = self._absent_since is not None and self._now() - self._absent_since > ABSENCE
         if self.claimant and (absent or self._now() >= self._due):
             self._make(self.claimant, f"{self.claimant} is the operator now, {self.operator} watches")
@@ -117,7 +116,7 @@ class Roles:
         return True
 
     def view(self) -> dict:
-        """What every browser is shown."""
+        """The roles, as every browser shows them."""
         return {"operator": self.operator, "claimant": self.claimant}
 
     def _make(self, name: str, sentence: str, level: str = "warning") -> None:
@@ -147,11 +146,11 @@ class Desk:
         if goes_on:
             events.add("experiment", goes_on, "warning")
         self.object_id = ""
-        """chosen for the next action that takes one; empty: the brain's default"""
+        """Object of the next action that needs one. Empty: the brain's default."""
         self._trial = (0, 0)
         self._held: dict[str, HeldButton] = {}
         self._begun: dict[str, tuple[str, dict]] = {}
-        """by who holds a button down that has begun something: what"""
+        """By browser: the command that has begun and whose button is still held."""
 
     # --- from the browsers ------------------------------------------------------------------------------------
 

@@ -35,9 +35,9 @@ from ..desk.words import plain
 from .knowledge import lookup
 from .view import RosView
 
-LIMIT = 6.0  # s, of one command
-HAND_LIMIT = 3.0  # s until the hand has said whether it calibrates
-MAX_WAITING = 12  # services that have not answered
+LIMIT = 6.0  # s that one command may take
+HAND_LIMIT = 3.0  # s that the hand may take to begin or refuse a calibration
+MAX_WAITING = 12  # commands whose service has not answered
 STOP_ANSWER_LIMIT = 3.0  # s until a missing answer to STOP is reported
 MAX_WAITING_STOPS = 8  # threads whose service has not answered a STOP
 HOME_CONTROLLER = "ptp"
@@ -60,7 +60,7 @@ class RosBackend:
         }
 
     def listen(self, told: Callable[[str, str, str], None]) -> None:
-        """`told(name, text, who)` gets what other nodes say on the topics of notes and of the next object."""
+        """Calls `told(name, text, who)` for messages of other nodes on the topics of notes and of the next object."""
 
         def heard(message: String, name: str) -> None:
             who = message._connection_header.get("callerid", "somebody")
@@ -83,7 +83,7 @@ class RosBackend:
         self._stop(who)
 
     async def call(self, name: str, arguments: dict) -> Answer:
-        """Runs the command in a thread of its own; an answer that does not come is told after LIMIT s."""
+        """Runs the command in its own thread. Without an answer within LIMIT, it returns a failure."""
         if not self._waiting.acquire(blocking=False):
             return Answer(False, f"{MAX_WAITING} earlier requests have not been answered; is the ROS master there?")
         loop = asyncio.get_running_loop()
@@ -139,7 +139,7 @@ class RosBackend:
                 return Answer(True, f"{now.message}; the hand tells how it ends")
             if self._view.hand_number > number and now.event_code == ReasonCode.HAND_REFUSED:
                 refused = now.message
-                # The same words as before may be those of an earlier request.
+                # The same words may be those of an earlier request.
                 if refused != before.message:
                     break
             time.sleep(0.02)
@@ -192,19 +192,19 @@ class RosBackend:
 
 
 class DirectService(rospy.ServiceProxy):
-    """A service whose address is known beforehand; where the known one fails, the master is asked."""
+    """A service proxy that knows the address beforehand. If that address fails, it requests it from the master."""
 
     address: str | None = None
 
     def refresh(self) -> None:
-        """Asks the master; may wait as long as the master does."""
+        """Requests the address from the master. This waits as long as the master takes."""
         try:
             self.address = rospy.get_master().lookupService(self.resolved_name)[2] or self.address
-        except Exception:  # it is not offered now, or the master is away: the known address stays
+        except Exception:  # no such service now, or no master: keep the known address
             pass
 
     def _get_service_uri(self, request: object) -> str:
-        address, self.address = self.address, None  # a stale one is used once
+        address, self.address = self.address, None  # use a stale address only once
         if address:
             try:
                 parse_rosrpc_uri(address)
@@ -233,8 +233,8 @@ class StopPath:
         self._keeper.start()
 
     def press(self, who: str) -> None:
-        """Returns at once. A press while eight services have not answered goes by the topic alone."""
-        self._topic.publish(String("hold"))  # a queue of its own and a thread per connection: never waits
+        """Sends STOP and returns at once. While MAX_WAITING_STOPS services have not answered, only by the topic."""
+        self._topic.publish(String("hold"))  # never waits: it has a queue, and a thread per connection
         began = time.monotonic()
         for name, call in (("arm", lambda: self._arm("hold")), ("brain", lambda: self._brain())):
             if self._waiting.acquire(blocking=False):

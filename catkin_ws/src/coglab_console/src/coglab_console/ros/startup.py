@@ -24,20 +24,20 @@ import rosgraph
 import rospkg
 
 PLACE = "/coglab_console_place"
-PATIENCE = 2.0  # s for one that is being respawned and may still end
-ANSWER_LIMIT = 2.0  # s for another console to say its process
+PATIENCE = 2.0  # s to wait for another console to end, for example while it is respawned
+ANSWER_LIMIT = 2.0  # s to wait for the process number of another console
 PACKAGES = (
     "python3-rospy", "python3-aiohttp", "python3-numpy", "python3-scipy", "libjs-three", "libjs-dygraphs", "graphviz",
 )  # fmt: skip
-DPKG_LIMIT = 5.0  # s, for dpkg
+DPKG_LIMIT = 5.0  # s
 
 
 class StartError(Exception):
-    """The console cannot begin; the sentence says what to do."""
+    """The console cannot start. The message says what to do."""
 
 
 class _Brief(Transport):
-    """Gives up after ANSWER_LIMIT s."""
+    """An XML-RPC transport with the timeout ANSWER_LIMIT."""
 
     def make_connection(self, host: Any) -> HTTPConnection:
         connection = super().make_connection(host)
@@ -46,7 +46,7 @@ class _Brief(Transport):
 
 
 def only_one(home: Path) -> int:
-    """A lock that one console of this ROS master holds until its process ends."""
+    """Takes the lock of this ROS master and returns its file descriptor. The process holds it until its end."""
     master = urlsplit(os.environ.get("ROS_MASTER_URI", "")).port or 11311
     lock = os.open(home / f"console_{master}.lock", os.O_RDWR | os.O_CREAT, 0o600)
     for _ in range(round(PATIENCE / 0.1)):
@@ -59,12 +59,12 @@ def only_one(home: Path) -> int:
 
 
 def announce(master: rosgraph.Master, uri: str) -> None:
-    """Tells where this console's node is."""
+    """Writes the address and process number of this console to the master."""
     master.setParam(PLACE, [uri, os.getpid()])
 
 
 def look_for_another(master: rosgraph.Master) -> None:
-    """StartError where a console of this master runs already; before a node is made, whose name would end the other."""
+    """Raises StartError if this master has a console. Call it before init_node, which would end the other one."""
     end = time.monotonic() + PATIENCE
     while True:
         found = _another(master)
@@ -76,7 +76,7 @@ def look_for_another(master: rosgraph.Master) -> None:
 
 
 def _another(master: rosgraph.Master) -> str:
-    """Where another console is, in words; empty where there is none, or no master to be asked."""
+    """Address of another console, in words; empty if there is none, or no master."""
     try:
         uri, process = master.getParam(PLACE)
         if not isinstance(uri, str):
@@ -90,7 +90,7 @@ def _another(master: rosgraph.Master) -> str:
 
 
 def bind(address: str, port: int, fixed: bool) -> socket.socket:
-    """A listening socket; where the port is taken and not `fixed`, on one of the next nine, or on any."""
+    """Returns a listening socket. If the port is taken and not `fixed`: one of the next nine, or any free port."""
     wanted = [port] if fixed or port == 0 else [*range(port, port + 10), 0]
     for number in wanted:
         found = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
@@ -106,14 +106,14 @@ def bind(address: str, port: int, fixed: bool) -> socket.socket:
 
 
 def exposure(address: str) -> str:
-    """What is to be said of an address that others reach; empty for loopback."""
+    """Warning about an address that other computers reach; empty for loopback."""
     if address in ("127.0.0.1", "localhost"):
         return ""
     return f"the console listens on {address}: whoever gets the link can move the robot, and nothing is encrypted"
 
 
 def versions() -> dict[str, str]:
-    """Version by name; what is not there says so."""
+    """Version by name. The text says so if a version is unknown."""
     return {
         "CogLab": _own_version(),
         "Debian": _file_text(Path("/etc/debian_version")),
@@ -124,7 +124,7 @@ def versions() -> dict[str, str]:
 
 
 def debian_versions(names: tuple[str, ...]) -> dict[str, str]:
-    """Version of each Debian package, in one question to dpkg."""
+    """Version of each Debian package, by one call of dpkg-query."""
     try:
         command = ["dpkg-query", "-W", "-f=${db:Status-Status} ${Package} ${Version}\n", *names]
         lines = subprocess.run(command, capture_output=True, text=True, timeout=DPKG_LIMIT).stdout.splitlines()
@@ -136,7 +136,7 @@ def debian_versions(names: tuple[str, ...]) -> dict[str, str]:
 
 
 def _own_version() -> str:
-    """Version of the package, and the commit where this is a checkout."""
+    """Version of the package, and the commit if this is a checkout."""
     packages = rospkg.RosPack()
     try:
         found = str(packages.get_manifest("coglab_console").version)
@@ -148,7 +148,7 @@ def _own_version() -> str:
 
 
 def commit(top: Path) -> str:
-    """Short name of the commit that a checkout stands at, read from its files."""
+    """Short hash of the checked-out commit, read from the files of git."""
     entry = top / ".git"
     if entry.is_file():  # a worktree names its folder
         entry = top / _file_text(entry).removeprefix("gitdir: ")

@@ -1,4 +1,4 @@
-"""What the console knows of the robot: the newest of every topic, and from it the state that goes out at 30 Hz."""
+"""Keeps the newest message of every topic, and makes from them the state that the page gets at 30 Hz."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ from .tables import Tables
 
 PALM = "ih2_palm"
 FRAME_PARENTS = ("world", "lwr_base_link")
-OLD = 1.0  # s without a message after which a motion's path or progress is over
+OLD = 1.0  # s without a message, after which the path or progress of a motion is over
 GOAL_FRAME = "dmp_goal"
 ASKED_FOR = (ReasonCode.CANCELLED, ReasonCode.SWITCHED, ReasonCode.SUPERSEDED)
-"""a motion that ends for one of these ends because the brain or a person asked for it: no failure"""
-MOST_POSES = 200
-MOST_STATIC = 1000  # frames of /tf_static that are kept by name, as the object they belong to may be chosen later
+"""Reason codes of motions that the brain or a person has ended. They are no failures."""
+MOST_POSES = 200  # of one path
+MOST_STATIC = 1000  # frames of /tf_static that are kept, because their object may be selected later
 SILENT = 0.75  # s; each source sends at 4 Hz or more, and the page shows the silence within another 0.2 s
 ALL_DRIVES = 0x7F  # one bit a joint; further bits of LwrState.power mean something else
 LONGEST_NAME = 256  # bytes of a frame's name
@@ -89,22 +89,24 @@ class Sources:
         self._heard: dict[str, float] = {}
 
     def heard(self, name: str) -> None:
-        """It has said something."""
+        """Registers a message of this source."""
         self._heard[name] = self._now()
 
     def speaks(self, name: str) -> bool:
-        """Whether it was heard a moment ago."""
+        """True if its last message is younger than SILENT."""
         return self._now() - self._heard.get(name, float("-inf")) < SILENT
 
     def silent(self) -> dict[str, float]:
-        """For how long (s) each one that was heard before has been silent."""
+        """Silence in s of each source that sent something before and is silent now."""
         now = self._now()
         return {name: round(now - at, 1) for name, at in list(self._heard.items()) if now - at >= SILENT}
 
 
 class RosView:
-    """Callbacks write, anybody reads; each value is replaced as a whole. `say(source, text, level, phase)` makes an
-    event, `put(name, value)` a document, `transition` goes to the graphs and `result` to the desk."""
+    """The callbacks of the topics write; any thread may read, because each value is replaced as a whole.
+
+    `say(source, text, level, phase)` adds an event, `put(name, value)` sets a document, `transition` passes a
+    transition to the graphs, and `result` passes a result to the desk."""
 
     def __init__(
         self,
@@ -131,7 +133,7 @@ class RosView:
         self.sources = Sources()
         self.contact_stamp = 0.0
         self.hand_number = 0
-        """of the newest message of the hand"""
+        """Count of the hand's messages."""
         self.signal, self.contact, self.latency = ContactSignal(), "", math.nan
         self._dmp_at = self._latency_at = self._path_at = 0.0
         self._path_of = ""  # the controller whose motion is under way
@@ -139,15 +141,15 @@ class RosView:
         self.entry: Callable[[], dict] = dict
         self.config: Callable[[], dict] = dict
         self.objects: Callable[[], tuple[str, ...] | None] = lambda: None
-        """of the database; None where it is not there"""
+        """Identifiers of the objects in the database; None if there is no database."""
         self.objects_read: Callable[[], None] = lambda: None
         self.named = frozenset({self.hand_frame, self._board_frame, GOAL_FRAME})
-        """frames that the picture may show, however many others there are; Knowledge adds those of the objects"""
+        """Frames that the picture may show. Knowledge adds those of the objects."""
         self._moving = frozenset(model.moving()) if model else None
         self._subscribers: dict[str, rospy.Subscriber] = {}
 
     def listen(self) -> None:
-        """Begins; what is latched comes at once, when everybody who is told must be there."""
+        """Subscribes to the topics. Latched messages arrive at once, so call this when all callbacks are set."""
         for topic, kind, callback, queue in (
             ("coglab/state", MasterState, self._on_machine, 20),
             ("coglab/transitions", Transition, self._on_transition, 200),
@@ -170,7 +172,7 @@ class RosView:
             self._subscribers[topic] = rospy.Subscriber(topic, PredictedPath, self._on_path, name, queue_size=5)
 
     def there(self, topic: str) -> bool:
-        """Whether somebody publishes it."""
+        """True if a node publishes this topic."""
         return self._subscribers[topic].get_num_connections() > 0
 
     def phase(self) -> str:
@@ -180,7 +182,7 @@ class RosView:
     # --- read -------------------------------------------------------------------------------------------------
 
     def standing(self) -> Standing:
-        """For the desk."""
+        """State of the robot for the desk."""
         machine, arm, hand = self.machine, self.arm, self.hand
         return Standing(
             master_there=self.there("coglab/state"),
@@ -204,24 +206,24 @@ class RosView:
         )
 
     def stopped(self) -> tuple[bool, str, int]:
-        """Whether the robot stands after a stop or a fault, why, and how often it has come to stand."""
-        # One that is silent for a moment stands all the same.
+        """True if the robot stands after a stop or a fault; the reason; and how often it has come to stand."""
+        # A node that is silent for a moment does not end the standstill.
         held = self.there("lwr/state") and self.arm.hold_latched
         stands = self.there("coglab/state") and self.machine.state.rsplit("/", 1)[-1] in STANDSTILL
         return stands or held, plain(self.machine.why or self.arm.reason), self._standstills.count
 
     def palm(self) -> Any:
-        """Place of the palm in the world, m; None where it is not known."""
+        """Position of the palm in the world, m; None if it is not known."""
         if self.model is None or not self.joints:
             return None
         return self.model.place(PALM, self.joints)[:3, 3]
 
     def path_runs(self) -> bool:
-        """Whether the path of a motion under way is shown."""
+        """True if the page shows the path of a running motion."""
         return bool(self._path_of) and time.monotonic() - self._path_at < OLD
 
     def shown(self, kind: str, path: PredictedPath) -> dict | None:
-        """The document of a path; None where it has no poses, or its frame is none of the robot's."""
+        """Document of a path; None if it has no poses, or if the robot has no such frame."""
         if self.model is None or not path.poses or len(path.poses) != len(path.times) or len(path.poses) > MOST_POSES:
             return None
         frame = path.header.frame_id
@@ -229,7 +231,7 @@ class RosView:
         return path_ahead.document(kind, path, self.model.place(frame, self.joints)) if known else None
 
     def frame(self) -> dict:
-        """What goes out 30 times a second."""
+        """The state that the page gets 30 times a second."""
         now = time.monotonic()
         self._measure_palm(now)
         object_frame = str(self.entry().get("frame", ""))
@@ -268,7 +270,7 @@ class RosView:
         }
 
     def status(self) -> dict:
-        """What changes seldom: the document `status` of the page."""
+        """The document `status` of the page: the values that change seldom."""
         now, machine, arm, hand = self.standing(), self.machine, self.arm, self.hand
         return {
             "machine": {
