@@ -1,9 +1,7 @@
 // STOP, and the buttons that set something going; why one is disabled stands below it.
 import { h, setAttribute, setText } from './dom.js';
-import { onDocs, store } from './store.js';
-import { command, stop } from './link.js';
-import { choice } from './choice.js';
-import { actionButton, blocked, refuse, watch } from './controls.js';
+import { command, onDocs, stop, store } from './link.js';
+import { actionButton, blocked, choice, refuse, watch } from './controls.js';
 
 const BUTTONS = [
   ['initialise', 'Initialise'],

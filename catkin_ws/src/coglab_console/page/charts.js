@@ -1,6 +1,6 @@
 // Strip charts on one time axis (the last 20 s), drawn by Debian's dygraphs; phases as bars above them.
 import { drawn, h, setText, svg } from './dom.js';
-import { on, onDocs, store } from './store.js';
+import { on, onDocs, store } from './link.js';
 
 const WINDOW = 20; // s
 const JOINTS = [0, 1, 3]; // A1, A2, A3 (wire joints 1, 2, 4) carry the lever of a hand-over

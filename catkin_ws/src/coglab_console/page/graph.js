@@ -1,8 +1,7 @@
 // The graph of a state machine as Graphviz laid it out; active states thick and filled, the last transition in words.
-import { h, setText, svg } from './dom.js';
-import { onDocs, store, on } from './store.js';
-import { choice } from './choice.js';
-import { more } from './more.js';
+import { h, more, setText, svg } from './dom.js';
+import { on, onDocs, store } from './link.js';
+import { choice } from './controls.js';
 
 const MAIN = '/coglab';
 const READABLE = 14 / 11; // px a unit of the picture, whose letters are 11 high, to be 14

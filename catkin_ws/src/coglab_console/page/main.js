@@ -1,16 +1,13 @@
 // The page: tabs, keys, and the parts of the first page.
 import { h, setAttribute, setText } from './dom.js';
-import { on, onDocs, operating, store } from './store.js';
-import { connect } from './link.js';
+import { connect, on, onDocs, operating, store } from './link.js';
 import { armStop, showActions, showCause } from './actions.js';
-import { eventsPage, showLog } from './log.js';
-import { showStatus } from './status.js';
+import { eventsPage, showLog, showStatus } from './status.js';
 import { palmShown, showView, viewKind } from './view.js';
 import { showGraph } from './graph.js';
 import { barsShown, showCharts, stripsShown } from './charts.js';
 import { experimentPage, showSession } from './tab_experiment.js';
-import { contactPage } from './tab_contact.js';
-import { feedbackPage, objectsPage, primitivesPage } from './tab_lists.js';
+import { contactPage, feedbackPage, objectsPage, primitivesPage } from './tab_robot.js';
 import { healthPage, helpPage, takeOver } from './tab_health.js';
 
 const PAGES = [['Live', null], ['Machine', null], ['Experiment', experimentPage], ['Contact', contactPage], ['Objects', objectsPage], ['Primitives', primitivesPage],

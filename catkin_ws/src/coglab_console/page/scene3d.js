@@ -1,8 +1,8 @@
 // The 3D view, with Debian's three.js (r111).
 import * as THREE from '/lib/three/build/three.module.js';
 import { OrbitControls } from '/lib/three/examples/jsm/controls/OrbitControls.js';
-import { fixedShapes, robotShapes, robotPoses, objectShape, path, HAND_SHAPES } from './cell.js';
-import { store } from './store.js';
+import { fixedShapes, HAND_SHAPES, objectShape, path, robotPoses, robotShapes } from './cell.js';
+import { store } from './link.js';
 
 const HALF_HIGH = Math.tan((19 * Math.PI) / 180); // half the height of the picture, at a distance of 1
 const NARROW = 1.5; // width by height below which the picture keeps its width: arm and person stay in it

@@ -1,9 +1,31 @@
-// The column on the left: how everything stands, at a glance.
-import { h, mark, paced, setText } from './dom.js';
-import { on, onDocs, store } from './store.js';
+// The column on the left and the events: three lines in the footer, and a page of their own.
+import { h, mark, more, paced, setText } from './dom.js';
+import { on, onDocs, store } from './link.js';
 import { ageWords } from './cell.js';
-import { clock } from './log.js';
-import { more } from './more.js';
+
+const LEVELS = { info: 'idle', warning: 'warn', fault: 'fault' };
+
+export function clock(stamp) {
+  return new Date(stamp * 1000).toLocaleTimeString('en-GB');
+}
+
+function line(event) {
+  return h('li', { class: event.level === 'fault' ? 'faultrow' : '' }, mark(LEVELS[event.level]), `${clock(event.stamp)} ${event.source}: ${event.text}${event.phase ? ` [${event.phase}]` : ''}`);
+}
+
+export function showLog(list) {
+  more(list.parentElement, list);
+  on('events', paced(() => list.replaceChildren(...store.events.slice(-3).reverse().map(line)), 150));
+}
+
+export function eventsPage(page) {
+  page.className = 'page';
+  const list = h('ol', { reversed: true, tabindex: '0', 'aria-label': 'All events, newest first' });
+  page.append(h('h2', {}, 'Events, newest first'), list);
+  const draw = paced(() => list.isConnected && list.replaceChildren(...store.events.slice(-300).reverse().map(line)), 300);
+  draw();
+  return { events: draw };
+}
 
 const NOW = ['Phase', 'Waits']; // above everything else
 const ROWS = ['FRI', 'Arm', 'Motion', 'Hand', 'Person', 'Object', 'Contact', 'Why', 'Last'];
@@ -117,7 +139,7 @@ function rows() {
     Object: object(machine),
     Contact: contact(),
     Why: why(machine, a, stood),
-    Last: last ? [{ info: 'idle', warning: 'warn', fault: 'fault' }[last.level], `${clock(last.stamp)} ${last.text}`] : ['idle', 'nothing yet'],
+    Last: last ? [LEVELS[last.level], `${clock(last.stamp)} ${last.text}`] : ['idle', 'nothing yet'],
   };
 }
 

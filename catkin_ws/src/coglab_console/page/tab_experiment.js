@@ -1,10 +1,8 @@
 // Experiment: participant, conditions, order of trials, notes. One file per session, written by the server.
 import { h, setText, table } from './dom.js';
-import { onDocs, store } from './store.js';
-import { command } from './link.js';
-import { commandButton } from './controls.js';
-import { choice } from './choice.js';
-import { clock } from './log.js';
+import { command, onDocs, store } from './link.js';
+import { choice, commandButton } from './controls.js';
+import { clock } from './status.js';
 
 export function field(label, input) {
   return h('label', {}, label, input);

@@ -1,7 +1,6 @@
 // Health: diagnostics tree, versions, parameters, browsers; and Help.
 import { h, mark, setText, table } from './dom.js';
-import { operating, store } from './store.js';
-import { command } from './link.js';
+import { command, operating, store } from './link.js';
 import { viewKind } from './view.js';
 import { commandButton, watch } from './controls.js';
 

@@ -20,8 +20,8 @@ import rospy
 import rostest
 import tf2_ros
 from coglab_console.browser import Browser, acknowledge, fresh_link, press_and_hold
-from coglab_console.page_check import PAGES, look
 from coglab_msgs.msg import LwrState, MasterState
+from page_check import PAGES, look
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys

@@ -6,7 +6,7 @@ import time
 
 from coglab_console.desk.desk import Desk
 from coglab_console.desk.events import EventLog
-from coglab_console.desk.hold import HeldButton
+from coglab_console.desk.gates import HeldButton
 from coglab_console.web.fan_out import Documents
 from console_double import RobotDouble
 

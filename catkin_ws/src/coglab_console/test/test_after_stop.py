@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import pytest
 from coglab_console.desk.desk import Answer
-from coglab_console.desk.gates import MotionGuard, Standstills
-from coglab_console.desk.hold import HOLD_TIME, HeldButton
+from coglab_console.desk.gates import HOLD_TIME, HeldButton, MotionGuard, Standstills
 from console_double import running
 from desk_double import RECEIVE, Clock, ask, hold_for, newest, shown
 

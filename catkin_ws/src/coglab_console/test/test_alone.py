@@ -8,8 +8,8 @@ from xmlrpc.server import SimpleXMLRPCServer
 
 import pytest
 import rosgraph
-from coglab_console.ros import alone
-from coglab_console.ros.alone import PLACE, StartError, announce, look_for_another
+from coglab_console.ros import startup
+from coglab_console.ros.startup import PLACE, StartError, announce, look_for_another
 
 
 @contextlib.contextmanager
@@ -52,8 +52,8 @@ def node(pid):
 
 @pytest.fixture(autouse=True)
 def quickly(monkeypatch):
-    monkeypatch.setattr(alone, "PATIENCE", 0.3)
-    monkeypatch.setattr(alone, "ANSWER_LIMIT", 0.3)
+    monkeypatch.setattr(startup, "PATIENCE", 0.3)
+    monkeypatch.setattr(startup, "ANSWER_LIMIT", 0.3)
 
 
 def test_the_first_console_begins_and_the_second_is_told_where_the_first_is(master):
@@ -83,7 +83,7 @@ def test_a_console_that_is_frozen_is_one(master):
 
 
 def test_one_that_is_just_ending_is_waited_for(master, monkeypatch):
-    monkeypatch.setattr(alone, "PATIENCE", 10.0)
+    monkeypatch.setattr(startup, "PATIENCE", 10.0)
     with contextlib.ExitStack() as stack:
         uri = stack.enter_context(node(4711))
         master.values[PLACE] = [uri, 4711]

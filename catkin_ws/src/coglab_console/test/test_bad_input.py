@@ -15,7 +15,7 @@ RECEIVE = {"action": "exchange_human_to_robot"}
 @pytest.fixture(autouse=True)
 def patient(monkeypatch):
     """A crowded computer makes gaps between the messages of a held button; gaps have tests of their own."""
-    monkeypatch.setattr("coglab_console.desk.hold.LONGEST_GAP", 5.0)
+    monkeypatch.setattr("coglab_console.desk.gates.LONGEST_GAP", 5.0)
 
 
 def go(test, tmp_path, robot=None, **more):
@@ -81,7 +81,7 @@ def test_of_two_operators_at_once_one_is_served_and_the_other_is_told_who_operat
 
 
 def test_whoever_has_taken_over_alone_operates(tmp_path, monkeypatch):
-    monkeypatch.setattr("coglab_console.desk.roles.NOTICE", 0.2)
+    monkeypatch.setattr("coglab_console.desk.desk.NOTICE", 0.2)
 
     async def test(console):
         async with console.browser() as one, console.browser() as two:

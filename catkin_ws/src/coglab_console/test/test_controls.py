@@ -9,7 +9,7 @@ import pytest
 from coglab_console.browser import Browser, press_and_hold
 from coglab_console.desk.desk import Answer
 from coglab_console.desk.words import BUTTONS
-from coglab_console.page_check import PAGES, look
+from page_check import PAGES, look
 from page_double import STATUS, Desk
 
 pytestmark = pytest.mark.skipif(
@@ -53,7 +53,7 @@ OPERATORS = {
 @pytest.fixture(autouse=True)
 def patient(monkeypatch):
     """A crowded computer makes gaps between the messages of a held button; gaps have tests of their own."""
-    monkeypatch.setattr("coglab_console.desk.hold.LONGEST_GAP", 5.0)
+    monkeypatch.setattr("coglab_console.desk.gates.LONGEST_GAP", 5.0)
 
 
 @pytest.fixture(scope="module")

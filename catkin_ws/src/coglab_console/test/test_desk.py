@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 from coglab_console.desk.commands import COMMANDS, BadCommand, judge
+from coglab_console.desk.desk import ABSENCE, NOTICE, Roles
 from coglab_console.desk.experiment import Experiment, ExperimentError, latin_row, order_of
 from coglab_console.desk.gates import MotionGuard, Standing, reasons
-from coglab_console.desk.roles import ABSENCE, NOTICE, Roles
 from console_double import READY
 from desk_double import Clock, ask, hold_for
 

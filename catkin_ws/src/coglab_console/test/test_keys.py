@@ -8,7 +8,7 @@ import pytest
 if shutil.which("chromedriver") is None:
     pytest.skip("chromium-driver is missing: ./coglab install browser", allow_module_level=True)
 from coglab_console.browser import Browser
-from coglab_console.page_check import PAGES, look
+from page_check import PAGES, look
 from page_double import Desk
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By

@@ -6,9 +6,9 @@ import time
 import pytest
 from coglab_console.browser import Browser
 from coglab_console.desk.gates import Standing
-from coglab_console.page_check import PAGES, focus_order, look
 from coglab_console.scene.graph_layout import Container, Layout
 from console_double import PAGE_DOCUMENTS, READY
+from page_check import PAGES, focus_order, look
 from page_double import IN_HAND, Desk
 
 pytestmark = pytest.mark.skipif(

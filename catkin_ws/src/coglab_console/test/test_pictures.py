@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 import yaml
 from coglab_console.desk.words import phase
-from coglab_console.ros import versions, wire
+from coglab_console.ros import startup
+from coglab_console.ros.view import BadBytes, transforms
 from coglab_console.scene import path_ahead
 from coglab_console.scene.graph_layout import Container, Layout, roots
 from coglab_console.scene.primitives import LibraryError, load_library, shape_map
@@ -246,7 +247,7 @@ def test_bytes_against_the_messages_own_decoding():
         message.transforms.append(one)
     stream = io.BytesIO()
     message.serialize(stream)
-    found = list(wire.transforms(stream.getvalue()))
+    found = list(transforms(stream.getvalue()))
     assert found[2] == ("world", "child_2", 5.25, (2.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0))
 
 
@@ -256,11 +257,11 @@ def test_bytes_that_are_none_are_refused():
         for _ in range(200):
             data = bytes(chance.randrange(256) for _ in range(size))
             try:
-                list(wire.transforms(data))
-            except wire.BadBytes:
+                list(transforms(data))
+            except BadBytes:
                 pass
-    with pytest.raises(wire.BadBytes):
-        list(wire.transforms(struct.pack("<I", 4000000000)))
+    with pytest.raises(BadBytes):
+        list(transforms(struct.pack("<I", 4000000000)))
 
 
 def test_phases_in_words_depend_on_the_action():
@@ -274,20 +275,20 @@ def test_phases_in_words_depend_on_the_action():
 
 
 def test_versions_of_debian_packages_and_of_a_checkout(tmp_path):
-    found = versions.debian(("python3-numpy", "no-such-package-here"))
+    found = startup.debian_versions(("python3-numpy", "no-such-package-here"))
     assert found["python3-numpy"][0].isdigit() and found["no-such-package-here"] == "not installed"
-    assert versions.commit(tmp_path) == "unknown"
+    assert startup.commit(tmp_path) == "unknown"
     (tmp_path / ".git" / "refs" / "heads").mkdir(parents=True)
     (tmp_path / ".git" / "HEAD").write_text("ref: refs/heads/x\n")
     (tmp_path / ".git" / "packed-refs").write_text("# pack\n1234567890abcdef refs/heads/x\n")
-    assert versions.commit(tmp_path) == "1234567890"
+    assert startup.commit(tmp_path) == "1234567890"
     (tmp_path / ".git" / "refs" / "heads" / "x").write_text("abcdef1234567890\n")
-    assert versions.commit(tmp_path) == "abcdef1234"
+    assert startup.commit(tmp_path) == "abcdef1234"
 
 
 def test_health_shows_the_version_of_the_release():
     """That of package.xml, which is one for all packages and the newest of CHANGELOG.md."""
     (newest, *_) = re.findall(r"^## (\d\S*)", (SOURCES.parents[1] / "CHANGELOG.md").read_text(), re.M)
-    assert versions.of_everything()["CogLab"].split(",")[0] == newest
+    assert startup.versions()["CogLab"].split(",")[0] == newest
     told = [re.search("<version>(.*)</version>", path.read_text()).group(1) for path in SOURCES.glob("*/package.xml")]
     assert set(told) == {newest}

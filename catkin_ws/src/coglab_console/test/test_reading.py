@@ -7,8 +7,8 @@ import time
 import pytest
 from coglab_console.browser import Browser
 from coglab_console.desk import words
-from coglab_console.page_check import focus_order, look
 from coglab_console.scene.graph_layout import Container, Layout
+from page_check import focus_order, look
 from page_double import STATUS, Desk
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By

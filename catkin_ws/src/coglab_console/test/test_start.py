@@ -8,8 +8,9 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from coglab_console.ros import node as ros_node
-from coglab_console.ros.node import ADDRESS, PORT, ConsoleNode, StartError, bind, exposure, only_one
+from coglab_console.ros import startup
+from coglab_console.ros.node import ADDRESS, PORT, ConsoleNode
+from coglab_console.ros.startup import StartError, bind, exposure, only_one
 from coglab_console.web.access import Access
 
 
@@ -63,7 +64,7 @@ def test_each_run_has_tokens_of_its_own():
 
 
 def test_one_console_for_each_master(tmp_path, monkeypatch):
-    monkeypatch.setattr(ros_node.time, "sleep", lambda seconds: None)
+    monkeypatch.setattr(startup.time, "sleep", lambda seconds: None)
     monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:11999")
     only_one(tmp_path)
     with pytest.raises(StartError, match="another console"):

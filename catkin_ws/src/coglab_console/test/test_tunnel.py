@@ -5,8 +5,8 @@ import socket
 
 import aiohttp
 from aiohttp.abc import AbstractResolver
-from coglab_console.forwarder import Forwarder
 from console_double import running
+from forwarder import Forwarder
 
 
 def go(test, tmp_path, **more):

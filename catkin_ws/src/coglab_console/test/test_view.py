@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 from coglab_console.ros import view as ros_view
-from coglab_console.ros.sources import Sources
+from coglab_console.ros.view import Sources
 from coglab_console.scene.urdf_model import RobotModel
 from coglab_msgs.msg import (
     ContactSignal,

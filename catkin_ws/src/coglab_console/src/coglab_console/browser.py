@@ -1,4 +1,4 @@
-"""Debian's chromium, without a screen, for tests, benches and pictures of the console (package group `browser`)."""
+"""Runs Debian's chromium without a screen, for tests, benchmarks and pictures of the console."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ NO_GL = ("--disable-gpu", "--disable-3d-apis")
 
 
 class Browser:
-    """One browser with a profile of its own; `driver` is selenium's. Closes with the context."""
+    """One browser with its own profile; `driver` is selenium's. Leaving the context closes it."""
 
     def __init__(self, webgl: bool = True, size: tuple[int, int] = SIZE, touch: bool = False) -> None:
         from selenium import webdriver
@@ -62,7 +62,7 @@ class Browser:
             shutil.rmtree(self._profile, ignore_errors=True)
 
     def open(self, link: str, limit: float = 30.0) -> None:
-        """The console at this one-time link; returns when it is live and shows the robot."""
+        """Opens the console at this one-time link. Returns when the page is live and shows the robot."""
         self.driver.get(link)
         self.until(
             "return coglab.state() !== null && coglab.docs().desk !== undefined && coglab.view() !== 'none'", limit
@@ -73,7 +73,7 @@ class Browser:
         return self.driver.execute_script(script, *arguments)
 
     def until(self, script: str, limit: float, *arguments: Any) -> Any:
-        """Waits until the script returns something true. TimeoutError after `limit` s, with what the page shows."""
+        """Waits until the script returns a true value. TimeoutError after `limit` s, with the text of the page."""
         end = time.monotonic() + limit
         while True:
             try:
@@ -88,18 +88,18 @@ class Browser:
             time.sleep(0.1)
 
     def painted(self) -> None:
-        """Waits for two pictures more: what was changed before is seen."""
+        """Waits until the page was drawn twice, so that earlier changes are visible."""
         self.driver.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]))")
 
     def summary(self) -> str:
-        """What the page says, for a message."""
+        """Text of the page, for a message."""
         try:
             return str(self.js("return document.body.innerText.slice(0, 600)"))
         except Exception as error:
             return str(error).splitlines()[0]
 
     def tab(self, name: str) -> None:
-        """Goes to a page of the console."""
+        """Opens a tab of the console."""
         self.js("document.getElementById('tab-' + arguments[0]).click()", name)
 
     def touch(self, selector: str, done: Callable[[], bool] = lambda: True, limit: float = 5.0) -> None:
@@ -121,7 +121,7 @@ class Browser:
             send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
 
     def picture(self, path: Path) -> None:
-        """Keeps what is seen now."""
+        """Saves a screenshot."""
         path.parent.mkdir(parents=True, exist_ok=True)
         self.driver.save_screenshot(str(path))
 
@@ -131,7 +131,7 @@ class Browser:
 
 
 def listens(link: str) -> bool:
-    """Whether somebody takes connections at the address of this link."""
+    """True if the address of this link accepts connections."""
     place = urlsplit(link)
     try:
         with socket.create_connection((place.hostname or "", place.port or 0), timeout=2.0):
@@ -141,8 +141,9 @@ def listens(link: str) -> bool:
 
 
 def fresh_link(home: Path, used: str = "", limit: float = 30.0) -> str:
-    """The link in console.url of this ROS_HOME, another one than `used`, of a console that runs: the file may be one
-    that an earlier console has left."""
+    """The link in console.url of this ROS_HOME, other than `used`.
+
+    Waits until its console runs, because an earlier console may have left the file."""
     end = time.monotonic() + limit
     path = home / "console.url"
     while time.monotonic() < end:
@@ -154,8 +155,7 @@ def fresh_link(home: Path, used: str = "", limit: float = 30.0) -> str:
 
 
 def acknowledge(browser: Browser, press: Callable[[], None], limit: float = 20.0) -> None:
-    """Acknowledges the newest stop: again where another one came while `press` was on its way. TimeoutError after
-    `limit` s."""
+    """Acknowledges the newest stop, again if another one came in between. TimeoutError after `limit` s."""
     end = time.monotonic() + limit
     while browser.js("return coglab.docs().desk.guard.unacknowledged"):
         browser.until("return document.getElementById('acknowledge').offsetParent !== null", limit)

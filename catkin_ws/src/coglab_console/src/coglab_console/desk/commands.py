@@ -1,6 +1,6 @@
-"""The closed list of commands with a JSON Schema each. What is not here cannot be asked for by a browser.
+"""The closed list of commands, each with a JSON Schema. A browser cannot request anything else.
 
-`python3 -m coglab_console.desk.commands` prints the table of them.
+`python3 -m coglab_console.desk.commands` prints them as a table.
 """
 
 from __future__ import annotations
@@ -11,22 +11,22 @@ from typing import Any
 import jsonschema
 
 STARTS = ("initialise", "reset", "exchange_human_to_robot", "exchange_robot_to_human", "take", "put")
-"""Actions of the service coglab/start"""
-# Python's $ would let a line's end follow.
+"""Actions of the service coglab/start."""
+# \Z, because Python's $ also matches before a newline at the end.
 _OBJECT = {"type": "string", "pattern": r"^([a-z][a-z0-9_]{0,31})?\Z"}
 _NAME = {"type": "string", "pattern": r"^[A-Za-z0-9_./-]{1,64}\Z"}
 _LABEL = {"type": "string", "pattern": r"^[A-Za-z0-9_ .-]{1,40}\Z"}
-# Halves of a pair of UTF-16, which JSON can name, have no UTF-8.
+# JSON can contain single UTF-16 surrogates, which UTF-8 cannot encode.
 _TEXT = {"type": "string", "minLength": 1, "maxLength": 500, "pattern": "^[^\ud800-\udfff]*\\Z"}
 
 
 class BadCommand(Exception):
-    """Not in the list, or its arguments do not fit; the sentence says what was expected and what came."""
+    """Unknown command or wrong arguments. The message gives what was expected and what was received."""
 
 
 @dataclass(frozen=True)
 class Command:
-    """`operator`: only the operator may ask for it; `motion`: it sets the arm or the hand in motion."""
+    """`operator`: only the operator may request it; `motion`: it moves the arm or the hand."""
 
     name: str
     about: str
@@ -88,7 +88,7 @@ _ALL = (
         "names": {"type": "array", "minItems": 1, "maxItems": 64, "items": _NAME}}, ("names",)),
 )  # fmt: skip
 COMMANDS = {command.name: command for command in _ALL}
-# 2.0 is no integer here: Python would count nothing with it.
+# 2.0 is no integer here: range() and the like do not take a float.
 _TYPES = jsonschema.Draft7Validator.TYPE_CHECKER.redefine(
     "integer", lambda _, value: isinstance(value, int) and not isinstance(value, bool)
 )
@@ -97,7 +97,7 @@ _VALIDATORS = {command.name: _Validator(command.schema()) for command in _ALL}
 
 
 def judge(name: Any, arguments: Any) -> Command:
-    """The command; BadCommand if there is none of that name or its arguments do not fit the schema."""
+    """Returns the command. Raises BadCommand if the name is unknown or the arguments do not fit the schema."""
     if not isinstance(name, str) or name not in COMMANDS:
         told = f"'{name[:40]}'" if isinstance(name, str) else f"without a name of letters ({type(name).__name__})"
         raise BadCommand(f"there is no command {told}; there are: {', '.join(COMMANDS)}")
@@ -112,7 +112,7 @@ def judge(name: Any, arguments: Any) -> Command:
 
 
 def _values(schema: dict[str, Any]) -> str:
-    """What a field may hold, in words."""
+    """Possible values of a field, in words."""
     if "enum" in schema:
         return ", ".join(f"`{value}`" for value in schema["enum"])
     if schema["type"] == "array":

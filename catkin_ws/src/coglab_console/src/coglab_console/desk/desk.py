@@ -1,11 +1,12 @@
-"""What the console does with a command, without ROS and without a web library: who may, when, and what is written down.
+"""Decides on each command of a browser: checks it, performs it and records it. Needs neither ROS nor a web library.
 
-The robot is reached through a Backend; the node has the real one, tests have a double.
+A Backend reaches the robot: the node has the real one, tests have a double.
 """
 
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any, Protocol
@@ -14,14 +15,13 @@ from ..web.fan_out import Documents
 from .commands import BadCommand, judge
 from .events import EventLog
 from .experiment import GIVES, TAKES, Experiment, ExperimentError
-from .gates import MotionGuard, Standing, control, reasons
-from .hold import HeldButton
-from .roles import Roles
+from .gates import HeldButton, MotionGuard, Standing, control, reasons
 from .words import command as words_of
 from .words import plain
 
-UNKNOWN = "unknown"
-"""what the brain says of an object that was in the hand before it began"""
+UNKNOWN = "unknown"  # the brain's name of an object that was in the hand before the brain started
+NOTICE = 3.0  # s between the announcement of a new operator and the change
+ABSENCE = 10.0  # s without a connection after which nobody operates; longer than a page takes to load again
 
 
 class Answer(dict):
@@ -39,16 +39,89 @@ class Backend(Protocol):
     real: bool
 
     def standing(self) -> Standing:
-        """How it stands, from the newest messages; never waits."""
+        """State of the robot from the newest messages; never waits."""
 
     def stop(self, who: str) -> None:
-        """Brake, latch, end the action; returns at once, the outcome comes as events."""
+        """Brakes the arm, latches the hold and ends the action. Returns at once; the outcome comes as events."""
 
     def tell(self, name: str, text: str) -> None:
-        """Show a note, or the object of the next action, to everybody on ROS; returns at once."""
+        """Publishes a note, or the object of the next action, on ROS. Returns at once."""
 
     def call(self, name: str, arguments: dict) -> Awaitable[Answer]:
-        """A command of the list that needs the robot; ends within its time limit."""
+        """Runs a command that needs the robot. It ends within its time limit."""
+
+
+class Roles:
+    """One browser operates, all others watch. Taking over is announced, and the operator may keep the control.
+
+    Browsers are known by their name; `say(text, level)` makes an event. Called from one thread."""
+
+    def __init__(self, say: Callable[[str, str], object], now: Callable[[], float] = time.monotonic) -> None:
+        self._say, self._now = say, now
+        self.operator = ""
+        self.claimant = ""
+        self._due = 0.0
+        self._absent_since: float | None = None
+
+    def connected(self, name: str) -> None:
+        """A browser is there; the first one becomes the operator."""
+        if name == self.operator:
+            self._absent_since = None
+        elif not self.operator:
+            self._make(name, f"{name} is the operator", "info")
+
+    def disconnected(self, name: str) -> None:
+        """The last connection of a browser closed. The operator keeps the role for ABSENCE s."""
+        if name == self.operator:
+            self._absent_since = self._now()
+        if name == self.claimant:
+            self.claimant = ""
+            self._say(f"{name} went away and does not take over any more", "info")
+
+    def take_over(self, name: str) -> str:
+        """The browser `name` requests to be the operator. Returns the answer in words."""
+        if name == self.operator:
+            return "you are the operator"
+        if self.claimant and self.claimant != name:
+            return f"{self.claimant} is taking over already"
+        if not self.operator:
+            self._make(name, f"{name} is the operator now; nobody was")
+            return "you are the operator now"
+        if not self.claimant:
+            self.claimant, self._due = name, self._now() + NOTICE
+            self._say(
+                f"{name} takes over from {self.operator} in {NOTICE:.0f} s, unless {self.operator} keeps the control",
+                "warning",
+            )
+        return f"{self.operator} was told; you are the operator in {NOTICE:.0f} s unless they keep the control"
+
+    def keep(self, name: str) -> str:
+        """The operator refuses to hand over. Returns the answer in words."""
+        if name != self.operator or not self.claimant:
+            return "nobody is taking over from you"
+        self._say(f"{name} keeps the control; {self.claimant} goes on watching", "warning")
+        self.claimant = ""
+        return "you keep the control"
+
+    def tick(self) -> bool:
+        """Call this several times a second. Returns True if the operator changed."""
+        absent = self._absent_since is not None and self._now() - self._absent_since > ABSENCE
+        if self.claimant and (absent or self._now() >= self._due):
+            self._make(self.claimant, f"{self.claimant} is the operator now, {self.operator} watches")
+        elif absent:
+            gone, self.operator, self._absent_since = self.operator, "", None
+            self._say(f"{gone} has been away for {ABSENCE:.0f} s: nobody operates; press Take over", "warning")
+        else:
+            return False
+        return True
+
+    def view(self) -> dict:
+        """The roles, as every browser shows them."""
+        return {"operator": self.operator, "claimant": self.claimant}
+
+    def _make(self, name: str, sentence: str, level: str = "warning") -> None:
+        self.operator, self.claimant, self._absent_since = name, "", None
+        self._say(sentence, level)
 
 
 class Desk:
@@ -73,11 +146,11 @@ class Desk:
         if goes_on:
             events.add("experiment", goes_on, "warning")
         self.object_id = ""
-        """chosen for the next action that takes one; empty: the brain's default"""
+        """Object of the next action that needs one. Empty: the brain's default."""
         self._trial = (0, 0)
         self._held: dict[str, HeldButton] = {}
         self._begun: dict[str, tuple[str, dict]] = {}
-        """by who holds a button down that has begun something: what"""
+        """By browser: the command that has begun and whose button is still held."""
 
     # --- from the browsers ------------------------------------------------------------------------------------
 

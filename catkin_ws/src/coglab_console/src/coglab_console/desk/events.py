@@ -1,4 +1,4 @@
-"""The event log: numbered from 1, bounded, so that a browser that comes back asks for what it has missed."""
+"""The event log: a bounded list, numbered from 1, so that a browser that reconnects gets the events it has missed."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import threading
 from collections import deque
 from collections.abc import Callable
 
-KEPT = 5000
+KEPT = 5000  # events
 LEVELS = ("info", "warning", "fault")
 LONGEST = 600  # characters of one event
 
 
 class EventLog:
-    """Thread-safe. An event is {seq, stamp (s since 1970), level, source, phase, text}; `phase` tells in words what the
-    robot was doing then, empty where nobody knows."""
+    """Thread-safe. An event is {seq, stamp (s since 1970), level, source, phase, text}; `phase` is what the
+    robot was doing, in words; empty if that is unknown."""
 
     def __init__(self, now: Callable[[], float], keep: int = KEPT) -> None:
         self._now = now
@@ -24,12 +24,11 @@ class EventLog:
         self.phase: Callable[[], str] = lambda: ""
 
     def listen(self, on_event: Callable[[dict], None]) -> None:
-        """Call this with each event, in the thread that adds it and in the order of the numbers."""
+        """Registers a callback for each event. It runs in the thread that adds the event, in order of the numbers."""
         self._listeners.append(on_event)
 
     def add(self, source: str, text: str, level: str = "info", phase: str | None = None) -> dict:
-        """Adds one and returns it; a text that is too long is cut. `phase` where it belongs to another one than that of
-        now."""
+        """Adds an event and returns it. A text that is too long is cut. `phase`: if it differs from the current one."""
         if level not in LEVELS:
             raise ValueError(f"level is one of {', '.join(LEVELS)}, got '{level}'")
         if len(text) > LONGEST:
@@ -54,9 +53,9 @@ class EventLog:
         return self._seq
 
     def since(self, seq: int, limit: int = 500) -> tuple[list[dict], int]:
-        """The events after number `seq`, oldest first and at most `limit`, and how many before them are lost for good.
+        """The events after number `seq`, oldest first and at most `limit`, and how many before them are no longer kept.
 
-        A number from the future (of a console that ran before) counts as 0.
+        A number higher than the newest (from an earlier console) counts as 0.
         """
         with self._lock:
             if seq > self._seq or seq < 0:

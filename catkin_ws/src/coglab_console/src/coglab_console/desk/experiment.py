@@ -1,9 +1,10 @@
-"""A session with one participant: conditions, order of trials, notes, and one file that tools can read.
+"""A session with one participant: conditions, order of trials, notes, and the session file (session_file reads it).
 
-The file holds one JSON object a line, each with `type` and `stamp` (s since 1970): session, trial_begin, trial_end,
-result (as on coglab/results, whose times are of the brain's clock, and `began` like `stamp`), note, stop (by the page),
-stopped (the robot stands, whoever asked for it), resumed (by the next console after one was killed), session_end.
-Participants are pseudonyms; no names belong here. What reads it is session_file.
+The file holds one JSON object per line, each with `type` and `stamp` (s since 1970). The types are session,
+trial_begin, trial_end, result (as on coglab/results: its times are of the brain's clock, `began` is like `stamp`),
+note, stop (by the page), stopped (the robot stands, for any reason), resumed (by the next console after one was killed)
+and session_end.
+Use pseudonyms for participants, never names.
 """
 
 from __future__ import annotations
@@ -21,23 +22,21 @@ from .session_file import Session, SessionFileError, newest, read_session
 from .words import button, outcome
 
 MAX_TRIALS = 600
-RESUME = 4 * 3600.0
-"""s without a line after which the session of a console that was killed does not go on"""
-
-
+RESUME = 4 * 3600.0  # s since the last line of the file; the session of a killed console is resumed within this time
 TAKES = ("exchange_human_to_robot", "take")
-"""actions that begin with an empty hand and end with an object in it"""
+"""Actions that begin with an empty hand and end with an object in it."""
 GIVES = ("exchange_robot_to_human", "put")
 _ACTION = {word: name for name in (*TAKES, *GIVES) for word in (name, button(name).lower())}
 
 
 class ExperimentError(Exception):
-    """Not possible now; the sentence says why and what to do."""
+    """The command is not possible now. The message gives the reason and what to do."""
 
 
 def latin_row(conditions: list[str], number: int) -> list[str]:
-    """One row of a balanced Latin square (Williams design): over 2n rows each condition follows each other equally
-    often; over n rows where n is even."""
+    """One row of a balanced Latin square (Williams design).
+
+    Over n rows (n even) or 2n rows (n odd), each condition follows each other one equally often."""
     n = len(conditions)
     first = [0]
     for step in range(1, n):
@@ -67,13 +66,14 @@ def order_of(conditions: list[str], repetitions: int, order: str, number: int) -
 
 
 def actions_in(condition: str) -> list[str]:
-    """Actions that the words of a condition name: 'receive ball' names Receive, 'slowly' none."""
+    """Actions that a condition names in its words: 'receive ball' names Receive, 'slowly' names none."""
     return [_ACTION[word] for word in re.split(r"[^a-z0-9_]+", condition.lower()) if word in _ACTION]
 
 
 def unprepared(trials: Sequence[str], held: bool) -> list[int]:
-    """Numbers of the trials before which somebody has to fill or empty the robot's hand, which holds something at the
-    beginning if `held`."""
+    """Numbers of the trials before which somebody has to fill or empty the robot's hand.
+
+    `held`: the hand holds something before the first trial."""
     found = []
     for number, named in enumerate(map(actions_in, trials), 1):
         if named and held != (named[0] in GIVES):
@@ -83,12 +83,12 @@ def unprepared(trials: Sequence[str], held: bool) -> list[int]:
 
 
 def _mark(row: dict) -> tuple:
-    """What tells one result from another: when its action began and ended, by the brain's clock."""
+    """Identity of a result: its kind, and when its action began and ended by the brain's clock."""
     return row.get("kind"), row.get("started"), row.get("ended")
 
 
 class Experiment:
-    """At most one session at a time. A file that cannot be written is told, and the session goes on in memory."""
+    """At most one session at a time. If the file cannot be written, the session goes on in memory, with a warning."""
 
     def __init__(self, folder: Path, now: Callable[[], float], warn: Callable[[str], object]) -> None:
         self._folder, self._now, self._warn = folder, now, warn
@@ -101,11 +101,11 @@ class Experiment:
         self.notes: list[dict] = []
         self._last_result: tuple = ()
         self._results: list[dict] = []
-        """of the trial that is under way, of actions with an object"""
+        """Results of actions with an object in the current trial."""
         self.phase: Callable[[], str] = lambda: ""
 
     def resume(self) -> str:
-        """Goes on with the session that a console has left open when it was killed; says so, or is empty."""
+        """Resumes the session that a killed console has left open. Returns a sentence about it, or an empty text."""
         try:
             path = newest(self._folder)
             found = read_session(path) if path is not None else None
@@ -138,7 +138,7 @@ class Experiment:
     def begin(
         self, participant: str, conditions: list[str], repetitions: int, order: str, number: int, held: bool = False
     ) -> str:
-        """Opens a session; the answer in words. `held`: something is in the robot's hand."""
+        """Opens a session. Returns the answer in words. `held`: something is in the robot's hand."""
         self._needs("session_begin")
         trials = order_of(conditions, repetitions, order, number)
         self._folder.mkdir(parents=True, exist_ok=True)
@@ -160,8 +160,9 @@ class Experiment:
         return sentence
 
     def refusals(self, now: Standing | None = None) -> dict[str, str]:
-        """Why each of the commands of sessions and trials is not possible now, and the actions that are none of the
-        trial under way; empty where it is. `now`: how the robot stands."""
+        """Reason by command of sessions and trials, and by action that the current trial is not about.
+
+        A reason is empty if the command is possible. `now`: state of the robot."""
         none = "" if self.participant else "no session is open; begin one first"
         running = f"trial {self.position + 1} is under way; end it first" if self.running else ""
         over = "every trial is done; end the session" if self.position >= len(self.trials) else ""
@@ -175,7 +176,7 @@ class Experiment:
         }
 
     def _not_ready(self, now: Standing | None) -> str:
-        """Why the next trial cannot begin with the hand as it is."""
+        """Reason why the next trial cannot begin with the hand as it is, or an empty text."""
         if now is None or not now.master_alive:
             return ""
         if now.under_way:
@@ -187,7 +188,7 @@ class Experiment:
         return f"the hand {stands}: first {' or '.join(map(button, means))}, which counts for no trial"
 
     def _foreign(self) -> dict[str, str]:
-        """The actions that the trial under way is not about."""
+        """Reasons of the actions that the current trial is not about."""
         named = actions_in(self.condition()) if self.running else []
         words = " and ".join(map(button, dict.fromkeys(named)))
         return {
@@ -195,7 +196,7 @@ class Experiment:
         }
 
     def _not_done(self, now: Standing | None) -> str:
-        """Why the trial under way cannot be called done."""
+        """Reason why the current trial cannot be called done, or an empty text."""
         if now is not None and now.under_way:
             return "an action is under way"
         newest_of = {row["kind"]: row["outcome"] for row in self._results}
@@ -213,11 +214,11 @@ class Experiment:
             raise ExperimentError(refusal)
 
     def begun(self) -> tuple[int, int]:
-        """Number of the trial that is under way and which go at it; zeros where none is."""
+        """Numbers of the current trial and of the attempt at it; zeros if there is no trial."""
         return (self.position + 1, self._goes) if self.running else (0, 0)
 
     def condition(self) -> str:
-        """Of the trial that is under way or next; empty after the last one."""
+        """Condition of the current or next trial; empty after the last one."""
         return self.trials[self.position]["condition"] if self.position < len(self.trials) else ""
 
     def end(self) -> str:
@@ -229,7 +230,7 @@ class Experiment:
         return sentence
 
     def trial_begin(self) -> str:
-        """The next trial of the order."""
+        """Begins the next trial of the order."""
         self._needs("trial_begin")
         self.running = True
         self._goes += 1
@@ -239,7 +240,7 @@ class Experiment:
         return f"trial {self.position + 1} of {len(self.trials)}: {condition}"
 
     def trial_end(self, outcome: str) -> str:
-        """`repeat` leaves the trial to be done again; `failed`: the robot has failed, and the next trial follows."""
+        """Ends the trial. `repeat`: it is done again; `failed`: the robot has failed, and the next trial follows."""
         self._needs("trial_end")
         self.running = False
         trial = self.position + 1
@@ -249,13 +250,13 @@ class Experiment:
         return f"trial {trial}: {outcome}"
 
     def note(self, who: str, text: str) -> str:
-        """A note, also between trials."""
+        """Records a note, also between trials."""
         self.notes = [*self.notes[-99:], {"stamp": round(self._now(), 3), "who": who, "text": text}]
         self.record("note", who=who, text=text)
         return "noted" if self._path is not None else "noted in the event log alone: no session is open"
 
     def result(self, row: dict) -> None:
-        """An action of the brain's journal has ended. One that is told again, as a latched topic does, is the same."""
+        """Records the result of an action. A repeated result is ignored, because the topic is latched."""
         if _mark(row) == self._last_result:
             return
         self._last_result = _mark(row)
@@ -269,19 +270,19 @@ class Experiment:
         self._write("result", **fields, began=self._began(row))
 
     def _began(self, row: dict) -> float:
-        """When the action of a result began, s since 1970: as the brain says, or from the end, which is now."""
+        """Start of a result's action in s since 1970: from the brain, or computed from its end, which is now."""
         try:
             return datetime.fromisoformat(row["started_utc"]).timestamp()
         except (KeyError, TypeError, ValueError):
             return round(self._now() - row.get("duration_s", 0.0), 3)
 
     def record(self, kind: str, /, **fields: object) -> None:
-        """A note or a stop, into the file of the open session, with the phase in which it was."""
+        """Writes a note or a stop, with the current phase, into the file of the open session."""
         phase = self.phase()
         self._write(kind, **fields, **({"phase": phase} if phase else {}))
 
     def view(self) -> dict:
-        """What the page shows."""
+        """The session as the page shows it."""
         return {
             "participant": self.participant,
             "file": str(self._path or ""),
@@ -298,7 +299,7 @@ class Experiment:
         if self.running and "trial" not in fields:
             fields["trial"] = self.position + 1
         try:
-            # A line that a full disk or a killed console has left unfinished is ended first: it would spoil this one.
+            # A full disk or a killed console may have left half a line. End it first, or it would spoil this one.
             with self._path.open("a+b") as stream:
                 if stream.tell():
                     stream.seek(-1, os.SEEK_END)

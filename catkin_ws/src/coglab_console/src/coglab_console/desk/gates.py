@@ -1,13 +1,14 @@
-"""Why a control is disabled, and the two acts after a stop: acknowledge the cause, then press and hold.
+"""Reasons why a control is disabled, and the two steps after a stop: acknowledge the cause, then press and hold.
 
-What the state machine takes is its own decision (MasterState.actions); here only its words are repeated, and what
-belongs to the console alone is added: who is the operator, what was not acknowledged yet.
+The state machine decides which actions it accepts (MasterState.actions); this module only repeats that. It adds the
+conditions of the console: an acknowledged stop, a held button, a running action or trial.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,16 +17,16 @@ from .words import action_of, button, phase, without_advice
 
 CALIBRATIONS = ("calibrate", "calibrate_complete", "calibrate_forced")
 STANDSTILL = ("stopped", "fault")
-LONGEST = 28
-"""characters of the arm's reason below a button, which has room for three lines; the status column has all of it"""
+HOLD_TIME = 0.8  # s that a button must be held
+LONGEST_GAP = 0.25  # s between two messages of a held button
+LONGEST = 28  # characters of the arm's reason below a button; the status column shows all of it
 SECOND_THOUGHT = ("feedback", "feedback_order", "contact_learn", "contact_arm", "objects_reload")
-"""commands that are held down, not clicked: nobody sees at once what they have changed; they change limits, gains or
-thresholds, which object files hold, too, and therefore wait until no action and no trial is under way"""
-NEEDS = {  # what must be there
+"""Commands that need a held button, because nobody sees their effect at once. They change limits, gains or thresholds
+(object files hold some, too), so they are refused while an action or a trial is under way."""
+NEEDS = {  # field of Standing that must be true for a command, and the reason if it is false
     "feedback": ("manager_alive", "the controllers are not there, or silent"),
     "feedback_order": ("manager_alive", "the controllers are not there, or silent"),
-    # There is one short line for it.
-    "speed_scale": ("manager_alive", "no motion control"),
+    "speed_scale": ("manager_alive", "no motion control"),  # the page has one short line for it
     "contact_learn": ("detector_alive", "the contact detector is not there, or silent"),
     "contact_arm": ("detector_alive", "the contact detector is not there, or silent"),
     "objects_reload": ("database_alive", "the object database is not there"),
@@ -34,16 +35,16 @@ NEEDS = {  # what must be there
 
 @dataclass
 class MotionGuard:
-    """After a stop nothing moves before its cause was acknowledged, and the first motion needs a held button."""
+    """After a stop, no motion starts until the cause is acknowledged. The first motion then needs a held button."""
 
     real: bool = False
     cause: str = ""
     unacknowledged: bool = False
     lifted: bool = False
-    """the robot stands no more though the stop was not acknowledged: somebody has reset it without the page"""
+    """The stop is over but was not acknowledged: somebody has reset the robot without the page."""
     needs_hold: bool = field(default=False)
     stops: int = 0
-    """how many there were: a motion that was asked for before the newest one is not the first after it"""
+    """Number of stops so far. A motion requested before the newest stop is not the first one after it."""
     _was_stopped: bool = False
     _standstills: int = 0
 
@@ -51,12 +52,12 @@ class MotionGuard:
         self.needs_hold = self.real
 
     def stop(self, cause: str) -> None:
-        """A stop, by whomever. Its number is `stops`."""
+        """Registers a stop, whatever its source. Its number is `stops`."""
         self.cause, self.unacknowledged, self.needs_hold, self.lifted = cause, True, True, False
         self.stops += 1
 
     def told(self) -> str:
-        """What the page says of the newest stop."""
+        """Text of the page about the newest stop."""
         if not self.lifted:
             return self.cause
         return (
@@ -64,8 +65,10 @@ class MotionGuard:
         )
 
     def observe(self, stopped: bool, cause: str, standstills: int = 0) -> bool:
-        """How the robot stands, several times a second, and how often it has come to stand (Standstills); True where a
-        stop has begun since the last look, also one that followed another without a motion between them."""
+        """Call this several times a second. `stopped`: the robot stands after a stop or fault; `standstills`: see
+        Standstills.
+
+        Returns True if a stop has begun since the last call, even right after another one without a motion between."""
         begun = (stopped and not self._was_stopped) or standstills > self._standstills
         ended = self._was_stopped and not stopped
         self._was_stopped, self._standstills = stopped, standstills
@@ -79,8 +82,9 @@ class MotionGuard:
         return begun
 
     def acknowledge(self, stop: int) -> str:
-        """The operator has read the cause of the stop of this number. Why that is refused: an answer to an old stop
-        lifts no newer one. Empty where it is taken."""
+        """The operator has read the cause of the stop of this number. Returns why that is refused, or an empty text.
+
+        An acknowledgement of an old stop is refused: it must not lift a newer one."""
         if stop != self.stops:
             return (
                 f"expected an answer to stop {self.stops}, the newest ({self.cause or 'no reason was told'}), "
@@ -90,12 +94,14 @@ class MotionGuard:
         return ""
 
     def moved(self, stops: int) -> None:
-        """A motion was begun with a held button, which was asked for when there had been so many stops."""
+        """A motion has begun with a held button. `stops`: number of stops when it was requested."""
         self.needs_hold = self.needs_hold and stops != self.stops
 
     def guarded(self, name: str, arguments: dict) -> bool:
-        """Whether this command needs a held button now. Always: calibrations that open the hand whatever it holds, and
-        what changes how the arm yields or is watched. Switching the watch off never does."""
+        """True if this command needs a held button now.
+
+        Calibrations that open the hand whatever it holds always need it, and so do the commands of SECOND_THOUGHT.
+        Switching the contact detector off never does."""
         if name == "calibrate" and (arguments.get("force") or arguments.get("mode") == "complete"):
             return True
         if name in SECOND_THOUGHT:
@@ -104,8 +110,8 @@ class MotionGuard:
 
 
 class Standstills:
-    """Counts how often the robot has come to stand after a stop or a fault. Told of every message, because what is
-    over between two looks counts, too."""
+    """Counts how often the robot has come to stand after a stop or a fault. It gets every message, so
+    that a short stop counts, too."""
 
     def __init__(self) -> None:
         self.count = 0
@@ -113,23 +119,23 @@ class Standstills:
         self._held = False
 
     def machine(self, state: str) -> None:
-        """Path of the machine's active state. Where it stops because the arm is held, that is one stop."""
+        """Gets the path of the machine's active state. If it stops because the arm is held, both are one stop."""
         before, self._leaf = self._leaf, state.rsplit("/", 1)[-1]
         if self._leaf in STANDSTILL and self._leaf != before:
             self.count += self._leaf != "stopped" or not self._held
 
     def arm(self, held: bool) -> None:
-        """Whether the arm is held until a reset."""
+        """Gets whether the arm is held until a reset."""
         self.count += held and not self._held
         self._held = held
 
 
 @dataclass
 class Standing:
-    """What the reasons depend on; the node fills it in. `…_alive`: it is there and was heard a moment ago."""
+    """State of the robot that the reasons depend on. `…_alive`: the node runs, and its last message is recent."""
 
     master_there: bool = False
-    """also where it has been silent for a moment: what it was doing may go on"""
+    """True also if the brain has been silent for a moment, because its action may go on."""
     master_alive: bool = False
     state: str = ""
     in_hub: bool = False
@@ -147,7 +153,7 @@ class Standing:
     detector_alive: bool = False
     database_alive: bool = False
     objects: tuple[str, ...] = ()
-    """objects of the database"""
+    """Identifiers of the objects in the database."""
 
     @property
     def leaf(self) -> str:
@@ -218,8 +224,9 @@ def _motion_reason(name: str, now: Standing) -> str:
 
 
 def reasons(now: Standing, guard: MotionGuard, session: Mapping[str, str] | None = None) -> dict[str, str]:
-    """Reason by control, empty where it may be used; `session` has those of the session and its trials. Whether one is
-    the operator is each browser's own matter."""
+    """Reason by control, empty if the control may be used. `session`: reasons of the session and its trials.
+
+    Each browser checks by itself whether it is the operator."""
     found = {name: _motion_reason(name, now) for name in (*STARTS, *CALIBRATIONS, "home")}
     for name, reason in found.items():
         if not reason and guard.unacknowledged:
@@ -235,7 +242,7 @@ def reasons(now: Standing, guard: MotionGuard, session: Mapping[str, str] | None
 
 
 def control(name: str, arguments: Mapping[str, Any]) -> str:
-    """The control that stands for a command, by which `reasons` knows it."""
+    """Name of the control of a command, as in `reasons`."""
     if name == "start":
         return str(arguments["action"])
     if name == "calibrate" and arguments.get("force"):
@@ -243,3 +250,30 @@ def control(name: str, arguments: Mapping[str, Any]) -> str:
     if name == "calibrate" and arguments.get("mode") == "complete":
         return "calibrate_complete"
     return "trial_done" if name == "trial_end" and arguments["outcome"] == "done" else name
+
+
+class HeldButton:
+    """The held button of one browser: a motion begins only after its button was held for HOLD_TIME.
+
+    The page sends a message ten times a second while the button is down. So nothing begins if the browser dies or loses
+    its connection. Times in s of the steady clock."""
+
+    def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
+        self._now = now
+        self._what: object = None
+        self._since = self._last = 0.0
+
+    def held(self, what: object) -> bool:
+        """Gets one message of a held button. True exactly once, when `what` was held for long enough without a gap."""
+        now = self._now()
+        if what != self._what or now - self._last > LONGEST_GAP:
+            self._what, self._since = what, now
+        self._last = now
+        if now - self._since >= HOLD_TIME:
+            self._since = float("inf")  # until the button is released
+            return True
+        return False
+
+    def unfinished(self) -> Any:
+        """The command whose button is held down and that has not begun yet, or None."""
+        return self._what if self._since != float("inf") else None

@@ -1,10 +1,10 @@
-"""Reads the file of a session: the order of trials, what the experimenter did and noted, what the brain's journal told.
+"""Reads a session file: the order of trials, what the experimenter did and noted, and the brain's results.
 
     session = read_session(newest(Path.home() / ".ros" / "console_sessions"))
     for attempt in session.attempts:
         print(attempt.trial, attempt.condition, attempt.outcome, [row["outcome"] for row in attempt.results])
 
-A file ends where its console ended: half a line, or one that means nothing, is named in `problems` and left out.
+Half a line (the console was killed) or an unknown line is left out and named in `problems`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from typing import Any
 MAX_BYTES = 50_000_000
 NAME = re.compile(r"[A-Za-z0-9_-]{1,32}_(\d{1,12})\.jsonl")
 OPEN, NOT_BEGUN = "open", "not begun"
-"""Outcomes beside those of the page: a trial that was begun and not ended, and one that was not begun"""
+"""Outcomes beside those of the page: the trial was not ended; the trial was not begun."""
 COLUMNS = {
     "trials": (
         "session", "participant", "number", "order", "trial", "attempt", "condition", "outcome", "began", "duration_s",
@@ -33,16 +33,16 @@ COLUMNS = {
     ),
     "events": ("session", "participant", "trial", "attempt", "condition", "stamp", "kind", "who", "phase", "text"),
 }  # fmt: skip
-"""Columns by table, in their order"""
+"""Columns of each table, in their order."""
 
 
 class SessionFileError(Exception):
-    """No file of a session; the sentence says what was expected and what came."""
+    """This is no session file. The message gives what was expected and what was read."""
 
 
 @dataclass
 class Attempt:
-    """One go at a trial. Times in s since 1970; `results` as on coglab/results, each with the `stamp` of its end."""
+    """One attempt at a trial. Times in s since 1970; `results` as on coglab/results, with the `stamp` of their end."""
 
     trial: int = 0
     attempt: int = 0
@@ -56,17 +56,17 @@ class Attempt:
 
     @property
     def duration(self) -> float | None:
-        """s; None where it was not ended."""
+        """Duration in s; None if the attempt was not ended."""
         return None if self.ended is None else round(self.ended - self.began, 3)
 
     def covers(self, stamp: float) -> bool:
-        """Whether this time lies in it."""
+        """True if this time lies in the attempt."""
         return self.began <= stamp <= (math.inf if self.ended is None else self.ended)
 
 
 @dataclass
 class Session:
-    """One file. `outside` holds what came between the trials; `problems` the lines that were left out, and why."""
+    """One session file. `outside` holds the rows between the trials, `problems` the lines left out, with the reason."""
 
     path: Path
     participant: str
@@ -82,12 +82,12 @@ class Session:
     problems: list[str] = field(default_factory=list)
 
     def running(self) -> Attempt | None:
-        """The trial that was begun and not ended."""
+        """The attempt that was begun and not ended, or None."""
         last = self.attempts[-1] if self.attempts else None
         return last if last is not None and last.ended is None else None
 
     def passed(self) -> int:
-        """How many trials of the order are behind."""
+        """Number of trials of the order that are over."""
         return sum(attempt.outcome in ("done", "failed", "skipped") for attempt in self.attempts)
 
 
@@ -95,19 +95,19 @@ class Session:
 
 
 def session_files(folder: Path) -> list[Path]:
-    """The session files of a folder, by the time of their beginning, which is in their names."""
+    """The session files of a folder, sorted by their start, which is in their names."""
     found = [(NAME.fullmatch(path.name), path) for path in folder.glob("*.jsonl")] if folder.is_dir() else []
     return [path for _, path in sorted((int(match[1]), path) for match, path in found if match)]
 
 
 def newest(folder: Path) -> Path | None:
-    """The session of this folder that began last; None where there is none."""
+    """The session file of this folder that began last, or None."""
     found = session_files(folder)
     return found[-1] if found else None
 
 
 def read_session(path: Path) -> Session:
-    """Everything of one file. SessionFileError where it is none."""
+    """Reads one session file. Raises SessionFileError if it is none."""
     try:
         if path.stat().st_size > MAX_BYTES:
             raise SessionFileError(f"{path}: expected at most {MAX_BYTES} bytes, got {path.stat().st_size}")

@@ -1,4 +1,4 @@
-"""Commands of the page as services and topics that everybody can call. Each ends within its time limit."""
+"""Sends STOP and the commands of the page to the robot, by services and topics that every node can use."""
 
 from __future__ import annotations
 
@@ -17,23 +17,29 @@ from coglab_msgs.srv import (
     ArmContact,
     FeedbackSelect,
     Learn,
+    LwrCommand,
     Reload,
     SetExecutionOrder,
     SetSpeedScale,
     Start,
     SwitchController,
 )
-from coglab_py.steady import wait_for_service
+from coglab_py.steady import wait_for_service, worker
+from rospy.core import parse_rosrpc_uri
 from std_msgs.msg import String
+from std_srvs.srv import Trigger
 
 from ..desk.desk import Answer
 from ..desk.gates import Standing
+from ..desk.words import plain
 from .knowledge import lookup
 from .view import RosView
 
-LIMIT = 6.0  # s, of one command
-HAND_LIMIT = 3.0  # s until the hand has said whether it calibrates
-MAX_WAITING = 12  # services that have not answered
+LIMIT = 6.0  # s that one command may take
+HAND_LIMIT = 3.0  # s that the hand may take to begin or refuse a calibration
+MAX_WAITING = 12  # commands whose service has not answered
+STOP_ANSWER_LIMIT = 3.0  # s until a missing answer to STOP is reported
+MAX_WAITING_STOPS = 8  # threads whose service has not answered a STOP
 HOME_CONTROLLER = "ptp"
 NOTES, NEXT_OBJECT = "coglab/note", "coglab/next_object"
 HIDDEN = ("robot_description", "roslaunch", "rosdistro", "run_id")
@@ -54,7 +60,7 @@ class RosBackend:
         }
 
     def listen(self, told: Callable[[str, str, str], None]) -> None:
-        """`told(name, text, who)` gets what other nodes say on the topics of notes and of the next object."""
+        """Calls `told(name, text, who)` for messages of other nodes on the topics of notes and of the next object."""
 
         def heard(message: String, name: str) -> None:
             who = message._connection_header.get("callerid", "somebody")
@@ -77,7 +83,7 @@ class RosBackend:
         self._stop(who)
 
     async def call(self, name: str, arguments: dict) -> Answer:
-        """Runs the command in a thread of its own; an answer that does not come is told after LIMIT s."""
+        """Runs the command in its own thread. Without an answer within LIMIT, it returns a failure."""
         if not self._waiting.acquire(blocking=False):
             return Answer(False, f"{MAX_WAITING} earlier requests have not been answered; is the ROS master there?")
         loop = asyncio.get_running_loop()
@@ -133,7 +139,7 @@ class RosBackend:
                 return Answer(True, f"{now.message}; the hand tells how it ends")
             if self._view.hand_number > number and now.event_code == ReasonCode.HAND_REFUSED:
                 refused = now.message
-                # The same words as before may be those of an earlier request.
+                # The same words may be those of an earlier request.
                 if refused != before.message:
                     break
             time.sleep(0.02)
@@ -183,3 +189,81 @@ class RosBackend:
         walk("", rospy.get_param("/"))
         mark = hashlib.sha256(json.dumps(rows).encode()).hexdigest()[:12]
         return Answer(True, f"{len(rows)} parameters; the same mark means the same values: {mark}", rows)
+
+
+class DirectService(rospy.ServiceProxy):
+    """A service proxy that knows the address beforehand. If that address fails, it requests it from the master."""
+
+    address: str | None = None
+
+    def refresh(self) -> None:
+        """Requests the address from the master. This waits as long as the master takes."""
+        try:
+            self.address = rospy.get_master().lookupService(self.resolved_name)[2] or self.address
+        except Exception:  # no such service now, or no master: keep the known address
+            pass
+
+    def _get_service_uri(self, request: object) -> str:
+        address, self.address = self.address, None  # use a stale address only once
+        if address:
+            try:
+                parse_rosrpc_uri(address)
+                return address
+            except rospy.ServiceException:
+                pass
+        return super()._get_service_uri(request)
+
+
+class StopPath:
+    """STOP goes three ways at once. None waits for another, for the ROS master, or for the event loop.
+
+    `hold` on the topic lwr/ros_events, `hold` by the service lwr/command, and the service coglab/stop. The topic uses a
+    connection that stands already. A thread asks the master once a second for the addresses of the services, so that a
+    master that no longer answers is not needed when it counts.
+
+    Call `press` from any thread; `say(text, level)` gets the outcomes."""
+
+    def __init__(self, say: Callable[[str, str], None]) -> None:
+        self._say = say
+        self._topic = rospy.Publisher("lwr/ros_events", String, queue_size=5, tcp_nodelay=True)
+        self._arm = DirectService("lwr/command", LwrCommand)
+        self._brain = DirectService("coglab/stop", Trigger)
+        self._waiting = threading.Semaphore(MAX_WAITING_STOPS)
+        self._keeper = worker(self._keep, "stop_addresses")
+        self._keeper.start()
+
+    def press(self, who: str) -> None:
+        """Sends STOP and returns at once. While MAX_WAITING_STOPS services have not answered, only by the topic."""
+        self._topic.publish(String("hold"))  # never waits: it has a queue, and a thread per connection
+        began = time.monotonic()
+        for name, call in (("arm", lambda: self._arm("hold")), ("brain", lambda: self._brain())):
+            if self._waiting.acquire(blocking=False):
+                threading.Thread(target=self._ask, args=(name, call, began), name=f"stop_{name}", daemon=True).start()
+        self._say(f"STOP by {who}", "fault")
+
+    def _ask(self, name: str, call: Callable[[], Any], began: float) -> None:
+        watch = threading.Timer(
+            STOP_ANSWER_LIMIT,
+            self._say,
+            (
+                f"STOP: the {name} has not answered for {STOP_ANSWER_LIMIT:.0f} s; use the red button of the robot",
+                "fault",
+            ),
+        )
+        watch.daemon = True
+        watch.start()
+        try:
+            answer = call()
+            took = 1000 * (time.monotonic() - began)
+            self._say(f"STOP, {name}: {plain(answer.message)} ({took:.0f} ms)", "info" if answer.success else "fault")
+        except Exception as error:
+            self._say(f"STOP: the {name} cannot be asked ({error}); if the arm moves, use the red button", "fault")
+        finally:
+            watch.cancel()
+            self._waiting.release()
+
+    def _keep(self) -> None:
+        while not rospy.is_shutdown():
+            self._arm.refresh()
+            self._brain.refresh()
+            time.sleep(1.0)

@@ -1,4 +1,4 @@
-"""Ties view, commands, STOP and the web server together; the process of /coglab_console."""
+"""The node /coglab_console: connects view, commands, STOP and the web server."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import asyncio
 import os
 import secrets
 import signal
-import socket
 import sys
 import time
 from pathlib import Path
@@ -26,12 +25,10 @@ from ..web.access import Access, allowed_hosts
 from ..web.fan_out import Documents
 from ..web.page_files import load_all
 from ..web.server import ConsoleServer
-from . import versions
-from .alone import StartError, announce, look_for_another, only_one
-from .commands import RosBackend
+from .commands import RosBackend, StopPath
 from .graph import SmachGraphs
 from .knowledge import Knowledge
-from .stop import StopPath
+from .startup import StartError, announce, bind, exposure, look_for_another, only_one, versions
 from .tables import SILENT_DIAGNOSTICS
 from .view import RosView
 
@@ -42,36 +39,13 @@ HEALTH = 1.0  # s
 FRAMES = {"human_hand": "human_hand", "board": "board"}
 
 
-def bind(address: str, port: int, fixed: bool) -> socket.socket:
-    """A listening socket; where the port is taken and not `fixed`, on one of the next nine, or on any."""
-    wanted = [port] if fixed or port == 0 else [*range(port, port + 10), 0]
-    for number in wanted:
-        found = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-        found.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            found.bind((address, number))
-            found.listen(64)
-            return found
-        except OSError as error:
-            found.close()
-            problem = error.strerror
-    raise StartError(f"{address}:{port} cannot be used ({problem}); choose another console_port, or leave it out")
-
-
 def words_of_age(age: float) -> str:
-    """Beside the diagnostics of a node that has fallen silent; empty beside others."""
+    """Note on the diagnostics of a silent node; empty if the node is not silent."""
     return f" (silent for {age:.0f} s)" if age >= SILENT_DIAGNOSTICS else ""
 
 
-def exposure(address: str) -> str:
-    """What is to be said of an address that others reach; empty for loopback."""
-    if address in ("127.0.0.1", "localhost"):
-        return ""
-    return f"the console listens on {address}: whoever gets the link can move the robot, and nothing is encrypted"
-
-
 class ConsoleNode:
-    """Everything of one run."""
+    """All parts of one console, from start to end."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop, home: Path) -> None:
         self.loop, self.home = loop, home
@@ -122,7 +96,7 @@ class ConsoleNode:
     # --- from other threads -----------------------------------------------------------------------------------
 
     def soon(self, callback: Any, *arguments: Any) -> None:
-        """Calls it in the event loop, if that still runs."""
+        """Calls it in the event loop, if the loop still runs."""
         try:
             self.loop.call_soon_threadsafe(callback, *arguments)
         except RuntimeError:  # the loop has ended
@@ -132,11 +106,11 @@ class ConsoleNode:
         self.server.wake()
 
     def say(self, source: str, text: str, level: str = "info", phase: str | None = None) -> None:
-        """An event, from any thread."""
+        """Adds an event, from any thread."""
         self.events.add(source, text, level, phase)
 
     def put(self, name: str, value: Any) -> None:
-        """A document, from any thread; None takes it away."""
+        """Sets a document, from any thread; None removes it."""
         if value is None:
             self.soon(self.documents.remove, name)
         else:
@@ -176,14 +150,14 @@ class ConsoleNode:
             },
         )
         self.versions = {
-            **versions.of_everything(),
+            **versions(),
             "console": f"http://{self.address}:{self.port}",
             "ROS master": os.environ.get("ROS_MASTER_URI", ""),
             "packed page": f"{sum(len(file.packed) for file in files.values()) / 1e6:.2f} MB",
         }
 
     def write_link(self) -> str:
-        """A new link for one browser, kept in console.url; the one before stays good until it is used."""
+        """Makes a link for one browser and writes it to console.url. An earlier link stays valid until it is used."""
         name = "127.0.0.1" if self.address in ("0.0.0.0", "") else self.address
         link = f"http://{name}:{self.port}/?t={self.access.new_token()}"
         path = self.home / "console.url"
@@ -218,7 +192,7 @@ class ConsoleNode:
         await runner.cleanup()
 
     async def _states(self) -> None:
-        """30 times a second, on a grid that does not drift; what a busy computer missed is left out."""
+        """Publishes the state at STATE_RATE without drift. A busy computer skips states."""
         due = self.loop.time()
         while True:
             due = max(due + 1.0 / STATE_RATE, self.loop.time())
@@ -257,7 +231,7 @@ class ConsoleNode:
         self.documents.put("health", {"rows": rows, "versions": self.versions, "browsers": browsers})
 
     def _careful(self, work: Any) -> None:
-        """Nothing that a topic carries may end the loop."""
+        """Runs `work` and logs an exception, because no message may end the loop."""
         try:
             work()
         except Exception as error:
@@ -275,7 +249,7 @@ async def _main(home: Path) -> None:
 
 
 def main() -> int:
-    """Exit status 1 where the console cannot begin."""
+    """Runs the console. Exit status 1 if it cannot start."""
     home = Path(rospkg.get_ros_home())
     try:
         home.mkdir(parents=True, exist_ok=True)

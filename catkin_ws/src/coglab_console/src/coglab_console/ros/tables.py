@@ -1,4 +1,4 @@
-"""Topics that are shown as tables: feedback controllers, recognition, diagnostics. Each becomes a document as it is."""
+"""Makes documents of topics that the page shows as tables: feedback controllers, recognition, diagnostics."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from coglab_msgs.msg import FeedbackState, FeedbackStatus, Recognition
 from diagnostic_msgs.msg import DiagnosticArray
 from std_msgs.msg import Float64
 
-SILENT_DIAGNOSTICS = 2.5  # s without a word of diagnostics, which come once a second
-COMPUTER = ": computer"  # names of the diagnostics that say whether this computer keeps up end so
+SILENT_DIAGNOSTICS = 2.5  # s without diagnostics, which are published once a second
+COMPUTER = ": computer"  # end of the names of diagnostics about an overloaded computer
 OK = 0
 
 
 class Tables:
-    """`put(name, value)` gets the documents `feedback`, `attribution`, `recognition`, `real_time_factor` (of the
-    simulation); diagnostics are kept by name."""
+    """Sets the documents `feedback`, `attribution`, `recognition` and `real_time_factor` (of the simulation) by
+    `put(name, value)`, and keeps the diagnostics by name."""
 
     def __init__(self, put: Callable[[str, Any], None]) -> None:
         self._put = put
@@ -35,7 +35,7 @@ class Tables:
             rospy.Subscriber(topic, kind, callback, queue_size=20)
 
     def busy(self, now: float) -> str:
-        """What is said of a computer that does not keep up; empty while it does."""
+        """Messages about an overloaded computer; empty if there are none."""
         rows = [row for name, row in sorted(self.diagnostics.items()) if name.endswith(COMPUTER)]
         fresh = [row for row in rows if now - row["at"] < SILENT_DIAGNOSTICS]
         return " ".join(row["message"] for row in fresh if row["level"] != OK)

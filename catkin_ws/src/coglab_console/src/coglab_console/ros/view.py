@@ -1,11 +1,12 @@
-"""What the console knows of the robot: the newest of every topic, and from it the state that goes out at 30 Hz."""
+"""Keeps the newest message of every topic, and makes from them the state that the page gets at 30 Hz."""
 
 from __future__ import annotations
 
 import json
 import math
+import struct
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import rospy
@@ -29,27 +30,83 @@ from ..desk.gates import STANDSTILL, Standing, Standstills
 from ..desk.words import outcome, phase, plain, supervisor, transition
 from ..scene import path_ahead
 from ..scene.urdf_model import RobotModel
-from . import status, wire
-from .sources import SILENT, Sources
 from .tables import Tables
 
 PALM = "ih2_palm"
 FRAME_PARENTS = ("world", "lwr_base_link")
-OLD = 1.0  # s without a message after which a motion's path or progress is over
+OLD = 1.0  # s without a message, after which the path or progress of a motion is over
 GOAL_FRAME = "dmp_goal"
 ASKED_FOR = (ReasonCode.CANCELLED, ReasonCode.SWITCHED, ReasonCode.SUPERSEDED)
-"""a motion that ends for one of these ends because the brain or a person asked for it: no failure"""
-MOST_POSES = 200
-MOST_STATIC = 1000  # frames of /tf_static that are kept by name, as the object they belong to may be chosen later
+"""Reason codes of motions that the brain or a person has ended. They are no failures."""
+MOST_POSES = 200  # of one path
+MOST_STATIC = 1000  # frames of /tf_static that are kept, because their object may be selected later
+SILENT = 0.75  # s; each source sends at 4 Hz or more, and the page shows the silence within another 0.2 s
+ALL_DRIVES = 0x7F  # one bit a joint; further bits of LwrState.power mean something else
+LONGEST_NAME = 256  # bytes of a frame's name
+# ROS 1 serialisation: little-endian; strings and arrays begin with their length as uint32.
+_U32 = struct.Struct("<I")
+_STAMP = struct.Struct("<III")
+_POSE = struct.Struct("<7d")
 
 
 def _round(values: Any, digits: int = 4) -> list[float]:
     return [round(value, digits) if math.isfinite(value) else 0.0 for value in values]
 
 
+class BadBytes(ValueError):
+    """These bytes are no tf message."""
+
+
+def _name(data: bytes, at: int) -> tuple[str, int]:
+    (size,) = _U32.unpack_from(data, at)
+    if size > LONGEST_NAME:
+        raise BadBytes(f"a name of {size} bytes")
+    return data[at + 4 : at + 4 + size].decode("utf-8", "replace"), at + 4 + size
+
+
+def transforms(data: bytes) -> Iterator[tuple[str, str, float, tuple[float, ...]]]:
+    """Frames of a tf2_msgs/TFMessage: parent, child, stamp (s), pose (x, y, z, qx, qy, qz, qw). BadBytes if it is none.
+
+    Reading the bytes takes a tenth of the time of a whole decoding, and these messages come often."""
+    try:
+        (count,) = _U32.unpack_from(data, 0)
+        at = 4
+        for _ in range(count):
+            _, seconds, nanoseconds = _STAMP.unpack_from(data, at)
+            parent, at = _name(data, at + 12)
+            child, at = _name(data, at)
+            yield parent, child, seconds + nanoseconds * 1e-9, _POSE.unpack_from(data, at)
+            at += 56
+    except struct.error as error:
+        raise BadBytes(str(error)) from error
+
+
+class Sources:
+    """When each source was heard last. Called from any thread; `now` in s of the steady clock."""
+
+    def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
+        self._now = now
+        self._heard: dict[str, float] = {}
+
+    def heard(self, name: str) -> None:
+        """Registers a message of this source."""
+        self._heard[name] = self._now()
+
+    def speaks(self, name: str) -> bool:
+        """True if its last message is younger than SILENT."""
+        return self._now() - self._heard.get(name, float("-inf")) < SILENT
+
+    def silent(self) -> dict[str, float]:
+        """Silence in s of each source that sent something before and is silent now."""
+        now = self._now()
+        return {name: round(now - at, 1) for name, at in list(self._heard.items()) if now - at >= SILENT}
+
+
 class RosView:
-    """Callbacks write, anybody reads; each value is replaced as a whole. `say(source, text, level, phase)` makes an
-    event, `put(name, value)` a document, `transition` goes to the graphs and `result` to the desk."""
+    """The callbacks of the topics write; any thread may read, because each value is replaced as a whole.
+
+    `say(source, text, level, phase)` adds an event, `put(name, value)` sets a document, `transition` passes a
+    transition to the graphs, and `result` passes a result to the desk."""
 
     def __init__(
         self,
@@ -76,7 +133,7 @@ class RosView:
         self.sources = Sources()
         self.contact_stamp = 0.0
         self.hand_number = 0
-        """of the newest message of the hand"""
+        """Count of the hand's messages."""
         self.signal, self.contact, self.latency = ContactSignal(), "", math.nan
         self._dmp_at = self._latency_at = self._path_at = 0.0
         self._path_of = ""  # the controller whose motion is under way
@@ -84,15 +141,15 @@ class RosView:
         self.entry: Callable[[], dict] = dict
         self.config: Callable[[], dict] = dict
         self.objects: Callable[[], tuple[str, ...] | None] = lambda: None
-        """of the database; None where it is not there"""
+        """Identifiers of the objects in the database; None if there is no database."""
         self.objects_read: Callable[[], None] = lambda: None
         self.named = frozenset({self.hand_frame, self._board_frame, GOAL_FRAME})
-        """frames that the picture may show, however many others there are; Knowledge adds those of the objects"""
+        """Frames that the picture may show. Knowledge adds those of the objects."""
         self._moving = frozenset(model.moving()) if model else None
         self._subscribers: dict[str, rospy.Subscriber] = {}
 
     def listen(self) -> None:
-        """Begins; what is latched comes at once, when everybody who is told must be there."""
+        """Subscribes to the topics. Latched messages arrive at once, so call this when all callbacks are set."""
         for topic, kind, callback, queue in (
             ("coglab/state", MasterState, self._on_machine, 20),
             ("coglab/transitions", Transition, self._on_transition, 200),
@@ -115,7 +172,7 @@ class RosView:
             self._subscribers[topic] = rospy.Subscriber(topic, PredictedPath, self._on_path, name, queue_size=5)
 
     def there(self, topic: str) -> bool:
-        """Whether somebody publishes it."""
+        """True if a node publishes this topic."""
         return self._subscribers[topic].get_num_connections() > 0
 
     def phase(self) -> str:
@@ -125,7 +182,7 @@ class RosView:
     # --- read -------------------------------------------------------------------------------------------------
 
     def standing(self) -> Standing:
-        """For the desk."""
+        """State of the robot for the desk."""
         machine, arm, hand = self.machine, self.arm, self.hand
         return Standing(
             master_there=self.there("coglab/state"),
@@ -149,24 +206,24 @@ class RosView:
         )
 
     def stopped(self) -> tuple[bool, str, int]:
-        """Whether the robot stands after a stop or a fault, why, and how often it has come to stand."""
-        # One that is silent for a moment stands all the same.
+        """True if the robot stands after a stop or a fault; the reason; and how often it has come to stand."""
+        # A node that is silent for a moment does not end the standstill.
         held = self.there("lwr/state") and self.arm.hold_latched
         stands = self.there("coglab/state") and self.machine.state.rsplit("/", 1)[-1] in STANDSTILL
         return stands or held, plain(self.machine.why or self.arm.reason), self._standstills.count
 
     def palm(self) -> Any:
-        """Place of the palm in the world, m; None where it is not known."""
+        """Position of the palm in the world, m; None if it is not known."""
         if self.model is None or not self.joints:
             return None
         return self.model.place(PALM, self.joints)[:3, 3]
 
     def path_runs(self) -> bool:
-        """Whether the path of a motion under way is shown."""
+        """True if the page shows the path of a running motion."""
         return bool(self._path_of) and time.monotonic() - self._path_at < OLD
 
     def shown(self, kind: str, path: PredictedPath) -> dict | None:
-        """The document of a path; None where it has no poses, or its frame is none of the robot's."""
+        """Document of a path; None if it has no poses, or if the robot has no such frame."""
         if self.model is None or not path.poses or len(path.poses) != len(path.times) or len(path.poses) > MOST_POSES:
             return None
         frame = path.header.frame_id
@@ -174,7 +231,7 @@ class RosView:
         return path_ahead.document(kind, path, self.model.place(frame, self.joints)) if known else None
 
     def frame(self) -> dict:
-        """What goes out 30 times a second."""
+        """The state that the page gets 30 times a second."""
         now = time.monotonic()
         self._measure_palm(now)
         object_frame = str(self.entry().get("frame", ""))
@@ -213,8 +270,60 @@ class RosView:
         }
 
     def status(self) -> dict:
-        """What changes seldom."""
-        return status.document(self)
+        """The document `status` of the page: the values that change seldom."""
+        now, machine, arm, hand = self.standing(), self.machine, self.arm, self.hand
+        return {
+            "machine": {
+                "alive": self.there("coglab/state"),
+                "state": machine.state,
+                "words": phase(machine.state),
+                "hub": machine.in_hub,
+                "actions": list(machine.actions),
+                "object": machine.object_id,
+                "why": plain(machine.why),
+                "fallback": str(self.config().get("default_object", "")),
+            },
+            "arm": {
+                "alive": self.there("lwr/state"),
+                "supervisor": arm.supervisor,
+                "words": supervisor(arm.supervisor),
+                "fri": arm.fri_state,
+                "quality": arm.quality,
+                "mode": arm.control_mode,
+                "power": arm.power & ALL_DRIVES == ALL_DRIVES,
+                "allowed": arm.motion_allowed,
+                "held": arm.hold_latched,
+                "reason": plain(arm.reason),
+                "cycle": arm.cycle_time,
+            },
+            "hand": {
+                "alive": self.there("ih2_hand/hand_status"),
+                "connected": hand.connected,
+                "calibrated": hand.calibrated,
+                "calibrating": hand.calibrating,
+                "holding": hand.holding,
+                "message": hand.message,
+                "motors": len(hand.motors),
+            },
+            "manager": {
+                "alive": self.there("controller_manager/status"),
+                "state": self.manager.state,
+                "active": self.manager.active_controller,
+                "reason": plain(self.manager.reason),
+                "scale": round(self.manager.speed_scale, 3),
+            },
+            "contact": {
+                "words": self.contact,
+                "stamp": round(self.contact_stamp, 1),
+                "alive": now.detector_alive,
+                "state": self.signal.state,
+                "mode": self.signal.mode,
+                "learnt": self.signal.learnt,
+                "samples": self.signal.rest_samples,
+                "k": round(self.signal.k, 3),
+                "window": round(self.signal.window, 4),
+            },
+        }
 
     # --- arm and hand -----------------------------------------------------------------------------------------
 
@@ -253,12 +362,12 @@ class RosView:
 
     def _on_tf(self, message: rospy.AnyMsg, static: bool = False) -> None:
         try:
-            for parent, child, stamp, pose in wire.transforms(message._buff):
+            for parent, child, stamp, pose in transforms(message._buff):
                 kept = child in self.named or (static and len(self.frames) < MOST_STATIC)
                 if kept and parent in FRAME_PARENTS and all(map(math.isfinite, pose)) and any(pose[3:]):
                     self.frames[child] = pose
                     self._stamps[child] = stamp
-        except wire.BadBytes:
+        except BadBytes:
             return
 
     def _on_arm(self, message: LwrState) -> None:

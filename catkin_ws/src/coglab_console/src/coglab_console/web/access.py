@@ -1,11 +1,11 @@
-"""Who may speak to the console: one-time tokens, sessions, and the lists of hosts and origins. No web library here.
+"""Access to the console: one-time tokens, sessions, and the lists of hosts and origins. Needs no web library.
 
 A browser comes once with a token that the terminal printed (/?t=TOKEN) and gets a session, which its cookie carries.
 Every request must name a host of the list (against DNS rebinding); one that changes something, and the WebSocket,
 must also come from an origin of the list and, a POST, carry a header that a foreign page cannot set.
 
-A program without a browser gets a key for a token (POST /api/session) and says it as `Authorization: Bearer KEY`. No
-page can make a browser send that, so neither origin nor header is asked for; an origin that is named must be listed.
+A program without a browser gets a key for a token (POST /api/session) and sends it as `Authorization: Bearer KEY`. No
+page can make a browser send that, so neither origin nor header is required; an origin that is sent must be listed.
 """
 
 from __future__ import annotations
@@ -18,12 +18,11 @@ from dataclasses import dataclass
 
 CSRF_HEADER = "X-CogLab-Console"
 MAX_SESSIONS = 32
-SESSION_LIFE = 24 * 3600.0
-"""s without a request after which a session is forgotten"""
+SESSION_LIFE = 24 * 3600.0  # s without a request, after which a session ends
 
 
 class Denied(Exception):
-    """A request that is refused: HTTP status and one sentence."""
+    """A refused request: HTTP status and a message."""
 
     def __init__(self, status: int, sentence: str) -> None:
         super().__init__(sentence)
@@ -31,14 +30,14 @@ class Denied(Exception):
 
 
 class TokenBucket:
-    """So many requests a second, and so many at once; more are refused."""
+    """Limits requests to `rate` per second and `burst` at once; refuses more."""
 
     def __init__(self, rate: float, burst: float, now: Callable[[], float] = time.monotonic) -> None:
         self._rate, self._burst, self._now = rate, burst, now
         self._level, self._since = burst, now()
 
     def take(self) -> bool:
-        """Whether one more fits."""
+        """True if one more request is allowed."""
         now = self._now()
         self._level = min(self._burst, self._level + (now - self._since) * self._rate)
         self._since = now
@@ -50,7 +49,7 @@ class TokenBucket:
 
 @dataclass
 class Session:
-    """One browser; `name` is what the others see of it."""
+    """One browser or program. Other browsers see its `name`."""
 
     key: str
     name: str
@@ -59,11 +58,11 @@ class Session:
     stops: TokenBucket
     sockets: int = 0
     program: bool = False
-    """whether its key comes as Authorization: Bearer, and never as a cookie"""
+    """True if its key comes as Authorization: Bearer, never as a cookie."""
 
 
 def allowed_hosts(address: str, port: int, more: Iterable[str] = ()) -> tuple[str, ...]:
-    """Values of the header Host that are served: where the console listens, loopback (a tunnel), and what was named."""
+    """Allowed values of the header Host: the address of the console, loopback (for a tunnel), and those in `more`."""
     names = {"127.0.0.1", "localhost"} | ({address} if address not in ("0.0.0.0", "::") else set())
     found = {f"{name}:{port}" for name in names} | {host if ":" in host else f"{host}:{port}" for host in more}
     return tuple(sorted(found))

@@ -1,8 +1,8 @@
-"""What goes to the browsers: documents with versions, the newest state, and every event since the last one seen.
+"""Sends documents with versions, the newest state, and all new events to the browsers.
 
-Nothing is queued per browser but the newest state: documents and events are looked up when there is room to send. There
-is room while fewer than WINDOW states wait for the browser's word that it has taken them; buffers of the network would
-otherwise hold seconds of old states. So a browser that is slow misses states, never an event, and shows what is new.
+Only the newest state is queued per browser; documents and events are looked up when there is room to send. There is
+room while fewer than WINDOW states wait for the acknowledgement of the browser. Otherwise the buffers of the network
+would hold seconds of old states. So a slow browser misses states but no event, and shows new values.
 """
 
 from __future__ import annotations
@@ -14,12 +14,11 @@ from collections.abc import Awaitable, Callable, Iterator
 
 from ..desk.events import EventLog
 
-WINDOW = 4
-"""states on the way to one browser: at 30 Hz enough for a round trip of 0.13 s at the full rate"""
+WINDOW = 4  # states not yet acknowledged by one browser: at 30 Hz enough for a round trip of 0.13 s
 
 
 def to_json(value: object) -> str:
-    """Compact JSON; numbers that are not finite become null."""
+    """Returns compact JSON. Numbers that are not finite become null."""
     try:
         return json.dumps(value, separators=(",", ":"), allow_nan=False)
     except ValueError:
@@ -37,14 +36,14 @@ def _finite(value: object) -> object:
 
 
 class Documents:
-    """Named values that change seldom. Called from the event loop alone."""
+    """Named values that change seldom. Call it only from the event loop."""
 
     def __init__(self) -> None:
         self._texts: dict[str, tuple[int, str]] = {}
         self.changed: Callable[[], None] = lambda: None
 
     def put(self, name: str, value: object) -> bool:
-        """Sets one; True if it differs from what was there."""
+        """Sets a document. Returns True if it has changed."""
         text = to_json({"t": "doc", "name": name, "value": value})
         version, before = self._texts.get(name, (0, ""))
         if text == before:
@@ -54,12 +53,12 @@ class Documents:
         return True
 
     def remove(self, name: str) -> None:
-        """Forgets one; browsers are told null."""
+        """Removes a document. Browsers get null."""
         if name in self._texts:
             self.put(name, None)
 
     def newer(self, known: dict[str, int]) -> Iterator[str]:
-        """Texts that a browser with these versions has not got; brings `known` up to date."""
+        """Documents newer than the versions in `known`, as text. Updates `known`."""
         for name, (version, text) in list(self._texts.items()):
             if known.get(name, 0) != version:
                 known[name] = version

@@ -1,6 +1,6 @@
-"""The files that are served: the page's own folder and, from where Debian puts them, three.js and dygraphs.
+"""Files of the page: the folder `page`, and three.js and dygraphs from Debian.
 
-A closed table from address to file, made at the start: nothing else on the disk can be asked for.
+A table from address to file is made at the start. No other file of the disk can be requested.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def load(path: Path) -> PageFile:
 
 
 def load_all(page: Path, libraries: Path = DEBIAN) -> tuple[dict[str, PageFile], list[str]]:
-    """Files by address, and the Debian packages that are missing."""
+    """Returns the files by address, and the names of missing Debian packages."""
     found = {f"/page/{path.name}": load(path) for path in sorted(page.iterdir()) if path.suffix in KINDS}
     found["/"] = found.pop("/page/index.html")
     missing = []

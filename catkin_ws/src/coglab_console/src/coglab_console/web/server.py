@@ -2,7 +2,7 @@
 
 GET  /?t=TOKEN   a session for a one-time token      GET /ws      state, events, documents; STOP and held buttons
 GET  / /page /lib  the page                          POST /api/command {"name", "arguments"}      POST /api/stop
-POST /api/session  a program's key for a one-time token, which is said as Authorization: Bearer
+POST /api/session  gives a program a key for a one-time token; the program sends it as Authorization: Bearer
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from .access import Access, Denied, Session
 from .fan_out import Client, Documents, to_json
 from .page_files import PageFile
 
-MAX_MESSAGE = 64 * 1024  # bytes, of a request's body and of a frame
+MAX_MESSAGE = 64 * 1024  # bytes of a request's body or of a frame
 MAX_BAD_FRAMES = 20
-MAX_SOCKETS = 4  # of one browser
+MAX_SOCKETS = 4  # per browser
 SEND_LIMIT = 5.0  # s that a browser may take to read
-HELLO_LIMIT = 3.0  # s until a connection has said what it has seen
+HELLO_LIMIT = 3.0  # s within which a new connection must send its newest event number
 CSP = (
     "default-src 'self'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
     "connect-src 'self' ws://{host}; "
     "object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-REFUSALS = {  # in place of the library's two words
+REFUSALS = {  # by HTTP status, instead of the library's short text
     405: "expected GET for the page, POST for /api/command, /api/stop and /api/session",
     413: f"expected at most {MAX_MESSAGE} bytes; a command is far shorter",
 }
@@ -48,7 +48,7 @@ _LOG = logging.getLogger(__name__)
 
 
 def parsed(text: str) -> Any:
-    """JSON of a browser; ValueError for what is none, also for NaN and Infinity, which Python would take."""
+    """Parses JSON of a browser. Raises ValueError also for NaN and Infinity, which Python accepts."""
 
     def refuse(word: str) -> object:
         raise ValueError(f"{word} is no number")
@@ -57,7 +57,7 @@ def parsed(text: str) -> Any:
 
 
 class ConsoleServer:
-    """One console. `epoch` tells a browser that comes back whether it is the same run."""
+    """The web server of one console. By `epoch`, a browser that reconnects sees whether it is the same run."""
 
     def __init__(
         self,

@@ -1,10 +1,10 @@
-"""What is wrong with a page of the console as a browser shows it: for the tests and the bench."""
+"""Finds faults of a page of the console as a browser shows it."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from .browser import Browser
+from coglab_console.browser import Browser
 
 PAGES = ("Live", "Machine", "Experiment", "Contact", "Objects", "Primitives", "Feedback", "Events", "Health", "Help")
 _LOOK = Path(__file__).with_name("look_at_page.js").read_text()

@@ -1,4 +1,4 @@
-"""What ssh -L makes, without ssh: for tests and the bench of the console through a tunnel."""
+"""A TCP port forwarder as `ssh -L` makes it, without ssh."""
 
 from __future__ import annotations
 
