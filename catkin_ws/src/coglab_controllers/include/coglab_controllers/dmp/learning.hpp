@@ -27,8 +27,9 @@ struct LearningOptions {
 struct DemonstrationLimits {
   static constexpr double kShort = 0.05;     ///< "short": m, smallest way from the start
   static constexpr double kBrief = 0.25;     ///< "brief": s, smallest duration
-  static constexpr double kJump = 5.0;       ///< "jump": m/s, largest speed between samples,
-  static constexpr double kJumpShare = 6.0;  ///< or largest ratio of a step to its neighbours
+  static constexpr double kJump = 5.0;       ///< "jump": m/s, largest speed between samples
+  static constexpr double kJumpShare = 6.0;  ///< "jump": largest ratio of a step to its neighbours,
+                                             ///< if the step is also over 20 % of the way
   static constexpr double kMoving = 0.5;     ///< "moving": largest speed at both ends, share of the
                                              ///< mean speed: a reach begins and ends at rest
   static constexpr double kNoisy = 0.02;     ///< "noisy": largest noise, share of the way
