@@ -1,0 +1,1 @@
+"""The Python interface of CogLab: one Robot, running or in virtual time; own controllers; learning environments."""

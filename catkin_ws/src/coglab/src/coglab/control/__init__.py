@@ -1,0 +1,1 @@
+"""Own controllers in Python, for the virtual world and for the running robot."""
