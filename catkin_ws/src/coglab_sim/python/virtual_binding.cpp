@@ -1,7 +1,7 @@
 /// Python module coglab_sim._virtual: the whole robot (cell, bridge, controller manager) in virtual
 /// time.
 #include "coglab_sim/virtual_robot.hpp"
-#include "lwr_fri_bridge/ros/reason_codes.hpp"
+#include "lwr_fri_bridge/requests/events.hpp"
 #include "py_cell.hpp"
 
 namespace py = pybind11;
@@ -168,7 +168,7 @@ PYBIND11_MODULE(_virtual, m) {
             const auto outcome = robot.bridge().outcome(ticket);
             if (outcome.code == lwr_fri_bridge::OutcomeCode::Pending) return py::none();
             return py::make_tuple(outcome.success(), describe(outcome),
-                                  lwr_fri_bridge::reasonCode(outcome.code));
+                                  static_cast<std::uint16_t>(codeOf(outcome.code)));
           },
           py::arg("ticket"), "(success, message, reason code), or None while it is not finished.")
 

@@ -5,9 +5,6 @@ from __future__ import annotations
 import threading
 import time
 
-import rospy
-from std_msgs.msg import Float64
-
 TOPIC = "coglab_sim/real_time_factor"
 
 
@@ -42,11 +39,16 @@ class Pace:
 
     def follow(self, topic: str = TOPIC) -> Pace:
         """Subscribe to the cell's factor. Returns self."""
+        import rospy  # here, because states use clocks without ROS, too
+        from std_msgs.msg import Float64
+
         self._subscriber = rospy.Subscriber(topic, Float64, lambda message: self.change(message.data))
         return self
 
     def change(self, factor: float) -> None:
         """Set the factor. A value outside of (0, 1] is ignored."""
+        import rospy
+
         if not 0.0 < factor <= 1.0 or factor == self.factor:
             return
         with self._lock:
