@@ -11,10 +11,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
 
 import numpy as np
 from coglab_py.pose import length
+from numpy.typing import ArrayLike
 
 from .minimum_jerk import ACCELERATION, END, POSITION, VELOCITY, transition
 
@@ -22,6 +22,14 @@ ERROR = 4  # index of the tracker's error in the state
 STATES = 5
 NEVER = -math.inf  # arrival time of a hand at rest
 SPAWN_STEP = 0.035  # s between the onsets of new motions, if observations are farther apart
+UNLIKELY = 13.0  # a hypothesis is dropped when it is less likely than the best one by this factor, as logarithm
+WANDER = (
+    ((VELOCITY, ACCELERATION, 2.0),),
+    ((POSITION, ACCELERATION, 6.0), (VELOCITY, VELOCITY, 3.0)),
+    ((POSITION, VELOCITY, 8.0),),
+    ((POSITION, POSITION, 20.0),),
+)
+"""divisors of the covariances that a random walk of the acceleration adds, by the power of the time beyond the first"""
 
 
 @dataclass(frozen=True)
@@ -80,31 +88,51 @@ class ReachSettings:
 
 @dataclass(frozen=True)
 class _Motions:
-    """A family of motions that may begin: durations (s) per axis, rates (1/s), variance (m^2) of their ends per axis,
-    and whether they go toward a handover."""
+    """A family of motions that may begin: durations (s) per axis (3, n), logarithms of their rates (1/s) (n,), variance
+    (m^2) of their ends per axis (3, n), and whether each goes toward a handover (n,)."""
 
     times: np.ndarray
-    rates: np.ndarray
+    log_rates: np.ndarray
     variance: np.ndarray
-    toward: bool
+    toward: np.ndarray
 
     @staticmethod
     def of(
-        times: Sequence[float], vertical: float, rate: float, deviation: Sequence[float] | float, toward: bool
+        times: Sequence[float], vertical: float, rates: ArrayLike, deviation: Sequence[float] | float, toward: bool
     ) -> _Motions:
-        """Motions with equally likely durations. ``vertical``: factor of the vertical duration; ``deviation`` in m."""
+        """``vertical``: factor of the vertical duration; ``rates`` (1/s): one for all durations together, or one for
+        each; ``deviation`` in m."""
         n = len(times)
-        variance = np.full((n, 3), np.square(deviation))
-        return _Motions(np.outer(times, [1.0, 1.0, vertical]), np.full(n, rate / n), variance, toward)
+        each = np.asarray(rates, dtype=float)
+        each = np.full(n, each / n) if each.ndim == 0 else each
+        variance = np.repeat(np.square(np.broadcast_to(deviation, 3))[:, None], n, axis=1)
+        return _Motions(np.outer([1.0, 1.0, vertical], times), np.log(each), variance, np.full(n, toward))
 
-    def and_(self, other: _Motions) -> _Motions:
-        """The union of both families."""
+    @staticmethod
+    def union(families: Sequence[_Motions]) -> _Motions:
+        """All motions of some families, in their order."""
         return _Motions(
-            np.concatenate([self.times, other.times]),
-            np.append(self.rates, other.rates),
-            np.concatenate([self.variance, other.variance]),
-            self.toward,
+            np.concatenate([f.times for f in families], axis=1),
+            np.concatenate([f.log_rates for f in families]),
+            np.concatenate([f.variance for f in families], axis=1),
+            np.concatenate([f.toward for f in families]),
         )
+
+    def slower(self, factor: float) -> _Motions:
+        """The same motions with their rates multiplied."""
+        return replace(self, log_rates=self.log_rates + math.log(factor))
+
+
+@dataclass(frozen=True)
+class _Birth:
+    """New motions of one family from one hypothesis: index of that hypothesis, their onset (s), mean of their ends (m),
+    and the time (s) during which they could have begun."""
+
+    source: int
+    begin: float
+    family: str
+    end: np.ndarray
+    during: float
 
 
 @dataclass(frozen=True)
@@ -121,7 +149,9 @@ class Prediction:
 
 class ReachBank:
     """Hypotheses for one hand. Call ``step`` with each observation, in the order of stamps. ``handover`` is then the
-    probability that the hand moves toward a handover or waits at one."""
+    probability that the hand moves toward a handover or waits at one.
+
+    All n hypotheses lie in the last axis of a few arrays, so that each line of the filter treats all of them."""
 
     def __init__(self, stamp: float, position: np.ndarray, settings: ReachSettings) -> None:
         self.settings = s = settings
@@ -132,40 +162,29 @@ class ReachBank:
         # The arrival of a hand that is observed for the first time was not observed. So rest at a handover gets half of
         # its probability.
         share = 0.5 * at_place / (at_place + elsewhere)
-        mean: np.ndarray = np.zeros((2, 3, STATES))
-        mean[..., POSITION] = mean[..., END] = position
-        cov: np.ndarray = np.zeros((2, 3, STATES, STATES))
+        mean = np.zeros((STATES, 3, 2))
+        mean[POSITION] = mean[END] = position[:, None]
+        cov = np.zeros((STATES, STATES, 3, 2))
         for i in (POSITION, END):
             for j in (POSITION, END):
-                cov[..., i, j] = s.noise**2
-        cov[..., ERROR, ERROR] = s.noise**2
-        cov[..., ERROR, POSITION] = cov[..., POSITION, ERROR] = -0.5 * s.noise**2
-        cov[..., ERROR, END] = cov[..., END, ERROR] = -0.5 * s.noise**2
+                cov[i, j] = s.noise**2
+        cov[ERROR, ERROR] = s.noise**2
+        cov[ERROR, POSITION] = cov[POSITION, ERROR] = -0.5 * s.noise**2
+        cov[ERROR, END] = cov[END, ERROR] = -0.5 * s.noise**2
         self._mean, self._cov = mean, cov
-        self._begin: np.ndarray = np.full(2, stamp)
-        self._onset: np.ndarray = np.full(2, stamp)
-        self._arrival: np.ndarray = np.full((2, 3), NEVER)
-        self._toward: np.ndarray = np.array([True, False])
+        """state (5) per axis (3): mean (5, 3, n) and covariance (5, 5, 3, n), of position, velocity, ..."""
+        self._begin = np.full(2, stamp)
+        self._onset = np.full(2, stamp)
+        self._arrival = np.full((3, 2), NEVER)
+        """s (3, n), end of the motion per axis"""
+        self._toward = np.array([True, False])
         self._log_weight = np.log(np.array([max(share, 1e-9), 1.0 - share]))
+        self._weight = np.exp(self._log_weight)
+        self._prediction: Prediction | None = None
+        self._predicted = False
         self._place = np.array(s.place)
-        scale = np.log(np.array(s.reach_times) / s.reach_time) / s.reach_time_deviation
-        likely = np.exp(-0.5 * scale**2)
-        vertical, rate, wide = s.vertical_shares[-1], s.correction_rate, s.wide_way
-        by_share = [_Motions.of(s.reach_times, v, 1.0, s.place_deviation, True) for v in s.vertical_shares]
-        self._reaches = replace(
-            reduce(_Motions.and_, by_share),
-            rates=np.tile(s.handover_rate * likely / likely.sum(), len(by_share)) / len(by_share),
-        )
-        self._corrected = _Motions.of(s.correction_times, vertical, rate, s.correction_way, True)
-        self._joined = _Motions.of(s.correction_times, vertical, rate, s.place_deviation, True)
-        self._others = _Motions.of(s.small_times, vertical, s.other_rate / 2, s.small_way, False).and_(
-            _Motions.of(s.wide_times, vertical, s.other_rate / 2, wide, False)
-        )
-        self._turned = replace(self._others, rates=self._others.rates * rate / s.other_rate)
-        self._withdrawn = _Motions.of(s.wide_times, vertical, rate, wide, False)
-        self._left = _Motions.of(s.wide_times, vertical, rate / 2, wide, False)
-        self._retreated = _Motions.of(s.wide_times, vertical, rate / 2, s.return_way, False)
-        self._returned = _Motions.of(s.wide_times, vertical, s.return_rate, s.return_way, False)
+        self._families = _families(s)
+        self._unions: dict[tuple[str, ...], tuple[_Motions, np.ndarray]] = {}
         self._home = position
         self._seen = True
 
@@ -174,33 +193,39 @@ class ReachBank:
     @property
     def handover(self) -> float:
         """Probability, 0..1."""
-        return float(np.exp(self._log_weight[self._toward]).sum())
+        return float(self._weight @ self._toward)
 
     def position(self) -> np.ndarray:
         """Expected current position (m), without the tracker's error."""
-        position: np.ndarray = np.einsum("i,ij->j", np.exp(self._log_weight), self._mean[..., POSITION])
+        position: np.ndarray = self._mean[POSITION] @ self._weight
         return position
 
     def velocity(self) -> np.ndarray:
         """Expected current velocity (m/s)."""
-        velocity: np.ndarray = np.einsum("i,ij->j", np.exp(self._log_weight), self._mean[..., VELOCITY])
+        velocity: np.ndarray = self._mean[VELOCITY] @ self._weight
         return velocity
 
     def prediction(self) -> Prediction | None:
         """Prediction of the handover; None if no hypothesis of a motion toward a handover is left."""
-        if not self._toward.any():
+        if not self._predicted:
+            self._prediction, self._predicted = self._predict_end(), True
+        return self._prediction
+
+    def _predict_end(self) -> Prediction | None:
+        which = self._toward.nonzero()[0]
+        if not len(which):
             return None
-        weight = np.exp(self._log_weight[self._toward] - self._log_weight[self._toward].max())
+        weight = self._weight[which]
         weight /= weight.sum()
-        ends = self._mean[self._toward][..., END]
-        end = weight @ ends
-        spread = ends - end
-        covariance = np.einsum("i,ij,ik->jk", weight, spread, spread)
-        covariance += np.diag(weight @ self._cov[self._toward][..., END, END])
-        arrivals = np.maximum(self._arrival[self._toward].max(axis=1), self.stamp)
+        ends = self._mean[END].take(which, axis=1)
+        end = ends @ weight
+        spread = ends - end[:, None]
+        covariance = (spread * weight) @ spread.T
+        covariance.ravel()[::4] += self._cov[END, END].take(which, axis=1) @ weight
+        arrivals = np.maximum(self._arrival.max(axis=0)[which], self.stamp)
         arrival = float(weight @ arrivals)
         deviation = math.sqrt(float(weight @ (arrivals - arrival) ** 2))
-        return Prediction(end, covariance, arrival, deviation, float(weight @ self._onset[self._toward]))
+        return Prediction(end, covariance, arrival, deviation, float(weight @ self._onset[which]))
 
     # -- observations ----------------------------------------------------------------------------------------------
 
@@ -208,171 +233,215 @@ class ReachBank:
         """Process an observation. False if it does not show this hand or is impossible for a hand; then only the
         prediction to the stamp is done."""
         gap = stamp - self.stamp
-        self._spawn(stamp)
+        self._add(self._births(stamp))
         self._predict(stamp)
-        log_likelihood = self._log_likelihood(position)
-        total = self._log_weight + log_likelihood
+        innovation, variance = self._innovation(position)
+        total = self._log_weight - 0.5 * (innovation**2 / variance + np.log(2 * np.pi * variance)).sum(axis=0)
         top = float(total.max())
         evidence = top + math.log(float(np.exp(total - top).sum()))
         s = self.settings
         seen = evidence > math.log(s.clutter_density if self._seen else s.clutter_again)
         self._seen = seen
         if seen:
-            self._update(position)
+            self._update(innovation, variance)
             self._log_weight = total
-        self._merge_rest()
-        self._prune()
-        rests = (self._arrival[:, 0] == NEVER) & ~self._toward
-        share = float(np.exp(self._log_weight[rests]).sum()) * (1.0 - math.exp(-gap / self.settings.home_time))
+        self._keep(self._likely(self._merge_rest()), normalise=True)
+        rests = (self._arrival[0] == NEVER) & ~self._toward
+        share = float(self._weight @ rests) * (1.0 - math.exp(-gap / s.home_time))
         self._home = self._home + share * (self.position() - self._home)
         return seen
 
     def forget(self) -> None:
         """Count every motion toward a handover as another motion from now on."""
         self._toward = np.zeros_like(self._toward)
-        self._merge_rest()
+        self._keep(self._merge_rest())
 
-    def _spawn(self, stamp: float) -> None:
-        """Add motions that began since the last observation: from rest, and changes of motions in progress."""
-        resting = self._arrival[:, 0] == NEVER
+    def _births(self, stamp: float) -> list[_Birth]:
+        """Motions that began since the last observation: from rest, and changes of motions in progress."""
+        resting = self._arrival[0] == NEVER
         gap = stamp - self.stamp
-        begins = self.stamp + np.arange(0.0, gap, max(SPAWN_STEP, gap / 8.0))
-        born: list[tuple[int, float, _Motions, np.ndarray, float]] = []
-        for source in np.flatnonzero(resting):
-            toward = bool(self._toward[source])
-            here = self._mean[source][:, POSITION]
+        begins = (self.stamp + np.arange(0.0, gap, max(SPAWN_STEP, gap / 8.0))).tolist()
+        born: list[_Birth] = []
+        for source in resting.nonzero()[0].tolist():
+            here = self._mean[POSITION, :, source]
             for begin in begins:
                 during = gap / len(begins)
-                if toward:
-                    born.append((source, begin, self._corrected, here, during))
-                    born.append((source, begin, self._left, here, during))
-                    born.append((source, begin, self._retreated, self._home, during))
+                if self._toward[source]:
+                    born.append(_Birth(source, begin, "corrected", here, during))
+                    born.append(_Birth(source, begin, "left", here, during))
+                    born.append(_Birth(source, begin, "retreated", self._home, during))
                 else:
-                    born.append((source, begin, self._reaches, self._place, during))
-                    born.append((source, begin, self._others, here, during))
+                    born.append(_Birth(source, begin, "reaches", self._place, during))
+                    born.append(_Birth(source, begin, "others", here, during))
                     if length(here - self._home) > 2.0 * self.settings.return_way:
-                        born.append((source, begin, self._returned, self._home, during))
+                        born.append(_Birth(source, begin, "returned", self._home, during))
         for toward in (True, False):
-            moving = np.flatnonzero(~resting & (self._toward == toward))
+            moving = (~resting & (self._toward == toward)).nonzero()[0]
             if not len(moving):
                 continue
-            source = moving[np.argmax(self._log_weight[moving])]
-            end = self._mean[source][:, END] if toward else self._place
-            born.append((source, self.stamp, self._corrected if toward else self._joined, end, gap))
-            here = self._mean[source][:, POSITION]
-            born.append((source, self.stamp, self._withdrawn if toward else self._turned, here, gap))
-        if born:
-            self._add(born)
+            source = int(moving[self._log_weight[moving].argmax()])
+            here = self._mean[POSITION, :, source]
+            end = self._mean[END, :, source] if toward else self._place
+            born.append(_Birth(source, self.stamp, "corrected" if toward else "joined", end, gap))
+            born.append(_Birth(source, self.stamp, "withdrawn" if toward else "turned", here, gap))
+        return born
 
-    def _add(self, born: list[tuple[int, float, _Motions, np.ndarray, float]]) -> None:
-        """Add motions (source, onset in s, family, mean of their ends in m, s during which they could have begun)."""
-        counts = [len(motions.times) for _, _, motions, _, _ in born]
-        source = np.repeat([b[0] for b in born], counts)
-        begin = np.repeat([b[1] for b in born], counts)
-        mean, cov = self._mean[source], self._cov[source]
-        mean[..., END] = np.repeat([b[3] for b in born], counts, axis=0)
-        cov[..., END, :] = cov[..., :, END] = 0.0
-        cov[..., END, END] = np.concatenate([b[2].variance for b in born])
-        times = np.concatenate([b[2].times for b in born])
-        share = np.concatenate([b[2].rates * b[4] for b in born])
-        self._log_weight = np.append(self._log_weight, self._log_weight[source] + np.log(share))
-        self._mean = np.concatenate([self._mean, mean])
-        self._cov = np.concatenate([self._cov, cov])
-        self._begin = np.append(self._begin, begin)
+    def _add(self, born: Sequence[_Birth]) -> None:
+        """Add motions as copies of the hypotheses that they begin from, with other ends."""
+        if not born:
+            return
+        names = tuple(b.family for b in born)
+        if names not in self._unions:
+            families = [self._families[name] for name in names]
+            which = np.repeat(np.arange(len(families)), [len(f.log_rates) for f in families])
+            self._unions[names] = _Motions.union(families), which
+        new, which = self._unions[names]
+        source = np.array([b.source for b in born])[which]
+        begin = np.array([b.begin for b in born])[which]
+        n = len(self._log_weight)
+        every = np.concatenate([np.arange(n), source])
+        self._mean = self._mean.take(every, axis=-1)
+        self._cov = self._cov.take(every, axis=-1)
+        self._mean[END, :, n:] = np.array([b.end for b in born]).T[:, which]
+        self._cov[END, :, :, n:] = self._cov[:, END, :, n:] = 0.0
+        self._cov[END, END, :, n:] = new.variance
+        share = new.log_rates + np.log([b.during for b in born])[which]
+        self._log_weight = np.concatenate([self._log_weight, self._log_weight[source] + share])
+        self._begin = np.concatenate([self._begin, begin])
         # The onset of a changed reach is the onset of the original one.
-        changed = self._toward[source] & np.repeat([b[2].toward for b in born], counts)
-        self._onset = np.append(self._onset, np.where(changed, self._onset[source], begin))
-        self._arrival = np.concatenate([self._arrival, begin[:, None] + times])
-        self._toward = np.append(self._toward, np.repeat([b[2].toward for b in born], counts))
+        changed = self._toward[source] & new.toward
+        self._onset = np.concatenate([self._onset, np.where(changed, self._onset[source], begin)])
+        self._arrival = np.concatenate([self._arrival, begin + new.times], axis=1)
+        self._toward = np.concatenate([self._toward, new.toward])
 
     def _predict(self, stamp: float) -> None:
         s = self.settings
         gap = stamp - self.stamp
         resting = self._arrival == NEVER
         # A motion that began after the last observation has only moved since its onset.
-        since = np.where(resting, gap, stamp - np.maximum(self.stamp, self._begin)[:, None])
+        since = np.where(resting, gap, stamp - np.maximum(self.stamp, self._begin))
         remaining = np.where(resting, 0.0, self._arrival - (stamp - since))
         over = since >= remaining - 1e-9
-        a = np.zeros((*since.shape, STATES, STATES))
-        a[..., :ERROR, :ERROR] = transition(remaining, since)
+        moves = transition(remaining, since)
         keep = math.exp(-gap / s.noise_time)
-        a[..., ERROR, ERROR] = keep
-        self._mean = np.matmul(a, self._mean[..., None])[..., 0]
-        self._cov = np.matmul(np.matmul(a, self._cov), np.swapaxes(a, -1, -2))
-        self._cov[..., ERROR, ERROR] += s.noise**2 * (1.0 - keep**2)
+        mean, cov = self._mean, self._cov
+        mean[:END] = np.einsum("ij...,j...->i...", moves, mean[:ERROR])
+        mean[ERROR] *= keep
+        half = np.einsum("ij...,jk...->ik...", moves, cov[:ERROR])
+        half[:, ERROR] *= keep
+        cov[:END, :END] = np.einsum("ij...,kj...->ik...", half[:, :ERROR], moves)
+        cov[:END, END:] = half[:, END:]
+        cov[END:, :END] = half[:, END:].swapaxes(0, 1)
+        cov[END, ERROR] *= keep
+        cov[ERROR, END] *= keep
+        cov[ERROR, ERROR] *= keep**2
+        cov[ERROR, ERROR] += s.noise**2 * (1.0 - keep**2)
         # Equal for all hypotheses of rest: otherwise the one that fits a still hand better would win in time.
         wander = np.where(resting, s.rest_wander**2, s.end_wander**2) * since
-        self._cov[..., END, END] += wander
+        cov[END, END] += wander
+        wander[~over] = 0.0
         for i, j in ((POSITION, POSITION), (POSITION, END), (END, POSITION)):
-            self._cov[..., i, j] += np.where(over, wander, 0.0)
+            cov[i, j] += wander
+        # A random walk of the acceleration, integrated.
         bent = np.where(over, 0.0, s.acceleration_wander**2) * since
-        self._cov[..., ACCELERATION, ACCELERATION] += bent
-        for i, j, power in ((VELOCITY, VELOCITY, 2), (POSITION, POSITION, 4)):
-            self._cov[..., i, j] += bent * since**power / (3.0 if power == 2 else 20.0)
-        for i, j, power, part in (
-            (VELOCITY, ACCELERATION, 1, 2.0),
-            (POSITION, ACCELERATION, 2, 6.0),
-            (POSITION, VELOCITY, 3, 8.0),
-        ):
-            self._cov[..., i, j] += bent * since**power / part
-            self._cov[..., j, i] = self._cov[..., i, j]
+        cov[ACCELERATION, ACCELERATION] += bent
+        for terms in WANDER:
+            bent = bent * since
+            for i, j, part in terms:
+                cov[i, j] += bent / part
+        for i, j in ((VELOCITY, ACCELERATION), (POSITION, ACCELERATION), (POSITION, VELOCITY)):
+            cov[j, i] = cov[i, j]
         self.stamp = stamp
 
     def _innovation(self, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        c = self._cov
-        variance = c[..., POSITION, POSITION] + 2.0 * c[..., POSITION, ERROR] + c[..., ERROR, ERROR] + 1e-8
-        return position - self._mean[..., POSITION] - self._mean[..., ERROR], variance
+        """Difference of an observation to each hypothesis (m), and its variance (m^2); both (3, n)."""
+        mean, cov = self._mean, self._cov
+        variance = cov[POSITION, POSITION] + 2.0 * cov[POSITION, ERROR] + cov[ERROR, ERROR] + 1e-8
+        return position[:, None] - mean[POSITION] - mean[ERROR], variance
 
-    def _log_likelihood(self, position: np.ndarray) -> np.ndarray:
-        innovation, variance = self._innovation(position)
-        result: np.ndarray = -0.5 * (innovation**2 / variance + np.log(2 * np.pi * variance)).sum(axis=1)
-        return result
+    def _update(self, innovation: np.ndarray, variance: np.ndarray) -> None:
+        seen = self._cov[:, POSITION] + self._cov[:, ERROR]
+        gain = seen / variance
+        self._mean += gain * innovation
+        self._cov -= gain[:, None] * seen
 
-    def _update(self, position: np.ndarray) -> None:
-        innovation, variance = self._innovation(position)
-        seen = self._cov[..., POSITION] + self._cov[..., ERROR]
-        gain = seen / variance[..., None]
-        self._mean = self._mean + gain * innovation[..., None]
-        self._cov = self._cov - gain[..., :, None] * seen[..., None, :]
-
-    def _merge_rest(self) -> None:
-        """Merge all completed motions of a kind into one rest of that kind, with their mean and covariance."""
-        over = self._arrival.max(axis=1) <= self.stamp + 1e-9
-        rest = []
-        for toward in (True, False):
-            these = np.flatnonzero(over & (self._toward == toward))
+    def _merge_rest(self) -> np.ndarray:
+        """Merge all completed motions of a kind into one rest of that kind, with their mean and covariance. Returns
+        which hypotheses (n,) are left."""
+        left = np.full(len(self._log_weight), True)
+        over = self._arrival.max(axis=0) <= self.stamp + 1e-9
+        for kind in (over & self._toward, over & ~self._toward):
+            these = kind.nonzero()[0]
             if not len(these):
                 continue
-            log = self._log_weight[these]
-            total = log.max() + math.log(float(np.exp(log - log.max()).sum()))
-            weight = np.exp(log - total)
-            mean = np.einsum("i,ijk->jk", weight, self._mean[these])
-            spread = self._mean[these] - mean
-            cov = np.einsum("i,ijkl->jkl", weight, self._cov[these])
-            cov += np.einsum("i,ijk,ijl->jkl", weight, spread, spread)
-            rest.append((mean, cov, float(weight @ self._onset[these]), toward, total))
-        kept = ~over
-        if rest:
-            self._mean = np.concatenate([self._mean[kept], np.array([r[0] for r in rest])])
-            self._cov = np.concatenate([self._cov[kept], np.array([r[1] for r in rest])])
-            self._begin = np.append(self._begin[kept], np.full(len(rest), self.stamp))
-            self._onset = np.append(self._onset[kept], [r[2] for r in rest])
-            self._arrival = np.concatenate([self._arrival[kept], np.full((len(rest), 3), NEVER)])
-            self._toward = np.append(self._toward[kept], [r[3] for r in rest])
-            self._log_weight = np.append(self._log_weight[kept], [r[4] for r in rest])
+            first = these[0]
+            if len(these) > 1:
+                log = self._log_weight[these]
+                top = log.max()
+                total = top + math.log(float(np.exp(log - top).sum()))
+                weight = np.exp(log - total)
+                means = self._mean.take(these, axis=-1)
+                mean = means @ weight
+                spread = means - mean[..., None]
+                cov = self._cov.take(these, axis=-1) @ weight
+                cov += np.einsum("iak,jak->ija", spread * weight, spread)
+                self._mean[..., first], self._cov[..., first] = mean, cov
+                self._onset[first] = weight @ self._onset[these]
+                self._log_weight[first] = total
+                left[these[1:]] = False
+            self._begin[first] = self.stamp
+            self._arrival[:, first] = NEVER
+        return left
 
-    def _prune(self) -> None:
-        """Drop unlikely hypotheses and normalise the weights."""
-        top = float(self._log_weight.max())
-        keep = np.flatnonzero(self._log_weight > top - 13.0)
-        if len(keep) > self.settings.hypotheses:
-            best = np.argpartition(-self._log_weight[keep], self.settings.hypotheses)[: self.settings.hypotheses]
-            keep = keep[best]
-        self._mean, self._cov = self._mean[keep], self._cov[keep]
-        self._begin, self._onset = self._begin[keep], self._onset[keep]
-        self._arrival, self._toward = self._arrival[keep], self._toward[keep]
-        log = self._log_weight[keep]
-        self._log_weight = log - (top + math.log(float(np.exp(log - top).sum())))
+    def _likely(self, left: np.ndarray) -> np.ndarray:
+        """Which of the hypotheses ``left`` (n,) are likely enough to be kept, at most ``settings.hypotheses``."""
+        log = np.where(left, self._log_weight, -math.inf)
+        likely: np.ndarray = log > log.max() - UNLIKELY
+        most = self.settings.hypotheses
+        if np.count_nonzero(likely) > most:
+            dropped = np.argpartition(-np.where(likely, log, -math.inf), most)[most:]
+            likely[dropped] = False
+        return likely
+
+    def _keep(self, which: np.ndarray, normalise: bool = False) -> None:
+        """Drop all hypotheses but these (n,)."""
+        self._predicted = False
+        if not which.all():
+            index = which.nonzero()[0]
+            self._mean, self._cov = self._mean.take(index, axis=-1), self._cov.take(index, axis=-1)
+            self._begin, self._onset = self._begin[index], self._onset[index]
+            self._arrival, self._toward = self._arrival.take(index, axis=1), self._toward[index]
+            self._log_weight = self._log_weight[index]
+        if normalise:
+            top = float(self._log_weight.max())
+            self._log_weight = self._log_weight - (top + math.log(float(np.exp(self._log_weight - top).sum())))
+        self._weight = np.exp(self._log_weight)
+
+
+def _families(s: ReachSettings) -> dict[str, _Motions]:
+    """The families of motions that may begin, by name."""
+    scale = np.log(np.array(s.reach_times) / s.reach_time) / s.reach_time_deviation
+    likely = np.exp(-0.5 * scale**2)
+    shares = s.vertical_shares
+    rates = s.handover_rate * likely / likely.sum() / len(shares)
+    vertical, rate, wide = shares[-1], s.correction_rate, s.wide_way
+    others = _Motions.union(
+        [
+            _Motions.of(s.small_times, vertical, s.other_rate / 2, s.small_way, False),
+            _Motions.of(s.wide_times, vertical, s.other_rate / 2, wide, False),
+        ]
+    )
+    return {
+        "reaches": _Motions.union([_Motions.of(s.reach_times, v, rates, s.place_deviation, True) for v in shares]),
+        "corrected": _Motions.of(s.correction_times, vertical, rate, s.correction_way, True),
+        "joined": _Motions.of(s.correction_times, vertical, rate, s.place_deviation, True),
+        "others": others,
+        "turned": others.slower(rate / s.other_rate),
+        "withdrawn": _Motions.of(s.wide_times, vertical, rate, wide, False),
+        "left": _Motions.of(s.wide_times, vertical, rate / 2, wide, False),
+        "retreated": _Motions.of(s.wide_times, vertical, rate / 2, s.return_way, False),
+        "returned": _Motions.of(s.wide_times, vertical, s.return_rate, s.return_way, False),
+    }
 
 
 def _density(way: np.ndarray, deviation: np.ndarray) -> float:
