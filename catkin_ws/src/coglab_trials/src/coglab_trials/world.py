@@ -4,7 +4,6 @@ bytes as on the network, in lockstep), hand emulator behind the real driver, vir
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from operator import gt, truediv
 from types import SimpleNamespace
 from typing import Any
 
@@ -43,7 +42,6 @@ except ImportError as error:
 LIMITS = str(package_path("lwr_description", "config", "joint_limits.yaml"))
 BOARD = Pose(np.array([0.45, -0.55, 0.05]), about_z(-np.pi / 2))  # frame `board` in `world`, m
 DT = 0.005  # s, FRI period
-FLOAT32 = 5e-4  # rad/s, velocity error between two answers from rounding to float32
 TASK_LIMIT = 8.0  # s, time limit of a preshape or a grasp
 OLDEST = 1e9  # s, age of a frame that was never seen
 
@@ -79,15 +77,10 @@ class Robot:
         self.virtual = LockstepRobot(urdf_file(), limits, parameters, yaml.safe_dump(manager_parameters()))
         self.cell = self.virtual.cell
         self.limits = cc.load_joint_limits(limits)
-        # Plain floats: at 200 Hz, comparing seven floats is faster than numpy.
-        self._fastest_to_command = [float(speed) for speed in self.limits.velocity]
-        self._fastest = [float(v) for v in read(limits).value["default"]["velocity"]]
-        lowest, highest = self.limits.lower_position, self.limits.upper_position
-        self._range = [(float(low), float(high)) for low, high in zip(lowest, highest, strict=True)]
         with open(urdf_file(), encoding="utf-8") as stream:
             self.urdf = stream.read()
         self.chain = cc.Chain(self.urdf)
-        self.report = self.virtual.report()
+        self._report: dict[str, Any] | None = None
         self.progress: dict[str, Any] = {
             "motion": "idle",
             "reason": "",
@@ -98,51 +91,48 @@ class Robot:
         }
         self.ended: dict[int, dict[str, Any]] = {}
         self.loaded: dict[str, str] = {}
-        self.peak_share = self.measured_share = 0.0
-        self.outside = {"commanded": 0, "measured": 0, "over_command": 0}
         self.silent = 0.0  # s since the robot's process has stopped (``virtual.frozen``)
         self.debug: dict[str, Any] | None = None
-        self._commanded: list[float] | None = None
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """The control cycle's newest report, as LockstepRobot.report() returns it. Read once per period."""
+        if self._report is None:
+            self._report = self.virtual.report()
+        return self._report
+
+    @property
+    def outside(self) -> dict[str, int]:
+        """Numbers of periods outside a limit, without any tolerance but the rounding of commands to float32.
+        ``commanded``: the commands. ``measured``: the true joints; their speed is the highest in any physics step.
+        ``over_command``: a true joint above the limit of commands, which is a few percent lower than that of the arm
+        (``servo_overshoot`` in the file of limits)."""
+        limits = self.virtual.limits()
+        return {name: limits[name] for name in ("commanded", "measured", "over_command")}
 
     @property
     def limit_violations(self) -> int:
         """Number of periods in which the commands or the true joints were outside a limit."""
-        return self.outside["commanded"] + self.outside["measured"]
+        outside = self.outside
+        return outside["commanded"] + outside["measured"]
 
-    def _look_at_arm(self) -> None:
-        """Compare the true joints with the arm's limits: position, and highest speed in any physics step of the period.
+    @property
+    def peak_share(self) -> float:
+        """Largest speed of the commands so far, as share of its limit."""
+        return float(self.virtual.limits()["peak_share"])
 
-        Nothing is differentiated or rounded, and there is no tolerance. The limit of commands is a few percent lower
-        (``servo_overshoot`` in the file of limits). Periods with a joint above that limit are counted separately."""
-        fastest = self.cell.fastest.tolist()
-        share = max(map(truediv, fastest, self._fastest))
-        self.measured_share = max(self.measured_share, share)
-        self.outside["measured"] += share > 1.0 or self._beyond(self.cell.position.tolist())
-        self.outside["over_command"] += any(map(gt, fastest, self._fastest_to_command))
-
-    def _beyond(self, position: list[float]) -> bool:
-        return not all(low <= at <= high for at, (low, high) in zip(position, self._range, strict=True))
+    @property
+    def measured_share(self) -> float:
+        """Largest speed of the true joints so far, as share of the arm's limit."""
+        return float(self.virtual.limits()["measured_share"])
 
     def step(self) -> None:
-        """Run one FRI period. Check the true joints and the commands against the limits."""
+        """Run one FRI period. True joints and commands are checked against the limits."""
         self.virtual.tick()
+        self._report = None
         self.silent = self.silent + DT if self.virtual.frozen else 0.0
-        self._look_at_arm()
-        self.report = report = self.virtual.report()
-        if report["fri_period"] <= 0.0:
-            return
-        if "ptp" in self.loaded:
+        if "ptp" in self.loaded and self.virtual.connected:
             self.ended.update((end["ptp_id"], end) for end in self.virtual.ptp_ends())
-        commanded = np.asarray(report["commanded_position"]).tolist()
-        outside = self._beyond(commanded)
-        if self._commanded is not None and report["motion_allowed"]:
-            speed = [abs(now - before) / DT for now, before in zip(commanded, self._commanded, strict=True)]
-            self.peak_share = max(self.peak_share, *map(truediv, speed, self._fastest_to_command))
-            outside = outside or any(
-                v > most + FLOAT32 for v, most in zip(speed, self._fastest_to_command, strict=True)
-            )
-        self._commanded = commanded if report["motion_allowed"] else None
-        self.outside["commanded"] += outside
 
     def palm(self) -> Pose:
         """Returns the pose of the palm in the base frame, from the measured joints."""
@@ -322,6 +312,7 @@ class World:
         self.hand = Hand(self.cell)
         self.board = conditions.perception.calibration(seed) * BOARD
         """pose of the board as the tracker measures it, with the calibration error"""
+        self.robot.virtual.set_fixed_frame("board", self.board.position, self.board.orientation)
         self.trackers = {name: Tracker(name, conditions.perception, seed) for name in (self.object_frame, "human_hand")}
         self.after_period: list[Callable[[], None]] = []
         self.speed_scale = 1.0
@@ -345,11 +336,10 @@ class World:
         if self.ticks % 2 == 0:
             self._person_and_tracker()
         self.hand.step(self.t)
-        self.robot.virtual.set_frame("board", self.board.position, self.board.orientation)
         self.robot.step()
         self.ticks += 1
         self.t = self.robot.virtual.now
-        if self.robot.report["fri_period"] > 0.0:
+        if self.robot.virtual.connected:
             for look in self.after_period:
                 look()
 
