@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+from coglab_py.rotation import Rotation
 
 
 def min_jerk(x: float) -> tuple[float, float]:

@@ -13,7 +13,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 from coglab_py.pose import Pose, length
-from scipy.spatial.transform import Rotation
+from coglab_py.rotation import Rotation
 
 from coglab_sim.person.participant import Participant
 from coglab_sim.person.scene import WorldView

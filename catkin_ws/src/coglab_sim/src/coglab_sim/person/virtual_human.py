@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from coglab_msgs.msg import Say
 from coglab_py.pose import Pose, length
-from scipy.spatial.transform import Rotation
+from coglab_py.rotation import Rotation
 
 from coglab_sim.person.grip import GripForce
 from coglab_sim.person.participant import Participant

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 from coglab_py.pose import Pose
-from scipy.spatial.transform import Rotation
+from coglab_py.rotation import Rotation
 
 CALIBRATED_AT = np.array([0.75, 0.0, 0.40])  # m, world: place of the calibration; its angular error turns about it
 
