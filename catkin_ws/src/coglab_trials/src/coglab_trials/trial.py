@@ -13,7 +13,7 @@ import smach
 from coglab_objects.database import ObjectDatabase, objects_folder
 from coglab_perception.belief import BeliefFilter
 from coglab_py.packages import package_path
-from coglab_py.pose import Pose
+from coglab_py.pose import Pose, length
 from coglab_sim.person.in_cell import pose_of_truth
 from coglab_smach.context.config import Config
 from coglab_smach.context.context import Context
@@ -318,7 +318,7 @@ class Reach:
         if not self.stood and self.reached is not None and watching:
             self.stood = True
             self._measure()
-        if self.touched is None and np.linalg.norm(sum(self._world.cell.touch().values())) > TOUCH:
+        if self.touched is None and length(self._world.cell.touch_total) > TOUCH:
             self.touched, self.moving = t, not robot.report["standing"]
         if self.found is None and self._contact.event() is not None:
             self.found, self.moving_when_found = t, not robot.report["standing"]

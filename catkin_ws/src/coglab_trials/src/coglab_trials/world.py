@@ -14,7 +14,7 @@ from coglab_objects.database import cell_parameters, objects_folder, read_object
 from coglab_py.packages import package_path
 from coglab_py.pose import Pose, about_z
 from coglab_py.yaml_file import read
-from coglab_sim.person.in_cell import move_person, pose_of_truth, view_of
+from coglab_sim.person.in_cell import move_person, seen_in
 from coglab_sim.person.recorded_person import RecordedPerson, open_recorded_hand, scene_of
 from coglab_sim.person.scene import Scene
 from coglab_sim.person.virtual_human import VirtualHuman
@@ -209,12 +209,7 @@ class Hand(HandMemory):
     def step(self, t: float) -> None:
         """Advance to time ``t`` (s): read the simulated motors, poll the driver, set the motor commands."""
         self.clock.now = max(self.clock.now, t)
-        self.emulator.follow(
-            [
-                MotorState(motor["position"], motor["current"], motor["effort"], motor["moving"], motor["locked"])
-                for motor in self.cell.motors()
-            ]
-        )
+        self.emulator.follow([MotorState(*state) for state in self.cell.motor_states()])
         self.emulator.advance()
         self.calibration_over(t)
         self._poll(t)
@@ -318,9 +313,14 @@ class World:
         self.speed_scale = 1.0
         self.t = self.robot.virtual.now
         self.ticks = 0
-        self.truth = self.cell.truth()
         self.sights: dict[str, Sight] = {}
         self.blind: set[str] = set()
+
+    @property
+    def truth(self) -> dict[str, Any]:
+        """The true state of the cell, as Cell.truth() returns it."""
+        truth: dict[str, Any] = self.cell.truth()
+        return truth
 
     def newest(self, name: str) -> tuple[Pose | None, float]:
         """Returns the newest pose of a frame and its age (s). The board was seen once and does not move: age 0."""
@@ -344,14 +344,11 @@ class World:
                 look()
 
     def _person_and_tracker(self) -> None:
-        self.truth = truth = self.cell.truth()
-        view = view_of(truth)
+        view, hand = seen_in(self.cell)
         move_person(self.cell, self.human.step(self.t, view))
         # Use the hand where the arm has moved it, not where the person wants it.
-        frames = {self.object_frame: view.object, "human_hand": pose_of_truth(truth["human_hand"])}
-        for name, frame in frames.items():
-            others = [other for each, other in frames.items() if each != name]
-            for sight in self.trackers[name].step(self.t, frame, view.robot_hand, others):
+        for name, frame, other in ((self.object_frame, view.object, hand), ("human_hand", hand, view.object)):
+            for sight in self.trackers[name].step(self.t, frame, view.robot_hand, (other,)):
                 if name not in self.blind:
                     self.sights[name] = sight
                     self.robot.virtual.set_frame(

@@ -132,7 +132,10 @@ class EmulatedHand:
         if elapsed <= 0.0:
             return
         self._now = now
-        if all(motor.mode == "stop" for motor in self.motors):
+        for motor in self.motors:
+            if motor.mode != "stop":
+                break
+        else:
             return
         steps = max(1, int(elapsed / STEP_S + 0.999))
         for _ in range(min(steps, 10000)):
