@@ -191,22 +191,26 @@ class CoglabState(smach.State):
         path = f"{self.path()}/{self.label}"
         # A wait inside a condition, e.g. for a sight, is published as part of the outer wait.
         within, self._waits = self._waits, True
+
+        def over() -> bool:
+            nonlocal left, before, told
+            self.check()
+            if condition():
+                return True
+            now = self.ctx.clock.now()
+            used = (now - before) * (min(1.0, max(0.1, pace())) if pace is not None else 1.0)
+            left -= used
+            self._deadline += now - before - used
+            before = now
+            if left <= 0.0:
+                raise TimeLimit(f"{what} within {max(0.0, allowed):.1f} s expected, it did not happen")
+            if not within and now + left > told + RETOLD:
+                told = now + left
+                self.ctx.journal.waits(path, Wait(what, told, code, aside=not self.essential))
+            return False
+
         try:
-            while True:
-                self.check()
-                if condition():
-                    return
-                now = self.ctx.clock.now()
-                used = (now - before) * (min(1.0, max(0.1, pace())) if pace is not None else 1.0)
-                left -= used
-                self._deadline += now - before - used
-                before = now
-                if left <= 0.0:
-                    raise TimeLimit(f"{what} within {max(0.0, allowed):.1f} s expected, it did not happen")
-                if not within and now + left > told + RETOLD:
-                    told = now + left
-                    self.ctx.journal.waits(path, Wait(what, told, code, aside=not self.essential))
-                self.ctx.clock.sleep(POLL_PERIOD)
+            self.ctx.clock.poll(over, POLL_PERIOD)
         finally:
             self._waits = within
             if told > -math.inf:
@@ -231,12 +235,18 @@ class CoglabState(smach.State):
     def pause(self, duration: float) -> None:
         """Wait for a duration (s); preemption or STOP ends it. At the state's own limit: TimeLimit, so that loops
         around it end too."""
-        end = self.ctx.clock.now() + duration
-        while self.ctx.clock.now() < end:
+        clock = self.ctx.clock
+        end = clock.now() + duration
+
+        def nearly_over() -> bool:
             self.check()
             if self.left() <= 0.0:
                 raise TimeLimit(f"{self.label} had to end within {self.time_limit():.1f} s, it did not")
-            self.ctx.clock.sleep(min(POLL_PERIOD, end - self.ctx.clock.now()))
+            return end - clock.now() <= POLL_PERIOD
+
+        if duration > 0.0:
+            clock.poll(nearly_over, POLL_PERIOD)
+            clock.sleep(max(0.0, end - clock.now()))
 
 
 class _Placed:
