@@ -3,6 +3,8 @@ bytes as on the network, in lockstep), hand emulator behind the real driver, vir
 
 from __future__ import annotations
 
+import gc
+import weakref
 from collections.abc import Callable, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any
@@ -44,6 +46,7 @@ BOARD = Pose(np.array([0.45, -0.55, 0.05]), about_z(-np.pi / 2))  # frame `board
 DT = 0.005  # s, FRI period
 TASK_LIMIT = 8.0  # s, time limit of a preshape or a grasp
 OLDEST = 1e9  # s, age of a frame that was never seen
+DROPPED = 6  # number of worlds that may wait for Python's collector
 
 
 def urdf_file() -> str:
@@ -242,6 +245,25 @@ class Hand(HandMemory):
         self.reason, self.message = verdict.reason, f"{job.task.name}: {verdict.text}"
 
 
+class _Dropped:
+    """Frees the worlds that nobody uses any more. Each holds several MB that Python does not see, so that its collector
+    of cycles would come too late."""
+
+    def __init__(self) -> None:
+        self._alive: weakref.WeakSet[Any] = weakref.WeakSet()
+        self._enough = DROPPED
+
+    def add(self, world: Any) -> None:
+        """Count a new world. If many have become alive, collect those that are only alive in cycles."""
+        if len(self._alive) >= self._enough:
+            gc.collect()
+            self._enough = len(self._alive) + DROPPED
+        self._alive.add(world)
+
+
+_DROPPED = _Dropped()
+
+
 class World:
     """The simulated cell: robot, hand, object, person and tracker. ``step()`` advances it.
 
@@ -277,6 +299,7 @@ class World:
 
         ObjectError: unknown object. RecordingError: unusable recording. ValueError: a value is out of range.
         """
+        _DROPPED.add(self)
         conditions = conditions or Conditions()
         self.seed, self.conditions = seed, conditions
         thing, _ = read_object(objects_folder() / f"{conditions.object_id}.yaml")
