@@ -46,7 +46,7 @@ BOARD = Pose(np.array([0.45, -0.55, 0.05]), about_z(-np.pi / 2))  # frame `board
 DT = 0.005  # s, FRI period
 TASK_LIMIT = 8.0  # s, time limit of a preshape or a grasp
 OLDEST = 1e9  # s, age of a frame that was never seen
-DROPPED = 6  # number of worlds that may wait for Python's collector
+DROPPED = 2  # number of worlds that may wait for Python's collector
 
 
 def urdf_file() -> str:
