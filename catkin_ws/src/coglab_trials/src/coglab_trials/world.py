@@ -174,11 +174,13 @@ class Hand(HandMemory):
         self.positions: tuple[int, ...] = ()
         self.readings: Sequence[Any] = ()
         self.dead = False
+        self._rested = False
         self._next_poll = 0.0
         self._calibrated_at = 0.0
 
     def begin(self, name: str, **fields: Any) -> Job:
         """Start a goal of one of the hand's actions. A running goal ends. Raises the error that refuses the goal."""
+        self._follow()
         if self.job is not None:
             self.end(self.job, "replaced by a new goal; fingers stopped", Reason.SUPERSEDED)
         task = self.task_for(name, SimpleNamespace(**fields), self.driver)
@@ -212,11 +214,19 @@ class Hand(HandMemory):
     def step(self, t: float) -> None:
         """Advance to time ``t`` (s): read the simulated motors, poll the driver, set the motor commands."""
         self.clock.now = max(self.clock.now, t)
-        self.emulator.follow([MotorState(*state) for state in self.cell.motor_states()])
+        rested, self._rested = self._rested, self.emulator.at_rest
+        # While all motors are off, only a poll looks at them, and no order changes.
+        if not (rested and self._rested) or t >= self._next_poll:
+            self._follow()
         self.emulator.advance()
         self.calibration_over(t)
         self._poll(t)
-        self.cell.set_motors(*map(list, zip(*self.emulator.orders(), strict=True)))
+        if not (rested and self._rested and self.emulator.at_rest):
+            self.cell.set_motors(*map(list, zip(*self.emulator.orders(), strict=True)))
+
+    def _follow(self) -> None:
+        """Read the simulated motors."""
+        self.emulator.follow([MotorState(*state) for state in self.cell.motor_states()])
 
     def _poll(self, t: float) -> None:
         if t < self._next_poll or self.dead or self.calibrating:
