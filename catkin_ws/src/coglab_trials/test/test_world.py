@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from coglab_objects.database import ObjectError
 from coglab_py.pose import Pose
-from coglab_sim.person.in_cell import pose_of_truth
+from coglab_sim.person.in_cell import pose_of_truth, seen_in
 from coglab_sim.person.scene import shipped
 from coglab_sim.tracker.tracker import PerceptionSettings
 from coglab_trials import Conditions, World
@@ -70,6 +70,17 @@ def test_a_library_that_is_missing_is_named_with_what_to_do(monkeypatch, module)
 
 
 # --- what is seen -----------------------------------------------------------------------------------------------------
+
+
+def test_what_people_and_trackers_see_is_the_truth():
+    world = World(4, CONSIDERATE)
+    world.human.command("give mug")
+    truth, (view, hand) = stepped(world, 1.5).truth, seen_in(world.cell)
+    for name, pose in (("robot_hand", view.robot_hand), ("object", view.object), ("human_hand", hand)):
+        assert pose.position == pytest.approx(truth[name]["position"], abs=1e-15)
+        assert pose.orientation == pytest.approx(truth[name]["rotation"], abs=1e-15)
+    assert view.hand_closure == truth["hand_closure"] and view.load.tolist() == list(truth["human_force"])
+    assert world.cell.touch_total.tolist() == pytest.approx(sum(world.cell.touch().values()))
 
 
 def test_the_tracker_sees_the_hand_where_it_is():
