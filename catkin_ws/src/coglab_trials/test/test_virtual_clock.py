@@ -135,45 +135,25 @@ def test_polls_keep_the_order_of_sleeps():
     assert run(lambda clock, over, step: clock.poll(over, step)) == run(by_sleeping)
 
 
-def test_what_is_polled_may_wait_and_raises_where_it_is_waited_for():
+def test_what_is_polled_raises_where_it_is_waited_for():
     with using(VirtualClock()) as clock:
-        event, seen = clock.event(), []
+        seen = []
 
-        def told_after_a_wait():
-            if clock.now() < 2.0:
-                return False
-            seen.append(event.wait(10.0))  # in its own thread: the others go on meanwhile
-            return True
-
-        def broken():
-            return clock.now() >= 1.0 and 1 / 0 > 0
-
-        def watch():
-            with pytest.raises(ZeroDivisionError):
-                clock.poll(broken, 0.25)
+        def watch(over, error):
+            with pytest.raises(error):
+                clock.poll(over, 0.25)
             seen.append(clock.now())
 
-        clock.start_thread(lambda: clock.poll(told_after_a_wait, 0.5), "told")
-        watcher = clock.start_thread(watch, "watch")
+        def waits():
+            return clock.now() >= 2.0 and clock.event().wait()
+
+        threads = [
+            clock.start_thread(lambda: watch(lambda: clock.now() >= 1.0 and 1 / 0 > 0, ZeroDivisionError), "broken"),
+            clock.start_thread(lambda: watch(waits, RuntimeError), "waits itself"),
+        ]
         clock.sleep(5.0)
-        event.set()
-        clock.sleep(0.0)
-        assert seen == [1.0, True] and clock.now() == 5.0
-        watcher.join(5)
-
-
-def test_a_deadlock_of_what_polls_is_named_too():
-    clock = VirtualClock(stall_limit=0.2)
-
-    def wait_for_ever():
-        with pytest.raises(ClockStalled):
-            clock.poll(lambda: clock.now() > 3.0 and clock.event().wait(), 0.5)
-
-    with clock.attached():
-        thread = clock.start_thread(wait_for_ever, "forever")
-        with pytest.raises(ClockStalled, match="forever"):
-            clock.event().wait()
-    thread.join(5)
+        assert seen == [1.0, 2.0] and clock.now() == 5.0
+        [thread.join(5) for thread in threads]
 
 
 def test_an_outside_thread_can_set_an_event():

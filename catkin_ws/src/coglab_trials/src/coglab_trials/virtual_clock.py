@@ -5,7 +5,7 @@ ready, the time jumps to the nearest deadline. Therefore, every run is the same.
 sleep on the clock, but the operating system decides when they do so.
 
 To hand a turn to another thread costs much more than most turns do. So what is polled (`poll`) is called by the thread
-that waits next, in the same order; the polling thread gets its turn when it has something to do.
+that waits next, in the same order; the polling thread gets its turn when that has come true.
 
 `using` runs a machine under such a clock. It requires only that `smach.concurrence` takes its threads, events and
 conditions from `threading`. Our engine and those of the ROS distributions do so.
@@ -33,12 +33,8 @@ class ClockStalled(RuntimeError):
     """
 
 
-class _MustWait(BaseException):
-    """What is polled in the turn of another thread wants to wait. No error: it is called again in its own thread."""
-
-
 class _Poll:
-    """What a waiting thread polls, and its result: `over`, or an `error`. Neither: it must run in its own thread."""
+    """What a waiting thread polls, and its result: `over`, or an `error`. Neither: it is time to call it again."""
 
     __slots__ = ("call", "error", "over", "period")
 
@@ -207,11 +203,10 @@ class VirtualClock(Clock):
         """Call `over` at once, and then every `period` s of virtual time until it returns True. Its exceptions are
         raised here.
 
-        Between the first call and the last, other threads call it, each in its own turn. If it waits there, it is
-        called again in this thread at the same time."""
+        After the first time other threads call it, while they begin to wait. It must not wait itself: RuntimeError."""
         while not over():
             if self._holder is not threading.current_thread():
-                self.sleep(period)  # a thread that does not belong to the clock, or one that is polled itself
+                self.sleep(period)  # this thread does not belong to the clock
                 continue
             poll = _Poll(over, period)
             self._park(None, max(0.0, period), poll)
@@ -289,11 +284,10 @@ class VirtualClock(Clock):
                 self._dispatch()
 
     def _park(self, event: VirtualEvent | None, timeout: float | None, poll: _Poll | None = None) -> bool:
-        """Wait for the event or the time; with `poll`, until that has something to do. Returns True if the event
-        came."""
+        """Wait for the event or the time; with `poll`, until that has a result. Returns True if the event came."""
         me = threading.current_thread()
         if self._poller is me:
-            raise _MustWait
+            raise RuntimeError("what is polled on a virtual clock waits itself; wait for it in a loop with sleep()")
         parked = _Parked(me, poll)
         with self._lock:
             if event is not None:
@@ -352,8 +346,6 @@ class VirtualClock(Clock):
         try:
             poll.over = poll.call()
             again = not poll.over
-        except _MustWait:
-            pass
         except Exception as error:
             poll.error = error
         except BaseException:  # Ctrl-C in this thread, which is not meant for the other one

@@ -23,7 +23,7 @@ class Clock(ABC):
     def poll(self, over: Callable[[], bool], period: float) -> None:
         """Call ``over`` at once, and then every ``period`` s until it returns True. Its exceptions are raised here.
 
-        A virtual clock may call it in another thread, and twice at one time if it waits itself."""
+        ``over`` only looks: it does not wait. A virtual clock calls it in other threads."""
         while not over():
             self.sleep(period)
 

@@ -179,12 +179,15 @@ class CoglabState(smach.State):
         limit: float | None = None,
         pace: Callable[[], float] | None = None,
         code: int = wait_reasons.ANSWER,
+        looks: bool = False,
     ) -> None:
         """Wait until ``condition()``. After ``limit`` s or at the state's own limit: TimeLimit that names ``what``.
         ``code``: the code of ``wait_reasons``, for programs.
 
         ``pace`` (0..1, e.g. the speed scale): the limit counts the time of a slowed motion. The used time is multiplied
         by the pace (at least 0.1), and the state's own limit is extended accordingly.
+
+        ``looks``: the condition only looks; it does not wait for anything itself. That saves time in simulated trials.
         """
         allowed = self.left() if limit is None else min(limit, self.left())
         left, before, told = allowed, self.ctx.clock.now(), -math.inf
@@ -210,7 +213,11 @@ class CoglabState(smach.State):
             return False
 
         try:
-            self.ctx.clock.poll(over, POLL_PERIOD)
+            if looks:
+                self.ctx.clock.poll(over, POLL_PERIOD)
+                return
+            while not over():
+                self.ctx.clock.sleep(POLL_PERIOD)
         finally:
             self._waits = within
             if told > -math.inf:
@@ -226,7 +233,7 @@ class CoglabState(smach.State):
     ) -> Any:
         """Wait for the pending call and return its value. Cancel the call if the wait ends otherwise."""
         try:
-            self.wait_for(pending.done, what, limit, pace, code)
+            self.wait_for(pending.done, what, limit, pace, code, looks=True)
         except (Interrupted, TimeLimit):
             pending.cancel()
             raise
