@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from coglab_perception._reach_bank import transition
 from coglab_perception.belief import Belief, BeliefFilter, BeliefSettings
-from coglab_perception.minimum_jerk import transition
 from coglab_perception.reach_bank import ReachBank, ReachSettings
 from coglab_perception.recogniser import PatternEnd
 from other_motions import KINDS, other_motion
@@ -89,7 +89,7 @@ def carried(hand: Path3) -> Path3:
 def test_the_feedback_form_is_minimum_jerk():
     state, t = np.array([0.0, 0.0, 0.0, 0.5]), 0.0
     for step in np.random.default_rng(1).uniform(0.005, 0.06, 80):
-        state = transition(np.array(1.2 - t), np.array(step)) @ state
+        state[:3] = transition(1.2 - t, step) @ state
         t += step
         assert state[0] == pytest.approx(0.5 * share(t / 1.2), abs=1e-9)
     assert state == pytest.approx([0.5, 0.0, 0.0, 0.5])
@@ -282,7 +282,7 @@ def test_the_work_per_sight_is_bounded():
     bank = ReachBank(0.0, START, ReachSettings())
     for k in range(1, 150):
         bank.step(k / 30, START + rng.normal(0.0, 0.02, 3))
-        assert len(bank._log_weight) <= bank.settings.hypotheses and np.isfinite(bank._mean).all()
+        assert len(bank) <= ReachSettings().hypotheses and np.isfinite(bank.position()).all()
     assert 0.0 <= bank.handover <= 1.0
 
 

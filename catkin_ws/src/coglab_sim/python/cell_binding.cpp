@@ -22,6 +22,12 @@ PYBIND11_MODULE(_cell, m) {
            "the next measurement, 916 bytes, or None if nothing is sent.")
       .def("truth", &PyCell::truth,
            "What really happens in the cell; nothing in control may read it.")
+      .def(
+          "view", &PyCell::view,
+          "The part of truth() that people and trackers see and feel: (position and rotation of "
+          "the "
+          "robot's hand, closure of its fingers, position and rotation of the object, force on the "
+          "person's hand, position and rotation of the person's hand).")
       .def_property_readonly("period", [](const PyCell& c) { return c.cell().period(); })
       .def_property_readonly("time", [](const PyCell& c) { return c.cell().controller().time(); })
       .def_property_readonly("set_point",
@@ -97,6 +103,17 @@ PYBIND11_MODULE(_cell, m) {
           "motors", [](const PyCell& c) { return motorList(c.cell().plant()); },
           "Of each motor: position (share of the stroke), current (counts), effort (counts that "
           "the tension stands for), tension (N), moving, locked.")
+      .def(
+          "motor_states", [](const PyCell& c) { return motorTuples(c.cell().plant()); },
+          "The same as tuples (position, current, effort, moving, locked), for callers in a hurry.")
+      .def_property_readonly(
+          "touch_total",
+          [](const PyCell& c) {
+            Vector3d total = Vector3d::Zero();
+            for (const Vector3d& force : c.cell().touch().phalanges) total += force;
+            return Vector3d(total + c.cell().touch().palm);
+          },
+          "N (3,), sum of the forces of touch().")
       .def(
           "touch", [](const PyCell& c) { return touchDict(c.cell().plant(), c.cell().touch()); },
           "Forces on phalanges and palm, N, axes of ih2_palm.")

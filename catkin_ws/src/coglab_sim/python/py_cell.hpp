@@ -50,6 +50,17 @@ inline py::list motorList(const plant::Plant& plant) {
   return list;
 }
 
+/// The same states without names: (position, current, effort, moving, locked) of each motor.
+inline py::list motorTuples(const plant::Plant& plant) {
+  py::list list;
+  for (int i = 0; i < plant::kMotors; ++i) {
+    const plant::MotorState& state = plant.motors().state(i);
+    list.append(
+        py::make_tuple(state.position, state.current, state.effort, state.moving, state.locked));
+  }
+  return list;
+}
+
 /// Contact forces by the names of phalanges and palm.
 inline py::dict touchDict(const plant::Plant& plant, const plant::Touch& touch) {
   const auto& phalanges = plant.config().hand.phalanges;
@@ -105,6 +116,15 @@ class PyCell {
     result["set_point"] = t.set_point;
     result["external_torque"] = t.external_torque;
     return result;
+  }
+
+  /// What people and trackers see and feel of the truth, without a dictionary.
+  py::tuple view() const {
+    const CellTruth t = cell_.truth();
+    const auto rotation = [](const Pose& pose) { return Eigen::Vector4d(pose.rotation.coeffs()); };
+    return py::make_tuple(t.robot_hand.position, rotation(t.robot_hand), t.hand_closure,
+                          t.object.position, rotation(t.object), t.human_force,
+                          t.human_hand.position, rotation(t.human_hand));
   }
 
   Cell& cell() { return cell_; }

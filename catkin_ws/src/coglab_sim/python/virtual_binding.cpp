@@ -90,6 +90,17 @@ py::dict reportOf(Robot& robot) {
   return result;
 }
 
+py::dict limitsOf(Robot& robot) {
+  const LimitWatch& limits = robot.limits();
+  py::dict result;
+  result["commanded"] = limits.outside().commanded;
+  result["measured"] = limits.outside().measured;
+  result["over_command"] = limits.outside().over_command;
+  result["peak_share"] = limits.peakShare();
+  result["measured_share"] = limits.measuredShare();
+  return result;
+}
+
 py::dict feedbackOf(Robot& robot) {
   py::list controllers;
   for (const ctrl_more::ControllerStatus& status : robot.manager().feedback().statusAll()) {
@@ -157,6 +168,14 @@ PYBIND11_MODULE(_virtual, m) {
       .def_property("frozen", &Robot::frozen, &Robot::setFrozen,
                     "Whether the process of bridge and manager stands still; the cell goes on.")
       .def("report", &reportOf, "The control cycle's newest report.")
+      .def_property_readonly(
+          "connected", [](const Robot& robot) { return robot.report().robot.cycle_time > 0.0; },
+          "Whether the arm's interface has an FRI session: the report then has an fri_period > 0.")
+      .def(
+          "limits", &limitsOf,
+          "Numbers of ticks outside a limit: {commanded, measured, over_command (true joints above "
+          "the lower limit of commands)}, and the largest speeds so far as share of their limits: "
+          "{peak_share (commands), measured_share (true joints)}.")
 
       .def(
           "submit",
@@ -327,6 +346,14 @@ PYBIND11_MODULE(_virtual, m) {
           },
           py::arg("frame"), py::arg("position"), py::arg("rotation") = Eigen::Vector4d(0, 0, 0, 1),
           py::arg("age") = 0.0, "Where perception sees a frame in the world, captured `age` s ago.")
+      .def(
+          "set_fixed_frame",
+          [](Robot& robot, const std::string& frame, const Vector3d& position,
+             const Eigen::Vector4d& rotation) {
+            robot.frames().setFixed(frame, makePose(position, rotation));
+          },
+          py::arg("frame"), py::arg("position"), py::arg("rotation") = Eigen::Vector4d(0, 0, 0, 1),
+          "A frame that does not move: in each tick it counts as captured at that moment.")
       .def("forget_frame",
            [](Robot& robot, const std::string& frame) { robot.frames().forget(frame); });
 }

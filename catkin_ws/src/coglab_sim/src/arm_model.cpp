@@ -96,18 +96,26 @@ ArmModel::ArmModel(const std::string& urdf, const ModelErrors& errors, const std
       jacobian_(kJoints) {}
 
 void ArmModel::evaluate(const Vector7& position, const Vector7& velocity, ArmTerms& terms) {
+  evaluateDynamics(position, velocity, terms);
+  evaluateKinematics(position, terms);
+}
+
+void ArmModel::evaluateDynamics(const Vector7& position, const Vector7& velocity, ArmTerms& terms) {
   q_.data = position;
   dq_.data = velocity;
   dynamics_.JntToMass(q_, mass_);
   dynamics_.JntToCoriolis(q_, dq_, coriolis_);
   dynamics_.JntToGravity(q_, gravity_);
-  jacobian_solver_.JntToJac(q_, jacobian_);
-  KDL::Frame tip;
-  forward_.JntToCart(q_, tip);
-
   terms.mass = mass_.data;
   terms.coriolis = coriolis_.data;
   terms.gravity = gravity_.data;
+}
+
+void ArmModel::evaluateKinematics(const Vector7& position, ArmTerms& terms) {
+  q_.data = position;
+  jacobian_solver_.JntToJac(q_, jacobian_);
+  KDL::Frame tip;
+  forward_.JntToCart(q_, tip);
   terms.jacobian = jacobian_.data;
   terms.tip.position = Vector3d(tip.p.x(), tip.p.y(), tip.p.z());
   Matrix3d rotation;

@@ -39,6 +39,15 @@ void WorldFrames::set(const std::string& frame, const Pose& in_world, std::int64
   frames_[frame] = {in_world, stamp_ns};
 }
 
+void WorldFrames::setFixed(const std::string& frame, const Pose& in_world) {
+  frames_[frame] = {in_world, 0, true};
+}
+
+void WorldFrames::refresh(std::int64_t now_ns) {
+  for (auto& [name, seen] : frames_)
+    if (seen.fixed) seen.stamp_ns = now_ns;
+}
+
 bool WorldFrames::find(const std::string& frame, Seen& seen) const {
   if (frame == "world" || frame == "lwr_base_link") {
     seen = Seen{};
@@ -66,7 +75,7 @@ bool WorldFrames::lookup(const std::string& reference, const std::string& frame,
 }
 
 LockstepRobot::LockstepRobot(const LockstepRobotConfig& config)
-    : cell_(config.cell), bridge_(bridgeConfig(config)) {
+    : cell_(config.cell), bridge_(bridgeConfig(config)), limits_(config.limits_file) {
   auto settings = coglab_controllers::readManagerSettings(YAML::Load(config.manager_parameters),
                                                           textOf(config.cell.urdf),
                                                           bridge_.config().limits, true);
@@ -76,6 +85,7 @@ LockstepRobot::LockstepRobot(const LockstepRobotConfig& config)
   settings.types.erase("coglab/PtpController");
   settings.logger = &logger_;
   manager_ = std::make_unique<coglab_controllers::ControllerManager>(std::move(settings));
+  report_ = manager_->report();
 }
 
 LockstepRobot::~LockstepRobot() {
@@ -106,11 +116,20 @@ coglab_controllers::PtpController& LockstepRobot::ptp(const std::string& id) {
 
 void LockstepRobot::tick() {
   std::array<std::uint8_t, lwr_fri_bridge::fri::kCommandSize> bytes{};
+  frames_.refresh(now_ns_);
   const bool answered = !frozen_ && answer(bytes);
   if (!frozen_) controlCycle(answered);
+  const double period = cell_.period();
   cell_.step(answered ? bytes.data() : nullptr, bytes.size());
   measured_ = cell_.sent();
   now_ns_ += static_cast<std::int64_t>(std::llround(1e9 * cell_.period()));
+  limits_.lookAtArm(cell_.plant().position(), cell_.fastest());
+  report_ = manager_->report();
+  const auto& robot = report_.robot;
+  if (robot.cycle_time > 0.0) {
+    limits_.lookAtCommand(robot.commanded_position, robot.block == coglab_rt::MotionBlock::None,
+                          period);
+  }
 }
 
 bool LockstepRobot::answer(std::array<std::uint8_t, lwr_fri_bridge::fri::kCommandSize>& bytes) {

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from coglab_msgs.msg import Say
+from coglab_py.rotation import Rotation
 from person_phase import DT, WEIGHT, Acting, carried, percept
-from scipy.spatial.transform import Rotation
 
 PALM = (0.0, 0.0, 0.0)
 """its outward axis is x, its fingers point along z"""

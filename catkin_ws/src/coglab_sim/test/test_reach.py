@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from coglab_py.rotation import Rotation
 from coglab_sim.person.reach import CorrectedReach, Reach, Turn, min_jerk
-from scipy.spatial.transform import Rotation
 
 
 def test_min_jerk_closed_form():

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from coglab_py.pose import Pose
-from coglab_sim.person.in_cell import view_of
 from coglab_sim.person.participant import Participant
 from coglab_sim.person.scene import WorldView
 from coglab_sim.person.senses import Senses
@@ -48,12 +47,6 @@ def test_the_bend_of_the_fingers_is_seen_as_inexactly_as_their_tips():
         seen = perceive(person, lambda t: WorldView(hand_closure=t), 1.0, seed)[50:]
         speeds.append(np.mean([p.closing_speed for _, p in seen]))
     assert np.std(speeds) == pytest.approx(0.1, rel=0.35)
-
-
-def test_the_view_takes_the_fingers_from_the_plant():
-    frame = {"position": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0, 1.0]}
-    truth = {"robot_hand": frame, "object": frame, "human_force": [0.0, 0.0, 0.0]}
-    assert view_of({**truth, "hand_closure": 0.25}).hand_closure == 0.25
 
 
 STEP = 1 / 64

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode, Say
 from coglab_py.packages import package_path
-from coglab_sim.person.in_cell import move_person, view_of
+from coglab_sim.person.in_cell import move_person, seen_in
 from coglab_sim.person.participant import Participant
 from coglab_sim.person.scene import Scene
 from coglab_sim.person.virtual_human import VirtualHuman
@@ -30,11 +30,10 @@ class Trial:
 
     def tick(self):
         cell = self.robot.cell
-        truth = cell.truth()
-        obj = truth["object"]
-        move_person(cell, self.human.step(self.robot.now, view_of(truth)))
+        view, _ = seen_in(cell)
+        move_person(cell, self.human.step(self.robot.now, view))
         cell.set_motors([1.0] * 5, self.wanted, [self.current] * 5)
-        self.robot.set_frame("object_mug", obj["position"], obj["rotation"])
+        self.robot.set_frame("object_mug", view.object.position, view.object.orientation)
         self.robot.tick()
         self.peak = max(self.peak, float(np.abs(cell.velocity).max()))
         return self.robot.report()

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from coglab_objects.database import ObjectError
 from coglab_py.pose import Pose
-from coglab_sim.person.in_cell import pose_of_truth
+from coglab_sim.person.in_cell import pose_of_truth, seen_in
 from coglab_sim.person.scene import shipped
 from coglab_sim.tracker.tracker import PerceptionSettings
 from coglab_trials import Conditions, World
@@ -70,6 +70,17 @@ def test_a_library_that_is_missing_is_named_with_what_to_do(monkeypatch, module)
 
 
 # --- what is seen -----------------------------------------------------------------------------------------------------
+
+
+def test_what_people_and_trackers_see_is_the_truth():
+    world = World(4, CONSIDERATE)
+    world.human.command("give mug")
+    truth, (view, hand) = stepped(world, 1.5).truth, seen_in(world.cell)
+    for name, pose in (("robot_hand", view.robot_hand), ("object", view.object), ("human_hand", hand)):
+        assert pose.position == pytest.approx(truth[name]["position"], abs=1e-15)
+        assert pose.orientation == pytest.approx(truth[name]["rotation"], abs=1e-15)
+    assert view.hand_closure == truth["hand_closure"] and view.load.tolist() == list(truth["human_force"])
+    assert world.cell.touch_total.tolist() == pytest.approx(sum(world.cell.touch().values()))
 
 
 def test_the_tracker_sees_the_hand_where_it_is():
@@ -188,81 +199,3 @@ def test_a_new_goal_ends_the_one_that_runs():
     world.hand.end(second, "enough", Reason.CANCELLED)
     before = world.cell.truth()["hand_closure"]
     assert stepped(world, 0.3).cell.truth()["hand_closure"] == pytest.approx(before, abs=0.05), "the fingers stop"
-
-
-# --- limits -----------------------------------------------------------------------------------------------------------
-
-
-class Arm:
-    """In the place of LockstepRobot: it goes as it is told here, whatever was commanded."""
-
-    def __init__(self):
-        self.cell, self.frozen = self, False
-        self.position, self.fastest, self.commanded = np.zeros(7), np.zeros(7), np.zeros(7)
-        self.connected = self.allowed = True
-
-    def tick(self):
-        pass
-
-    def report(self):
-        return {
-            "fri_period": DT if self.connected else 0.0,
-            "commanded_position": self.commanded,
-            "motion_allowed": self.allowed,
-        }
-
-
-@pytest.fixture
-def robot():
-    robot = Robot(1)
-    robot.virtual = robot.cell = Arm()
-    robot.step()
-    robot.outside = dict.fromkeys(robot.outside, 0)
-    return robot
-
-
-def test_a_joint_that_moves_too_fast_is_counted_whatever_was_commanded(robot):
-    arm = robot.virtual
-    # rad/s, as published: the KRC's file rsidef7.dat, the same in the robot description.
-    limit = np.radians([110.0, 110.0, 112.5, 112.5, 130.0, 112.5, 112.5])
-    for joint in range(7):
-        arm.fastest = np.eye(7)[joint] * limit * 0.9999
-        robot.step()
-        assert robot.outside == {"commanded": 0, "measured": joint, "over_command": 2 * joint + 1}
-        arm.fastest = np.eye(7)[joint] * limit * 1.0001
-        robot.step()
-        assert robot.outside == {"commanded": 0, "measured": joint + 1, "over_command": 2 * joint + 2}
-    assert robot.limit_violations == 7 and robot.measured_share > 1.0 and robot.peak_share == 0.0
-    arm.fastest = np.zeros(7)
-    arm.position = np.array(robot.limits.upper_position) + np.eye(7)[3] * 1e-6
-    robot.step()
-    assert robot.outside["measured"] == 8, "beyond its range"
-
-
-def test_what_is_commanded_too_fast_or_too_far_is_counted_though_the_arm_stands(robot):
-    arm = robot.virtual
-
-    def command(joint, speed):
-        arm.commanded = arm.commanded + np.eye(7)[joint] * speed * DT
-        robot.step()
-        return robot.outside["commanded"]
-
-    for joint in range(7):
-        limit = robot.limits.velocity[joint]
-        assert command(joint, -limit - 4e-4) == joint, "rounding to float32 adds so much"
-        assert command(joint, limit + 6e-4) == joint + 1
-    arm.allowed = False
-    assert command(3, 50.0) == 7
-    arm.allowed = True
-    assert command(3, 50.0) == 7, "nothing to compare with after a stop"
-    assert command(3, 50.0) == 8
-    for end, beyond in ((robot.limits.upper_position, 1e-9), (robot.limits.lower_position, -1e-9)):
-        for joint in range(7):
-            counted = robot.outside["commanded"]
-            arm.allowed = False
-            arm.commanded = np.array(end)
-            assert command(joint, 0.0) == counted
-            arm.commanded = np.array(end) + beyond * np.eye(7)[joint]
-            assert command(joint, 0.0) == counted + 1
-    arm.connected = False
-    assert command(0, 0.0) == counted + 1, "nobody is connected"

@@ -231,16 +231,14 @@ class BeliefFilter:
     def _hand_seen_at(self, stamp: float) -> tuple[np.ndarray, np.ndarray] | None:
         """Position (m) and velocity (m/s) of the hand at a stamp between two of its observations. None if the two are
         far apart and neither is close to the stamp: the motion in between is unknown."""
-        times = [t for t, _ in self._track]
-        after = bisect_left(times, stamp)
-        near = [i for i in (after - 1, after) if 0 <= i < len(times)]
-        nearest = min(near, key=lambda i: abs(times[i] - stamp))
-        if times[near[-1]] - times[near[0]] <= EXTRAPOLATED:
+        after = bisect_left(self._track, stamp, key=_stamp_of)
+        near = [self._track[i] for i in (after - 1, after) if 0 <= i < len(self._track)]
+        if near[-1][0] - near[0][0] <= EXTRAPOLATED:
             return self._hand_at(stamp)
-        if abs(times[nearest] - stamp) > BESIDE:
+        nearest, state = min(near, key=lambda seen: abs(seen[0] - stamp))
+        if abs(nearest - stamp) > BESIDE:
             return None
-        state = self._track[nearest][1]
-        return state[:3] + (stamp - times[nearest]) * state[3:], state[3:]
+        return state[:3] + (stamp - nearest) * state[3:], state[3:]
 
     def see_hand(
         self, stamp: float, position: np.ndarray, now: float, robot_holds: bool = False, end: PatternEnd | None = None
@@ -307,9 +305,12 @@ class BeliefFilter:
         newest, state = self._track[-1]
         if stamp >= newest:
             return state[:3] + min(stamp - newest, EXTRAPOLATED) * state[3:], state[3:]
-        times = np.array([t for t, _ in self._track])
-        states = np.array([p for _, p in self._track])
-        then = np.array([np.interp(stamp, times, states[:, i]) for i in range(6)])
+        after = bisect_left(self._track, stamp, key=_stamp_of)
+        if after == 0:
+            then = self._track[0][1]
+        else:
+            (begin, before), (end, behind) = self._track[after - 1], self._track[after]
+            then = before + (stamp - begin) / (end - begin) * (behind - before)
         return then[:3], then[3:]
 
     # -- judgement -------------------------------------------------------------------------------------------------
@@ -358,7 +359,7 @@ class BeliefFilter:
         if onset > self._onset + s.same_reach:
             self._place.forget()
         self._onset = onset
-        spread = math.sqrt(float(np.max(np.diag(covariance)))) / s.unsure
+        spread = math.sqrt(max(covariance[i, i] for i in range(3))) / s.unsure
         time = s.request_time if self._robot_holds else s.place_time * min(1.0, max(s.least_share, spread))
         return self._place.step(stamp, place, time)
 
@@ -382,7 +383,11 @@ class BeliefFilter:
         return covariance @ (precision @ prediction.end + of_pattern * end.place), covariance, name
 
 
+def _stamp_of(seen: tuple[float, np.ndarray]) -> float:
+    return seen[0]
+
+
 def _usable(stamp: float, position: np.ndarray, now: float) -> bool:
     """True if an observation is finite, within a room, and not from the future."""
-    fits = position.shape == (3,) and bool(np.all(np.abs(position) < ROOM))
+    fits = position.shape == (3,) and all(abs(value) < ROOM for value in position.tolist())
     return math.isfinite(stamp) and stamp <= now + AHEAD and fits

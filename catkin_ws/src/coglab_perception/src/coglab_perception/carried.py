@@ -7,13 +7,14 @@ the first two look the same, and their probabilities do not change. The first mo
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from coglab_py.pose import length
 
 CARRIED, LYING, FREE = range(3)
-RATES = np.array([[0.0, 0.02, 0.1], [0.3, 0.0, 0.1], [0.3, 2.0, 0.0]])
+RATES = ((0.0, 0.02, 0.1), (0.3, 0.0, 0.1), (0.3, 2.0, 0.0))
 """1/s, rates from mode (row) to mode. People pick up more readily than they let go; a falling object soon rests"""
 JITTER = 0.003  # m per axis, apparent displacement of a resting hand between two observations
 
@@ -56,12 +57,12 @@ class CarriedObject:
         self._noise, self._noise_time = noise
         self._position, self._hand, self._velocity = position, hand, np.zeros(3)
         near = self._near()
-        self._modes = np.array([0.6, 0.35, 0.05] if near else [0.0, 0.7, 0.3])
+        self._modes = [0.6, 0.35, 0.05] if near else [0.0, 0.7, 0.3]
 
     @property
     def carried(self) -> float:
         """Probability, 0..1."""
-        return float(self._modes[CARRIED])
+        return self._modes[CARRIED]
 
     def step(
         self, stamp: float, position: np.ndarray, hand: np.ndarray, velocity: np.ndarray, hand_error: float
@@ -72,27 +73,29 @@ class CarriedObject:
         gap = stamp - self.stamp
         if gap <= 0.0:
             return
-        way, believed = position - self._position, 0.5 * gap * (self._velocity + velocity)
+        # Three numbers at a time: plain floats are several times faster than arrays.
+        way = (position - self._position).tolist()
+        believed = (0.5 * gap * (self._velocity + velocity)).tolist()
         # James-Stein shrinkage by the expected displacement: one that may be mere jitter counts as zero. Otherwise
         # `lying` would become more likely at rest.
-        moved = max(0.0, 1.0 - 3.0 * JITTER**2 / max(1e-12, float(believed @ believed)))
-        hand_way = moved * (hand - self._hand)
+        moved = max(0.0, 1.0 - 3.0 * JITTER**2 / max(1e-12, _square(believed)))
+        hand_way = (moved * (hand - self._hand)).tolist()
         error = 2.0 * self._noise**2 * (1.0 - math.exp(-gap / self._noise_time)) + JITTER**2
         if gap < s.lost_time and not self._possible(way, hand_way, gap, 4.0 * math.sqrt(error) + 2.0 * hand_error):
             return
-        variances = np.array(
-            [
-                error + moved * hand_error**2 + s.turning**2 * float(hand_way @ hand_way) / 3.0,
-                error,
-                error + (s.free_speed * gap) ** 2,
-            ]
+        variances = (
+            error + moved * hand_error**2 + s.turning**2 * _square(hand_way) / 3.0,
+            error,
+            error + (s.free_speed * gap) ** 2,
         )
-        misses = np.array([way - hand_way, way, way])
-        log = -0.5 * ((misses**2).sum(axis=1) / variances + 3.0 * np.log(variances))
+        still = _square(way)
+        misses = (_square([a - b for a, b in zip(way, hand_way, strict=True)]), still, still)
+        log = [-0.5 * (miss / v + 3.0 * math.log(v)) for miss, v in zip(misses, variances, strict=True)]
         self.stamp, self._position, self._hand, self._velocity = stamp, position, hand, velocity
-        changed = 1.0 - np.exp(-RATES * gap)
-        likely = self._modes @ (changed + np.diag(1.0 - changed.sum(axis=1)))
-        likely = np.maximum(likely, 1e-6) * np.exp(log - log.max())
+        top = max(log)
+        likely = [
+            max(share, 1e-6) * math.exp(one - top) for share, one in zip(_later(self._modes, gap), log, strict=True)
+        ]
         if self._near():
             # The less certain the position of the hand, the less the observation changes the offset.
             known = self._noise**2 / (self._noise**2 + hand_error**2)
@@ -101,24 +104,43 @@ class CarriedObject:
         else:
             likely[CARRIED] = 0.0
             self.offset = position - hand
-        self._modes = likely / likely.sum()
+        total = sum(likely)
+        self._modes = [share / total for share in likely]
 
-    def _possible(self, way: np.ndarray, hand_way: np.ndarray, gap: float, error: float) -> bool:
+    def _possible(self, way: Sequence[float], hand_way: Sequence[float], gap: float, error: float) -> bool:
         """True if an object can have moved by ``way`` (m) in ``gap`` (s), within ``error`` (m). Free: anywhere.
 
         Another object lies, moves with the hand, or has just left it and falls. Any other motion is a different object.
         """
-        if length(way) > self.settings.fastest * gap + error:
+        if math.sqrt(_square(way)) > self.settings.fastest * gap + error:
             return False
         if self._modes[FREE] > 0.5:
             return True
-        error += self.settings.turning * length(hand_way)
-        for start in (np.zeros(3), hand_way):
-            off = way - start
-            off[2] -= min(0.0, max(-self.settings.fastest * gap, off[2]))
-            if length(off) <= error:
+        error += self.settings.turning * math.sqrt(_square(hand_way))
+        for start in ((0.0, 0.0, 0.0), hand_way):
+            x, y, z = (a - b for a, b in zip(way, start, strict=True))
+            z -= min(0.0, max(-self.settings.fastest * gap, z))
+            if math.sqrt(_square((x, y, z))) <= error:
                 return True
         return False
 
     def _near(self) -> bool:
         return length(self._position - self._hand) < self.settings.reach
+
+
+def _square(vector: Sequence[float]) -> float:
+    """Squared length of three numbers."""
+    x, y, z = vector
+    return x * x + y * y + z * z
+
+
+def _later(modes: Sequence[float], gap: float) -> list[float]:
+    """Probabilities of the modes ``gap`` s later, before the observation."""
+    later = list(modes)
+    for mode in (CARRIED, LYING, FREE):
+        for other in (CARRIED, LYING, FREE):
+            if other != mode:
+                changed = modes[mode] * (1.0 - math.exp(-RATES[mode][other] * gap))
+                later[mode] -= changed
+                later[other] += changed
+    return later

@@ -1,4 +1,4 @@
-"""Poses of rigid frames: a position (m) and a unit quaternion (x y z w), rotated by scipy's Rotation."""
+"""Poses of rigid frames: a position (m) and a unit quaternion (x y z w)."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+import scipy.spatial.transform
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
+
+from coglab_py.rotation import Rotation
 
 IDENTITY = (0.0, 0.0, 0.0, 1.0)  # quaternion without rotation
 
@@ -31,8 +33,7 @@ def rotation(quaternion: ArrayLike) -> Rotation:
 
 def about_z(angle: float) -> np.ndarray:
     """Quaternion of a rotation about the vertical axis by `angle` (rad)."""
-    turned: np.ndarray = Rotation.from_rotvec([0.0, 0.0, angle]).as_quat()
-    return turned
+    return Rotation.from_rotvec([0.0, 0.0, angle]).as_quat()
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,8 @@ class Pose:
 
     @property
     def rotation(self) -> Rotation:
-        """The orientation as scipy's Rotation."""
+        """The orientation as a Rotation of this package; ``scipy.spatial.transform.Rotation.from_quat(orientation)`` is
+        the same for scipy."""
         return Rotation.from_quat(self.orientation)
 
     def __mul__(self, other: Pose) -> Pose:
@@ -64,13 +66,12 @@ class Pose:
 
     def axis(self, i: int) -> np.ndarray:
         """Unit vector of axis i (0 x, 1 y, 2 z) in the parent frame."""
-        unit: np.ndarray = self.rotation.apply(np.eye(3)[i])
-        return unit
+        return self.rotation.as_matrix()[:, i]
 
     def distance(self, other: Pose) -> tuple[float, float]:
         """Distance (m) and angle (rad) between this pose and another one in the same parent."""
         angle = (self.rotation.inv() * other.rotation).magnitude()
-        return length(self.position - other.position), float(angle)
+        return length(self.position - other.position), angle
 
     def to_dict(self) -> dict[str, list[float]]:
         """The pose as plain lists, for user data and files."""
@@ -88,12 +89,12 @@ class Pose:
         rpy = np.asarray(data.get("rpy_deg", [0.0, 0.0, 0.0]), dtype=float)
         if rpy.shape != (3,) or not np.all(np.isfinite(rpy)):
             raise ValueError(f"rpy_deg has three finite numbers in degrees, got {data.get('rpy_deg')}")
-        return Pose(xyz, Rotation.from_euler("xyz", rpy, degrees=True).as_quat())
+        return Pose(xyz, scipy.spatial.transform.Rotation.from_euler("xyz", rpy, degrees=True).as_quat())
 
 
 def mean_pose(poses: Sequence[Pose]) -> Pose:
     """Mean position and mean rotation of poses, to reduce noise."""
     if not poses:
         raise ValueError("the mean of no poses is undefined")
-    turned = Rotation.from_quat(np.array([pose.orientation for pose in poses])).mean()
+    turned = scipy.spatial.transform.Rotation.from_quat(np.array([pose.orientation for pose in poses])).mean()
     return Pose(np.mean([pose.position for pose in poses], axis=0), turned.as_quat())

@@ -45,6 +45,9 @@ class ArmModel {
 
   /// Fills `terms` for joint positions (rad) and velocities (rad/s). Allocates nothing.
   void evaluate(const Vector7& position, const Vector7& velocity, ArmTerms& terms);
+  /// The two halves of evaluate(): mass, coriolis and gravity; jacobian and tip.
+  void evaluateDynamics(const Vector7& position, const Vector7& velocity, ArmTerms& terms);
+  void evaluateKinematics(const Vector7& position, ArmTerms& terms);
 
  private:
   KDL::Chain chain_;

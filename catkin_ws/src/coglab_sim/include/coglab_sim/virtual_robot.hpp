@@ -18,6 +18,7 @@
 #include "coglab_controllers/plugins/dmp_controller.hpp"
 #include "coglab_controllers/plugins/ptp_controller.hpp"
 #include "coglab_sim/cell.hpp"
+#include "coglab_sim/limit_watch.hpp"
 #include "ctrl_more/log/logger.hpp"
 #include "lwr_fri_bridge/bridge/bridge.hpp"
 
@@ -28,6 +29,10 @@ class WorldFrames : public coglab_controllers::GoalSource {
  public:
   /// Stores the pose of a frame, seen at `stamp_ns` (ns, robot's clock).
   void set(const std::string& frame, const Pose& in_world, std::int64_t stamp_ns);
+  /// Stores a frame that does not move. refresh() stamps it.
+  void setFixed(const std::string& frame, const Pose& in_world);
+  /// Stamps the fixed frames as seen at `now_ns`.
+  void refresh(std::int64_t now_ns);
   void forget(const std::string& frame) { frames_.erase(frame); }
   bool lookup(const std::string& reference, const std::string& frame,
               coglab_controllers::GoalObservation& observation, std::string& why) override;
@@ -36,6 +41,7 @@ class WorldFrames : public coglab_controllers::GoalSource {
   struct Seen {
     Pose pose;
     std::int64_t stamp_ns = 0;
+    bool fixed = false;
   };
   bool find(const std::string& frame, Seen& seen) const;
   std::map<std::string, Seen> frames_;
@@ -54,7 +60,7 @@ class LockstepRobot {
   explicit LockstepRobot(const LockstepRobotConfig& config);
   ~LockstepRobot();
 
-  /// One FRI period.
+  /// One FRI period. Then the limits are checked (limits()) and the report is read (report()).
   void tick();
   double now() const { return 1e-9 * static_cast<double>(now_ns_); }  ///< s
   std::int64_t nowNs() const { return now_ns_; }
@@ -63,6 +69,11 @@ class LockstepRobot {
   /// answers.
   void setFrozen(bool frozen) { frozen_ = frozen; }
   bool frozen() const { return frozen_; }
+
+  /// The control cycle's report after the newest tick.
+  const coglab_controllers::CycleReport& report() const { return report_; }
+  /// Whether commands and true joints kept their limits in every tick so far.
+  const LimitWatch& limits() const { return limits_; }
 
   Cell& cell() { return cell_; }
   lwr_fri_bridge::Bridge& bridge() { return bridge_; }
@@ -91,6 +102,8 @@ class LockstepRobot {
       logger_;  // of the feedback stage; has no sink, because requests return their errors
   std::unique_ptr<coglab_controllers::ControllerManager> manager_;
   std::vector<coglab_controllers::DmpController*> dmps_;
+  coglab_controllers::CycleReport report_;
+  LimitWatch limits_;
 };
 
 }  // namespace coglab_sim

@@ -41,15 +41,22 @@ ModelErrors errorsOf(const ServoParameters& parameters, std::uint64_t seed) {
 Servos::Servos(const std::string& urdf, const ServoParameters& parameters,
                const Vector7& rotor_inertia, std::uint64_t seed)
     : parameters_(parameters),
-      model_(urdf, errorsOf(parameters, seed)),
-      rotor_inertia_(withErrors(rotor_inertia, parameters.inertia_error, seed)) {
+      rotor_inertia_(withErrors(rotor_inertia, parameters.inertia_error, seed)),
+      model_(urdf, errorsOf(parameters, seed)) {
   observe(position_, velocity_);
 }
 
 void Servos::observe(const Vector7& position, const Vector7& velocity) {
   position_ = position;
   velocity_ = velocity;
-  model_.evaluate(position_, velocity_, terms_);
+  model_.evaluateDynamics(position_, velocity_, terms_);
+  has_kinematics_ = false;
+}
+
+const ArmTerms& Servos::terms() const {
+  if (!has_kinematics_) model_.evaluateKinematics(position_, terms_);
+  has_kinematics_ = true;
+  return terms_;
 }
 
 Servos::Law Servos::jointLaw(const ServoCommand& command, const Vector7& stiffness,
@@ -63,9 +70,10 @@ Servos::Law Servos::jointLaw(const ServoCommand& command, const Vector7& stiffne
 }
 
 Servos::Law Servos::frameLaw(const ServoCommand& command, double dt) const {
-  const Matrix67& jacobian = terms_.jacobian;
+  const ArmTerms& terms = this->terms();
+  const Matrix67& jacobian = terms.jacobian;
   // Effective mass of each tip direction alone: 1 / (J (M+B)^-1 J^T)_ii.
-  Matrix7 total = terms_.mass;
+  Matrix7 total = terms.mass;
   total.diagonal() += rotor_inertia_;
   const Eigen::LLT<Matrix7> factor(total);
   Eigen::Matrix<double, 7, 6> half = jacobian.transpose();
@@ -75,8 +83,8 @@ Servos::Law Servos::frameLaw(const ServoCommand& command, double dt) const {
       2.0 * command.frame_damping.array() * (command.frame_stiffness.array() * mass.array()).sqrt();
 
   Vector6 error, wanted;
-  error << command.frame.position - terms_.tip.position,
-      rotationBetween(terms_.tip.rotation, command.frame.rotation);
+  error << command.frame.position - terms.tip.position,
+      rotationBetween(terms.tip.rotation, command.frame.rotation);
   wanted << command.frame_velocity.linear, command.frame_velocity.angular;
   const Vector6 force =
       command.frame_stiffness.cwiseProduct(error) + damping.cwiseProduct(wanted) + command.force;

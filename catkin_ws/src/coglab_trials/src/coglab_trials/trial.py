@@ -13,7 +13,7 @@ import smach
 from coglab_objects.database import ObjectDatabase, objects_folder
 from coglab_perception.belief import BeliefFilter
 from coglab_py.packages import package_path
-from coglab_py.pose import Pose
+from coglab_py.pose import Pose, length
 from coglab_sim.person.in_cell import pose_of_truth
 from coglab_smach.context.config import Config
 from coglab_smach.context.context import Context
@@ -193,33 +193,44 @@ class VirtualTrial:
 
     def wait_hub(self, label: str, limit: float = 60.0) -> None:
         """In a script: wait until this hub is active. TimeoutError after ``limit`` s."""
-        end = self.clock.now() + limit
-        while self.hub != label:
-            if self.clock.now() >= end:
-                raise TimeoutError(f"hub '{label}' was not reached within {limit:g} s: {self._last()}")
-            self.clock.sleep(0.05)
+        self._wait(lambda: self.hub == label, 0.05, limit, f"hub '{label}' was not reached")
 
     def ask_for(self, *actions: str, limit: float = 60.0) -> None:
         """In a script: execute the actions one after the other, each in its hub, until one fails. TimeoutError if one
         takes longer than ``limit`` s."""
         for action in actions:
             end = self.clock.now() + limit
-            while self.hub == "" and self.clock.now() < end:
-                self.clock.sleep(0.1)
+            self._wait(lambda: self.hub != "", 0.1, limit)
             if not self.submit(action):
                 return  # the previous action failed, so this hub does not accept it
             self.begun.append(action)
-            before = len(self.ctx.journal.results)
-            while len(self.ctx.journal.results) == before:
-                if self.clock.now() > end:
-                    raise TimeoutError(f"'{action}' has not ended within {limit:g} s: {self._last()}")
-                self.clock.sleep(0.05)
+            self._wait(self._one_more(), 0.05, end - self.clock.now(), f"'{action}' has not ended", limit)
             # Wait until the person's hand has returned, before the next action.
-            while self.world.human.phase != "idle" and self.clock.now() < end:
-                self.clock.sleep(0.1)
-            end = self.clock.now() + 10.0
-            while self.hub == "" and self.clock.now() < end:
-                self.clock.sleep(0.05)
+            self._wait(lambda: self.world.human.phase == "idle", 0.1, end - self.clock.now())
+            self._wait(lambda: self.hub != "", 0.05, 10.0)
+
+    def _one_more(self) -> Callable[[], bool]:
+        """Returns a condition: an action has ended since now."""
+        results = self.ctx.journal.results
+        before = len(results)
+        return lambda: len(results) > before
+
+    def _wait(
+        self, condition: Callable[[], bool], period: float, left: float, missed: str = "", limit: float = 0.0
+    ) -> None:
+        """In a script: wait until the condition is true, at most ``left`` s. Then TimeoutError with the text ``missed``
+        and the ``limit`` (s; ``left`` without one), if there is a text."""
+        end = self.clock.now() + left
+
+        def over() -> bool:
+            if condition():
+                return True
+            late = self.clock.now() >= end
+            if late and missed:
+                raise TimeoutError(f"{missed} within {limit or left:g} s: {self._last()}")
+            return late
+
+        self.clock.poll(over, period)
 
     def _last(self) -> str:
         transitions = self.ctx.journal.transitions
@@ -318,7 +329,7 @@ class Reach:
         if not self.stood and self.reached is not None and watching:
             self.stood = True
             self._measure()
-        if self.touched is None and np.linalg.norm(sum(self._world.cell.touch().values())) > TOUCH:
+        if self.touched is None and length(self._world.cell.touch_total) > TOUCH:
             self.touched, self.moving = t, not robot.report["standing"]
         if self.found is None and self._contact.event() is not None:
             self.found, self.moving_when_found = t, not robot.report["standing"]

@@ -4,6 +4,9 @@ The threads of the clock take turns. One thread runs until it waits, then the ne
 ready, the time jumps to the nearest deadline. Therefore, every run is the same. Other threads may also set events and
 sleep on the clock, but the operating system decides when they do so.
 
+To hand a turn to another thread costs much more than most turns do. So what is polled (`poll`) is called by the thread
+that waits next, in the same order; the polling thread gets its turn when that has come true.
+
 `using` runs a machine under such a clock. It requires only that `smach.concurrence` takes its threads, events and
 conditions from `threading`. Our engine and those of the ROS distributions do so.
 """
@@ -30,16 +33,28 @@ class ClockStalled(RuntimeError):
     """
 
 
+class _Poll:
+    """What a waiting thread polls, and its result: `over`, or an `error`. Neither: it is time to call it again."""
+
+    __slots__ = ("call", "error", "over", "period")
+
+    def __init__(self, call: Callable[[], bool], period: float) -> None:
+        self.call, self.period = call, period
+        self.over = False
+        self.error: Exception | None = None
+
+
 class _Parked:
-    """One waiting thread. `going`: it has its turn. `fired`: an event woke it, not the time.
+    """One waiting thread. `going`: it has its turn. `fired`: an event woke it, not the time. `poll`: what it polls.
 
     The gate is a bare lock that is held until the turn comes. An event of `threading` would cost several locks.
     """
 
-    __slots__ = ("fired", "gate", "going", "released", "thread")
+    __slots__ = ("fired", "gate", "going", "poll", "released", "thread")
 
-    def __init__(self, thread: threading.Thread) -> None:
+    def __init__(self, thread: threading.Thread, poll: _Poll | None = None) -> None:
         self.thread = thread
+        self.poll = poll
         self.gate = threading.Lock()
         self.gate.acquire()
         self.fired = self.going = self.released = False
@@ -168,6 +183,7 @@ class VirtualClock(Clock):
         self._stall_limit = stall_limit
         self._members: Counter[threading.Thread] = Counter()  # thread -> number of its attachments
         self._holder: threading.Thread | None = None  # the member that has the turn
+        self._poller: threading.Thread | None = None  # the thread that polls for the holder
         self._ready: deque[_Parked] = deque()
         self._timed: list[tuple[float, int, _Parked]] = []
         self._parked: dict[_Parked, None] = {}
@@ -182,6 +198,22 @@ class VirtualClock(Clock):
         """Wait in virtual time. 0 gives the other threads a turn."""
         if not self._pass_alone(seconds):
             self._park(None, max(0.0, seconds))
+
+    def poll(self, over: Callable[[], bool], period: float) -> None:
+        """Call `over` at once, and then every `period` s of virtual time until it returns True. Its exceptions are
+        raised here.
+
+        After the first time other threads call it, while they begin to wait. It must not wait itself: RuntimeError."""
+        while not over():
+            if self._holder is not threading.current_thread():
+                self.sleep(period)  # this thread does not belong to the clock
+                continue
+            poll = _Poll(over, period)
+            self._park(None, max(0.0, period), poll)
+            if poll.error is not None:
+                raise poll.error
+            if poll.over:
+                return
 
     def _pass_alone(self, seconds: float) -> bool:
         """Move the time on directly if no other thread has a turn before `seconds` have passed. Returns True if it did.
@@ -251,10 +283,12 @@ class VirtualClock(Clock):
                     self._holder = None
                 self._dispatch()
 
-    def _park(self, event: VirtualEvent | None, timeout: float | None) -> bool:
-        """Wait for the event or the time. Returns True if the event came."""
+    def _park(self, event: VirtualEvent | None, timeout: float | None, poll: _Poll | None = None) -> bool:
+        """Wait for the event or the time; with `poll`, until that has a result. Returns True if the event came."""
         me = threading.current_thread()
-        parked = _Parked(me)
+        if self._poller is me:
+            raise RuntimeError("what is polled on a virtual clock waits itself; wait for it in a loop with sleep()")
+        parked = _Parked(me, poll)
         with self._lock:
             if event is not None:
                 if event._flag:
@@ -263,9 +297,10 @@ class VirtualClock(Clock):
             if timeout is not None:
                 heapq.heappush(self._timed, (self._now + timeout, next(self._sequence), parked))
             self._parked[parked] = None
-            if self._holder is me:
+            polls = self._holder is me
+            if polls:
                 self._holder = None
-            self._dispatch()
+            self._dispatch(polls)
         try:
             self._await_turn(parked)
         finally:
@@ -282,8 +317,9 @@ class VirtualClock(Clock):
             parked.fired = fired
             self._ready.append(parked)
 
-    def _dispatch(self) -> None:
-        """Give the turn to the next ready thread. If none is ready, move the time on. The caller holds the lock."""
+    def _dispatch(self, polls: bool = False) -> None:
+        """Give the turn to the next ready thread. If none is ready, move the time on. The caller holds the lock.
+        ``polls``: it is a member that begins to wait, and so can poll for others."""
         while self._holder is None:
             while not self._ready:
                 if not self._timed:
@@ -293,11 +329,35 @@ class VirtualClock(Clock):
                     self._now = max(self._now, deadline)
                     self._release(parked, fired=False)
             parked = self._ready.popleft()
-            self._parked.pop(parked, None)
             self._progress = time.monotonic()
+            if parked.poll is not None and polls and not self._poll(parked, parked.poll):
+                continue
+            self._parked.pop(parked, None)
             if parked.thread in self._members:
                 self._holder = parked.thread
             parked.go()
+
+    def _poll(self, parked: _Parked, poll: _Poll) -> bool:
+        """Poll in the turn of a waiting thread. Returns True if that thread must go on by itself. The caller holds the
+        lock, and does not while it polls."""
+        self._holder, self._poller = parked.thread, threading.current_thread()
+        self._lock.release()
+        again = False
+        try:
+            poll.over = poll.call()
+            again = not poll.over
+        except Exception as error:
+            poll.error = error
+        except BaseException:  # Ctrl-C in this thread, which is not meant for the other one
+            again = True
+            raise
+        finally:
+            self._lock.acquire()
+            self._holder = self._poller = None
+            if again:
+                parked.released = False
+                heapq.heappush(self._timed, (self._now + poll.period, next(self._sequence), parked))
+        return not again
 
     def _await_turn(self, parked: _Parked) -> None:
         while not parked.gate.acquire(timeout=self._stall_limit):

@@ -3,8 +3,9 @@ bytes as on the network, in lockstep), hand emulator behind the real driver, vir
 
 from __future__ import annotations
 
+import gc
+import weakref
 from collections.abc import Callable, Mapping, Sequence
-from operator import gt, truediv
 from types import SimpleNamespace
 from typing import Any
 
@@ -16,7 +17,7 @@ from coglab_perception.sights import Sight
 from coglab_py.packages import package_path
 from coglab_py.pose import Pose, about_z
 from coglab_py.yaml_file import read
-from coglab_sim.person.in_cell import move_person, pose_of_truth, view_of
+from coglab_sim.person.in_cell import move_person, seen_in
 from coglab_sim.person.recorded_person import RecordedPerson, open_recorded_hand, scene_of
 from coglab_sim.person.scene import Scene
 from coglab_sim.person.virtual_human import VirtualHuman
@@ -44,9 +45,9 @@ except ImportError as error:
 LIMITS = str(package_path("lwr_description", "config", "joint_limits.yaml"))
 BOARD = Pose(np.array([0.45, -0.55, 0.05]), about_z(-np.pi / 2))  # frame `board` in `world`, m
 DT = 0.005  # s, FRI period
-FLOAT32 = 5e-4  # rad/s, velocity error between two answers from rounding to float32
 TASK_LIMIT = 8.0  # s, time limit of a preshape or a grasp
 OLDEST = 1e9  # s, age of a frame that was never seen
+DROPPED = 2  # number of worlds that may wait for Python's collector
 
 
 def urdf_file() -> str:
@@ -80,15 +81,10 @@ class Robot:
         self.virtual = LockstepRobot(urdf_file(), limits, parameters, yaml.safe_dump(manager_parameters()))
         self.cell = self.virtual.cell
         self.limits = cc.load_joint_limits(limits)
-        # Plain floats: at 200 Hz, comparing seven floats is faster than numpy.
-        self._fastest_to_command = [float(speed) for speed in self.limits.velocity]
-        self._fastest = [float(v) for v in read(limits).value["default"]["velocity"]]
-        lowest, highest = self.limits.lower_position, self.limits.upper_position
-        self._range = [(float(low), float(high)) for low, high in zip(lowest, highest, strict=True)]
         with open(urdf_file(), encoding="utf-8") as stream:
             self.urdf = stream.read()
         self.chain = cc.Chain(self.urdf)
-        self.report = self.virtual.report()
+        self._report: dict[str, Any] | None = None
         self.progress: dict[str, Any] = {
             "motion": "idle",
             "reason": "",
@@ -99,51 +95,48 @@ class Robot:
         }
         self.ended: dict[int, dict[str, Any]] = {}
         self.loaded: dict[str, str] = {}
-        self.peak_share = self.measured_share = 0.0
-        self.outside = {"commanded": 0, "measured": 0, "over_command": 0}
         self.silent = 0.0  # s since the robot's process has stopped (``virtual.frozen``)
         self.debug: dict[str, Any] | None = None
-        self._commanded: list[float] | None = None
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """The control cycle's newest report, as LockstepRobot.report() returns it. Read once per period."""
+        if self._report is None:
+            self._report = self.virtual.report()
+        return self._report
+
+    @property
+    def outside(self) -> dict[str, int]:
+        """Numbers of periods outside a limit, without any tolerance but the rounding of commands to float32.
+        ``commanded``: the commands. ``measured``: the true joints; their speed is the highest in any physics step.
+        ``over_command``: a true joint above the limit of commands, which is a few percent lower than that of the arm
+        (``servo_overshoot`` in the file of limits)."""
+        limits = self.virtual.limits()
+        return {name: limits[name] for name in ("commanded", "measured", "over_command")}
 
     @property
     def limit_violations(self) -> int:
         """Number of periods in which the commands or the true joints were outside a limit."""
-        return self.outside["commanded"] + self.outside["measured"]
+        outside = self.outside
+        return outside["commanded"] + outside["measured"]
 
-    def _look_at_arm(self) -> None:
-        """Compare the true joints with the arm's limits: position, and highest speed in any physics step of the period.
+    @property
+    def peak_share(self) -> float:
+        """Largest speed of the commands so far, as share of its limit."""
+        return float(self.virtual.limits()["peak_share"])
 
-        Nothing is differentiated or rounded, and there is no tolerance. The limit of commands is a few percent lower
-        (``servo_overshoot`` in the file of limits). Periods with a joint above that limit are counted separately."""
-        fastest = self.cell.fastest.tolist()
-        share = max(map(truediv, fastest, self._fastest))
-        self.measured_share = max(self.measured_share, share)
-        self.outside["measured"] += share > 1.0 or self._beyond(self.cell.position.tolist())
-        self.outside["over_command"] += any(map(gt, fastest, self._fastest_to_command))
-
-    def _beyond(self, position: list[float]) -> bool:
-        return not all(low <= at <= high for at, (low, high) in zip(position, self._range, strict=True))
+    @property
+    def measured_share(self) -> float:
+        """Largest speed of the true joints so far, as share of the arm's limit."""
+        return float(self.virtual.limits()["measured_share"])
 
     def step(self) -> None:
-        """Run one FRI period. Check the true joints and the commands against the limits."""
+        """Run one FRI period. True joints and commands are checked against the limits."""
         self.virtual.tick()
+        self._report = None
         self.silent = self.silent + DT if self.virtual.frozen else 0.0
-        self._look_at_arm()
-        self.report = report = self.virtual.report()
-        if report["fri_period"] <= 0.0:
-            return
-        if "ptp" in self.loaded:
+        if "ptp" in self.loaded and self.virtual.connected:
             self.ended.update((end["ptp_id"], end) for end in self.virtual.ptp_ends())
-        commanded = np.asarray(report["commanded_position"]).tolist()
-        outside = self._beyond(commanded)
-        if self._commanded is not None and report["motion_allowed"]:
-            speed = [abs(now - before) / DT for now, before in zip(commanded, self._commanded, strict=True)]
-            self.peak_share = max(self.peak_share, *map(truediv, speed, self._fastest_to_command))
-            outside = outside or any(
-                v > most + FLOAT32 for v, most in zip(speed, self._fastest_to_command, strict=True)
-            )
-        self._commanded = commanded if report["motion_allowed"] else None
-        self.outside["commanded"] += outside
 
     def palm(self) -> Pose:
         """Returns the pose of the palm in the base frame, from the measured joints."""
@@ -182,11 +175,13 @@ class Hand(HandMemory):
         self.positions: tuple[int, ...] = ()
         self.readings: Sequence[Any] = ()
         self.dead = False
+        self._rested = False
         self._next_poll = 0.0
         self._calibrated_at = 0.0
 
     def begin(self, name: str, **fields: Any) -> Job:
         """Start a goal of one of the hand's actions. A running goal ends. Raises the error that refuses the goal."""
+        self._follow()
         if self.job is not None:
             self.end(self.job, "replaced by a new goal; fingers stopped", Reason.SUPERSEDED)
         task = self.task_for(name, SimpleNamespace(**fields), self.driver)
@@ -220,16 +215,19 @@ class Hand(HandMemory):
     def step(self, t: float) -> None:
         """Advance to time ``t`` (s): read the simulated motors, poll the driver, set the motor commands."""
         self.clock.now = max(self.clock.now, t)
-        self.emulator.follow(
-            [
-                MotorState(motor["position"], motor["current"], motor["effort"], motor["moving"], motor["locked"])
-                for motor in self.cell.motors()
-            ]
-        )
+        rested, self._rested = self._rested, self.emulator.at_rest
+        # While all motors are off, only a poll looks at them, and no order changes.
+        if not (rested and self._rested) or t >= self._next_poll:
+            self._follow()
         self.emulator.advance()
         self.calibration_over(t)
         self._poll(t)
-        self.cell.set_motors(*map(list, zip(*self.emulator.orders(), strict=True)))
+        if not (rested and self._rested and self.emulator.at_rest):
+            self.cell.set_motors(*map(list, zip(*self.emulator.orders(), strict=True)))
+
+    def _follow(self) -> None:
+        """Read the simulated motors."""
+        self.emulator.follow([MotorState(*state) for state in self.cell.motor_states()])
 
     def _poll(self, t: float) -> None:
         if t < self._next_poll or self.dead or self.calibrating:
@@ -256,6 +254,25 @@ class Hand(HandMemory):
         job.verdict = verdict
         self.task_over(job.task, verdict)
         self.reason, self.message = verdict.reason, f"{job.task.name}: {verdict.text}"
+
+
+class _Dropped:
+    """Frees the worlds that nobody uses any more. Each holds several MB that Python does not see, so that its collector
+    of cycles would come too late."""
+
+    def __init__(self) -> None:
+        self._alive: weakref.WeakSet[Any] = weakref.WeakSet()
+        self._enough = DROPPED
+
+    def add(self, world: Any) -> None:
+        """Count a new world. If many have become alive, collect those that are only alive in cycles."""
+        if len(self._alive) >= self._enough:
+            gc.collect()
+            self._enough = len(self._alive) + DROPPED
+        self._alive.add(world)
+
+
+_DROPPED = _Dropped()
 
 
 class World:
@@ -293,6 +310,7 @@ class World:
 
         ObjectError: unknown object. RecordingError: unusable recording. ValueError: a value is out of range.
         """
+        _DROPPED.add(self)
         conditions = conditions or Conditions()
         self.seed, self.conditions = seed, conditions
         thing, _ = read_object(objects_folder() / f"{conditions.object_id}.yaml")
@@ -323,14 +341,20 @@ class World:
         self.hand = Hand(self.cell)
         self.board = conditions.perception.calibration(seed) * BOARD
         """pose of the board as the tracker measures it, with the calibration error"""
+        self.robot.virtual.set_fixed_frame("board", self.board.position, self.board.orientation)
         self.trackers = {name: Tracker(name, conditions.perception, seed) for name in (self.object_frame, "human_hand")}
         self.after_period: list[Callable[[], None]] = []
         self.speed_scale = 1.0
         self.t = self.robot.virtual.now
         self.ticks = 0
-        self.truth = self.cell.truth()
         self.sights: dict[str, Sight] = {}
         self.blind: set[str] = set()
+
+    @property
+    def truth(self) -> dict[str, Any]:
+        """The true state of the cell, as Cell.truth() returns it."""
+        truth: dict[str, Any] = self.cell.truth()
+        return truth
 
     def newest(self, name: str) -> tuple[Pose | None, float]:
         """Returns the newest pose of a frame and its age (s). The board was seen once and does not move: age 0."""
@@ -346,23 +370,19 @@ class World:
         if self.ticks % 2 == 0:
             self._person_and_tracker()
         self.hand.step(self.t)
-        self.robot.virtual.set_frame("board", self.board.position, self.board.orientation)
         self.robot.step()
         self.ticks += 1
         self.t = self.robot.virtual.now
-        if self.robot.report["fri_period"] > 0.0:
+        if self.robot.virtual.connected:
             for look in self.after_period:
                 look()
 
     def _person_and_tracker(self) -> None:
-        self.truth = truth = self.cell.truth()
-        view = view_of(truth)
+        view, hand = seen_in(self.cell)
         move_person(self.cell, self.human.step(self.t, view))
         # Use the hand where the arm has moved it, not where the person wants it.
-        frames = {self.object_frame: view.object, "human_hand": pose_of_truth(truth["human_hand"])}
-        for name, frame in frames.items():
-            others = [other for each, other in frames.items() if each != name]
-            for sight in self.trackers[name].step(self.t, frame, view.robot_hand, others):
+        for name, frame, other in ((self.object_frame, view.object, hand), ("human_hand", hand, view.object)):
+            for sight in self.trackers[name].step(self.t, frame, view.robot_hand, (other,)):
                 if name not in self.blind:
                     self.sights[name] = sight
                     self.robot.virtual.set_frame(

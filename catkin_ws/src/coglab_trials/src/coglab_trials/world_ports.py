@@ -135,11 +135,11 @@ class VirtualPerception:
 
     def _believe(self) -> None:
         """Feed each new sight to the filter, objects first. Set the predicted frames, as the recogniser's node does."""
-        t = self.world.t
-        for name, sight in sorted(self.world.sights.items(), reverse=True):
-            if sight.captured <= self._taken.get(name, -1.0):
-                continue
-            self._taken[name] = sight.captured
+        t, sights, taken = self.world.t, self.world.sights, self._taken
+        new = [name for name, sight in sights.items() if sight.captured > taken.get(name, -1.0)]
+        for name in sorted(new, reverse=True):
+            sight = sights[name]
+            taken[name] = sight.captured
             if name == HAND:
                 self._seen = t
                 if self.recogniser is not None:

@@ -60,7 +60,8 @@ class Servos {
 
   const Vector7& position() const { return position_; }
   const Vector7& velocity() const { return velocity_; }
-  const ArmTerms& terms() const { return terms_; }  ///< of the controller's model
+  /// Of the controller's model at the newest encoder values. Not thread-safe.
+  const ArmTerms& terms() const;
   const Vector7& motorTorque() const { return motor_torque_; }
   const ServoParameters& parameters() const { return parameters_; }
 
@@ -77,9 +78,11 @@ class Servos {
   Law frameLaw(const ServoCommand& command, double dt) const;
 
   ServoParameters parameters_;
-  ArmModel model_;
   Vector7 rotor_inertia_;
-  ArmTerms terms_;
+  // Most steps need no kinematics, so terms() computes them.
+  mutable ArmModel model_;
+  mutable ArmTerms terms_;
+  mutable bool has_kinematics_ = false;
   Vector7 position_ = Vector7::Zero(), velocity_ = Vector7::Zero(), motor_torque_ = Vector7::Zero();
 };
 

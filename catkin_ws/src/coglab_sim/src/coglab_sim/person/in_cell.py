@@ -16,15 +16,11 @@ def pose_of_truth(pose: Mapping[str, Any]) -> Pose:
     return Pose(np.asarray(pose["position"]), np.asarray(pose["rotation"]))
 
 
-def view_of(truth: Mapping[str, Any]) -> WorldView:
-    """Returns the person's view of the cell's truth. The felt load is the force on the person's own grip, even while
-    the robot holds the object as well."""
-    return WorldView(
-        pose_of_truth(truth["robot_hand"]),
-        float(truth["hand_closure"]),
-        pose_of_truth(truth["object"]),
-        np.asarray(truth["human_force"]),
-    )
+def seen_in(cell: Any) -> tuple[WorldView, Pose]:
+    """Returns the person's view of a cell, and the true pose of the person's hand. The felt load is the force on the
+    person's own grip, even while the robot holds the object as well."""
+    place, turn, closure, object_place, object_turn, force, hand, hand_turn = cell.view()
+    return WorldView(Pose(place, turn), closure, Pose(object_place, object_turn), force), Pose(hand, hand_turn)
 
 
 def move_person(cell: Any, hand: HandSample) -> None:

@@ -7,10 +7,11 @@ reach are superposed.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+from coglab_py.rotation import Rotation
 
 
 def min_jerk(x: float) -> tuple[float, float]:
@@ -44,8 +45,8 @@ class Reach:
         velocity = way * np.array([ds, ds, dsz / self.vertical_share]) / self.duration
         if self.bow != 0.0:
             # Half an ellipse over the chord, highest in the middle: y = bow * sin(pi s).
-            position[2] += self.bow * np.sin(np.pi * s)
-            velocity[2] += self.bow * np.pi * np.cos(np.pi * s) * ds / self.duration
+            position[2] += self.bow * math.sin(math.pi * s)
+            velocity[2] += self.bow * math.pi * math.cos(math.pi * s) * ds / self.duration
         return position, velocity
 
     def over(self, t: float) -> bool:
@@ -81,8 +82,11 @@ class CorrectedReach:
 
     def at(self, t: float) -> tuple[np.ndarray, np.ndarray]:
         """Position (m) and velocity (m/s) at time t (s)."""
-        samples = [part.at(t) for part in self.parts]
-        return sum((p for p, _ in samples), np.zeros(3)), sum((v for _, v in samples), np.zeros(3))
+        position, velocity = self.parts[0].at(t)
+        for part in self.parts[1:]:
+            more, faster = part.at(t)
+            position, velocity = position + more, velocity + faster
+        return position, velocity
 
     def over(self, t: float) -> bool:
         """True if the reach and all its corrections have ended."""

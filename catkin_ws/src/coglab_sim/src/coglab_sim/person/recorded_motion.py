@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 from coglab_py.pose import IDENTITY, Pose, about_z
-from scipy.spatial.transform import Rotation
+from coglab_py.rotation import Rotation
 
 MOST_SAMPLES = 1_000_000  # largest number of samples in one file: a day at 10 Hz
 FASTEST = 10.0  # m/s between two samples; at a higher speed the tracker lost the frame or confused it with another

@@ -13,7 +13,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 from coglab_py.pose import Pose, length
-from scipy.spatial.transform import Rotation
+from coglab_py.rotation import Rotation
 
 from coglab_sim.person.participant import Participant
 from coglab_sim.person.scene import WorldView
@@ -53,9 +53,9 @@ class SlowNoise:
 
     def step(self, dt: float) -> np.ndarray:
         """Returns the noise ``dt`` s later."""
-        keep = float(np.exp(-dt / NOISE_TIME))
+        keep = math.exp(-dt / NOISE_TIME)
         fresh = self._rng.normal(size=len(self._sigma))
-        self._value = keep * self._value + np.sqrt(1.0 - keep**2) * self._sigma * fresh
+        self._value = keep * self._value + math.sqrt(1.0 - keep**2) * self._sigma * fresh
         return self._value
 
 
@@ -130,12 +130,10 @@ class Senses:
         while len(before) > 2 and before[1][0] <= t - SPEED_TIME:
             before.popleft()
         then, place, closure = before[0]
-        if t - then < 0.5 * SPEED_TIME:
+        since = t - then
+        if since < 0.5 * SPEED_TIME:
             return 1.0, 0.0
-        return (
-            length(view.robot_hand.position - place) / (t - then),
-            (view.hand_closure - closure) / (t - then),
-        )
+        return length(view.robot_hand.position - place) / since, (view.hand_closure - closure) / since
 
     def _feel(self, load: np.ndarray) -> np.ndarray:
         """Returns the felt force (N). It keeps its value until the change is noticeable."""

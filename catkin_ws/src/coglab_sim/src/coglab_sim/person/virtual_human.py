@@ -8,10 +8,13 @@ lifting. The person perceives the cell by sight and touch (senses), and the robo
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 import numpy as np
 from coglab_msgs.msg import Say
 from coglab_py.pose import Pose, length
-from scipy.spatial.transform import Rotation
+from coglab_py.rotation import Rotation
 
 from coglab_sim.person.grip import GripForce
 from coglab_sim.person.participant import Participant
@@ -60,12 +63,18 @@ TASKS = {Say.READY_TO_RECEIVE: "give", Say.READY_TO_GIVE: "receive", Say.GIVEN_U
 """task that each prompt of the robot gives to the person"""
 
 
-def involuntary(p: Participant, f: np.ndarray, t: float) -> np.ndarray:
-    """Displacement (m) by sway (0.3-1 Hz) and tremor (8-12 Hz) at time t (s): bounded, smooth sums of sines with the
-    phases ``f`` (3 x 4, rad)."""
-    sway = np.sin(2 * np.pi * 0.35 * t + f[:, 0]) + 0.5 * np.sin(2 * np.pi * 0.8 * t + f[:, 1])
-    tremor = np.sin(2 * np.pi * 9.1 * t + f[:, 2]) + 0.6 * np.sin(2 * np.pi * 11.3 * t + f[:, 3])
-    return p.sway / 1.5 * sway + p.tremor / 1.6 * tremor
+def involuntary(p: Participant, f: Sequence[Sequence[float]], t: float) -> np.ndarray:
+    """Displacement (m) by sway (0.3-1 Hz) and tremor (8-12 Hz) at time t (s): bounded, smooth sums of sines with four
+    phases (rad) for each of three axes."""
+    sin, turn = math.sin, 2.0 * math.pi * t
+    slow, less_slow, quick, quicker = 0.35 * turn, 0.8 * turn, 9.1 * turn, 11.3 * turn
+    sway, tremor = p.sway / 1.5, p.tremor / 1.6
+    return np.array(
+        [
+            sway * (sin(slow + a) + 0.5 * sin(less_slow + b)) + tremor * (sin(quick + c) + 0.6 * sin(quicker + d))
+            for a, b, c, d in f
+        ]
+    )
 
 
 class VirtualHuman:
@@ -103,7 +112,7 @@ class VirtualHuman:
         self._met = self._checked = False
         self._held_load, self._touched = np.zeros(3), np.zeros(3)
         self._closure = 0.0
-        self._noise_phase = self.rng.uniform(0, 2 * np.pi, size=(3, 4))
+        self._noise_phase = self.rng.uniform(0, 2 * np.pi, size=(3, 4)).tolist()
         self._last: float | None = None
         self._interrupted = False
         self._tries = 0
@@ -236,9 +245,9 @@ class VirtualHuman:
 
     def _gap(self, palm: Pose, place: Pose) -> float:
         """m between the robot's palm and the surface of the object at ``place``."""
-        half = self.scene.object_size / 2
-        beyond = np.abs(place.rotation.inv().apply(palm.position - place.position) - self.scene.object_middle) - half
-        return length(np.maximum(beyond, 0.0))
+        away = np.abs(place.rotation.inv().apply(palm.position - place.position) - self.scene.object_middle).tolist()
+        half = (self.scene.object_size / 2).tolist()
+        return math.hypot(*(max(0.0, far - inside) for far, inside in zip(away, half, strict=True)))
 
     def _way_to(self, place: Pose) -> float:
         """Distance (m) from the hand to the pose where it takes the object at ``place``."""

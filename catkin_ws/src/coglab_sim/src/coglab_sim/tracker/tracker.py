@@ -8,14 +8,15 @@ can be switched off; ``perfect`` delivers true poses at the same rate. docs/peop
 from __future__ import annotations
 
 import heapq
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 from coglab_perception.sights import Sight
-from coglab_py.pose import Pose
-from scipy.spatial.transform import Rotation
+from coglab_py.pose import Pose, length
+from coglab_py.rotation import Rotation
 
 CALIBRATED_AT = np.array([0.75, 0.0, 0.40])  # m, world: place of the calibration; its angular error turns about it
 
@@ -89,6 +90,7 @@ class Tracker:
         self.calibration = settings.calibration(seed)
         self._next = 0.0
         self._lost = self._hidden = False
+        self._sigma = np.array([*settings.position_noise, *[settings.orientation_noise] * 3])
         self._noise = np.zeros(6)
         self._noise_stamp: float | None = None
         self._swap_left = 0
@@ -123,7 +125,7 @@ class Tracker:
             self._push(now, Sight(self.name, now, truth))
             return
         self._lost = self._burst(self._lost, s.dropout_start, s.dropout_end)
-        near = robot_hand is not None and np.linalg.norm(robot_hand.position - truth.position) < s.occlusion_distance
+        near = robot_hand is not None and length(robot_hand.position - truth.position) < s.occlusion_distance
         self._hidden = self._burst(self._hidden, s.occlusion_start, s.occlusion_end) if near else False
         noise = self._noise_step(now)
         taken = self.calibration * self._swapped(truth, others)
@@ -142,11 +144,10 @@ class Tracker:
 
     def _noise_step(self, now: float) -> np.ndarray:
         s = self.settings
-        sigma = np.array([*s.position_noise, s.orientation_noise, s.orientation_noise, s.orientation_noise])
         dt = now - self._noise_stamp if self._noise_stamp is not None else 1e9
         self._noise_stamp = now
-        keep = np.exp(-dt / s.correlation_time) if s.correlation_time > 0.0 else 0.0
-        self._noise = keep * self._noise + np.sqrt(1 - keep**2) * sigma * self.rng.normal(size=6)
+        keep = math.exp(-dt / s.correlation_time) if s.correlation_time > 0.0 else 0.0
+        self._noise = keep * self._noise + math.sqrt(1 - keep**2) * self._sigma * self.rng.normal(size=6)
         return self._noise
 
     def _swapped(self, truth: Pose, others: Sequence[Pose]) -> Pose:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 
 from coglab_py.pace import Pace
 
@@ -18,6 +19,13 @@ class Clock(ABC):
     @abstractmethod
     def sleep(self, seconds: float) -> None:
         """Wait for ``seconds``; a negative duration counts as 0."""
+
+    def poll(self, over: Callable[[], bool], period: float) -> None:
+        """Call ``over`` at once, and then every ``period`` s until it returns True. Its exceptions are raised here.
+
+        ``over`` only looks: it does not wait. A virtual clock calls it in other threads."""
+        while not over():
+            self.sleep(period)
 
 
 class SteadyClock(Clock):

@@ -179,33 +179,44 @@ class CoglabState(smach.State):
         limit: float | None = None,
         pace: Callable[[], float] | None = None,
         code: int = wait_reasons.ANSWER,
+        looks: bool = False,
     ) -> None:
         """Wait until ``condition()``. After ``limit`` s or at the state's own limit: TimeLimit that names ``what``.
         ``code``: the code of ``wait_reasons``, for programs.
 
         ``pace`` (0..1, e.g. the speed scale): the limit counts the time of a slowed motion. The used time is multiplied
         by the pace (at least 0.1), and the state's own limit is extended accordingly.
+
+        ``looks``: the condition only looks; it does not wait for anything itself. That saves time in simulated trials.
         """
         allowed = self.left() if limit is None else min(limit, self.left())
         left, before, told = allowed, self.ctx.clock.now(), -math.inf
         path = f"{self.path()}/{self.label}"
         # A wait inside a condition, e.g. for a sight, is published as part of the outer wait.
         within, self._waits = self._waits, True
+
+        def over() -> bool:
+            nonlocal left, before, told
+            self.check()
+            if condition():
+                return True
+            now = self.ctx.clock.now()
+            used = (now - before) * (min(1.0, max(0.1, pace())) if pace is not None else 1.0)
+            left -= used
+            self._deadline += now - before - used
+            before = now
+            if left <= 0.0:
+                raise TimeLimit(f"{what} within {max(0.0, allowed):.1f} s expected, it did not happen")
+            if not within and now + left > told + RETOLD:
+                told = now + left
+                self.ctx.journal.waits(path, Wait(what, told, code, aside=not self.essential))
+            return False
+
         try:
-            while True:
-                self.check()
-                if condition():
-                    return
-                now = self.ctx.clock.now()
-                used = (now - before) * (min(1.0, max(0.1, pace())) if pace is not None else 1.0)
-                left -= used
-                self._deadline += now - before - used
-                before = now
-                if left <= 0.0:
-                    raise TimeLimit(f"{what} within {max(0.0, allowed):.1f} s expected, it did not happen")
-                if not within and now + left > told + RETOLD:
-                    told = now + left
-                    self.ctx.journal.waits(path, Wait(what, told, code, aside=not self.essential))
+            if looks:
+                self.ctx.clock.poll(over, POLL_PERIOD)
+                return
+            while not over():
                 self.ctx.clock.sleep(POLL_PERIOD)
         finally:
             self._waits = within
@@ -222,7 +233,7 @@ class CoglabState(smach.State):
     ) -> Any:
         """Wait for the pending call and return its value. Cancel the call if the wait ends otherwise."""
         try:
-            self.wait_for(pending.done, what, limit, pace, code)
+            self.wait_for(pending.done, what, limit, pace, code, looks=True)
         except (Interrupted, TimeLimit):
             pending.cancel()
             raise
@@ -231,12 +242,18 @@ class CoglabState(smach.State):
     def pause(self, duration: float) -> None:
         """Wait for a duration (s); preemption or STOP ends it. At the state's own limit: TimeLimit, so that loops
         around it end too."""
-        end = self.ctx.clock.now() + duration
-        while self.ctx.clock.now() < end:
+        clock = self.ctx.clock
+        end = clock.now() + duration
+
+        def nearly_over() -> bool:
             self.check()
             if self.left() <= 0.0:
                 raise TimeLimit(f"{self.label} had to end within {self.time_limit():.1f} s, it did not")
-            self.ctx.clock.sleep(min(POLL_PERIOD, end - self.ctx.clock.now()))
+            return end - clock.now() <= POLL_PERIOD
+
+        if duration > 0.0:
+            clock.poll(nearly_over, POLL_PERIOD)
+            clock.sleep(max(0.0, end - clock.now()))
 
 
 class _Placed:

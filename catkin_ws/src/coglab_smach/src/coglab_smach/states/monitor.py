@@ -25,7 +25,7 @@ class MonitorDmp(CoglabState):
 
     def run(self, ud: Any) -> str:
         if not self.ctx.config.get("monitor.enabled"):
-            self.wait_for(lambda: False, "the end of the motion", code=ARM)
+            self.wait_for(lambda: False, "the end of the motion", code=ARM, looks=True)
         running = ud.goal["primitive"]
         family = dict(self.ctx.config.get("monitor.primitives"))
         if running not in family.values():
@@ -33,7 +33,8 @@ class MonitorDmp(CoglabState):
         switches = 0
         while True:
             try:
-                self.wait_for(partial(self._other_pattern, family, running), "another reaching pattern", code=SIGHT)
+                other = partial(self._other_pattern, family, running)
+                self.wait_for(other, "another reaching pattern", code=SIGHT, looks=True)
             except Interrupted as end:
                 if end.stop:
                     raise

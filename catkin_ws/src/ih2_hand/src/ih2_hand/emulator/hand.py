@@ -90,6 +90,17 @@ class EmulatedHand:
         """True while a calibration runs."""
         return self._calibration_end is not None
 
+    @property
+    def at_rest(self) -> bool:
+        """True if all motors are switched off and no calibration runs: `orders` does not change until a command."""
+        return self._calibration_end is None and self._all_off()
+
+    def _all_off(self) -> bool:
+        for motor in self.motors:  # a loop, because this is asked 200 times per second
+            if motor.mode != "stop":
+                return False
+        return True
+
     def set_contacts(self, positions: Sequence[float], stiffness: Sequence[float]) -> None:
         """Set the object for each motor: contact position 0..254 (255: no object) and stiffness (counts per count)."""
         if len(positions) != WIRE.motors or len(stiffness) != WIRE.motors:
@@ -132,7 +143,7 @@ class EmulatedHand:
         if elapsed <= 0.0:
             return
         self._now = now
-        if all(motor.mode == "stop" for motor in self.motors):
+        if self._all_off():
             return
         steps = max(1, int(elapsed / STEP_S + 0.999))
         for _ in range(min(steps, 10000)):

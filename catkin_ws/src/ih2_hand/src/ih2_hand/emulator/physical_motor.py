@@ -27,6 +27,8 @@ class MotorState(NamedTuple):
 
     def check(self) -> None:
         """Raise ValueError unless every value is possible for a motor."""
+        if 0.0 <= self.position <= 1.0 and 0.0 <= self.current <= 1e4 and 0.0 <= self.effort <= 1e4:
+            return
         for name, value, most in (
             ("position", self.position, 1.0),
             ("current", self.current, 1e4),
