@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -41,9 +43,9 @@ def stamped(kind, stamp, place, **fields):
 
 
 def write_bag(path):
-    """Two seconds of a tracker, as it was an hour ago."""
+    """Two minutes of a tracker, as it was years ago."""
     with rosbag.Bag(path, "w") as bag:
-        for i in range(60):
+        for i in range(3600):
             stamp = rospy.Time.from_sec(1.6e9 + i / 30.0)
             tree = [transform(stamp, "world", "tracker", TRACKER)]
             tree += [transform(stamp, "tracker", "tracker_hand", HAND)]
@@ -73,16 +75,22 @@ class Bridge(unittest.TestCase):
 
     @classmethod
     def tearDownClass(cls):
-        if cls.player is not None:
-            cls.player.kill()
-            cls.player.wait()
+        cls.stop_playing()
         cls.folder.cleanup()
 
+    @classmethod
+    def stop_playing(cls):
+        """End the player, if it runs."""
+        if cls.player is not None and cls.player.poll() is None:
+            os.killpg(cls.player.pid, signal.SIGKILL)
+            cls.player.wait()
+
     def play(self):
-        """Play the bag again and again."""
+        """Play the bag."""
         cls = type(self)
-        command = ["rosbag", "play", "--quiet", "--loop", str(self.bag)]
-        cls.player = subprocess.Popen(command, stdin=subprocess.DEVNULL)
+        command = ["rosbag", "play", "--quiet", str(self.bag)]
+        # A group of its own, because `rosbag play` starts another program.
+        cls.player = subprocess.Popen(command, stdin=subprocess.DEVNULL, start_new_session=True)
         answer = self.services["init_vision"](LIMIT)
         self.assertTrue(answer.success, answer.message)
 
@@ -122,8 +130,7 @@ class Bridge(unittest.TestCase):
         self.assertFalse(self.buffer.can_transform("world", "object_ball", rospy.Time(0)))
 
     def test_e_a_tracker_that_stops_is_seen_no_more(self):
-        self.player.kill()
-        self.player.wait()
+        self.stop_playing()
         self.assertTrue(wait_for(lambda: not self.services["locate_object"]("mug", 0.0).success, LIMIT))
         answer = self.services["locate_object"]("human_hand", 0.0)
         self.assertEqual((answer.success, answer.reason_code), (False, ReasonCode.OBJECT_NOT_SEEN))
