@@ -6,7 +6,7 @@ With T the duration of the task, H and R the times in which the person and the r
 - human idle time      1 - |H| / T
 - robot idle time      1 - |R| / T
 - concurrent activity  |H and R| / T
-- functional delay     sum over the turns of (start of one agent's activity - end of the other's activity before it) / T;
+- functional delay     sum over the turns of (start of one agent's activity - end of the other's before it) / T;
   negative where the next agent begins before the other has ended.
 """
 

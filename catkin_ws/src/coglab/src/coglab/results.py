@@ -83,8 +83,8 @@ class Exchange(Result):
 
     object_id: str = ""
     outcome: str = ""
-    """"succeeded"; "failed_empty" or "failed_holding": the hand is empty or holds the object; "stopped" or "fault": call
-    ``robot.reset()``"""
+    """"succeeded"; "failed_empty" or "failed_holding": the hand is empty or holds the object; "stopped" or "fault":
+    call ``robot.reset()``"""
     marks: Mapping[str, float] = field(default_factory=dict)
     """times of events, s: "offered", "motion_started", "contact", "closed", "released", ..."""
 

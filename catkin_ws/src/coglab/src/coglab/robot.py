@@ -112,9 +112,7 @@ class Arm:
         self._robot._check()
         position = self._cell.arm.joint_positions()
         if position is None:
-            raise RuntimeError(
-                "the arm has sent no joint positions for 0.5 s: does the robot node run? ./coglab status"
-            )
+            raise RuntimeError("the arm has sent no joint positions for 0.5 s: does it run? ./coglab status")
         return np.array(position)
 
     @property
@@ -208,7 +206,8 @@ class Arm:
     ) -> MotionResult:
         """Run a motion primitive to a frame, and follow the frame if it moves.
 
-        ``primitive``: of the loaded library, such as "reach_human". ``frame``: name, or a pose or position in the base frame.
+        ``primitive``: of the loaded library, such as "reach_human". ``frame``: name, or a pose or position in the
+        base frame.
         ``offset``: goal of the palm relative to the frame: a pose, or a position [3] m, which leaves the orientation
         free. ``ratio``: 2 takes twice as long as demonstrated.
         """

@@ -38,8 +38,8 @@ def trials(
 
     ``n``: number of trials, with the seeds 1 .. n; or ``seeds``: these seeds. ``actions``: as for ``World.trial``,
     by default "receive". ``workers``: processes; 1: in this process. ``limit``: s of virtual time for each action.
-    ``world``: further arguments of World, such as ``person="accustomed"``. ``each``: a function of a module, called with
-    each World instead of the actions; its values are returned instead of Trials.
+    ``world``: further arguments of World, such as ``person="accustomed"``. ``each``: a function of a module, called
+    with each World instead of the actions; its values are returned instead of Trials.
 
     Each worker is a new process (forkserver), so a script needs ``if __name__ == "__main__":`` around this call.
     A trial that does not succeed is a Trial like others. TrialFailed names the seed of one that raised an exception.

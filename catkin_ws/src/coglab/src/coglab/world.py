@@ -1,4 +1,4 @@
-"""The whole cell in virtual time: person, tracker, robot, hand and state machines in this process, without a ROS master."""
+"""The whole cell in virtual time: person, tracker, robot, hand and state machines in one process, without ROS."""
 
 from __future__ import annotations
 
@@ -79,8 +79,8 @@ class World:
         touch: float | None = None,
     ) -> None:
         """
-        ``seed``: of person, noise and tracker. ``person``: "drawn" (by the seed), "patient" or "accustomed"; or fields of
-        coglab_sim.person.participant.Participant that override those of the drawn person, such as {"trust": 0.1}.
+        ``seed``: of person, noise and tracker. ``person``: "drawn" (by the seed), "patient" or "accustomed"; or fields
+        of coglab_sim.person.participant.Participant that override those of the drawn person: {"trust": 0.1}.
         ``object``: an object of the database. ``behaviour``: of the person, such as "slow" or "never_release".
         ``perfect_perception``: the tracker has no noise, delay or gaps.
         ``conditions``: a coglab_trials.Conditions instead of the four arguments above.
@@ -155,9 +155,7 @@ class World:
         trial = self._trial
         assert trial is not None  # _check() was called
         if self._inside:
-            raise RuntimeError(
-                "a function that is called in each period cannot let time pass: it may only look and act"
-            )
+            raise RuntimeError("a function of after_period cannot let time pass: it may only look and act")
         clock = trial.clock
         clock.let_think(False)
         self._inside = True
@@ -183,7 +181,7 @@ class World:
 
     @contextmanager
     def _signals(self) -> Iterator[None]:
-        """Ctrl-C takes effect between two periods, so that no wait of the clock is torn apart. The third one at once."""
+        """Ctrl-C takes effect between two periods, so that no wait of the clock is cut. The third at once."""
         if threading.current_thread() is not threading.main_thread():
             yield
             return
@@ -335,7 +333,7 @@ class World:
     # --- its end ---
 
     def close(self) -> None:
-        """Stop the arm, wait until it stands, end the machines. Twice does no harm. Other uses are refused afterwards."""
+        """Stop the arm, wait until it stands, end the machines. Twice does no harm; other uses are refused."""
         trial = self._trial
         if trial is None:
             return
@@ -372,8 +370,8 @@ class World:
             other = there() if there is not None else None
             if other is not None and other._trial is not None and other._pid == self._pid:
                 raise RuntimeError(
-                    f"this thread has an open World (seed {other.seed}): close() it first, or use 'with coglab.World(...)'; "
-                    "several at a time: coglab.trials()"
+                    f"this thread has an open World (seed {other.seed}): close() it first, or use "
+                    "'with coglab.World(...)'; several at a time: coglab.trials()"
                 )
             _open_worlds[self._thread] = weakref.ref(self)
 
@@ -387,8 +385,8 @@ class World:
         """RuntimeError in words if this World cannot be used here."""
         if os.getpid() != self._pid:
             raise RuntimeError(
-                "this World was opened before the process forked, and a fork does not take its threads along: open it in "
-                "the child, start the child by 'spawn' or 'forkserver', or use coglab.trials()"
+                "this World was opened before the process forked, and a fork does not take its threads along: open it "
+                "in the child, start the child by 'spawn' or 'forkserver', or use coglab.trials()"
             )
         if self._trial is None:
             raise RuntimeError("this World is closed: open another one with the same seed")

@@ -197,6 +197,7 @@ def run(top: Path, options: argparse.Namespace) -> int:
         from coglab.plot import draw_trial
 
         from coglab_bringup.handover import run_handover
+        from coglab_bringup.trial_recorder import TrialRecorder
 
         rospy.init_node("coglab_demo", anonymous=True, disable_signals=True)
         recorder = TrialRecorder()
