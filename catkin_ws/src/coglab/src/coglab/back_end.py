@@ -33,6 +33,9 @@ class BackEnd(Protocol):
     def now(self) -> float:
         """Returns the time, s."""
 
+    def clock(self) -> float:
+        """Returns the time for time limits, s: it passes slowly while a busy computer slows the simulated cell down."""
+
     def pause(self, seconds: float) -> None:
         """Let time pass."""
 

@@ -588,9 +588,9 @@ class Robot:
 
     def _wait(self, condition: Callable[[], bool], limit: float, what: str) -> None:
         """Let time pass until the condition is true. TimeoutError names what was waited for."""
-        end = self.time + limit
+        end = self._cell.clock() + limit
         while not condition():
-            if self.time >= end:
+            if self._cell.clock() >= end:
                 raise TimeoutError(f"{what} did not come within {limit:g} s: {self._now_in_words()}")
             self._pause(POLL)
 

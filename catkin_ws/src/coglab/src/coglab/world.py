@@ -430,6 +430,9 @@ class _VirtualBackEnd:
     def now(self) -> float:
         return self._world.time
 
+    def clock(self) -> float:
+        return self._world.time
+
     def pause(self, seconds: float) -> None:
         self._world._check()
         self._world._advance(max(1, round(seconds / DT)))

@@ -34,6 +34,10 @@ class Newest:
         if self._on_message is not None:
             self._on_message(message)
 
+    def close(self) -> None:
+        """Unsubscribe."""
+        self._subscriber.unregister()
+
     def age(self) -> float:
         """Returns the age of the last message, s in the time of the cell; large if there was none."""
         return (time.monotonic() - self.stamp) * PACE.factor
