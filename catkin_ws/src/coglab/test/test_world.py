@@ -82,7 +82,7 @@ def test_time_passes_only_inside_calls_and_thinking_is_no_stall(world):
 
 def test_a_motion_ends_with_its_block(world):
     arm = world.robot.arm
-    with arm.start_joints(arm.home + 0.5, duration=6.0) as motion:
+    with arm.start_joints(arm.home - 0.5, duration=6.0) as motion:
         world.step(1.0)
         assert not motion.done and not world.robot.state.standing
     assert (motion.result.ok, motion.result.reason) == (False, "CANCELLED")
@@ -92,7 +92,7 @@ def test_a_motion_ends_with_its_block(world):
 def test_a_motion_that_takes_too_long_is_stopped_and_named(world):
     arm = world.robot.arm
     with pytest.raises(TimeoutError, match="the end of 'move_joints' did not come within 0.5 s"):
-        arm.move_joints(arm.home + 0.5, duration=5.0, limit=0.5)
+        arm.move_joints(arm.home - 0.5, duration=5.0, limit=0.5)
     assert world.robot.state.standing
 
 
@@ -108,7 +108,7 @@ def test_interrupt_stops_the_motion(world):
     world.after_period.append(press)
     try:
         with pytest.raises(KeyboardInterrupt):
-            arm.move_joints(arm.home + 0.5, duration=6.0)
+            arm.move_joints(arm.home - 0.5, duration=6.0)
     finally:
         world.after_period.remove(press)
     assert world.robot.state.standing and world.time < begun + 3.0
@@ -129,7 +129,7 @@ def test_hold_and_stop_are_latched_until_reset(world, latch):
 
 def test_robot_is_reset_after_the_controller_left_command_mode(world):
     arm = world.robot.arm
-    with arm.start_joints(arm.home + 0.5, duration=6.0) as motion:
+    with arm.start_joints(arm.home - 0.5, duration=6.0) as motion:
         world.step(1.0)
         world.leave_command_mode()
         result = motion.wait()

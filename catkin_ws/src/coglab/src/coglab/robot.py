@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike
 
 from coglab.back_end import BackEnd
 from coglab.results import Event, Exchange, MotionResult, Refused, Result, RobotState
-from coglab.values import finite, joints_of, number, pose_of
+from coglab.values import finite, has_shape, joints_of, number, pose_of
 
 Joints = ArrayLike
 PoseLike = Pose | Sequence[Any] | np.ndarray
@@ -229,7 +229,7 @@ class Arm:
         limit = number(limit, "limit", "s", 0.0)
         name = frame if isinstance(frame, str) else OWN_FRAME
         if not isinstance(frame, str):
-            if offset is None and not isinstance(frame, Pose) and np.shape(frame) == (3,):
+            if offset is None and not isinstance(frame, Pose) and has_shape(frame, (3,)):
                 offset = (0.0, 0.0, 0.0)  # a bare position leaves the orientation free
             self._show(_place_of(frame, "frame"))
         position, orientation = _goal_of(offset)
@@ -263,7 +263,7 @@ class Arm:
             if not callable(target):
                 raise ValueError(f"target: the name of a frame or a function of time is expected, got {target!r}")
             first = target(0.0)
-            if np.shape(first) == (3,) and not isinstance(first, Pose) and offset is None:
+            if has_shape(first, (3,)) and not isinstance(first, Pose) and offset is None:
                 offset = (0.0, 0.0, 0.0)  # a position leaves the orientation free
             self._show(_place_of(first, "target(t)"))
         with self.start_reach(primitive, name, offset, limit=limit) as motion:
@@ -474,7 +474,9 @@ class Robot:
         self._check()
         begun = self.time
         self._cell.stop(reason)
-        return self._come_to_rest("stop", begun, limit)
+        result = self._come_to_rest("stop", begun, limit)
+        self._wait(lambda: not self._cell.actions or self._resettable(), limit, "the end of the brain's action")
+        return result
 
     def hold(self, reason: str = "held from Python", *, limit: float = STOPPING) -> Result:
         """Brake the arm and latch until ``reset()``."""
@@ -685,8 +687,12 @@ class Robot:
         try:
             self._cell.stop(reason)
             self._wait(self._stands, STOPPING, "the arm to stand")
+            self._wait(self._at_rest, STOPPING, "the end of the brain's action")
         except (TimeoutError, RuntimeError, PortError):
             pass  # the caller gets the first error
+
+    def _at_rest(self) -> bool:
+        return not self._cell.actions or self._cell.state().in_hub
 
     def _halt(self, reason: str) -> None:
         """End every motion and wait until the arm stands."""
@@ -766,7 +772,7 @@ def _goal_of(offset: Any) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Position and orientation of the palm relative to the goal frame. A bare position leaves the orientation free."""
     if offset is None:
         return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
-    if not isinstance(offset, Pose) and np.shape(offset) == (3,):
+    if not isinstance(offset, Pose) and has_shape(offset, (3,)):
         x, y, z = finite(offset, "offset", (3,))
         return (float(x), float(y), float(z)), UNSET
     pose = pose_of(offset, "offset")
@@ -775,7 +781,7 @@ def _goal_of(offset: Any) -> tuple[tuple[float, ...], tuple[float, ...]]:
 
 def _place_of(value: Any, name: str) -> Pose:
     """A pose, or a bare position [3]."""
-    if not isinstance(value, Pose) and np.shape(value) == (3,):
+    if not isinstance(value, Pose) and has_shape(value, (3,)):
         return Pose(finite(value, name, (3,)))
     return pose_of(value, name)
 

@@ -212,7 +212,7 @@ class _RunningBackEnd:
         for topic in (self._state, *self._topics):
             topic.close()
         if self.hand is not None:
-            self.hand.close()
+            self.hand.disconnect()
         self._listener.unregister()
 
     def check(self) -> None:

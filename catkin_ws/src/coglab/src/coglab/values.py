@@ -23,6 +23,14 @@ def finite(value: Any, name: str, shape: tuple[int, ...]) -> np.ndarray:
     return array
 
 
+def has_shape(value: Any, shape: tuple[int, ...]) -> bool:
+    """True if the value is made of numbers in this shape."""
+    try:
+        return bool(np.shape(value) == shape)
+    except ValueError:  # of rows of different lengths
+        return False
+
+
 def joints_of(value: Any, name: str) -> np.ndarray:
     """Seven joint positions, rad."""
     return finite(value, name, (7,))
@@ -41,7 +49,7 @@ def pose_of(value: Any, name: str) -> Pose:
     """A Pose from a Pose, from (position [3] m, quaternion [4] x y z w), or from a 4 x 4 matrix."""
     if isinstance(value, Pose):
         position, orientation = value.position, value.orientation
-    elif np.shape(value) == (4, 4):
+    elif has_shape(value, (4, 4)):
         matrix = finite(value, name, (4, 4))
         turn = matrix[:3, :3]
         if np.abs(turn @ turn.T - np.eye(3)).max() > 1e-6 or np.linalg.det(turn) < 0.0:

@@ -110,7 +110,7 @@ class RosHand:
         self._status = Newest(f"{namespace}/hand_status", HandStatus)
         self._calibration = rospy.Publisher(f"{namespace}/hand_calibration", String, queue_size=1)
 
-    def close(self) -> None:
+    def disconnect(self) -> None:
         """Disconnect the action clients."""
         for client in self._clients.values():
             client.stop()
