@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from types import TracebackType
-from typing import Any
+from typing import Any, TypeAlias
 
 import coglab_controllers as cc
 import numpy as np
@@ -27,8 +27,7 @@ from coglab.back_end import BackEnd
 from coglab.results import Event, Exchange, MotionResult, Refused, Result, RobotState
 from coglab.values import finite, has_shape, joints_of, number, pose_of
 
-Joints = ArrayLike
-PoseLike = Pose | Sequence[Any] | np.ndarray
+PoseLike: TypeAlias = Pose | Sequence[Any] | np.ndarray
 
 JOINT_NAMES = ("a1", "a2", "e1", "a3", "a4", "a5", "a6")
 POLL = 0.005  # s between two looks of a wait
@@ -125,7 +124,7 @@ class Arm:
         """Joint positions at home, rad, shape (7,)."""
         return home_posture().copy()
 
-    def move_joints(self, joints: Joints, duration: float | None = None, *, limit: float = 30.0) -> MotionResult:
+    def move_joints(self, joints: ArrayLike, duration: float | None = None, *, limit: float = 30.0) -> MotionResult:
         """Move in joint space, all joints at once.
 
         ``joints``: target, rad, shape (7,). ``duration``: s, if it shall take longer than at default speed, or shorter
@@ -133,7 +132,7 @@ class Arm:
         """
         return self.start_joints(joints, duration, limit=limit).wait()
 
-    def start_joints(self, joints: Joints, duration: float | None = None, *, limit: float = 30.0) -> Motion:
+    def start_joints(self, joints: ArrayLike, duration: float | None = None, *, limit: float = 30.0) -> Motion:
         """Start ``move_joints`` and return it while it runs."""
         target = joints_of(joints, "joints")
         _within_limits(target)

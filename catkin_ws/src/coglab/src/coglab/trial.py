@@ -142,7 +142,7 @@ class Trial:
         """The record as the rows that plots and reports of running systems use, too."""
         rows = range(len(self.time))
         forces = np.linalg.norm(self.hand_force, axis=1)
-        truth = [
+        truth: list[tuple[Any, ...]] = [
             (t, palm, person, thing, float(force))
             for t, palm, person, thing, force in zip(
                 self.time, self.palm_position, self.person_position, self.object_position, forces, strict=True
@@ -197,24 +197,30 @@ class Trial:
             if not file.is_file():
                 raise FileNotFoundError(f"{file} is not there: give the folder that Trial.save() returned")
         try:
-            data = yaml.safe_load(words.read_text(encoding="utf-8"))
+            data: dict[str, Any] = yaml.safe_load(words.read_text(encoding="utf-8"))
             version = data.pop("version")
             if version != VERSION:
                 raise ValueError(f"its version is {version}, this program reads version {VERSION}")
-            with np.load(numbers, allow_pickle=False) as file:
-                arrays = {name: file[name] for name in ARRAYS}
+            with np.load(numbers, allow_pickle=False) as stored:
+                arrays: dict[str, Any] = {name: stored[name] for name in ARRAYS}
             count = len(arrays["time"])
             for name, shape in ARRAYS.items():
                 if arrays[name].shape != (count, *shape):
                     raise ValueError(f"{name} has the shape {arrays[name].shape}, {(count, *shape)} is expected")
-            results = tuple(Exchange(**{**row, "causes": tuple(row["causes"])}) for row in data.pop("results"))
-            phases = tuple(Phase(**row) for row in data.pop("phases"))
-            rows = {name: tuple(map(tuple, data.pop(name))) for name in ("transitions", "contacts", "said")}
-            return Trial(results=results, phases=phases, **rows, **data, **arrays)
+            data["results"] = tuple(_exchange(row) for row in data["results"])
+            data["phases"] = tuple(Phase(**row) for row in data["phases"])
+            for name in ("transitions", "contacts", "said"):
+                data[name] = tuple(map(tuple, data[name]))
+            return Trial(**data, **arrays)
         except FileNotFoundError:
             raise
         except Exception as error:  # of yaml, zip, numpy, or a field that is missing
             raise ValueError(f"{place} has no trial that can be read: {error}") from None
+
+
+def _exchange(row: dict[str, Any]) -> Exchange:
+    values: dict[str, Any] = {**row, "causes": tuple(row["causes"])}
+    return Exchange(**values)
 
 
 def speed_of(times: np.ndarray, points: np.ndarray) -> np.ndarray:
