@@ -45,8 +45,8 @@ class BackEnd(Protocol):
     def submit(self, action: str, object_id: str) -> Answer:
         """Send a trigger to the brain."""
 
-    def result_since(self, begun: float, action: str) -> Exchange | None:
-        """Returns the newest result of this action that began at ``begun`` s or later; None if there is none."""
+    def result(self, action: str) -> Exchange | None:
+        """Returns the result of this action since the last accepted trigger; None while it runs."""
 
     def stop(self, reason: str) -> None:
         """STOP: the arm brakes and latches, the brain ends its action."""

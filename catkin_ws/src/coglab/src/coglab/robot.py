@@ -651,14 +651,13 @@ class Robot:
         self._wait(lambda: cell.state().in_hub, limit, f"a hub of the brain before '{name}'")
         if action not in cell.state().actions:
             raise Refused(self._wrong_hub(name), ReasonCode.WRONG_STATE)
-        begun = self.time
         answer = cell.submit(action, object_id or "")
         if not answer.ok:
             raise Refused(_for_python(answer.message), answer.code)
         found: list[Exchange] = []
 
         def over() -> bool:
-            result = cell.result_since(begun, action)
+            result = cell.result(action)
             if result is not None and not found:
                 found.append(replace(result, what=name))
             return bool(found)

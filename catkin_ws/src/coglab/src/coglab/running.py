@@ -39,7 +39,7 @@ BASE = "world"
 KEPT_EVENTS = 10_000
 SHOW_PERIOD = 0.02  # s between two broadcasts of an own frame
 ANSWER = 2.0  # s, longest wait for an answer of the master or of a node
-RESULT_EARLY = 0.2  # s by which the start of an action may seem to lie before its request
+LATCHED = 0.2  # s in which a latched message comes after its topic is connected
 
 
 class NoRobot(ConnectionError):
@@ -170,9 +170,11 @@ class _RunningBackEnd:
         self._results: list[tuple[float, Exchange]] = []
         self._events: deque[Event] = deque(maxlen=KEPT_EVENTS)
         self._connected = rospy.get_time()
+        self._submitted = time.monotonic()
+        self._result_topic = Newest(f"{prefix}coglab/results", String, self._on_result)
         self._topics = [
+            self._result_topic,
             Newest(f"{prefix}coglab/transitions", Transition, self._on_transition),
-            Newest(f"{prefix}coglab/results", String, self._on_result),
             Newest(f"{prefix}say", Say, self._on_say),
         ]
         self._buffer = tf2_ros.Buffer(debug=False)
@@ -192,6 +194,7 @@ class _RunningBackEnd:
         }
         if self.actions:
             heard["the state of the brain"] = lambda: self._state.message is not None
+            heard["the topic coglab/results"] = self._result_topic.is_connected
         if self.hand is not None:
             hand = self.hand
             heard["the status of the hand"] = lambda: hand.state().event != ReasonCode.NODE_SILENT
@@ -200,6 +203,8 @@ class _RunningBackEnd:
             if time.monotonic() > end:
                 raise NoRobot(f"{' and '.join(missing)} did not come within {limit:g} s; see ./coglab status")
             time.sleep(0.02)
+        if self.actions:
+            time.sleep(LATCHED)  # so that an old result is not taken for a new one
 
     def close(self) -> None:
         """Unsubscribe from everything. The node stays for other connections."""
@@ -251,6 +256,7 @@ class _RunningBackEnd:
         )
 
     def submit(self, action: str, object_id: str) -> Answer:
+        submitted = time.monotonic()
         pending = call(f"{self._prefix}coglab/start", Start, wait=ANSWER, action=action, object_id=object_id)
         end = time.monotonic() + 2 * ANSWER + 2.0
         while not pending.done():
@@ -262,16 +268,17 @@ class _RunningBackEnd:
             answer = pending.result()
         except PortError as error:
             return Answer(False, error.sentence.partition(" refused: ")[2] or error.sentence, error.code)
+        self._submitted = submitted
         # The state from before the request must not be taken for the hub after the action.
         end = time.monotonic() + 1.0
         while self.state().in_hub and action in self.state().actions and time.monotonic() < end:
             time.sleep(0.005)
         return Answer(True, answer.message)
 
-    def result_since(self, begun: float, action: str) -> Exchange | None:
+    def result(self, action: str) -> Exchange | None:
         with self._lock:
-            for _, result in reversed(self._results):
-                if result.started >= begun - RESULT_EARLY and ACTIONS.get(result.what, result.what) == action:
+            for arrived, result in reversed(self._results):
+                if arrived > self._submitted and ACTIONS.get(result.what, result.what) == action:
                     return result
         return None
 

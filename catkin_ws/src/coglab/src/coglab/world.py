@@ -409,6 +409,7 @@ class _VirtualBackEnd:
         self._watch = StateWatch(trial.ctx, lambda state: None)
         self._frames: dict[str, Pose] = {}
         self._push_until = 0.0
+        self._before = 0  # results before the last trigger
         self._events: deque[Event] = deque(maxlen=KEPT_EVENTS)
         self._said = 0
         trial.ctx.journal.listen(self._on_transition)
@@ -441,14 +442,16 @@ class _VirtualBackEnd:
         return self._watch.now()
 
     def submit(self, action: str, object_id: str) -> Answer:
+        before = len(self._trial.results)
         answer = ask_for(self._trial.ctx, action, object_id)
         if answer.ok:
+            self._before = before
             self._trial.begun.append(action)
         return answer
 
-    def result_since(self, begun: float, action: str) -> Exchange | None:
-        for result in reversed(self._trial.results):
-            if result.action == action and result.started >= begun - DT:
+    def result(self, action: str) -> Exchange | None:
+        for result in reversed(self._trial.results[self._before :]):
+            if result.action == action:
                 return exchange_of(result)
         return None
 

@@ -34,6 +34,10 @@ class Newest:
         if self._on_message is not None:
             self._on_message(message)
 
+    def is_connected(self) -> bool:
+        """True if the topic has a publisher."""
+        return bool(self._subscriber.get_num_connections())
+
     def close(self) -> None:
         """Unsubscribe."""
         self._subscriber.unregister()
