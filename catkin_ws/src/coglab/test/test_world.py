@@ -143,8 +143,10 @@ def test_hand_makes_preshapes_closes_and_opens(world):
     assert hand.close(300).ok
     closed = hand.fingers
     assert hand.open().ok and sum(hand.fingers) < sum(closed)
-    with pytest.raises(coglab.Refused, match="cylindrical"):
+    with pytest.raises(ValueError, match="cylindrical"):
         hand.preshape("fist of fury")
+    with pytest.raises(coglab.Refused, match="high"):
+        hand.preshape("lateral", "low")
     for wrong in (0, 512, 2.5, None, "fast"):
         with pytest.raises(ValueError, match="1 .. 511"):
             hand.open(wrong)

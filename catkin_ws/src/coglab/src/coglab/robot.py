@@ -20,7 +20,7 @@ from coglab_py.pose import Pose
 from coglab_smach.kinematics.reachability import default_arm, home_posture, joint_limits, solve
 from coglab_smach.ports.interfaces import DmpRequest
 from coglab_smach.ports.pending import Pending, PortError
-from ih2_hand.grasps import LEVELS
+from ih2_hand.grasps import CLOSING_MOTORS, LEVELS, levels_of
 from numpy.typing import ArrayLike
 
 from coglab.back_end import BackEnd
@@ -374,13 +374,16 @@ class Hand:
         """True if the motors feel an object between the fingers."""
         return bool(self._port().state().holding)
 
-    def preshape(self, name: str, level: str = "medium", *, limit: float = 10.0) -> Result:
+    def preshape(self, name: str, level: str | None = None, *, limit: float = 10.0) -> Result:
         """Prepare a grasp: "cylindrical", "lateral", "tridigit", "bidigit", "tridigit2" or "bidigit2". ``level``: force
-        of the later grasp, "low", "medium" or "high"."""
-        if level not in LEVELS:
+        of the later grasp, "low", "medium" or "high"; None: the lowest one that every hand has for this grasp."""
+        if name not in CLOSING_MOTORS:
+            raise ValueError(f"name: one of {', '.join(CLOSING_MOTORS)} is expected, got {name!r}")
+        force = levels_of(name, "legacy")[0] if level is None else level
+        if force not in LEVELS:
             raise ValueError(f"level: one of {', '.join(LEVELS)} is expected, got {level!r}")
         self._empty("preshape")
-        return self._do(f"preshape {name}", lambda: self._port().preshape(str(name), level), limit)
+        return self._do(f"preshape {name}", lambda: self._port().preshape(name, force), limit)
 
     def close(self, speed: int | None = None, *, limit: float = 10.0) -> Result:
         """Close the fingers: the preshaped grasp, or with ``speed`` (1 .. 511, sets the force too) from where they

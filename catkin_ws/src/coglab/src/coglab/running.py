@@ -14,9 +14,15 @@ from collections.abc import Callable, Mapping
 from typing import Any
 from urllib.parse import urlparse
 
-import rosgraph
-import rospy
-import tf2_ros
+try:
+    import rosgraph
+    import rospy
+    import tf2_ros
+except ImportError as error:
+    raise ImportError(
+        f"coglab.connect() needs ROS 1, and it is not there ({error}): use ./coglab shell python3, or install Debian's "
+        "python3-rospy and python3-tf2-ros; coglab.World needs no ROS master"
+    ) from error
 from coglab_msgs.msg import MasterState as MasterStateMessage
 from coglab_msgs.msg import ReasonCode, Say, Transition
 from coglab_msgs.srv import LwrCommand, Start
