@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""A small study: the same people, three timings of the robot; fluency after Hoffman (2019)."""
+"""A small study: the same people, two timings of the robot; fluency after Hoffman (2019)."""
 
 import coglab
 import numpy as np
@@ -13,7 +13,7 @@ def main() -> None:
     arguments.add_argument("--workers", type=int, default=2)
     options = arguments.parse_args()
 
-    timings = ("calm", "natural", "brisk")
+    timings = ("calm", "natural")
     table = []
     for timing in timings:
         trials = coglab.trials(options.people, workers=options.workers, settings={"timing": timing})
@@ -27,7 +27,7 @@ def main() -> None:
     axes = figure.subplots()
     labels = ("person idle", "robot idle", "both active", "functional delay")
     for k, (timing, row) in enumerate(zip(timings, table, strict=True)):
-        axes.bar(np.arange(4) + 0.27 * (k - 1), 100.0 * row, 0.25, label=timing)
+        axes.bar(np.arange(4) + 0.27 * (k - 0.5), 100.0 * row, 0.25, label=timing)
     axes.set_xticks(range(4), labels)
     axes.set_ylabel("share of the handover [%]")
     axes.axhline(0.0, color="0.2", linewidth=0.8)

@@ -240,6 +240,7 @@ def test_arguments_of_a_world_are_checked(world):
 
     assert "mug" in other(object="teapot") and "accustomed" in other(person="robot")
     assert "trust" in other(person={"trsut": 1.0}) and "pull_back" in other(behaviour="rude")
+    assert "calm" in other(settings={"timing": "frantic"})
     assert "board" in other(object_on="moon") and "seed" in other(seed=-1)
 
 

@@ -21,6 +21,7 @@ from coglab_sim.person.in_cell import pose_of_truth
 from coglab_sim.person.participant import BEHAVIOURS, PROFILES, Participant
 from coglab_sim.person.virtual_human import VirtualHuman
 from coglab_sim.tracker.tracker import PerceptionSettings
+from coglab_smach.context.config import ConfigError
 from coglab_smach.context.context import Context
 from coglab_smach.context.journal import TransitionRecord
 from coglab_smach.context.master_state import MasterState, StateWatch
@@ -107,6 +108,9 @@ class World:
             cell = Cell(seed, conditions, "human_hand" if object_on == "person" else "world")
             self._stack = ExitStack()
             trial = VirtualTrial(world=cell, settings=settings, recogniser=recogniser, touch=touch, machine=machine)
+        except ConfigError as error:
+            self._release_thread()
+            raise ValueError(f"settings: {error}") from None
         except BaseException:
             self._release_thread()
             raise
