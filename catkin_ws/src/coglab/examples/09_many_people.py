@@ -26,7 +26,7 @@ def main() -> None:
     left.set_xlabel("duration [s]")
     left.set_ylabel("handovers")
     middle.hist([trial.peak_force for trial in good], bins=12)
-    middle.set_xlabel("largest force before the release [N]")
+    middle.set_xlabel("largest force while both hold [N]")
     fluency = np.array([(f.human_idle, f.robot_idle, f.concurrent_activity) for f in (t.fluency() for t in good)])
     right.boxplot(100.0 * fluency.reshape(-1, 3))
     right.set_xticks([1, 2, 3], ["person idle", "robot idle", "both active"], fontsize=8)

@@ -12,7 +12,7 @@ with coglab.World(seed=5, person="accustomed", object="bottle") as world:
 
     def push(world: coglab.World) -> None:
         """Somebody knocks against the arm once, while it carries the bottle."""
-        if not pushes and world.robot.state.holding:
+        if not pushes and not any(world.truth["human_force"]) and world.truth["held_by"] == "robot":
             pushes.append(world.time)
             world.push([0.0, 25.0, 0.0], seconds=0.2)
 
@@ -20,7 +20,7 @@ with coglab.World(seed=5, person="accustomed", object="bottle") as world:
     trial = world.trial("receive", "give")
 
 print(*trial.results, sep="\n")
-print(f"largest force before the release: {trial.peak_force:.1f} N")
+print(f"largest force while both touch the bottle: {trial.peak_force:.1f} N")
 figure = new_figure(8, 6)
 top, middle, bottom = figure.subplots(3, sharex=True)
 top.plot(trial.time, np.linalg.norm(trial.hand_force, axis=1))

@@ -28,6 +28,7 @@ HOLDERS = ("nobody", "human", "robot", "board")
 VERSION = 1  # of the files that save() writes
 SAMPLE = 2  # periods between two samples: 10 ms
 PERSON_SPEED, PALM_SPEED = 0.05, 0.05  # m/s, from which a hand counts as active
+TOUCH = 0.05  # N, from which the person touches the object
 FINGER_SPEED = 20.0  # counts of 254 per s, from which the robot's fingers count as active
 
 ARRAYS = {
@@ -134,8 +135,8 @@ class Trial:
 
     @property
     def peak_force(self) -> float:
-        """N, largest force on the robot's hand while the person holds the object too; 0 if that never was."""
-        shared = self.held_by == HOLDERS.index("human")
+        """N, largest force on the robot's hand while the person touches the object too; 0 if that never was."""
+        shared = np.linalg.norm(self.person_force, axis=1) > TOUCH
         return float(np.linalg.norm(self.hand_force[shared], axis=1).max(initial=0.0))
 
     def series(self) -> Series:
