@@ -584,7 +584,7 @@ class Robot:
 
     def _check(self) -> None:
         if self._closed:
-            raise RuntimeError("this robot was closed: call coglab.connect() again")
+            raise RuntimeError("this robot was closed: connect again, or open another World")
         self._cell.check()
 
     def _pause(self, seconds: float) -> None:
@@ -754,15 +754,16 @@ def _posture(target: Pose, start: np.ndarray) -> np.ndarray | None:
     """Joint positions that bring the palm to a pose within 0.1 mm and 0.01 deg; None if it is out of reach."""
     arm, limits = default_arm(), joint_limits()
     for begin in (start, home_posture()):
-        posture = solve(arm, target, begin)
+        near = solve(arm, target, begin.tolist())
+        if near is None:
+            continue
+        posture: np.ndarray = near
         for _ in range(20):
-            if posture is None:
-                break
             position, orientation = arm.fk(posture)
             turn = (target.rotation * Pose(position, orientation).rotation.inv()).as_rotvec()
             error = np.concatenate([target.position - position, turn])
             if np.abs(error[:3]).max() < 1e-4 and np.abs(error[3:]).max() < 2e-4:
-                return np.asarray(posture)
+                return posture
             j = arm.jacobian(posture)
             posture = posture + j.T @ np.linalg.solve(j @ j.T + 1e-8 * np.eye(6), error)
             posture = np.clip(posture, limits.lower_position, limits.upper_position)
