@@ -196,9 +196,9 @@ def run(top: Path, options: argparse.Namespace) -> int:
         if not options.no_console:
             threading.Thread(target=say_console, args=(out / "ros_home", system.alive), daemon=True).start()
         import rospy
+        from coglab.plot import draw_trial
 
         from coglab_bringup.handover import run_handover
-        from coglab_bringup.trial_plot import draw_trial
         from coglab_bringup.trial_recorder import TrialRecorder
 
         rospy.init_node("coglab_demo", anonymous=True, disable_signals=True)

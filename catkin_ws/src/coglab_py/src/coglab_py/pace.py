@@ -39,7 +39,7 @@ class Pace:
 
     def follow(self, topic: str = TOPIC) -> Pace:
         """Subscribe to the cell's factor. Returns self."""
-        import rospy  # here, because states use clocks without ROS, too
+        import rospy  # here, so that programs without ROS can use this module
         from std_msgs.msg import Float64
 
         self._subscriber = rospy.Subscriber(topic, Float64, lambda message: self.change(message.data))
@@ -47,10 +47,10 @@ class Pace:
 
     def change(self, factor: float) -> None:
         """Set the factor. A value outside of (0, 1] is ignored."""
-        import rospy
-
         if not 0.0 < factor <= 1.0 or factor == self.factor:
             return
+        import rospy
+
         with self._lock:
             self._steady.change(time.monotonic(), factor)
             self._stamps.change(rospy.get_time(), factor)

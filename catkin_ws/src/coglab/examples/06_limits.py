@@ -3,8 +3,9 @@
 
 import coglab_controllers as cc
 import numpy as np
-from example_files import LIMITS, URDF, pyplot, save_plot
+from example import LIMITS, URDF, new_figure, parser, save
 
+options = parser(__doc__).parse_args()
 CYCLE = 0.005
 chain = cc.Chain(URDF.read_text())
 limits = cc.load_joint_limits(str(LIMITS))
@@ -20,11 +21,12 @@ for _ in time:
     scales.append(result.scale)
     reasons.append(result.reason)
 
-pyplot.figure(figsize=(7, 3.5))
+figure = new_figure(7, 3.5)
+axes = figure.subplots()
 for reason in dict.fromkeys(reasons):
     chosen = np.array([r == reason for r in reasons])
-    pyplot.plot(time[chosen], np.array(scales)[chosen], ".", markersize=3, label=reason)
-pyplot.xlabel("time [s]")
-pyplot.ylabel("share of the request that passes")
-pyplot.legend()
-save_plot(__file__)
+    axes.plot(time[chosen], np.array(scales)[chosen], ".", markersize=3, label=reason)
+axes.set_xlabel("time [s]")
+axes.set_ylabel("share of the request that passes")
+axes.legend()
+save(figure, __file__, options.out)

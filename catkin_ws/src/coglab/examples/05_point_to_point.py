@@ -3,8 +3,9 @@
 
 import coglab_controllers as cc
 import numpy as np
-from example_files import LIMITS, pyplot, save_plot
+from example import LIMITS, new_figure, parser, save
 
+options = parser(__doc__).parse_args()
 CYCLE, KP = 0.005, 10.0
 limits = cc.load_joint_limits(str(LIMITS))
 start = np.array([0.0, 0.5, 0.0, -1.2, 0.0, 0.8, 0.0])
@@ -24,11 +25,12 @@ for t in time:
     followed.append(interpolator.velocity)
 print(f"off by {np.degrees(np.abs(interpolator.position - target).max()):.4f} deg after another 0.5 s")
 
-pyplot.figure(figsize=(7, 4))
-lines = pyplot.plot(time, planned, "--", linewidth=0.8)
+figure = new_figure(7, 4)
+axes = figure.subplots()
+lines = axes.plot(time, planned, "--", linewidth=0.8)
 for line, values, name in zip(lines, np.transpose(followed), ("a1", "a2", "e1", "a3", "a4", "a5", "a6"), strict=True):
-    pyplot.plot(time, values, color=line.get_color(), label=name)
-pyplot.xlabel("time [s]")
-pyplot.ylabel("joint velocity [rad/s], planned dashed")
-pyplot.legend(ncols=4)
-save_plot(__file__)
+    axes.plot(time, values, color=line.get_color(), label=name)
+axes.set_xlabel("time [s]")
+axes.set_ylabel("joint velocity [rad/s], planned dashed")
+axes.legend(ncols=4)
+save(figure, __file__, options.out)

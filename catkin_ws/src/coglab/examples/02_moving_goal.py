@@ -3,8 +3,9 @@
 
 import coglab_controllers as cc
 import numpy as np
-from example_files import PRIMITIVES, pyplot, save_plot
+from example import PRIMITIVES, new_figure, parser, save
 
+options = parser(__doc__).parse_args()
 CYCLE = 0.005
 UPRIGHT = [0.0, 0.0, 0.0, 1.0]
 library = cc.Library()
@@ -25,7 +26,8 @@ for i in range(0, len(times), 7):
     for k in range(i, min(i + 7, len(times))):
         seen[k] = seen[k] + noise
 
-figure, (top, bottom) = pyplot.subplots(2, sharex=True, figsize=(7, 5))
+figure = new_figure(7, 5)
+(top, bottom) = figure.subplots(2, sharex=True)
 top.plot(times, [g[1] for g in seen], color="0.7", label="goal as received")
 for constant, label in ((0.0, "estimator off"), (0.06, "estimator 0.06 s")):
     motion = cc.CartesianMotion(constant)
@@ -43,4 +45,4 @@ top.set_ylabel("y [m]")
 bottom.set_ylabel("y'' [m/s²]")
 bottom.set_xlabel("time [s]")
 top.legend()
-save_plot(__file__)
+save(figure, __file__, options.out)

@@ -3,13 +3,15 @@
 
 import coglab_controllers as cc
 import numpy as np
-from example_files import PRIMITIVES, pyplot, save_plot
+from example import PRIMITIVES, new_figure, parser, save
 
+options = parser(__doc__).parse_args()
 CYCLE, GOAL = 0.005, np.array([0.4, 0.0, -0.2])
 library = cc.Library()
 library.load(str(PRIMITIVES))
 
-figure, (left, right) = pyplot.subplots(1, 2, figsize=(9, 4))
+figure = new_figure(9, 4)
+(left, right) = figure.subplots(1, 2)
 for name, ratio in (("reach_human", 1.0), ("reach_human", 2.0), ("put_board", 1.0)):
     dmp = cc.Dmp(library["reach_human"], [0.0, 0.0, 0.0], GOAL)
     path, speeds = [], []
@@ -28,4 +30,4 @@ left.set_ylabel("z [m]")
 right.set_xlabel("time [s], switched at 0.5")
 right.set_ylabel("speed [m/s]")
 left.legend()
-save_plot(__file__)
+save(figure, __file__, options.out)

@@ -5,13 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.transforms import Bbox
 
-from coglab_bringup.trial_recorder import Trial
+from coglab.series import Series, state_intervals
 
 # Colours of Okabe and Ito, which colour-blind readers can distinguish
 COLOURS = ["#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#CC79A7", "#1B1F24"]
@@ -44,27 +45,6 @@ def _speed(times: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return grid, np.convolve(speed, np.ones(3) / 3, mode="same")
 
 
-def state_intervals(trial: Trial, end: float) -> dict[str, list[tuple[float, float, str]]]:
-    """For each container: start, end and name of its states, from the transitions. Active states end at `end` (s)."""
-    intervals: dict[str, list[tuple[float, float, str]]] = {}
-    entered: dict[tuple[str, str], float] = {}  # (container, state) -> time
-    begun: dict[str, float] = {}  # container -> time
-    left = {(path, from_state) for _, path, from_state, *_ in trial.transitions}
-    for t, path, from_state, outcome, to_state, *_ in trial.transitions:
-        above = path  # a child of a concurrence begins with its container, without a transition
-        while above and above not in begun:
-            above = above.rpartition("/")[0]
-        since = entered.pop((path, from_state), begun.get(above, trial.transitions[0][0]))
-        intervals.setdefault(path, []).append((since, t, from_state))
-        # `to_state` is a sibling, not an outcome of the container: it is left later, or its name is not the outcome's
-        if (path, to_state) in left or to_state != outcome:
-            entered[path, to_state] = t
-            begun[f"{path}/{to_state}"] = t
-    for (path, state), since in entered.items():
-        intervals.setdefault(path, []).append((since, end, state))
-    return intervals
-
-
 def rows_without_overlap(intervals: list[tuple[float, float, str]]) -> list[list[tuple[float, float, str]]]:
     """Distribute intervals over the smallest number of rows without overlaps (children of a concurrence overlap)."""
     rows: list[list[tuple[float, float, str]]] = []
@@ -78,13 +58,13 @@ def rows_without_overlap(intervals: list[tuple[float, float, str]]) -> list[list
     return rows
 
 
-def lanes_of(trial: Trial, start: float, end: float) -> list[tuple[str, list[list[tuple[float, float, str]]]]]:
+def lanes_of(trial: Series, start: float, end: float) -> list[tuple[str, list[list[tuple[float, float, str]]]]]:
     """Rows of the phases, from the outermost container inwards: label and intervals between `start` and `end` (s).
 
     Containers with the same name and depth share a lane, for example the approach of each action.
     """
     lanes: dict[tuple[int, str], list[tuple[float, float, str]]] = {}
-    for path, intervals in state_intervals(trial, end).items():
+    for path, intervals in state_intervals(trial.transitions, end).items():
         seen = [(max(since, start), min(until, end), name) for since, until, name in intervals]
         seen = [interval for interval in seen if interval[1] > interval[0]]
         if seen:
@@ -95,11 +75,11 @@ def lanes_of(trial: Trial, start: float, end: float) -> list[tuple[str, list[lis
 
 def colours_of(names: list[str]) -> dict[str, tuple]:
     """One colour for each name."""
-    palette = plt.get_cmap("tab20").colors
+    palette = matplotlib.colormaps["tab20"].colors
     return {name: palette[k % len(palette)] for k, name in enumerate(dict.fromkeys(names))}
 
 
-def _label(axis: plt.Axes, x: float, y: float, name: str, space: Bbox) -> None:
+def _label(axis: Axes, x: float, y: float, name: str, space: Bbox) -> None:
     """Write a name into its bar, in one line or one word per line. Omit it if neither fits."""
     renderer = axis.figure.canvas.get_renderer()
     for words in (name, name.replace(" ", "\n")):
@@ -110,7 +90,7 @@ def _label(axis: plt.Axes, x: float, y: float, name: str, space: Bbox) -> None:
         label.remove()
 
 
-def _phases(axis: plt.Axes, trial: Trial, start: float, end: float) -> None:
+def _phases(axis: Axes, trial: Series, start: float, end: float) -> None:
     """One lane per active container, one bar per state. Parallel children share the height of the lane. A name is
     written if it fits into its bar."""
     lanes = lanes_of(trial, start, end)
@@ -141,7 +121,7 @@ def _phases(axis: plt.Axes, trial: Trial, start: float, end: float) -> None:
     axis.tick_params(axis="y", length=0)
 
 
-def _hands(path_axis: plt.Axes, speed_axis: plt.Axes, truth: list[tuple], start: float) -> None:
+def _hands(path_axis: Axes, speed_axis: Axes, truth: list[tuple], start: float) -> None:
     """True paths and speeds of the robot's and the person's hand."""
     times, robot = _column(truth, 1, start)
     _, human = _column(truth, 2, start)
@@ -152,7 +132,7 @@ def _hands(path_axis: plt.Axes, speed_axis: plt.Axes, truth: list[tuple], start:
     speed_axis.plot(*_speed(times, human), color=COLOURS[3], ls="--", label="person's hand")
 
 
-def _torques(axis: plt.Axes, rows: list[tuple], start: float) -> None:
+def _torques(axis: Axes, rows: list[tuple], start: float) -> None:
     """External torques: one trace per joint, one above the other, on one scale that the bar at the right shows."""
     times, torques = _column(rows, 1, start)
     low, high = np.percentile(torques, [0.5, 99.5], axis=0)  # so that one peak does not flatten the other traces
@@ -167,31 +147,31 @@ def _torques(axis: plt.Axes, rows: list[tuple], start: float) -> None:
     axis.text(x * 1.008, -3 * step, f"{size:g} Nm", va="center", fontsize=TEXT, clip_on=False)
 
 
-def _fingers(axis: plt.Axes, rows: list[tuple], start: float) -> None:
+def _fingers(axis: Axes, rows: list[tuple], start: float) -> None:
     """Positions of the five finger motors."""
     times, positions = _column(rows, 1, start)
     for k, name in enumerate(FINGERS):
         axis.plot(times, positions[:, k], color=COLOURS[k], label=name)
 
 
-def _contact_lines(axes: list[plt.Axes], contacts: list[tuple], start: float) -> None:
+def _contact_lines(axes: list[Axes], contacts: list[tuple], start: float) -> None:
     """Vertical lines at the events of the contact detector, explained beside the phases."""
     kinds = {True: ("contact or load felt", ":"), False: ("load taken over", "--")}
     for axis in axes:
         for t, found, *_ in contacts:
             axis.axvline(t - start, color=CONTACT, lw=0.9, ls=kinds[bool(found)][1])
     shown = [kinds[found] for found in (True, False) if any(bool(c[1]) is found for c in contacts)]
-    handles = [plt.Line2D([], [], color=CONTACT, lw=0.9, ls=style, label=label) for label, style in shown]
+    handles = [Line2D([], [], color=CONTACT, lw=0.9, ls=style, label=label) for label, style in shown]
     if handles:
         axes[0].legend(handles=handles, loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
-def draw_trial(trial: Trial, title: str, start: float, end: float, path: Path) -> None:
-    """Write the figure of the trial between `start` and `end` (s of ROS time): `path` as PNG, a PDF beside it."""
-    with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(
-            6, 1, figsize=(7.2, 9.0), sharex=True, height_ratios=[2.2, 1.6, 0.9, 1.7, 1.0, 0.7], layout="constrained"
-        )
+def figure_of(trial: Series, title: str, start: float, end: float) -> Figure:
+    """The figure of the trial between `start` and `end` (s). It belongs to no window."""
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(7.2, 9.0), layout="constrained")
+        FigureCanvasAgg(figure)
+        axes = figure.subplots(6, 1, sharex=True, height_ratios=[2.2, 1.6, 0.9, 1.7, 1.0, 0.7])
         labels = (
             "",
             "position, m",
@@ -221,6 +201,12 @@ def draw_trial(trial: Trial, title: str, start: float, end: float, path: Path) -
         axes[-1].set_xlabel("time, s")
         _contact_lines(list(axes), [row for row in trial.contacts if start <= row[0] <= end], start)
         _phases(axes[0], trial, start, end)
+    return figure
+
+
+def draw_trial(trial: Series, title: str, start: float, end: float, path: Path) -> None:
+    """Write the figure of the trial between `start` and `end` (s of ROS time): `path` as PNG, a PDF beside it."""
+    figure = figure_of(trial, title, start, end)
+    with matplotlib.rc_context(STYLE):
         figure.savefig(path, dpi=160)
         figure.savefig(path.with_suffix(".pdf"))
-        plt.close(figure)

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import coglab_controllers as cc
 import numpy as np
-from example_files import minimum_jerk, pyplot, save_plot
+from example import minimum_jerk, new_figure, parser, save
 
+options = parser(__doc__).parse_args()
 # A demonstration: times in s and positions in m, one row each. Here a reach that is lifted on its way.
 times = np.linspace(0.0, 1.2, 241)
 way = minimum_jerk(times / 1.2)
@@ -24,7 +25,8 @@ with tempfile.TemporaryDirectory() as folder:
     library.save(str(Path(folder) / "my_primitives.xml"))
     library.load(str(Path(folder) / "my_primitives.xml"))
 
-axes = pyplot.figure(figsize=(7, 5)).add_subplot(projection="3d")
+figure = new_figure(7, 5)
+axes = figure.add_subplot(projection="3d")
 axes.plot(*demonstration.T, "k--", label="demonstration")
 for goal in ([0.5, 0.0, 0.1], [0.3, 0.4, 0.2], [-0.2, 0.4, 0.0], [0.1, -0.3, -0.1]):
     dmp = cc.Dmp(library["lifted_reach"], position=[0.0, 0.0, 0.0], goal=goal)
@@ -34,4 +36,4 @@ axes.set_xlabel("x [m]")
 axes.set_ylabel("y [m]")
 axes.set_zlabel("z [m]")
 axes.legend(fontsize=7)
-save_plot(__file__)
+save(figure, __file__, options.out)

@@ -3,8 +3,9 @@
 
 import coglab_controllers as cc
 import numpy as np
-from example_files import LIMITS, PRIMITIVES, URDF, pyplot, save_plot
+from example import LIMITS, PRIMITIVES, URDF, new_figure, parser, save
 
+options = parser(__doc__).parse_args()
 CYCLE = 0.005
 chain = cc.Chain(URDF.read_text())
 limits = cc.load_joint_limits(str(LIMITS))
@@ -15,7 +16,8 @@ position, orientation = chain.fk(start)
 goal = position + [0.1, -0.45, 0.15]
 target = chain.fk(start + [0.0, 0.0, 0.0, 0.0, 0.6, -0.5, 0.4])[1]
 
-figure, axes = pyplot.subplots(3, sharex=True, figsize=(7, 6))
+figure = new_figure(7, 6)
+axes = figure.subplots(3, sharex=True)
 for first, label in ((True, "rotation shrunk first"), (False, "whole vector scaled")):
     ik = cc.TwoTaskIk(rotation_first_scaling=first, velocity_limit=0.6 * limits.velocity)
     motion, q, velocity = cc.CartesianMotion(), start.copy(), np.zeros(7)
@@ -36,4 +38,4 @@ for axis, label in zip(axes, ("position error [mm]", "orientation error [deg]", 
     axis.set_ylabel(label)
 axes[0].legend()
 axes[-1].set_xlabel("time [s]")
-save_plot(__file__)
+save(figure, __file__, options.out)
