@@ -79,6 +79,20 @@ def test_the_hand_closes_on_command_once_and_opens_again(make):
     assert list(dict.fromkeys(phases)) == [1, 2, 3, 0]
 
 
+@pytest.mark.parametrize("control", ["palm_twist", "joint_velocity"])
+def test_no_action_breaks_a_limit_of_the_arm(make, control):
+    env = make(control=control)
+    env.reset(seed=1)
+    draw = np.random.default_rng(2)
+    terminated = False
+    for step in range(60):
+        if step % 4 == 0:
+            action = draw.choice([-1.0, 1.0], env.action_space.shape)
+        if not terminated:
+            _, _, terminated, _, info = env.step(action)
+    assert env.stage.world.robot.limit_violations == 0 and not info["stopped"]
+
+
 def test_observations_hold_nothing_of_the_truth(make):
     env = make(GIVE)
     seen, info = env.reset(seed=1)

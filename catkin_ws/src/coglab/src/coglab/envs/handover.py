@@ -59,9 +59,9 @@ class HandoverEnv(gymnasium.Env):
     estimates it (7,), ``phase`` of the robot's hand: 0 open, 1 closing, 2 closed, 3 opening; ``time`` s (1,). Poses:
     position m and quaternion x y z w in the base frame. What was never seen has an age of 10 s.
 
-    Info: ``success``, ``time`` s until the receiver held the object alone (infinite without success), ``force`` N, largest
-    on the person, ``dropped``, ``gave_up``, ``stopped`` (why the arm follows no more; empty while it does), ``person``
-    (seed), ``object``, ``reward``: its parts. All but the last three are the truth, which no observation has.
+    Info: ``success``, ``time`` s until the receiver held the object alone (infinite without success), ``force`` N,
+    largest on the person, ``dropped``, ``gave_up``, ``stopped``: why the arm follows no more (empty while it does),
+    ``person`` (seed), ``object``, ``reward``: its parts. The first five are the truth, which no observation has.
 
     ``reset(seed=...)`` draws a person of the split; ``reset(options={"person": 7})`` takes the eighth one. The same
     seed and actions give the same episode, bit for bit.
@@ -248,7 +248,7 @@ class HandoverEnv(gymnasium.Env):
             "time": [world.t - self._begun],
         }
         bounded: dict[str, Any] = {}
-        for name, space in self.observation_space.spaces.items():  # type: ignore[attr-defined]
+        for name, space in self.observation_space.spaces.items():
             if name != "phase":
                 bounded[name] = np.clip(seen[name], space.low, space.high).astype(np.float32)
         bounded["phase"] = np.int64(stage.phase)

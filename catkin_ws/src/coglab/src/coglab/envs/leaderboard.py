@@ -98,8 +98,8 @@ def run(job: Job) -> dict[str, Any]:
     if policy == "brain":
         figures = run_brain(task, split, person)
     else:
-        made: Policy = StraightReach(task) if policy == "straight" else RandomPolicy(person)
-        figures = run_policy(made, task, split, person)
+        straight = policy == "straight"
+        figures = run_policy(StraightReach(task) if straight else RandomPolicy(person), task, split, person)
     return {"person": person, **figures}
 
 
