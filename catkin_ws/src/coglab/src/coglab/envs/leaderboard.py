@@ -98,8 +98,10 @@ def run(job: Job) -> dict[str, Any]:
     if policy == "brain":
         figures = run_brain(task, split, person)
     else:
-        straight = policy == "straight"
-        figures = run_policy(StraightReach(task) if straight else RandomPolicy(person), task, split, person)
+        made: Policy = StraightReach(task)
+        if policy == "random":
+            made = RandomPolicy(person)
+        figures = run_policy(made, task, split, person)
     return {"person": person, **figures}
 
 
