@@ -171,6 +171,16 @@ def test_a_stopped_arm_ends_the_episode_with_its_reason(make):
     assert terminated and info["stopped"] and not info["success"]
 
 
+def test_a_picture_shows_the_cell(make):
+    pytest.importorskip("coglab_sim._camera", reason="built by ./coglab film alone")
+    env = make(render_mode="rgb_array")
+    env.reset(seed=1)
+    picture = env.render()
+    assert picture.shape == (480, 640, 3) and picture.dtype == np.uint8
+    red = (picture[..., 0] > 100) & (picture[..., 1] < 60)
+    assert 10 < red.sum() < 20_000  # the mug
+
+
 def test_nobody_is_in_two_splits():
     people = [set(SPLITS[name].seeds) for name in ("train", "validation", "test")]
     assert sum(map(len, people)) == len(set.union(*people))

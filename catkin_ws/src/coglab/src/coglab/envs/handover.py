@@ -151,9 +151,13 @@ class HandoverEnv(gymnasium.Env):
         if self._camera_type is None or self._stage is None:
             return None
         if self._camera is None:
-            self._camera = self._camera_type(self._stage.world.cell, 640, 480)
-            self._camera.set_colour("object", (0.85, 0.25, 0.15))
-            self._camera.look([0.7, 0.0, 0.4], 1.7, 130.0, -20.0)
+            self._camera = camera = self._camera_type(self._stage.world.cell, 640, 480)
+            camera.look([0.7, 0.0, 0.4], 1.6, -84.0, -15.0)
+            camera.set_colour("world", (0.86, 0.87, 0.88))
+            for number in range(1, 7):
+                camera.set_colour(f"lwr_link_{number}", (0.93, 0.45, 0.10))
+            camera.set_colour("object", (0.85, 0.12, 0.12))
+            camera.set_colour("person_hand", (0.89, 0.69, 0.56))
         picture: np.ndarray = self._camera.draw().copy()
         return picture
 
