@@ -154,10 +154,13 @@ def play(jobs: Sequence[Job], results: Results, workers: int, say: Callable[[str
     say(f"{len(left)} of {len(jobs)} episodes to run, {workers} at a time")
     with processes(workers) as pool:
         asked = {pool.submit(run, job): job for job in left}
-        for count, future in enumerate(as_completed(asked), 1):
-            results.add(asked[future], future.result())
-            if count % 20 == 0 or count == len(left):
-                say(f"{count} of {len(left)}")
+        try:
+            for count, future in enumerate(as_completed(asked), 1):
+                results.add(asked[future], future.result())
+                if count % 20 == 0 or count == len(left):
+                    say(f"{count} of {len(left)}")
+        finally:  # at Ctrl-C, those that have not begun never begin
+            pool.shutdown(cancel_futures=True)
 
 
 def row(episodes: Iterable[dict[str, Any]]) -> dict[str, Any]:

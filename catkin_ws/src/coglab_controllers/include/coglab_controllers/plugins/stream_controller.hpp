@@ -31,7 +31,7 @@ struct StreamRequest {
 /// The arm follows the newest command until the stream is closed: by a cancel, by a switch to
 /// another controller, or because the robot stops. If no command came for `command_timeout`, the
 /// arm brakes and stands, and the stream stays open for the next one. A limit slows the arm but
-/// does not close the stream.
+/// does not close the stream. `speed_scale` slows it as it slows every motion.
 ///
 /// Commands are reduced to the largest speeds below, in their direction; changes of velocity to the
 /// largest accelerations. The reference stays within `leash` of the commanded arm, so
