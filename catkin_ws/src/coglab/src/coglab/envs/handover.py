@@ -63,8 +63,8 @@ class HandoverEnv(gymnasium.Env):
     largest on the person, ``dropped``, ``gave_up``, ``stopped``: why the arm follows no more (empty while it does),
     ``person`` (seed), ``object``, ``reward``: its parts. The first five are the truth, which no observation has.
 
-    The robot speaks by itself, as with the shipped machines: it asks the person at the beginning, and says "I have it" or
-    "You have it" once its hand has closed on the object or has opened.
+    The robot speaks by itself, as with the shipped machines: it asks the person at the beginning, and says "I have it"
+    or "You have it" once its hand has closed on the object or has opened.
 
     ``reset(seed=...)`` draws a person of the split; ``reset(options={"person": 7})`` takes the eighth one. The same
     seed and actions give the same episode, bit for bit.
