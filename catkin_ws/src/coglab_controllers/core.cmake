@@ -72,7 +72,8 @@ add_library(coglab_controllers_plugins
   src/motion/reference_loop.cpp
   src/plugins/dmp_controller.cpp
   src/plugins/dmp_cycle.cpp
-  src/plugins/ptp_controller.cpp)
+  src/plugins/ptp_controller.cpp
+  src/plugins/stream_controller.cpp)
 target_compile_options(coglab_controllers_plugins PRIVATE -Wall -Wextra)
 target_link_libraries(coglab_controllers_plugins PUBLIC coglab_controllers_manager)
 set_target_properties(coglab_controllers_plugins PROPERTIES POSITION_INDEPENDENT_CODE ON)

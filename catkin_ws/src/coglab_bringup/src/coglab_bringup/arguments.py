@@ -276,6 +276,8 @@ def judge(top: Path, command: str, words: list[str]) -> None:
         judge_launch(top, words)
     elif command == "shell":
         _judge_shell(top, words)
+    elif command == "extras":
+        pass  # any command, also one that PyPI installs first
     elif command == "install":
         lines = (top / "debian-packages.txt").read_text(encoding="utf-8").splitlines()
         _named(words, dict.fromkeys(line.split(":")[0] for line in lines if line and line[0] != "#"), "group")

@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "coglab_rt/joint_limits_table.hpp"
+#include "stream_types.hpp"
 #include "system_calls.hpp"
 #include "virtual_robot.hpp"
 
@@ -157,6 +158,8 @@ struct Requests {
   FrameTable& frames;
   DmpController& dmp;
   PtpController& ptp;
+  StreamController& twists;
+  StreamController& joints;
   int made = 0, accepted = 0, paths = 0;
 
   void count(bool success) {
@@ -194,6 +197,14 @@ struct Requests {
     for (int i = 0; i < 3; ++i) {
       ptp.askPath();
       count(ptp.add({{-1.4 + turn, -0.6, 1.5, 1.7, 0.2, 0.2, 0.8}, {}, {}}).id >= 0);
+    }
+    for (const auto& [id, stream, size] :
+         {std::tuple("twists", &twists, 6), std::tuple("joints", &joints, 7)}) {
+      count(manager.switchTo(id, type).success);
+      count(stream->open().success);
+      const std::vector<double> command(static_cast<std::size_t>(size), 0.02 * (number % 3 - 1));
+      count(stream->send(command).success);
+      std::this_thread::sleep_for(std::chrono::microseconds(500));
     }
     count(manager.feedback().disable("limits", true).ok());
     IkDebugRecord record;
@@ -235,11 +246,15 @@ TEST(Cycle, NeitherAllocatesNorLocksWhileServicesAreCalled) {
   ASSERT_TRUE(VirtualRobot::ok(manager.load("ptp", "coglab/PtpController")));
   auto& dmp = dynamic_cast<DmpController&>(*manager.motion("dmp"));
   auto& ptp = dynamic_cast<PtpController&>(*manager.motion("ptp"));
+  ASSERT_TRUE(VirtualRobot::ok(manager.load("twists", "coglab/TwistStream")));
+  ASSERT_TRUE(VirtualRobot::ok(manager.load("joints", "coglab/JointVelocityStream")));
+  auto& twists = dynamic_cast<StreamController&>(*manager.motion("twists"));
+  auto& joints = dynamic_cast<StreamController&>(*manager.motion("joints"));
   dmp.setGoalSource(&frames);
   int loaded = 0;
   ASSERT_TRUE(
       VirtualRobot::ok(dmp.loadDmps(std::string(PACKAGE_DIR) + "/config/primitives.xml", loaded)));
-  Requests requests{manager, frames, dmp, ptp};
+  Requests requests{manager, frames, dmp, ptp, twists, joints};
   for (int round = 0; counted.cycles < kCycles || round < 30; ++round) requests.round(round);
   stop = true;
   control.join();
