@@ -1,1 +1,23 @@
-"""Own controllers in Python, for the virtual world and for the running robot."""
+"""Own motions and feedback controllers in Python."""
+
+from coglab.control.motion import (
+    Argument,
+    ControlError,
+    Motion,
+    MotionCycle,
+    MotionSetup,
+    MotionStart,
+    Reference,
+    SetPoint,
+)
+
+__all__ = [
+    "Argument",
+    "ControlError",
+    "Motion",
+    "MotionCycle",
+    "MotionSetup",
+    "MotionStart",
+    "Reference",
+    "SetPoint",
+]
