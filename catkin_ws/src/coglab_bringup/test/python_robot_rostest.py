@@ -7,6 +7,7 @@ import os
 import sys
 import time
 import unittest
+from unittest import mock
 
 import coglab
 import numpy as np
@@ -16,6 +17,7 @@ import rostest
 from coglab.running import NoRobot
 from coglab_bringup.handover import READY_LIMIT
 from coglab_msgs.msg import ReasonCode
+from coglab_msgs.srv import Start
 
 LIMIT = 90.0  # s for an exchange on a loaded machine
 
@@ -108,6 +110,8 @@ class PythonRobot(unittest.TestCase):
         self.assertEqual(own, [rospy.get_name()])
         with self.assertRaises(NoRobot):
             coglab.connect(namespace="nowhere")
+        with mock.patch("coglab.running.LwrCommand", Start), self.assertRaisesRegex(NoRobot, "another version"):
+            coglab.connect()
         before = os.environ["ROS_MASTER_URI"]
         with self.assertRaises(NoRobot):
             coglab.connect("1")
