@@ -160,7 +160,7 @@ struct Requests {
   PtpController& ptp;
   StreamController& twists;
   StreamController& joints;
-  int made = 0, accepted = 0, paths = 0;
+  int made = 0, accepted = 0, paths = 0, streamed = 0;
 
   void count(bool success) {
     ++made;
@@ -203,7 +203,9 @@ struct Requests {
       count(manager.switchTo(id, type).success);
       count(stream->open().success);
       const std::vector<double> command(static_cast<std::size_t>(size), 0.02 * (number % 3 - 1));
-      count(stream->send(command).success);
+      const bool sent = stream->send(command).success;
+      count(sent);
+      if (sent) ++streamed;
       std::this_thread::sleep_for(std::chrono::microseconds(500));
     }
     count(manager.feedback().disable("limits", true).ok());
@@ -263,6 +265,7 @@ TEST(Cycle, NeitherAllocatesNorLocksWhileServicesAreCalled) {
   EXPECT_GT(requests.made, 300);
   EXPECT_GT(requests.accepted, requests.made / 2);
   EXPECT_GT(requests.paths, 20);
+  EXPECT_GT(requests.streamed, 20);
   EXPECT_EQ(allocations.load(), 0u);
   EXPECT_EQ(locks.load(), 0u);
   const auto calls = static_cast<int>(SystemCalls::count() - calls_before);

@@ -65,8 +65,9 @@ class Stage:
             raise RuntimeError(f"the arm does not start: {outcome[0][1]}")
         self._until(self._done, "the hand does not take its preshape")
         if self.task != RECEIVE:
-            world.cell.place("robot_hand", in_palm.position, in_palm.orientation)
+            # First the order, from the preshape: closed fingers would take their preshape once more, and drop it.
             self._order(True)
+            world.cell.place("robot_hand", in_palm.position, in_palm.orientation)
             self._until(self._done, "the hand does not close on the object")
         self._told = True
         good, why = world.robot.virtual.open_stream(stream)
