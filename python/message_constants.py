@@ -1,6 +1,6 @@
 """Writes a Python module with the constants of messages, for installations without ROS.
 
-    message_constants.py MODULE.py MESSAGE.msg ...
+message_constants.py MODULE.py MESSAGE.msg ...
 """
 
 from __future__ import annotations
