@@ -28,6 +28,7 @@ SPREAD = {  # first standard deviation of each parameter, and its range
     "smoothing": (0.2, 0.0, 0.95),
     "touch": (0.7, 0.3, 6.0),
     "patience": (1.0, 0.5, 6.0),
+    "lift": (0.02, 0.0, 0.08),
 }
 
 
@@ -45,8 +46,8 @@ def judge(pool, candidates, task, split, people):
 
 
 def mean_return(figures):
-    """Mean sum of rewards."""
-    return float(np.mean([one["return"] for one in figures]))
+    """Mean sum of rewards. An episode counts -1 at least, so that a single hard push does not decide."""
+    return float(np.mean([max(-1.0, one["return"]) for one in figures]))
 
 
 def learn(pool, options, rng):

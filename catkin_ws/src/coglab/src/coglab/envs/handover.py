@@ -262,7 +262,7 @@ class HandoverEnv(gymnasium.Env):
         }
         # All bounded at once: a step has little time.
         flat = np.concatenate([seen[name] for name, _ in self._places])
-        bounded = np.clip(flat, self._low, self._high, dtype=np.float32, casting="same_kind")
+        bounded = np.clip(flat, self._low, self._high).astype(np.float32)
         observation: dict[str, Any] = {name: bounded[place] for name, place in self._places}
         observation["phase"] = np.int64(stage.phase)
         return observation

@@ -13,6 +13,8 @@ from coglab.envs.handover import SPEED, TURNING
 from coglab.envs.referee import RECEIVE
 from coglab.envs.stage import CLOSED, OPEN
 
+LIFT_SPEED = 0.03  # m/s
+
 Observation = Mapping[str, Any]
 
 
@@ -64,6 +66,8 @@ class Reaching:
     """Nm, change of the external torques that counts as the person's hand"""
     patience: float = 2.5
     """s after which the hand acts without having felt the person"""
+    lift: float = 0.0
+    """m, way up once the hand holds the object (receiving): people let go when they feel that the robot carries it"""
 
 
 class StraightReach:
@@ -79,6 +83,7 @@ class StraightReach:
         self._target: Pose | None = None
         self._stands: float | None = None
         self._calm: np.ndarray | None = None
+        self._held: float | None = None
         self._acted = False
 
     def act(self, observation: Observation) -> np.ndarray:
@@ -88,6 +93,8 @@ class StraightReach:
         if self._acted or int(observation["phase"]) != rest:
             self._acted = True  # stand still while the hand acts, and afterwards
             action[6] = 1.0 if self.task == RECEIVE else -1.0
+            if self.task == RECEIVE and float(observation["holding"][0]) > 0.0:
+                self._lift(observation, action)
             return action
         self._see(observation)
         if self._target is None:
@@ -119,6 +126,14 @@ class StraightReach:
             middle = p.smoothing * self._target.position + (1.0 - p.smoothing) * target.position
             target = Pose(middle, target.orientation)
         self._target = target
+
+    def _lift(self, observation: Observation, action: np.ndarray) -> None:
+        """Sets the part of the action that raises the object."""
+        now = float(observation["time"][0])
+        if self._held is None and int(observation["phase"]) == CLOSED:
+            self._held = now
+        if self._held is not None and now - self._held < self.reaching.lift / LIFT_SPEED:
+            action[2] = LIFT_SPEED / SPEED
 
     def _wait(self, observation: Observation) -> None:
         """Stands still until the person is felt."""
