@@ -77,7 +77,9 @@ void bindTableOne(Type& type) {
     both(
         type, paper,
         [method](Self self, const std::string& name) {
-          return (self.cast<Script&>().body(self).*method)(name);
+          Body& body = self.cast<Script&>().body(self);
+          py::gil_scoped_release unlocked;
+          return (body.*method)(name);
         },
         py::arg("name"));
   };
@@ -99,8 +101,10 @@ void bindTableOne(Type& type) {
       },
       py::arg("gains"));
   type.def("plot", [](Self self) {
+    Body& body = self.cast<Script&>().body(self);
+    py::gil_scoped_release unlocked;
     std::ostringstream out;
-    self.cast<Script&>().body(self).plot(out);
+    body.plot(out);
     return out.str();
   });
 }

@@ -274,26 +274,29 @@ void bindChanging(Class& type) {
 
 template <typename Class>
 void bindQueries(Class& type) {
+  // Another thread may hold the lock of the list and wait for Python's.
+  const py::call_guard<py::gil_scoped_release> unlocked_call;
   both(
       type, "isEnabled", [](const Feedback& m, const std::string& n) { return m.isEnabled(n); },
-      py::arg("name"));
+      py::arg("name"), unlocked_call);
   both(
       type, "isPaused", [](const Feedback& m, const std::string& n) { return m.isPaused(n); },
-      py::arg("name"));
+      py::arg("name"), unlocked_call);
   both(
       type, "getGains", [](const Feedback& m, const std::string& n) { return m.getGains(n).all(); },
-      py::arg("name"));
-  type.def("__contains__", &Feedback::has);
-  both(type, "getControllersNames", &Feedback::getControllersNames);
-  both(type, "getExecutionOrder", &Feedback::getExecutionOrder);
-  both(type, "getProfiles", &Feedback::getProfiles);
-  both(type, "hasProfile", &Feedback::hasProfile, py::arg("profile"));
-  both(type, "getUsedRobotStates", &Feedback::getUsedRobotStates, py::arg("enabled_only") = false);
+      py::arg("name"), unlocked_call);
+  type.def("__contains__", &Feedback::has, unlocked_call);
+  both(type, "getControllersNames", &Feedback::getControllersNames, unlocked_call);
+  both(type, "getExecutionOrder", &Feedback::getExecutionOrder, unlocked_call);
+  both(type, "getProfiles", &Feedback::getProfiles, unlocked_call);
+  both(type, "hasProfile", &Feedback::hasProfile, py::arg("profile"), unlocked_call);
+  both(type, "getUsedRobotStates", &Feedback::getUsedRobotStates, py::arg("enabled_only") = false,
+       unlocked_call);
   both(type, "getUsedControlStates", &Feedback::getUsedControlStates,
-       py::arg("enabled_only") = false);
-  type.def("describe", &Feedback::describe, py::arg("name"));
-  type.def("status", &Feedback::status, py::arg("name"));
-  both(type, "statusAll", &Feedback::statusAll);
+       py::arg("enabled_only") = false, unlocked_call);
+  type.def("describe", &Feedback::describe, py::arg("name"), unlocked_call);
+  type.def("status", &Feedback::status, py::arg("name"), unlocked_call);
+  both(type, "statusAll", &Feedback::statusAll, unlocked_call);
   type.def(
       "plot",
       [](const Feedback& m, const std::string& name) {
@@ -301,14 +304,17 @@ void bindQueries(Class& type) {
         name.empty() ? m.plotAll(out) : m.plot(name, out);
         return out.str();
       },
-      py::arg("name") = "");
-  both(type, "plotAll", [](const Feedback& m) {
-    std::ostringstream out;
-    m.plotAll(out);
-    return out.str();
-  });
-  type.def("attribution", &Feedback::attribution);
-  both(type, "lastCycle", &Feedback::lastCycle);
+      py::arg("name") = "", unlocked_call);
+  both(
+      type, "plotAll",
+      [](const Feedback& m) {
+        std::ostringstream out;
+        m.plotAll(out);
+        return out.str();
+      },
+      unlocked_call);
+  type.def("attribution", &Feedback::attribution, unlocked_call);
+  both(type, "lastCycle", &Feedback::lastCycle, unlocked_call);
   type.def_property_readonly("name", [](const Feedback& m) { return m.name(); });
 }
 
