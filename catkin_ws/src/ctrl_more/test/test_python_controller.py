@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import signal
 import threading
 from pathlib import Path
 
@@ -264,3 +265,18 @@ def test_store_refuses_wrong_values(value: object) -> None:
     with pytest.raises(Refused):
         control.setTaskSpaceReferencePose("ee", value)
     assert control.getTaskSpaceReferencePose("ee").tolist() == POSE
+
+
+def test_ctrl_c_in_update_reaches_the_program() -> None:
+    def interrupt(controller: Lift, modified: ctrl_more.ModifiedControlStates) -> None:
+        raise KeyboardInterrupt
+
+    cell = Cell()
+    add(cell, Lift(interrupt))
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            cell.run()
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert cell.manager.status("lift").fault == "exception"

@@ -16,8 +16,9 @@ auto guarded(Call&& call) -> decltype(call()) {
     return call();
   } catch (py::error_already_set& error) {
     // Ctrl-C is not the controller's fault alone: the program must see it as well.
+    const std::string text = shortText(error);  // runs Python, which would take the interrupt
     if (error.matches(PyExc_KeyboardInterrupt)) PyErr_SetInterrupt();
-    throw std::runtime_error(shortText(error));
+    throw std::runtime_error(text);
   }
 }
 

@@ -36,8 +36,8 @@ void PythonManager::call(const py::object& method, Call&& call) noexcept {
   try {
     call();
   } catch (py::error_already_set& error) {
+    failure_ = shortText(error);  // runs Python, which would take the interrupt
     if (error.matches(PyExc_KeyboardInterrupt)) PyErr_SetInterrupt();
-    failure_ = shortText(error);
   } catch (const std::exception& error) {
     failure_ = error.what();
   }
