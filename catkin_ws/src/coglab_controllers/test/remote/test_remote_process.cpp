@@ -4,69 +4,20 @@
 
 #include <atomic>
 #include <csignal>
-#include <cstddef>
-#include <cstring>
 #include <functional>
 #include <random>
 #include <string>
 
 #include <sys/mman.h>
 #include <sys/prctl.h>
-#include <sys/socket.h>
-#include <sys/un.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "coglab_controllers/remote/slot.hpp"
 #include "coglab_controllers/testing/virtual_arm.hpp"
+#include "remote_client.hpp"
 
 namespace coglab_controllers {
 namespace {
-
-std::string addressOf(const std::string& id) {
-  return "coglab/" + std::to_string(::getuid()) + "/" + std::to_string(::getpid()) + "/" + id;
-}
-
-std::string helloOf(RemoteKind kind, int interface = kRemoteInterface) {
-  return "coglab-slot " + std::to_string(interface) + " " + std::to_string(static_cast<int>(kind)) +
-         " " + std::to_string(kQuestionSize) + " " + std::to_string(kAnswerSize);
-}
-
-/// Connects as a process does. Returns the socket, the robot's answer and the memory.
-struct Connection {
-  Connection(const std::string& address, const std::string& hello) {
-    file = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
-    sockaddr_un name{};
-    name.sun_family = AF_UNIX;
-    std::memcpy(name.sun_path + 1, address.data(), address.size());
-    const auto length =
-        static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + address.size());
-    if (::connect(file, reinterpret_cast<sockaddr*>(&name), length) != 0) return;
-    if (::send(file, hello.data(), hello.size(), MSG_NOSIGNAL) < 0) return;
-    iovec part{text, sizeof(text) - 1};
-    msghdr message{};
-    alignas(cmsghdr) char control[CMSG_SPACE(sizeof(int))];
-    message.msg_iov = &part;
-    message.msg_iovlen = 1;
-    message.msg_control = control;
-    message.msg_controllen = sizeof(control);
-    if (::recvmsg(file, &message, 0) <= 0) return;
-    if (const cmsghdr* const header = CMSG_FIRSTHDR(&message))
-      std::memcpy(&memory, CMSG_DATA(header), sizeof(int));
-  }
-  ~Connection() {
-    ::close(file);
-    if (memory >= 0) ::close(memory);
-  }
-  RemoteSegment* map() const {
-    void* const place =
-        ::mmap(nullptr, sizeof(RemoteSegment), PROT_READ | PROT_WRITE, MAP_SHARED, memory, 0);
-    return place == MAP_FAILED ? nullptr : static_cast<RemoteSegment*>(place);
-  }
-
-  int file = -1, memory = -1;
-  char text[512] = {};
-};
 
 /// Answers of all processes so far, in memory that they share.
 std::atomic<int>& answers() {
@@ -160,12 +111,13 @@ struct Motion : ::testing::Test {
   }
 };
 
-// The sixth joint swings with 0.3 rad.
+// The sixth joint swings with 0.3 rad, back where it has come far.
 void swing(const RemoteQuestion& question, RemoteAnswer& answer) {
   answer.kind = static_cast<std::int64_t>(RemoteAnswerKind::Joints);
   for (int i = 0; i < 7; ++i) answer.values[i] = question.from_joints[i];
-  answer.values[5] += 0.3 * (1.0 - std::cos(question.time));
-  answer.values[12] = 0.3 * std::sin(question.time);
+  const double size = question.from_joints[5] > 0.8 ? -0.3 : 0.3;
+  answer.values[5] += size * (1.0 - std::cos(question.time));
+  answer.values[12] = size * std::sin(question.time);
 }
 
 TEST_F(Motion, AStoppedOrDeadProcessNeverHoldsTheArm) {
