@@ -73,10 +73,20 @@ add_library(coglab_controllers_plugins
   src/plugins/dmp_controller.cpp
   src/plugins/dmp_cycle.cpp
   src/plugins/ptp_controller.cpp
-  src/plugins/stream_controller.cpp)
+  src/plugins/stream_controller.cpp
+  src/remote/slot.cpp)
 target_compile_options(coglab_controllers_plugins PRIVATE -Wall -Wextra)
 target_link_libraries(coglab_controllers_plugins PUBLIC coglab_controllers_manager)
 set_target_properties(coglab_controllers_plugins PROPERTIES POSITION_INDEPENDENT_CODE ON)
+
+# The slots for Python processes: plug-ins that nobody links.
+foreach(slot motion feedback)
+  add_library(coglab_remote_${slot} MODULE src/remote/remote_${slot}.cpp)
+  target_compile_options(coglab_remote_${slot} PRIVATE -Wall -Wextra)
+  target_link_libraries(coglab_remote_${slot} PRIVATE coglab_controllers_plugins)
+endforeach()
+# The name by which Ctrl-MORE finds the type RemoteFeedback.
+set_target_properties(coglab_remote_feedback PROPERTIES OUTPUT_NAME remote_feedback)
 
 # Python module coglab_controllers._core, beside the Python files of src/coglab_controllers.
 pybind11_add_module(coglab_controllers_python
@@ -91,6 +101,7 @@ set_target_properties(coglab_controllers_python PROPERTIES
   LIBRARY_OUTPUT_DIRECTORY ${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_PYTHON_DESTINATION})
 
 install(TARGETS coglab_controllers_core coglab_controllers_manager coglab_controllers_plugins
+    coglab_remote_motion coglab_remote_feedback
   ARCHIVE DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
   LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
   RUNTIME DESTINATION ${CATKIN_GLOBAL_BIN_DESTINATION})

@@ -4,14 +4,17 @@
 #include <pthread.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <cmath>
 #include <cstdlib>
 #include <mutex>
 #include <shared_mutex>
 #include <thread>
 
 #include "coglab_rt/joint_limits_table.hpp"
+#include "remote_client.hpp"
 #include "stream_types.hpp"
 #include "system_calls.hpp"
 #include "virtual_robot.hpp"
@@ -276,6 +279,57 @@ TEST(Cycle, NeitherAllocatesNorLocksWhileServicesAreCalled) {
   RecordProperty("locks", static_cast<int>(locks.load()));
   RecordProperty("system_calls", counted.system_calls ? calls : -1);
   RecordProperty("allocations", static_cast<int>(allocations.load()));
+}
+
+TEST(Cycle, SlotsOfPythonProcessesNeitherAllocateNorLock) {
+  VirtualRobot robot("plugin_paths: [" PLUGIN_DIR "]");
+  // The manager itself locks in lockstep, where the caller's thread adopts requests.
+  const std::uint64_t locks_at_first = locks;
+  counting = true;
+  robot.tick();
+  counting = false;
+  const std::uint64_t locks_of_lockstep = locks - locks_at_first;
+  auto& motion = robot.load("python", "coglab/RemoteMotion");
+  ASSERT_TRUE(VirtualRobot::ok(robot.manager->load("law", "RemoteFeedback")));
+  ASSERT_TRUE(robot.manager->feedback().enable("law").ok());
+  const Connection first(addressOf("python"), helloOf(RemoteKind::Motion));
+  const Connection second(addressOf("law"), helloOf(RemoteKind::Feedback));
+  RemoteSegment* const segments[] = {first.map(), second.map()};
+  ASSERT_TRUE(segments[0] != nullptr && segments[1] != nullptr);
+  const bool system_calls = SystemCalls::enable();
+  const std::uint64_t calls_before = SystemCalls::count();
+  const std::uint64_t allocations_before = allocations, locks_before = locks;
+  int moving = 0;
+  for (std::uint64_t i = 1; i <= 3000; ++i) {
+    if (i % 1000 == 1) motion.startMotion({});
+    if (system_calls) SystemCalls::start();
+    counting = true;
+    robot.tick();
+    counting = false;
+    SystemCalls::stop();
+    moving += robot.state() == MotionState::Running ? 1 : 0;
+    if (i % 1000 > 800) continue;  // silence: it brakes, fades and ends
+    for (int k = 0; k < 2; ++k) {
+      RemoteQuestion question;
+      std::uint64_t number = 0;
+      if (!segments[k]->question.read(question, number)) continue;
+      RemoteAnswer answer{};
+      answer.stamp_ns = question.stamp_ns;
+      answer.run = question.run;
+      answer.time = question.time;
+      answer.kind = k == 0 ? 1 : 3;
+      if (k == 0) std::copy(question.from_joints, question.from_joints + 7, answer.values);
+      answer.values[k == 0 ? 5 : 1] += 0.1 * std::sin(question.time);
+      if (i % 50 == 0) answer.values[0] = std::nan("");
+      segments[k]->answer.write(answer, i);
+    }
+  }
+  EXPECT_GT(moving, 2000);
+  EXPECT_EQ(allocations - allocations_before, 0u);
+  EXPECT_EQ(locks - locks_before, 3000 * locks_of_lockstep);
+  if (system_calls) {
+    EXPECT_EQ(SystemCalls::count() - calls_before, 0u) << SystemCalls::last();
+  }
 }
 
 }  // namespace

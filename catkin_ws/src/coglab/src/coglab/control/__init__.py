@@ -10,6 +10,7 @@ from coglab.control.motion import (
     Reference,
     SetPoint,
 )
+from coglab.control.simulation import Simulated, simulate
 
 __all__ = [
     "Argument",
@@ -20,4 +21,6 @@ __all__ = [
     "MotionStart",
     "Reference",
     "SetPoint",
+    "Simulated",
+    "simulate",
 ]
