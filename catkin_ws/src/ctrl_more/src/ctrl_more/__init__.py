@@ -11,6 +11,10 @@ C++ loggers go to `logging`, below the name `ctrl_more`.
     manager.update(Cycle(now_ns=0, dt=0.005, number=1))
 """
 
+from pkgutil import extend_path
+
+__path__ = extend_path(__path__, __name__)  # a new process may find this folder before that of the compiled module
+
 from ctrl_more._core import (
     INTERFACE,
     Attribution,

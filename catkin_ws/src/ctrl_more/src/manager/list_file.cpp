@@ -29,8 +29,8 @@ double readPositive(const ConfigNode& node, const std::string& what) {
   return value;
 }
 
-ControllerEntry readEntry(const std::string& name, const ConfigNode& block,
-                          const SearchPath& files, const std::string& base) {
+ControllerEntry readEntry(const std::string& name, const ConfigNode& block, const SearchPath& files,
+                          const std::string& base) {
   block.requireKeys("controller '" + name + "'", kBlockKeys);
   ControllerEntry entry;
   const auto locate = [&](const ConfigNode& node, const char* key) {
