@@ -101,6 +101,7 @@ class HandFaults(unittest.TestCase):
             self.hand.send(name, 200)
             for fault in ("lose 1", "garbage 3", "lose_in 1"):
                 time.sleep(0.15)
+                self.hand.fresh_status()  # the fault before has had its poll: two in one would look like a cut cable
                 self.hand.fault(fault)
             result = self.hand.result(name)
             self.assertTrue(result.isOk, result.message)

@@ -100,7 +100,7 @@ def _drop_unwritable(handler: logging.Handler) -> None:
         except OSError:
             pass
 
-    handler.emit = emit_or_drop  # type: ignore[method-assign]
+    handler.emit = emit_or_drop  # type: ignore[assignment]
 
 
 def _living(master: str, name: str) -> str:
