@@ -86,7 +86,7 @@ add_library(coglab_sim_virtual src/limit_watch.cpp src/virtual_robot.cpp)
 target_compile_options(coglab_sim_virtual PRIVATE -Wall -Wextra)
 set_target_properties(coglab_sim_virtual PROPERTIES POSITION_INDEPENDENT_CODE ON)
 target_link_libraries(coglab_sim_virtual PUBLIC coglab_sim ${COGLAB_SIM_ROBOT} yaml-cpp)
-pybind11_add_module(coglab_sim_virtual_python python/virtual_binding.cpp)
+pybind11_add_module(coglab_sim_virtual_python python/python_motion.cpp python/virtual_binding.cpp)
 set_target_properties(coglab_sim_virtual_python PROPERTIES
   OUTPUT_NAME _virtual
   LIBRARY_OUTPUT_DIRECTORY ${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_PYTHON_DESTINATION})

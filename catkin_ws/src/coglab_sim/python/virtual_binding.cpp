@@ -3,6 +3,7 @@
 #include "coglab_sim/virtual_robot.hpp"
 #include "lwr_fri_bridge/requests/events.hpp"
 #include "py_cell.hpp"
+#include "python_motion.hpp"
 
 namespace py = pybind11;
 using namespace coglab_sim;
@@ -17,6 +18,7 @@ class Robot : public LockstepRobot {
  public:
   using LockstepRobot::LockstepRobot;
   std::uint16_t reason_code = 0;
+  std::map<std::string, const PythonMotion*> python_motions;  ///< by id; the manager owns them
 
   py::tuple keep(const Answer& answer) {
     reason_code = answer.number();
@@ -64,6 +66,47 @@ py::tuple openStream(Robot& robot, const std::string& id) {
   }
   if (answer.success) answer = robot.stream(id).open();
   return robot.keep(answer);
+}
+
+py::tuple addMotion(Robot& robot, const std::string& id, const py::object& steps) {
+  auto motion = std::make_unique<PythonMotion>(steps);
+  const PythonMotion* const kept = motion.get();
+  const Answer answer = robot.add(id, "python/Motion", std::move(motion));
+  if (answer.success) robot.python_motions[id] = kept;
+  return robot.keep(answer);
+}
+
+py::tuple startMotion(Robot& robot, const std::string& id, const py::dict& arguments, bool queue) {
+  coglab_controllers::CustomMotionController& motion = robot.motion(id);
+  coglab_controllers::MotionRequestByName request;
+  request.queue = queue;
+  for (const auto& [name, value] : arguments) {
+    request.names.push_back(name.cast<std::string>());
+    request.values.push_back(value.cast<double>());
+  }
+  if (robot.manager().report().active.str() != id) {
+    std::string type;
+    const Answer answer = robot.manager().switchTo(id, type);
+    if (!answer.success) return py::make_tuple(false, answer.message, -1);
+  }
+  const coglab_controllers::MotionAnswer answer = motion.startMotion(request);
+  robot.reason_code = answer.number();
+  return py::make_tuple(answer.success, answer.message, answer.id);
+}
+
+py::dict motionProgress(Robot& robot, const std::string& id) {
+  coglab_controllers::MotionProgress progress;
+  robot.motion(id).readProgress(progress);
+  py::dict result;
+  result["number"] = progress.id;
+  result["state"] = std::string(nameOf(progress.state));
+  result["reason"] = progress.reason.str();
+  result["reason_code"] = progress.reason.number();
+  result["time"] = progress.time;
+  result["queued"] = progress.queued;
+  const auto found = robot.python_motions.find(id);
+  result["error"] = found == robot.python_motions.end() ? "" : found->second->error();
+  return result;
 }
 
 Eigen::Vector4d noOrientation() { return Eigen::Vector4d::Zero(); }
@@ -288,6 +331,26 @@ PYBIND11_MODULE(_virtual, m) {
           "ptp_ends", [](Robot& robot) { return endsOf(robot.ptp()); },
           "[{ptp_id, executed, reason_code, reason}] of the same motions, instead of "
           "finished_ptps().")
+
+      .def_property_readonly(
+          "feedback",
+          [](Robot& robot) -> ctrl_more::FeedbackControllersManager& {
+            py::module_::import("ctrl_more");  // registers the type, and loads Python controllers
+            return robot.manager().feedback();
+          },
+          py::return_value_policy::reference_internal,
+          "The robot's own ctrl_more.FeedbackControllersManager: load, order, pause and tune "
+          "controllers here, C++ and Python ones. The cycle runs it.")
+
+      .def("add_motion", &addMotion, py::arg("id"), py::arg("motion"),
+           "Loads a motion in Python under an id, see python_motion.hpp; (success, message).")
+      .def("start_motion", &startMotion, py::arg("id"), py::arg("arguments") = py::dict(),
+           py::arg("queue") = false,
+           "Switches to a motion of add_motion() and starts it with these arguments; the others "
+           "have their defaults. (accepted, message, number of the motion)")
+      .def("motion_progress", &motionProgress, py::arg("id"),
+           "{number, state, reason, reason_code, time, queued, error} of the current or last "
+           "motion of an id; time: s of motion time, error: the Python message of a fault.")
 
       .def("open_stream", &openStream, py::arg("id"),
            "Opens the stream of velocities twist_stream or joint_velocity_stream: loads its "

@@ -113,6 +113,21 @@ coglab_controllers::Answer LockstepRobot::load(const std::string& id, const std:
   return answer;
 }
 
+coglab_controllers::Answer LockstepRobot::add(
+    const std::string& id, const std::string& type,
+    std::unique_ptr<coglab_controllers::Motion<>> motion) {
+  return manager_->load(id, type,
+                        std::unique_ptr<coglab_controllers::MotionController>(
+                            coglab_controllers::CustomMotionController::make(std::move(motion))));
+}
+
+coglab_controllers::CustomMotionController& LockstepRobot::motion(const std::string& id) {
+  using coglab_controllers::CustomMotionController;
+  if (auto* motion = dynamic_cast<CustomMotionController*>(manager_->motion(id))) return *motion;
+  throw std::invalid_argument("no motion of your own is loaded under the id '" + id +
+                              "'; add_motion() loads one");
+}
+
 coglab_controllers::DmpController& LockstepRobot::dmp(const std::string& id) {
   if (auto* dmp = dynamic_cast<coglab_controllers::DmpController*>(manager_->motion(id)))
     return *dmp;

@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import fields
-from types import TracebackType
+from types import SimpleNamespace, TracebackType
 from typing import Any
 
 from coglab_msgs.msg import ReasonCode
@@ -34,7 +34,9 @@ from coglab_trials.trial import engine_logs
 from coglab_trials.virtual_clock import VirtualClock
 from coglab_trials.world import DT
 
-from coglab.results import ACTIONS, Event, Exchange
+from coglab.control.in_cycle import InCycle
+from coglab.control.motion import Motion as OwnMotion
+from coglab.results import ACTIONS, Event, Exchange, MotionResult, Refused
 from coglab.robot import Robot
 from coglab.trial import Recording, Trial
 from coglab.values import finite, number
@@ -242,6 +244,55 @@ class World:
         self._check()
         assert self._trial is not None
         return self._trial
+
+    # -- own controllers -------------------------------------------------------------------------
+
+    @property
+    def feedback(self) -> Any:
+        """The robot's own ``ctrl_more.FeedbackControllersManager``: load a list file with C++ and Python controllers,
+        order, enable, pause and tune them here. The control cycle runs them."""
+        self._check()
+        return self.cell.robot.virtual.feedback
+
+    def add_motion(self, name: str, motion: OwnMotion) -> None:
+        """Load a motion of ``coglab.control`` into the control cycle, as ``./coglab controller run`` does on the
+        running robot. Refused: the name is in use, or ``configure`` raised."""
+        self._check()
+        robot = self.cell.robot
+        in_cycle = InCycle(motion, SimpleNamespace(chain=robot.chain, limits=robot.limits))
+        loaded, sentence = robot.virtual.add_motion(name, in_cycle)
+        if not loaded:
+            raise Refused(sentence, robot.virtual.reason_code)
+
+    def run_motion(self, name: str, limit: float = 60.0, **arguments: float) -> MotionResult:
+        """Start a motion of ``add_motion`` with these arguments and wait for its end. A motion that raises, or returns
+        no reference, is aborted: the arm brakes, and ``causes`` has the Python message.
+
+        ``limit``: virtual time, s; TimeoutError after it. Refused: unknown argument, out of range, or not now.
+        """
+        self._check()
+        robot, begun = self.cell.robot, self.time
+        accepted, sentence, number = robot.virtual.start_motion(name, arguments)
+        if not accepted:
+            raise Refused(sentence, robot.virtual.reason_code)
+
+        def over() -> bool:
+            progress = robot.virtual.motion_progress(name)
+            return progress["number"] == number and progress["state"] in ("reached", "aborted")
+
+        self.run_until(over, limit, f"the end of motion '{name}'")
+        end = robot.virtual.motion_progress(name)
+        return MotionResult(
+            what=name,
+            ok=end["state"] == "reached",
+            code=end["reason_code"],
+            sentence=end["reason"],
+            causes=(end["error"],) if end["error"] else (),
+            started=begun,
+            ended=self.time,
+            joints=robot.report["position"],
+            palm=robot.palm(),
+        )
 
     def push(self, force: Sequence[float], seconds: float) -> None:
         """Push the palm with a force ([3] N, base frame) from now on for ``seconds``. Time does not pass."""

@@ -113,19 +113,55 @@ std::string ControllerManager::loadedMotions() const {
 // Other requests do not wait for it: a plug-in's code and the ROS master may take seconds.
 Answer ControllerManager::load(const std::string& id, const std::string& type,
                                const Attach& attach) {
+  std::shared_ptr<void> claimed;
+  if (const Answer refused = claimNew(id, claimed); !refused.success) return refused;
+  const bool motion = !libraryOf(type).empty() || MotionTypes::instance().find(type).controller;
+  return motion ? loadMotion(id, type, attach) : loadFeedback(id, type);
+}
+
+Answer ControllerManager::load(const std::string& id, const std::string& type,
+                               std::unique_ptr<MotionController> controller) {
+  std::shared_ptr<void> claimed;
+  if (const Answer refused = claimNew(id, claimed); !refused.success) return refused;
+  auto loaded = std::make_shared<LoadedMotion>();
+  loaded->id = id;
+  loaded->type = type;
+  loaded->controller = std::move(controller);
+  try {
+    add(std::move(loaded), {});
+    return {};
+  } catch (const std::exception& error) {
+    return Answer::invalid("controller '" + id + "' of type '" + type +
+                           "' was not loaded: " + error.what());
+  }
+}
+
+Answer ControllerManager::claimNew(const std::string& id, std::shared_ptr<void>& claimed) {
   if (!validId(id)) {
     return Answer::invalid("controller_id '" + id +
                            "': expected up to 48 letters, digits and '_', beginning with a "
                            "letter");
   }
-  const std::shared_ptr<void> claimed = claim(id);
-  if (!claimed) {
-    return Answer::refusal(
-        ReasonCode::InvalidArgument,
-        "controller_id '" + id + "' is in use; choose another id, or go on with the loaded one");
-  }
-  const bool motion = !libraryOf(type).empty() || MotionTypes::instance().find(type).controller;
-  return motion ? loadMotion(id, type, attach) : loadFeedback(id, type);
+  claimed = claim(id);
+  if (claimed) return {};
+  return Answer::refusal(
+      ReasonCode::InvalidArgument,
+      "controller_id '" + id + "' is in use; choose another id, or go on with the loaded one");
+}
+
+void ControllerManager::add(std::shared_ptr<LoadedMotion> loaded,
+                            const std::function<void(MotionController&)>& attach) {
+  MotionSetup setup;
+  setup.id = loaded->id;
+  setup.cycle_time = settings_.cycle.cycle_time;
+  setup.parameters =
+      Parameters(settings_.parameters, "controller_manager").block(loaded->id).node();
+  setup.robot = settings_.robot;
+  setup.host = this;
+  loaded->controller->configure(setup);
+  if (attach) attach(*loaded->controller);
+  const std::lock_guard<std::mutex> lock(table_);
+  motions_.push_back(std::move(loaded));
 }
 
 std::shared_ptr<void> ControllerManager::claim(const std::string& id) {
@@ -179,16 +215,9 @@ Answer ControllerManager::loadMotion(const std::string& id, const std::string& t
                                   : "its library has gone"));
     }
     loaded->controller.reset(maker.controller());
-    MotionSetup setup;
-    setup.id = id;
-    setup.cycle_time = settings_.cycle.cycle_time;
-    setup.parameters = Parameters(settings_.parameters, "controller_manager").block(id).node();
-    setup.robot = settings_.robot;
-    setup.host = this;
-    loaded->controller->configure(setup);
-    if (attach) attach(*loaded->controller, maker);
-    const std::lock_guard<std::mutex> lock(table_);
-    motions_.push_back(std::move(loaded));
+    add(std::move(loaded), [&](MotionController& controller) {
+      if (attach) attach(controller, maker);
+    });
     return {};
   } catch (const std::exception& error) {
     return Answer::invalid(what + error.what());

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "coglab_controllers/manager/controller_manager.hpp"
+#include "coglab_controllers/motion/custom_motion_controller.hpp"
 #include "coglab_controllers/plugins/dmp_controller.hpp"
 #include "coglab_controllers/plugins/ptp_controller.hpp"
 #include "coglab_controllers/plugins/stream_controller.hpp"
@@ -83,6 +84,11 @@ class LockstepRobot {
 
   /// Loads a controller; a DMP controller gets the frame table as goal source.
   coglab_controllers::Answer load(const std::string& id, const std::string& type);
+  /// Loads a motion of the caller's, as controller of that id and of a type that no library has.
+  coglab_controllers::Answer add(const std::string& id, const std::string& type,
+                                 std::unique_ptr<coglab_controllers::Motion<>> motion);
+  /// The controller of a motion of add(). @throws std::invalid_argument if there is none
+  coglab_controllers::CustomMotionController& motion(const std::string& id);
   /// The controller of that id. @throws std::invalid_argument if there is none of that type.
   coglab_controllers::DmpController& dmp(const std::string& id = "dmp");
   coglab_controllers::PtpController& ptp(const std::string& id = "ptp");

@@ -70,6 +70,10 @@ class ControllerManager : public MotionHost {
   /// Loads a controller of a type under an id: a motion controller, or a feedback controller if the
   /// type belongs to Ctrl-MORE. If the plug-in throws, nothing stays loaded.
   Answer load(const std::string& id, const std::string& type, const Attach& attach = {});
+  /// Loads a motion controller that the caller has made, under a name of its type that no library
+  /// has. If configure() throws, it is not loaded.
+  Answer load(const std::string& id, const std::string& type,
+              std::unique_ptr<MotionController> controller);
   /// Reserves an id for a controller that is being loaded, as long as the result exists. Null if
   /// the id is in use.
   std::shared_ptr<void> claim(const std::string& id);
@@ -147,6 +151,12 @@ class ControllerManager : public MotionHost {
   /// Message for a plan that the cycle did not adopt, with the controller whose code is running.
   std::string notAdopted(PlanOutcome outcome) const override;
 
+  /// Refuses an id that is not valid or in use, else reserves it.
+  Answer claimNew(const std::string& id, std::shared_ptr<void>& claimed);
+  /// Configures a controller and puts it into the table. @throws what configure() or `attach`
+  /// throws
+  void add(std::shared_ptr<LoadedMotion> loaded,
+           const std::function<void(MotionController&)>& attach);
   Answer loadMotion(const std::string& id, const std::string& type, const Attach& attach);
   Answer loadFeedback(const std::string& id, const std::string& type);
   std::string libraryOf(const std::string& type) const;
