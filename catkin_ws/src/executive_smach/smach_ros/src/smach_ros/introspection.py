@@ -210,7 +210,7 @@ class IntrospectionServer:
             return
         if not self._watched:
             self.construct(self._server_name, self._state, self._path)
-        queue_size = max(100, 4 * len(self._watched))
+        queue_size = max(1000, 4 * len(self._watched))  # a burst that a busy computer sends late
         options = {"queue_size": queue_size, "subscriber_listener": _Newcomers(self)}
         self._status_pub = rospy.Publisher(self._server_name + STATUS_TOPIC, SmachContainerStatus, **options)
         self._structure_pub = rospy.Publisher(self._server_name + STRUCTURE_TOPIC, SmachContainerStructure, **options)
