@@ -31,8 +31,11 @@ class HandFaults(unittest.TestCase):
 
     def begin(self, name: str) -> None:
         """Have the action of that name on its way."""
+        # From the other end: the interrupted goal before this one may have left the fingers anywhere.
         if name == "hand_open":
             self.assertTrue(self.hand.run("hand_close", 511).isOk)
+        if name == "hand_close":
+            self.assertTrue(self.hand.run("hand_open", 511).isOk)
         if name == "hand_preshape_close":
             self.assertTrue(self.hand.run("hand_preshape", "cylindrical", "low").isOk)
         self.hand.send(name, *GOALS[name])
