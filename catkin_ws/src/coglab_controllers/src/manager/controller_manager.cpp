@@ -128,7 +128,7 @@ Answer ControllerManager::load(const std::string& id, const std::string& type,
   loaded->type = type;
   loaded->controller = std::move(controller);
   try {
-    add(std::move(loaded), {});
+    add(loaded, {});
     return {};
   } catch (const std::exception& error) {
     return Answer::invalid("controller '" + id + "' of type '" + type +
@@ -215,7 +215,7 @@ Answer ControllerManager::loadMotion(const std::string& id, const std::string& t
                                   : "its library has gone"));
     }
     loaded->controller.reset(maker.controller());
-    add(std::move(loaded), [&](MotionController& controller) {
+    add(loaded, [&](MotionController& controller) {
       if (attach) attach(controller, maker);
     });
     return {};
