@@ -53,7 +53,7 @@ def bare(tmp_path_factory):
     top = tmp_path_factory.mktemp("bare")
     shutil.copy(TOP / "coglab", top)
     (top / "debian-packages.txt").write_text(
-        "".join(f"{group}: {ABSENT}\n" for group in ("run", "build", "test", "browser", "viz"))
+        "".join(f"{group}: {ABSENT}\n" for group in ("run", "build", "test", "tools", "browser", "viz"))
     )
     (top / "catkin_ws" / "devel").mkdir(parents=True)
     (top / "catkin_ws" / "src").symlink_to(TOP / "catkin_ws" / "src")

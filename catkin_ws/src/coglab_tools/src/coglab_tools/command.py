@@ -1,0 +1,85 @@
+"""What the commands `./coglab NOUN VERB` share: answers, errors with exit codes, progress bars.
+
+A noun is a module `coglab_tools.NOUN.commands` with `HELP`, one sentence, and `add(verbs)`, which adds its verbs to an
+argparse subparsers object and sets `run` of each to a function from the options to an Answer::
+
+    def add(verbs):
+        parser = verbs.add_parser("list", help="lists the trials of a folder")
+        parser.add_argument("folder", type=Path)
+        parser.set_defaults(run=list_trials)
+
+Heavy libraries (pandas, matplotlib, distributed, rospy) are imported in these functions: help and completion stay quick.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+OK, CHECK_FAILED, USAGE, NOT_THERE = 0, 1, 2, 3
+"""exit codes: done; a check failed; the command cannot be used like this; robot, ROS or a library is not there"""
+
+Item = TypeVar("Item")
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a command found out. ``--json`` prints ``data``, otherwise ``text`` and the next command are printed."""
+
+    text: str
+    """for people: sentences or a table"""
+    data: dict[str, Any] = field(default_factory=dict)
+    """for programs: values of JSON, units in the names of the keys, such as duration_s"""
+    next: str = ""
+    """the sensible next command, such as "./coglab trial report out/trial_3" """
+    status: int = OK
+    """exit code"""
+
+
+class CommandError(Exception):
+    """A command ended without an answer. The message says what was expected, what came and what to do next."""
+
+    status = CHECK_FAILED
+
+
+class CheckFailed(CommandError):
+    """The input was read and judged, and it cannot be used: exit code 1."""
+
+
+class UsageError(CommandError):
+    """The arguments cannot be used: exit code 2."""
+
+    status = USAGE
+
+
+class NotThere(CommandError):
+    """The robot, ROS, a file's device or a library is not there: exit code 3."""
+
+    status = NOT_THERE
+
+
+def progress(items: Iterable[Item], total: int, title: str) -> Iterator[Item]:
+    """Yield the items. On a terminal a bar shows how many of `total` are done once this has taken more than 2 s."""
+    if not sys.stderr.isatty():
+        yield from items
+        return
+    from time import monotonic
+
+    from rich.console import Console
+    from rich.progress import Progress
+
+    begin, bar, task = monotonic(), None, None
+    try:
+        for done, item in enumerate(items):
+            if bar is None and monotonic() - begin > 2.0:
+                bar = Progress(console=Console(stderr=True), transient=True)
+                bar.start()
+                task = bar.add_task(title, total=total)
+            if bar is not None and task is not None:
+                bar.update(task, completed=done)
+            yield item
+    finally:
+        if bar is not None:
+            bar.stop()

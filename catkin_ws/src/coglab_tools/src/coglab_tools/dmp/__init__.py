@@ -1,0 +1,1 @@
+"""Teaching: records and recordings become primitives."""

@@ -1,0 +1,1 @@
+"""Recordings of people: importers for public datasets."""

@@ -1,0 +1,1 @@
+"""Studies: participants, conditions, trials and questionnaires."""

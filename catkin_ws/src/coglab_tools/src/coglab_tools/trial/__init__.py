@@ -1,0 +1,1 @@
+"""Recorded handovers: what was recorded, and what it shows."""
