@@ -8,7 +8,7 @@ argparse subparsers object and sets `run` of each to a function from the options
         parser.add_argument("folder", type=Path)
         parser.set_defaults(run=list_trials)
 
-Heavy libraries (pandas, matplotlib, distributed, rospy) are imported in these functions: help and completion stay quick.
+Heavy libraries (pandas, matplotlib, distributed, rospy) are imported in these functions, so that help stays quick.
 """
 
 from __future__ import annotations
