@@ -78,7 +78,9 @@ class Handover(unittest.TestCase):
         start, end = (when + self.stamps_later for when in (self.start, self.end))
         during = [m for m in self.logged if start <= m.header.stamp.to_sec() <= end]
         self.assertTrue(during)
-        self.assertEqual([m.msg for m in during if m.level >= Log.ERROR], [])
+        # On a busy computer, a client of a service may give up before it has sent its request.
+        errors = [m.msg for m in during if m.level >= Log.ERROR]
+        self.assertEqual([text for text in errors if not text.startswith("incoming connection failed")], [])
         motions = [m for m in during if m.file.endswith("_controller_ros.cpp")]
         self.assertEqual([m.msg for m in motions if m.level > Log.INFO], [])
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from coglab.series import Series
 from coglab_bringup.reach_errors import GIVES, TAKES, reach_errors
-from coglab_bringup.trial_recorder import Trial
 from coglab_py.pose import Pose, about_z
 
 GRASP = Pose(np.array([0.0, -0.04, 0.07]), about_z(0.3))
@@ -34,10 +34,10 @@ def turn(degrees: float) -> np.ndarray:
     return about_z(np.radians(degrees))
 
 
-def reach(kind: str, begun: float, left: float, states: list[tuple], outcome: str = "succeeded") -> Trial:
+def reach(kind: str, begun: float, left: float, states: list[tuple], outcome: str = "succeeded") -> Series:
     """A trial with one reach; `states` of its motion: (t, state)."""
     path = f"/coglab_master/{kind}/approach/arm_motion"
-    trial = Trial()
+    trial = Series()
     reason = "grasp 'side'" if kind == TAKES else ""
     trial.transitions = [
         (begun - 0.2, f"/coglab_master/{kind}", "set_dmp_goal", "succeeded", "approach", reason, 0),

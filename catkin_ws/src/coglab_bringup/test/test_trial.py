@@ -2,17 +2,18 @@
 
 import numpy as np
 import pytest
+from coglab.plot import draw_trial, figure_of, rows_without_overlap
+from coglab.series import Series, state_intervals
 from coglab_bringup.demo import keep, unfinished
 from coglab_bringup.handover import NotTaken
-from coglab_bringup.trial_plot import draw_trial, rows_without_overlap, state_intervals
-from coglab_bringup.trial_recorder import Trial, summarise
+from coglab_bringup.trial_recorder import summarise
 from coglab_msgs.msg import ReasonCode
 
 LIMITS = np.full(7, 2.0)
 
 
 def test_summary_of_a_known_trial():
-    trial = Trial()
+    trial = Series()
     trial.joints = [(t, [0.0] * 7, [0.0] * 6 + [t / 10]) for t in np.arange(0.0, 10.0, 0.1)]
     trial.feedback = [(4.0, "running", 0.2), (5.0, "reached", 0.004), (5.5, "reached", 0.003), (9.0, "reached", 0.5)]
     trial.truth = [(5.9, [0, 0, 0], [0, 0, 0], [0, 0, 0], 0.1), (6.0, [0, 0, 0], [0, 0, 0], [0, 0, 0], 2.0)]
@@ -28,14 +29,14 @@ def test_summary_of_a_known_trial():
 
 def test_no_contact_is_waited_for_where_the_robot_gives():
     """The object touches the hand that holds it all the while; what touches on the way there is no object felt."""
-    trial = Trial()
+    trial = Series()
     trial.truth = [(t, [0, 0, 0], [0, 0, 0], [0, 0, 0], 3.0) for t in (1.0, 2.0, 3.0)]
     trial.contacts = [(3.1, True, 2.0)]
     assert summarise(trial, "exchange_robot_to_human", "success", 0.9, 8.0, LIMITS)["contact_delay_ms"] is None
 
 
 def test_summary_without_measurements_says_none():
-    row = summarise(Trial(), "take", "no end", 0.0, 1.0, LIMITS)
+    row = summarise(Series(), "take", "no end", 0.0, 1.0, LIMITS)
     assert row["final_error_mm"] is None and row["contact_delay_ms"] is None and row["peak_velocity_share"] is None
     assert row["fri_lost"] is None and row["believed_error_mm"] is None
     assert row["final_error_by"].startswith("nobody") and row["reaches"] == []
@@ -49,26 +50,26 @@ def test_a_handover_that_did_not_end_has_a_code():
 
 
 def test_state_intervals_end_where_states_end():
-    trial = Trial()
+    trial = Series()
     trial.transitions = [
         (1.0, "/m", "idle", "go", "work", ""),
         (2.0, "/m/work", "first", "done", "second", ""),
         (3.0, "/m/work", "second", "finished", "finished", ""),
         (3.0, "/m", "work", "finished", "idle", ""),
     ]
-    intervals = state_intervals(trial, 5.0)
+    intervals = state_intervals(trial.transitions, 5.0)
     assert intervals["/m/work"] == [(1.0, 2.0, "first"), (2.0, 3.0, "second")]
     assert intervals["/m"] == [(1.0, 1.0, "idle"), (1.0, 3.0, "work"), (3.0, 5.0, "idle")]
 
 
 def test_a_child_of_a_concurrence_begins_with_it():
-    trial = Trial()
+    trial = Series()
     trial.transitions = [
         (1.0, "/m", "idle", "go", "both", ""),
         (2.5, "/m/both/left", "first", "done", "done", ""),
         (3.0, "/m", "both", "done", "idle", ""),
     ]
-    assert state_intervals(trial, 5.0)["/m/both/left"] == [(1.0, 2.5, "first")]
+    assert state_intervals(trial.transitions, 5.0)["/m/both/left"] == [(1.0, 2.5, "first")]
 
 
 def test_children_of_a_concurrence_get_rows_of_their_own():
@@ -79,9 +80,9 @@ def test_children_of_a_concurrence_get_rows_of_their_own():
     assert len(rows) == 2
 
 
-def two_approaches() -> Trial:
+def two_approaches() -> Series:
     """Two actions, each with an approach of two parallel children."""
-    trial = Trial()
+    trial = Series()
     for action, since in (("take", 0.0), ("give", 10.0)):
         inner = f"/m/{action}/approach"
         trial.transitions += [
@@ -99,20 +100,16 @@ def two_approaches() -> Trial:
     return trial
 
 
-def test_the_picture_is_written_with_labels_in_their_bars(tmp_path, monkeypatch):
-    import coglab_bringup.trial_plot as trial_plot
-
-    kept = []
-    monkeypatch.setattr(trial_plot.plt, "close", kept.append)
+def test_the_picture_is_written_with_labels_in_their_bars(tmp_path):
     draw_trial(two_approaches(), "title", 0.0, 18.0, tmp_path / "trial.png")
     assert (tmp_path / "trial.png").stat().st_size > 10000 and (tmp_path / "trial.pdf").read_bytes()[:4] == b"%PDF"
-    figure = kept[-1]
+    figure = figure_of(two_approaches(), "title", 0.0, 18.0)
+    figure.canvas.draw()
     renderer = figure.canvas.get_renderer()
     bars = [bar.get_window_extent(renderer) for bar in figure.axes[0].patches]
     for label in figure.axes[0].texts:
         box = label.get_window_extent(renderer)
         assert any(bar.x0 <= box.x0 and box.x1 <= bar.x1 for bar in bars), label.get_text()
-    trial_plot.plt.figure(figure).clear()
 
 
 def test_a_result_that_cannot_be_written_leaves_the_old_one_and_a_sentence(tmp_path):

@@ -18,7 +18,7 @@ REFUSED = {
     "demo --seed -1": "expected a whole number from 0 to 2147483647, got '-1'",
     "demo --out /proc/x": "/proc/x cannot be written",
     "demo --person robot": "invalid choice: 'robot'",
-    "test nosuch": "no package named nosuch; there are: coglab_bringup, coglab_console, ",
+    "test nosuch": "no package named nosuch; there are: coglab, coglab_bringup, ",
     "test --out /usr": "--out /usr holds other files",
     "bench nosuch": "no benchmark named nosuch; there are: console, contact, dynamics",
     "launch bogus:=1": "coglab.launch has no argument 'bogus'; there are: sim, split",

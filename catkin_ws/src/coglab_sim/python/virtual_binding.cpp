@@ -1,7 +1,7 @@
 /// Python module coglab_sim._virtual: the whole robot (cell, bridge, controller manager) in virtual
 /// time.
 #include "coglab_sim/virtual_robot.hpp"
-#include "lwr_fri_bridge/ros/reason_codes.hpp"
+#include "lwr_fri_bridge/requests/events.hpp"
 #include "py_cell.hpp"
 
 namespace py = pybind11;
@@ -45,6 +45,25 @@ py::list endsOf(coglab_controllers::PtpController& ptp) {
     ends.append(entry);
   }
   return ends;
+}
+
+/// Loads, activates and opens a stream of velocities.
+py::tuple openStream(Robot& robot, const std::string& id) {
+  const bool twist = id == "twist_stream";
+  if (!twist && id != "joint_velocity_stream") {
+    return robot.keep(Answer::refusal(
+        coglab_rt::ReasonCode::UnknownName,
+        "'" + id + "' is no stream; there are twist_stream and joint_velocity_stream"));
+  }
+  Answer answer;
+  if (robot.manager().motion(id) == nullptr)
+    answer = robot.load(id, twist ? "coglab/TwistStream" : "coglab/JointVelocityStream");
+  if (answer.success && robot.manager().report().active.str() != id) {
+    std::string type;
+    answer = robot.manager().switchTo(id, type);
+  }
+  if (answer.success) answer = robot.stream(id).open();
+  return robot.keep(answer);
 }
 
 Eigen::Vector4d noOrientation() { return Eigen::Vector4d::Zero(); }
@@ -187,7 +206,7 @@ PYBIND11_MODULE(_virtual, m) {
             const auto outcome = robot.bridge().outcome(ticket);
             if (outcome.code == lwr_fri_bridge::OutcomeCode::Pending) return py::none();
             return py::make_tuple(outcome.success(), describe(outcome),
-                                  lwr_fri_bridge::reasonCode(outcome.code));
+                                  static_cast<std::uint16_t>(codeOf(outcome.code)));
           },
           py::arg("ticket"), "(success, message, reason code), or None while it is not finished.")
 
@@ -221,7 +240,8 @@ PYBIND11_MODULE(_virtual, m) {
 
       .def_readonly("reason_code", &Robot::reason_code,
                     "ReasonCode of the newest answer of load_controller, switch_controller, "
-                    "apply_profile, speed_scale, add_ptp, load_dmps, execute_dmp or switch_dmp.")
+                    "apply_profile, speed_scale, add_ptp, open_stream, stream_twist, "
+                    "stream_joint_velocity, load_dmps, execute_dmp or switch_dmp.")
       .def(
           "ask_cancel",
           [](Robot& robot, const std::string& id, const std::string& why) {
@@ -268,6 +288,25 @@ PYBIND11_MODULE(_virtual, m) {
           "ptp_ends", [](Robot& robot) { return endsOf(robot.ptp()); },
           "[{ptp_id, executed, reason_code, reason}] of the same motions, instead of "
           "finished_ptps().")
+
+      .def("open_stream", &openStream, py::arg("id"),
+           "Opens the stream of velocities twist_stream or joint_velocity_stream: loads its "
+           "controller, switches to it and lets it follow commands, until a cancel, a hold or a "
+           "switch; (success, message).")
+      .def(
+          "stream_twist",
+          [](Robot& robot, const std::vector<double>& twist) {
+            return robot.keep(robot.stream("twist_stream").send(twist));
+          },
+          py::arg("twist"),
+          "Twist of the palm in the base frame: three numbers m/s, three rad/s. It is followed for "
+          "0.1 s, then the arm brakes; send another one before. (success, message)")
+      .def(
+          "stream_joint_velocity",
+          [](Robot& robot, const std::vector<double>& velocity) {
+            return robot.keep(robot.stream("joint_velocity_stream").send(velocity));
+          },
+          py::arg("velocity"), "The same with seven joint velocities, rad/s, in wire order.")
 
       .def(
           "load_dmps",

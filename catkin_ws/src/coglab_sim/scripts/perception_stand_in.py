@@ -20,28 +20,20 @@ import numpy as np
 import rospy
 import tf2_ros
 from coglab_msgs.msg import CellTruth
-from coglab_msgs.srv import (
-    FreePlaces,
-    FreePlacesResponse,
-    InitVision,
-    InitVisionResponse,
-    LocateObject,
-    LocateObjectResponse,
-)
 from coglab_perception.frames import FrameNames
+from coglab_perception.ros_services import PerceptionServices
+from coglab_perception.sights import Board, Sight, slots_of
 from coglab_py import parameters, steady
 from coglab_py.alone import init_node
-from coglab_py.messages import pose_message, pose_of
+from coglab_py.messages import pose_of
 from coglab_py.pose import Pose, about_z
 from coglab_sim.person.recorded_motion import Playback, PlaybackSettings
 from coglab_sim.plausible import IMPLAUSIBLE, plausible
-from coglab_sim.tracker.tracker import Board, PerceptionSettings, Sight
-from coglab_sim.tracker.vision import NotSeen, Vision
-from geometry_msgs.msg import PoseStamped, Quaternion, TransformStamped, Vector3
+from coglab_sim.tracker.tracker import PerceptionSettings
+from coglab_sim.tracker.vision import Vision
 from std_msgs.msg import UInt8
 
 PLAYBACK_HZ = 100.0
-LONGEST_WAIT = 10.0  # s, longest time-out of a service
 OTHERS = [[1.05, 0.45, 0.35], [1.05, -0.45, 0.35]]  # m, default of ~others: hands of the other people
 
 
@@ -60,20 +52,20 @@ class PerceptionNode:
             PerceptionSettings.from_mapping(settings),
             Board(
                 Pose(np.array(board["xyz"], dtype=float), turn),
-                {name: np.array(place, dtype=float) for name, place in board["slots"].items()},
+                slots_of(board["slots"]),
             ),
             seed,
             time.monotonic,
             parameters.read("~partner_margin", float, 0.0, 0.0),
         )
-        self.stamps = steady.Stamps()
         self.others = [Pose(np.array(place)) for place in parameters.points("~others", OTHERS)]
         self.people = parameters.read("~people", int, 1, 0, 255)
         self.truth: CellTruth | None = None
         self.broadcaster = tf2_ros.TransformBroadcaster()
         self.static = tf2_ros.StaticTransformBroadcaster()
+        self.services = PerceptionServices(names, self.vision, steady.Stamps())
         board_sight = Sight(names.board, time.monotonic(), self.vision.board.frame)
-        self.static.sendTransform(self.transform(board_sight))
+        self.static.sendTransform(self.services.transform(board_sight))
         recording = {"frame": names.human_hand, **parameters.read("~recording", dict, {})}
         playback = PlaybackSettings.from_mapping(recording)
         self.playback = None
@@ -88,9 +80,6 @@ class PerceptionNode:
             steady.SteadyTimer(1.0 / PLAYBACK_HZ, self.see, "playback")
         rospy.Subscriber("coglab_sim/truth/cell", CellTruth, self.on_truth, queue_size=1, tcp_nodelay=True)
         rospy.Subscriber("~people", UInt8, self.on_people, queue_size=1)
-        rospy.Service("~init_vision", InitVision, self.on_init)
-        rospy.Service("~locate_object", LocateObject, self.on_locate)
-        rospy.Service("~free_places", FreePlaces, self.on_places)
 
     # -- seeing ----------------------------------------------------------------------------------
 
@@ -128,64 +117,10 @@ class PerceptionNode:
         sights = self.vision.see(hands, objects, robot)
         try:
             if sights:
-                self.broadcaster.sendTransform([self.transform(sight) for sight in sights])
+                self.broadcaster.sendTransform([self.services.transform(sight) for sight in sights])
         except rospy.ROSException:
             if not rospy.core.is_shutdown_requested():
                 raise  # during shutdown, rospy has already closed tf
-
-    def transform(self, sight: Sight) -> TransformStamped:
-        """Converts a sight to a tf message, stamped with its capture time."""
-        message = TransformStamped()
-        message.header.stamp = self.stamps.stamp(sight.captured)
-        message.header.frame_id = self.vision.names.world
-        message.child_frame_id = sight.name
-        message.transform.translation = Vector3(*sight.frame.position)
-        message.transform.rotation = Quaternion(*sight.frame.orientation)
-        return message
-
-    # -- services --------------------------------------------------------------------------------
-
-    def on_init(self, request):
-        """Succeeds once the cell is visible."""
-        try:
-            return InitVisionResponse(success=True, message=self.vision.init_vision(request.timeout))
-        except NotSeen as reason:
-            return InitVisionResponse(False, reason.code, str(reason))
-
-    def on_locate(self, request):
-        """Returns the newest sight of an object, of the partner's hand or of the board, or a reason."""
-        try:
-            frame, sight, age = self.vision.locate(request.object_id, bounded(request.timeout))
-        except NotSeen as reason:
-            return LocateObjectResponse(success=False, reason_code=reason.code, message=str(reason))
-        return LocateObjectResponse(
-            success=True, frame_id=frame, age=age, pose=self.pose(self.vision.names.world, sight.captured, sight.frame)
-        )
-
-    def on_places(self, request):
-        """Returns the free slots of the board, or a reason."""
-        try:
-            places = self.vision.free_places(request.object_id, bounded(request.timeout))
-        except NotSeen as reason:
-            return FreePlacesResponse(False, reason.code, str(reason), [])
-        return FreePlacesResponse(
-            success=True,
-            message=", ".join(name for name, _ in places),
-            places=[self.pose(self.vision.names.board, time.monotonic(), Pose(place)) for _, place in places],
-        )
-
-    def pose(self, parent: str, captured: float, frame: Pose) -> PoseStamped:
-        """Converts a frame seen at ``captured`` (monotonic clock, s) to PoseStamped."""
-        message = PoseStamped()
-        message.header.frame_id = parent
-        message.header.stamp = self.stamps.stamp(captured)
-        message.pose = pose_message(frame)
-        return message
-
-
-def bounded(timeout: float) -> float:
-    """Requested time-out (s), limited to 0..LONGEST_WAIT; 0 for NaN."""
-    return min(max(timeout, 0.0), LONGEST_WAIT) if timeout == timeout else 0.0
 
 
 def main() -> int:

@@ -16,6 +16,17 @@ const coglab_controllers::MotionRegistration ptp_registration(
                              },
                              nullptr});
 
+const coglab_controllers::MotionRegistration twist_registration(
+    "coglab/TwistStream", {[]() -> coglab_controllers::MotionController* {
+                             return new coglab_controllers::TwistStream();
+                           },
+                           nullptr});
+const coglab_controllers::MotionRegistration joint_velocity_registration(
+    "coglab/JointVelocityStream", {[]() -> coglab_controllers::MotionController* {
+                                     return new coglab_controllers::JointVelocityStream();
+                                   },
+                                   nullptr});
+
 std::string textOf(const std::string& path) {
   std::ifstream file(path);
   if (!file) throw std::runtime_error("cannot read " + path);
@@ -112,6 +123,13 @@ coglab_controllers::PtpController& LockstepRobot::ptp(const std::string& id) {
   if (auto* ptp = dynamic_cast<coglab_controllers::PtpController*>(manager_->motion(id)))
     return *ptp;
   throw std::invalid_argument("no point-to-point controller is loaded under the id '" + id + "'");
+}
+
+coglab_controllers::StreamController& LockstepRobot::stream(const std::string& id) {
+  if (auto* stream = dynamic_cast<coglab_controllers::StreamController*>(manager_->motion(id)))
+    return *stream;
+  throw std::invalid_argument("no stream of velocities is loaded under the id '" + id +
+                              "'; open_stream() loads it");
 }
 
 void LockstepRobot::tick() {

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from coglab_perception.sights import Board
 from coglab_py.pose import Pose, about_z
-from coglab_sim.tracker import tracker as module
-from coglab_sim.tracker.tracker import Board, PerceptionSettings, Tracker
+from coglab_sim.tracker.tracker import PerceptionSettings, Tracker
 
 CALIBRATED = {"calibration_offset": 0.0, "calibration_turn_deg": 0.0, "swap_probability": 0.0}
 """for tests of something else"""
@@ -184,4 +184,3 @@ def test_a_place_is_free_10_cm_from_every_object(away, free):
     assert (board.free([place + [0.0, 0.0, away]]) == ["A1"]) is free
     assert board.free([place + [0.0, 0.0, 1.0], place + [away, 0.0, 0.0]]) == (["A1"] if free else [])
     assert board.free([place + [0.06, 0.0, 0.0]], clearance=0.05) == ["A1"]
-    assert module.Board is Board

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_perception.frames import FrameNames
+from coglab_perception.sights import Board, NotSeen
 from coglab_py.pose import Pose
-from coglab_sim.tracker.tracker import Board, PerceptionSettings
-from coglab_sim.tracker.vision import NotSeen, PartnerChoice, Vision
+from coglab_sim.tracker.tracker import PerceptionSettings
+from coglab_sim.tracker.vision import PartnerChoice, Vision
 
 NAMES = FrameNames("world", "human_hand", "board", "object_{id}")
 BOARD = Pose(np.array([0.45, -0.55, 0.05]))

@@ -8,10 +8,11 @@ import smach
 from coglab_msgs.msg import ReasonCode
 from coglab_perception.frames import FrameNames
 from coglab_perception.recogniser import Recogniser, load_patterns
+from coglab_perception.sights import Board, NotSeen
 from coglab_py.packages import package_path
 from coglab_py.pose import Pose
-from coglab_sim.tracker.tracker import Board, PerceptionSettings
-from coglab_sim.tracker.vision import NotSeen, Vision
+from coglab_sim.tracker.tracker import PerceptionSettings
+from coglab_sim.tracker.vision import Vision
 from coglab_smach.ports.interfaces import Located
 from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_trials import GIVE, RECEIVE, Conditions, VirtualTrial

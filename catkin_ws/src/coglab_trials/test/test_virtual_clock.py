@@ -199,3 +199,40 @@ def test_a_member_that_raises_gives_its_turn_away():
         finally:
             threading.excepthook = hook
         assert clock.now() == 1.0
+
+
+def test_each_thread_may_use_a_clock_of_its_own():
+    """A Concurrence gets the threads of the clock of the thread that makes it."""
+    import smach
+
+    both, seen = threading.Barrier(2), {}
+
+    def use(seconds):
+        with using(VirtualClock()) as clock:
+            both.wait(10)
+            child = smach.concurrence.threading.Thread(target=lambda: clock.sleep(seconds))
+            child.start()
+            clock.sleep(2 * seconds)
+            seen[seconds] = (clock.now(), child.is_alive())
+            both.wait(10)
+
+    threads = [threading.Thread(target=use, args=(seconds,)) for seconds in (10.0, 1000.0)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(20)
+    assert seen == {10.0: (20.0, False), 1000.0: (2000.0, False)}
+    assert smach.concurrence.threading is threading
+
+
+def test_a_thread_that_may_think_does_not_stall_the_clock():
+    clock, ended = VirtualClock(stall_limit=0.1), []
+    with clock.attached():
+        thread = clock.start_thread(lambda: ended.append(clock.sleep(1.0)), "other")
+        clock.sleep(0.5)
+        clock.let_think(True)
+        threading.Event().wait(0.4)
+        clock.let_think(False)
+        clock.sleep(1.0)
+    thread.join(5)
+    assert ended == [None]

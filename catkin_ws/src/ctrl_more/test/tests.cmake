@@ -6,7 +6,7 @@ endif()
 
 # Libraries that a manager must cope with.
 foreach(plugin good none two again paper_maker unresolved throwing wrong_type other_abi
-    strangers rebuilt static_object resident)
+    strangers rebuilt static_object resident walk)
   set(source ${plugin})
   if(plugin STREQUAL resident)
     set(source good)

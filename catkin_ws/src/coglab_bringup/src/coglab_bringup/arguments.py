@@ -250,12 +250,12 @@ def _judge_tool(command: str, words: list[str]) -> None:
         what = f"got '{words[0]}'" if words else "got nothing"
         raise Refused(f"{command} expects one of: {', '.join(verbs)}; {what}")
     if len(words) - 1 < verbs[words[0]]:
-        raise Refused(f"{command} {words[0]} expects a NAME")
+        raise Refused(f"{command} {words[0]} expects a {'FILE' if words[0] == 'run' else 'NAME'}")
 
 
 TOOLS = {
     "hand": {"trace": 0},
-    "controller": {"new": 1},
+    "controller": {"new": 1, "run": 1},
     "object": {"new": 1, "check": 0, "list": 0},
     "console": {"picture": 0},
 }
@@ -276,6 +276,8 @@ def judge(top: Path, command: str, words: list[str]) -> None:
         judge_launch(top, words)
     elif command == "shell":
         _judge_shell(top, words)
+    elif command == "extras":
+        pass  # any command, also one that PyPI installs first
     elif command == "install":
         lines = (top / "debian-packages.txt").read_text(encoding="utf-8").splitlines()
         _named(words, dict.fromkeys(line.split(":")[0] for line in lines if line and line[0] != "#"), "group")

@@ -14,6 +14,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+from coglab_py.alone import log_without_raising
+
 from coglab_bringup import process_tree
 from coglab_bringup.arguments import demo_parser
 from coglab_bringup.run_directory import free_port, record_run, run_environment
@@ -194,12 +196,13 @@ def run(top: Path, options: argparse.Namespace) -> int:
         if not options.no_console:
             threading.Thread(target=say_console, args=(out / "ros_home", system.alive), daemon=True).start()
         import rospy
+        from coglab.plot import draw_trial
 
         from coglab_bringup.handover import run_handover
-        from coglab_bringup.trial_plot import draw_trial
         from coglab_bringup.trial_recorder import TrialRecorder
 
         rospy.init_node("coglab_demo", anonymous=True, disable_signals=True)
+        log_without_raising()
         recorder = TrialRecorder()
         pace.follow()
         spans: list[tuple[float, float]] = []
@@ -220,21 +223,18 @@ def run(top: Path, options: argparse.Namespace) -> int:
         text = json.dumps(result, indent=1) + "\n"
         keep(problems, out, "result.json", lambda path: path.write_text(text))
         system.stop()
-    status = summarise(out, result["handovers"])
+    status = summarise(out, result["handovers"], "" if problems else f"{out}/result.json and trial.png, ")
     for problem in problems:
         print(f"[coglab] error: {problem}; make room, or name another folder: --out DIR", file=sys.stderr)
     return 1 if problems else status
 
 
-def summarise(out: Path, handovers: list[dict]) -> int:
-    """Prints how each handover ended; returns exit status 0 if all succeeded."""
+def summarise(out: Path, handovers: list[dict], files: str) -> int:
+    """Prints how each handover ended, and the files that were written; returns exit status 0 if all succeeded."""
     good = sum(row["outcome"] == "success" for row in handovers)
     for row in handovers:
         print(f"{row['kind']}: {row['outcome']}" + (f" in {row['duration_s']:.1f} s" if "duration_s" in row else ""))
-    print(
-        f"{good} of {len(KINDS)} handovers succeeded; {out}/result.json and trial.png, log: {out}/roslaunch.log",
-        flush=True,
-    )
+    print(f"{good} of {len(KINDS)} handovers succeeded; {files}log: {out}/roslaunch.log", flush=True)
     return 0 if good == len(KINDS) else 1
 
 

@@ -100,8 +100,8 @@ def _checks(sources: Path, objects: Path) -> dict[str, Check]:
     """Check of each argument. An argument without a check accepts any text. `objects`: folder of the database."""
     profiles = re.findall(r"^(\w+):\s*$", (sources / LIMITS).read_text(encoding="utf-8"), re.MULTILINE)
     flags = ("alone", "sim", "split", "rviz", "perfect_perception", "auto_trigger", "recogniser", "console")
-    files = ("controllers", "dmp_library", "machines", "patterns")
-    written = ("result_file", "log_file", "hand_trace")
+    files = ("controllers", "primitives", "dmp_library", "machines", "patterns")
+    written = ("results", "result_file", "log_file", "hand_trace")
     return {
         **dict.fromkeys(flags, _flag),
         **dict.fromkeys(files, _file),
@@ -120,7 +120,8 @@ def _checks(sources: Path, objects: Path) -> dict[str, Check]:
         "recorded_object": _one_of("recorded", "in_hand"),
         "object": _or_empty(_one_of(*sorted(path.stem for path in objects.glob("*.yaml")))),
         "objects": _folder,
-        "recording": _or_empty(_file),
+        "perception": _one_of("stand_in", "bridge", "none"),
+        **dict.fromkeys(("feedback", "recording", "tracker"), _or_empty(_file)),
     }
 
 
@@ -145,6 +146,8 @@ def judge_launch(top: Path, words: list[str]) -> None:
         raise SystemExit(0)
     if {"arm:=ideal", "split:=true"} <= {word.lower() for word in words}:
         raise Refused("the ideal arm and its controllers are one process: leave out split:=true or arm:=ideal")
+    if "perception:=bridge" in words and not any(re.match("tracker:=.", word) for word in words):
+        raise Refused("perception:=bridge needs tracker:=FILE, such as coglab_perception/config/perception_bridge.yaml")
     folders = [value for name, _, value in (word.partition(":=") for word in words) if name == "objects"]
     checks = _checks(sources, Path(folders[-1]) if folders and "$(" not in folders[-1] else sources / OBJECTS)
     for word in split_port(words)[1]:

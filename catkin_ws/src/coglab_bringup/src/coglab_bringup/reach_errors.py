@@ -15,14 +15,14 @@ import numpy as np
 from coglab_py.pose import Pose
 
 if TYPE_CHECKING:
-    from coglab_bringup.trial_recorder import Trial
+    from coglab.series import Series
 
 TAKES, GIVES = "exchange_human_to_robot", "exchange_robot_to_human"
 MOVING = ("running", "holding")  # states of a motion in progress
 OLDEST = 0.1  # s, largest age of the simulated poses that are used
 
 
-def _reaches_of(trial: Trial, start: float, end: float) -> Iterator[tuple[float, str]]:
+def _reaches_of(trial: Series, start: float, end: float) -> Iterator[tuple[float, str]]:
     """Time of the measurement (s) of each reach that began between `start` and `end` (s), and how it ended: reached,
     met or unfinished."""
     begun: float | None = None
@@ -38,7 +38,7 @@ def _reaches_of(trial: Trial, start: float, end: float) -> Iterator[tuple[float,
         yield _end_of(trial, begun, min([end, *(row[0] for row in trial.poses[-1:])]), False)
 
 
-def _end_of(trial: Trial, begun: float, left: float, succeeded: bool) -> tuple[float, str]:
+def _end_of(trial: Series, begun: float, left: float, succeeded: bool) -> tuple[float, str]:
     states = [(t, state) for t, state, _ in trial.feedback if begun <= t <= left]
     pairs = zip(states, states[1:], strict=False)
     ends = [later for (_, before), later in pairs if before in MOVING and later[1] not in MOVING]
@@ -48,14 +48,14 @@ def _end_of(trial: Trial, begun: float, left: float, succeeded: bool) -> tuple[f
     return (ends[-1][0] if stands else left), ("met" if succeeded else "unfinished")
 
 
-def _grasp_of(trial: Trial, until: float) -> str:
+def _grasp_of(trial: Series, until: float) -> str:
     """Name of the last grasp chosen before `until` (s), from the transitions of set_dmp_goal; empty if none was."""
     told = [row[5] for row in trial.transitions if row[0] <= until and row[2] == "set_dmp_goal"]
     found = [match.group(1) for match in (re.fullmatch(r"grasp '(.+)'", reason) for reason in told) if match]
     return found[-1] if found else ""
 
 
-def _error(trial: Trial, kind: str, entry: Mapping[str, Any] | None, moment: float) -> dict[str, float | None]:
+def _error(trial: Series, kind: str, entry: Mapping[str, Any] | None, moment: float) -> dict[str, float | None]:
     """Distance in mm and angle in degrees from the palm to its goal: the grasp in the object's file, or the delivery
     pose in front of the person's hand. None if unknown."""
     truth = [row for row in trial.poses if moment - OLDEST <= row[0] <= moment]
@@ -70,7 +70,7 @@ def _error(trial: Trial, kind: str, entry: Mapping[str, Any] | None, moment: flo
     return {"error_mm": round(1000.0 * metres, 3), "error_deg": round(float(np.degrees(angle)), 3)}
 
 
-def reach_errors(trial: Trial, kind: str, entry: Mapping[str, Any] | None, start: float, end: float) -> dict[str, Any]:
+def reach_errors(trial: Series, kind: str, entry: Mapping[str, Any] | None, start: float, end: float) -> dict[str, Any]:
     """Fields of result.json: `reaches`, the errors of the last reach as `final_error_mm` and `final_error_deg`, and the
     source of the measurement, or the reason why there is none. `entry`: the object's entry in the database."""
     rows: list[dict[str, Any]] = [

@@ -33,7 +33,8 @@ from coglab_bringup.arguments import Wanted, binary_of, cases_in, left_out, pack
 from coglab_bringup.run_directory import free_port, run_environment
 from coglab_bringup.usage import Refused
 
-AT_A_TIME = max(2, min(4, os.cpu_count() or 2))
+AT_A_TIME = max(2, min(4, os.cpu_count() or 2))  # programs that compute, one per core
+BESIDE = AT_A_TIME // 2  # rostests beside them: a rostest mostly waits for its nodes
 BUSY = ("-c", "import os\nparent = os.getppid()\nwhile os.getppid() == parent:\n  sum(range(100000))")
 """A process that uses one core while its parent lives."""
 OWN_NODE = "rospy.init_node("  # in a pytest file: the file needs its own process
@@ -219,8 +220,7 @@ def run(program: Program, log: Path, limit: float) -> None:
 
 def longest_first(programs: list[Program]) -> list[Program]:
     """Programs in their starting order. Short ones are last, so that all processor cores finish at the same time."""
-    kinds = ("pytest", "rostest", "gtest")
-    return sorted(programs, key=lambda one: (-one.slots, kinds.index(one.kind), -len(one.files)))
+    return sorted(programs, key=lambda one: (-one.slots, one.kind == "gtest", -len(one.files)))
 
 
 def log_of(program: Program, results: Path) -> Path:
@@ -319,7 +319,19 @@ def run_all(top: Path, results: Path, wanted: list[Wanted], limit: float) -> tup
     programs = find_programs(top, results, python, wanted)
     start = time.monotonic()
 
-    free = Semaphore(AT_A_TIME)
+    rostests = [one for one in programs if one.kind == "rostest"]
+    others = [one for one in programs if one.kind != "rostest"]
+    queues = [(longest_first(others), AT_A_TIME), (rostests, BESIDE if others else AT_A_TIME)]
+    with ThreadPoolExecutor(max_workers=len(queues)) as pool:
+        for one in [pool.submit(run_queue, queue, slots, results, limit) for queue, slots in queues]:
+            one.result()
+    print(f"all tests: {time.monotonic() - start:.0f} s; JUnit files and logs: {os.path.relpath(results)}")
+    return programs, report(programs, results)
+
+
+def run_queue(programs: list[Program], most: int, results: Path, limit: float) -> None:
+    """Run these programs, in this order and at most ``most`` slots at a time."""
+    free = Semaphore(most)
 
     def run_one(program: Program, slots: int) -> None:
         try:
@@ -327,17 +339,15 @@ def run_all(top: Path, results: Path, wanted: list[Wanted], limit: float) -> tup
         finally:
             free.release(slots)
 
-    with ThreadPoolExecutor(max_workers=AT_A_TIME) as pool:
+    with ThreadPoolExecutor(max_workers=most) as pool:
         started = []
-        for program in longest_first(programs):
-            slots = min(program.slots, AT_A_TIME)
+        for program in programs:
+            slots = min(program.slots, most)
             for _ in range(slots):
                 free.acquire()
             started.append(pool.submit(run_one, program, slots))
         for one in started:
             one.result()
-    print(f"all tests: {time.monotonic() - start:.0f} s; JUnit files and logs: {os.path.relpath(results)}")
-    return programs, report(programs, results)
 
 
 if __name__ == "__main__":

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import rospy
+from coglab.series import Series
 from coglab_msgs.msg import CellTruth, Contact, DmpFeedback, HandStatus, Transition
 from coglab_py.pose import Pose
 from coglab_py.steady import Stamps
@@ -25,26 +25,11 @@ FORCE_THRESHOLD = 0.3  # N on palm and fingers; a larger true force counts as to
 LOST_KEYS = ("measurements lost", "answers lost")  # diagnostics of the bridge that count lost FRI packets
 
 
-@dataclass
-class Trial:
-    """Time series of one trial. Each row begins with its time t (s of the steady clock)."""
-
-    joints: list[tuple] = field(default_factory=list)  # (t, position[7], velocity[7])
-    external_torques: list[tuple] = field(default_factory=list)  # (t, torque[7]) in Nm
-    truth: list[tuple] = field(default_factory=list)  # (t, robot xyz, human xyz, object xyz, force on the robot's hand)
-    poses: list[tuple] = field(default_factory=list)  # (t, palm, person's hand, object): true Poses in world
-    fingers: list[tuple] = field(default_factory=list)  # (t, position[5])
-    feedback: list[tuple] = field(default_factory=list)  # (t, state, remaining distance)
-    transitions: list[tuple] = field(default_factory=list)  # (t, path, from, outcome, to, reason, code)
-    contacts: list[tuple] = field(default_factory=list)  # (t, contact, margin, text of the detector)
-    fri_lost: list[tuple] = field(default_factory=list)  # (t, FRI packets lost so far), from the bridge's diagnostics
-
-
 class TrialRecorder:
-    """Subscribes to the topics of a running system and fills a Trial until `stop()`."""
+    """Subscribes to the topics of a running system and fills a Series until `stop()`."""
 
     def __init__(self) -> None:
-        self.trial = Trial()
+        self.trial = Series()
         self.changed = threading.Condition()
         self._time = Stamps().steady
         self._subscribers = [
@@ -58,7 +43,7 @@ class TrialRecorder:
             rospy.Subscriber("/diagnostics", DiagnosticArray, self._on_diagnostics, queue_size=10),
         ]
 
-    def stop(self) -> Trial:
+    def stop(self) -> Series:
         """Stop recording and return the complete trial."""
         for subscriber in self._subscribers:
             subscriber.unregister()
@@ -117,7 +102,7 @@ def _pose(message: PoseMessage) -> Pose:
 
 
 def summarise(
-    trial: Trial,
+    trial: Series,
     kind: str,
     outcome: str,
     start: float,

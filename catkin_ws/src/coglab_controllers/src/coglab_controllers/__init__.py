@@ -5,6 +5,10 @@ lwr_a6). Arrays are numpy arrays of float64. Wrong input raises ``ValueError`` (
 ``ValueError``) that says what was expected and what came.
 """
 
+from pkgutil import extend_path
+
+__path__ = extend_path(__path__, __name__)  # a new process may find this folder before that of the compiled module
+
 from coglab_controllers._core import (
     MAX_BASIS,
     ArmDynamics,

@@ -48,7 +48,8 @@ ManagerSettings readManagerSettings(const YAML::Node& node, const std::string& u
       lockstep ? 0.0 : parameters.number("overrun_time", cycle.cycle_time, 0.0, 10.0);
   settings.plan_timeout = parameters.number("plan_timeout", settings.plan_timeout, 0.05, 30.0);
   settings.types = {{"coglab/DmpController", "libcoglab_dmp_controller.so"},
-                    {"coglab/PtpController", "libcoglab_ptp_controller.so"}};
+                    {"coglab/PtpController", "libcoglab_ptp_controller.so"},
+                    {"coglab/RemoteMotion", "libcoglab_remote_motion.so"}};
   const Parameters types = parameters.block("types");
   if (types.node().IsDefined() && types.node().IsMap()) {
     for (const auto& entry : types.node()) {

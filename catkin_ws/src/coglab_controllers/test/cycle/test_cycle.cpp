@@ -4,14 +4,18 @@
 #include <pthread.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <cmath>
 #include <cstdlib>
 #include <mutex>
 #include <shared_mutex>
 #include <thread>
 
 #include "coglab_rt/joint_limits_table.hpp"
+#include "remote_client.hpp"
+#include "stream_types.hpp"
 #include "system_calls.hpp"
 #include "virtual_robot.hpp"
 
@@ -157,7 +161,9 @@ struct Requests {
   FrameTable& frames;
   DmpController& dmp;
   PtpController& ptp;
-  int made = 0, accepted = 0, paths = 0;
+  StreamController& twists;
+  StreamController& joints;
+  int made = 0, accepted = 0, paths = 0, streamed = 0;
 
   void count(bool success) {
     ++made;
@@ -194,6 +200,16 @@ struct Requests {
     for (int i = 0; i < 3; ++i) {
       ptp.askPath();
       count(ptp.add({{-1.4 + turn, -0.6, 1.5, 1.7, 0.2, 0.2, 0.8}, {}, {}}).id >= 0);
+    }
+    for (const auto& [id, stream, size] :
+         {std::tuple("twists", &twists, 6), std::tuple("joints", &joints, 7)}) {
+      count(manager.switchTo(id, type).success);
+      count(stream->open().success);
+      const std::vector<double> command(static_cast<std::size_t>(size), 0.02 * (number % 3 - 1));
+      const bool sent = stream->send(command).success;
+      count(sent);
+      if (sent) ++streamed;
+      std::this_thread::sleep_for(std::chrono::microseconds(500));
     }
     count(manager.feedback().disable("limits", true).ok());
     IkDebugRecord record;
@@ -235,11 +251,15 @@ TEST(Cycle, NeitherAllocatesNorLocksWhileServicesAreCalled) {
   ASSERT_TRUE(VirtualRobot::ok(manager.load("ptp", "coglab/PtpController")));
   auto& dmp = dynamic_cast<DmpController&>(*manager.motion("dmp"));
   auto& ptp = dynamic_cast<PtpController&>(*manager.motion("ptp"));
+  ASSERT_TRUE(VirtualRobot::ok(manager.load("twists", "coglab/TwistStream")));
+  ASSERT_TRUE(VirtualRobot::ok(manager.load("joints", "coglab/JointVelocityStream")));
+  auto& twists = dynamic_cast<StreamController&>(*manager.motion("twists"));
+  auto& joints = dynamic_cast<StreamController&>(*manager.motion("joints"));
   dmp.setGoalSource(&frames);
   int loaded = 0;
   ASSERT_TRUE(
       VirtualRobot::ok(dmp.loadDmps(std::string(PACKAGE_DIR) + "/config/primitives.xml", loaded)));
-  Requests requests{manager, frames, dmp, ptp};
+  Requests requests{manager, frames, dmp, ptp, twists, joints};
   for (int round = 0; counted.cycles < kCycles || round < 30; ++round) requests.round(round);
   stop = true;
   control.join();
@@ -248,6 +268,7 @@ TEST(Cycle, NeitherAllocatesNorLocksWhileServicesAreCalled) {
   EXPECT_GT(requests.made, 300);
   EXPECT_GT(requests.accepted, requests.made / 2);
   EXPECT_GT(requests.paths, 20);
+  EXPECT_GT(requests.streamed, 20);
   EXPECT_EQ(allocations.load(), 0u);
   EXPECT_EQ(locks.load(), 0u);
   const auto calls = static_cast<int>(SystemCalls::count() - calls_before);
@@ -258,6 +279,57 @@ TEST(Cycle, NeitherAllocatesNorLocksWhileServicesAreCalled) {
   RecordProperty("locks", static_cast<int>(locks.load()));
   RecordProperty("system_calls", counted.system_calls ? calls : -1);
   RecordProperty("allocations", static_cast<int>(allocations.load()));
+}
+
+TEST(Cycle, SlotsOfPythonProcessesNeitherAllocateNorLock) {
+  VirtualRobot robot("plugin_paths: [" PLUGIN_DIR "]");
+  // The manager itself locks in lockstep, where the caller's thread adopts requests.
+  const std::uint64_t locks_at_first = locks;
+  counting = true;
+  robot.tick();
+  counting = false;
+  const std::uint64_t locks_of_lockstep = locks - locks_at_first;
+  auto& motion = robot.load("python", "coglab/RemoteMotion");
+  ASSERT_TRUE(VirtualRobot::ok(robot.manager->load("law", "RemoteFeedback")));
+  ASSERT_TRUE(robot.manager->feedback().enable("law").ok());
+  const Connection first(addressOf("python"), helloOf(RemoteKind::Motion));
+  const Connection second(addressOf("law"), helloOf(RemoteKind::Feedback));
+  RemoteSegment* const segments[] = {first.map(), second.map()};
+  ASSERT_TRUE(segments[0] != nullptr && segments[1] != nullptr);
+  const bool system_calls = SystemCalls::enable();
+  const std::uint64_t calls_before = SystemCalls::count();
+  const std::uint64_t allocations_before = allocations, locks_before = locks;
+  int moving = 0;
+  for (std::uint64_t i = 1; i <= 3000; ++i) {
+    if (i % 1000 == 1) motion.startMotion({});
+    if (system_calls) SystemCalls::start();
+    counting = true;
+    robot.tick();
+    counting = false;
+    SystemCalls::stop();
+    moving += robot.state() == MotionState::Running ? 1 : 0;
+    if (i % 1000 > 800) continue;  // silence: it brakes, fades and ends
+    for (int k = 0; k < 2; ++k) {
+      RemoteQuestion question;
+      std::uint64_t number = 0;
+      if (!segments[k]->question.read(question, number)) continue;
+      RemoteAnswer answer{};
+      answer.stamp_ns = question.stamp_ns;
+      answer.run = question.run;
+      answer.time = question.time;
+      answer.kind = k == 0 ? 1 : 3;
+      if (k == 0) std::copy(question.from_joints, question.from_joints + 7, answer.values);
+      answer.values[k == 0 ? 5 : 1] += 0.1 * std::sin(question.time);
+      if (i % 50 == 0) answer.values[0] = std::nan("");
+      segments[k]->answer.write(answer, i);
+    }
+  }
+  EXPECT_GT(moving, 2000);
+  EXPECT_EQ(allocations - allocations_before, 0u);
+  EXPECT_EQ(locks - locks_before, 3000 * locks_of_lockstep);
+  if (system_calls) {
+    EXPECT_EQ(SystemCalls::count() - calls_before, 0u) << SystemCalls::last();
+  }
 }
 
 }  // namespace

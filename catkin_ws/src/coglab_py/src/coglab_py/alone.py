@@ -3,6 +3,7 @@ would restart it, and two launches on one ROS master would end each other's node
 
 from __future__ import annotations
 
+import logging
 import os
 import sys
 import time
@@ -78,6 +79,28 @@ def init_node(name: str, **options: Any) -> None:
             refuse(f"another node has this name: {there}; end it first, or use a ROS master of your own")
         time.sleep(0.2)
     rospy.init_node(name, **options)
+    log_without_raising()
+
+
+def log_without_raising() -> None:
+    """Make the log handlers of this process drop what they cannot write. rospy's own handlers raise from the log call,
+    so that a full disk would end the thread that logs."""
+    logging.raiseExceptions = False
+    loggers = [logging.getLogger(), *map(logging.getLogger, logging.Logger.manager.loggerDict)]
+    for handler in {handler for logger in loggers for handler in logger.handlers}:
+        _drop_unwritable(handler)
+
+
+def _drop_unwritable(handler: logging.Handler) -> None:
+    emit = handler.emit
+
+    def emit_or_drop(record: logging.LogRecord) -> None:
+        try:
+            emit(record)
+        except OSError:
+            pass
+
+    handler.emit = emit_or_drop  # type: ignore[assignment]
 
 
 def _living(master: str, name: str) -> str:

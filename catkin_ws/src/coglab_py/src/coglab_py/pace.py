@@ -5,9 +5,6 @@ from __future__ import annotations
 import threading
 import time
 
-import rospy
-from std_msgs.msg import Float64
-
 TOPIC = "coglab_sim/real_time_factor"
 
 
@@ -42,6 +39,9 @@ class Pace:
 
     def follow(self, topic: str = TOPIC) -> Pace:
         """Subscribe to the cell's factor. Returns self."""
+        import rospy  # here, so that programs without ROS can use this module
+        from std_msgs.msg import Float64
+
         self._subscriber = rospy.Subscriber(topic, Float64, lambda message: self.change(message.data))
         return self
 
@@ -49,6 +49,8 @@ class Pace:
         """Set the factor. A value outside of (0, 1] is ignored."""
         if not 0.0 < factor <= 1.0 or factor == self.factor:
             return
+        import rospy
+
         with self._lock:
             self._steady.change(time.monotonic(), factor)
             self._stamps.change(rospy.get_time(), factor)

@@ -17,6 +17,7 @@
 #include "coglab_controllers/manager/controller_manager.hpp"
 #include "coglab_controllers/plugins/dmp_controller.hpp"
 #include "coglab_controllers/plugins/ptp_controller.hpp"
+#include "coglab_controllers/plugins/stream_controller.hpp"
 #include "coglab_sim/cell.hpp"
 #include "coglab_sim/limit_watch.hpp"
 #include "ctrl_more/log/logger.hpp"
@@ -85,6 +86,8 @@ class LockstepRobot {
   /// The controller of that id. @throws std::invalid_argument if there is none of that type.
   coglab_controllers::DmpController& dmp(const std::string& id = "dmp");
   coglab_controllers::PtpController& ptp(const std::string& id = "ptp");
+  /// The same for a stream of velocities.
+  coglab_controllers::StreamController& stream(const std::string& id);
 
  private:
   bool answer(std::array<std::uint8_t, lwr_fri_bridge::fri::kCommandSize>& bytes);

@@ -36,7 +36,7 @@ LOG = logging.getLogger("coglab_trials")
 
 
 @contextmanager
-def _engine_logs() -> Iterator[None]:
+def engine_logs() -> Iterator[None]:
     """Inside the block, the SMACH engine logs to ``coglab_trials``; transitions as hidden debug messages."""
     before = smach.loginfo, smach.logwarn, smach.logdebug, smach.logerr
     smach.set_loggers(LOG.debug, LOG.warning, LOG.debug, LOG.error)
@@ -101,12 +101,14 @@ class VirtualTrial:
         settings: Mapping[str, Any] | None = None,
         recogniser: Any = None,
         touch: float | None = None,
+        machine: Callable[[Context], Any] = build_master,
     ) -> None:
         """
         ``seed``, ``conditions``: of the world. ``world``: an existing world, instead of these.
         ``settings``: dotted names of machines.yaml with their values, e.g. ``{"handover.reach_ratio": 2.0}``.
         ``recogniser``: a coglab_perception Recogniser that receives the tracker's sights; None: no recognition.
         ``touch``: standard deviation (N) of the hand's touch sensors; None: no sensors.
+        ``machine``: builds the state machine, like coglab_smach.machines.build_master.
 
         ValueError: conditions together with a world. ObjectError: unknown object. ConfigError: a setting does not exist
         or is out of range. ImportError: the simulation was not built.
@@ -135,7 +137,7 @@ class VirtualTrial:
         )
         self.ctx.journal.listen(self._on_transition)
         with using(self.clock):
-            self.master = build_master(self.ctx)
+            self.master = machine(self.ctx)
         self.beside: Callable[[VirtualTrial], None] = lambda trial: None
         self.reach: Reach | None = None
         self.reaches: list[Reach] = []
@@ -160,7 +162,7 @@ class VirtualTrial:
         """
         if self._over:
             raise RuntimeError("a trial runs once: make another one with the same seed")
-        with using(self.clock), _engine_logs():
+        with using(self.clock), engine_logs():
             self.clock.start_thread(self._run_world, "world")
             walk = script or (lambda trial: trial.ask_for(*actions, limit=limit))
             self.clock.start_thread(lambda: self._run_script(walk), "script")
@@ -236,13 +238,17 @@ class VirtualTrial:
         transitions = self.ctx.journal.transitions
         return transitions[-1].sentence() if transitions else "nothing has happened yet"
 
+    def period(self) -> None:
+        """Advance the world by one FRI period (5 ms), update the current reach, and call ``beside``."""
+        self.world.step()
+        if self.reach is not None:
+            self.reach.look()
+        self.beside(self)
+
     def _run_world(self) -> None:
         try:
             while not self._over:
-                self.world.step()
-                if self.reach is not None:
-                    self.reach.look()
-                self.beside(self)
+                self.period()
                 self.clock.sleep(DT)
         except Exception as error:
             self._failure = error

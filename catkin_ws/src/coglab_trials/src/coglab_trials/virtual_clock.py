@@ -159,6 +159,7 @@ class VirtualThread(threading.Thread):
         self._clock._give_turns()
 
     def run(self) -> None:
+        _of_thread.clocks = [self._clock]
         try:
             self._clock._await_turn(self._turn)
             super().run()
@@ -189,6 +190,7 @@ class VirtualClock(Clock):
         self._parked: dict[_Parked, None] = {}
         self._sequence = itertools.count()
         self._progress = time.monotonic()
+        self._free = False
 
     def now(self) -> float:
         """Returns the virtual time, s."""
@@ -233,6 +235,12 @@ class VirtualClock(Clock):
     def event(self) -> VirtualEvent:
         """Returns a new event that is not set."""
         return VirtualEvent(self)
+
+    def let_think(self, free: bool) -> None:
+        """`free`: the running thread may keep its turn for any wall time, like a person at a prompt. It does not stall
+        the clock. False: the stall limit counts again from now on."""
+        with self._lock:
+            self._free, self._progress = free, time.monotonic()
 
     def start_thread(self, target: Callable[[], object], name: str, daemon: bool = False) -> threading.Thread:
         """Start a thread that belongs to this clock, and return it."""
@@ -362,7 +370,7 @@ class VirtualClock(Clock):
     def _await_turn(self, parked: _Parked) -> None:
         while not parked.gate.acquire(timeout=self._stall_limit):
             with self._lock:
-                if parked.going or time.monotonic() - self._progress < self._stall_limit:
+                if parked.going or self._free or time.monotonic() - self._progress < self._stall_limit:
                     continue
                 parked.released = True
                 if parked in self._ready:
@@ -380,38 +388,60 @@ class VirtualClock(Clock):
 
 
 class _Threading:
-    """The module `threading`, but with threads, events and conditions of a VirtualClock."""
-
-    def __init__(self, clock: VirtualClock) -> None:
-        self._clock = clock
+    """The module `threading`. In a thread with a VirtualClock: with threads, events and conditions of that clock."""
 
     def __getattr__(self, name: str) -> Any:
         return getattr(threading, name)
 
-    def Thread(self, *args: Any, **kw: Any) -> VirtualThread:
-        return VirtualThread(self._clock, *args, **kw)
+    def Thread(self, *args: Any, **kw: Any) -> threading.Thread:
+        clock = _clock_here()
+        return threading.Thread(*args, **kw) if clock is None else VirtualThread(clock, *args, **kw)
 
-    def Event(self) -> VirtualEvent:
-        return self._clock.event()
+    def Event(self) -> threading.Event | VirtualEvent:
+        clock = _clock_here()
+        return threading.Event() if clock is None else clock.event()
 
-    def Condition(self, lock: Any = None) -> VirtualCondition:
-        return VirtualCondition(self._clock, lock)
+    def Condition(self, lock: Any = None) -> threading.Condition | VirtualCondition:
+        clock = _clock_here()
+        return threading.Condition(lock) if clock is None else VirtualCondition(clock, lock)
+
+
+_of_thread = threading.local()  # clocks: those of the calling thread, innermost last
+_users = 0  # blocks of `using` that are open in this process
+_users_lock = threading.Lock()
+
+
+def _clock_here() -> VirtualClock | None:
+    clocks = getattr(_of_thread, "clocks", None)
+    return clocks[-1] if clocks else None
+
+
+def _count_users(change: int) -> None:
+    """Give smach the module above while any block of `using` is open, else `threading` itself."""
+    global _users
+    module: Any = smach.concurrence
+    with _users_lock:
+        _users += change
+        module.threading = _Threading() if _users else threading
 
 
 @contextmanager
 def using(clock: VirtualClock) -> Iterator[VirtualClock]:
     """Inside the block, the calling thread belongs to `clock`. So do the children of each Concurrence that is
-    created and executed there. Only one clock at a time in a process. Example::
+    created and executed there. Each thread of a process may use a clock of its own. Example::
 
         with using(VirtualClock()) as clock:
             machine = build()
             machine.execute()           # an hour of it takes milliseconds
     """
-    module: Any = smach.concurrence
-    before = module.threading
-    module.threading = _Threading(clock)
+    if not hasattr(_of_thread, "clocks"):
+        _of_thread.clocks = []
+    mine = _of_thread.clocks
+    _count_users(+1)
+    mine.append(clock)
     try:
         with clock.attached():
             yield clock
     finally:
-        module.threading = before
+        mine.remove(clock)
+        _count_users(-1)

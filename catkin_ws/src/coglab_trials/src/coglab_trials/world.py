@@ -13,6 +13,7 @@ import coglab_controllers as cc
 import numpy as np
 import yaml
 from coglab_objects.database import cell_parameters, objects_folder, read_object
+from coglab_perception.sights import Sight
 from coglab_py.packages import package_path
 from coglab_py.pose import Pose, about_z
 from coglab_py.yaml_file import read
@@ -20,7 +21,7 @@ from coglab_sim.person.in_cell import move_person, seen_in
 from coglab_sim.person.recorded_person import RecordedPerson, open_recorded_hand, scene_of
 from coglab_sim.person.scene import Scene
 from coglab_sim.person.virtual_human import VirtualHuman
-from coglab_sim.tracker.tracker import Sight, Tracker
+from coglab_sim.tracker.tracker import Tracker
 from ih2_hand.clock import SteppedClock
 from ih2_hand.driver import HandSerialDriver
 from ih2_hand.emulator.hand import EmulatedHand

@@ -8,12 +8,49 @@
 
 #include "ctrl_more/description/config_node.hpp"
 #include "ctrl_more/feedback_controllers_manager.hpp"
+#include "ctrl_more/loading/plugin_library.hpp"
 #include "ctrl_more/log/logger.hpp"
 #include "ctrl_more/manager/manager.hpp"
 #include "ctrl_more/states/control_states.hpp"
 #include "ctrl_more/states/robot_states.hpp"
 
 namespace ctrl_more {
+
+/// Makes a manager that lies in a library, from its block of the central module's file. May throw.
+using ManagerLibraryMaker = std::unique_ptr<Manager> (*)(const std::string& name,
+                                                         const ConfigNode& block,
+                                                         RobotStates& robot, ControlStates& control,
+                                                         Logger* logger);
+
+/// The types of managers that libraries have registered.
+class ManagerPrototypes : public PluginTypesOf<ManagerLibraryMaker> {
+ public:
+  /// No types.
+  ManagerPrototypes();
+  /// Registers a maker; false if the type is known or the ABI differs, which the loader reports.
+  bool insert(const std::string& type, ManagerLibraryMaker maker, const Abi& abi = thisAbi());
+};
+
+/// The types, one list per process.
+ManagerPrototypes& managerPrototypes();
+
+/// Registers a type of managers while its library is loaded. Used by the macro below.
+class ManagerRegistration {
+ public:
+  /// Inserts the type.
+  ManagerRegistration(const char* type, ManagerLibraryMaker maker, const Abi& abi = thisAbi())
+      : type_(type), maker_(maker) {
+    managerPrototypes().insert(type_, maker_, abi);
+  }
+  /// Erases the type.
+  ~ManagerRegistration() { managerPrototypes().erase(type_, maker_); }
+  ManagerRegistration(const ManagerRegistration&) = delete;
+  ManagerRegistration& operator=(const ManagerRegistration&) = delete;
+
+ private:
+  std::string type_;
+  ManagerLibraryMaker maker_;
+};
 
 /// Runs the managers of a robot in the order that the user chose. All managers share one
 /// RobotStates and one ControlStates (Ctrl-MORE paper, section VI).
@@ -25,6 +62,8 @@ namespace ctrl_more {
 ///     period: 0.005             # [s]
 ///     locomotion: {type: MyLocomotion, step_length: 0.2}
 ///     feedback: {type: Feedback, listFile: feedback.yaml}
+///
+/// A type of a library also has `libPath`; see CTRL_MORE_REGISTER_MANAGER.
 ///
 /// Each stage runs in all managers, in order, before the next stage begins.
 class CentralModule {
@@ -88,10 +127,15 @@ class CentralModule {
                                         const std::string& base);
   std::unique_ptr<Manager> makeOther(const std::string& name, const ConfigNode& block,
                                      const ConfigNode& type);
+  std::unique_ptr<Manager> makeFromLibrary(const std::string& name, const ConfigNode& block,
+                                           const std::string& type, const ConfigNode& library,
+                                           const std::string& base);
 
   Logger* logger_;
   std::unique_ptr<RobotStates> robot_;
   std::unique_ptr<ControlStates> control_;
+  std::vector<std::shared_ptr<PluginLibrary>>
+      libraries_;  // before the managers, whose code they are
   std::vector<std::unique_ptr<Manager>> managers_;
   FeedbackControllersManager* feedback_ = nullptr;
   std::vector<std::string> load_errors_;
@@ -99,3 +143,19 @@ class CentralModule {
 };
 
 }  // namespace ctrl_more
+
+/// Registers a class of managers from the source file of its library:
+/// `CTRL_MORE_REGISTER_MANAGER(my_lab::Walk, "Walk")`. Its constructor takes the arguments of
+/// ManagerLibraryMaker. Use it once per library, outside of any namespace.
+#define CTRL_MORE_REGISTER_MANAGER(Class, type)                                                    \
+  namespace {                                                                                      \
+  std::unique_ptr<::ctrl_more::Manager> ctrlMoreManagerMaker(const std::string& name,              \
+                                                             const ::ctrl_more::ConfigNode& block, \
+                                                             ::ctrl_more::RobotStates& robot,      \
+                                                             ::ctrl_more::ControlStates& control,  \
+                                                             ::ctrl_more::Logger* logger) {        \
+    return std::make_unique<Class>(name, block, robot, control, logger);                           \
+  }                                                                                                \
+  const ::ctrl_more::ManagerRegistration ctrl_more_manager_registration(type,                      \
+                                                                        &ctrlMoreManagerMaker);    \
+  }

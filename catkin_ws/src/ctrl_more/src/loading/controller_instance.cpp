@@ -4,12 +4,17 @@
 #include <stdexcept>
 
 #include "ctrl_more/feedback_controller.hpp"
+#include "ctrl_more/loading/script_loader.hpp"
 #include "ctrl_more/log/words.hpp"
 
 namespace ctrl_more {
 
 ControllerInstance makeController(const std::string& library_path, const std::string& type) {
   ControllerInstance instance;
+  if (isScriptType(type)) {
+    instance.controller = makeScriptController(type, library_path);
+    return instance;
+  }
   std::string wanted = type;
   std::vector<std::string> known = prototypes().types();
   if (!library_path.empty()) {

@@ -56,6 +56,18 @@ Status copySignals(const ControlStates& from, ControlStates& to) {
 
 }  // namespace
 
+ManagerPrototypes::ManagerPrototypes()
+    : PluginTypesOf("manager", "CTRL_MORE_REGISTER_MANAGER", "ctrl_more", thisAbi()) {}
+
+bool ManagerPrototypes::insert(const std::string& type, ManagerLibraryMaker maker, const Abi& abi) {
+  return add(type, maker, abi);
+}
+
+ManagerPrototypes& managerPrototypes() {
+  static ManagerPrototypes the_list;
+  return the_list;
+}
+
 bool CentralModule::registerManager(const std::string& type, ManagerMaker maker) {
   ManagerTypes& types = managerTypes();
   const std::lock_guard<std::mutex> lock(types.mutex);
@@ -95,8 +107,11 @@ void CentralModule::build(const ConfigNode& config, const std::string& base) {
     }
     const ConfigNode* type = block->find("type");
     if (!type) throw block->error("manager '" + name + "' needs a type");
-    managers_.push_back(type->text("type") == kFeedback ? makeFeedback(name, *block, base)
-                                                        : makeOther(name, *block, *type));
+    const ConfigNode* library = block->find("libPath");
+    const std::string type_name = type->text("type");
+    managers_.push_back(type_name == kFeedback ? makeFeedback(name, *block, base)
+                        : library ? makeFromLibrary(name, *block, type_name, *library, base)
+                                  : makeOther(name, *block, *type));
   }
 }
 
@@ -170,6 +185,32 @@ std::unique_ptr<Manager> CentralModule::makeOther(const std::string& name, const
   auto manager = maker(name, block, *robot_, *control_, logger_);
   if (!manager) throw block.error("the maker of '" + type_name + "' returned nothing");
   return manager;
+}
+
+std::unique_ptr<Manager> CentralModule::makeFromLibrary(const std::string& name,
+                                                        const ConfigNode& block,
+                                                        const std::string& type,
+                                                        const ConfigNode& library,
+                                                        const std::string& base) {
+  std::string complaint;
+  try {
+    const std::string path = SearchPath(base).find(library.text("libPath"));
+    libraries_.push_back(PluginLibrary::open(path, managerPrototypes()));
+    const std::vector<std::string>& types = libraries_.back()->types();
+    if (std::count(types.begin(), types.end(), type) == 0) {
+      throw std::runtime_error("library " + path + " has no manager of type '" + type + "'" +
+                               suggestion(type, types));
+    }
+    auto manager = managerPrototypes().find(type)(name, block, *robot_, *control_, logger_);
+    if (manager) return manager;
+    complaint = "the maker of '" + type + "' returned nothing";
+  } catch (const std::exception& e) {
+    // The exception ends here: its code may lie in the library, which is closed if this fails.
+    complaint = e.what();
+  } catch (...) {
+    complaint = "it threw something that is not a std::exception";
+  }
+  throw block.error("manager '" + name + "': " + complaint);
 }
 
 FeedbackControllersManager& CentralModule::feedbackControllers() {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "ctrl_more/loading/script_loader.hpp"
 #include "ctrl_more/log/words.hpp"
 
 namespace ctrl_more {
@@ -28,8 +29,8 @@ double readPositive(const ConfigNode& node, const std::string& what) {
   return value;
 }
 
-ControllerEntry readEntry(const std::string& name, const ConfigNode& block,
-                          const SearchPath& files) {
+ControllerEntry readEntry(const std::string& name, const ConfigNode& block, const SearchPath& files,
+                          const std::string& base) {
   block.requireKeys("controller '" + name + "'", kBlockKeys);
   ControllerEntry entry;
   const auto locate = [&](const ConfigNode& node, const char* key) {
@@ -52,6 +53,14 @@ ControllerEntry readEntry(const std::string& name, const ConfigNode& block,
   if (const ConfigNode* node = block.find("on_fault")) entry.on_fault = readPolicy(*node);
   if (const ConfigNode* node = block.find("configFile")) {
     entry.config_file = locate(*node, "configFile");
+  }
+  if (isScriptType(entry.type)) {
+    if (const ConfigNode* node = block.find("libPath")) {
+      throw node->error("controller '" + name + "': type " + entry.type +
+                        " is a Python class, which has no libPath; delete one of the two");
+    }
+    entry.library = base;
+    return entry;
   }
   if (const ConfigNode* node = block.find("libPath")) entry.library = locate(*node, "libPath");
   if (entry.library.empty()) {
@@ -91,6 +100,7 @@ SearchPath ListFile::filesOf(const ConfigNode& list, const std::string& base) {
 
 ListFile::ListFile(const ConfigNode& list, const std::string& base)
     : list_(list),
+      base_(base),
       files_(filesOf(list, base)),
       items_(list.find("loadControllers")),
       profiles_(list.find("profiles")) {
@@ -120,7 +130,7 @@ ListFile::Controller ListFile::read(const ConfigNode& item) const {
     throw item.error("loadControllers lists '" + name + "', but there is no block '" + name + ":'" +
                      suggestion(name, blocks_));
   }
-  return {name, readEntry(name, *block, files_), block};
+  return {name, readEntry(name, *block, files_, base_), block};
 }
 
 }  // namespace ctrl_more

@@ -39,6 +39,7 @@ class ListFile {
   void readShared();
 
   const ConfigNode& list_;
+  std::string base_;
   SearchPath files_;
   std::vector<std::string> blocks_;
   const ConfigNode* items_;

@@ -35,6 +35,12 @@ TEST_F(ListFiles, EveryKeyOfABlockHasItsValues) {
   EXPECT_FALSE(rig.manager->has("Good"));
 }
 
+TEST_F(ListFiles, PythonClassesNeedAProgramWithPython) {
+  EXPECT_TRUE(contains(refusalOf("type: 'mine:Mine'"), "has no libPath"));
+  EXPECT_TRUE(
+      contains(load("loadControllers: [a]\na: {type: 'mine:Mine'}\n").text(), "runs no Python"));
+}
+
 TEST_F(ListFiles, BlendTimeOfTheFileIsTheControllers) {
   ASSERT_EQ(refusalOf("enabled: true, blend_s: 0.02"), "");
   for (int i = 1; i <= 4; ++i) {

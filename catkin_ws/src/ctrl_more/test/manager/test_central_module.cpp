@@ -200,5 +200,29 @@ TEST_F(CentralModuleTest, EverySignalOfTheUserGoesInAndComesOut) {
   EXPECT_FALSE(module.update(other, &control));
 }
 
+TEST_F(CentralModuleTest, ManagersComeFromLibraries) {
+  const auto make = [&](const std::string& block) {
+    return CentralModule(
+        ConfigNode::fromText("managers: [walk]\nwalk: {" + block + "}\n", "central.yaml"), kPlugins,
+        &logger);
+  };
+  const auto refusal = [&](const std::string& block) -> std::string {
+    try {
+      make(block);
+    } catch (const ConfigError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_TRUE(contains(refusal("type: Walk, libPath: libwalk.so"), "needs a step"));
+  EXPECT_TRUE(contains(refusal("type: Wlk, libPath: libwalk.so"), "did you mean 'Walk'"));
+  EXPECT_TRUE(contains(refusal("type: Walk, libPath: libgood.so"), "registers no manager"));
+  EXPECT_TRUE(contains(refusal("type: Walk, libPath: libnowhere.so"), "libnowhere.so"));
+  CentralModule central = make("type: Walk, libPath: libwalk.so, step: 0.5");
+  central.update();
+  central.update();
+  EXPECT_EQ(central.controlStates().getCoM()[0], 1.0);
+}
+
 }  // namespace
 }  // namespace ctrl_more

@@ -240,4 +240,40 @@ std::string describe(const Outcome& o) {
   return word;
 }
 
+coglab_rt::ReasonCode codeOf(OutcomeCode code) {
+  using coglab_rt::ReasonCode;
+  switch (code) {
+    case OutcomeCode::Pending:
+    case OutcomeCode::Done:
+    case OutcomeCode::AlreadyThere:
+      return ReasonCode::None;
+    case OutcomeCode::Held:
+      return ReasonCode::Held;
+    case OutcomeCode::Busy:
+    case OutcomeCode::InCommandMode:
+      return ReasonCode::Busy;
+    case OutcomeCode::NotSupported:
+    case OutcomeCode::NoKrlProgram:
+    case OutcomeCode::WrongStrategy:
+      return ReasonCode::NotSupported;
+    case OutcomeCode::PoorQuality:
+      return ReasonCode::PoorQuality;
+    case OutcomeCode::ProgramRefused:
+    case OutcomeCode::NotEntered:
+      return ReasonCode::NotInCommandMode;
+    case OutcomeCode::NoPower:
+      return ReasonCode::NoPower;
+    case OutcomeCode::NotLeft:
+      return ReasonCode::TimeLimit;
+    case OutcomeCode::Interrupted:
+      return ReasonCode::Cancelled;
+    case OutcomeCode::Disconnected:
+    case OutcomeCode::LostConnection:
+      return ReasonCode::RobotDisconnected;
+    case OutcomeCode::NotServed:
+      break;
+  }
+  return ReasonCode::NotAdopted;
+}
+
 }  // namespace lwr_fri_bridge

@@ -15,7 +15,6 @@
 #include "coglab_rt/ros/parameter.hpp"
 #include "coglab_rt/ros/ros_time.hpp"
 #include "lwr_fri_bridge/bridge/diagnosis.hpp"
-#include "lwr_fri_bridge/ros/reason_codes.hpp"
 #include "target_topic.hpp"
 
 namespace lwr_fri_bridge {
@@ -180,7 +179,7 @@ bool BridgeRos::onCommand(coglab_msgs::LwrCommand::Request& request,
   try {
     const Outcome outcome = bridge_.command(request.event);
     response.success = outcome.success();
-    response.reason_code = reasonCode(outcome.code);
+    response.reason_code = static_cast<std::uint16_t>(codeOf(outcome.code));
     response.message = describe(outcome);
   } catch (const std::invalid_argument& error) {
     response.success = false;
@@ -334,7 +333,7 @@ void BridgeRos::publishState(const StateView& view) {
   message.drive_warning = view.drive_warning;
   message.motion_allowed = view.block == MotionBlock::None;
   message.hold_latched = view.hold_latched;
-  message.reason_code = reasonCode(view.block, view.loss);
+  message.reason_code = static_cast<std::uint16_t>(codeOf(view.block, view.loss));
   message.reason = reasonOf(view.block, view.blocking_joint, view.loss);
   const std::string event = wayOut(view.block);
   if (!event.empty()) message.reason += ": rosservice call " + command_.getService() + " " + event;

@@ -7,19 +7,23 @@
 #include <coglab_msgs/ReasonCode.h>
 
 #include "coglab_rt/reason.hpp"
-#include "lwr_fri_bridge/ros/reason_codes.hpp"
+#include "lwr_fri_bridge/bridge/diagnosis.hpp"
 
 namespace lwr_fri_bridge {
 namespace {
 
 using Code = coglab_msgs::ReasonCode;
 
+std::uint16_t number(MotionBlock block, const CommandModeLoss& loss) {
+  return static_cast<std::uint16_t>(codeOf(block, loss));
+}
+
 TEST(ReasonCodes, EveryMotionBlockHasOneOfItsOwn) {
   std::set<std::uint16_t> seen;
   for (int i = 0; i < 256; ++i) {
     const auto block = static_cast<MotionBlock>(i);
     if (std::string(describe(block)) == "?") continue;  // no value of the enum
-    const std::uint16_t code = reasonCode(block);
+    const std::uint16_t code = static_cast<std::uint16_t>(coglab_rt::codeOf(block));
     EXPECT_NE(code, Code::UNEXPECTED) << describe(block);
     EXPECT_EQ(code == Code::NONE, block == MotionBlock::None) << describe(block);
     EXPECT_TRUE(seen.insert(code).second) << describe(block);
@@ -37,7 +41,7 @@ TEST(ReasonCodes, EveryOutcomeHasOne) {
     outcome.code = static_cast<OutcomeCode>(i);
     if (describe(outcome) == "start") continue;  // no words: no value of the enum
     ++values;
-    const std::uint16_t code = reasonCode(outcome.code);
+    const std::uint16_t code = static_cast<std::uint16_t>(codeOf(outcome.code));
     EXPECT_NE(code, Code::UNEXPECTED) << describe(outcome);
     EXPECT_EQ(code == Code::NONE, outcome.success() || outcome.code == OutcomeCode::Pending)
         << describe(outcome);
@@ -48,11 +52,11 @@ TEST(ReasonCodes, EveryOutcomeHasOne) {
 TEST(ReasonCodes, ALossThatTheComputerCausedIsNamed) {
   CommandModeLoss loss;
   loss.cause = LossCause::ComputerLate;
-  EXPECT_EQ(reasonCode(MotionBlock::Monitor, loss), Code::COMPUTER_LATE);
-  EXPECT_EQ(reasonCode(MotionBlock::NotStarted, loss), Code::COMPUTER_LATE);
-  EXPECT_EQ(reasonCode(MotionBlock::Held, loss), Code::HELD);
+  EXPECT_EQ(number(MotionBlock::Monitor, loss), Code::COMPUTER_LATE);
+  EXPECT_EQ(number(MotionBlock::NotStarted, loss), Code::COMPUTER_LATE);
+  EXPECT_EQ(number(MotionBlock::Held, loss), Code::HELD);
   loss.cause = LossCause::LeftByController;
-  EXPECT_EQ(reasonCode(MotionBlock::Monitor, loss), Code::NOT_IN_COMMAND_MODE);
+  EXPECT_EQ(number(MotionBlock::Monitor, loss), Code::NOT_IN_COMMAND_MODE);
 }
 
 }  // namespace

@@ -14,6 +14,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
+from coglab_perception.sights import Sight
 from coglab_py.pose import Pose, length
 from coglab_py.rotation import Rotation
 
@@ -77,15 +78,6 @@ class PerceptionSettings:
         turn = Rotation.from_rotvec(np.radians(self.calibration_turn_deg) * axis)
         off = CALIBRATED_AT - turn.apply(CALIBRATED_AT) + self.calibration_offset * aside
         return Pose(off, turn.as_quat())
-
-
-@dataclass(frozen=True)
-class Sight:
-    """One delivered observation of a frame: capture time (s) and seen pose."""
-
-    name: str
-    captured: float
-    frame: Pose
 
 
 class Tracker:
@@ -173,19 +165,3 @@ class Tracker:
         if self._swap is not None and self._swap < len(others):
             return others[self._swap]
         return Pose(truth.position + self._jump, truth.orientation)
-
-
-@dataclass(frozen=True)
-class Board:
-    """The storage board: its frame in world and its slots (object positions in the board frame, m)."""
-
-    frame: Pose
-    slots: dict[str, np.ndarray]
-
-    def free(self, occupied: list[np.ndarray], clearance: float = 0.10) -> list[str]:
-        """Slots farther than ``clearance`` m from every object (world positions, m), best first."""
-        return [
-            name
-            for name, place in self.slots.items()
-            if all(np.linalg.norm(self.frame.apply(place) - o) > clearance for o in occupied)
-        ]

@@ -34,6 +34,14 @@ class Newest:
         if self._on_message is not None:
             self._on_message(message)
 
+    def is_connected(self) -> bool:
+        """True if the topic has a publisher."""
+        return bool(self._subscriber.get_num_connections())
+
+    def close(self) -> None:
+        """Unsubscribe."""
+        self._subscriber.unregister()
+
     def age(self) -> float:
         """Returns the age of the last message, s in the time of the cell; large if there was none."""
         return (time.monotonic() - self.stamp) * PACE.factor

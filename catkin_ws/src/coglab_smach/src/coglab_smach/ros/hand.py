@@ -110,6 +110,11 @@ class RosHand:
         self._status = Newest(f"{namespace}/hand_status", HandStatus)
         self._calibration = rospy.Publisher(f"{namespace}/hand_calibration", String, queue_size=1)
 
+    def disconnect(self) -> None:
+        """Disconnect the action clients."""
+        for client in self._clients.values():
+            client.stop()
+
     def _call(self, name: str, goal: Any) -> Pending:
         return ActionCall(self._clients[name], f"{self._ns}/{name}", goal)
 

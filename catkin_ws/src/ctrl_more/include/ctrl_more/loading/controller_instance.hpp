@@ -22,8 +22,9 @@ struct ControllerInstance {
 };
 
 /// Makes a controller of a type.
-/// @param library_path file; "": the type is linked into the program
-/// @param type registered name; "": the only one in the library
+/// @param library_path file; "": the type is linked into the program. Of a script type: the folder
+///        of its module
+/// @param type registered name; "": the only one in the library; `module:Class` for a script type
 /// @throws std::runtime_error with one sentence
 ControllerInstance makeController(const std::string& library_path, const std::string& type);
 

@@ -22,12 +22,14 @@ struct ManagerOptions {
 
 /// Options of one controller: its block in the list file.
 struct ControllerEntry {
-  std::string type;                        ///< registered class; "": the only one in the library
-  std::string library;                     ///< `libPath` resolved; "": linked into the program
-  std::string config_file;                 ///< `configFile` resolved; "": defaults
-  bool enabled = false;                    ///< enabled from the start
-  double overrun_us = 0.0;                 ///< longest update() [us]; 0: not judged
-  double blend_s = -1.0;                   ///< own blend time [s]; < 0: the manager's
+  std::string type;         ///< registered class; "": the only one in the library;
+                            ///< `module:Class`: a script type
+  std::string library;      ///< `libPath` resolved; "": linked into the program; of a
+                            ///< script type: folder of its module
+  std::string config_file;  ///< `configFile` resolved; "": defaults
+  bool enabled = false;     ///< enabled from the start
+  double overrun_us = 0.0;  ///< longest update() [us]; 0: not judged
+  double blend_s = -1.0;    ///< own blend time [s]; < 0: the manager's
   StopPolicy on_fault = StopPolicy::Fade;  ///< policy for the last correction after a fault
 };
 

@@ -18,6 +18,7 @@
 #include <cstdint>
 #include <string>
 
+#include "coglab_rt/reason.hpp"
 #include "lwr_fri_bridge/fri/krl_convention.hpp"
 
 namespace lwr_fri_bridge {
@@ -90,5 +91,8 @@ struct Outcome {
 
 /// Text of the outcome: expected and actual state, and what to do next.
 std::string describe(const Outcome& outcome);
+
+/// Code of the outcome for programs; None for success and while it is pending.
+coglab_rt::ReasonCode codeOf(OutcomeCode code);
 
 }  // namespace lwr_fri_bridge

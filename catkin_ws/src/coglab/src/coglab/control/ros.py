@@ -1,0 +1,58 @@
+"""The services of the controller manager that `./coglab controller run` uses."""
+
+from __future__ import annotations
+
+from typing import Any
+from xmlrpc.client import ServerProxy
+
+import rosgraph
+import rospy
+from coglab_msgs.srv import LoadController, StartMotion, SwitchController
+
+from coglab.control.slot import SlotError
+
+MANAGER = "/controller_manager"
+WAIT = 10.0  # s, longest wait for a service
+
+
+class SlotServices:
+    """Loads the slot of a motion into the running robot, and starts the motion."""
+
+    def load(self, slot: str) -> None:
+        """Load a slot for a motion. Raises SlotError if no robot runs, or with its refusal."""
+        self._call(f"{MANAGER}/load_controller", LoadController, slot, "coglab/RemoteMotion")
+
+    def start(self, slot: str) -> None:
+        """Make the slot the active controller and start its motion. Raises SlotError with the refusal."""
+        self._call(f"{MANAGER}/switch_controller", SwitchController, slot)
+        self._call(f"{MANAGER}/{slot}/start_motion", StartMotion, [], [], False)
+
+    def robot(self) -> int:
+        """Number of the process that offers the controller manager. Raises SlotError."""
+        try:
+            uri = self._node_of(f"{MANAGER}/load_controller")
+            proxy: Any = ServerProxy(uri)
+            return int(proxy.getPid("/coglab_control")[2])
+        except (OSError, rosgraph.MasterException) as error:
+            raise SlotError(f"the robot does not answer: {error}") from error
+
+    @staticmethod
+    def _node_of(service: str) -> str:
+        master = rosgraph.Master("/coglab_control")
+        for name, nodes in master.getSystemState()[2]:
+            if name == service and nodes:
+                return str(master.lookupNode(nodes[0]))
+        raise SlotError(f"nobody offers {service}; start the system: ./coglab launch")
+
+    @staticmethod
+    def _call(name: str, kind: Any, *words: object) -> Any:
+        if not rosgraph.is_master_online():
+            raise SlotError("no ROS master answers; start the system first: ./coglab launch")
+        try:
+            rospy.wait_for_service(name, WAIT)
+            answer = rospy.ServiceProxy(name, kind)(*words)
+        except (rospy.ROSException, rospy.ServiceException, OSError) as error:
+            raise SlotError(f"{name} does not answer: {error}") from error
+        if not answer.success:
+            raise SlotError(f"the robot refuses: {answer.message}")
+        return answer

@@ -1,0 +1,97 @@
+"""Many trials, on several processors."""
+
+from __future__ import annotations
+
+import multiprocessing
+import pickle
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from typing import Any
+
+from coglab.trial import Trial
+from coglab.world import World
+
+MOST_WORKERS = 256
+
+
+class TrialFailed(RuntimeError):
+    """One of many trials raised an exception. ``seed``: its seed."""
+
+    def __init__(self, sentence: str, seed: int) -> None:
+        super().__init__(sentence, seed)
+        self.seed = seed
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+def trials(
+    n: int | None = None,
+    *actions: str,
+    seeds: Iterable[int] | None = None,
+    workers: int = 2,
+    each: Callable[[World], Any] | None = None,
+    limit: float = 60.0,
+    **world: Any,
+) -> list[Any]:
+    """Run many trials, each in a World of its own, and return their records in the order of the seeds.
+
+    ``n``: number of trials, with the seeds 1 .. n; or ``seeds``: these seeds. ``actions``: as for ``World.trial``,
+    by default "receive". ``workers``: processes; 1: in this process. ``limit``: s of virtual time for each action.
+    ``world``: further arguments of World, such as ``person="accustomed"``. ``each``: a function of a module, called
+    with each World instead of the actions; its values are returned instead of Trials.
+
+    Each worker is a new process (forkserver), so a script needs ``if __name__ == "__main__":`` around this call.
+    A trial that does not succeed is a Trial like others. TrialFailed names the seed of one that raised an exception.
+    Example::
+
+        trials = coglab.trials(100, "receive", "give", person="drawn")
+        print(sum(map(bool, trials)), "of", len(trials))
+    """
+    chosen = _seeds(n, seeds)
+    if isinstance(workers, bool) or not isinstance(workers, int) or not 1 <= workers <= MOST_WORKERS:
+        raise ValueError(f"workers: a whole number 1 .. {MOST_WORKERS} is expected, got {workers!r}")
+    if each is not None and actions:
+        raise ValueError("give actions, or a function 'each', not both")
+    jobs = [(seed, actions or ("receive",), limit, world, each) for seed in chosen]
+    if workers == 1 or len(jobs) == 1:
+        return [_one(job) for job in jobs]
+    try:
+        pickle.dumps((world, each))  # what multiprocessing does to send them; here the reason can be named
+    except Exception as error:
+        raise ValueError(
+            f"these arguments cannot be sent to another process ({error}): use functions of a module instead of lambda "
+            "or inner functions, or workers=1"
+        ) from None
+    context = multiprocessing.get_context("forkserver")
+    with ProcessPoolExecutor(min(workers, len(jobs)), mp_context=context) as pool:
+        return list(_in_order(pool, jobs))
+
+
+def _in_order(pool: ProcessPoolExecutor, jobs: list[Any]) -> Iterator[Any]:
+    try:
+        yield from pool.map(_one, jobs)
+    except BaseException:
+        pool.shutdown(cancel_futures=True)
+        raise
+
+
+def _seeds(n: int | None, seeds: Iterable[int] | None) -> list[int]:
+    if (n is None) == (seeds is None):
+        raise ValueError("give n, the number of trials, or seeds=..., not both")
+    if seeds is not None:
+        return list(seeds)
+    if isinstance(n, bool) or not isinstance(n, int) or n < 1:
+        raise ValueError(f"n: a whole number 1 or more is expected, got {n!r}")
+    return list(range(1, n + 1))
+
+
+def _one(job: tuple[int, tuple[str, ...], float, dict[str, Any], Callable[[World], Any] | None]) -> Trial | Any:
+    seed, actions, limit, arguments, each = job
+    try:
+        with World(seed, **arguments) as world:
+            return each(world) if each is not None else world.trial(*actions, limit=limit)
+    except (ValueError, TypeError):
+        raise  # of the arguments: the same for each seed
+    except Exception as error:
+        raise TrialFailed(f"the trial with seed {seed} failed: {type(error).__name__}: {error}", seed) from error

@@ -1,0 +1,40 @@
+"""What coglab.control accepts from the author of a motion, and how it refuses the rest."""
+
+import numpy as np
+import pytest
+from coglab.control import ControlError, MotionSetup, Reference
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"joints": np.zeros(6)}, r"joints: shape \(7,\) is expected, shape \(6,\) came"),
+        ({"joints": [0.0] * 6 + [np.nan]}, "finite numbers"),
+        ({"joints": ["a"] * 7}, "7 numbers"),
+        ({"joint_velocity": np.zeros(7)}, "without joints"),
+        ({"joints": np.zeros(7), "twist": np.zeros(6)}, "both came"),
+        ({"position": np.zeros(3)}, "needs position and orientation"),
+        ({"position": np.zeros(3), "orientation": [0, 0, 0, 2]}, "length is 2"),
+    ],
+)
+def test_wrong_reference_is_refused_in_words(fields, words):
+    with pytest.raises(ControlError, match=words):
+        Reference(**fields)
+
+
+def test_reference_keeps_a_copy():
+    joints = np.zeros(7)
+    reference = Reference(joints=joints)
+    joints[0] = 1.0
+    assert reference.joints is not None and reference.joints[0] == 0.0
+
+
+def test_arguments_take_defaults_and_refuse_what_is_outside():
+    setup = MotionSetup()
+    name = setup.argument("radius", "m", 0.05, 0.0, 0.15)
+    assert setup.values({}) == {name: 0.05}
+    for wrong in (0.2, float("nan"), "wide"):
+        with pytest.raises(ControlError, match="0.0 to 0.15 m is expected"):
+            setup.values({"radius": wrong})
+    with pytest.raises(ControlError, match="no argument 'size'; it has: radius"):
+        setup.values({"size": 1.0})

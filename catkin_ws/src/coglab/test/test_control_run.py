@@ -1,0 +1,105 @@
+"""`./coglab controller run` with a real robot node (its ideal arm), and what it says about files that are no good."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from coglab.control import slot as wire
+from coglab.control.host import find_class, load_module
+from coglab.control.motion import ControlError
+
+HERE = Path(__file__).resolve().parent
+SOURCES = HERE.parents[1]
+sys.path.insert(0, str(SOURCES / "coglab_controllers" / "test"))
+from own_master import node_path, own_master  # noqa: E402
+
+LIMIT = 60.0  # s, for all that is waited for
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("import nowhere_at_all\n", r"bad.py:1: ModuleNotFoundError"),
+        ("x = 1\ny = (\n", r"bad.py:2: SyntaxError"),
+        ("x = 1\n", "no class with the methods"),
+        ("class A:\n    start = reference = done = len\nclass B(A): pass\n", "2 controllers: A, B"),
+    ],
+)
+def test_bad_file_is_refused_in_words(tmp_path, text, words):
+    file = tmp_path / "bad.py"
+    file.write_text(text)
+    with pytest.raises(ControlError, match=words):
+        find_class(load_module(file))
+
+
+@pytest.fixture(name="robot")
+def running_robot() -> Iterator[subprocess.Popen]:
+    """A robot node with the ideal arm and the slot `python_motion`."""
+    with own_master() as master:
+        master.setParam("/robot_description", (SOURCES / "lwr_description" / "urdf" / "lwr_ih2.urdf").read_text())
+        master.setParam("/lwr", {"arm": "ideal", "rt_priority": 0})
+        master.setParam("/controller_manager", {"load": {"python_motion": "coglab/RemoteMotion"}})
+        node = subprocess.Popen([node_path("robot_node"), "__name:=robot"])
+        try:
+            wait(lambda: any(one.robot == node.pid for one in wire.offered()), "the slot")
+            yield node
+        finally:
+            node.send_signal(signal.SIGINT)
+            node.wait(timeout=LIMIT)
+
+
+def wait(condition, what: str) -> None:
+    """Wait until a condition holds; fail with what was waited for."""
+    end = time.monotonic() + LIMIT
+    while not condition():
+        assert time.monotonic() < end, f"not within {LIMIT} s: {what}"
+        time.sleep(0.02)
+
+
+def test_motion_of_a_file_moves_the_arm_and_is_stopped(robot):
+    import rospy
+    from coglab_msgs.msg import MotionFeedback
+    from coglab_msgs.srv import LwrCommand, StartMotion, SwitchController
+
+    rospy.init_node("test_control_run", disable_signals=True)
+    ends: list[MotionFeedback] = []
+    rospy.Subscriber("/controller_manager/python_motion/motion_feedback", MotionFeedback, ends.append)
+    rospy.wait_for_service("/lwr/command", LIMIT)
+    wait(lambda: rospy.ServiceProxy("/lwr/command", LwrCommand)("start").success, "the arm's start")
+
+    command = [sys.executable, "-u", "-m", "coglab.control.run", str(HERE / "my_sway.py"), "duration=1"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=dict(os.environ)) as process:
+        assert process.stdout is not None
+        try:
+            assert "holds the slot python_motion" in process.stdout.readline()
+            with pytest.raises(wire.SlotError, match=f"process {process.pid} holds this slot"):
+                wire.Slot(wire.Address(robot.pid, "python_motion"), wire.MOTION)
+            with pytest.raises(wire.SlotError, match="the process has 99"):
+                wire.Slot(wire.Address(robot.pid, "python_motion"), wire.MOTION, interface=99)
+            assert rospy.ServiceProxy("/controller_manager/switch_controller", SwitchController)(
+                "python_motion"
+            ).success
+            start = rospy.ServiceProxy("/controller_manager/python_motion/start_motion", StartMotion)
+            answer = start([], [], False)
+            assert answer.success, answer.message
+            wait(lambda: any(m.state == "reached" for m in ends), f"the end: {ends[-1:]}")
+
+            ends.clear()
+            assert start([], [], False).success
+            time.sleep(0.2)
+            process.send_signal(signal.SIGSTOP)
+            wait(lambda: any(m.state == "aborted" and "sent nothing usable" in m.reason for m in ends), "an abort")
+            process.send_signal(signal.SIGCONT)
+            process.send_signal(signal.SIGINT)
+            assert process.wait(timeout=LIMIT) == 0
+        finally:
+            process.kill()
+    with wire.Slot(wire.Address(robot.pid, "python_motion"), wire.MOTION):
+        pass  # a restart is accepted

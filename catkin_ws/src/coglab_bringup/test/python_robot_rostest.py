@@ -1,0 +1,122 @@
+#!/usr/bin/python3
+"""coglab.connect() on the running simulated cell: motions, hold and reset, and an exchange each way."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+import unittest
+from unittest import mock
+
+import coglab
+import numpy as np
+import rosnode
+import rospy
+import rostest
+from coglab.running import NoRobot
+from coglab_bringup.handover import READY_LIMIT
+from coglab_msgs.msg import ReasonCode
+from coglab_msgs.srv import Start
+
+LIMIT = 90.0  # s for an exchange on a loaded machine
+
+
+class PythonRobot(unittest.TestCase):
+    """One system for all tests; they run in the order of their names."""
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        end = time.monotonic() + READY_LIMIT
+        while True:
+            try:
+                cls.robot = coglab.connect()
+                if cls.robot.state.actions:
+                    break
+                cls.robot.close()
+            except NoRobot:
+                pass
+            if time.monotonic() > end:
+                raise TimeoutError("the system is not ready")
+            time.sleep(0.5)
+
+    @classmethod
+    def tearDownClass(cls) -> None:
+        cls.robot.close()
+
+    def test_1_moves_and_stops_at_the_end_of_a_block(self) -> None:
+        arm = self.robot.arm
+        target = arm.home + 0.1
+        result = arm.move_joints(target)
+        self.assertTrue(result.ok, str(result))
+        self.assertLess(np.abs(arm.joints - target).max(), 0.01)
+        with arm.start_joints(arm.home - 0.3, duration=8.0) as motion:
+            time.sleep(1.0)
+            self.assertFalse(motion.done)
+        self.assertEqual((motion.result.ok, motion.result.reason), (False, "CANCELLED"))
+        self.assertTrue(self.robot.state.standing)
+        self.assertGreater(np.abs(arm.joints - arm.home + 0.3).max(), 0.05)
+
+    def test_2_comes_to_a_pose_and_follows_a_function(self) -> None:
+        arm = self.robot.arm
+        self.assertTrue(arm.move_joints(arm.home).ok)
+        palm = arm.palm
+        there = coglab.Pose(palm.position + [0.05, 0.0, 0.05], palm.orientation)
+        self.assertTrue(arm.move_to(there).ok)
+        self.assertLess(np.linalg.norm(arm.palm.position - there.position), 0.01)
+        self.assertTrue(arm.reach("reach_human", palm).ok)
+        self.assertLess(np.linalg.norm(arm.palm.position - palm.position), 0.01)
+        result = arm.follow(lambda t: palm.position + [0.0, 0.03 * t, 0.0], 3.0)
+        self.assertTrue(result.ok, str(result))
+        self.assertGreater(arm.palm.position[1] - palm.position[1], 0.03)
+
+    def test_3_hold_is_latched_until_reset(self) -> None:
+        robot = self.robot
+        self.assertTrue(robot.hold().ok)
+        with self.assertRaises(coglab.Refused) as refused:
+            robot.arm.move_joints(robot.arm.home)
+        self.assertIn("robot.reset()", str(refused.exception))
+        result = robot.reset(limit=LIMIT)
+        self.assertTrue(result.ok, str(result))
+
+    def test_4_receives_and_gives_back(self) -> None:
+        robot = self.robot
+        robot.events()
+        with self.assertRaises(coglab.Refused) as refused:
+            robot.give()
+        self.assertEqual(refused.exception.code, ReasonCode.WRONG_STATE)
+        with self.assertRaises(coglab.Refused) as refused:
+            robot.receive("teapot_of_nobody")
+        self.assertEqual(refused.exception.code, ReasonCode.OBJECT_UNKNOWN)
+        received = robot.receive("mug", limit=LIMIT)
+        self.assertTrue(received.ok, str(received))
+        self.assertEqual(robot.state.holding, "mug")
+        self.assertTrue(received.started <= received.marks["closed"] <= received.ended <= rospy.get_time())
+        with self.assertRaises(coglab.Refused):
+            robot.hand.open()
+        given = robot.give(limit=LIMIT)
+        self.assertTrue(given.ok, str(given))
+        kinds = {event.kind for event in robot.events()}
+        self.assertEqual(kinds, {"transition", "result", "said"})
+        self.assertTrue(robot.hand.preshape("lateral").ok)
+
+    def test_5_several_connections_and_a_clean_end(self) -> None:
+        with coglab.connect() as second:
+            self.assertEqual(second.state.holding, self.robot.state.holding)
+        with self.assertRaises(RuntimeError):
+            second.arm.joints  # noqa: B018  (a property that is refused)
+        self.assertEqual(self.robot.arm.joints.shape, (7,))
+        own = [name for name in rosnode.get_node_names() if "coglab_python" in name or name == rospy.get_name()]
+        self.assertEqual(own, [rospy.get_name()])
+        with self.assertRaises(NoRobot):
+            coglab.connect(namespace="nowhere")
+        with mock.patch("coglab.running.LwrCommand", Start), self.assertRaisesRegex(NoRobot, "another version"):
+            coglab.connect()
+        before = os.environ["ROS_MASTER_URI"]
+        with self.assertRaises(NoRobot):
+            coglab.connect("1")
+        self.assertEqual(os.environ["ROS_MASTER_URI"], before)
+
+
+if __name__ == "__main__":
+    rostest.rosrun("coglab_bringup", "python_robot", PythonRobot, sys.argv)

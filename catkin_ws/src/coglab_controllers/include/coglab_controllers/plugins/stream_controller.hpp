@@ -1,0 +1,92 @@
+/// @file
+/// Motion controllers that follow a stream of velocities: a twist of the hand, or joint velocities.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "coglab_controllers/motion/motion_runner.hpp"
+#include "coglab_rt/triple_buffer.hpp"
+
+namespace coglab_controllers {
+
+/// One command of a stream.
+struct StreamCommand {
+  JointVector velocity = JointVector::Zero();  ///< a twist has six numbers, the seventh is 0
+  std::int64_t stamp_ns = 0;                   ///< when it was sent, MotionHost::now_ns()
+};
+
+/// The commands of a stream, from the sender to the control cycle. The cycle reads without waiting.
+using StreamMailbox = TripleBuffer<StreamCommand>;
+
+/// Request that opens a stream.
+struct StreamRequest {
+  std::int64_t opened_ns = 0;  ///< older commands do not count
+};
+
+/// The arm follows the newest command until the stream is closed: by a cancel, by a switch to
+/// another controller, or because the robot stops. If no command came for `command_timeout`, the
+/// arm brakes and stands, and the stream stays open for the next one. A limit slows the arm but
+/// does not close the stream. `speed_scale` slows it as it slows every motion.
+///
+/// Commands are reduced to the largest speeds below, in their direction; changes of velocity to the
+/// largest accelerations. The reference stays within `leash` of the commanded arm, so
+/// that it does not run ahead while a limit holds the arm.
+///
+/// Parameters: those of MotionRunner without a queue, and `command_timeout` (s, default 0.1).
+class StreamController : public MotionRunner<StreamRequest> {
+ public:
+  /// Opens the stream, or opens it anew. Any thread.
+  MotionAnswer open();
+  /// Sends one command; refused if the stream is not open, for a wrong size, and for a number that
+  /// is not finite. Any thread but the control thread.
+  Answer send(const std::vector<double>& velocity);
+  /// True while the stream is open.
+  bool isOpen() const { return open_.load(std::memory_order_relaxed); }
+
+  void adopt(const CycleInput& input) override;
+
+ protected:
+  /// What a kind of stream is made of.
+  struct Parts {
+    std::unique_ptr<Motion<StreamRequest>> motion;
+    StreamMailbox* mailbox;          ///< a member of the motion
+    std::vector<std::string> names;  ///< of the numbers of a command
+    std::string units;
+  };
+  explicit StreamController(Parts parts);
+
+ private:
+  void report(std::int64_t stamp_ns) override;
+
+  StreamMailbox& mailbox_;
+  const std::vector<std::string> names_;
+  const std::string units_;
+  std::mutex sending_;  // among senders; the cycle does not take it
+  std::atomic<bool> open_{false};
+};
+
+/// Follows twists of the tool frame: linear (m/s), then angular (rad/s), axes of the base frame.
+/// Parameters besides those of StreamController: `max_speed` (m/s, default 0.8, and at
+/// most 0.8 times `hand_speed_limit`), `max_turning`
+/// (rad/s, 3.0), `max_acceleration` (m/s^2, 3.0), `max_turning_acceleration` (rad/s^2, 12.0),
+/// `leash` (m, 0.02; the same number of tenths of a radian for the orientation).
+class TwistStream : public StreamController {
+ public:
+  TwistStream();
+};
+
+/// Follows joint velocities (rad/s), seven in wire order. A joint near its stop brakes by itself;
+/// the others go on. Parameters besides those of StreamController: `max_share` (of the robot's
+/// velocity limits, default 1.0), `max_acceleration_share` (of its acceleration limits, 0.5),
+/// `leash` (rad, 0.05).
+class JointVelocityStream : public StreamController {
+ public:
+  JointVelocityStream();
+};
+
+}  // namespace coglab_controllers

@@ -1,0 +1,283 @@
+#include "coglab_controllers/plugins/stream_controller.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "coglab_controllers/kinematics/rotation.hpp"
+#include "coglab_rt/braking.hpp"
+
+namespace coglab_controllers {
+
+namespace {
+
+/// The vector, shortened to a length.
+template <typename Vector>
+Vector shortened(const Vector& vector, double most) {
+  const double length = vector.norm();
+  return length > most ? Vector(vector * (most / length)) : vector;
+}
+
+/// What both streams share: the newest command, its age, and rest while there is none.
+class StreamMotion : public Motion<StreamRequest> {
+ public:
+  StreamMailbox mailbox;
+
+  void configure(MotionConfiguration& configuration) override {
+    robot_ = configuration.setup.robot;
+    const Parameters& parameters = configuration.parameters;
+    timeout_ns_ =
+        static_cast<std::int64_t>(1e9 * parameters.number("command_timeout", 0.1, 0.005, 10.0));
+    waiting_ = Reason(ReasonCode::GoalStale, "the stream is open and has no command newer than ")
+               << 1e-9 * static_cast<double>(timeout_ns_) << " s: the arm stands";
+    configureStream(parameters);
+  }
+
+  void start(const MotionStart<StreamRequest>& start) override {
+    opened_ns_ = start.request.opened_ns;
+    resting_ = false;  // the arm may move: go on from there
+    restart(start.from);
+  }
+
+  void computeReference(const MotionCycle& cycle, MotionReference& reference) override {
+    mailbox.read(newest_);
+    const std::int64_t now = cycle.input.robot.stamp_ns;
+    if (newest_.stamp_ns < opened_ns_ || now - newest_.stamp_ns > timeout_ns_) {
+      resting_ = true;
+      reference.rest();
+      return;
+    }
+    if (resting_) restart(commanded(cycle.input));
+    resting_ = false;
+    follow(cycle, newest_.velocity, cycle.next - cycle.time, reference);
+  }
+
+  MotionState state() const override {
+    return resting_ ? MotionState::Holding : MotionState::Running;
+  }
+  const Reason& reason() const override {
+    static const Reason none;
+    return resting_ ? waiting_ : none;
+  }
+  /// A limit that blocks the arm does not close the stream: the next command may lead away from it.
+  bool endIfThere(const CycleInput&) override { return true; }
+
+ protected:
+  virtual void configureStream(const Parameters& parameters) = 0;
+  /// The reference goes on from here.
+  virtual void restart(const SetPoint& from) = 0;
+  /// @param dt s of motion time until the next cycle
+  virtual void follow(const MotionCycle& cycle, const JointVector& command, double dt,
+                      MotionReference& reference) = 0;
+
+  const Pose& commandedTool(const CycleInput& input) {
+    robot_->chain.evaluate(input.robot.commanded_position, commanded_);
+    return commanded_.tool;
+  }
+
+  std::shared_ptr<const RobotSetup> robot_;
+
+ private:
+  /// The commanded state of an arm that may still be braking.
+  SetPoint commanded(const CycleInput& input) {
+    SetPoint from;
+    from.joints = input.robot.commanded_position;
+    from.joint_velocity = input.robot.commanded_velocity / std::max(input.time_scale, 0.1);
+    from.pose = commandedTool(input);
+    const Eigen::Matrix<double, 6, 1> twist = commanded_.jacobian * from.joint_velocity;
+    from.velocity = twist.head<3>();
+    from.angular_velocity = twist.tail<3>();
+    return from;
+  }
+
+  std::int64_t timeout_ns_ = 100'000'000, opened_ns_ = 0;
+  StreamCommand newest_;
+  bool resting_ = false;
+  Reason waiting_;
+  ChainState commanded_;  // kinematics at the commanded joints
+};
+
+class TwistMotion : public StreamMotion {
+ protected:
+  void configureStream(const Parameters& parameters) override {
+    max_speed_ = parameters.number("max_speed", 0.8, 0.01, 5.0);
+    // Below the guard's limit, which would slow the turning too.
+    const double hand = robot_->guard.hand_speed;
+    if (hand > 0.0) max_speed_ = std::min(max_speed_, 0.8 * hand);
+    max_turning_ = parameters.number("max_turning", 3.0, 0.01, 20.0);
+    max_acceleration_ = parameters.number("max_acceleration", 3.0, 0.1, 50.0);
+    max_turning_acceleration_ = parameters.number("max_turning_acceleration", 12.0, 0.1, 200.0);
+    leash_ = parameters.number("leash", 0.02, 0.001, 0.2);
+  }
+
+  void restart(const SetPoint& from) override {
+    pose_ = from.pose;
+    velocity_ = from.velocity;
+    turning_ = from.angular_velocity;
+  }
+
+  void follow(const MotionCycle& cycle, const JointVector& command, double dt,
+              MotionReference& reference) override {
+    const Vector3 linear = shortened(Vector3(command.head<3>()), max_speed_);
+    const Vector3 angular = shortened(Vector3(command.segment<3>(3)), max_turning_);
+    velocity_ += shortened(Vector3(linear - velocity_), max_acceleration_ * dt);
+    turning_ += shortened(Vector3(angular - turning_), max_turning_acceleration_ * dt);
+    const Pose next = leashed({pose_.position + dt * velocity_,
+                               (expRotation(dt * turning_) * pose_.orientation).normalized()},
+                              commandedTool(cycle.input));
+    reference.pose(pose_, next);
+    pose_ = next;
+  }
+
+ private:
+  Pose leashed(const Pose& pose, const Pose& tool) const {
+    const Vector3 turn = rotationBetween(tool.orientation, pose.orientation);
+    return {tool.position + shortened(Vector3(pose.position - tool.position), leash_),
+            (expRotation(shortened(turn, kTurnPerWay * leash_)) * tool.orientation).normalized()};
+  }
+
+  static constexpr double kTurnPerWay = 10.0;  // rad/m
+
+  double max_speed_ = 0.8, max_turning_ = 3.0, max_acceleration_ = 3.0;
+  double max_turning_acceleration_ = 12.0, leash_ = 0.02;
+  Pose pose_;                           // of the reference, now
+  Vector3 velocity_ = Vector3::Zero();  // m/s of motion time
+  Vector3 turning_ = Vector3::Zero();   // rad/s of motion time
+};
+
+class JointMotion : public StreamMotion {
+ protected:
+  void configureStream(const Parameters& parameters) override {
+    const coglab_rt::JointLimits& limits = robot_->limits;
+    max_velocity_ = parameters.number("max_share", 1.0, 0.01, 1.0) * limits.velocity;
+    max_acceleration_ =
+        parameters.number("max_acceleration_share", 0.5, 0.01, 1.0) * limits.acceleration;
+    leash_ = parameters.number("leash", 0.05, 0.001, 0.5);
+  }
+
+  void restart(const SetPoint& from) override {
+    joints_ = from.joints;
+    velocity_ = from.joint_velocity;
+  }
+
+  void follow(const MotionCycle& cycle, const JointVector& command, double dt,
+              MotionReference& reference) override {
+    const coglab_rt::JointLimits& limits = robot_->limits;
+    const double share = std::max(1.0, (command.array() / max_velocity_.array()).abs().maxCoeff());
+    const JointVector wanted = command / share;
+    delay_ = cycle.input.robot.stop_delay + kDelay;
+    JointVector next;
+    for (int i = 0; i < kMaxJoints; ++i) {
+      const double step = max_acceleration_[i] * dt;
+      const double velocity = velocity_[i] + std::clamp(wanted[i] - velocity_[i], -step, step);
+      velocity_[i] = std::clamp(velocity, -towards(joints_[i] - limits.lower_position[i], i),
+                                towards(limits.upper_position[i] - joints_[i], i));
+      const double commanded = cycle.input.robot.commanded_position[i];
+      next[i] = std::clamp(joints_[i] + dt * velocity_[i], commanded - leash_, commanded + leash_);
+    }
+    reference.joints(joints_, next);
+    joints_ = next;
+  }
+
+ private:
+  /// Largest speed (rad/s) toward a stop so far away (rad): the joint brakes before its margin.
+  double towards(double distance, int joint) const {
+    return coglab_rt::brakingSpeed(distance - robot_->limits.position_margin - kReserve,
+                                   0.5 * max_acceleration_[joint], robot_->limits.jerk[joint],
+                                   delay_);
+  }
+
+  // The guard of the cycle keeps a distance of its own, and slows all joints there.
+  static constexpr double kReserve = 0.01;  // rad
+  static constexpr double kDelay = 0.05;    // s, besides what a robot needs to hear of a stop
+
+  JointVector max_velocity_ = JointVector::Ones(), max_acceleration_ = JointVector::Ones();
+  double leash_ = 0.05, delay_ = kDelay;
+  JointVector joints_ = JointVector::Zero();    // rad, reference now
+  JointVector velocity_ = JointVector::Zero();  // rad/s of motion time
+};
+
+RunnerPolicy streamPolicy() {
+  RunnerPolicy policy;
+  policy.open_end = true;
+  policy.id_name = nullptr;
+  policy.longest_queue = 0;
+  return policy;
+}
+
+}  // namespace
+
+StreamController::StreamController(Parts parts)
+    : MotionRunner<StreamRequest>(std::move(parts.motion), streamPolicy()),
+      mailbox_(*parts.mailbox),
+      names_(std::move(parts.names)),
+      units_(std::move(parts.units)) {}
+
+MotionAnswer StreamController::open() {
+  const MotionRequest begun = setup().host->beginRequest(id());
+  if (!begun.welcome.success) return MotionAnswer::rejected(begun.welcome);
+  return offer(begun, {setup().host->now_ns()}, false);
+}
+
+Answer StreamController::send(const std::vector<double>& velocity) {
+  if (velocity.size() != names_.size()) {
+    std::string text = "a command of '" + id() + "' has " + std::to_string(velocity.size()) +
+                       " numbers; expected " + std::to_string(names_.size()) + " (" + units_ +
+                       "), in the order";
+    for (const std::string& name : names_) text += " " + name;
+    return Answer::invalid(text);
+  }
+  StreamCommand command;
+  for (std::size_t i = 0; i < velocity.size(); ++i) {
+    if (!std::isfinite(velocity[i])) {
+      return Answer::invalid(names_[i] + " of a command of '" + id() +
+                             "' is not finite; expected finite numbers, " + units_);
+    }
+    command.velocity[static_cast<Eigen::Index>(i)] = velocity[i];
+  }
+  if (!isOpen()) {
+    return Answer::refusal(ReasonCode::NotActive, "the stream '" + id() +
+                                                      "' is not open; open it first, also after a "
+                                                      "cancel, a hold or a switch");
+  }
+  command.stamp_ns = setup().host->now_ns();
+  const std::lock_guard<std::mutex> lock(sending_);
+  mailbox_.write(command);
+  return {};
+}
+
+void StreamController::adopt(const CycleInput& input) {
+  MotionRunner<StreamRequest>::adopt(input);
+  open_.store(stage() != RunnerStage::Rest, std::memory_order_relaxed);
+}
+
+void StreamController::report(std::int64_t) {
+  open_.store(stage() != RunnerStage::Rest, std::memory_order_relaxed);
+}
+
+namespace {
+
+template <typename Made>
+std::pair<std::unique_ptr<Made>, StreamMailbox*> make() {
+  auto motion = std::make_unique<Made>();
+  StreamMailbox* const mailbox = &motion->mailbox;
+  return {std::move(motion), mailbox};
+}
+
+}  // namespace
+
+TwistStream::TwistStream()
+    : StreamController([] {
+        auto [motion, mailbox] = make<TwistMotion>();
+        return Parts{
+            std::move(motion), mailbox, {"vx", "vy", "vz", "wx", "wy", "wz"}, "m/s and rad/s"};
+      }()) {}
+
+JointVelocityStream::JointVelocityStream()
+    : StreamController([] {
+        auto [motion, mailbox] = make<JointMotion>();
+        return Parts{
+            std::move(motion), mailbox, {"a1", "a2", "e1", "a3", "a4", "a5", "a6"}, "rad/s"};
+      }()) {}
+
+}  // namespace coglab_controllers
