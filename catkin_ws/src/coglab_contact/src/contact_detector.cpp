@@ -280,7 +280,7 @@ std::optional<ContactEvent> ContactDetector::checkOffset() {
   Armed& a = *armed_;
   const std::optional<Joints> before_motion = a.carries ? std::nullopt : rest_.beforeMotion();
   const std::optional<Joints> reference = a.before ? a.before : before_motion;
-  if (a.mode != "contact" || !reference) return std::nullopt;
+  if (a.mode != "contact" || !reference || a.watched.empty()) return std::nullopt;
   double offset = 0.0;
   int largest = a.watched.front();
   for (int joint : a.watched) {
@@ -321,7 +321,7 @@ std::optional<ContactEvent> ContactDetector::watchWeight(double stamp, const Joi
   const double force = (loading ? -1.0 : 1.0) * along / square;
   const double needed = a.load_share * a.mass * kGravity;
   margin_ = force / needed;
-  if (margin_ < 1.0) {
+  if (!(margin_ >= 1.0)) {  // also if no joint is watched
     a.gone_since.reset();
     return std::nullopt;
   }
