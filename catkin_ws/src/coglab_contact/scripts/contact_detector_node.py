@@ -79,11 +79,10 @@ class ContactDetectorNode:
             setattr(settings, field.name, value)
         self.arm = cc.Chain(urdf)
         self.joints = tuple(self.arm.joint_names)
-        jacobian = lambda q: self.arm.jacobian(np.asarray(q, dtype=float))[:3]  # noqa: E731
         self.learnt_file = parameters.read("~learnt_file", str, "")
-        self.moving = MovingContact(self.thresholds(), cc.ArmDynamics(urdf), jacobian)
+        self.moving = MovingContact(self.thresholds(), cc.ArmDynamics(urdf), self.arm)
         held = GripAndLoad(lambda q: Pose(*self.arm.fk(np.asarray(q, dtype=float))).rotation.as_matrix())
-        self.detector = FusedDetector(ContactDetector(settings, jacobian), self.moving, held=held)
+        self.detector = FusedDetector(ContactDetector(settings, self.arm), self.moving, held=held)
         self.recorder: MotionRecorder | None = None
         self.lock = threading.Lock()
         self.position: list[float] | None = None

@@ -379,7 +379,7 @@ def test_a_jump_of_more_than_12_newton_metres_is_doubted_twice(jump, doubted):
 
 def of(torque, features=None, jacobian=PALM, rate=0.0):
     features = np.tile([1.0, 0, 0, 0, 0, 0], (7, 1)) if features is None else features
-    return Change(0.0, np.asarray(torque, dtype=float), features, seven(rate), np.zeros(7), lambda q: jacobian)
+    return Change(0.0, np.asarray(torque, dtype=float), features, seven(rate), np.zeros(7), jacobian)
 
 
 def thresholds(constant=0.04, **rest):
@@ -407,10 +407,7 @@ def reaches(lag=0.0, count=20, samples=40):
         noise = rng.normal(0.0, 0.2, (samples, 7))
         features = np.tile([1.0, 0, 0, 0, 0, 0], (7, 1))
         found.append(
-            [
-                Change(0.0, noise[i] + lag * rates[i], features, rates[i], np.zeros(7), lambda q: PALM)
-                for i in range(samples)
-            ]
+            [Change(0.0, noise[i] + lag * rates[i], features, rates[i], np.zeros(7), PALM) for i in range(samples)]
         )
     return found
 

@@ -281,7 +281,9 @@ def test_a_sample_that_no_arm_can_give_is_ignored_and_the_push_after_it_found(po
     sample[which] = (
         {"six": np.zeros(6), "eight": np.zeros(8)}.get(value) if isinstance(value, str) else np.full(7, value)
     )
-    trial.detector._jacobian = lambda q: trial.jacobian * (1.0 if np.all(np.abs(q) < 10.0) else np.nan)
+    trial.detector = ContactDetector(
+        DetectorSettings(), lambda q: trial.jacobian * (1.0 if np.all(np.abs(q) < 10.0) else np.nan)
+    )
     trial.feed(1.5)
     for arm in (False, True):
         if arm:
@@ -320,7 +322,7 @@ def test_the_noise_is_learnt_anew_at_rest_alone(posture):
     assert run.detector.state() == "waiting"  # until enough was seen
     run.feed(1.0)
     assert run.detector.state() == "watching" and all(
-        mine == (j in run.detector._armed.watched) for j, mine in enumerate(run.detector.look().watched)
+        mine == (j in run.detector.watched) for j, mine in enumerate(run.detector.look().watched)
     )
     moving = ContactTrial(posture, 5)
     moving.feed(1.0)

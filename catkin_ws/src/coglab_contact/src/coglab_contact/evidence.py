@@ -8,10 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+
+from coglab_contact._core import ContactEvent, Evidence, probability
+
+__all__ = ["ContactEvent", "Evidence", "probability"]
 
 MOMENTUM = "momentum"
 TACTILE = "tactile"
@@ -19,46 +22,8 @@ FINGERS = "finger_motor"
 SIGHT = "sight"
 FUSED = "fused"
 DECIDED = 0.99  # probability that counts as a contact; one source at its threshold is sufficient
-STEEPNESS = 12.0  # logits per unit of margin: at 0.8 of its threshold a source gives 0.9, at 0.6 it gives 0.5
 SLOW = 0.03  # m/s of the palm; below, an object seen in the palm stays there
 SPEAKS_TOO = 0.5  # probability from which a source counts as a contributor to the event
-
-
-@dataclass(frozen=True)
-class ContactEvent:
-    """Contact detected (contact=True) or load released (False); fields of coglab_msgs/Contact.
-
-    ``margin``: signal over threshold. ``confidence``: probability (0..1) that the signal is over its threshold, given
-    the noise of the sensor. ``code``: ReasonCode of the message.
-    """
-
-    contact: bool
-    source: str
-    margin: float
-    message: str = ""
-    confidence: float = 1.0
-    code: int = 0
-
-
-@dataclass(frozen=True)
-class Evidence:
-    """Evidence of one source at one time (s), valid until ``until`` (s)."""
-
-    source: str
-    stamp: float
-    until: float
-    margin: float
-    message: str = ""
-
-    @property
-    def probability(self) -> float:
-        """Probability of a contact from this source alone."""
-        return probability(self.margin)
-
-
-def probability(margin: float) -> float:
-    """Returns the probability of a contact from a margin (signal over threshold): 0.99 at 1."""
-    return 1.0 / (1.0 + math.exp(-min(60.0, math.log(DECIDED / (1.0 - DECIDED)) + STEEPNESS * (margin - 1.0))))
 
 
 def together(evidence: Iterable[Evidence]) -> float:

@@ -12,20 +12,18 @@ that force in standard deviations is compared with a limit that reaches without 
 
 from __future__ import annotations
 
-import math
-from collections import deque
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import yaml
 from coglab_py.yaml_file import read
 from scipy.optimize import nnls
 
-from coglab_contact.momentum_observer import Residual
+from coglab_contact._core import Change, Offset, explained
+
+__all__ = ["FEATURES", "Change", "Offset", "ThresholdError", "Thresholds", "explained", "learn"]
 
 FEATURES = (
     "constant",
@@ -39,115 +37,14 @@ FEATURES = (
 time of the reference mean; a^2 (rad/s^2, joint with the largest acceleration); and, for each joint, the square of the
 change (Nm) of the torque that carries and accelerates the set payload"""
 FLOOR = 1e-4  # Nm^2, lower limit of the variance: in a noise-free simulation, rounding must not trigger
-RECENT = 0.10  # s, age of the newest sample of the reference mean
-OLD = 0.60  # s, age of its oldest sample
-LATELY = 0.25  # s, age of the oldest sample of the mean for an offset
-MEMORY = 0.025  # s, averaging time of speeds and payload torque; about the time constant of the residual
-LEAST = 20  # smallest number of samples of the reference mean
 CONFIRM = 2  # consecutive samples over the limit
 ALARM_SHARE = 2e-3  # probability with which a reach without contact may exceed the limit
 EULER = 0.5772156649015329
-AXES = np.eye(3)
-WEIGHT = np.array([0.0, 0.0, 9.81])  # m/s^2, acceleration for carrying, base frame
 LONGEST_LAG = 0.01  # s, largest plausible lag
 
 
 class ThresholdError(ValueError):
     """Thresholds cannot be used or learnt. The sentence gives the reason."""
-
-
-@dataclass(frozen=True)
-class Offset:
-    """Residual at rest after a motion minus that before it, Nm, with the palm's 3 x 7 Jacobian there."""
-
-    torque: np.ndarray
-    jacobian: np.ndarray
-
-
-@dataclass(frozen=True)
-class Change:
-    """Change of the residual at one sample, Nm; the terms of its variance; the joint positions, rad."""
-
-    stamp: float
-    torque: np.ndarray
-    features: np.ndarray
-    """7 x FEATURES"""
-    rate: np.ndarray
-    """Nm/s, derivative of this change with respect to the lag: the torque's rate"""
-    position: np.ndarray
-    jacobian_at: Callable[[np.ndarray], np.ndarray]
-
-    @cached_property
-    def jacobian(self) -> np.ndarray:
-        """The palm's 3 x 7 Jacobian at this position. Computed on demand, which is rare."""
-        return self.jacobian_at(self.position)
-
-
-class ChangeOfResidual:
-    """Change of the residual against its own recent mean."""
-
-    def __init__(self, jacobian: Any) -> None:
-        """``jacobian``: converts joint positions (rad) to the 3 x 7 matrix, m/rad, base frame."""
-        self._jacobian = jacobian
-        self._recent: deque[tuple[float, np.ndarray]] = deque()
-        self._old: deque[tuple[float, np.ndarray]] = deque()
-        self.reset()
-
-    def reset(self) -> None:
-        """Delete the past."""
-        self._recent.clear()
-        self._old.clear()
-        self._speed: float | None = None
-        self._stamp = 0.0
-        self._sum = np.zeros(22)
-        self._palm: np.ndarray | None = None
-        self._carried = np.zeros(7)
-
-    @property
-    def past(self) -> np.ndarray:
-        """Nm, mean of the samples between RECENT and LATELY; fewer samples than for the change."""
-        return np.asarray(np.mean([all_of[:7] for at, all_of in self._old if at >= self._stamp - LATELY], axis=0))
-
-    def _needed(self, residual: Residual, load: float, step: float, blend: float) -> np.ndarray:
-        """Returns the low-passed torque (Nm) that carries and accelerates the payload."""
-        if not load > 0.0:
-            return self._carried
-        jacobian = self._jacobian(residual.position)
-        palm = jacobian @ residual.velocity
-        hastened = WEIGHT if self._palm is None or step <= 0.0 else WEIGHT + (palm - self._palm) / step
-        needed = load * (jacobian.T @ hastened)
-        self._carried = needed if self._palm is None else self._carried + blend * (needed - self._carried)
-        self._palm = palm
-        return self._carried
-
-    def feed(self, residual: Residual, load: float) -> Change | None:
-        """Process one residual with the payload ``load`` (kg). None until there is a reference mean."""
-        if residual.fresh:
-            self.reset()
-        speed = float(np.abs(residual.velocity).max()) ** 2
-        step = residual.stamp - self._stamp
-        blend = 1.0 if self._speed is None else 1.0 - float(np.exp(-step / MEMORY))
-        # Residual, its rate, payload torque and squared speed share one running sum.
-        now = np.empty(22)
-        now[:7], now[7:14], now[21] = residual.torque, residual.rate, speed
-        now[14:21] = self._needed(residual, load, step, blend)
-        self._recent.append((residual.stamp, now))
-        while self._recent and self._recent[0][0] <= residual.stamp - RECENT:
-            self._old.append(self._recent.popleft())
-            self._sum = self._sum + self._old[-1][1]
-        while self._old and self._old[0][0] < residual.stamp - OLD:
-            self._sum = self._sum - self._old.popleft()[1]
-        self._speed = speed if self._speed is None else self._speed + blend * (speed - self._speed)
-        self._stamp = residual.stamp
-        if len(self._old) < LEAST:
-            return None
-        mean = self._sum / len(self._old)
-        acceleration = float(np.abs(residual.acceleration).max())
-        features = np.empty((7, len(FEATURES)))
-        features[:, :5] = [1.0, math.sqrt(self._speed), self._speed, max(0.0, float(mean[21])), acceleration**2]
-        change = now - mean
-        features[:, 5] = change[14:21] ** 2
-        return Change(residual.stamp, change[:7], features, change[7:14], residual.position, self._jacobian)
 
 
 @dataclass(frozen=True)
@@ -166,14 +63,11 @@ class Thresholds:
         """Returns the standard deviation of each joint's change without contact, Nm, shape (7,)."""
         return np.sqrt(np.maximum((self.variance * features).sum(axis=1), FLOOR))
 
-    def force(self, change: Change) -> tuple[np.ndarray, float]:
-        """Returns the force on the palm (N, base frame) that explains a change best, and its length in deviations."""
-        return explained(change.torque, self.deviation(change.features), change.jacobian)
-
-    def steady_force(self, offset: Offset, features: np.ndarray) -> tuple[np.ndarray, float]:
-        """The same for an offset, seen while the arm moves with these ``features``."""
-        deviation = np.sqrt(self.steady**2 + self.deviation(features) ** 2)
-        return explained(offset.torque, deviation, offset.jacobian)
+    def size(self, change: Change, lag: float = 0.0) -> float:
+        """Returns the length, in deviations, of the force on the palm that explains a change best. ``lag``: s, of the
+        torques, beyond the one with which the change was computed."""
+        torque = change.torque - lag * change.rate
+        return explained(torque, self.deviation(change.features), change.jacobian)[1]
 
     def save(self, path: Path) -> None:
         """Write the file; OSError if that fails."""
@@ -211,16 +105,6 @@ class Thresholds:
         return Thresholds(variance, limit, steady, steady_limit, reaches, lag)
 
 
-def explained(torque: np.ndarray, deviation: np.ndarray, jacobian: np.ndarray) -> tuple[np.ndarray, float]:
-    """Returns the force on the palm (N) that explains joint torques (Nm), and its length in standard deviations."""
-    weighed = jacobian / deviation
-    information = weighed @ weighed.T
-    # A stretched arm cannot measure forces along itself: the small term keeps the solution finite there.
-    steadied = information + 1e-9 * information.trace() * AXES
-    force = np.linalg.solve(steadied, weighed @ (torque / deviation))
-    return force, math.sqrt(max(0.0, force @ information @ force))
-
-
 def learn(
     reaches: Iterable[Sequence[Change]],
     offsets: Sequence[Offset] = (),
@@ -238,13 +122,12 @@ def learn(
     weights = 1.0 / np.maximum(np.einsum("kji,ji->kj", features, shares_of(torques, features)), FLOOR)
     moved = float(np.sum(weights * torques * rates) / max(1e-9, float(np.sum(weights * rates**2))))
     moved = min(max(moved, -LONGEST_LAG - lag), LONGEST_LAG - lag)
-    runs = [[replace(change, torque=change.torque - moved * change.rate) for change in run] for run in runs]
     variance = shares_of(torques - moved * rates, features)
     rests = np.array([offset.torque for offset in offsets]).reshape(-1, 7)
     # Without enough offsets, use a limit as large as the offset of D4.10's detector.
     steady = np.sqrt(np.mean(rests**2, axis=0)) if len(rests) >= 20 else np.full(7, 0.3)
     draft = Thresholds(variance, 1.0, steady, 1.0, len(runs))
-    changed = [largest_confirmed([draft.force(change)[1] for change in run]) for run in runs]
+    changed = [largest_confirmed([draft.size(change, moved) for change in run]) for run in runs]
     rested = [explained(each.torque, steady, each.jacobian)[1] for each in offsets] if len(rests) >= 20 else [4.0]
     limits = limit_of(changed, alarm_share), limit_of(rested, alarm_share)
     return Thresholds(variance, limits[0], steady, limits[1], len(runs), lag + moved)

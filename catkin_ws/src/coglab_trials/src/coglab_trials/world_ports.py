@@ -202,11 +202,10 @@ class VirtualContact:
         self.world, self._touch = world, touch
         self._noise = np.random.default_rng(0)
         chain = world.robot.chain
-        jacobian = lambda q: chain.jacobian(np.asarray(q, dtype=float))[:3]  # noqa: E731
-        moving = MovingContact(Thresholds.load(THRESHOLDS), cc.ArmDynamics(world.robot.urdf), jacobian)
+        moving = MovingContact(Thresholds.load(THRESHOLDS), cc.ArmDynamics(world.robot.urdf), chain)
         self.moving = moving
         held = GripAndLoad(lambda q: Pose(*chain.fk(q)).rotation.as_matrix())
-        self.detector = FusedDetector(ContactDetector(DetectorSettings(), jacobian), moving, held=held)
+        self.detector = FusedDetector(ContactDetector(DetectorSettings(), chain), moving, held=held)
         self.watched_while_moving = 0  # periods in which the detector for an arm at rest watched a moving arm
         self._event: ContactEvent | None = None
         self._grasp: tuple[str, Pose] | None = None
