@@ -1,5 +1,6 @@
 /// Python module coglab_contact._core. Documentation of the Python side is in _core.pyi.
 #include <pybind11/eigen.h>
+#include <pybind11/operators.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
@@ -133,6 +134,7 @@ void bindEvidence(py::module_& module) {
       .def_readonly("message", &ContactEvent::message)
       .def_readonly("confidence", &ContactEvent::confidence)
       .def_readonly("code", &ContactEvent::code)
+      .def(py::self == py::self)
       .def("__repr__", [](const ContactEvent& e) {
         return py::str(
                    "ContactEvent(contact={}, source={!r}, margin={}, message={!r}, "

@@ -34,6 +34,11 @@ struct ContactEvent {
   std::string message;
   double confidence = 1.0;  ///< probability (0..1) that the signal is over its threshold
   int code = 0;             ///< ReasonCode of the message
+
+  bool operator==(const ContactEvent& other) const {
+    return contact == other.contact && source == other.source && margin == other.margin &&
+           message == other.message && confidence == other.confidence && code == other.code;
+  }
 };
 
 }  // namespace coglab_contact

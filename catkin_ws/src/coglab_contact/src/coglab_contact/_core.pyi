@@ -55,6 +55,7 @@ class ContactEvent:
     @property
     def code(self) -> int:
         """ReasonCode of the message."""
+    def __eq__(self, other: object) -> bool: ...
 
 class Residual:
     """Result of the observer for one sample. Nm, rad, rad/s, rad/s^2; [7] each."""
