@@ -3,6 +3,9 @@
 import json
 import math
 import resource
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -236,3 +239,13 @@ def test_results_go_on_after_a_torn_line(tmp_path):
     shown = table(results, ["receive"], ["test"], ["random"], 300)
     assert "| coglab/Receive-v0 | test | random | 2 | 50.0 %" in shown
     assert json.loads(results.path(*job[:3]).read_text().splitlines()[0])["force"] == 8.0
+
+
+def test_the_example_that_learns_runs_and_draws_its_picture(tmp_path):
+    example = Path(__file__).resolve().parents[1] / "examples" / "20_learn_a_reach.py"
+    small = "--generations 1 --population 2 --people 1 --validation 1 --test 1 --workers 1".split()
+    command = [sys.executable, str(example), *small, "--out", str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=240)
+    assert done.returncode == 0, done.stderr[-3000:]
+    assert "before: success" in done.stdout and "after: success" in done.stdout
+    assert (tmp_path / "20_learn_a_reach.png").stat().st_size > 5000

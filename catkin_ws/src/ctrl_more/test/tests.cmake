@@ -48,7 +48,7 @@ foreach(room states description loading manager controllers memory realtime)
     CTRL_MORE_DESCRIBE="$<TARGET_FILE:ctrl_more_describe>"
     CTRL_MORE_EXAMPLE="$<TARGET_FILE:ctrl_more_attitude_example>")
   add_dependencies(${target} ctrl_more_describe ctrl_more_attitude_example ${CTRL_MORE_PLUGINS}
-    ${CTRL_MORE_EXAMPLES} ${CTRL_MORE_TEST_PLUGINS})
+    ${CTRL_MORE_TEST_PLUGINS})
 endforeach()
 # It defines functions of the C library, which no other file may see.
 if(TARGET ctrl_more_test_realtime)

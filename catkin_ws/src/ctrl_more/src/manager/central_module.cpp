@@ -77,7 +77,7 @@ bool CentralModule::registerManager(const std::string& type, ManagerMaker maker)
 
 CentralModule::CentralModule(const std::string& file, Logger* logger)
     : logger_(logger ? logger : &Logger::standard()) {
-  build(ConfigNode::fromFile(file), std::filesystem::path(file).parent_path().string());
+  build(ConfigNode::fromFile(file), std::filesystem::absolute(file).parent_path().string());
 }
 
 CentralModule::CentralModule(const ConfigNode& config, const std::string& base, Logger* logger)

@@ -257,7 +257,7 @@ std::string LoadReport::text() const {
 
 LoadReport FeedbackControllersManager::load(const std::string& file, bool strict) {
   try {
-    const std::string base = std::filesystem::path(file).parent_path().string();
+    const std::string base = std::filesystem::absolute(file).parent_path().string();
     return load(ConfigNode::fromFile(file), base, strict);
   } catch (const std::exception& e) {
     LoadReport report;
