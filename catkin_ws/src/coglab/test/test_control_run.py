@@ -121,7 +121,7 @@ def test_feedback_controllers_of_a_file_find_slots_and_let_go(robot):
     rospy.Subscriber(
         "/controller_manager/feedback/state",
         FeedbackState,
-        lambda state: shifts.update({each.controller: each.values[2] for each in state.values}),
+        lambda state: shifts.update({each.controller: each.values[2] for each in state.states}),
     )
     assert rospy.ServiceProxy("/controller_manager/switch_controller", SwitchController)("python_motion").success
     with (
