@@ -56,13 +56,14 @@ class Yields(ctrl_more.FeedbackController):
         self.reset()
 
     def gains_changed(self) -> None:
-        """Keep the numbers that each cycle needs."""
+        """The matrix of the differential equation, and what a force does."""
         self.lightness, self.least = 1.0 / self.gain(self.mass), self.scalar(self.dead_band)
-        self.damper, self.spring = self.gain(self.damping) * self.lightness, self.gain(self.stiffness) * self.lightness
+        spring, damper = self.gain(self.stiffness) * self.lightness, self.gain(self.damping) * self.lightness
+        self.rates = np.block([[np.zeros((3, 3)), np.eye(3)], [np.diag(-spring), np.diag(-damper)]])
 
     def reset(self) -> None:
         """At rest, without an offset."""
-        self.offset, self.velocity = np.zeros(3), np.zeros(3)
+        self.state = np.zeros(6)  # offset, velocity
 
     def update(
         self,
@@ -74,14 +75,12 @@ class Yields(ctrl_more.FeedbackController):
         """One cycle."""
         force = robot.view(self.wrench)[:3]
         size = math.sqrt(force.dot(force))
+        rate = self.rates @ self.state
         if size > self.least:
-            felt = force * (self.lightness * (1.0 - self.least / size))
-            self.velocity += cycle.dt * (felt - self.damper * self.velocity - self.spring * self.offset)
-        else:
-            self.velocity -= cycle.dt * (self.damper * self.velocity + self.spring * self.offset)
-        self.offset += cycle.dt * self.velocity
-        modified[self.pose][:3] += self.offset
-        modified[self.twist][:3] += self.velocity
+            rate[3:] += force * (self.lightness * (1.0 - self.least / size))
+        self.state += cycle.dt * rate
+        modified[self.pose][:3] += self.state[:3]
+        modified[self.twist][:3] += self.state[3:]
 
 
 def in_the_cycle(quick: bool) -> Iterator[Row]:

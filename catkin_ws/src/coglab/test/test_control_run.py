@@ -82,7 +82,7 @@ def test_motion_of_a_file_moves_the_arm_and_is_stopped(robot):
 
     ends: list[MotionFeedback] = []
     rospy.Subscriber("/controller_manager/python_motion/motion_feedback", MotionFeedback, ends.append)
-    with command_of("my_sway.py", "duration=1") as process:
+    with command_of("my_sway.py", "--slot", "python_motion", "duration=1") as process:
         assert process.stdout is not None
         try:
             assert "holds the slot python_motion" in process.stdout.readline()

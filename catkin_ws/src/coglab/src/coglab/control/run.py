@@ -125,7 +125,7 @@ def connect(options: argparse.Namespace, kind: int, services: SlotServices) -> w
 
 def run(words: list[str]) -> int:
     """Run the command. Return its exit status."""
-    options = parser().parse_args(words)
+    options = parser().parse_intermixed_args(words)  # so that options may come before NAME=VALUE
     ended = threading.Event()
     last = threading.Timer(LAST, _leave)
     last.daemon = True
