@@ -28,7 +28,9 @@ LIMIT = 60.0  # s, for all that is waited for
     [
         ("import nowhere_at_all\n", r"bad.py:1: ModuleNotFoundError"),
         ("x = 1\ny = (\n", r"bad.py:2: SyntaxError"),
+        ("import sys\nsys.exit(3)\n", r"bad.py:2: SystemExit"),
         ("x = 1\n", "no class with the methods"),
+        ("class A:\n    describe = initialize = update = len\n", "derive A from ctrl_more.FeedbackController"),
         ("class A:\n    start = reference = done = len\nclass B(A): pass\n", "2 controllers: A, B"),
     ],
 )

@@ -254,7 +254,7 @@ TEST_F(Feedback, TheCorrectionOfAStoppedOrDeadProcessFades) {
 /// Well at first, then what no correction is: a wrong kind, NaN, and numbers beyond any reach.
 void spoilt(const RemoteQuestion& question, RemoteAnswer& answer) {
   shift(question, answer);
-  if (question.cycle < 40) return;
+  if (answers() < 40) return;
   if (question.cycle % 3 == 0) answer.kind = static_cast<std::int64_t>(RemoteAnswerKind::Joints);
   answer.values[question.cycle % 3] = question.cycle % 2 == 0 ? std::nan("") : 1e9;
 }
@@ -268,7 +268,7 @@ TEST_F(Feedback, AnswersThatAreNoCorrectionsFade) {
 
 void givesUp(const RemoteQuestion& question, RemoteAnswer& answer) {
   shift(question, answer);
-  if (question.cycle >= 40) answer.kind = static_cast<std::int64_t>(RemoteAnswerKind::GiveUp);
+  if (answers() >= 40) answer.kind = static_cast<std::int64_t>(RemoteAnswerKind::GiveUp);
 }
 
 TEST_F(Feedback, TheCorrectionOfAControllerThatGaveUpFades) {
