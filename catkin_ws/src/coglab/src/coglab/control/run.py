@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import select
 import signal
 import sys
 import threading
@@ -111,7 +112,11 @@ def connect(options: argparse.Namespace, kind: int, services: SlotServices) -> w
     for slot in ids:
         address = choose(slot, options.robot)
         if address is None:
-            services.load(slot, TYPES[kind])
+            try:
+                services.load(slot, TYPES[kind])
+            except wire.SlotError:
+                if choose(slot, options.robot) is None:  # else another process has just loaded it
+                    raise
             address = choose(slot, services.robot())
         if address is None:
             raise wire.SlotError(f"the robot loaded '{slot}', but it runs on another computer; run this one there")
@@ -157,7 +162,7 @@ def run(words: list[str]) -> int:
             else:
                 print(f"start it: {how}", flush=True)
             if sys.stdin is not None and sys.stdin.isatty():
-                threading.Thread(target=_listen, args=(host,), daemon=True).start()
+                threading.Thread(target=_listen, args=(host, ended), daemon=True).start()
             serve(connection, host, ends=ended.is_set, period=REPORT, tell=_tell, silent=silent)
     except (ControlError, wire.SlotError) as error:
         print(f"error: {error}", file=sys.stderr)
@@ -176,12 +181,20 @@ def _act(act: Callable[[str], None], slot: str, ended: threading.Event) -> None:
         ended.set()
 
 
-def _listen(host: Host) -> None:
+def _listen(host: Host, ended: threading.Event) -> None:
     """Take NAME=VALUE from the terminal."""
-    for line in sys.stdin:
+    while not ended.is_set():
+        ready, _, _ = select.select([sys.stdin], [], [], 0.2)
+        # A process in the background would be stopped if it read.
+        if not ready or os.tcgetpgrp(sys.stdin.fileno()) != os.getpgrp():
+            ended.wait(0.2)
+            continue
+        line = sys.stdin.readline()
+        if not line:
+            return
         try:
             host.set(numbers(line.split()))
-            _tell(f"set {line.strip()}")
+            _tell(f"set {line.strip()}" if line.strip() else "NAME=VALUE changes a gain or an argument")
         except ControlError as error:
             _tell(f"not changed: {error}")
 
