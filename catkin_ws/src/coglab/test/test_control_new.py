@@ -8,8 +8,9 @@ from coglab.control import ControlError, Motion, MotionCycle, Reference, simulat
 from coglab.control.new import make
 
 
-def test_new_file_passes_its_test_and_plots(tmp_path):
-    file = make("WristSway", tmp_path)
+@pytest.mark.parametrize("motion", [True, False], ids=["motion", "feedback"])
+def test_new_file_passes_its_test_and_plots(tmp_path, motion):
+    file = make("WristSway", tmp_path, motion)
     for command in (["-m", "pytest", "-q", "-p", "no:cacheprovider", str(file)], [str(file)]):
         done = subprocess.run(
             [sys.executable, *command], cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False
@@ -17,7 +18,7 @@ def test_new_file_passes_its_test_and_plots(tmp_path):
         assert done.returncode == 0, done.stdout + done.stderr
     assert (tmp_path / "wrist_sway.png").is_file()
     with pytest.raises(FileExistsError, match="exists already"):
-        make("WristSway", tmp_path)
+        make("WristSway", tmp_path, motion)
     with pytest.raises(ValueError, match="CamelCase"):
         make("../away", tmp_path)
 

@@ -28,7 +28,9 @@ LIMIT = 60.0  # s, for all that is waited for
     [
         ("import nowhere_at_all\n", r"bad.py:1: ModuleNotFoundError"),
         ("x = 1\ny = (\n", r"bad.py:2: SyntaxError"),
+        ("import sys\nsys.exit(3)\n", r"bad.py:2: SystemExit"),
         ("x = 1\n", "no class with the methods"),
+        ("class A:\n    describe = initialize = update = len\n", "derive A from ctrl_more.FeedbackController"),
         ("class A:\n    start = reference = done = len\nclass B(A): pass\n", "2 controllers: A, B"),
     ],
 )
@@ -39,9 +41,12 @@ def test_bad_file_is_refused_in_words(tmp_path, text, words):
         find_class(load_module(file))
 
 
-@pytest.fixture(name="robot")
+@pytest.fixture(name="robot", scope="module")
 def running_robot() -> Iterator[subprocess.Popen]:
     """A robot node with the ideal arm and the slot `python_motion`."""
+    import rospy
+    from coglab_msgs.srv import LwrCommand
+
     with own_master() as master:
         master.setParam("/robot_description", (SOURCES / "lwr_description" / "urdf" / "lwr_ih2.urdf").read_text())
         master.setParam("/lwr", {"arm": "ideal", "rt_priority": 0})
@@ -49,6 +54,9 @@ def running_robot() -> Iterator[subprocess.Popen]:
         node = subprocess.Popen([node_path("robot_node"), "__name:=robot"])
         try:
             wait(lambda: any(one.robot == node.pid for one in wire.offered()), "the slot")
+            rospy.init_node("test_control_run", disable_signals=True)
+            rospy.wait_for_service("/lwr/command", LIMIT)
+            wait(lambda: rospy.ServiceProxy("/lwr/command", LwrCommand)("start").success, "the arm's start")
             yield node
         finally:
             node.send_signal(signal.SIGINT)
@@ -63,19 +71,20 @@ def wait(condition, what: str) -> None:
         time.sleep(0.02)
 
 
+def command_of(file: str, *words: str) -> subprocess.Popen:
+    """`./coglab controller run` of a file beside this one."""
+    command = [sys.executable, "-u", "-m", "coglab.control.run", str(HERE / file), *words]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=dict(os.environ))
+
+
 def test_motion_of_a_file_moves_the_arm_and_is_stopped(robot):
     import rospy
     from coglab_msgs.msg import MotionFeedback
-    from coglab_msgs.srv import LwrCommand, StartMotion, SwitchController
+    from coglab_msgs.srv import StartMotion, SwitchController
 
-    rospy.init_node("test_control_run", disable_signals=True)
     ends: list[MotionFeedback] = []
     rospy.Subscriber("/controller_manager/python_motion/motion_feedback", MotionFeedback, ends.append)
-    rospy.wait_for_service("/lwr/command", LIMIT)
-    wait(lambda: rospy.ServiceProxy("/lwr/command", LwrCommand)("start").success, "the arm's start")
-
-    command = [sys.executable, "-u", "-m", "coglab.control.run", str(HERE / "my_sway.py"), "duration=1"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=dict(os.environ)) as process:
+    with command_of("my_sway.py", "--slot", "python_motion", "duration=1") as process:
         assert process.stdout is not None
         try:
             assert "holds the slot python_motion" in process.stdout.readline()
@@ -103,3 +112,33 @@ def test_motion_of_a_file_moves_the_arm_and_is_stopped(robot):
             process.kill()
     with wire.Slot(wire.Address(robot.pid, "python_motion"), wire.MOTION):
         pass  # a restart is accepted
+
+
+def test_feedback_controllers_of_a_file_find_slots_and_let_go(robot):
+    import rospy
+    from coglab_msgs.msg import FeedbackState
+    from coglab_msgs.srv import SwitchController
+
+    shifts: dict[str, float] = {}
+    rospy.Subscriber(
+        "/controller_manager/feedback/state",
+        FeedbackState,
+        lambda state: shifts.update({each.controller: each.values[2] for each in state.states}),
+    )
+    assert rospy.ServiceProxy("/controller_manager/switch_controller", SwitchController)("python_motion").success
+    with (
+        command_of("remote_controllers.py", "--class=Shift", "height=0.02") as first,
+        command_of("remote_controllers.py", "--class=Endless", "height=0.01") as endless,
+    ):
+        try:
+            slots = {process.stdout.readline().split(" of ")[0].rpartition(" ")[2] for process in (first, endless)}
+            assert slots == {"python_feedback", "python_feedback_2"}
+            wait(lambda: any(value == pytest.approx(0.02) for value in shifts.values()), f"the shift: {shifts}")
+            assert "has not returned" in endless.stdout.readline()
+            for process in (first, endless):
+                process.send_signal(signal.SIGINT)
+            assert first.wait(timeout=LIMIT) == 0 and endless.wait(timeout=LIMIT) == 1
+            wait(lambda: not any(shifts.values()), f"the end of the shifts: {shifts}")
+        finally:
+            first.kill()
+            endless.kill()

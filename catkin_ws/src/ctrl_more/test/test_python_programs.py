@@ -85,3 +85,21 @@ def test_command_runs_a_list_file(tmp_path: Path) -> None:
     code, said = call("-m", "ctrl_more", "list", tmp_path / "missing.yaml")
     assert code == 1 and "missing.yaml" in said and "Traceback" not in said
     assert call("-m", "ctrl_more", "walk")[0] == 2
+
+
+def test_command_runs_a_controller_of_a_python_file(tmp_path: Path) -> None:
+    file = tmp_path / "rises.py"
+    file.write_text(
+        "import ctrl_more\n"
+        "class Rises(ctrl_more.FeedbackController):\n"
+        "    def describe(self):\n"
+        "        d = ctrl_more.Description('rises')\n"
+        "        d.modifies('zmp', 'zmp')\n"
+        "        return d\n"
+        "    def initialize(self, setup): self.zmp = setup.modify('zmp')\n"
+        "    def update(self, cycle, robot, original, modified): modified[self.zmp][2] += 0.1\n"
+    )
+    code, said = call("-m", "ctrl_more", "run", file, "--cycles", "50")
+    assert code == 0 and "ran in 50 of 50 cycles" in said and "0.1" in said, said
+    code, said = call("-m", "ctrl_more", "run", f"{file}:Falls")
+    assert code == 1 and "its controllers: ['Rises']" in said

@@ -59,8 +59,8 @@ ctrl_more::Description RemoteFeedback::describe() const {
   d.use = "Load it, then run a Python controller in a second terminal: ./coglab controller run.";
   d.when = "To try a law in Python on the running robot. A law that is done belongs into C++.";
   d.limitations =
-      "Corrections of joint references are not passed on. The answer to a cycle acts one cycle "
-      "later.";
+      "Python gets the signals below and corrects the hand's pose; other corrections are not "
+      "passed on. The answer to a cycle acts one cycle later.";
   d.law = "p' = p + c, R' = \\exp(r) R; \\|\\dot c\\| and \\|c\\| bounded";
   d.source = "The Python process.";
   d.information = "Without a process, or when it is late, the correction fades to zero.";
@@ -125,6 +125,10 @@ void RemoteFeedback::initialize(ctrl_more::Setup& setup) {
 void RemoteFeedback::take(std::int64_t now_ns) noexcept {
   RemoteAnswer answer;
   if (!slot_->read(answer) || answer.run != question_.run) return;
+  if (answer.kind == static_cast<std::int64_t>(RemoteAnswerKind::GiveUp)) {
+    answered_ = false;  // the correction fades at once
+    return;
+  }
   bool usable = answer.kind == static_cast<std::int64_t>(RemoteAnswerKind::Correction) &&
                 answer.stamp_ns <= now_ns && !(answered_ && answer.stamp_ns < answer_.stamp_ns);
   for (int i = 0; i < 6; ++i)

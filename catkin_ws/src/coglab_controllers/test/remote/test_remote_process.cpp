@@ -251,5 +251,32 @@ TEST_F(Feedback, TheCorrectionOfAStoppedOrDeadProcessFades) {
   }
 }
 
+/// Well at first, then what no correction is: a wrong kind, NaN, and numbers beyond any reach.
+void spoilt(const RemoteQuestion& question, RemoteAnswer& answer) {
+  shift(question, answer);
+  if (answers() < 40) return;
+  if (question.cycle % 3 == 0) answer.kind = static_cast<std::int64_t>(RemoteAnswerKind::Joints);
+  answer.values[question.cycle % 3] = question.cycle % 2 == 0 ? std::nan("") : 1e9;
+}
+
+TEST_F(Feedback, AnswersThatAreNoCorrectionsFade) {
+  const Process process("law", RemoteKind::Feedback, spoilt);
+  ASSERT_TRUE(soon([this] { return tick(answers() > 0), away() > 0.005; }));
+  for (int i = 0; i < 180; ++i) tick(true);
+  EXPECT_LT(away(), 1e-3);
+}
+
+void givesUp(const RemoteQuestion& question, RemoteAnswer& answer) {
+  shift(question, answer);
+  if (answers() >= 40) answer.kind = static_cast<std::int64_t>(RemoteAnswerKind::GiveUp);
+}
+
+TEST_F(Feedback, TheCorrectionOfAControllerThatGaveUpFades) {
+  const Process process("law", RemoteKind::Feedback, givesUp);
+  ASSERT_TRUE(soon([this] { return tick(answers() > 0), away() > 0.005; }));
+  for (int i = 0; i < 180; ++i) tick(true);
+  EXPECT_LT(away(), 1e-3);
+}
+
 }  // namespace
 }  // namespace coglab_controllers

@@ -1,4 +1,7 @@
-"""`python3 -m ctrl_more list|check|page|run FILE`: what a list file loads, and what its controllers do."""
+"""`python3 -m ctrl_more list|check|page|run FILE`: what a list file loads, and what its controllers do.
+
+FILE may also be a Python file with a controller: `my_module.py`, or `my_module.py:MyController`.
+"""
 
 from __future__ import annotations
 
@@ -21,6 +24,7 @@ from ctrl_more import (
     RobotStates,
     describe,
 )
+from ctrl_more._scripts import controllers_of
 
 Numbers = npt.NDArray[np.float64]
 
@@ -33,7 +37,33 @@ class Loaded:
         self.robot = RobotStates(quiet)
         self.control = ControlStates(joints, period, quiet)
         self.manager = FeedbackControllersManager(self.robot, self.control, logger=quiet)
-        self.manager.load(file)
+        if is_python(file):
+            path, kind = python_type(file)
+            name = kind.rpartition(":")[2]
+            self.manager.load_text(
+                f"loadControllers: [{name}]\n{name}: {{type: '{kind}', enabled: true}}\n", path.parent
+            )
+        else:
+            self.manager.load(file)
+
+
+def is_python(file: str) -> bool:
+    """Whether it is `my_module.py` or `my_module.py:MyController`, not a list file or a library."""
+    return file.partition(":")[0].endswith(".py")
+
+
+def python_type(file: str) -> tuple[Path, str]:
+    """The path of `my_module.py` or `my_module.py:MyController`, and its type `my_module:MyController`."""
+    name, _, chosen = file.partition(":")
+    path = Path(name)
+    if not path.is_file():
+        raise Refused(f"there is no file {path}")
+    if not chosen:
+        found = controllers_of(path)
+        if len(found) != 1:
+            raise Refused(f"{path} has {len(found)} controllers: {found}; choose one: {path}:MyController")
+        chosen = found[0]
+    return path, f"{path.stem}:{chosen}"
 
 
 def show_list(arguments: argparse.Namespace) -> int:
@@ -49,10 +79,9 @@ def descriptions(file: str, joints: int) -> list[tuple[str, Description]]:
     """Controllers of a list file, or the one of a library or of `module.py:Class`."""
     if file.endswith(".so"):
         return [(file, describe(file))]
-    if ":" in file:
-        module, _, name = file.rpartition(":")
-        path = Path(module)
-        return [(file, describe(str(path.parent), f"{path.stem}:{name}"))]
+    if is_python(file):
+        path, kind = python_type(file)
+        return [(kind.rpartition(":")[2], describe(str(path.parent), kind))]
     manager = Loaded(file, joints).manager
     return [(name, manager.describe(name)) for name in manager.get_controllers_names()]
 
@@ -130,7 +159,7 @@ def run(arguments: argparse.Namespace) -> int:
         ran.update(status.name for status in manager.status_all() if status.activity == "running")
     for status in manager.status_all():
         words = f", {status.fault_text} (cycle {status.fault_cycle})" if status.faults else ""
-        words += f", waits for {status.waiting_for}" if status.waiting_for else ""
+        words += f", waits for {status.waiting_for} (--signal gives it)" if status.waiting_for else ""
         print(f"{status.name}: {status.activity}, ran in {ran[status.name]} of {arguments.cycles} cycles{words}")
         for change in manager.last_cycle().changes:
             if change.controller == status.name:
@@ -141,17 +170,17 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def parser() -> argparse.ArgumentParser:
-    top = argparse.ArgumentParser(prog="python3 -m ctrl_more", description=__doc__)
+    top = argparse.ArgumentParser(prog="python3 -m ctrl_more", description=__doc__.partition("\n")[0])
     commands = top.add_subparsers(dest="command", required=True)
     for name, function, words in (
-        ("list", show_list, "load a list file and name each controller"),
+        ("list", show_list, "load it and name each controller"),
         ("check", check, "load it and find empty fields of descriptions"),
         ("page", page, "write the documentation page in Markdown"),
         ("run", run, "run it for some cycles and say what each controller did"),
     ):
         command = commands.add_parser(name, help=words, description=words)
-        other = ", a library, or my_module.py:MyController" if name in ("check", "page") else ""
-        command.add_argument("file", help=f"list file{other}")
+        other = ", a library" if name in ("check", "page") else ""
+        command.add_argument("file", help=f"list file{other}, my_module.py or my_module.py:MyController")
         command.add_argument(
             "--joints", type=int, default=0, help="joints of the robot (0: the first reference decides)"
         )

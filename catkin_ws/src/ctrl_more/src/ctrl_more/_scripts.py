@@ -24,20 +24,23 @@ def find_class(type_name: str, folder: str) -> type[FeedbackController]:
     module_name, _, class_name = type_name.partition(":")
     if not all(part.isidentifier() for part in [*module_name.split("."), class_name]):
         raise Refused(f"type '{type_name}': expected my_module:MyController")
-    try:
-        module = _import(module_name, Path(folder or "."))
-    except Exception as error:
-        last = traceback.extract_tb(error.__traceback__)[-1]
-        place = f" ({Path(last.filename).name}:{last.lineno})" if last.lineno else ""
-        raise Refused(
-            f"type '{type_name}': the module was not imported: {type(error).__name__}: {error}{place}"
-        ) from error
+    module = _module(module_name, Path(folder or "."), f"type '{type_name}'")
     found = getattr(module, class_name, None)
     if found is None:
         names = [n for n, v in vars(module).items() if inspect.isclass(v) and issubclass(v, FeedbackController)]
         raise Refused(f"type '{type_name}': {module.__file__} has no class {class_name}; its controllers: {names}")
     judge(found, type_name)
     return found
+
+
+def controllers_of(file: Path) -> list[str]:
+    """Return the names of the controllers that a Python file defines. Raises Refused if it cannot be imported."""
+    module = _module(file.stem, file.parent, str(file))
+    return [
+        name
+        for name, value in vars(module).items()
+        if inspect.isclass(value) and issubclass(value, FeedbackController) and value.__module__ == module.__name__
+    ]
 
 
 def judge(found: object, name: str) -> None:
@@ -65,6 +68,15 @@ def judge(found: object, name: str) -> None:
 def make(type_name: str, folder: str) -> FeedbackController:
     """Make a controller of the type `module:Class`."""
     return find_class(type_name, folder)()
+
+
+def _module(name: str, folder: Path, what: str) -> ModuleType:
+    try:
+        return _import(name, folder)
+    except Exception as error:
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        place = f" ({Path(last.filename).name}:{last.lineno})" if last.lineno else ""
+        raise Refused(f"{what}: the module was not imported: {type(error).__name__}: {error}{place}") from error
 
 
 def _import(name: str, folder: Path) -> ModuleType:

@@ -1,10 +1,11 @@
-"""Runs a Python motion for the robot's control cycle: questions in, answers out."""
+"""Loads a controller from a file and answers the questions of the robot's control cycle with it."""
 
 from __future__ import annotations
 
 import importlib.util
 import math
 import sys
+import threading
 import time
 import traceback
 from collections.abc import Callable, Mapping
@@ -14,12 +15,15 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from ctrl_more import FeedbackController
 
 from coglab.control import slot as wire
 from coglab.control.motion import ControlError, Motion, MotionCycle, MotionSetup, MotionStart, Reference, SetPoint
 
 POLL = 0.0005  # s between two looks for a question; a wake-up would cost the robot's cycle a system call
 ALIVE = 0.5  # s between two looks whether the robot is still there
+LONGEST = 1.0  # s, a controller that takes longer is named
+SILENT = 1.0  # s without a question, after which that is said
 MOTION_METHODS = ("start", "reference", "done")
 FEEDBACK_METHODS = ("describe", "initialize", "update")
 
@@ -36,7 +40,7 @@ def load_module(file: Path) -> ModuleType:
     sys.path.insert(0, str(file.resolve().parent))
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(file)]
         line = error.lineno if isinstance(error, SyntaxError) else frames[-1].lineno if frames else 1
         raise ControlError(f"{file}:{line}: {type(error).__name__}: {error}") from error
@@ -49,39 +53,54 @@ def find_class(module: ModuleType, name: str = "") -> tuple[type, int]:
     Raises ControlError if there is none, or several and no name.
     """
     found: dict[str, tuple[type, int]] = {}
+    underived = ""
     for key, value in vars(module).items():
         if not isinstance(value, type) or value.__module__ != module.__name__ or value is Motion:
             continue
-        for methods, kind in ((MOTION_METHODS, wire.MOTION), (FEEDBACK_METHODS, wire.FEEDBACK)):
-            if all(callable(getattr(value, method, None)) for method in methods):
-                found[key] = (value, kind)
+        if issubclass(value, FeedbackController):
+            found[key] = (value, wire.FEEDBACK)
+        elif _has(value, MOTION_METHODS):
+            found[key] = (value, wire.MOTION)
+        elif _has(value, FEEDBACK_METHODS):
+            underived = key
     if name:
         if name not in found:
             raise ControlError(f"the file has no controller class '{name}'; it has: {', '.join(found) or 'none'}")
         return found[name]
+    if not found and underived:
+        raise ControlError(f"derive {underived} from ctrl_more.FeedbackController, or it is no feedback controller")
     if not found:
         raise ControlError(
-            f"the file has no class with the methods {', '.join(MOTION_METHODS)} (a motion) or "
-            f"{', '.join(FEEDBACK_METHODS)} (a feedback controller)"
+            f"the file has no class with the methods {', '.join(MOTION_METHODS)} (a motion), and none derived from "
+            f"ctrl_more.FeedbackController with {', '.join(FEEDBACK_METHODS)} (a feedback controller)"
         )
     if len(found) > 1:
         raise ControlError(f"the file has {len(found)} controllers: {', '.join(found)}; choose one with --class")
     return next(iter(found.values()))
 
 
+def _has(value: type, methods: tuple[str, ...]) -> bool:
+    return all(callable(getattr(value, method, None)) for method in methods)
+
+
 class MotionHost:
     """One motion object and the arguments of its next start."""
 
-    def __init__(self, motion: Any, given: Mapping[str, float], robot: Any = None) -> None:
+    def __init__(self, motion: Any, given: Mapping[str, Any], robot: Any = None) -> None:
         """Configure the motion. Raises ControlError for arguments that it does not take."""
         self.motion = motion
         setup = MotionSetup(robot)
         configure = getattr(motion, "configure", None)
         if configure is not None:
             configure(setup)
+        self._setup = setup
         self.arguments = setup.values(given)
         self._run = 0
         self._failed = False
+
+    def set(self, given: Mapping[str, Any]) -> None:
+        """Change arguments of the next start; the others stay. Raises ControlError."""
+        self.arguments = self._setup.values({**self.arguments, **given})
 
     def answer(self, question: np.void, answer: npt.NDArray[np.void]) -> bool:
         """Fill in the answer to a question. Return false if there is nothing to answer.
@@ -171,6 +190,31 @@ class Latencies:
         return f"{count} answers, after {median:.2f} ms (median) and {high:.2f} ms (99 %)"
 
 
+class Watch:
+    """A thread that says so when the controller keeps the process longer than `LONGEST`."""
+
+    def __init__(self, tell: Callable[[str], None]) -> None:
+        """`tell`: gets the sentence."""
+        self._tell, self._ended = tell, threading.Event()
+        self.began = math.inf  # s, when the call under way began; infinite: none is
+        threading.Thread(target=self._look, name="watch", daemon=True).start()
+
+    def end(self) -> None:
+        """End the thread."""
+        self._ended.set()
+
+    def _look(self) -> None:
+        told = math.inf
+        while not self._ended.wait(LONGEST / 4):
+            began = self.began
+            if time.monotonic() - began > LONGEST and began != told:
+                told = began
+                self._tell(
+                    f"the controller has not returned for {LONGEST:g} s: the robot has let its correction fade, or has "
+                    "braked. Ctrl-C ends this process"
+                )
+
+
 def serve(
     slot: wire.Slot,
     host: Any,
@@ -178,21 +222,45 @@ def serve(
     ends: Callable[[], bool] = lambda: False,
     period: float = math.inf,
     tell: Callable[[str], None] = print,
+    silent: str = "",
 ) -> None:
     """Answer the questions of a slot until the robot lets go or `ends()` is true.
 
-    Each `period` s it tells how fast the answers were and how many came late.
+    Each `period` s it tells how fast the answers were and how many came late. `silent`: what it tells when no question
+    has come for `SILENT`.
     """
+    watch = Watch(tell)
+    try:
+        _serve(slot, host, watch, ends, period, tell, silent)
+    finally:
+        watch.end()
+
+
+def _serve(
+    slot: wire.Slot,
+    host: Any,
+    watch: Watch,
+    ends: Callable[[], bool],
+    period: float,
+    tell: Callable[[str], None],
+    silent: str,
+) -> None:
     answer = np.zeros(1, dtype=wire.ANSWER)
     latencies = Latencies()
     late = refused = 0
-    looked = told = time.monotonic()
+    looked = told = asked = time.monotonic()
     while not ends():
         question = slot.question()
         if question is not None:
-            if host.answer(question, answer):
+            watch.began = time.monotonic()
+            answered = host.answer(question, answer)
+            watch.began = math.inf
+            if answered:
                 slot.answer(answer)
                 latencies.add(question)
+            if asked < 0.0:
+                tell("the robot asks again")
+            asked = time.monotonic()
             more = latencies.note(question)
             late, refused = late + more[0], refused + more[1]
         now = time.monotonic()
@@ -201,6 +269,9 @@ def serve(
             if not slot.alive():
                 tell("the robot has let go: it has ended, or its controller was unloaded")
                 return
+        if silent and asked > 0.0 and now - asked > SILENT:
+            asked = -1.0
+            tell(silent)
         if now - told > period:
             told = now
             words = latencies.report()

@@ -7,7 +7,7 @@ from xmlrpc.client import ServerProxy
 
 import rosgraph
 import rospy
-from coglab_msgs.srv import LoadController, StartMotion, SwitchController
+from coglab_msgs.srv import FeedbackSelect, LoadController, StartMotion, SwitchController
 
 from coglab.control.slot import SlotError
 
@@ -16,11 +16,15 @@ WAIT = 10.0  # s, longest wait for a service
 
 
 class SlotServices:
-    """Loads the slot of a motion into the running robot, and starts the motion."""
+    """Loads a slot into the running robot, and lets it act."""
 
-    def load(self, slot: str) -> None:
-        """Load a slot for a motion. Raises SlotError if no robot runs, or with its refusal."""
-        self._call(f"{MANAGER}/load_controller", LoadController, slot, "coglab/RemoteMotion")
+    def load(self, slot: str, kind: str) -> None:
+        """Load a slot of the type `kind`. Raises SlotError if no robot runs, or with its refusal."""
+        self._call(f"{MANAGER}/load_controller", LoadController, slot, kind)
+
+    def enable(self, slot: str) -> None:
+        """Enable the slot of a feedback controller. Raises SlotError with the refusal."""
+        self._call(f"{MANAGER}/feedback/enable", FeedbackSelect, [slot], "")
 
     def start(self, slot: str) -> None:
         """Make the slot the active controller and start its motion. Raises SlotError with the refusal."""

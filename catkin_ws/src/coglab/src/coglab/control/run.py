@@ -3,49 +3,93 @@
 from __future__ import annotations
 
 import argparse
+import os
+import select
 import signal
 import sys
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from types import FrameType
+from typing import TypeAlias
 
 from coglab.control import slot as wire
+from coglab.control.feedback_host import FeedbackHost
 from coglab.control.host import MotionHost, find_class, load_module, serve
 from coglab.control.motion import ControlError
-from coglab.control.ros import SlotServices
+from coglab.control.ros import MANAGER, SlotServices
 
 SLOTS = {wire.MOTION: "python_motion", wire.FEEDBACK: "python_feedback"}
+TYPES = {wire.MOTION: "coglab/RemoteMotion", wire.FEEDBACK: "RemoteFeedback"}
+MOST_SLOTS = 4  # feedback controllers that find a slot by themselves
 REPORT = 5.0  # s between two lines about latency and misses
+LAST = 1.0  # s after Ctrl-C until a controller that does not return is ended
+
+Numbers: TypeAlias = dict[str, float | list[float]]
+Host: TypeAlias = MotionHost | FeedbackHost
 
 
 def parser() -> argparse.ArgumentParser:
     """Arguments of the command."""
     result = argparse.ArgumentParser(
         prog="./coglab controller run",
-        description="Connects a Python motion to the robot that runs. Ctrl-C lets go: the arm brakes.",
+        description="Connects a Python motion or feedback controller to the robot that runs. Ctrl-C lets go: the arm "
+        "brakes, or the correction fades. In a terminal, NAME=VALUE and Enter changes a gain, or an argument of the "
+        "next motion.",
     )
-    result.add_argument("file", type=Path, help="Python file with one class of a motion (start, reference, done)")
-    result.add_argument("arguments", nargs="*", metavar="NAME=VALUE", help="arguments of the motion, e.g. radius=0.1")
+    result.add_argument(
+        "file",
+        type=Path,
+        help="Python file with one class: a motion (start, reference, done) or a ctrl_more.FeedbackController",
+    )
+    result.add_argument(
+        "numbers",
+        nargs="*",
+        metavar="NAME=VALUE",
+        help="arguments of the motion, or gains: radius=0.1, mass=4,4,4",
+    )
     result.add_argument("--class", dest="name", default="", help="which class, if the file has several")
-    result.add_argument("--slot", default="", help="id of the controller in the robot (python_motion)")
+    result.add_argument("--config", type=Path, help="gains and settings of a feedback controller, as in a list file")
+    result.add_argument(
+        "--slot", default="", help="id of the slot in the robot (python_motion; the first free python_feedback)"
+    )
     result.add_argument("--robot", type=int, default=0, help="number of the robot's process, if several run")
-    result.add_argument("--start", action="store_true", help="activate the controller and start the motion at once")
+    result.add_argument("--start", action="store_true", help="a motion: activate the slot and start the motion at once")
+    result.add_argument(
+        "--wait", action="store_true", help="a feedback controller: connect only; it acts when its slot is enabled"
+    )
     return result
 
 
-def numbers(words: list[str]) -> dict[str, float]:
-    """`["radius=0.1"]` as `{"radius": 0.1}`. Raises ControlError."""
-    result = {}
+def numbers(words: list[str]) -> Numbers:
+    """`["radius=0.1", "mass=4,4,4"]` as `{"radius": 0.1, "mass": [4.0, 4.0, 4.0]}`. Raises ControlError."""
+    result: Numbers = {}
     for word in words:
-        name, equals, value = word.partition("=")
+        name, equals, text = word.partition("=")
         try:
-            if not equals:
-                raise ValueError
-            result[name] = float(value)
+            values = [float(part) for part in text.split(",")]
         except ValueError:
-            raise ControlError(f"'{word}': NAME=NUMBER is expected, for example radius=0.1") from None
+            values = []
+        if not equals or not values:
+            raise ControlError(f"'{word}': NAME=NUMBER is expected, for example radius=0.1 or mass=4,4,4")
+        result[name.strip()] = values[0] if len(values) == 1 else values
     return result
+
+
+def make_host(options: argparse.Namespace) -> tuple[Host, int]:
+    """The controller of the file in its host, and what it is. Raises ControlError."""
+    controller, kind = find_class(load_module(options.file), options.name)
+    given = numbers(options.numbers)
+    try:
+        made = controller()
+    except Exception as error:
+        raise ControlError(f"{controller.__name__}() raised {type(error).__name__}: {error}") from error
+    if kind == wire.FEEDBACK:
+        return FeedbackHost(made, given, config=options.config), kind
+    if options.config:
+        raise ControlError("--config is for feedback controllers; give a motion its arguments as NAME=VALUE")
+    return MotionHost(made, given), kind
 
 
 def choose(slot: str, robot: int) -> wire.Address | None:
@@ -57,53 +101,108 @@ def choose(slot: str, robot: int) -> wire.Address | None:
     return found[0] if found else None
 
 
-def run(words: list[str]) -> int:
-    """Run the command. Return its exit status."""
-    options = parser().parse_args(words)
-    ended = threading.Event()
+def connect(options: argparse.Namespace, kind: int, services: SlotServices) -> wire.Slot:
+    """Connect to the slot. Load it into the robot if it is missing. Raises SlotError.
 
-    def end(_signal: int, _frame: FrameType | None) -> None:
-        ended.set()
-
-    try:
-        controller, kind = find_class(load_module(options.file), options.name)
-        if kind == wire.FEEDBACK:
-            raise ControlError(
-                f"{controller.__name__} is a feedback controller; this command runs motions only. Load the class in "
-                "coglab.World"
-            )
-        host = MotionHost(controller(), numbers(options.arguments))
-        slot = options.slot or SLOTS[kind]
-        services = SlotServices()
+    A feedback controller that named no slot takes the first one that no other process holds.
+    """
+    ids = [options.slot or SLOTS[kind]]
+    if kind == wire.FEEDBACK and not options.slot:
+        ids += [f"{SLOTS[kind]}_{number}" for number in range(2, MOST_SLOTS + 1)]
+    for slot in ids:
         address = choose(slot, options.robot)
         if address is None:
-            services.load(slot)
+            try:
+                services.load(slot, TYPES[kind])
+            except wire.SlotError:
+                if choose(slot, options.robot) is None:  # else another process has just loaded it
+                    raise
             address = choose(slot, services.robot())
         if address is None:
             raise wire.SlotError(f"the robot loaded '{slot}', but it runs on another computer; run this one there")
-        with wire.Slot(address, kind) as connection:
+        try:
+            return wire.Slot(address, kind)
+        except wire.SlotTaken:
+            if slot == ids[-1]:
+                raise
+    raise AssertionError("unreachable")
+
+
+def run(words: list[str]) -> int:
+    """Run the command. Return its exit status."""
+    options = parser().parse_intermixed_args(words)  # so that options may come before NAME=VALUE
+    ended = threading.Event()
+    last = threading.Timer(LAST, _leave)
+    last.daemon = True
+
+    def end(_signal: int, _frame: FrameType | None) -> None:
+        if not ended.is_set():
+            last.start()
+        ended.set()
+
+    try:
+        host, kind = make_host(options)
+        services = SlotServices()
+        with connect(options, kind, services) as connection:
             signal.signal(signal.SIGINT, end)
             signal.signal(signal.SIGTERM, end)
-            print(f"{controller.__name__} holds the slot {slot} of the robot (process {address.robot}); Ctrl-C lets go")
-            if options.start:
-                starter = threading.Thread(target=_start, args=(services, slot, ended), daemon=True)
-                starter.start()
+            address = connection.address
+            name = type(host.motion if isinstance(host, MotionHost) else host.controller).__name__
+            print(f"{name} holds the slot {address.slot} of the robot (process {address.robot}); Ctrl-C lets go")
+            act, how = services.start, f"rosservice call {MANAGER}/{address.slot}/start_motion '{{}}'"
+            silent = ""
+            if kind == wire.FEEDBACK:
+                act, how = services.enable, f"rosservice call {MANAGER}/feedback/enable '{{names: [{address.slot}]}}'"
+                silent = (
+                    f"the robot does not ask: {address.slot} is disabled, as by a motion whose feedback profile does "
+                    f"not name it, or the robot measures nothing. Enable it: {how}"
+                )
+            if options.start or (kind == wire.FEEDBACK and not options.wait):
+                threading.Thread(target=_act, args=(act, address.slot, ended), daemon=True).start()
             else:
-                print(f"start it: rosservice call /controller_manager/{slot}/start_motion '{{}}'", flush=True)
-            serve(connection, host, ends=ended.is_set, period=REPORT, tell=_tell)
+                print(f"start it: {how}", flush=True)
+            if sys.stdin is not None and sys.stdin.isatty():
+                threading.Thread(target=_listen, args=(host, ended), daemon=True).start()
+            serve(connection, host, ends=ended.is_set, period=REPORT, tell=_tell, silent=silent)
     except (ControlError, wire.SlotError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
-    print("let go")
+    finally:
+        last.cancel()
+    print("let go", flush=True)
     return 0
 
 
-def _start(services: SlotServices, slot: str, ended: threading.Event) -> None:
+def _act(act: Callable[[str], None], slot: str, ended: threading.Event) -> None:
     try:
-        services.start(slot)
+        act(slot)
     except wire.SlotError as error:
         print(f"error: {error}", file=sys.stderr, flush=True)
         ended.set()
+
+
+def _listen(host: Host, ended: threading.Event) -> None:
+    """Take NAME=VALUE from the terminal."""
+    while not ended.is_set():
+        ready, _, _ = select.select([sys.stdin], [], [], 0.2)
+        # A process in the background would be stopped if it read.
+        if not ready or os.tcgetpgrp(sys.stdin.fileno()) != os.getpgrp():
+            ended.wait(0.2)
+            continue
+        line = sys.stdin.readline()
+        if not line:
+            return
+        try:
+            host.set(numbers(line.split()))
+            _tell(f"set {line.strip()}" if line.strip() else "NAME=VALUE changes a gain or an argument")
+        except ControlError as error:
+            _tell(f"not changed: {error}")
+
+
+def _leave() -> None:
+    """End a process whose controller does not return; the robot sees its end."""
+    print("the controller does not return; this process ends", file=sys.stderr, flush=True)
+    os._exit(1)
 
 
 def _tell(text: str) -> None:

@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 INTERFACE = 1
 MOTION, FEEDBACK = 1, 2  # what a slot is for
-REST, JOINTS, POSE, CORRECTION, GIVE_UP = 0, 1, 2, 3, 4  # what an answer contains
+REST, JOINTS, POSE, CORRECTION, GIVE_UP = 0, 1, 2, 3, 4  # what an answer contains; GIVE_UP: the controller failed
 GREETING_TIME = 3.0  # s, longest wait for the robot's answer to the greeting
 
 QUESTION = np.dtype(
@@ -57,6 +57,10 @@ def checksum(words: npt.NDArray[np.uint64], number: int) -> int:
 
 class SlotError(RuntimeError):
     """No slot could be had. The message says why, and what to do."""
+
+
+class SlotTaken(SlotError):
+    """Another process holds the slot."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +124,8 @@ class Slot:
         try:
             answer = text.decode(errors="replace")
             if answer != "welcome" or not files:
-                raise SlotError(answer.removeprefix("refused ") or "the robot closed the connection without an answer")
+                why = answer.removeprefix("refused ") or "the robot closed the connection without an answer"
+                raise SlotTaken(why) if "holds this slot" in why else SlotError(why)
             return mmap.mmap(files[0], SIZE)
         finally:
             for file in files:
