@@ -16,7 +16,7 @@ MEASURES: dict[str, tuple[str, str, str]] = {
     "duration_s": ("duration", "s", "From the start of the action to its end, when the robot is ready again."),
     "reaction_s": ("reaction", "s", "From the moment in which the offer or request is believed to the arm's start."),
     "approach_s": ("approach", "s", "From the arm's start to the contact of both with the object."),
-    "transfer_s": ("transfer", "s", "From the contact until the first holder has let go: both hold the object."),
+    "transfer_s": ("transfer", "s", "From the contact until the person has let go (receive): both hold the object."),
     "human_idle": ("person idle", "share", f"1 - |H| / T. {_HUMAN}"),
     "robot_idle": ("robot idle", "share", f"1 - |R| / T. {_ROBOT}"),
     "concurrent_activity": ("both active", "share", "|H and R| / T."),
@@ -63,7 +63,7 @@ def times_of(exchange: Exchange) -> dict[str, float]:
     for name, first, last in (
         ("reaction_s", "offered", "motion_started"),
         ("approach_s", "motion_started", "contact"),
-        ("transfer_s", "contact", "released" if "released" in marks else "opening"),
+        ("transfer_s", "contact", "released"),
     ):
         if first in marks and last in marks:
             found[name] = marks[last] - marks[first]

@@ -186,13 +186,14 @@ def _outcome_figure(study: Study, table: Sequence[Mapping[str, Any]]) -> Figure:
     return figure
 
 
-def _measure_figures(study: Study, measures: Sequence[Measure], each: int = 12) -> Iterator[Figure]:
-    """Small charts, twelve on a figure: participants' means as lines over the conditions, mean and 95 % interval."""
+def _measure_figures(study: Study, measures: Sequence[Measure]) -> Iterator[Figure]:
+    """A figure for each action and questionnaire, with small charts: participants' means as lines over the conditions,
+    mean and 95 % interval."""
     from matplotlib.figure import Figure
     from scipy.stats import t
 
-    for start in range(0, len(measures), each):
-        shown = measures[start : start + each]
+    for _, group in itertools.groupby(measures, lambda measure: measure.title.partition(":")[0]):
+        shown = list(group)
         rows = math.ceil(len(shown) / 4)
         figure = Figure(figsize=(12, 2.6 * rows), layout="constrained")
         for place, measure in enumerate(shown, 1):
