@@ -7,8 +7,9 @@ from dataclasses import replace
 import pytest
 from coglab_console.desk.commands import COMMANDS, BadCommand, judge
 from coglab_console.desk.desk import ABSENCE, NOTICE, Roles
-from coglab_console.desk.experiment import Experiment, ExperimentError, latin_row, order_of
+from coglab_console.desk.experiment import Experiment, ExperimentError
 from coglab_console.desk.gates import MotionGuard, Standing, reasons
+from coglab_py.orders import latin_row, order_of
 from console_double import READY
 from desk_double import Clock, ask, hold_for
 
@@ -207,12 +208,12 @@ def test_a_balanced_latin_square():
 
 
 @pytest.mark.parametrize("order", ["as_listed", "latin_square", "random"])
-def test_each_block_holds_each_condition_once(order):
+def test_each_block_holds_each_condition_once(order, tmp_path):
     trials = order_of(["a", "b", "c"], 4, order, 7)
     assert all(sorted(trials[i : i + 3]) == ["a", "b", "c"] for i in range(0, 12, 3))
     assert trials == order_of(["a", "b", "c"], 4, order, 7)
     with pytest.raises(ExperimentError):
-        order_of(["a"] * 12, 51, order, 0)
+        Experiment(tmp_path, time.time, lambda text: None).begin("p1", ["a"] * 12, 51, order, 0)
 
 
 def test_the_file_of_a_session(tmp_path):

@@ -8,9 +8,10 @@ from dataclasses import replace
 import pytest
 from coglab_console.desk.desk import Desk
 from coglab_console.desk.events import EventLog
-from coglab_console.desk.experiment import RESUME, Experiment, ExperimentError, order_of, unprepared
+from coglab_console.desk.experiment import RESUME, Experiment, ExperimentError, unprepared
 from coglab_console.desk.session_file import newest, read_session, rows_of
 from coglab_console.web.fan_out import Documents
+from coglab_py.orders import order_of
 from console_double import RobotDouble
 from desk_double import ask
 

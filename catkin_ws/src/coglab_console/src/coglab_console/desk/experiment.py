@@ -10,11 +10,12 @@ Use pseudonyms for participants, never names.
 from __future__ import annotations
 
 import os
-import random
 import re
 from collections.abc import Callable, Sequence
 from datetime import datetime
 from pathlib import Path
+
+from coglab_py.orders import order_of
 
 from ..web.fan_out import to_json
 from .gates import Standing
@@ -31,38 +32,6 @@ _ACTION = {word: name for name in (*TAKES, *GIVES) for word in (name, button(nam
 
 class ExperimentError(Exception):
     """The command is not possible now. The message gives the reason and what to do."""
-
-
-def latin_row(conditions: list[str], number: int) -> list[str]:
-    """One row of a balanced Latin square (Williams design).
-
-    Over n rows (n even) or 2n rows (n odd), each condition follows each other one equally often."""
-    n = len(conditions)
-    first = [0]
-    for step in range(1, n):
-        first.append((step + 1) // 2 if step % 2 else n - step // 2)
-    row = [(value + number) % n for value in first]
-    if n % 2 and (number // n) % 2:
-        row.reverse()
-    return [conditions[index] for index in row]
-
-
-def order_of(conditions: list[str], repetitions: int, order: str, number: int) -> list[str]:
-    """The condition of each trial, in blocks that hold every condition once."""
-    if len(conditions) * repetitions > MAX_TRIALS:
-        raise ExperimentError(
-            f"{len(conditions) * repetitions} trials are more than {MAX_TRIALS}; use fewer repetitions"
-        )
-    chance = random.Random(number)
-    trials: list[str] = []
-    for block in range(repetitions):
-        if order == "latin_square":
-            trials += latin_row(conditions, number + block)
-        elif order == "random":
-            trials += chance.sample(conditions, len(conditions))
-        else:
-            trials += conditions
-    return trials
 
 
 def actions_in(condition: str) -> list[str]:
@@ -140,6 +109,10 @@ class Experiment:
     ) -> str:
         """Opens a session. Returns the answer in words. `held`: something is in the robot's hand."""
         self._needs("session_begin")
+        if len(conditions) * repetitions > MAX_TRIALS:
+            raise ExperimentError(
+                f"{len(conditions) * repetitions} trials are more than {MAX_TRIALS}; use fewer repetitions"
+            )
         trials = order_of(conditions, repetitions, order, number)
         self._folder.mkdir(parents=True, exist_ok=True)
         stamp = int(self._now())

@@ -3,10 +3,174 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import Any
+
+from coglab_tools.command import Answer, CheckFailed, UsageError
 
 HELP = "studies: plan, run, resume, report"
 
 
 def add(verbs: argparse._SubParsersAction[Any]) -> None:
     """Add the verbs of `study`."""
+    init = verbs.add_parser("init", help="makes a folder with a commented study.yaml")
+    init.add_argument("name", type=Path, metavar="NAME", help="the new folder; its last part is the study's name")
+    init.set_defaults(run=_init)
+    for verb, text in (
+        ("run", "runs a study from its beginning"),
+        ("resume", "runs what an interrupted study has left"),
+    ):
+        parser = verbs.add_parser(verb, help=text)
+        _folder(parser)
+        parser.add_argument("--workers", type=int, default=0, help="processes on this computer; default: one per core")
+        parser.add_argument(
+            "--scheduler", default="", metavar="ADDRESS", help="Dask scheduler, such as tcp://127.0.0.1:8786"
+        )
+        parser.add_argument("--live", action="store_true", help="with participants, at the running system")
+        parser.add_argument("--participant", default="", metavar="P03", help="of a live session; default: the next one")
+        parser.set_defaults(run=_run, fresh=verb == "run")
+    status = verbs.add_parser("status", help="shows what is done and what comes next")
+    _folder(status)
+    status.set_defaults(run=_status)
+    ask = verbs.add_parser("ask", help="fills in the questionnaires of a participant on the terminal")
+    ask.add_argument("participant", metavar="P03")
+    _folder(ask)
+    ask.add_argument("--condition", default="", help="default: each condition that is not answered yet")
+    ask.set_defaults(run=_ask)
+    load = verbs.add_parser("import", help="reads answers to questionnaires from a CSV file")
+    load.add_argument("file", type=Path, metavar="FILE")
+    _folder(load)
+    load.set_defaults(run=_import)
+    report = verbs.add_parser("report", help="writes report.html and trials.csv")
+    _folder(report)
+    report.add_argument("--pdf", action="store_true", help="report.pdf too")
+    report.set_defaults(run=_report)
+
+
+def _folder(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "folder", type=Path, nargs="?", default=Path(), metavar="FOLDER", help="of the study; default: here"
+    )
+
+
+def _init(options: argparse.Namespace) -> Answer:
+    from coglab_tools.study.plan import load, new
+
+    file = new(options.name)
+    study = load(file.parent)
+    text = (
+        f"wrote {file}: {len(study.participants)} participants, {len(study.conditions)} conditions, "
+        f"{len(study.trials())} trials; edit it as you like"
+    )
+    return Answer(text, {"file": str(file), "trials": len(study.trials())}, f"./coglab study run {file.parent}")
+
+
+def _run(options: argparse.Namespace) -> Answer:
+    from coglab_tools.study.plan import load
+    from coglab_tools.study.rows import open_rows
+
+    study = load(options.folder)
+    total = len(study.trials())
+    with open_rows(study) as rows:
+        done, live = len(rows.trials), bool(rows.header) and not rows.simulated
+    live = live or options.live
+    if options.fresh and done and not live:
+        if done == total:
+            return Answer(
+                f"all {total} trials of {study.name} are done",
+                {"trials": total},
+                f"./coglab study report {study.folder}",
+            )
+        raise UsageError(
+            f"{done} of {total} trials are done already: ./coglab study resume {study.folder} runs the others"
+        )
+    if not options.fresh and not done and not live:
+        raise UsageError(f"nothing was interrupted, no trial is done: ./coglab study run {study.folder}")
+    if live:
+        if options.workers or options.scheduler:
+            raise UsageError("--workers and --scheduler are for simulated studies, and this one is live")
+        from coglab_tools.study.live import run_live
+
+        data = run_live(study, options.participant)
+    else:
+        if options.participant:
+            raise UsageError("--participant is for live sessions: add --live")
+        from coglab_tools.study.run import run_simulated
+
+        data = run_simulated(study, options.workers, options.scheduler)
+    text = (
+        f"{data['trials']} of {total} trials of {study.name} are done, {data['trials_now']} of them now: "
+        f"{data['succeeded']} of {data['handovers']} handovers succeeded; {data['table']}"
+    )
+    following = "report" if data["trials"] == total else "status"
+    return Answer(text, data, f"./coglab study {following} {study.folder}")
+
+
+def _status(options: argparse.Namespace) -> Answer:
+    from coglab_tools.study.plan import load
+    from coglab_tools.study.questionnaires import answers_of
+    from coglab_tools.study.rows import open_rows
+
+    study = load(options.folder)
+    trials = study.trials()
+    answered = {(row.participant, row.condition) for row in answers_of(study.folder)}
+    with open_rows(study) as rows:
+        done, started, simulated = set(rows.trials), rows.header is not None, rows.simulated
+        table = rows.table()
+    kind = ("simulated" if simulated else "live") if started else "not started"
+    lines = [f"{study.name}, {kind}: {len(done)} of {len(trials)} trials done"]
+    people = []
+    for name in study.participants:
+        own = [trial for trial in trials if trial.participant == name]
+        order = list(dict.fromkeys((trial.block, trial.condition) for trial in own))
+        finished = sum(trial.number in done for trial in own)
+        failed = sum(row["participant"] == name and not int(row["success"]) for row in table)
+        asked = sum((name, condition) in answered for condition in study.conditions)
+        people.append({"participant": name, "done": finished, "trials": len(own), "failed": failed, "answered": asked})
+        lines.append(
+            f"  {name}  {finished:3d} of {len(own)} trials, {failed} failed handovers, questionnaires of {asked} of "
+            f"{len(study.conditions)} conditions; order {', '.join(condition for _, condition in order)}"
+        )
+    if len(lines) > 42:
+        lines[41:] = [f"  ... {len(study.participants) - 40} more; --json has all"]
+    following = next((trial for trial in trials if trial.number not in done), None)
+    if following is None:
+        then = f"./coglab study report {study.folder}"
+    else:
+        live = " --live" if started and not simulated else ""
+        then = f"./coglab study {'resume' if done else 'run'} {study.folder}{live}"
+    data = {"study": study.name, "kind": kind, "done": len(done), "trials": len(trials), "participants": people}
+    return Answer("\n".join(lines), data, then)
+
+
+def _ask(options: argparse.Namespace) -> Answer:
+    from coglab_tools.study.ask import ask
+    from coglab_tools.study.plan import load
+
+    study = load(options.folder)
+    count = ask(study, study.participant(options.participant), options.condition)
+    text = f"{count} answers of {options.participant} written"
+    return Answer(text, {"answers": count}, f"./coglab study status {study.folder}")
+
+
+def _import(options: argparse.Namespace) -> Answer:
+    from coglab_tools.study.plan import load
+    from coglab_tools.study.questionnaires import add_answers, read_answers
+
+    study = load(options.folder)
+    if not study.questionnaires:
+        raise CheckFailed(f"{study.folder}/study.yaml names no questionnaires: add questionnaires: [nasa_tlx]")
+    rows = read_answers(options.file, study.participants, list(study.conditions), study.questionnaires, study.blocks)
+    new, replaced = add_answers(study.folder, rows)
+    text = f"{new} new answers, {replaced} replaced, from {options.file}"
+    return Answer(text, {"new": new, "replaced": replaced}, f"./coglab study report {study.folder}")
+
+
+def _report(options: argparse.Namespace) -> Answer:
+    from coglab_tools.study.plan import load
+    from coglab_tools.study.report import write_report
+
+    study = load(options.folder)
+    data = write_report(study, options.pdf)
+    text = "\n".join([data["verdict"], *(f"wrote {file}" for file in data["files"])])
+    return Answer(text, data, f"./coglab study status {study.folder}" if data["left"] else "")

@@ -1,0 +1,440 @@
+"""A live session of a study: one participant at the running system, real or simulated.
+
+The robot is driven by coglab.connect(). A condition takes effect without a restart: the brain reads its machines.yaml
+again and the object database its folder, so the system is launched with the copies of both in the study's folder
+``live``. Everything is put back at the end of the session.
+"""
+
+from __future__ import annotations
+
+import copy
+import time
+from collections.abc import Callable, Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Protocol
+
+import yaml
+from coglab_objects.database import ObjectError, objects_folder, parse_object
+from coglab_py.packages import package_path
+from coglab_smach.context.config import Config, ConfigError
+from coglab_smach.parameters import BY_NAME
+
+from coglab_tools.command import CheckFailed, NotThere, UsageError
+from coglab_tools.study import settings as condition_settings
+from coglab_tools.study.ask import ask
+from coglab_tools.study.plan import Study, Trial
+from coglab_tools.study.questionnaires import write_whole
+from coglab_tools.study.rows import Rows, open_rows, undone, write_table
+
+LIVE = "live"
+ANSWER = 5.0  # s, limit for an answer of a node
+PARAMETERS = "/coglab/trial"
+HELP = (
+    "Enter starts, n TEXT notes, r does the last trial again, s skips this one, c resets the robot, q ends the session"
+)
+
+
+class System(Protocol):
+    """What a session needs from the running system beside the Robot."""
+
+    def apply(self, condition: str) -> None:
+        """Let the settings of a condition take effect. CheckFailed or NotThere if they cannot."""
+
+    def announce(self, trial: Trial, session: str) -> None:
+        """Say which trial is next, for recorders."""
+
+    def restore(self) -> None:
+        """Put everything back as it was before the session."""
+
+
+def run_live(study: Study, participant: str = "") -> dict[str, Any]:
+    """Run the trials of one participant that are left, with prompts on the terminal. Returns numbers, as run_simulated.
+
+    ``participant``: "": the first one with trials left. NotThere: no robot, or it was launched with other files.
+    """
+    from coglab.running import NoRobot, connect
+
+    try:
+        with connect() as robot:
+            system = RunningSystem(study)
+            return session(study, robot, system, participant)
+    except (NoRobot, ImportError) as error:
+        prepare(study)
+        raise NotThere(f"{error}; for this study: {launch_line(study)}") from None
+
+
+def session(
+    study: Study, robot: Any, system: System, participant: str = "", line: Callable[[str], str] = input
+) -> dict[str, Any]:
+    """The session itself. ``line``: reads a line after a prompt."""
+    with open_rows(study, write=True) as rows:
+        left = [trial for trial in undone(study, rows) if participant in ("", trial.participant)]
+        if participant:
+            study.participant(participant)
+        if not left:
+            who = participant or "every participant"
+            raise UsageError(f"all trials of {who} are done; ./coglab study report {study.folder}")
+        left = [trial for trial in left if trial.participant == left[0].participant]
+        rows.begin({}, simulated=False)
+        name = f"{study.name}_{left[0].participant}_{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
+        before = len(rows.trials)
+        print(f"{left[0].participant}: {len(left)} trials. {HELP}")
+        try:
+            _Session(study, robot, system, rows, name, line).run(left)
+        except EOFError:
+            print()
+        finally:
+            system.restore()
+        table = rows.table()
+        return {
+            "study": study.name,
+            "session": name,
+            "trials": len(rows.trials),
+            "trials_now": len(rows.trials) - before,
+            "handovers": len(table),
+            "succeeded": sum(int(row["success"]) for row in table),
+            "table": str(write_table(rows)),
+        }
+
+
+class _Session:
+    def __init__(
+        self, study: Study, robot: Any, system: System, rows: Rows, name: str, line: Callable[[str], str]
+    ) -> None:
+        self.study, self.robot, self.system, self.rows, self.name, self.line = study, robot, system, rows, name, line
+        self._condition = ""
+        self._notes: list[str] = []
+        self._attempts: dict[int, int] = {}
+
+    def run(self, left: list[Trial]) -> None:
+        place = 0
+        while place < len(left):
+            trial = left[place]
+            print(
+                f"\n{trial.participant}, trial {place + 1} of {len(left)}: {trial.condition}"
+                f" ({trial.repetition} of {self.study.repetitions}): {', '.join(self.study.actions)}"
+            )
+            word, _, text = self.line("> ").strip().partition(" ")
+            if word == "q":
+                return
+            if word == "n":
+                self._notes.append(text)
+            elif word == "c":
+                self._reset()
+            elif word == "r" and place > 0:
+                place -= 1
+            elif word == "s":
+                self.rows.add(trial.number, [])
+                place += 1
+            elif word == "":
+                if self._run(trial):
+                    place += 1
+                    self._questions(trial, left[place:])
+            else:
+                print(f"  {HELP}")
+
+    def _run(self, trial: Trial) -> bool:
+        """Run a trial and write its rows. False if it did not begin."""
+        import coglab
+
+        try:
+            if trial.condition != self._condition:
+                self.system.apply(trial.condition)
+                self._condition = trial.condition
+            self.system.announce(trial, self.name)
+        except (CheckFailed, NotThere) as error:
+            print(f"  {error}")
+            return False
+        rows: list[dict[str, Any]] = []
+        object_id = self.study.object_of(trial.condition)
+        attempt = self._attempts.get(trial.number, 0) + 1
+        for place, action in enumerate(self.study.actions):
+            row = {
+                "trial": trial.number,
+                "participant": trial.participant,
+                "block": trial.block,
+                "condition": trial.condition,
+                "repetition": trial.repetition,
+                "handover": place + 1,
+                "action": action,
+                "object": object_id,
+                "session": self.name,
+                "attempt": attempt,
+                "started_utc": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%S.%f}"[:-3] + "Z",
+            }
+            print(f"  {action} ...", flush=True)
+            try:
+                named = object_id if action in ("receive", "take") else None
+                result = getattr(self.robot, action)(named, limit=self.study.limit)
+            except coglab.Refused as error:
+                print(f"  refused: {error}")
+                if not rows:
+                    return False
+                rows.append(row | {"success": 0, "outcome": "refused", "reason_code": error.name, "reason": str(error)})
+                break
+            except KeyboardInterrupt:
+                self.robot.stop("the experimenter pressed Ctrl-C")
+                print("  stopped. c resets the robot")
+                rows.append(
+                    row | {"success": 0, "outcome": "aborted", "reason_code": "", "reason": "by the experimenter"}
+                )
+                break
+            except TimeoutError as error:
+                print(f"  {error}")
+                rows.append(row | {"success": 0, "outcome": "no_result", "reason_code": "", "reason": str(error)})
+                break
+            print(f"  {result}")
+            rows.append(row | result_fields(result))
+            if not result.ok:
+                break
+        notes = "; ".join(self._notes)
+        self.rows.add(trial.number, [row | {"notes": notes} for row in rows])
+        self._notes, self._attempts[trial.number] = [], attempt
+        return True
+
+    def _reset(self) -> None:
+        try:
+            print(f"  {self.robot.reset()}")
+        except (RuntimeError, TimeoutError) as error:
+            print(f"  {error}")
+
+    def _questions(self, trial: Trial, left: list[Trial]) -> None:
+        """After the last trial under a condition: its questionnaires."""
+        if not self.study.questionnaires or any((t.block, t.condition) == (trial.block, trial.condition) for t in left):
+            return
+        if self.line("questionnaires now? Enter: yes, l: later > ").strip() == "":
+            ask(self.study, trial.participant, trial.condition, trial.block, self.line)
+
+
+def result_fields(result: Any) -> dict[str, Any]:
+    """Outcome, reason and times of a handover, for its row."""
+    from coglab_tools.study.measures import times_of
+
+    return {
+        "success": int(result.ok),
+        "outcome": result.outcome,
+        "reason_code": "" if result.ok else result.reason,
+        "reason": result.sentence,
+        **times_of(result),
+    }
+
+
+# --- the files that the system is launched with -------------------------------------------------------------------
+
+
+def machines_file(study: Study) -> Path:
+    """The brain's configuration during a session."""
+    return (study.folder / LIVE / "machines.yaml").resolve()
+
+
+def objects_copy(study: Study) -> Path:
+    """The object database during a session."""
+    return (study.folder / LIVE / "objects").resolve()
+
+
+def launch_line(study: Study) -> str:
+    """The command that starts the system for this study."""
+    return f"./coglab launch machines:={machines_file(study)} objects:={objects_copy(study)}"
+
+
+def prepare(study: Study) -> None:
+    """Write both as they are without a condition: from the study's own machines.yaml and objects/, else as shipped."""
+    objects_copy(study).mkdir(parents=True, exist_ok=True)
+    write_machines(study, {})
+    for file in sorted(_objects(study).glob("*.yaml")):
+        _write(objects_copy(study) / file.name, file.read_bytes())
+
+
+def write_machines(study: Study, settings: Mapping[str, Any]) -> None:
+    """Write the brain's configuration with these settings. The brain reads it again within a state."""
+    base = study.folder / "machines.yaml"
+    if not base.is_file():
+        base = Path(package_path("coglab_smach", "config", "machines.yaml"))
+    try:
+        Config.load(str(base))
+        values = yaml.safe_load(base.read_text(encoding="utf-8"))
+        text = yaml.safe_dump(with_settings(values, condition_settings.machines_settings(settings)), sort_keys=False)
+        part = machines_file(study).with_name(".machines.check.yaml")
+        write_whole(part, text.encode())
+        Config.load(str(part))
+        part.unlink()
+    except ConfigError as error:
+        raise CheckFailed(str(error)) from None
+    _write(machines_file(study), text.encode())
+
+
+def with_settings(values: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
+    """A copy of a machines.yaml's values with parameters set. What a timing sets wins over the file, so parameters of
+    timings are set in the active one."""
+    changed: dict[str, Any] = copy.deepcopy(dict(values))
+    if "timing" in settings:
+        changed["timing"] = settings["timing"]
+    active = changed.get("timing", "")
+    for name, value in settings.items():
+        if active and BY_NAME[name].timed:
+            changed["timings"][active][name] = value
+        elif name != "timing":
+            node = changed
+            *above, last = name.split(".")
+            for part in above:
+                node = node.setdefault(part, {})
+            node[last] = value
+    return changed
+
+
+def write_objects(study: Study, object_id: str, settings: Mapping[str, Any]) -> None:
+    """Write the objects, one of them with the primitive and delivery of a condition."""
+    for file in sorted(_objects(study).glob("*.yaml")):
+        content = file.read_bytes()
+        if file.stem == object_id and ("primitive" in settings or "delivery" in settings):
+            try:
+                changed = condition_settings.object_with(parse_object(content.decode(), file.name), settings)
+                content = yaml.safe_dump(changed, sort_keys=False).encode()
+                parse_object(content.decode(), file.name)
+            except (ObjectError, UnicodeDecodeError) as error:
+                raise CheckFailed(str(error)) from None
+        _write(objects_copy(study) / file.name, content)
+
+
+def _objects(study: Study) -> Path:
+    own = study.folder / "objects"
+    return own if own.is_dir() else objects_folder()
+
+
+def _write(file: Path, content: bytes) -> None:
+    if not file.exists() or file.read_bytes() != content:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(file, content)
+
+
+# --- the running system -------------------------------------------------------------------------------------------
+
+
+class RunningSystem:
+    """The System over ROS. NotThere: it was launched with other files than the study's."""
+
+    def __init__(self, study: Study) -> None:
+        import rospy
+
+        self.study = study
+        changes = [set(settings) for settings in study.conditions.values()]
+        self._names = set().union(*changes)
+        prepare(study)
+        wrong = [
+            f"{parameter} is {rospy.get_param(parameter, 'not set')}"
+            for parameter, wanted in (
+                ("/coglab/config_file", machines_file(study)),
+                ("/object_database/folder", objects_copy(study)),
+            )
+            if Path(str(rospy.get_param(parameter, ""))).resolve() != wanted
+        ]
+        if wrong:
+            raise NotThere(
+                f"the system was launched with other files ({'; '.join(wrong)}), so conditions cannot take effect; end "
+                f"it and start it by {launch_line(study)}"
+            )
+        above = set(rospy.get_param("/coglab/config_overrides", {})) & set(self._parameters())
+        if above:
+            raise NotThere(
+                f"the parameter /coglab/config_overrides sets {', '.join(sorted(above))}, which conditions of this "
+                "study set too, and it would win: launch the system without it"
+            )
+        self._speed = float(rospy.get_param("/controller_manager/speed_scale", 1.0))
+        self._feedback = self._standing_feedback() if "feedback" in self._names else []
+
+    def _parameters(self) -> set[str]:
+        return {name for s in self.study.conditions.values() for name in condition_settings.machines_settings(s)}
+
+    def apply(self, condition: str) -> None:
+        """See System."""
+        settings = self.study.conditions[condition]
+        write_machines(self.study, settings)
+        self._set_objects(self.study.object_of(condition), settings)
+        if "speed" in self._names:
+            self._set_speed(float(settings.get("speed", self._speed)))
+        if "feedback" in self._names:
+            self._set_feedback(settings.get("feedback", self._feedback))
+
+    def announce(self, trial: Trial, session: str) -> None:
+        """See System: sets the parameters /coglab/trial/study, participant, condition and session."""
+        import rospy
+
+        values = {
+            "study": self.study.name,
+            "participant": trial.participant,
+            "condition": trial.condition,
+            "session": session,
+        }
+        rospy.set_param(PARAMETERS, values)
+
+    def restore(self) -> None:
+        """See System."""
+        import rospy
+
+        write_machines(self.study, {})
+        try:
+            self._set_objects("", {})
+            if "speed" in self._names:
+                self._set_speed(self._speed)
+            if "feedback" in self._names:
+                self._set_feedback(self._feedback)
+            if rospy.has_param(PARAMETERS):
+                rospy.delete_param(PARAMETERS)
+        except (NotThere, CheckFailed, OSError) as error:
+            print(f"  the system was not put back: {error}; launch it again")
+
+    def _set_objects(self, object_id: str, settings: Mapping[str, Any]) -> None:
+        from coglab_msgs.srv import Reload
+
+        write_objects(self.study, object_id, settings)
+        self._call("object_database/reload", Reload)
+
+    def _set_speed(self, speed: float) -> None:
+        from coglab_msgs.srv import SetSpeedScale
+
+        self._call("controller_manager/speed_scale", SetSpeedScale, speed_scale=speed)
+
+    def _set_feedback(self, names: list[str]) -> None:
+        from coglab_msgs.srv import FeedbackSelect, SetExecutionOrder
+
+        status = self._status()
+        others = [each.name for each in status if each.name not in names]
+        self._call("controller_manager/feedback/set_execution_order", SetExecutionOrder, names=[*names, *others])
+        enabled = {each.name for each in status if each.enabled}
+        for verb, chosen in (("disable", enabled - set(names)), ("enable", set(names) - enabled)):
+            if chosen:
+                self._call(f"controller_manager/feedback/{verb}", FeedbackSelect, names=sorted(chosen), reason="")
+
+    def _standing_feedback(self) -> list[str]:
+        return [each.name for each in self._status() if each.enabled]
+
+    @staticmethod
+    def _status() -> list[Any]:
+        import rospy
+        from coglab_msgs.msg import FeedbackStatus
+
+        try:
+            status = rospy.wait_for_message("controller_manager/feedback/status", FeedbackStatus, timeout=ANSWER)
+        except rospy.ROSException:
+            raise NotThere(
+                f"controller_manager/feedback/status has said nothing for {ANSWER:g} s; ./coglab status"
+            ) from None
+        return list(status.controllers)
+
+    @staticmethod
+    def _call(name: str, kind: Any, **fields: Any) -> Any:
+        from coglab_smach.ports.pending import PortError
+        from coglab_smach.ros.calls import call
+
+        pending = call(name, kind, wait=ANSWER, **fields)
+        end = time.monotonic() + 2 * ANSWER
+        while not pending.done():
+            if time.monotonic() > end:
+                pending.cancel()
+                raise NotThere(f"the service {name} does not answer; ./coglab status")
+            time.sleep(0.01)
+        try:
+            return pending.result()
+        except PortError as error:
+            raise CheckFailed(error.sentence) from None

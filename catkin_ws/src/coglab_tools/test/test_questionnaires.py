@@ -1,0 +1,71 @@
+"""Questionnaires: scores, and answers from CSV files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from coglab_tools.command import CheckFailed
+from coglab_tools.study.ask import ask
+from coglab_tools.study.plan import load
+from coglab_tools.study.questionnaires import add_answers, answers_of, find, read_answers, scores_of, shipped
+
+HERE = Path()
+TLX = "mental_demand,physical_demand,temporal_demand,performance,effort,frustration"
+
+
+def read(tmp_path, text, **more):
+    file = tmp_path / "answers.csv"
+    file.write_text(text)
+    return read_answers(file, ["P01", "P02"], ["calm"], [find("nasa_tlx", HERE), find("godspeed", HERE)], **more)
+
+
+def test_a_reversed_item_is_turned_over():
+    godspeed = find("godspeed", HERE)
+    safety = godspeed.scores({"anxious_relaxed": 5, "agitated_calm": 4, "quiescent_surprised": 1})
+    assert safety == {"perceived_safety": pytest.approx((5 + 4 + 5) / 3)}
+
+
+@pytest.mark.parametrize("name, items", [("rosas", 18), ("godspeed", 24), ("nasa_tlx", 6), ("fluency", 18)])
+def test_shipped_questionnaires_are_complete(name, items):
+    assert name in shipped() and len(find(name, HERE).items) == items
+
+
+def test_a_table_of_a_web_form_is_read_scored_and_kept(tmp_path):
+    rows = read(tmp_path, f"participant,condition,{TLX}\nP01,calm,10,20,30,40,50,60\nP02,calm,5,5,5,5,5,\n")
+    assert add_answers(tmp_path, rows) == (11, 0)
+    assert add_answers(tmp_path, rows[:1]) == (0, 1)
+    scores = scores_of(answers_of(tmp_path), [find("nasa_tlx", HERE)])
+    assert [(s["participant"], s["scale"], s["value"]) for s in scores] == [("P01", "workload", 35.0)]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", ":1: a line of column names"),
+        ("condition,effort\n", ":1: the column participant"),
+        ("participant,condition,fatigue\n", ":1: the column 'fatigue'"),
+        ("participant,condition,effort\nP01,calm,50\nAnna,calm,5\n", ":3: participant: one of P01, P02"),
+        ("participant,condition,effort\nP01,loud,50\n", ":2: condition"),
+        ("participant,condition,effort\nP01,calm,52\n", ":2: effort: 0 to 100 in steps of 5"),
+        ("participant,condition,effort\nP01,calm,nan\n", ":2: effort: 0 to 100"),
+        ("participant,condition,effort\nP01,calm,high\n", ":2: effort: a number"),
+        ("participant,condition,effort\nP01,calm\n", ":2: 3 cells"),
+        ("participant,condition,effort\nP01,calm,5\nP01,calm,10\n", ":3: effort: answered twice"),
+        ("participant,condition,questionnaire,item,answer\nP01,calm,rosas,happy,5\n", ":2: an item of"),
+    ],
+)
+def test_bad_answers_are_refused_with_file_and_line(tmp_path, text, words):
+    with pytest.raises(CheckFailed) as refused:
+        read(tmp_path, text)
+    assert f"answers.csv{words}" in str(refused.value)
+
+
+def test_the_terminal_corrects_goes_back_and_keeps_complete_questionnaires(tmp_path):
+    (tmp_path / "study.yaml").write_text(
+        "version: 1\nname: s\nparticipants: 1\nconditions: {calm: {}}\ntrial: [receive]\nquestionnaires: [nasa_tlx]\n"
+    )
+    lines = iter(["7", "x", "50", "back", "10", "20", "skip", "40", "50", "60"])
+    assert ask(load(tmp_path), "P01", line=lambda prompt: next(lines)) == 5
+    assert {row.item: row.answer for row in answers_of(tmp_path)}["mental_demand"] == 10.0
+    assert ask(load(tmp_path), "P01", line=lambda prompt: "30") == 1

@@ -1,0 +1,209 @@
+"""Simulated studies: conditions act, and whatever is killed, the rows are those of the undisturbed run."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import coglab
+import pytest
+from coglab_tools.command import CheckFailed, UsageError
+from coglab_tools.study import settings, simulate
+from coglab_tools.study.live import session
+from coglab_tools.study.plan import load
+from coglab_tools.study.report import write_report
+from coglab_tools.study.rows import ROWS, open_rows
+from coglab_tools.study.run import run_simulated
+
+YAML = """\
+version: 1
+name: kill
+participants: 2
+conditions:
+  calm: {timing: calm}
+  natural: {timing: natural, speed: 0.8}
+trial: [receive]
+record: false
+simulated: {person: accustomed, perfect_perception: true}
+"""
+LIMIT = 240.0  # s, for a run of four trials on a loaded computer
+
+
+def make(folder: Path, text: str = YAML) -> Path:
+    folder.mkdir()
+    (folder / "study.yaml").write_text(text)
+    return folder
+
+
+def start(*words: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-m", *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def kill(process: subprocess.Popen[str]) -> None:
+    if process.poll() is None:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait(30)
+
+
+def wait_for_rows(folder: Path, count: int, process: subprocess.Popen[str]) -> None:
+    end = time.monotonic() + LIMIT
+    while not (folder / ROWS).exists() or (folder / ROWS).read_bytes().count(b"\n") < count + 1:
+        if process.poll() is not None or time.monotonic() > end:
+            kill(process)
+            pytest.fail(f"no {count} rows: {process.communicate()[0]}")
+        time.sleep(0.02)
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    folder = make(tmp_path_factory.mktemp("undisturbed") / "kill")
+    assert run_simulated(load(folder), workers=1)["trials"] == 4
+    return folder
+
+
+def test_conditions_act_and_the_report_compares_them(undisturbed):
+    with open_rows(load(undisturbed)) as rows:
+        table = rows.table()
+    slow = [row["approach_s"] for row in table if row["condition"] == "calm"]
+    quick = [row["approach_s"] for row in table if row["condition"] == "natural"]
+    assert min(slow) > 1.2 * max(quick)
+    data = write_report(load(undisturbed), pdf=True)
+    page = (undisturbed / "report.html").read_text()
+    assert "4 of 4 handovers succeeded" in data["verdict"] and "<script" not in page and 'src="http' not in page
+    one = next(c for c in data["comparisons"] if c["measure"] == "receive: approach")
+    assert one["pairs"] == 2 and one["difference"] < 0.0
+    assert (undisturbed / "report.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_a_crashed_study_goes_on_with_the_same_rows(undisturbed, tmp_path):
+    folder = make(tmp_path / "kill")
+    lines = (undisturbed / ROWS).read_bytes().splitlines(keepends=True)
+    (folder / ROWS).write_bytes(b"".join(lines[:4]) + lines[4][:40])  # as a crash in mid-write leaves it
+    with open_rows(load(folder), write=True), pytest.raises(UsageError, match="another process"):
+        run_simulated(load(folder), workers=1)
+    assert run_simulated(load(folder), workers=1)["trials_now"] == 1
+    assert (folder / "trials.csv").read_bytes() == (undisturbed / "trials.csv").read_bytes()
+
+
+def test_a_lost_worker_and_a_lost_scheduler_change_nothing(undisturbed, tmp_path):
+    pytest.importorskip("distributed")
+    folder = make(tmp_path / "kill")
+    file = tmp_path / "scheduler.json"
+    scheduler = start(
+        "distributed.cli.dask_scheduler",
+        "--host",
+        "127.0.0.1",
+        "--port",
+        "0",
+        "--no-dashboard",
+        "--scheduler-file",
+        str(file),
+    )
+    worker = (
+        "distributed.cli.dask_worker",
+        "--nthreads",
+        "1",
+        "--no-dashboard",
+        "--no-nanny",
+        "--scheduler-file",
+        str(file),
+    )
+    places = ("--host", "127.0.0.1", "--local-directory", str(tmp_path))
+    workers = [start(*worker, *places) for _ in range(2)]
+    try:
+        end = time.monotonic() + 60.0
+        while not (file.exists() and "address" in file.read_text()):
+            assert time.monotonic() < end, "the scheduler does not start"
+            time.sleep(0.05)
+        address = file.read_text().split('"address": "')[1].split('"')[0]
+        study = start("coglab_tools", "study", "run", str(folder), "--scheduler", address)
+        wait_for_rows(folder, 1, study)
+        kill(workers.pop())
+        wait_for_rows(folder, 2, study)
+        kill(scheduler)
+        said, _ = study.communicate(timeout=LIMIT)
+        assert study.returncode == 3 and "study resume" in said, said
+    finally:
+        for process in (*workers, scheduler):
+            kill(process)
+    run_simulated(load(folder), workers=1)
+    assert (folder / "trials.csv").read_bytes() == (undisturbed / "trials.csv").read_bytes()
+
+
+def test_a_worker_of_another_version_is_refused(undisturbed):
+    study = load(undisturbed)
+    job = simulate.job_of(study, study.trials()[0])
+    with pytest.raises(simulate.OtherVersion, match="code"):
+        simulate.run(simulate.Job(**{**vars(job), "identity": {**job.identity, "code": "other"}}))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("speed: 0.8", "speed: 0.7", "'conditions' was changed"),
+        ("name: kill", "name: other", "a folder holds one study"),
+    ],
+)
+def test_an_edited_study_is_refused(undisturbed, tmp_path, old, new, words):
+    folder = make(tmp_path / "kill", YAML.replace(old, new))
+    (folder / ROWS).write_bytes((undisturbed / ROWS).read_bytes())
+    with pytest.raises(CheckFailed, match=words):
+        run_simulated(load(folder))
+    (folder / "study.yaml").write_text(YAML + "# a comment may change\n")
+    assert run_simulated(load(folder))["trials_now"] == 0
+
+
+def test_primitive_delivery_and_feedback_reach_the_world():
+    with coglab.World(seed=1, person="patient", perfect_perception=True) as world:
+        chosen = {
+            "primitive": {"receive": "reach_human_high"},
+            "delivery": "handle_first",
+            "feedback": ["ee_admittance"],
+        }
+        settings.apply(world, chosen)
+        world.step(0.1)
+        entry = world.virtual_trial.ctx.database.get_object("mug").result()
+        assert entry["dmp"]["receive"] == "reach_human_high" and entry["dmp"]["give"] == "give_human"
+        assert world.feedback.is_enabled("ee_admittance") and world.feedback.get_execution_order()[0] == "ee_admittance"
+
+
+class StubSystem:
+    """Conditions of a live session, noted only: what the World of the test runs under stays as it is."""
+
+    def __init__(self) -> None:
+        self.calls: list[str] = []
+
+    def apply(self, condition):
+        self.calls.append(condition)
+
+    def announce(self, trial, session):
+        self.calls.append(f"{trial.participant} {trial.condition}")
+
+    def restore(self):
+        self.calls.append("restored")
+
+
+def test_a_live_session_notes_repeats_and_goes_on(tmp_path, capsys):
+    text = YAML.replace("[receive]", "[receive, give]").replace("simulated:", "questionnaires: [nasa_tlx]\nsimulated:")
+    folder, system = make(tmp_path / "kill", text), StubSystem()
+    with coglab.World(seed=3, person="accustomed", perfect_perception=True) as world:
+        lines = iter(["what", "n looked away", "", "", *["50"] * 6, "r", "", "l", "q"])
+        data = session(load(folder), world.robot, system, "P02", lambda prompt: next(lines))
+    assert (data["trials"], data["trials_now"], data["handovers"], data["succeeded"]) == (1, 1, 2, 2)
+    first = system.calls[0]
+    assert system.calls == [first, f"P02 {first}", f"P02 {first}", "restored"]
+    with open_rows(load(folder)) as rows:
+        assert [row["attempt"] for row in rows.table()] == [2, 2]
+    assert b"looked away" in (folder / ROWS).read_bytes()
+    with pytest.raises(CheckFailed, match="live trials"):
+        run_simulated(load(folder))
