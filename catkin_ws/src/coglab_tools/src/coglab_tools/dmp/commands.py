@@ -186,7 +186,8 @@ def inspect(options: argparse.Namespace) -> Answer:
         f"{float(np.linalg.norm(np.asarray(primitive.goal) - primitive.start)):.3f} m",
         f"learnt from {', '.join(entry['from'])}" if entry.get("from") else "its source is not recorded",
         *(
-            f"dmp_ratio {ratio:g} to {np.round(goal, 3).tolist()} m: {c.verdict}, joints at {100 * c.peak:.0f} % ({c.fastest})"
+            f"dmp_ratio {ratio:g} to {np.round(goal, 3).tolist()} m: {c.verdict}, joints at {100 * c.peak:.0f} % of "
+            f"their speed ({c.fastest})"
             for ratio, c in zip(plot.RATIOS, courses, strict=True)
         ),
         *([entry["fingers"]] if "fingers" in entry else []),
@@ -255,8 +256,8 @@ def validate(options: argparse.Namespace) -> Answer:
         failed += [] if good else [name]
         missed = ", ".join(f"{count} {word}" for word, count in why.most_common())
         lines.append(
-            f"{'ok ' if good else 'bad'} {name}: {100 * share:.0f} % of {len(courses)} goals reached, {slowed} slowed by "
-            f"a joint's speed{f'; missed: {missed}' if missed else ''}; middle of the region: {middle.verdict}, joints "
+            f"{'ok ' if good else 'bad'} {name}: {100 * share:.0f} % of {len(courses)} goals reached, {slowed} slowed "
+            f"by a joint's speed{f'; missed: {missed}' if missed else ''}; middle of the region: {middle.verdict}, joints "
             f"at {100 * middle.peak:.0f} % ({middle.fastest})"
         )
         rows.append({"id": name, "ok": good, "share_reached": share, "slowed": slowed, "missed": dict(why),

@@ -77,8 +77,8 @@ def reaches(raw: Demonstration, back: bool = False) -> list[Demonstration]:
         found.append(part)
     if not found:
         raise CheckFailed(
-            f"{raw.name}: no reach in it: the longest motion goes {farthest:.3f} m, a reach at least {SHORTEST:g} m. Is "
-            "it the right frame? A reach begins and ends slowly"
+            f"{raw.name}: no reach in it: the longest motion goes {farthest:.3f} m, a reach at least {SHORTEST:g} m. "
+            "Is it the right frame? A reach begins and ends slowly"
         )
     if len(found) == 1:
         return found

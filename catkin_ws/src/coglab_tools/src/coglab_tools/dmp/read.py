@@ -60,7 +60,7 @@ class Source:
 
 
 def read(path: Path, source: Source = Source()) -> Demonstration:
-    """Read a file: all samples in order of time, as recorded. CheckFailed, NotThere with file and place of the fault."""
+    """Read a file: its samples in order of time. CheckFailed or NotThere with file and place of the fault."""
     readers = {".csv": _read_csv, ".npz": _read_npz, ".bag": _read_bag}
     reader = readers.get(path.suffix.lower())
     if reader is None:
@@ -396,7 +396,7 @@ def _closing(table: Table, notes: list[str]) -> Array | None:
     return np.asarray(np.clip(values / scale, 0.0, 1.0))
 
 
-def _without_jumps(path: Path, times: Array, places: Array, kept: Array, notes: list[str]) -> Array:
+def _without_jumps(path: Path, times: Array, places: Array, kept: Any, notes: list[str]) -> Any:
     """Indices of the samples that can be true. A jump that is taken back soon is left out; another one is refused."""
     good: list[int] = []
     left, since = 0, -1
@@ -409,8 +409,8 @@ def _without_jumps(path: Path, times: Array, places: Array, kept: Array, notes: 
                 if times[i] - times[since] > BRIEF_JUMP:
                     way = np.linalg.norm(places[since] - places[last])
                     raise CheckFailed(
-                        f"{path}: the hand jumps by {way:.2f} m at {times[since] - times[0]:.2f} s and stays there: the "
-                        "tracker took something else for it; cut the file there, or record again"
+                        f"{path}: the hand jumps by {way:.2f} m at {times[since] - times[0]:.2f} s and stays there: "
+                        "the tracker took something else for it; cut the file there, or record again"
                     )
                 continue
         since = -1

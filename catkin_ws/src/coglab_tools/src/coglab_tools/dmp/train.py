@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from datetime import datetime, timezone
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +48,7 @@ class Taught:
         """Values for the file beside the library."""
         p = self.primitive
         entry: dict[str, Any] = {
-            "learnt": datetime.now(timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ"),
+            "learnt": datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
             "from": [d.name for d in self.demonstrations],
             "notes": sorted({note for d in self.demonstrations for note in d.notes}),
             "duration_s": round(p.duration, 4),
