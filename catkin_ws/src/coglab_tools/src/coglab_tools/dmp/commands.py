@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from coglab_tools.command import CHECK_FAILED, OK, Answer, CheckFailed, UsageError, progress
+from coglab_tools.command import CHECK_FAILED, OK, Answer, CheckFailed, NotThere, UsageError, progress
 
 HELP = "teach motions: record, import, learn, inspect and check primitives"
 MAPPINGS = ("none", "similarity", "upright")
@@ -17,6 +17,21 @@ FAULTS = ("short", "brief", "jump", "moving", "noisy")
 
 def add(verbs: argparse._SubParsersAction[Any]) -> None:
     """Add the verbs of `dmp`."""
+    parser = verbs.add_parser("record", help="records a demonstration: the arm led by hand, or a tracked hand")
+    parser.add_argument("name", help="of the demonstration")
+    parser.add_argument("--frame", default="", help="tf frame of a tracked hand; default: the arm, led by hand")
+    parser.add_argument("--out", type=Path, default=Path("demonstrations"), help="folder of the demonstrations")
+    parser.add_argument(
+        "--button", default="", metavar="TOPIC", help="std_msgs/Bool or sensor_msgs/Joy: held = recorded"
+    )
+    parser.add_argument("--wait", type=int, default=3, metavar="S", help="count-down (3)")
+    parser.add_argument("--limit", type=float, default=30.0, metavar="S", help="longest demonstration (30)")
+    parser.add_argument(
+        "--stay", action="store_true", help="leave the arm where it was led, instead of bringing it home"
+    )
+    parser.add_argument("--master", default="", help="ROS master of the robot, address or port")
+    parser.set_defaults(run=record)
+
     parser = verbs.add_parser("import", help="reads recordings, judges them and cuts their reaches into demonstrations")
     _reading(parser)
     parser.add_argument("--out", type=Path, default=Path("demonstrations"), help="folder of the demonstrations")
@@ -94,6 +109,89 @@ def demonstrations(options: argparse.Namespace) -> list[Any]:
     for path in progress(o.files, len(o.files), "reading"):
         found += reaches(read(path, source), o.back)
     return found
+
+
+def record(options: argparse.Namespace) -> Answer:
+    """`dmp record`."""
+    import re
+
+    if not re.fullmatch(r"[A-Za-z0-9_.-]{1,64}", options.name):
+        raise UsageError(f"the name '{options.name}': expected 1 to 64 letters, digits, '_', '-' or '.'")
+    if not 0 <= options.wait <= 60 or not 1.0 <= options.limit <= 600.0:
+        raise UsageError("--wait: expected 0 to 60 s; --limit: expected 1 to 600 s")
+    path = _free(options.out, options.name)
+    try:
+        import coglab
+        from coglab.running import NoRobot
+    except ImportError as error:
+        raise NotThere(f"ROS is not there ({error}); start in ./coglab shell, after ./coglab build") from None
+    from coglab_tools.dmp import record as recorder
+    from coglab_tools.dmp.cut import reaches
+
+    terminal = recorder.Terminal()
+    try:
+        with coglab.connect(options.master or _running_master()) as robot:
+            button = recorder.Button(options.button) if options.button else None
+            if not options.frame:
+                terminal.say("hand guiding: take the robot's hand. The arm gives way as soon as the count is over")
+            if button is not None:
+                terminal.say(f"hold the button {options.button} while you demonstrate")
+                recorder.await_button(button, robot)
+            else:
+                terminal.count_down(options.wait, robot.pause)
+                terminal.begin()
+            with terminal.keys() as pressed:
+                recorded = recorder.record(
+                    robot,
+                    path.stem,
+                    options.frame,
+                    limit=options.limit,
+                    ends=lambda: pressed() or (button is not None and not button.held),
+                    show=terminal.show,
+                )
+            state = "" if options.frame else recorder.settle(robot, terminal, options.stay)
+    except NoRobot as error:
+        raise NotThere(str(error)) from None
+    except (coglab.Refused, TimeoutError) as error:
+        raise CheckFailed(str(error)) from None
+    recorded.save(path)
+    try:
+        found = reaches(recorded)
+    except CheckFailed as error:
+        raise CheckFailed(f"{error}. What was recorded is in {path}") from None
+    lines = [f"wrote {path}: {recorded.duration:.1f} s, {len(recorded.times)} samples", *_table(found)]
+    return Answer(
+        "\n".join([*lines, *([state] if state else [])]),
+        {"file": str(path), "demonstrations": [_facts(d, path) for d in found], "state": state},
+        f"./coglab dmp train {options.out}/*.csv --id NAME, or the same command again for one more demonstration",
+    )
+
+
+def _running_master() -> str:
+    """Address of the system that runs; empty: ROS_MASTER_URI says it."""
+    import os
+
+    from coglab_bringup.ask import Refused, find_master
+
+    top = os.environ.get("COGLAB_TOP", "")
+    if not top:
+        return ""
+    own = os.environ.get("COGLAB_USER_MASTER", "")
+    try:
+        return find_master(Path(top), 0, own)
+    except Refused as error:
+        if not own:
+            raise NotThere(str(error)) from None
+        return own
+
+
+def _free(folder: Path, name: str) -> Path:
+    """A path that is not there yet: name.csv, name_2.csv, ..."""
+    path, number = folder / f"{name}.csv", 1
+    while path.exists():
+        number += 1
+        path = folder / f"{name}_{number}.csv"
+    return path
 
 
 def import_files(options: argparse.Namespace) -> Answer:
@@ -257,8 +355,8 @@ def validate(options: argparse.Namespace) -> Answer:
         missed = ", ".join(f"{count} {word}" for word, count in why.most_common())
         lines.append(
             f"{'ok ' if good else 'bad'} {name}: {100 * share:.0f} % of {len(courses)} goals reached, {slowed} slowed "
-            f"by a joint's speed{f'; missed: {missed}' if missed else ''}; middle of the region: {middle.verdict}, joints "
-            f"at {100 * middle.peak:.0f} % ({middle.fastest})"
+            f"by a joint's speed{f'; missed: {missed}' if missed else ''}; middle of the region: {middle.verdict}, "
+            f"joints at {100 * middle.peak:.0f} % ({middle.fastest})"
         )
         rows.append({"id": name, "ok": good, "share_reached": share, "slowed": slowed, "missed": dict(why),
                      "joint_speed_share": middle.peak, "verdict": middle.verdict})  # fmt: skip
