@@ -12,6 +12,7 @@ from contextlib import contextmanager, nullcontext, suppress
 from typing import Any
 
 import numpy as np
+from coglab.results import Refused
 
 from coglab_tools.command import CheckFailed, NotThere
 from coglab_tools.dmp.cut import LOW, SHORTEST
@@ -19,6 +20,7 @@ from coglab_tools.dmp.demonstration import Demonstration
 
 PERIOD = 0.01  # s between two samples of the palm
 SEEN_PERIOD = 0.005  # s between two looks at a tracked hand
+SAME_SIGHT = 0.002  # s; times that are nearer are the same sight, with the error of its age
 STILL = 0.5  # s at rest after a reach that end a demonstration
 WINDOW = 0.1  # s over which the speed is taken
 FASTEST = 1.5  # m/s; a guided palm that is faster is not led any more
@@ -36,8 +38,8 @@ class Trace:
         self.still_since: float | None = None
 
     def add(self, t: float, pose: Any, fingers: tuple[int, ...]) -> None:
-        """A sample at t (s). One that is not newer than the last is left out."""
-        if self.times and t <= self.times[-1]:
+        """A sample at t (s). One that is not newer than the last, or the same sight again, is left out."""
+        if self.times and t <= self.times[-1] + SAME_SIGHT:
             return
         self.times.append(t)
         self.poses.append(pose)
@@ -65,6 +67,8 @@ class Trace:
     @property
     def over(self) -> bool:
         """A reach was made, and the hand rests."""
+        if not self.times:
+            return False
         rests = self.still_since is not None and self.times[-1] - self.still_since >= STILL
         return rests and self.way >= SHORTEST
 
@@ -93,29 +97,15 @@ def record(
     rests for 0.5 s after a reach, or after `limit` s. `show` gets a line ten times a second. CheckFailed if the arm
     runs away, the brain begins to act, or nothing was recorded.
     """
-    trace, shown = Trace(), -np.inf
-    with nullcontext() if frame else robot.arm.guided():
-        begun = robot.time
-        hub = robot.state.state
-        while robot.time - begun < limit and not ends():
-            if frame:
-                pose, age = robot.seen(frame)
-                trace.add(robot.time - age, pose, ())
-            else:
-                trace.add(robot.time, robot.arm.palm, robot.state.fingers)
-                if trace.speed > FASTEST:
-                    raise CheckFailed(
-                        f"the palm moves at {trace.speed:.1f} m/s and is not led any more (at most {FASTEST:g} m/s): "
-                        "the arm was stopped. Are the load data of the hand right?"
-                    )
-                if trace.times[-1] - shown >= TRACE and robot.state.state != hub:
-                    raise CheckFailed(f"the brain left {hub}: somebody started an action; hand guiding was ended")
-            if trace.over:
-                break
-            if trace.times[-1] - shown >= TRACE:
-                shown = trace.times[-1]
-                show(trace.line())
-            robot.pause(SEEN_PERIOD if frame else PERIOD)
+    trace = Trace()
+    problem = ""
+    try:
+        with nullcontext() if frame else robot.arm.guided():
+            _follow(robot, frame, trace, limit, ends, show)
+    except (Refused, TimeoutError) as error:
+        if not trace.over and not ends():
+            raise
+        problem = f"the end of hand guiding failed: {error}"  # what was recorded is good
     if len(trace.times) < 10:
         raise CheckFailed(f"{len(trace.times)} samples were recorded, expected at least 10")
     closing = np.array(trace.closing)
@@ -125,8 +115,32 @@ def record(
         np.array([pose.position for pose in trace.poses]),
         np.array([pose.orientation for pose in trace.poses]),
         closing if np.isfinite(closing).all() else None,
-        (f"recorded from {f'the frame {frame}' if frame else 'the arm, led by hand'}",),
+        (f"recorded from {f'the frame {frame}' if frame else 'the arm, led by hand'}", *([problem] if problem else [])),
     )
+
+
+def _follow(
+    robot: Any, frame: str, trace: Trace, limit: float, ends: Callable[[], bool], show: Callable[[str], None]
+) -> None:
+    """Fill the trace until it is over."""
+    begun, shown, hub = robot.time, -np.inf, robot.state.state
+    while robot.time - begun < limit and not ends() and not trace.over:
+        if frame:
+            pose, age = robot.seen(frame)
+            trace.add(robot.time - age, pose, ())
+        else:
+            trace.add(robot.time, robot.arm.palm, robot.state.fingers)
+            if trace.speed > FASTEST:
+                raise CheckFailed(
+                    f"the palm moves at {trace.speed:.1f} m/s and is not led any more (at most {FASTEST:g} m/s): "
+                    "the arm was stopped. Are the load data of the hand right?"
+                )
+        if robot.time - shown >= TRACE:
+            shown = robot.time
+            show(trace.line())
+            if not frame and robot.state.state != hub:
+                raise CheckFailed(f"the brain left {hub}: somebody started an action; hand guiding was ended")
+        robot.pause(SEEN_PERIOD if frame else PERIOD)
 
 
 def settle(robot: Any, terminal: Terminal, stay: bool) -> str:
