@@ -247,12 +247,14 @@ def _pose_row(stamp: Any, p: Any, q: Any) -> dict[str, float]:
 def _fingers(bag: Any, info: Mapping[str, Any]) -> Array:
     """Times (s) and closing 0..1 of the robot's hand, (n, 2); empty without a hand in the bag."""
     topics = [name for name, entry in info.items() if entry.msg_type == "coglab_msgs/HandStatus"]
+    if not topics:
+        return np.empty((0, 2))
     rows = [
         (m.header.stamp.to_sec(), float(np.mean([motor.position for motor in m.motors[1:]])) / MOTOR_CLOSED)
         for _, m, _ in bag.read_messages(topics=topics)
         if len(m.motors) == 5
     ]
-    return np.array(rows).reshape(-1, 2) if topics else np.empty((0, 2))
+    return np.array(rows).reshape(-1, 2)
 
 
 # --- judging ---
