@@ -266,6 +266,7 @@ def inspect(options: argparse.Namespace) -> Answer:
 
     from coglab_tools.dmp import check, plot
     from coglab_tools.dmp.cut import reaches
+    from coglab_tools.dmp.demonstration import for_shell
     from coglab_tools.dmp.read import read
     from coglab_tools.dmp.train import load_beside
 
@@ -302,7 +303,7 @@ def inspect(options: argparse.Namespace) -> Answer:
         ],
         "plot": str(path),
     }
-    return Answer("\n".join(lines), data, f"./coglab launch primitives:=$PWD/{options.library}")
+    return Answer("\n".join(lines), data, f"./coglab launch primitives:={for_shell(options.library)}")
 
 
 def list_primitives(options: argparse.Namespace) -> Answer:
@@ -338,6 +339,7 @@ def list_primitives(options: argparse.Namespace) -> Answer:
 def validate(options: argparse.Namespace) -> Answer:
     """`dmp validate`."""
     from coglab_tools.dmp import check
+    from coglab_tools.dmp.demonstration import for_shell
     from coglab_tools.dmp.train import load_library
 
     library = load_library(options.library)
@@ -368,7 +370,7 @@ def validate(options: argparse.Namespace) -> Answer:
     return Answer(
         "\n".join(lines),
         {"primitives": rows},
-        f"./coglab launch primitives:=$PWD/{options.library}",
+        f"./coglab launch primitives:={for_shell(options.library)}",
         CHECK_FAILED if failed else OK,
     )
 

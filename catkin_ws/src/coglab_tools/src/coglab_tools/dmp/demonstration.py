@@ -69,3 +69,8 @@ def write_whole(path: Path, text: str) -> None:
         os.replace(half, path)
     finally:
         half.unlink(missing_ok=True)
+
+
+def for_shell(path: Path) -> str:
+    """The path as a launch argument needs it: absolute."""
+    return str(path) if path.is_absolute() else f"$PWD/{path}"

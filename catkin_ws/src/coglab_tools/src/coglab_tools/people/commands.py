@@ -55,6 +55,7 @@ def import_recordings(options: argparse.Namespace) -> Answer:
     """`people import`."""
     import re
 
+    from coglab_tools.dmp.demonstration import for_shell
     from coglab_tools.people.handover import write_recording
 
     if options.object and not re.fullmatch(r"[a-z0-9_]{1,64}", options.object):
@@ -76,12 +77,12 @@ def import_recordings(options: argparse.Namespace) -> Answer:
                      "peak_speed_m_s": float(reach.speed.max()), "touch_s": h.touch, "source": h.source,
                      "notes": list(h.notes)})  # fmt: skip
     held = "" if options.object else " recorded_object:=in_hand"
-    return Answer("\n".join(lines), {"recordings": rows}, f"./coglab launch recording:=$PWD/{paths[0]}{held}")
+    return Answer("\n".join(lines), {"recordings": rows}, f"./coglab launch recording:={for_shell(paths[0])}{held}")
 
 
 def learn(options: argparse.Namespace) -> Answer:
     """`people learn`."""
-    from coglab_tools.dmp.demonstration import write_whole
+    from coglab_tools.dmp.demonstration import for_shell, write_whole
     from coglab_tools.people.learn import PRIMITIVES, base_library, learn_patterns, learn_primitives
 
     if options.primitives is None and options.patterns is None:
@@ -99,10 +100,10 @@ def learn(options: argparse.Namespace) -> Answer:
         lines += [f"  {name}: {library[name].description}" for name in PRIMITIVES]
         lines.append(f"wrote {options.primitives}: {', '.join(library.ids())}")
         data["primitives"] = {name: library[name].duration for name in PRIMITIVES}
-        follow.append(f"primitives:=$PWD/{options.primitives}")
+        follow.append(f"primitives:={for_shell(options.primitives)}")
     if options.patterns is not None:
         counts = learn_patterns(found, options.patterns)
         lines.append(f"wrote {options.patterns}: {', '.join(f'{name} ({n})' for name, n in counts.items())}")
         data["patterns"] = counts
-        follow.append(f"patterns:=$PWD/{options.patterns}")
+        follow.append(f"patterns:={for_shell(options.patterns)}")
     return Answer("\n".join(lines), data, f"./coglab launch {' '.join(follow)}")
