@@ -396,7 +396,10 @@ def export(options: argparse.Namespace) -> Answer:
     if kind == ".csv":
         Demonstration(options.id, times, path).save(options.out)
     elif kind == ".npz":
-        np.savez(options.out, t=times, position=path, centres=p.centres, widths=p.widths, weights=p.weights)
+        try:
+            np.savez(options.out, t=times, position=path, centres=p.centres, widths=p.widths, weights=p.weights)
+        except OSError as error:
+            raise CheckFailed(f"{options.out} cannot be written: {error.strerror}") from None
     else:
         values = {name: getattr(p, name) for name in ("id", "description", "duration", "alpha", "stiffness", "damping",
                                                       "mapping")}  # fmt: skip

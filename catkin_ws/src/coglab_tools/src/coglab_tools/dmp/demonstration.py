@@ -7,11 +7,14 @@ per sample. t in s, x y z in m, quaternion of length 1, closing of the fingers 0
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+
+from coglab_tools.command import CheckFailed
 
 Array = npt.NDArray[np.float64]
 
@@ -62,13 +65,16 @@ class Demonstration:
 
 def write_whole(path: Path, text: str) -> None:
     """Write a text file under another name first, so that nobody ever reads a half of it."""
-    path.parent.mkdir(parents=True, exist_ok=True)
     half = path.with_name(f".{path.name}.{os.getpid()}")
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         half.write_text(text, encoding="utf-8")
         os.replace(half, path)
+    except OSError as error:
+        raise CheckFailed(f"{path} cannot be written: {error.strerror}; what was there before is kept") from None
     finally:
-        half.unlink(missing_ok=True)
+        with suppress(OSError):
+            half.unlink(missing_ok=True)
 
 
 def for_shell(path: Path) -> str:

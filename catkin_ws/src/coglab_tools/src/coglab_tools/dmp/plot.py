@@ -9,6 +9,7 @@ from typing import Any
 import coglab_controllers as cc
 import numpy as np
 
+from coglab_tools.command import CheckFailed
 from coglab_tools.dmp import check
 from coglab_tools.dmp.demonstration import Array, Demonstration
 from coglab_tools.dmp.train import SHARES, course
@@ -49,8 +50,12 @@ def picture(
 
 def draw(path: Path, *args: Any, **named: Any) -> Path:
     """Write `picture(...)` as a PNG and return its path."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    picture(*args, **named).savefig(path, dpi=90)
+    figure = picture(*args, **named)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(path, dpi=90)
+    except (OSError, ValueError) as error:
+        raise CheckFailed(f"the picture {path} cannot be written: {error}") from None
     return path
 
 

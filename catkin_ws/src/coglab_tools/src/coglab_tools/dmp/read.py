@@ -67,7 +67,10 @@ def read(path: Path, source: Source = Source()) -> Demonstration:
         raise UsageError(f"{path}: expected a .csv, .npz or .bag file")
     if not path.is_file():
         raise NotThere(f"{path}: no such file")
-    table, units, lines = reader(path, source)
+    try:
+        table, units, lines = reader(path, source)
+    except OSError as error:
+        raise CheckFailed(f"{path} cannot be read: {error.strerror or error}") from None
     return _judge(path, table, units, lines, source)
 
 
