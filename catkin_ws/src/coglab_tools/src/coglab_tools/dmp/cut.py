@@ -18,7 +18,7 @@ from coglab_tools.dmp.demonstration import Array, Demonstration
 CUT_OFF = 8.0  # Hz
 SHORTEST = 0.1  # m, farthest point of a reach from its start
 LONGEST_GAP = 0.2  # s without a sample within a reach
-LOW, LOW_SHARE = 0.02, 0.03  # m/s, and share of the peak speed: below the larger one the hand rests
+LOW, LOW_SHARE = 0.02, 0.05  # m/s, and share of the peak speed: below the larger one the hand rests
 HIGH_SHARE = 0.25  # share of the largest speed that a motion must reach
 PAUSE_SHARE = 0.35  # slowest point between two motions, share of the smaller of their peaks
 BACK_SHARE = 0.35  # a motion that ends this near to where the last one began, share of the way, is a way back
