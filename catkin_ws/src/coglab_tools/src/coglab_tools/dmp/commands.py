@@ -56,7 +56,7 @@ def add(verbs: argparse._SubParsersAction[Any]) -> None:
     parser.add_argument(
         "--with", dest="demonstrations", type=Path, nargs="+", default=[], help="demonstrations to show"
     )
-    parser.add_argument("--plot", type=Path, help="the picture (default: beside the library)")
+    parser.add_argument("--plot", type=Path, help="the picture (default: ID.png here)")
     parser.set_defaults(run=inspect)
 
     parser = verbs.add_parser("list", help="lists the primitives of a library")
@@ -92,7 +92,12 @@ def _reading(parser: argparse.ArgumentParser) -> None:
 
 
 def _of_library(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("library", type=Path, help="library of primitives (.xml)")
+    from coglab_py.packages import package_path
+
+    shipped = package_path("coglab_controllers", "config", "primitives.xml")
+    parser.add_argument(
+        "library", type=Path, nargs="?", default=shipped, help="library (.xml); default: the shipped one"
+    )
 
 
 # --- the verbs ---
@@ -276,7 +281,7 @@ def inspect(options: argparse.Namespace) -> Answer:
     goal = np.array(options.goal) if options.goal else check.region_middle()
     turn, closing = (np.array(entry[name]) if name in entry else None for name in ("turn_rad", "closing"))
     rmse = np.array(entry.get("rmse_mm", [])) / 1000.0
-    path = options.plot or options.library.with_name(f"{options.id}.png")
+    path = options.plot or Path(f"{options.id}.png")
     plot.draw(path, primitive, found, rmse, turn, closing, goal)
     courses = [check.run(primitive, goal, ratio) for ratio in plot.RATIOS]
     lines = [
