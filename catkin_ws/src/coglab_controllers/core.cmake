@@ -108,7 +108,8 @@ install(TARGETS coglab_controllers_core coglab_controllers_manager coglab_contro
 install(TARGETS coglab_controllers_python LIBRARY DESTINATION ${CATKIN_PACKAGE_PYTHON_DESTINATION})
 install(FILES src/coglab_controllers/_core.pyi src/coglab_controllers/py.typed
   DESTINATION ${CATKIN_PACKAGE_PYTHON_DESTINATION})
-install(FILES config/primitives.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/config)
+install(FILES config/primitives.xml config/primitives_recorded.xml
+  DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/config)
 
 # Each folder of test/ is one binary. test_allocation counts the calls of malloc.
 if(CATKIN_ENABLE_TESTING)

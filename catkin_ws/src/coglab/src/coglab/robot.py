@@ -7,7 +7,8 @@ TimeoutError. A motion or an exchange that has begun and fails returns a result 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from types import TracebackType
 from typing import Any, TypeAlias
@@ -36,6 +37,8 @@ STOPPING = 8.0  # s, time limit for the arm to stand after a stop
 LIBRARY = str(package_path("coglab_controllers", "config", "primitives.xml"))
 OWN_FRAME = "coglab_goal"  # goal frame of a motion toward a pose, or along a function
 UNSET = (0.0, 0.0, 0.0, 0.0)
+GUIDE_MODE = "joint_impedance stiffness 0.01 damping 0.3"  # the smallest stiffness that the arm takes, Nm/rad
+GUIDE_ANSWER = 10.0  # s, time limit for a change of the arm's mode
 
 
 class Motion:
@@ -277,6 +280,35 @@ class Arm:
                     return replace(motion.result, what="follow")
             remaining = self._cell.arm.dmp_progress().remaining_distance
         return self._result("follow", begun, True, remaining=float(remaining))
+
+    @contextmanager
+    def guided(self) -> Iterator[None]:
+        """Inside the block the arm gives way to a hand that leads it: joint impedance with almost no stiffness, the
+        robot controller carries its weight. Afterwards it stands where it was left, in position mode. The brain may
+        stop while the arm changes its mode: ``robot.reset()`` brings arm and brain home. Example::
+
+            with robot.arm.guided():
+                robot.pause(10.0)  # lead the hand
+            print(robot.arm.joints)
+
+        Refused: the brain acts, or the arm has no such mode (``arm:=ideal``). On a real arm the load data of tool and
+        object must be right, or the arm sinks: hold it.
+        """
+        robot, arm = self._robot, self._cell.arm
+        robot._check()
+        robot._end_own_motion("hand guiding of the same caller")
+        robot._await_hub("hand guiding")
+
+        def command(*events: str) -> None:
+            for event in events:
+                robot._await(arm.lwr_command(event), GUIDE_ANSWER, f"the answer to '{event}'")
+
+        try:
+            command("stop", GUIDE_MODE, "start")
+            yield
+        finally:
+            command("stop", "position", "start")
+            robot._wait(lambda: arm.motion_allowed().ok, ANSWER, "the arm to stand in position mode")
 
     def _show(self, pose: Pose) -> None:
         """Show the goal frame of this object, and wait until the robot knows it."""
@@ -549,15 +581,24 @@ class Robot:
     def frame(self, name: str) -> Pose:
         """Pose of a frame in the base frame as the robot sees it: "palm", "human_hand", "object_mug", "board", ...
         Refused: never seen, or not seen for 1 s."""
+        return self.seen(name)[0]
+
+    def seen(self, name: str) -> tuple[Pose, float]:
+        """Like ``frame``, with the age of what is seen, s."""
         self._check()
         if name == "palm":
-            return self.arm.palm
+            return self.arm.palm, 0.0
         pose, age = self._cell.frame(str(name))
         if pose is None:
             raise Refused(f"the frame '{name}' was never seen; is its name right?", ReasonCode.GOAL_MISSING)
         if age > 1.0:
             raise Refused(f"the frame '{name}' was last seen {age:.1f} s ago", ReasonCode.GOAL_STALE)
-        return pose
+        return pose, age
+
+    def pause(self, seconds: float) -> None:
+        """Let time pass: virtual time in a World."""
+        self._check()
+        self._pause(number(seconds, "seconds", "s", 0.0))
 
     # --- its end ---
 

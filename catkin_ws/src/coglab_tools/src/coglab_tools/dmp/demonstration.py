@@ -1,0 +1,82 @@
+"""One demonstrated motion, and its file.
+
+A demonstration file is a CSV that `recording:=` plays, too: a header `t,x,y,z[,qx,qy,qz,qw][,closing]`, then one line
+per sample. t in s, x y z in m, quaternion of length 1, closing of the fingers 0 (open) .. 1 (closed).
+"""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from coglab_tools.command import CheckFailed
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Demonstration:
+    """Samples of a hand or a palm in one frame, and what was found out about them."""
+
+    name: str
+    times: Array
+    """s, (n,), increasing"""
+    positions: Array
+    """m, (n, 3)"""
+    orientations: Array | None = None
+    """quaternions x y z w, (n, 4); None: not recorded"""
+    closing: Array | None = None
+    """closing of the fingers, (n,), 0 open .. 1 closed; None: not recorded"""
+    notes: tuple[str, ...] = ()
+    """sentences on units, gaps, repeated samples and the cut"""
+    noise: float = 0.0
+    """m, standard deviation per axis of what smoothing took away"""
+
+    @property
+    def duration(self) -> float:
+        """s"""
+        return float(self.times[-1] - self.times[0])
+
+    @property
+    def way(self) -> float:
+        """m, from the first sample to the farthest one."""
+        return float(np.linalg.norm(self.positions - self.positions[0], axis=1).max())
+
+    @property
+    def speed(self) -> Array:
+        """m/s, (n,)"""
+        return np.asarray(np.linalg.norm(np.gradient(self.positions, self.times, axis=0), axis=1), dtype=float)
+
+    def save(self, path: Path) -> None:
+        """Write the demonstration file. It is there whole or not at all."""
+        columns, header = [self.times - self.times[0], *self.positions.T], "t,x,y,z"
+        if self.orientations is not None:
+            columns, header = [*columns, *self.orientations.T], header + ",qx,qy,qz,qw"
+        if self.closing is not None:
+            columns, header = [*columns, self.closing], header + ",closing"
+        lines = [header, *(",".join(f"{value:.9g}" for value in row) for row in np.column_stack(columns))]
+        write_whole(path, "\n".join(lines) + "\n")
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a text file under another name first, so that nobody ever reads a half of it."""
+    half = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        half.write_text(text, encoding="utf-8")
+        os.replace(half, path)
+    except OSError as error:
+        raise CheckFailed(f"{path} cannot be written: {error.strerror}; what was there before is kept") from None
+    finally:
+        with suppress(OSError):
+            half.unlink(missing_ok=True)
+
+
+def for_shell(path: Path) -> str:
+    """The path as a launch argument needs it: absolute."""
+    return str(path) if path.is_absolute() else f"$PWD/{path}"

@@ -1,0 +1,425 @@
+"""Reads motions from CSV, npz and bag files, and judges units, gaps and samples that cannot be true.
+
+Columns of a CSV, arrays of an npz (each (n,), or `position` (n, 3) and `orientation` (n, 4)) and topics of a bag:
+
+* time: `t` or `time`;
+* place: `x`, `y`, `z`; or the joints of the arm, `lwr_a1` .. `lwr_a6`, which give the palm;
+* turn: `qx`, `qy`, `qz`, `qw`, or `roll`, `pitch`, `yaw` (about the fixed axes x, y, z);
+* fingers: `closing`, 0 open .. 1 closed, or in percent, or as the hand's bytes 0 .. 254;
+* `frame`: several hands or objects in one file.
+
+A unit may stand behind a name: `x_mm`, `x [mm]`, `t_ms`, `roll_deg`. Without one it is judged from the numbers, and a
+note says so.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from coglab_tools.command import CheckFailed, NotThere, UsageError
+from coglab_tools.dmp.demonstration import Array, Demonstration
+
+FASTEST = 5.0  # m/s between two samples; above it the tracker took something else for the hand
+BRIEF_JUMP = 0.1  # s; a jump that is taken back within this time is left out
+MOST_SAMPLES = 1_000_000
+LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+ANGLE = {"rad": 1.0, "deg": np.pi / 180.0}
+JOINTS = tuple(f"lwr_{name}" for name in ("a1", "a2", "e1", "a3", "a4", "a5", "a6"))
+MOTOR_CLOSED = 254.0  # position of a closed motor of the IH2 hand
+
+Table = dict[str, Array]
+"""Numbers by column name, each (n,)"""
+
+
+@dataclass(frozen=True)
+class Source:
+    """What to read from a file, and its units. Empty: judge it."""
+
+    frame: str = ""
+    """frame or name of the hand; empty: the only one, or `human_hand`"""
+    topic: str = ""
+    """of a bag: tf, PoseStamped, PoseWithCovarianceStamped, TransformStamped or JointState"""
+    world: str = "world"
+    """parent frame of the transforms in a bag"""
+    length: str = ""
+    time: str = ""
+    angle: str = ""
+
+    def __post_init__(self) -> None:
+        for given, known in ((self.length, LENGTH), (self.time, TIME), (self.angle, ANGLE)):
+            if given and given not in known:
+                raise UsageError(f"unit '{given}' is unknown; expected one of {', '.join(known)}")
+
+
+def read(path: Path, source: Source = Source()) -> Demonstration:
+    """Read a file: its samples in order of time. CheckFailed or NotThere with file and place of the fault."""
+    readers = {".csv": _read_csv, ".npz": _read_npz, ".bag": _read_bag}
+    reader = readers.get(path.suffix.lower())
+    if reader is None:
+        raise UsageError(f"{path}: expected a .csv, .npz or .bag file")
+    if not path.is_file():
+        raise NotThere(f"{path}: no such file")
+    try:
+        table, units, lines = reader(path, source)
+    except OSError as error:
+        raise CheckFailed(f"{path} cannot be read: {error.strerror or error}") from None
+    return _judge(path, table, units, lines, source)
+
+
+# --- the three kinds of file: numbers by column name, units by column name, and where sample i is in the file ---
+
+
+def _read_csv(path: Path, source: Source) -> tuple[Table, dict[str, str], str]:
+    with open(path, newline="", encoding="utf-8", errors="replace") as stream:
+        rows = csv.reader(stream)
+        header = next(rows, None)
+        if header is None:
+            raise CheckFailed(f"{path}: the file is empty; expected a header line t,x,y,z and samples")
+        names, units = _named(header)
+        if "t" not in names:
+            raise CheckFailed(f"{path}:1: expected a header with t,x,y,z or t and seven joints, got {','.join(header)}")
+        frame_column = names.index("frame") if "frame" in names else -1
+        kept: list[list[str]] = []
+        frames: set[str] = set()
+        wanted = source.frame
+        for row in rows:
+            if not row or not "".join(row).strip():
+                continue
+            if len(row) != len(names):
+                raise CheckFailed(f"{path}:{rows.line_num}: expected {len(names)} columns, got {len(row)}")
+            if frame_column >= 0:
+                frame = row[frame_column].strip()
+                frames.add(frame)
+                wanted = wanted or ("human_hand" if "human_hand" in frames else frame)
+                if frame != wanted:
+                    continue
+            if len(kept) >= MOST_SAMPLES:
+                raise CheckFailed(f"{path}: more than {MOST_SAMPLES} samples; cut the file")
+            kept.append([*row, str(rows.line_num)])
+    if not kept:
+        seen = f"; its frames are {', '.join(sorted(frames))}" if frames else ""
+        raise CheckFailed(f"{path}: no samples{f' of {wanted}' if wanted else ''} in it{seen}; choose with --frame")
+    table = {}
+    for i, name in enumerate(names):
+        if name == "frame" or not name:
+            continue
+        try:
+            table[name] = np.array([float(row[i]) if row[i].strip() else np.nan for row in kept])
+        except ValueError:
+            bad = next(row for row in kept if not _is_number(row[i]))
+            raise CheckFailed(f"{path}:{bad[-1]}: expected a number for {header[i]}, got '{bad[i]}'") from None
+    return table, units, "line"
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text or "nan")
+    except ValueError:
+        return False
+    return True
+
+
+def _named(header: list[str]) -> tuple[list[str], dict[str, str]]:
+    """Known column names without their units, and the units by name."""
+    names, units = [], {}
+    for word in header:
+        match = re.fullmatch(r"(.+?)[\s_]*[\[(_]\s*(m|cm|mm|s|ms|us|ns|rad|deg)\s*[\])]?", word.strip())
+        name, unit = (match.group(1), match.group(2)) if match else (word.strip(), "")
+        name = {"time": "t", "stamp": "t"}.get(name.lower(), name)
+        name = name if name in JOINTS else name.lower()
+        names.append(name)
+        if unit:
+            units[name] = unit
+    return names, units
+
+
+def _read_npz(path: Path, source: Source) -> tuple[Table, dict[str, str], str]:
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {name: np.asarray(file[name], dtype=float) for name in file.files}
+    except Exception as error:  # zip, header and value errors alike
+        raise CheckFailed(f"{path}: no npz file of plain numbers ({error})") from None
+    frames = sorted({name.rpartition(".")[0] for name in arrays if name.endswith(".t")})
+    frame = source.frame or ("human_hand" if "human_hand" in frames else frames[0] if frames else "")
+    if frame in frames:
+        arrays = {name[len(frame) + 1 :]: value for name, value in arrays.items() if name.startswith(f"{frame}.")}
+    elif source.frame:
+        raise CheckFailed(f"{path}: no frame '{frame}' in it; its frames are {', '.join(frames) or 'not named'}")
+    table: Table = {}
+    for name, value in arrays.items():
+        columns = {"position": ("x", "y", "z"), "orientation": ("qx", "qy", "qz", "qw"), "joints": JOINTS}.get(name)
+        if columns is not None and value.ndim == 2 and value.shape[1] == len(columns):
+            table.update(zip(columns, value.T, strict=True))
+        elif value.ndim == 1:
+            table[name] = value
+    if "t" not in table:
+        raise CheckFailed(f"{path}: expected an array t and position (n, 3), got {', '.join(sorted(arrays)) or 'none'}")
+    n = len(table["t"])
+    wrong = [f"{name} has {len(value)}" for name, value in table.items() if len(value) != n]
+    if wrong:
+        raise CheckFailed(f"{path}: expected {n} values in each array as in t, but {', '.join(wrong)}")
+    return table, {}, "sample"
+
+
+def _read_bag(path: Path, source: Source) -> tuple[Table, dict[str, str], str]:
+    try:
+        import rosbag
+    except ImportError as error:
+        raise NotThere(
+            f"{path}: bags are read with Debian's python3-rosbag ({error}); ./coglab install gets it"
+        ) from None
+    try:
+        with rosbag.Bag(str(path)) as bag:
+            info = bag.get_type_and_topic_info().topics
+            topic = source.topic or _topic_of(path, {name: entry.msg_type for name, entry in info.items()}, source)
+            if topic not in info:
+                there = ", ".join(sorted(info)) or "none"
+                raise CheckFailed(f"{path}: no topic {topic} in it; there are: {there}; choose with --topic")
+            rows = [
+                row for _, message, when in bag.read_messages(topics=[topic]) for row in _rows(message, when, source)
+            ]
+            fingers = _fingers(bag, info)
+    except rosbag.ROSBagException as error:
+        raise CheckFailed(f"{path}: no readable bag ({error}); if it was cut off: rosbag reindex {path}") from None
+    except (OSError, ValueError, KeyError) as error:
+        raise CheckFailed(f"{path}: no readable bag ({error})") from None
+    if not rows:
+        what = f"'{source.world}' -> '{source.frame or 'human_hand'}'" if "tf" in topic else "a pose or seven joints"
+        raise CheckFailed(f"{path}: {topic} has no {what}; choose with --frame, --world or --topic")
+    table = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    if len(fingers):
+        order = np.argsort(fingers[:, 0])
+        table["closing"] = np.interp(table["t"], fingers[order, 0], fingers[order, 1])
+    return table, {"t": "s"}, "message"
+
+
+POSES = ("geometry_msgs/PoseStamped", "geometry_msgs/PoseWithCovarianceStamped", "geometry_msgs/TransformStamped")
+
+
+def _topic_of(path: Path, types: Mapping[str, str], source: Source) -> str:
+    """The topic that has the motion: /tf for a named frame, else the only pose topic, /tf, or the arm's joints."""
+    if source.frame and "/tf" in types:
+        return "/tf"
+    poses = [name for name, kind in types.items() if kind in POSES]
+    if len(poses) == 1:
+        return poses[0]
+    if "/tf" in types and not poses:
+        return "/tf"
+    joints = [name for name, kind in types.items() if kind == "sensor_msgs/JointState"]
+    if not poses and joints:
+        return "/lwr/joint_states" if "/lwr/joint_states" in joints else joints[0]
+    raise CheckFailed(
+        f"{path}: which topic has the motion? Choose with --topic; there are: {', '.join(sorted(types)) or 'none'}"
+    )
+
+
+def _rows(message: Any, when: Any, source: Source) -> list[dict[str, float]]:
+    """Samples of one message by column name."""
+    if hasattr(message, "transforms"):
+        frame = source.frame or "human_hand"
+        found = [
+            item
+            for item in message.transforms
+            if item.child_frame_id.lstrip("/") == frame and item.header.frame_id.lstrip("/") == source.world
+        ]
+        return [_pose_row(i.header.stamp, i.transform.translation, i.transform.rotation) for i in found]
+    if hasattr(message, "transform"):
+        return [_pose_row(message.header.stamp, message.transform.translation, message.transform.rotation)]
+    if hasattr(message, "pose"):
+        pose = getattr(message.pose, "pose", message.pose)
+        return [_pose_row(message.header.stamp, pose.position, pose.orientation)]
+    if hasattr(message, "position") and hasattr(message, "name"):
+        by_name = dict(zip(message.name, message.position, strict=False))
+        if all(name in by_name for name in JOINTS):
+            return [{"t": message.header.stamp.to_sec() or when.to_sec(), **{name: by_name[name] for name in JOINTS}}]
+    return []
+
+
+def _pose_row(stamp: Any, p: Any, q: Any) -> dict[str, float]:
+    return {"t": stamp.to_sec(), "x": p.x, "y": p.y, "z": p.z, "qx": q.x, "qy": q.y, "qz": q.z, "qw": q.w}
+
+
+def _fingers(bag: Any, info: Mapping[str, Any]) -> Array:
+    """Times (s) and closing 0..1 of the robot's hand, (n, 2); empty without a hand in the bag."""
+    topics = [name for name, entry in info.items() if entry.msg_type == "coglab_msgs/HandStatus"]
+    if not topics:
+        return np.empty((0, 2))
+    rows = [
+        (m.header.stamp.to_sec(), float(np.mean([motor.position for motor in m.motors[1:]])) / MOTOR_CLOSED)
+        for _, m, _ in bag.read_messages(topics=topics)
+        if len(m.motors) == 5
+    ]
+    return np.array(rows).reshape(-1, 2)
+
+
+# --- judging ---
+
+
+def _judge(path: Path, table: Table, units: dict[str, str], what: str, source: Source) -> Demonstration:
+    notes: list[str] = []
+    n = len(table["t"])
+    joints = all(name in table for name in JOINTS)
+    if not joints and any(name not in table for name in "xyz"):
+        raise CheckFailed(f"{path}: expected x, y, z or the joints {', '.join(JOINTS)}, got {', '.join(table)}")
+    used = [name for name in ("t", *("xyz" if not joints else JOINTS), *_turn_names(table)) if name in table]
+    whole = np.isfinite(np.column_stack([table[name] for name in used])).all(axis=1)
+    if not whole.all():
+        first = int(np.argmin(whole))
+        notes.append(
+            f"{n - int(whole.sum())} of {n} samples are not finite and were left out, first {what} {first + 1}"
+        )
+    if whole.sum() < 10:
+        raise CheckFailed(f"{path}: expected at least 10 finite samples, got {int(whole.sum())}")
+    table = {name: value[whole] for name, value in table.items()}
+
+    times = table["t"] * _time_unit(path, table["t"], source.time or units.get("t", ""), notes)
+    if np.any(np.diff(times) < 0.0):
+        at = int(np.argmax(np.diff(times) < 0.0))
+        raise CheckFailed(
+            f"{path}: {what} {at + 2}: time goes back by {times[at] - times[at + 1]:.4f} s; cut the file there"
+        )
+    if joints:
+        table.update(_palm_of(np.column_stack([table[name] for name in JOINTS]), source, units, notes))
+    places = np.column_stack([table[name] for name in "xyz"])
+    places = places * _length_unit(path, places, source.length or units.get("x", "m" if joints else ""), notes)
+    turns = _turns(path, table, source.angle or units.get("roll", ""), notes)
+
+    same = np.zeros(len(times), dtype=bool)
+    same[1:] = (np.diff(times) <= 0.0) | (np.all(np.diff(places, axis=0) == 0.0, axis=1) & _moves(places)[1:])
+    if same.any():
+        notes.append(f"{int(same.sum())} samples repeat the one before and were left out")
+    kept = _without_jumps(path, times, places, ~same, notes)
+    closing = _closing(table, notes)
+    return Demonstration(
+        path.stem,
+        times[kept] - times[kept][0],
+        places[kept],
+        None if turns is None else turns[kept],
+        None if closing is None else closing[kept],
+        tuple(notes),
+    )
+
+
+def _moves(places: Array) -> Array:
+    """Where the hand moves within 5 samples on both sides: only there a repeated sample is a lost one."""
+    far = np.linalg.norm(np.roll(places, -5, axis=0) - np.roll(places, 5, axis=0), axis=1)
+    return np.asarray(far > 1e-6)
+
+
+def _turn_names(table: Table) -> tuple[str, ...]:
+    for names in (("qx", "qy", "qz", "qw"), ("roll", "pitch", "yaw")):
+        if all(name in table for name in names):
+            return names
+    return ()
+
+
+def _time_unit(path: Path, t: Array, given: str, notes: list[str]) -> float:
+    if given:
+        return TIME[given]
+    step = float(np.median(np.diff(t)))
+    unit = "s" if step < 0.5 else "ms" if step < 1e3 else "us" if step < 1e6 else "ns"
+    if unit != "s":
+        notes.append(f"time is in {unit} (a sample every {step:g}), converted to s")
+    return TIME[unit]
+
+
+def _length_unit(path: Path, places: Array, given: str, notes: list[str]) -> float:
+    if given:
+        if given != "m":
+            notes.append(f"lengths are in {given}, converted to m")
+        return LENGTH[given]
+    extent = float(np.linalg.norm(np.percentile(places, 99, axis=0) - np.percentile(places, 1, axis=0)))
+    if extent <= 3.0:
+        return 1.0
+    if extent < 60.0:
+        raise CheckFailed(
+            f"{path}: the hand moves over {extent:.3g}: too far for m, too little for mm; name the unit with --length"
+        )
+    notes.append(f"lengths are in mm (the hand moves over {extent:.0f}), converted to m")
+    return 1e-3
+
+
+def _angle_unit(angles: Array, largest: float, given: str, what: str, notes: list[str]) -> float:
+    degrees = given == "deg" or (not given and float(np.abs(angles).max()) > largest)
+    if degrees:
+        notes.append(f"{what} are in degrees (up to {np.abs(angles).max():.0f}), converted to rad")
+    return ANGLE["deg" if degrees else "rad"]
+
+
+def _palm_of(joints: Array, source: Source, units: dict[str, str], notes: list[str]) -> Table:
+    """Pose of the palm by forward kinematics from joint positions (n, 7)."""
+    from coglab_smach.kinematics.reachability import default_arm
+
+    joints = joints * _angle_unit(joints, 3.2, source.angle or units.get(JOINTS[0], ""), "joint angles", notes)
+    notes.append("the palm is computed from the joints of the arm")
+    poses = [default_arm().fk(q) for q in joints]
+    places, turns = np.array([p for p, _ in poses]), np.array([q for _, q in poses])
+    return dict(zip(("x", "y", "z", "qx", "qy", "qz", "qw"), (*places.T, *turns.T), strict=True))
+
+
+def _turns(path: Path, table: Table, given: str, notes: list[str]) -> Array | None:
+    """Quaternions (n, 4) without changes of sign."""
+    names = _turn_names(table)
+    if not names:
+        return None
+    values = np.column_stack([table[name] for name in names])
+    if len(names) == 3:
+        from scipy.spatial.transform import Rotation
+
+        radians = values * _angle_unit(values, 2 * np.pi + 0.1, given, "turns", notes)
+        q = Rotation.from_euler("xyz", radians).as_quat()
+    else:
+        lengths = np.linalg.norm(values, axis=1)
+        if np.any(np.abs(lengths - 1.0) > 0.05):
+            at = int(np.argmax(np.abs(lengths - 1.0)))
+            raise CheckFailed(
+                f"{path}: sample {at + 1}: a quaternion of length {lengths[at]:.2f}, expected 1 (x y z w)"
+            )
+        q = values / lengths[:, None]
+    signs = np.cumprod(np.where(np.sum(q[1:] * q[:-1], axis=1) < 0.0, -1.0, 1.0))
+    q[1:] *= signs[:, None]
+    return q
+
+
+def _closing(table: Table, notes: list[str]) -> Array | None:
+    values = table.get("closing")
+    if values is None or not np.isfinite(values).any():
+        return None
+    values = np.interp(np.arange(len(values)), np.flatnonzero(np.isfinite(values)), values[np.isfinite(values)])
+    top = float(values.max())
+    scale = 1.0 if top <= 1.2 else 100.0 if top <= 100.0 else MOTOR_CLOSED
+    if scale > 1.0:
+        notes.append(f"closing is in {'percent' if scale == 100.0 else 'motor positions 0..254'}, converted to 0..1")
+    return np.asarray(np.clip(values / scale, 0.0, 1.0))
+
+
+def _without_jumps(path: Path, times: Array, places: Array, kept: Any, notes: list[str]) -> Any:
+    """Indices of the samples that can be true. A jump that is taken back soon is left out; another one is refused."""
+    good: list[int] = []
+    left, since = 0, -1
+    for i in np.flatnonzero(kept):
+        if good:
+            last = good[-1]
+            if np.linalg.norm(places[i] - places[last]) > FASTEST * (times[i] - times[last]):
+                since = i if since < 0 else since
+                left += 1
+                if times[i] - times[since] > BRIEF_JUMP:
+                    way = np.linalg.norm(places[since] - places[last])
+                    raise CheckFailed(
+                        f"{path}: the hand jumps by {way:.2f} m at {times[since] - times[0]:.2f} s and stays there: "
+                        "the tracker took something else for it; cut the file there, or record again"
+                    )
+                continue
+        since = -1
+        good.append(int(i))
+    if left:
+        notes.append(f"{left} samples jump faster than {FASTEST:g} m/s and were left out")
+    return np.array(good)
