@@ -28,8 +28,9 @@ DEFINITIONS = {
     "share of the duration; negative where they overlap (Hoffman 2019, F-DEL)",
     "peak_force_n": "N, largest force on palm and fingers of the robot; from the simulation's truth alone",
     "palm_peak_speed_m_s": "m/s, largest speed of the palm",
-    "palm_sparc": "spectral arc length of the palm's speed: smoother is nearer to zero (Balasubramanian 2015)",
-    "person_sparc": "the same of the person's hand",
+    "palm_sparc": "spectral arc length of the palm's speed from the start of the reach to its end or the contact: "
+    "smoother is nearer to zero (Balasubramanian 2015)",
+    "person_sparc": "the same of the person's hand in its longest movement",
     "detection_delay_s": "s from the first true touch (0.3 N) to the contact event; from the simulation's truth alone",
 }
 """name of each figure, with its unit as the ending where it has one, and its definition"""
@@ -59,7 +60,13 @@ def metrics_of(series: Series, start: float, end: float, marks: Mapping[str, flo
         found["concurrent_activity"] = fluency.concurrent_activity
         found["functional_delay"] = fluency.functional_delay
         found["palm_peak_speed_m_s"] = float(palm.max())
-        found["palm_sparc"], found["person_sparc"] = sparc(palm, RATE), sparc(person, RATE)
+        if "motion_started" in marks:
+            reach = start + marks["motion_started"]
+            ends = [start + marks[name] for name in ("motion_reached", "contact") if name in marks]
+            found["palm_sparc"] = _sparc_of(palm, grid, reach, min((t for t in ends if t > reach), default=end))
+        moves = active_intervals(grid, person > PERSON_SPEED)
+        if moves:
+            found["person_sparc"] = _sparc_of(person, grid, *max(moves, key=lambda each: each[1] - each[0]))
         forces = np.array([row[4] for row in rows], dtype=float)
         if np.isfinite(forces).all():
             found["peak_force_n"] = float(forces.max())
@@ -75,6 +82,10 @@ def metrics_of_trial(trial: Trial) -> dict[str, float]:
     action = trial.results[0]
     marks = {name: t - action.started for name, t in action.marks.items()}
     return metrics_of(trial.series(), action.started, action.ended, marks)
+
+
+def _sparc_of(speed: np.ndarray, grid: np.ndarray, start: float, end: float) -> float:
+    return sparc(speed[(grid >= start) & (grid <= end)], RATE)
 
 
 def speed_on(grid: np.ndarray, rows: Sequence[tuple[Any, ...]], column: int) -> np.ndarray:

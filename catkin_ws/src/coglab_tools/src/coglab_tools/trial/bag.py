@@ -59,9 +59,9 @@ def _read(bag: Any) -> Series:
         elif kind == "coglab_msgs/Contact":
             text = f"{message.source}: {message.message}"
             series.contacts.append((made, message.contact, message.margin, text))
-        elif kind == "tf2_msgs/TFMessage":
-            hand_frames.take(message, name.endswith("tf_static"), arrived)
     if not sees_truth:
+        for topic, message, stamp in bag.read_messages(topics=["/tf", "/tf_static"]):
+            hand_frames.take(message, topic == "/tf_static", stamp.to_sec())
         series.truth = hand_frames.rows(series.joints)
     return series
 
@@ -89,7 +89,14 @@ class _Frames:
 
     def take(self, message: Any, static: bool, arrived: float) -> None:
         """Take a message of /tf or /tf_static, in the order of the bag."""
-        for transform in message.transforms:
+        from geometry_msgs.msg import TransformStamped
+
+        for read in message.transforms:  # of a class that rosbag has made, which tf2 warns of
+            transform = TransformStamped(header=read.header, child_frame_id=read.child_frame_id)
+            for name in "xyz":
+                setattr(transform.transform.translation, name, getattr(read.transform.translation, name))
+            for name in "xyzw":
+                setattr(transform.transform.rotation, name, getattr(read.transform.rotation, name))
             (self._buffer.set_transform_static if static else self._buffer.set_transform)(transform, "bag")
             frame = transform.child_frame_id
             if not static and frame.startswith(FRAMES) and not frame.endswith("_ahead"):

@@ -27,6 +27,8 @@ MARKS = {
     "gave_way": "the palm gave way to a pull",
 }
 """event -> what it means"""
+MINOR = ("preshaped", "closing_on_the_way", "tightened", "switch_dmp", "went_on", "paused")
+"""left out first where there are too many"""
 MOST = 10  # lines
 
 
@@ -47,14 +49,14 @@ def explain(record: TrialRecord) -> list[str]:
     if not record.success:
         because = "".join(f", because {cause}" for cause in record.causes[:2])
         end = [f"why: {record.text or record.outcome}{because} ({record.reason}, {record.code})"]
-    seen: set[str] = set()
-    events = []
-    for mark in record.marks:
-        name = str(mark["name"])
-        if name not in seen:
-            events.append(f"{mark['time_s']:6.2f} s  {MARKS.get(name, name.replace('_', ' '))}")
-            seen.add(name)
     room = MOST - 1 - len(end)
+    times: dict[str, float] = {}
+    for mark in record.marks:
+        times.setdefault(str(mark["name"]), float(mark["time_s"]))
+    for name in MINOR:
+        if len(times) > room:
+            times.pop(name, None)
+    events = [f"{t:6.2f} s  {MARKS.get(name, name.replace('_', ' '))}" for name, t in times.items()]
     if len(events) > room:
         events = [*events[: room - 1], f"          ... {len(events) - room + 1} more: ./coglab trial show {record.id}"]
     return [first, *events, *end]

@@ -296,14 +296,18 @@ def main() -> int:
     place = Path(folder).expanduser() if folder else default_folder()
     recorder = Recorder(place, memory, parameters.read("~post_roll", float, 1.0, 0.0, 60.0))
 
+    brain = {"coglab/state": (MasterState, recorder.state), "coglab/results": (String, recorder.result)}
+    decoded = {rospy.resolve_name(name): what for name, what in brain.items()}
+
     def keep(message: rospy.AnyMsg, topic: str) -> None:
         memory.take(Stored(topic, rospy.Time.now(), message._buff, message._connection_header))
+        if topic in decoded:  # a second subscription of another type would get raw messages, too
+            kind, use = decoded[topic]
+            use(kind().deserialize(message._buff))
 
-    for name in names:
+    for name in dict.fromkeys([*names, *brain]):
         resolved = rospy.resolve_name(name)
         rospy.Subscriber(resolved, rospy.AnyMsg, keep, callback_args=resolved, queue_size=500, buff_size=1 << 20)
-    rospy.Subscriber("coglab/state", MasterState, recorder.state, queue_size=50)
-    rospy.Subscriber("coglab/results", String, recorder.result, queue_size=50)
     for left in place.glob(".recording_*"):  # of a recorder that was killed
         shutil.rmtree(left, ignore_errors=True)
     while not rospy.is_shutdown():
