@@ -280,6 +280,12 @@ void bindDetector(py::module_& module) {
           py::arg("mode"), py::arg("now"), py::arg("timeout"), py::arg("k") = 0.0,
           py::arg("joints") = std::vector<int>(), py::arg("mass") = 0.0,
           py::arg("load_share") = 0.0, py::arg("carries") = false)
+      .def(
+          "tune",
+          [](ContactDetector& detector, const py::object& settings) {
+            detector.tune(settingsOf(settings));
+          },
+          py::arg("settings"))
       .def("disarm", &ContactDetector::disarm)
       .def("learn", &ContactDetector::learn)
       .def("state", &ContactDetector::state)

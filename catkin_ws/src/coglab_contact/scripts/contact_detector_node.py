@@ -12,7 +12,7 @@ torques come; both at 100 Hz while a hand with touch sensors gives a load. With 
 ~force (geometry_msgs/Vector3Stamped, base frame), the force (N) on the palm relative to that before the last watched
 reach.
 Services: ~learn (Learn): learn the noise at rest again. ~learn_motion (LearnMotion): true: record motions without
-contact, false: learn from them.
+contact, false: learn from them. ~set_parameters (dynamic_reconfigure): coglab_contact.detector.TUNABLE.
 """
 
 import dataclasses
@@ -26,7 +26,7 @@ import coglab_controllers as cc
 import numpy as np
 import rospy
 import tf2_ros
-from coglab_contact.detector import ContactDetector, DetectorSettings
+from coglab_contact.detector import TUNABLE, ContactDetector, DetectorSettings
 from coglab_contact.fused_detector import IN_MOTION, LIFT, RELEASE, FusedDetector
 from coglab_contact.load import GripAndLoad
 from coglab_contact.motion_thresholds import ThresholdError, Thresholds
@@ -41,6 +41,7 @@ from coglab_py.pace import Pace
 from coglab_py.packages import package_path
 from coglab_py.pose import Pose
 from coglab_py.publish import can_be_sent, publish
+from coglab_py.reconfigure import Field, serve
 from coglab_py.yaml_file import YamlError
 from geometry_msgs.msg import Vector3, Vector3Stamped
 from sensor_msgs.msg import JointState
@@ -117,6 +118,14 @@ class ContactDetectorNode:
         rospy.Service("~learn", Learn, self.on_learn)
         rospy.Service("~learn_motion", LearnMotion, self.on_learn_motion)
         steady.SteadyTimer(0.05, self.on_timer, "signal")
+        gains = [Field(name, text, getattr(settings, name), low, high) for name, (low, high, text) in TUNABLE.items()]
+        self.reconfigure = serve(gains, self.tune)
+
+    def tune(self, gains: dict[str, float]) -> None:
+        """Use these settings (coglab_contact.detector.TUNABLE) from now on."""
+        with self.lock:
+            watches = self.detector.still
+            watches.tune(dataclasses.replace(watches.settings, **gains))
 
     def thresholds(self) -> Thresholds:
         """Returns the thresholds that this robot has learnt, else those of the package."""

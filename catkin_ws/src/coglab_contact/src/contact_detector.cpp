@@ -98,6 +98,14 @@ void ContactDetector::arm(const Request& request) {
   armed_ = std::move(armed);
 }
 
+void ContactDetector::tune(const DetectorSettings& settings) {
+  const DetectorSettings before = settings_;
+  settings_ = settings;
+  settings_.cutoff = before.cutoff;
+  settings_.window = before.window;
+  settings_.learn_samples = before.learn_samples;
+}
+
 std::string ContactDetector::learn() {
   if (armed_)
     throw std::invalid_argument("armed for " + armed_->mode +

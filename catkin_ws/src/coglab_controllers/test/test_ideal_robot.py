@@ -26,6 +26,7 @@ from coglab_msgs.srv import (
     UnloadController,
 )
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from dynamic_reconfigure.client import Client
 from own_master import built, own_master
 from robot_fixture import JOINTS, wait_until
 from rosgraph_msgs.msg import Log
@@ -222,6 +223,26 @@ def test_a_motion_is_made_shown_and_cancelled(robot: Robot) -> None:
     assert none.success and not none.was_running and "no motion of 'ptp'" in none.message
 
 
+def test_gains_change_by_dynamic_reconfigure(robot: Robot) -> None:
+    dmp = Client("/controller_manager/dmp", timeout=30.0)
+    described = {each["name"]: each for each in dmp.get_parameter_descriptions(timeout=30.0)}
+    assert described["pos_clik_gain"]["min"] == 0.0 and described["pos_clik_gain"]["max"] == 0.5 / PERIOD
+    assert "eq. (6)" in described["pos_clik_gain"]["description"]
+    assert dmp.update_configuration({"pos_clik_gain": 12, "goal_max_speed": 0.2})["pos_clik_gain"] == 12.0
+    assert dmp.get_configuration()["goal_max_speed"] == 0.2
+    with pytest.raises(rospy.ServiceException, match="pos_clik_gain: expected a number from 0 to 50, got 60"):
+        dmp.update_configuration({"correction_speed": 0.5, "pos_clik_gain": 60.0})
+    assert dmp.get_configuration()["correction_speed"] == 0.3, "all or nothing"
+    assert robot.manager("load_controller", LoadController, "soft", "EeAdmittance").success
+    soft = Client("/controller_manager/feedback/soft", timeout=30.0)
+    gain = next(name for name in soft.get_configuration(timeout=30.0) if name.startswith("damping"))
+    changed = soft.update_configuration({gain: 70.0})
+    assert changed[gain] == 70.0
+    with pytest.raises(rospy.ServiceException, match="damping"):
+        soft.update_configuration({gain: -1.0})
+    assert robot.manager("unload_controller", UnloadController, "soft").success
+
+
 def services(name: str) -> list[str]:
     return [s for s, _ in rosgraph.Master("/test").getSystemState()[2] if f"/controller_manager/{name}/" in s]
 
@@ -229,7 +250,8 @@ def services(name: str) -> list[str]:
 def test_a_controller_comes_and_goes_with_its_services_and_no_others(robot: Robot) -> None:
     loaded = robot.manager("load_controller", LoadController, "more", "coglab/PtpController")
     assert loaded.success and list(loaded.controller_ids)[-1] == "more"
-    assert sorted(services("more")) == ["/controller_manager/more/add_ptp", "/controller_manager/more/cancel"]
+    offered = ["add_ptp", "cancel", "set_parameters"]
+    assert sorted(services("more")) == [f"/controller_manager/more/{name}" for name in offered]
     again = robot.manager("load_controller", LoadController, "more", "coglab/PtpController")
     assert (again.success, again.reason_code) == (False, ReasonCode.INVALID_ARGUMENT) and "in use" in again.message
     gone = robot.manager("unload_controller", UnloadController, "more")

@@ -67,6 +67,10 @@ class ContactDetector {
  public:
   ContactDetector(const DetectorSettings& settings, JacobianAt jacobian);
 
+  /// Uses these settings from the next sample on; what is armed keeps its k and its share of the
+  /// load. `cutoff`, `window` and `learn_samples` stay as they were: what was learnt hangs on them.
+  void tune(const DetectorSettings& settings);
+
   /// Watches as soon as the arm stands still.
   /// @throws std::invalid_argument for an invalid request.
   void arm(const Request& request);

@@ -227,6 +227,8 @@ class ContactDetector:
         """Watch for 'contact', 'load' or 'release' for ``timeout`` s, as soon as the arm stands still. ``joints``:
         1..7. ``carries``: the arm carries an object. After each motion its torque differs, so the offset against the
         previous rest is not checked. ValueError: invalid request."""
+    def tune(self, settings: object) -> None:
+        """Use these DetectorSettings from the next sample on; cutoff, window and learn_samples stay as they were."""
     def disarm(self) -> None:
         """Stop watching."""
     def learn(self) -> str:

@@ -60,6 +60,20 @@ class DetectorSettings:
     """direction from the robot to the person, base frame"""
 
 
+TUNABLE = {
+    "k": (2.0, 20.0, "threshold in robust standard deviations, learnt at rest"),
+    "floor": (0.001, 0.5, "Nm, lower limit of the standard deviation"),
+    "still_speed": (0.001, 0.2, "rad/s; the arm moves if a joint is faster"),
+    "settle": (0.0, 2.0, "s of standstill before detection starts"),
+    "offset_threshold": (0.1, 10.0, "Nm, offset against the last rest that counts as an early contact"),
+    "sensitivity_share": (0.0, 1.0, "joints with this share of the largest lever are watched"),
+    "load_share": (0.05, 1.0, "share of the weight whose arrival counts as load and whose loss counts as release"),
+    "release_confirm": (0.0, 1.0, "s for which the load must be gone"),
+    "load_confirm": (0.0, 2.0, "s for which the load must be present"),
+}
+"""settings that may change at run time: smallest and largest value, meaning"""
+
+
 @dataclass(frozen=True)
 class Signal:
     """State of the detector, for tuning. Joints in wire order."""
@@ -83,6 +97,11 @@ class ContactDetector(_core.ContactDetector):
     def __init__(self, settings: DetectorSettings, jacobian: cc.Chain | Callable[[np.ndarray], np.ndarray]) -> None:
         """``jacobian``: the chain to the palm, or a function from joint positions (rad) to the palm's 3 x 7 matrix."""
         super().__init__(settings, jacobian)
+        self.settings = settings
+
+    def tune(self, settings: DetectorSettings) -> None:
+        """Use these settings from the next sample on. `cutoff`, `window` and `learn_samples` stay as they were."""
+        super().tune(settings)
         self.settings = settings
 
     def look(self) -> Signal:

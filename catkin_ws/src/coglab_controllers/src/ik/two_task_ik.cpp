@@ -107,6 +107,13 @@ TwoTaskIk::TwoTaskIk(const IkParameters& parameters)
   require("reaction_time", parameters.reaction_time, 0.0, 1.0);
 }
 
+void TwoTaskIk::setGains(double position, double rotation, double correction_speed) noexcept {
+  parameters_.pos_clik_gain = position;
+  parameters_.rot_clik_gain = rotation;
+  parameters_.correction_speed = correction_speed;
+  orientation_.setGain(rotation);
+}
+
 double TwoTaskIk::brakeableGain(const JointVector& way, double gain) const noexcept {
   // v^2 / (2 a) + v * lag = way, solved for v / way = 2 / (root + lag); the slowest joint counts.
   const auto lag = lag_.array();

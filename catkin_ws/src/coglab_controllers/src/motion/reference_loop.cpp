@@ -16,16 +16,26 @@ Reason Arrival::handStuck(double away) noexcept {
          << away << " m are left; is the arm blocked?";
 }
 
-void ReferenceLoop::configure(const MotionSetup& setup) {
+void ReferenceLoop::configure(const MotionSetup& setup, Spaces spaces, Tunables& tunables) {
   robot_ = setup.robot;
   const Parameters parameters(setup.parameters, setup.id);
   IkParameters ik;
-  const double most = std::min(200.0, largestGain(setup.cycle_time));
-  ik.pos_clik_gain =
-      parameters.number("pos_clik_gain", std::min(ik.pos_clik_gain, most), 0.0, most);
-  ik.rot_clik_gain =
-      parameters.number("rot_clik_gain", std::min(ik.rot_clik_gain, most), 0.0, most);
-  ik.correction_speed = parameters.number("correction_speed", kCorrectionSpeed, 1e-3, 10.0);
+  ik.correction_speed = kCorrectionSpeed;
+  if (spaces != Spaces::Joint) {
+    const double most = std::min(200.0, largestGain(setup.cycle_time));
+    position_gain_ = &tunables.add(parameters, "pos_clik_gain",
+                                   "K_pos of eq. (6), 1/s: how fast an error of the position goes",
+                                   std::min(ik.pos_clik_gain, most), 0.0, most);
+    rotation_gain_ =
+        &tunables.add(parameters, "rot_clik_gain", "K_rot of eq. (7), 1/s: the same for rotation",
+                      std::min(ik.rot_clik_gain, most), 0.0, most);
+    correction_speed_ =
+        &tunables.add(parameters, "correction_speed",
+                      "m/s, an error of the position goes no faster", kCorrectionSpeed, 1e-3, 10.0);
+    ik.pos_clik_gain = position_gain_->wanted();
+    ik.rot_clik_gain = rotation_gain_->wanted();
+    ik.correction_speed = correction_speed_->wanted();
+  }
   ik.singularity_threshold =
       parameters.number("singularity_threshold", ik.singularity_threshold, 1e-6, 1.0);
   ik.rotation_first_scaling = parameters.flag("rotation_first_scaling", ik.rotation_first_scaling);
@@ -33,8 +43,13 @@ void ReferenceLoop::configure(const MotionSetup& setup) {
   ik.acceleration_limit = robot_->limits.acceleration;
   ik.jerk_limit = robot_->limits.jerk;
   ik_ = std::make_unique<TwoTaskIk>(ik);
-  const double most_joints = std::min(100.0, largestGain(setup.cycle_time));
-  gain_ = parameters.number("Kp", std::min(gain_, most_joints), 0.0, most_joints);
+  if (spaces != Spaces::Pose) {
+    const double most = std::min(100.0, largestGain(setup.cycle_time));
+    joint_gain_ =
+        &tunables.add(parameters, "Kp", "1/s, how fast an error of a joint's position goes",
+                      std::min(gain_, most), 0.0, most);
+    gain_ = joint_gain_->wanted();
+  }
   tolerance_ = parameters.number("tolerance", tolerance_, 1e-5, 0.1);
   arrive_distance_ = parameters.number("arrive_distance", arrive_distance_, 1e-4, 0.5);
   blend_.setTime(parameters.number("hold_blend", 0.15, 0.0, 5.0));
@@ -80,7 +95,16 @@ void ReferenceLoop::beginBlend(const CycleInput& input) noexcept {
                JointVector::Zero());
 }
 
+/// Fades to gains that were changed.
+void ReferenceLoop::takeGains(double dt) noexcept {
+  if (joint_gain_ != nullptr) gain_ = joint_gain_->step(dt);
+  if (position_gain_ != nullptr) {
+    ik_->setGains(position_gain_->step(dt), rotation_gain_->step(dt), correction_speed_->step(dt));
+  }
+}
+
 void ReferenceLoop::resolve(const CycleInput& input, References& references) noexcept {
+  takeGains(input.dt);
   switch (reference_.space) {
     case Space::Rest:
       ik_result_.scale = 1.0;

@@ -27,6 +27,7 @@ RunnerPolicy dmpPolicy() {
   policy.open_end = true;
   policy.id_name = nullptr;
   policy.longest_queue = 0;
+  policy.spaces = ReferenceLoop::Spaces::Pose;
   return policy;
 }
 
@@ -54,7 +55,7 @@ void DmpController::configure(const MotionSetup& setup) {
   arrive_distance_ = parameters.number("arrive_distance", arrive_distance_, 1e-4, 0.5);
   goals_.configure(dmp_frame_, readGoalLimits(parameters), *setup.host);
   MotionRunner<DmpPlan>::configure(setup);
-  MotionConfiguration configuration(setup);
+  MotionConfiguration configuration(setup, not_offered_);
   imagined_.configure(configuration);
   const std::string file = parameters.text("dmp_file", "");
   if (file.empty()) return;

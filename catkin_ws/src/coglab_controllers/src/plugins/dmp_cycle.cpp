@@ -26,6 +26,8 @@ Pose operator*(const Pose& a, const Pose& b) {
   return {a.position + a.orientation * b.position, (a.orientation * b.orientation).normalized()};
 }
 
+constexpr double kShortestTracking = 0.005;  // s
+
 GoalFilterParameters readFilter(const Parameters& parameters) {
   GoalFilterParameters filter;
   filter.time_constant = parameters.number("goal_time_constant", filter.time_constant, 0.0, 2.0);
@@ -65,7 +67,18 @@ void DmpCycle::configure(MotionConfiguration& configuration) {
   topic_limits_ = frame_limits_;
   topic_limits_.max_age = parameters.number("goal_timeout", 0.0, 0.0, 3600.0);
   topic_limits_.max_jump = std::numeric_limits<double>::infinity();
-  motion_ = CartesianMotion(readFilter(parameters), readEnd(parameters));
+  const GoalFilterParameters filter = readFilter(parameters);
+  motion_ = CartesianMotion(filter, readEnd(parameters));
+  if (filter.time_constant < kShortestTracking) return;  // off
+  time_constant_ =
+      &configuration.tunable("goal_time_constant", "s, of the estimator for a still goal",
+                             filter.time_constant, kShortestTracking, 2.0);
+  noisy_time_constant_ = &configuration.tunable("noisy_goal_time_constant",
+                                                "s, to which it grows with the jitter of the goal",
+                                                filter.noisy_time_constant, kShortestTracking, 2.0);
+  max_goal_speed_ =
+      &configuration.tunable("goal_max_speed", "m/s, of the goal's own speed no more is followed",
+                             filter.max_speed, 0.01, 10.0);
 }
 
 // ---- begin and end
@@ -232,6 +245,11 @@ void DmpCycle::computeReference(const MotionCycle& cycle, MotionReference& refer
   if (stage_ == DmpStage::Settle) comeToRest(cycle.last);
   watchGoal(cycle.input);
   if (stage_ == DmpStage::GivenUp) return;
+  if (time_constant_ != nullptr) {
+    const double dt = cycle.input.dt;
+    motion_.setTracking(time_constant_->step(dt), noisy_time_constant_->step(dt),
+                        max_goal_speed_->step(dt));
+  }
   reference_ =
       motion_.step(cycle.input.dt, goal_, cycle.input.time_scale, plan_.approachAt(limits_.goal()));
   followEnd(cycle);

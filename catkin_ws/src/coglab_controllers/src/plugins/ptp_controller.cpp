@@ -79,6 +79,7 @@ class PtpMotion : public Motion<PtpTarget> {
 RunnerPolicy ptpPolicy() {
   RunnerPolicy policy;
   policy.id_name = "ptp_id";
+  policy.spaces = ReferenceLoop::Spaces::Joint;
   return policy;
 }
 
@@ -94,9 +95,12 @@ void PtpController::configure(const MotionSetup& setup) {
   const Parameters parameters(setup.parameters, setup.id);
   MotionRunner<PtpTarget>::configure(setup);
   tolerance_ = parameters.number("tolerance", tolerance_, 1e-5, 0.1);
-  default_speed_ = parameters.number("default_speed", default_speed_, 0.01, 1.0);
-  default_acceleration_ =
-      parameters.number("default_acceleration", default_acceleration_, 0.01, 1.0);
+  default_speed_ = &tunables()->add(
+      parameters, "default_speed",
+      "share of the joints' speed limits, of a request that gives none", 0.3, 0.01, 1.0);
+  default_acceleration_ = &tunables()->add(
+      parameters, "default_acceleration",
+      "share of the joints' acceleration limits, of a request that gives none", 0.2, 0.01, 1.0);
 }
 
 Answer PtpController::readTarget(const PtpRequest& request, PtpTarget& target) const {
@@ -108,8 +112,8 @@ Answer PtpController::readTarget(const PtpRequest& request, PtpTarget& target) c
   const JointVector margin =
       JointVector::Constant(setup().robot->guard.position_margin + tolerance_);
   const JointVector least = JointVector::Constant(1e-4);
-  target.velocity = default_speed_ * limits.velocity;
-  target.acceleration = default_acceleration_ * limits.acceleration;
+  target.velocity = default_speed_->wanted() * limits.velocity;
+  target.acceleration = default_acceleration_->wanted() * limits.acceleration;
   Answer answer = readJoints(request.position, "position", names, limits.lower_position + margin,
                              limits.upper_position - margin, "rad", target.position);
   if (answer.success && !request.max_vel.empty()) {

@@ -81,7 +81,7 @@ void RosLogSink::write(const ctrl_more::LogRecord& record) {
 }
 
 FeedbackRos::FeedbackRos(const ros::NodeHandle& node, ControllerManager& manager)
-    : node_(node), manager_(manager), feedback_(manager.feedback()) {
+    : node_(node), manager_(manager), feedback_(manager.feedback()), reconfigure_(node, manager) {
   status_ = node_.advertise<coglab_msgs::FeedbackStatus>("status", 5, true);
   state_ = node_.advertise<coglab_msgs::FeedbackState>("state", 5);
   const auto serve = [this](const std::string& name, auto method) {
@@ -179,18 +179,26 @@ bool FeedbackRos::onOrder(coglab_msgs::SetExecutionOrder::Request& request,
 
 bool FeedbackRos::onReload(coglab_msgs::ReloadGains::Request& request,
                            coglab_msgs::ReloadGains::Response& response) {
-  const auto lock = manager_.lockRequests();
-  return finish(request.filename.empty() ? feedback_.reloadGains(request.name)
-                                         : feedback_.loadGains(request.name, request.filename),
-                response);
+  {
+    const auto lock = manager_.lockRequests();
+    finish(request.filename.empty() ? feedback_.reloadGains(request.name)
+                                    : feedback_.loadGains(request.name, request.filename),
+           response);
+  }
+  reconfigure_.refresh();
+  return true;
 }
 
 bool FeedbackRos::onSetGains(coglab_msgs::SetGains::Request& request,
                              coglab_msgs::SetGains::Response& response) {
-  const auto lock = manager_.lockRequests();
-  std::map<std::string, std::vector<double>> gains;
-  for (const coglab_msgs::FeedbackGain& gain : request.gains) gains[gain.name] = gain.values;
-  return finish(feedback_.setGains(request.name, gains), response);
+  {
+    const auto lock = manager_.lockRequests();
+    std::map<std::string, std::vector<double>> gains;
+    for (const coglab_msgs::FeedbackGain& gain : request.gains) gains[gain.name] = gain.values;
+    finish(feedback_.setGains(request.name, gains), response);
+  }
+  reconfigure_.refresh();
+  return true;
 }
 
 bool FeedbackRos::onLoad(coglab_msgs::LoadFeedback::Request& request,
@@ -212,7 +220,9 @@ bool FeedbackRos::onLoad(coglab_msgs::LoadFeedback::Request& request,
       entry.library = files.findLibraryOf(entry.type);
     }
     if (!request.filename.empty()) entry.config_file = files.find(request.filename);
-    return finish(feedback_.loadController(request.name, entry), response);
+    finish(feedback_.loadController(request.name, entry), response);
+    reconfigure_.refresh();
+    return true;
   } catch (const std::exception& error) {
     return refuse(response, Code::BAD_FILE,
                   "'" + request.name + "' was not loaded: " + error.what());
@@ -220,14 +230,18 @@ bool FeedbackRos::onLoad(coglab_msgs::LoadFeedback::Request& request,
 }
 
 bool FeedbackRos::onUnload(Select::Request& request, Select::Response& response) {
-  const auto lock = manager_.lockRequests();
-  const ctrl_more::Status judged = judgeReason(request.reason);
-  if (!judged) return refuse(response, judged);
-  if (request.names.size() != 1) {
-    return refuse(response, Code::INVALID_ARGUMENT,
-                  "names: expected one controller, got " + std::to_string(request.names.size()));
+  {
+    const auto lock = manager_.lockRequests();
+    const ctrl_more::Status judged = judgeReason(request.reason);
+    if (!judged) return refuse(response, judged);
+    if (request.names.size() != 1) {
+      return refuse(response, Code::INVALID_ARGUMENT,
+                    "names: expected one controller, got " + std::to_string(request.names.size()));
+    }
+    finish(feedback_.unload(request.names[0]), response);
   }
-  return finish(feedback_.unload(request.names[0]), response);
+  reconfigure_.refresh();
+  return true;
 }
 
 bool FeedbackRos::onDescribe(coglab_msgs::DescribeController::Request& request,

@@ -142,11 +142,20 @@ Answer ManagerRos::load(const std::string& id, const std::string& type) {
     context.tf = tf_.get();
     context.listener = tf_listener_.get();
     side->ros->attach(controller, ros::NodeHandle(node_, id), context);
+    Tunables* const gains = controller.tunables();
+    if (gains != nullptr && !gains->all().empty()) {
+      side->gains = std::make_unique<ReconfigureServer>(ros::NodeHandle(node_, id), *gains);
+    }
     const std::lock_guard<std::mutex> lock(sides_mutex_);
     sides_.push_back(std::move(side));
   };
   const Answer answer = manager_->load(id, type, attach);
-  if (answer.success && manager_->motion(id) != nullptr) cancel_->serve(id);
+  if (!answer.success) return answer;
+  if (manager_->motion(id) != nullptr) {
+    cancel_->serve(id);
+  } else {
+    feedback_->refreshGains();
+  }
   return answer;
 }
 
@@ -200,6 +209,7 @@ bool ManagerRos::onUnload(coglab_msgs::UnloadController::Request& request,
   response.reason_code = answer.number();
   response.message = answer.message;
   manager_->list(response.controller_ids, response.controller_types);
+  if (answer.success) feedback_->refreshGains();
   if (!answer.success) ROS_WARN("unload_controller refused: %s", answer.message.c_str());
   return true;
 }

@@ -150,7 +150,7 @@ class LoopTest : public HoldTest {
     motion.parameters =
         YAML::Load("{Kp: 4, hold_blend: 0.3, tolerance: 0.004, arrive_distance: 0.02}");
     motion.robot = std::make_shared<RobotSetup>(setup);
-    loop.configure(motion);
+    loop.configure(motion, ReferenceLoop::Spaces::Both, tunables);
     input.chain = setup.chain.evaluate(input.robot.position);
   }
   JointVector run(const MotionReference& reference) {
@@ -159,6 +159,7 @@ class LoopTest : public HoldTest {
     return stage.references().states.view(stage.references().joint_velocity);
   }
   const double gone = 1.0 - std::exp(-0.005 / 0.3);  // share of a difference that became an error
+  Tunables tunables;
   ReferenceLoop loop;
 };
 

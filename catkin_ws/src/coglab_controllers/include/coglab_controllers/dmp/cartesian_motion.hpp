@@ -71,6 +71,14 @@ class CartesianMotion {
   const CartesianReference& step(double dt, const Pose& goal, double rate = 1.0,
                                  const Vector3& approach = Vector3::Zero()) noexcept;
 
+  /// Changes how the goal is followed; see GoalFilter::setTracking. No effect on a filter that is
+  /// off.
+  void setTracking(double time_constant, double noisy_time_constant, double max_speed) noexcept {
+    if (filter_.enabled()) {
+      filter_.setTracking(time_constant, noisy_time_constant, max_speed);
+    }
+  }
+
   /// Ends the motion as reached at this pose, the present one of the hand. A goal that moves away
   /// from it by more than follow_distance is followed again.
   void endAt(const Pose& pose) noexcept;

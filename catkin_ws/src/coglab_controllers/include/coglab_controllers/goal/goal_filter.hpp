@@ -60,6 +60,14 @@ class GoalFilter {
   /// @param predicted true: the goal is a predicted rest position, not a present one
   void update(double dt, const Pose& goal, bool predicted = false) noexcept;
 
+  /// Changes the time constants (s, 0.005 to 2) of an enabled filter and the largest g' (m/s),
+  /// between two cycles. The estimate goes over to them without a step.
+  void setTracking(double time_constant, double noisy_time_constant, double max_speed) noexcept {
+    parameters_.time_constant = time_constant;
+    parameters_.noisy_time_constant = noisy_time_constant;
+    parameters_.max_speed = max_speed;
+  }
+
   bool enabled() const noexcept { return parameters_.time_constant > 0.0; }
   const Vector3& position() const noexcept { return position_; }           ///< g, m
   const Vector3& velocity() const noexcept { return place_.velocity; }     ///< g', m/s

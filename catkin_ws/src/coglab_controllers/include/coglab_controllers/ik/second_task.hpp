@@ -36,6 +36,8 @@ class OrientationTask : public SecondTask {
  public:
   /// @param gain K_rot (rot_clik_gain), 1/s.  @throws std::invalid_argument unless finite and >= 0.
   explicit OrientationTask(double gain);
+  /// Changes K_rot (1/s, finite and >= 0), between two cycles.
+  void setGain(double gain) noexcept { gain_ = gain; }
   void evaluate(const ChainState& state, const JointVector& q, const CartesianReference& reference,
                 TaskConstraint& constraint) const noexcept override;
 

@@ -63,6 +63,10 @@ class TwoTaskIk {
   void solve(const ChainState& state, const JointVector& q, const CartesianReference& reference,
              const SecondTask& task, IkResult& result) const noexcept;
 
+  /// Changes K_pos, K_rot (1/s) and the correction speed (m/s), between two cycles. The values must
+  /// be within the ranges of the constructor.
+  void setGains(double position, double rotation, double correction_speed) noexcept;
+
   const IkParameters& parameters() const noexcept { return parameters_; }
 
  private:

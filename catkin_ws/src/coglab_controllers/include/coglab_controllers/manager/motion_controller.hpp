@@ -14,6 +14,7 @@
 
 #include "coglab_controllers/manager/motion_cancel.hpp"
 #include "coglab_controllers/manager/robot_setup.hpp"
+#include "coglab_controllers/manager/tunables.hpp"
 #include "coglab_controllers/names.hpp"
 #include "ctrl_more/states/control_states.hpp"
 
@@ -147,6 +148,9 @@ class MotionController {
   /// A limit keeps the motion from going on. Ends it as reached if the arm is within its tolerance
   /// of the goal. @return whether it did; if not, abort() follows
   virtual bool endIfThere(const CycleInput& /*input*/) { return false; }
+
+  /// Gains that may change at run time; null: none. Any thread.
+  virtual Tunables* tunables() { return nullptr; }
 
   virtual MotionState state() const = 0;
   /// Why it aborted or holds; empty otherwise.

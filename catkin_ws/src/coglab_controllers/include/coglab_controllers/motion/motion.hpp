@@ -11,6 +11,7 @@
 
 #include "coglab_controllers/ik/two_task_ik.hpp"
 #include "coglab_controllers/manager/motion_controller.hpp"
+#include "coglab_controllers/manager/tunables.hpp"
 #include "coglab_controllers/motion/motion_reference.hpp"
 
 namespace coglab_controllers {
@@ -39,10 +40,12 @@ struct MotionArguments {
 /// Input of configure(): robot and parameters. It also collects the declared arguments.
 class MotionConfiguration {
  public:
-  explicit MotionConfiguration(const MotionSetup& motion_setup)
+  /// @param tunables gets the gains that the motion declares; outlives the motion
+  MotionConfiguration(const MotionSetup& motion_setup, Tunables& tunables)
       : setup(motion_setup),
         robot(*motion_setup.robot),
-        parameters(motion_setup.parameters, motion_setup.id) {}
+        parameters(motion_setup.parameters, motion_setup.id),
+        tunables_(tunables) {}
 
   /// Declares a numeric request argument. A parameter of the same name changes its default.
   /// @throws std::runtime_error if there are more than MotionArguments::kMost
@@ -55,6 +58,13 @@ class MotionConfiguration {
     arguments_.push_back({name, unit, parameters.number(name, fallback, least, most), least, most});
     return {arguments_.size() - 1};
   }
+  /// Declares a gain that may change while the motion runs (dynamic_reconfigure). Its first value
+  /// is the parameter of the same name. The cycle calls Tunable::step(). The reference stays valid
+  /// as long as the motion.
+  Tunable& tunable(const std::string& name, const std::string& text, double fallback, double least,
+                   double most) {
+    return tunables_.add(parameters, name, text, fallback, least, most);
+  }
   const std::vector<MotionArgument>& arguments() const { return arguments_; }
 
   const MotionSetup& setup;
@@ -63,6 +73,7 @@ class MotionConfiguration {
 
  private:
   std::vector<MotionArgument> arguments_;
+  Tunables& tunables_;
 };
 
 /// State of the set-point at the start of a motion. The first reference must continue it.

@@ -44,6 +44,7 @@ struct RunnerPolicy {
   bool open_end = false;
   const char* id_name = "motion_id";  ///< name of the motion ids in reasons; null: no ids there
   int longest_queue = 64;             ///< largest max_queue; 0: no queue
+  ReferenceLoop::Spaces spaces = ReferenceLoop::Spaces::Both;  ///< of its references
 };
 
 /// Stage of a runner.
@@ -83,6 +84,7 @@ class MotionRunner : public MotionController {
   double limitScale() const override { return loop_.ik().scale; }
   int motionId() const override { return current_.id; }
   bool endIfThere(const CycleInput& input) override;
+  Tunables* tunables() override { return &tunables_; }
   MotionState state() const override { return state_; }
   const Reason& reason() const override { return reason_; }
 
@@ -129,6 +131,7 @@ class MotionRunner : public MotionController {
 
   const RunnerPolicy policy_;
   MotionSetup setup_;
+  Tunables tunables_;
   std::vector<MotionArgument> arguments_;
   PlanExchange<Plan> plans_;
   int next_id_ = 0;  // under the host's request lock
@@ -153,14 +156,14 @@ template <typename Request>
 void MotionRunner<Request>::configure(const MotionSetup& setup) {
   setup_ = setup;
   const Parameters parameters(setup.parameters, setup.id);
-  loop_.configure(setup);
+  loop_.configure(setup, policy_.spaces, tunables_);
   arrival_.configure(parameters);
   if (policy_.longest_queue > 0) {
     const int most = policy_.longest_queue;
     const int length = parameters.whole("max_queue", std::min(16, most), 0, most);
     queue_.resize(static_cast<std::size_t>(length));
   }
-  MotionConfiguration configuration(setup_);
+  MotionConfiguration configuration(setup_, tunables_);
   motion_->configure(configuration);
   arguments_ = configuration.arguments();
   if (std::function<void()> wait = setup.host->cycleWait()) plans_.setWait(wait);

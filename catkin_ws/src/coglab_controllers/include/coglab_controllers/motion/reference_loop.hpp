@@ -7,6 +7,7 @@
 
 #include "coglab_controllers/ik/two_task_ik.hpp"
 #include "coglab_controllers/manager/motion_controller.hpp"
+#include "coglab_controllers/manager/tunables.hpp"
 #include "coglab_controllers/motion/hold.hpp"
 #include "coglab_controllers/motion/motion.hpp"
 
@@ -46,11 +47,15 @@ class Arrival {
 ///
 /// Parameters: `Kp` (1/s, joints), `pos_clik_gain`, `rot_clik_gain` (1/s),
 /// `correction_speed` (m/s), `singularity_threshold`, `rotation_first_scaling` (poses, eq. 6-12),
-/// `hold_blend` (s), `tolerance` (rad), `arrive_distance` (m).
+/// `hold_blend` (s), `tolerance` (rad), `arrive_distance` (m). The first four are tunable.
 class ReferenceLoop {
  public:
+  /// What the references of a controller may be; the gains of the others are not offered.
+  enum class Spaces : std::uint8_t { Both, Joint, Pose };
+
+  /// @param tunables gets the gains that may change at run time; outlives this object
   /// @throws std::runtime_error naming the parameter
-  void configure(const MotionSetup& setup);
+  void configure(const MotionSetup& setup, Spaces spaces, Tunables& tunables);
 
   /// Ends the motion: the arm brakes and stands.
   void open() noexcept;
@@ -76,12 +81,16 @@ class ReferenceLoop {
   const IkResult& ik() const noexcept { return ik_result_; }  ///< of the last cycle
 
  private:
+  void takeGains(double dt) noexcept;
   void beginBlend(const CycleInput& input) noexcept;
   void resolveJoints(const CycleInput& input, References& references) noexcept;
   void resolvePose(const CycleInput& input, References& references) noexcept;
 
   std::shared_ptr<const RobotSetup> robot_;
   std::unique_ptr<TwoTaskIk> ik_;
+  // null where the controller has no such references
+  Tunable *joint_gain_ = nullptr, *position_gain_ = nullptr, *rotation_gain_ = nullptr,
+          *correction_speed_ = nullptr;
   double gain_ = 5.0, tolerance_ = 0.002, arrive_distance_ = 0.01;
   MotionReference reference_;  // the last one written
   StartBlend blend_;

@@ -103,7 +103,8 @@ class DmpController : public MotionRunner<DmpPlan> {
   GoalInput goals_;
   DmpCycle* const cycle_;  // the motion that the base runs
   std::mutex predict_mutex_;
-  DmpCycle imagined_;  // begins motions only for prediction
+  Tunables not_offered_;  // of the next one
+  DmpCycle imagined_;     // begins motions only for prediction
   CopyOnRequest<DmpSnapshot> snapshots_;
   std::atomic<bool> ik_debug_{false};
   TripleBuffer<DmpProgress> progress_;

@@ -96,6 +96,8 @@ class DmpCycle : public Motion<DmpPlan> {
 
   // set once, by configure()
   std::shared_ptr<const RobotSetup> robot_;
+  // null if the filter of the goal is off
+  Tunable *time_constant_ = nullptr, *noisy_time_constant_ = nullptr, *max_goal_speed_ = nullptr;
   GoalFrameLimits frame_limits_, topic_limits_;
   double arrive_distance_ = 0.01, finish_distance_ = 0.12;
 

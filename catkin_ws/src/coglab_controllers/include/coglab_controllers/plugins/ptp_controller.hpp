@@ -62,7 +62,8 @@ class PtpController : public MotionRunner<PtpTarget> {
   Answer readTarget(const PtpRequest& request, PtpTarget& target) const;
 
   double tolerance_ = 0.002;  // rad, as in ReferenceLoop
-  double default_speed_ = 0.3, default_acceleration_ = 0.2;
+  // set by configure()
+  const Tunable *default_speed_ = nullptr, *default_acceleration_ = nullptr;
   std::atomic<bool> moving_{false};
   CopyOnRequest<PtpSnapshot> snapshots_;
 };

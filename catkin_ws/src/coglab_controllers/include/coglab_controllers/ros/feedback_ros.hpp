@@ -11,6 +11,7 @@
 #include <ros/node_handle.h>
 
 #include "coglab_controllers/manager/controller_manager.hpp"
+#include "coglab_controllers/ros/feedback_reconfigure.hpp"
 #include "coglab_msgs/DescribeController.h"
 #include "coglab_msgs/FeedbackBySignal.h"
 #include "coglab_msgs/FeedbackSelect.h"
@@ -34,11 +35,15 @@ class RosLogSink : public ctrl_more::LogSink {
 /// resume_by_signal, disable_by_signal, reload_gains, set_gains, describe, load, unload (names: one
 /// controller), apply_profile (names: one profile). Topics: status (latched), and state with the
 /// internal values of each controller and its change of each reference. Every service answers after
-/// the cycle has adopted the change.
+/// the cycle has adopted the change. The gains are also on dynamic_reconfigure
+/// (feedback_reconfigure).
 class FeedbackRos {
  public:
   FeedbackRos(const ros::NodeHandle& node, ControllerManager& manager);
   ~FeedbackRos();
+
+  /// After a feedback controller was loaded or unloaded by another way than these services.
+  void refreshGains() { reconfigure_.refresh(); }
 
   /// Publishes status if it changed, and state while it has a subscriber. Publisher thread.
   void publishStatus();
@@ -72,6 +77,7 @@ class FeedbackRos {
   ctrl_more::FeedbackControllersManager& feedback_;
   ros::Publisher status_, state_;
   std::vector<ros::ServiceServer> services_;
+  FeedbackReconfigure reconfigure_;
   coglab_msgs::FeedbackStatus last_;
   bool published_ = false;
 };

@@ -23,6 +23,7 @@
 #include "coglab_controllers/ros/cancel_ros.hpp"
 #include "coglab_controllers/ros/feedback_ros.hpp"
 #include "coglab_controllers/ros/motion_controller_ros.hpp"
+#include "coglab_controllers/ros/reconfigure_server.hpp"
 #include "coglab_controllers/ros/touch_topic.hpp"
 #include "coglab_msgs/ControllerStatus.h"
 #include "coglab_msgs/GetActiveController.h"
@@ -73,6 +74,7 @@ class ManagerRos {
     std::string id;
     std::shared_ptr<const LoadedMotion> motion;  ///< set on unloading; keeps it while in use
     std::unique_ptr<MotionControllerRos> ros;    ///< destroyed before the motion
+    std::unique_ptr<ReconfigureServer> gains;  ///< null if it has none; destroyed before the motion
   };
 
   bool onLoad(coglab_msgs::LoadController::Request& request,
