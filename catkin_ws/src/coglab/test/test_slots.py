@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import random
+import signal
 from collections.abc import Iterator
 from typing import Any
 
 import coglab
 import ctrl_more
+import numpy as np
 import pytest
 from coglab.control import ControlError
 from coglab.control.feedback_host import FeedbackHost
@@ -58,6 +60,21 @@ def test_controller_that_holds_pythons_lock_is_late_and_comes_back(slots: Slots)
         for _ in range(50):
             slots.step(process)
         assert slots.correction[2] == pytest.approx(0.03)
+
+
+def test_motion_that_is_late_for_a_moment_goes_on_within_limits(slots: Slots) -> None:
+    with slots.motion("Sway") as process:
+        for _ in range(100):
+            slots.step(process)
+        process.send(signal.SIGSTOP)
+        for _ in range(40):  # 0.2 s, shorter than silent_time
+            slots.step()
+        assert np.abs(slots.robot.report()["velocity"]).max() < 1e-3, "it did not brake"
+        process.send(signal.SIGCONT)
+        for _ in range(60):
+            slots.step(process)
+        assert slots.robot.motion_progress(MOTION)["state"] == "running"
+        assert np.abs(slots.robot.report()["velocity"]).max() > 0.01
 
 
 class Needy(Shift):
