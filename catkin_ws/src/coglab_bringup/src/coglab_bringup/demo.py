@@ -15,7 +15,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 from coglab_py.alone import log_without_raising
-from coglab_tools.trial.record import BAG, TrialRecord, trials_in
 
 from coglab_bringup import process_tree
 from coglab_bringup.arguments import demo_parser
@@ -107,16 +106,6 @@ def keep(problems: list[str], folder: Path, name: str, write: Callable[[Path], o
         problems.append(f"{folder / name} could not be written ({error.strerror or error})")
 
 
-def report_on(folder: Path, before: set[Path], path: Path) -> None:
-    """Write one page about the recorded trials of this folder that are not in `before`."""
-    from coglab_tools.report.page import Part, write_page
-    from coglab_tools.trial.bag import series_of
-
-    places = [place for place in trials_in(folder) if place not in before]
-    parts = [Part(TrialRecord.load(place), series_of(place / BAG)) for place in places]
-    write_page(path, "Handovers of a demo", f"{parts[0].record.started}, simulated", parts)
-
-
 def commit_of(top: Path) -> str:
     """The commit of this checkout; "unknown" outside of a checkout or without git."""
     try:
@@ -197,11 +186,10 @@ def run(top: Path, options: argparse.Namespace) -> int:
     record_run(top, port, "demo")
     screen = bool(os.environ.get("DISPLAY")) and not options.headless and Path("/usr/bin/rviz").exists()
     launch = [f"seed:={options.seed}", f"rviz:={'true' if screen else 'false'}", f"log_file:={out / 'fri_ticks.csv'}"]
-    launch += [f"record:={out / 'trials'}"]
     launch += [f"console:={'false' if options.no_console else 'true'}", *person]
     (out / "ros_home" / "console.url").unlink(missing_ok=True)  # of an earlier demo
     system = System(environment, port, launch, out / "roslaunch.log")
-    pace, problems, before = PaceWatch(), list[str](), set(trials_in(out / "trials"))
+    pace, problems = PaceWatch(), list[str]()
     result: dict = {"commit": commit_of(top), "seed": options.seed, "person": options.person, "handovers": []}
     try:
         wait_for_master(system, MASTER_LIMIT)
@@ -235,9 +223,7 @@ def run(top: Path, options: argparse.Namespace) -> int:
         text = json.dumps(result, indent=1) + "\n"
         keep(problems, out, "result.json", lambda path: path.write_text(text))
         system.stop()
-    if set(trials_in(out / "trials")) - before:
-        keep(problems, out, "report.html", lambda path: report_on(out / "trials", before, path))
-    status = summarise(out, result["handovers"], "" if problems else f"{out}/report.html, result.json and trial.png, ")
+    status = summarise(out, result["handovers"], "" if problems else f"{out}/result.json and trial.png, ")
     for problem in problems:
         print(f"[coglab] error: {problem}; make room, or name another folder: --out DIR", file=sys.stderr)
     return 1 if problems else status
