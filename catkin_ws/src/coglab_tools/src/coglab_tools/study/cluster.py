@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 import os
+import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -53,15 +54,19 @@ def results(jobs: Sequence[simulate.Job], workers: int = 0, scheduler: str = "")
     if scheduler:
         yield from _with_scheduler(jobs, distributed, scheduler)
         return
-    with distributed.LocalCluster(
-        n_workers=count,
-        threads_per_worker=1,
-        processes=True,
-        host="127.0.0.1",
-        dashboard_address=None,
-        memory_limit=0,
-        silence_logs=logging.CRITICAL,
-    ) as cluster:
+    with (
+        tempfile.TemporaryDirectory() as place,
+        distributed.LocalCluster(
+            n_workers=count,
+            threads_per_worker=1,
+            processes=True,
+            host="127.0.0.1",
+            dashboard_address=None,
+            memory_limit=0,
+            local_directory=place,
+            silence_logs=logging.CRITICAL,
+        ) as cluster,
+    ):
         yield from _with_scheduler(jobs, distributed, cluster)
 
 

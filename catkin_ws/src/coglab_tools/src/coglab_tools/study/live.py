@@ -26,6 +26,7 @@ from coglab_tools.study.ask import ask
 from coglab_tools.study.plan import Study, Trial
 from coglab_tools.study.questionnaires import write_whole
 from coglab_tools.study.rows import Rows, open_rows, undone, write_table
+from coglab_tools.study.simulate import identity
 
 LIVE = "live"
 ANSWER = 5.0  # s, limit for an answer of a node
@@ -76,7 +77,7 @@ def session(
             who = participant or "every participant"
             raise UsageError(f"all trials of {who} are done; ./coglab study report {study.folder}")
         left = [trial for trial in left if trial.participant == left[0].participant]
-        rows.begin({}, simulated=False)
+        rows.begin(identity(), simulated=False)
         name = f"{study.name}_{left[0].participant}_{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
         before = len(rows.trials)
         print(f"{left[0].participant}: {len(left)} trials. {HELP}")

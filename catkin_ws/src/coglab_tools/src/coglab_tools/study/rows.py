@@ -7,6 +7,7 @@ holds the plan and the version: results of different plans or versions are never
 from __future__ import annotations
 
 import csv
+import errno
 import fcntl
 import io
 import json
@@ -78,8 +79,9 @@ class Rows:
     def _write(self, line: Mapping[str, Any]) -> None:
         assert self._stream is not None  # opened for reading alone
         try:
-            self._stream.write(json.dumps(line).encode() + b"\n")
-            self._stream.flush()
+            content = json.dumps(line).encode() + b"\n"
+            if self._stream.write(content) < len(content):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
             os.fsync(self._stream.fileno())
         except OSError as error:
             raise CheckFailed(
@@ -96,7 +98,7 @@ def open_rows(study: Study, write: bool = False) -> Iterator[Rows]:
         yield _read(study, path.read_bytes() if path.exists() else b"", None)
         return
     try:
-        stream = path.open("a+b")
+        stream = path.open("a+b", buffering=0)
     except OSError as error:
         raise CheckFailed(f"{path} cannot be written: {error.strerror}") from None
     with stream:

@@ -1,0 +1,43 @@
+"""Metrics of a trial equal their closed forms within 1 %."""
+
+import numpy as np
+import pytest
+from coglab_tools.report.metrics import METRICS, activities, metrics_of, sparc_of_speed
+from trials import measured
+
+
+def fast_part():
+    """Share of a minimum-jerk reach of 0.6 m in 2 s that is faster than 0.05 m/s: 30 s^2 (1 - s)^2 0.3 > 0.05."""
+    root = np.sqrt(0.05 / (0.3 * 30.0))
+    s = 0.5 - np.sqrt(0.25 - root)
+    return 2.0 * (1.0 - 2.0 * s), 3.0 + 2.0 * s
+
+
+def test_metrics_equal_their_closed_forms():
+    found = metrics_of(measured())
+    robot, begun = fast_part()
+    expected = {
+        "duration_s": 10.0, "reaction_s": 0.5, "approach_s": 2.0, "transfer_s": 2.0, "human_idle": 0.8,
+        "robot_idle": 1.0 - robot / 10.0, "concurrent_activity": 0.0, "functional_delay": (begun - 3.0) / 10.0,
+        "peak_force_n": 6.0, "mean_force_n": 6.0, "impulse_ns": 12.0, "sparc": -1.40, "detection_delay_s": 0.12,
+        "peak_palm_speed": 1.875 * 0.3, "nearest_m": 1.0,
+    }  # fmt: skip
+    assert set(expected) == set(METRICS)
+    for name, value in expected.items():
+        # 30 ms: the smoothing of the speed moves an edge by that much
+        assert found[name] == pytest.approx(value, rel=0.01, abs=0.003), name
+
+
+@pytest.mark.parametrize("rate", [60.0, 200.0])
+def test_sparc_does_not_depend_on_the_rate(rate):
+    s = np.arange(0.0, 1.0, 1.0 / (2.0 * rate))
+    assert sparc_of_speed(30 * s**2 * (1 - s) ** 2, rate) == pytest.approx(-1.40, rel=0.02)
+
+
+def test_a_hand_that_nobody_sees_gives_no_figures_of_the_person():
+    trial = measured()
+    trial.series.truth = [(t, palm, [np.nan] * 3, thing, np.nan) for t, palm, _, thing, _ in trial.series.truth]
+    found = metrics_of(trial)
+    assert found["human_idle"] is None and found["nearest_m"] is None and found["peak_force_n"] is None
+    assert found["robot_idle"] == pytest.approx(1.0 - fast_part()[0] / 10.0, rel=0.01)
+    assert activities(trial)[0] == []
