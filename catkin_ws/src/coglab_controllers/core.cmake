@@ -55,6 +55,8 @@ add_library(coglab_controllers_manager
   src/manager/feedback_stage.cpp
   src/manager/parameters.cpp
   src/manager/robot_setup.cpp
+  src/manager/signal_file.cpp
+  src/manager/signal_inputs.cpp
   src/manager/tunables.cpp)
 target_compile_features(coglab_controllers_manager PUBLIC cxx_std_17)
 target_compile_options(coglab_controllers_manager PRIVATE -Wall -Wextra)
