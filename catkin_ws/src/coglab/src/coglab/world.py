@@ -343,7 +343,8 @@ class World:
 
         ``actions``: "receive", "give", "take", "put" or one of your own in ``settings``, such as
         ``trial("receive", "give")``. ``limit``: s of virtual time for each. The record ends when the person's hand is
-        back. TimeoutError: an action does not end; the robot is stopped. Refused: the first action does not fit to what the hand holds.
+        back. TimeoutError: an action does not end; the robot is stopped.
+        Refused: the first action does not fit to what the hand holds.
         """
         self._check()
         known = [*ACTIONS, *(own.name for own in self.virtual_trial.ctx.parts.actions)]

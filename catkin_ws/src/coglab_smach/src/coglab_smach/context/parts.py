@@ -90,7 +90,7 @@ def imported(name: str, spec: str) -> Callable[..., Any]:
         there = [each for each, value in vars(found).items() if callable(value) and not each.startswith("_")]
         what = "no function" if part is None else f"{type_name(part)}, no function,"
         raise ConfigError(f"{name}: module '{module}' has {what} '{function}'; it has: {', '.join(there) or 'none'}")
-    return part  # type: ignore[no-any-return]
+    return part
 
 
 def built(name: str, build: Callable[[Any], Any], ctx: Any) -> Any:

@@ -17,8 +17,8 @@ from coglab_smach.states.hub import Fault, Hub, Stopped
 ACTIONS_EMPTY = ("exchange_human_to_robot", "take")
 ACTIONS_HOLDING = ("exchange_robot_to_human", "put")
 LABEL = "coglab_master"
-TAKEN = ("coglab_init_system", "which_hub", "wait_without_object", "wait_with_object", "stopped", "fault", "recover")
-TAKEN += (*ACTIONS_EMPTY, *ACTIONS_HOLDING, *SHORT_NAMES, "reset", "initialise", "refused")
+SHIPPED = ("coglab_init_system", "which_hub", "wait_without_object", "wait_with_object", "stopped", "fault", "recover")
+TAKEN = (*SHIPPED, *ACTIONS_EMPTY, *ACTIONS_HOLDING, *SHORT_NAMES, "reset", "initialise")
 """Names that no action of a user can have."""
 
 

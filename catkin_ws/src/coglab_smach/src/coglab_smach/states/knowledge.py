@@ -357,7 +357,7 @@ class SetDeliveryGoal(CoglabState):
                     f"'{entry['id']}' has no delivery '{name}'; it has: {', '.join(entry['deliveries'])}",
                     code=ReasonCode.UNKNOWN_NAME,
                 )
-            return entry["deliveries"][name]  # type: ignore[no-any-return]
+            return entry["deliveries"][name]
         try:
             return checked_delivery(mine(entry, Pose.from_dict(seen)), f"deliveries.{name}")
         except ObjectError as error:
