@@ -7,7 +7,7 @@ import actionlib
 import rospy
 from coglab_msgs.msg import HandoverAction, HandoverGoal
 
-rospy.init_node("handover_client")
+rospy.init_node("handover_client", anonymous=True)
 client = actionlib.SimpleActionClient("coglab/handover", HandoverAction)
 client.wait_for_server()
 goal = HandoverGoal(action=sys.argv[1], object_id=sys.argv[2], wait=60.0, time_limit=45.0, condition="example")
