@@ -226,8 +226,8 @@ def _motion_reason(name: str, now: Standing) -> str:
 def reasons(
     now: Standing, guard: MotionGuard, session: Mapping[str, str] | None = None, asked: Sequence[str] = ()
 ) -> dict[str, str]:
-    """Reason by control, empty if the control may be used. `session`: reasons of the session and its trials. `asked`: further
-    actions that need a reason, such as one that the machine does not have.
+    """Reason by control, empty if the control may be used. `session`: reasons of the session and its trials. `asked`:
+    further actions that need a reason, such as one that the machine does not have.
 
     Each browser checks by itself whether it is the operator."""
     found = {name: _motion_reason(name, now) for name in (*STARTS, *now.actions, *CALIBRATIONS, "home", *asked)}
