@@ -114,6 +114,23 @@ def test_hold_status_and_the_way_back(brain):
     assert status == 0 and brain.started == [("reset", "")], output
 
 
+def test_a_short_name_and_a_delivery_reach_the_brain(brain):
+    holding = "/coglab_master/wait_with_object", ["exchange_robot_to_human", "put", "polish"]
+    for words, asked in (
+        (("give", "mug", "delivery:=rim_first"), ("exchange_robot_to_human", "mug/rim_first")),
+        (("give", "delivery:=rim_first"), ("exchange_robot_to_human", "/rim_first")),
+        (("polish",), ("polish", "")),
+    ):
+        brain.started.clear()
+        brain.say(*holding, object_id="mug")
+        status, output = ask("start", *words)
+        assert status == 0 and brain.started == [asked], output
+    brain.say(*holding, object_id="mug")
+    status, output = ask("start", "give", "mug", "rim_first")
+    assert status == 1 and "delivery:=NAME is expected behind the object, got 'rim_first'" in output
+    brain.started.clear()
+
+
 def test_what_the_hub_does_not_take_ends_with_what_to_type(brain):
     brain.say(HUB, TAKES)
     status, output = ask("start", "put", "--wait", "0.5")

@@ -45,7 +45,10 @@ export function armStop(button) {
   });
 }
 
+let delivery = ''; // how the object is given; empty: its default
+
 function argumentsOf(name) {
+  if (name === 'exchange_robot_to_human' && delivery) return ['start', { action: name, delivery }];
   if (name === 'calibrate') return ['calibrate', { mode: 'fast' }];
   if (name === 'home') return ['home', {}];
   return ['start', { action: name }];
@@ -68,6 +71,22 @@ function objectChoice() {
     show();
   });
   watch(list.button, () => setAttribute(list.button, 'aria-disabled', blocked('select_object') ? 'true' : null));
+  return list.button;
+}
+
+/** How the object is given, where it has more than one way. */
+function deliveryChoice() {
+  const list = choice({ id: 'delivery', 'aria-label': 'Delivery: how the object is given', hidden: true, onchange: () => {
+    delivery = list.button.value;
+  } });
+  onDocs(['objects', 'desk', 'status'], () => {
+    const id = store.docs.status?.machine.object || store.docs.desk?.object || store.docs.status?.machine.fallback;
+    const ways = (store.docs.objects?.rows ?? []).find((row) => row.id === id)?.deliveries ?? [];
+    if (!ways.includes(delivery)) delivery = '';
+    list.offer(['', ...ways].map((way) => [way, way || '(as usual)']));
+    list.show(delivery);
+    list.button.hidden = ways.length < 2;
+  });
   return list.button;
 }
 
@@ -96,32 +115,52 @@ function sideReason() {
   return words;
 }
 
+/** One button with the reason below it why it is disabled. */
+function oneAction(name, label) {
+  const why = h('span', { class: 'why', id: `why-${name}` });
+  let told = '';
+  const tell = (text) => {
+    told = text;
+    setText(why, text);
+    setTimeout(() => {
+      told = '';
+      update();
+    }, 4000);
+  };
+  const mustHold = () => store.docs.desk?.guard.hold ?? true;
+  const button = actionButton(label, { blockedBy: () => blocked(name), mustHold, request: () => argumentsOf(name), tell });
+  setAttribute(button, 'aria-describedby', why.id);
+  button.dataset.action = name;
+  const update = () => {
+    const reason = blocked(name);
+    setAttribute(button, 'aria-disabled', reason ? 'true' : null);
+    if (!told) setText(why, reason || (mustHold() ? 'press and hold' : ''));
+  };
+  watch(button, update);
+  return { button, row: h('div', { class: 'act' }, button, why) };
+}
+
+/** Actions of a user's configuration, where the machine takes them now. */
+function ownActions() {
+  const place = h('div', { class: 'own', hidden: true });
+  let shown = '';
+  onDocs(['desk'], () => {
+    const names = store.docs.desk?.own ?? [];
+    if (names.join() === shown) return;
+    shown = names.join();
+    place.hidden = names.length === 0;
+    place.replaceChildren(...names.map((name) => oneAction(name, name.replaceAll('_', ' ')).row));
+  });
+  return place;
+}
+
 export function showActions(parent) {
   const buttons = BUTTONS.map(([name, label], i) => {
-    const why = h('span', { class: 'why', id: `why-${name}` });
-    let told = '';
-    const tell = (text) => {
-      told = text;
-      setText(why, text);
-      setTimeout(() => {
-        told = '';
-        update();
-      }, 4000);
-    };
-    const mustHold = () => store.docs.desk?.guard.hold ?? true;
-    const button = actionButton(`${i + 1} ${label}`, { blockedBy: () => blocked(name), mustHold, request: () => argumentsOf(name), tell });
-    setAttribute(button, 'aria-describedby', why.id);
-    button.dataset.action = name;
-    const update = () => {
-      const reason = blocked(name);
-      setAttribute(button, 'aria-disabled', reason ? 'true' : null);
-      if (!told) setText(why, reason || (mustHold() ? 'press and hold' : ''));
-    };
-    watch(button, update);
-    parent.append(h('div', { class: 'act' }, button, why));
+    const { button, row } = oneAction(name, `${i + 1} ${label}`);
+    parent.append(row);
     return button;
   });
-  parent.append(h('div', { class: 'side' }, h('label', {}, 'Object', objectChoice()), h('label', {}, 'Speed', speedChoice()), sideReason()));
+  parent.append(h('div', { class: 'side' }, h('div', { class: 'pick' }, h('label', {}, 'Object', objectChoice()), deliveryChoice()), h('label', {}, 'Speed', speedChoice()), sideReason()), ownActions());
   return buttons;
 }
 

@@ -11,7 +11,7 @@ from coglab_console.desk.experiment import Experiment, ExperimentError
 from coglab_console.desk.gates import MotionGuard, Standing, reasons
 from coglab_py.orders import latin_row, order_of
 from console_double import READY
-from desk_double import Clock, ask, hold_for
+from desk_double import Clock, ask, hold_for, shown
 
 # --- roles ----------------------------------------------------------------------------------------------------
 
@@ -185,6 +185,17 @@ def test_a_brain_that_is_silent_in_an_action_changes_no_threshold(desk):
 def test_what_fits_no_schema_is_refused(name, arguments):
     with pytest.raises(BadCommand):
         judge(name, arguments)
+
+
+def test_an_action_of_a_user_may_be_asked_for_where_the_machine_takes_it_and_no_other_one(desk):
+    """A double of the robot that takes it now; a delivery goes along."""
+    standing = desk.backend.standing()
+    desk.backend.standing = lambda: replace(standing, actions=(*standing.actions, "polish"))
+    assert shown(desk)["own"] == ["polish"] and shown(desk)["reasons"]["polish"] == ""
+    refused = ask(desk, "a", "start", action="drop_it")
+    assert not refused["success"] and "now only" in refused["message"] and "polish" in refused["message"]
+    assert ask(desk, "a", "start", action="polish", delivery="rim_first")["success"]
+    assert desk.backend.calls[-1] == ("start", {"action": "polish", "delivery": "rim_first"})
 
 
 def test_every_motion_is_the_operators_alone():

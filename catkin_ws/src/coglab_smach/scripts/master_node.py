@@ -2,10 +2,12 @@
 """The node /coglab: runs coglab_master on ROS ports, receives triggers, publishes transitions and introspection.
 
 Names are relative to the node's namespace.
+Action: coglab/handover (coglab_msgs/Handover).
 Services: coglab/start (coglab_msgs/Start), coglab/stop, coglab/why (std_srvs/Trigger).
-Topics: coglab/transitions (coglab_msgs/Transition), coglab/results (std_msgs/String, one JSON object per action,
-latched), coglab/holding (std_msgs/String, object in the hand, latched), coglab/state (coglab_msgs/MasterState,
-latched, at least 5 Hz), say (coglab_msgs/Say, messages to the person, latched).
+Topics: coglab/transitions (coglab_msgs/Transition), coglab/handover_results (coglab_msgs/HandoverResult, one per
+action, latched), coglab/results (std_msgs/String, the same as JSON, latched), coglab/holding (std_msgs/String, object
+in the hand, latched), coglab/state (coglab_msgs/MasterState, latched, at least 5 Hz), say (coglab_msgs/Say, messages to
+the person, latched).
 Parameters: perception/frames (names of human_hand and board). Private: config_file, dmp_library (path of the
 primitives), auto_trigger, result_file (JSON lines), state_file (object in the hand, survives a restart; default
 coglab_holding.json in ROS_HOME), config_overrides (mapping of dotted names), introspection (default true).
@@ -20,10 +22,11 @@ import coglab_controllers as cc
 import rospkg
 import rospy
 import smach_ros
+from coglab_msgs.msg import HandoverAction, HandoverResult, Say, Transition
 from coglab_msgs.msg import MasterState as MasterStateMsg
-from coglab_msgs.msg import Say, Transition
 from coglab_msgs.srv import Start, StartResponse
 from coglab_py import parameters
+from coglab_py.action_server import ActionServer
 from coglab_py.alone import init_node
 from coglab_py.publish import publish
 from coglab_py.steady import ClockWatch, Stamps, exit_status, utc_of, worker
@@ -40,6 +43,7 @@ from coglab_smach.machines import build_master
 from coglab_smach.ros.arm import RosArm
 from coglab_smach.ros.calls import PACE
 from coglab_smach.ros.hand import RosHand
+from coglab_smach.ros.handover_server import HandoverServer
 from coglab_smach.ros.ports import RosContact, RosDatabase, RosPerception
 from std_msgs.msg import String
 from std_srvs.srv import Trigger, TriggerResponse
@@ -76,6 +80,7 @@ class MasterNode:
         self.stamps = Stamps()
         self.transitions = rospy.Publisher("coglab/transitions", Transition, queue_size=200)
         self.results = rospy.Publisher("coglab/results", String, queue_size=20, latch=True)
+        self.typed_results = rospy.Publisher("coglab/handover_results", HandoverResult, queue_size=20, latch=True)
         self.spoken = rospy.Publisher(
             "say", Say, queue_size=20, latch=True
         )  # latched: a late listener receives the last message too
@@ -95,6 +100,7 @@ class MasterNode:
             say=self.say,
             **self.geometry(config),
         )
+        self.handovers = HandoverServer(self.ctx, self.stop, self.stamp, self.utc, self.spawn)
         self.master = build_master(self.ctx)
         self.thread = worker(self.master.execute, "coglab_master")
         self.states = rospy.Publisher("coglab/state", MasterStateMsg, queue_size=20, latch=True)
@@ -106,6 +112,28 @@ class MasterNode:
         rospy.Service("coglab/start", Start, self.on_start)
         rospy.Service("coglab/stop", Trigger, self.on_stop)
         rospy.Service("coglab/why", Trigger, self.on_why)
+        self.actions = ActionServer(
+            rospy.resolve_name("coglab/handover"),
+            HandoverAction,
+            self.handovers.on_goal,
+            self.handovers.on_cancel,
+            auto_start=False,
+        )
+        self.actions.start()
+
+    @staticmethod
+    def spawn(function) -> None:
+        """Run a function in a thread that does not keep the node from ending."""
+        threading.Thread(target=function, name="handover", daemon=True).start()
+
+    def stamp(self, when: float) -> rospy.Time:
+        """Returns the ROS time of a time (s) of the brain's clock."""
+        return self.stamps.stamp(PACE.steady(when))
+
+    @staticmethod
+    def utc(when: float) -> str:
+        """Returns the date and time of a time (s) of the brain's clock."""
+        return utc_of(PACE.steady(when))
 
     @staticmethod
     def geometry(config):
@@ -137,8 +165,12 @@ class MasterNode:
 
     def on_stop(self, _request):
         """STOP: the arm brakes and latches, the machine ends the action, the hand keeps its object."""
-        self.ctx.stop.press("the operator pressed STOP")
-        pending = self.ctx.arm.hold("the operator pressed STOP")
+        return self.stop("the operator pressed STOP")
+
+    def stop(self, reason: str):
+        """STOP with a reason. Returns the answer of the service."""
+        self.ctx.stop.press(reason)
+        pending = self.ctx.arm.hold(reason)
         end = self.ctx.clock.now() + 2.0
         while not pending.done() and self.ctx.clock.now() < end:
             self.ctx.clock.sleep(0.005)
@@ -192,12 +224,12 @@ class MasterNode:
         (rospy.logwarn if record.outcome in ("failed", "fault", "stopped") else rospy.loginfo)(record.sentence())
 
     def on_result(self, record: ActionRecord) -> None:
-        """Publish a result and append it to the result file, one JSON object per action."""
+        """Publish a result, typed and as JSON, and append it to the result file, one JSON object per action."""
+        publish(self.typed_results, self.handovers.result_of(record))
         row = record.to_dict()
         for name, when in (("started", record.started), ("ended", record.ended)):
-            steady = PACE.steady(when)
-            row[f"{name}_ros"] = round(self.stamps.stamp(steady).to_sec(), 3)
-            row[f"{name}_utc"] = utc_of(steady)
+            row[f"{name}_ros"], row[f"{name}_utc"] = self.ros_seconds(when), self.utc(when)
+        row["marks_ros"] = {name: self.ros_seconds(when) for name, when in record.marks.items()}
         line = json.dumps(row)
         publish(self.results, String(line))
         if self.result_file:
@@ -206,6 +238,10 @@ class MasterNode:
                     stream.write(line + "\n")
             except OSError as error:
                 rospy.logerr("result file %s cannot be written: %s", self.result_file, error)
+
+    def ros_seconds(self, when: float) -> float:
+        """Returns the ROS time of a time of the brain's clock, s to the ms."""
+        return round(self.stamp(when).to_sec(), 3)
 
     def run(self) -> None:
         """Execute the machine until shut-down."""

@@ -12,11 +12,21 @@ import threading
 import time
 import unittest
 
+import actionlib
 import numpy as np
 import rospy
 import rostest
 import yaml
-from coglab_msgs.msg import Contact, ContactSignal, MasterState, ReasonCode, Transition
+from coglab_msgs.msg import (
+    Contact,
+    ContactSignal,
+    HandoverAction,
+    HandoverGoal,
+    HandoverResult,
+    MasterState,
+    ReasonCode,
+    Transition,
+)
 from coglab_msgs.srv import ArmContact, GetObject, Learn, LearnMotion, ListObjects, Reload, Start
 from coglab_smach.kinematics.reachability import default_arm, home_posture, position_jacobian
 from sensor_msgs.msg import JointState
@@ -225,6 +235,23 @@ class BrainNodes(unittest.TestCase):
         self.assertTrue(any(0.0 < seconds <= 4.0 for seconds in vision), [(m.state, m.waits_for) for m in limited])
         self.until(lambda: waits[-1].state.endswith("/fault"), "fault again")
         self.assertEqual((waits[-1].waits_for, waits[-1].deadline.to_sec()), ("", 0.0))
+        self.handover_by_a_standard_client(shown["kind"], written["reason"])
+
+    def handover_by_a_standard_client(self, kind, reason):
+        """The action in the same fault: refused in words, and why an initialisation fails is its result."""
+        last = rospy.wait_for_message("/coglab/handover_results", HandoverResult, LIMIT)
+        self.assertEqual((last.action, last.reason, last.success), (kind, reason, False))
+        self.assertLess(abs(last.ended.to_sec() - time.time()), 2 * LIMIT, "times are of the wall clock")
+        client = actionlib.SimpleActionClient("/coglab/handover", HandoverAction)
+        self.assertTrue(client.wait_for_server(rospy.Duration(LIMIT)))
+        state = client.send_goal_and_wait(HandoverGoal(action="take", object_id="mug"), rospy.Duration(LIMIT))
+        result = client.get_result()
+        self.assertEqual((state, result.reason_code), (actionlib.GoalStatus.REJECTED, ReasonCode.WRONG_STATE))
+        self.assertIn("fault takes initialise", result.reason)
+        state = client.send_goal_and_wait(HandoverGoal(action="initialise"), rospy.Duration(2 * LIMIT))
+        result = client.get_result()
+        self.assertEqual((state, result.reason_code), (actionlib.GoalStatus.ABORTED, ReasonCode.NODE_SILENT))
+        self.assertIn("is its node running?", result.reason)
 
     def test_6_a_second_one_in_its_own_namespace_ends_without_a_traceback(self):
         config = rospy.get_param("/coglab/config_file")

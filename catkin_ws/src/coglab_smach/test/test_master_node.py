@@ -11,6 +11,7 @@ from coglab_objects.database import objects_folder
 from coglab_smach.context.journal import ActionRecord, TransitionRecord
 from coglab_smach.context.master_state import MasterState
 from coglab_smach.ports.pending import Polled, PortError, Ready
+from coglab_smach.ros.handover_server import HandoverServer
 
 SCRIPTS = Path(__file__).resolve().parents[1] / "scripts"
 
@@ -38,6 +39,9 @@ def master(monkeypatch, tmp_path):
     made.states, made.transitions, made.results, made.spoken = "states", "transitions", "results", "spoken"
     made.result_file = str(tmp_path / "results.jsonl")
     made.stamps = SimpleNamespace(stamp=lambda steady: rospy.Time.from_sec(steady + 1000.0))
+    made.typed_results = "typed"
+    made.ctx.holding = "mug"
+    made.handovers = HandoverServer(made.ctx, made.stop, made.stamp, made.utc, made.spawn)
     made.module = module
     return made
 
@@ -79,12 +83,16 @@ def test_transitions_and_results_are_told_and_written(master):
     told = master.sent[-2][1]
     assert (told.path, told.from_state, told.outcome, told.to_state) == ("/m", "a", "stopped", "b")
     assert (told.reason, list(told.causes), told.reason_code) == ("why", ["c"], 4)
-    record = ActionRecord("take", "mug", 1.0, 3.5, "succeeded")
+    record = ActionRecord("take", "mug", 1.0, 3.5, "succeeded", marks={"closed": 2.0})
     master.on_result(record)
+    typed = next(message for to, message in master.sent if to == "typed")
+    assert (typed.action, typed.success, typed.holding) == ("take", True, "mug")
+    assert [t.to_sec() for t in (typed.started, typed.ended, typed.marks[0].stamp)] == [1001.0, 1003.5, 1002.0]
     master.on_result(record)
     lines = Path(master.result_file).read_text().splitlines()
     row = json.loads(lines[0])  # beside bags, and beside videos and questionnaires
     assert (row["started_ros"], row["ended_ros"]) == (1001.0, 1003.5) and row["ended_utc"] > row["started_utc"]
+    assert row["marks_ros"] == {"closed": 1002.0} and typed.id == f"{row['started_utc']}_take"
     assert len(lines) == 2 and row["duration_s"] == 2.5 and master.sent[-1][1].data == lines[0]
     master.result_file = str(Path(master.result_file).parent)
     master.on_result(record)
@@ -94,6 +102,7 @@ def test_transitions_and_results_are_told_and_written(master):
     assert master.sent[-1][0] == "results"
     assert ActionRecord("take", "mug", 1.0).to_dict() == {
         **{"kind": "take", "object_id": "mug", "outcome": "", "reason": "", "reason_code": 0, "causes": []},
+        "delivery": "",
         **{"started": 1.0, "ended": 0.0, "duration_s": -1.0, "marks": {}},
     }
 

@@ -133,7 +133,7 @@ def queue_of_goals(monkeypatch: pytest.MonkeyPatch) -> tuple[goals.GoalQueue, Ma
     """A queue of goals without a master; its thread is not started."""
     master = Master()
     Server.started = 0
-    monkeypatch.setattr(goals, "HandActionServer", Server)
+    monkeypatch.setattr(goals, "ActionServer", Server)
     monkeypatch.setattr(goals.rospy, "resolve_name", lambda name: name)
     monkeypatch.setattr(goals.rospy, "get_name", lambda: "/ih2_hand")
     monkeypatch.setattr(goals.rospy, "is_shutdown", lambda: False)

@@ -127,7 +127,8 @@ class RobotState:
     state: str
     """path of the innermost active state; empty without a brain"""
     actions: tuple[str, ...]
-    """what the brain accepts now: names of ``coglab.ACTIONS``, "reset" or "initialise"; empty while an action runs"""
+    """what the brain accepts now: names of ``coglab.ACTIONS``, actions of your own, "reset" or "initialise"; empty
+    while an action runs"""
     holding: str
     """id of the object in the robot's hand; empty if the hand is empty"""
     why: str

@@ -490,9 +490,10 @@ class Robot:
         """Take an object that a person offers. ``object``: its id; None: the default object of the machines."""
         return self._act("receive", object, limit)
 
-    def give(self, object: str | None = None, *, limit: float = 60.0) -> Exchange:
-        """Give the object in the hand to a person. ``object``: needed only if its name is not known."""
-        return self._act("give", object, limit)
+    def give(self, object: str | None = None, *, delivery: str | None = None, limit: float = 60.0) -> Exchange:
+        """Give the object in the hand to a person. ``object``: needed only if its name is not known. ``delivery``: one
+        of those in the object's file; None: its default."""
+        return self.do("give", object, delivery=delivery, limit=limit)
 
     def take(self, object: str | None = None, *, limit: float = 60.0) -> Exchange:
         """Take an object from the board."""
@@ -501,6 +502,17 @@ class Robot:
     def put(self, object: str | None = None, *, limit: float = 60.0) -> Exchange:
         """Put the object in the hand on the board."""
         return self._act("put", object, limit)
+
+    def do(
+        self, action: str, object: str | None = None, *, delivery: str | None = None, limit: float = 60.0
+    ) -> Exchange:
+        """Execute an action by its name: receive, give, take, put, or one of your own that machines.yaml names.
+        ``object``, ``delivery``: as in ``receive`` and ``give``."""
+        if delivery is not None and (not isinstance(delivery, str) or not delivery or "/" in delivery):
+            raise ValueError(f"delivery: a name of the object's file is expected, got {delivery!r}")
+        if object is not None and (not isinstance(object, str) or "/" in object):
+            raise ValueError(f"object: an id such as 'mug' is expected, got {object!r}")
+        return self._act(str(action), f"{object or ''}/{delivery}" if delivery else object, limit)
 
     def stop(self, reason: str = "stopped from Python", *, limit: float = STOPPING) -> Result:
         """STOP: the arm brakes, the brain ends its action, the hand keeps its object. Latched until ``reset()``. No
@@ -688,9 +700,9 @@ class Robot:
         if object_id is not None and not isinstance(object_id, str):
             raise ValueError(f"object: an id such as 'mug' is expected, got {object_id!r}")
         cell = self._cell
-        if name not in cell.actions:
+        if not cell.actions:
             raise Refused(f"this robot has no brain for '{name}': ./coglab launch without arm:=ideal starts one", 110)
-        action = cell.actions[name]
+        action = cell.actions.get(name, name)
         self._end_own_motion(f"'{name}' begins")
         self._wait(lambda: cell.state().in_hub, limit, f"a hub of the brain before '{name}'")
         if action not in cell.state().actions:
@@ -721,7 +733,8 @@ class Robot:
         if self._resettable():
             return f"'{name}' is refused: {_for_python(state.why) or 'the robot is stopped'}; call robot.reset()"
         held = f"the hand holds the {state.holding}" if state.holding else "the hand is empty"
-        can = " or ".join(f"{each}()" for each in state.actions)
+        own = [each for each in state.actions if each not in self._cell.actions]
+        can = " or ".join(f"do('{each}')" if each in own else f"{each}()" for each in state.actions)
         return f"'{name}' is refused: {held}; call {can} first"
 
     def _halt_exchange(self, reason: str) -> None:

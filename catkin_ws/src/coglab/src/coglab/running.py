@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import atexit
 import io
-import json
 import os
 import socket
 import threading
@@ -23,8 +22,8 @@ except ImportError as error:
         f"coglab.connect() needs ROS 1, and it is not there ({error}): use ./coglab shell python3, or install Debian's "
         "python3-rospy and python3-tf2-ros; coglab.World needs no ROS master"
     ) from error
+from coglab_msgs.msg import HandoverResult, ReasonCode, Say, Transition
 from coglab_msgs.msg import MasterState as MasterStateMessage
-from coglab_msgs.msg import ReasonCode, Say, Transition
 from coglab_msgs.srv import LwrCommand, Start
 from coglab_perception.tf_listener import TfListener
 from coglab_py.pose import Pose
@@ -35,7 +34,6 @@ from coglab_smach.ros.arm import RosArm
 from coglab_smach.ros.calls import PACE, Newest, call
 from coglab_smach.ros.hand import RosHand
 from geometry_msgs.msg import TransformStamped
-from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from coglab.results import ACTIONS, Event, Exchange
@@ -177,7 +175,7 @@ class _RunningBackEnd:
         self._events: deque[Event] = deque(maxlen=KEPT_EVENTS)
         self._connected = rospy.get_time()
         self._submitted = time.monotonic()
-        self._result_topic = Newest(f"{prefix}coglab/results", String, self._on_result)
+        self._result_topic = Newest(f"{prefix}coglab/handover_results", HandoverResult, self._on_result)
         self._topics = [
             self._result_topic,
             Newest(f"{prefix}coglab/transitions", Transition, self._on_transition),
@@ -200,7 +198,7 @@ class _RunningBackEnd:
         }
         if self.actions:
             heard["the state of the brain"] = lambda: self._state.message is not None
-            heard["the topic coglab/results"] = self._result_topic.is_connected
+            heard["the topic coglab/handover_results"] = self._result_topic.is_connected
         if self.hand is not None:
             hand = self.hand
             heard["the status of the hand"] = lambda: hand.state().event != ReasonCode.NODE_SILENT
@@ -352,12 +350,8 @@ class _RunningBackEnd:
         if stamp >= self._connected:  # a latched message is older
             self._add(Event(stamp, "said", message.text, message.code))
 
-    def _on_result(self, message: String) -> None:
-        try:
-            result = _exchange(json.loads(message.data))
-        except (ValueError, KeyError, TypeError) as error:
-            rospy.logerr("a message on coglab/results cannot be read: %s", error)
-            return
+    def _on_result(self, message: HandoverResult) -> None:
+        result = _exchange(message)
         with self._lock:
             self._results.append((time.monotonic(), result))
             del self._results[:-200]
@@ -369,21 +363,19 @@ class _RunningBackEnd:
             self._events.append(event)
 
 
-def _exchange(row: Mapping[str, Any]) -> Exchange:
-    """Result of an action from its JSON row on coglab/results. Its times become ROS time."""
-    kind, ok = str(row["kind"]), row["outcome"] == "succeeded"
-    shift = float(row["started_ros"]) - float(row["started"])
+def _exchange(message: HandoverResult) -> Exchange:
+    """Result of an action from its message."""
     return Exchange(
-        next((name for name, action in ACTIONS.items() if action == kind), kind),
-        ok,
-        ReasonCode.NONE if ok else int(row["reason_code"]),
-        str(row["reason"]),
-        tuple(map(str, row["causes"])),
-        float(row["started_ros"]),
-        float(row["ended_ros"]),
-        str(row["object_id"]),
-        str(row["outcome"]),
-        {str(name): float(when) + shift for name, when in row["marks"].items()},
+        next((name for name, action in ACTIONS.items() if action == message.action), message.action),
+        message.success,
+        message.reason_code,
+        message.reason,
+        tuple(message.causes),
+        message.started.to_sec(),
+        message.ended.to_sec(),
+        message.object_id,
+        message.outcome,
+        {mark.name: mark.stamp.to_sec() for mark in message.marks},
     )
 
 

@@ -91,7 +91,8 @@ class World:
         ``perfect_perception``: the tracker has no noise, delay or gaps.
         ``conditions``: a coglab_trials.Conditions instead of the four arguments above.
         ``object_on``: "person": in the person's hand, "board": on the board.
-        ``settings``: dotted names of machines.yaml with their values, such as {"timing": "calm"}.
+        ``settings``: dotted names of machines.yaml with their values, such as {"timing": "calm"}, or actions, states
+        and deliveries of your own: {"actions": {"polish": "my_lab.machines:build_polish"}}.
         ``machine``: builds the state machine from the Context, as coglab_smach.machines.build_master does.
         ``recogniser``: a coglab_perception Recogniser, see VirtualTrial. ``touch``: standard deviation (N) of touch
         sensors in the hand; None: no sensors.
@@ -351,26 +352,26 @@ class World:
     def trial(self, *actions: str, limit: float = 60.0) -> Trial:
         """Execute actions one after the other until one fails, and record them.
 
-        ``actions``: "receive", "give", "take" or "put", such as ``trial("receive", "give")``. ``limit``: s of virtual
-        time for each. The record ends when the person's hand is back. TimeoutError: an action does not end; the robot
-        is stopped. Refused: the first action does not fit to what the hand holds.
+        ``actions``: "receive", "give", "take", "put" or one of your own in ``settings``, such as
+        ``trial("receive", "give")``. ``limit``: s of virtual time for each. The record ends when the person's hand is
+        back. TimeoutError: an action does not end; the robot is stopped.
+        Refused: the first action does not fit to what the hand holds.
         """
         self._check()
+        known = [*ACTIONS, *(own.name for own in self.virtual_trial.ctx.parts.actions)]
         if not actions:
-            raise ValueError(f"actions: at least one of {', '.join(ACTIONS)} is expected")
+            raise ValueError(f"actions: at least one of {', '.join(known)} is expected")
         for action in actions:
-            if action not in ACTIONS:
-                raise ValueError(f"actions: one of {', '.join(ACTIONS)} is expected, got {action!r}")
+            if action not in known:
+                raise ValueError(f"actions: one of {', '.join(known)} is expected, got {action!r}")
         with self.record() as recording:
             for action in actions:
-                result: Exchange = getattr(self.robot, action)(self._named(action), limit=limit)
+                thing = None if self.robot.state.holding else self.conditions.object_id
+                result: Exchange = self.robot.do(action, thing, limit=limit)
                 self._await_person()
                 if not result.ok:
                     break
         return recording.trial
-
-    def _named(self, action: str) -> str | None:
-        return self.conditions.object_id if action in ("receive", "take") else None
 
     def _await_person(self) -> None:
         end = self.time + REST_LIMIT

@@ -28,6 +28,7 @@ STATE_LIMIT = 3.0  # s, longest wait for the latched state
 CHANGE_LIMIT = 5.0  # s before an action is refused that the hub does not list: after a hold the list needs a moment
 DEFAULT_ACTIONS = ("exchange_human_to_robot", "exchange_robot_to_human")  # the first one that the hub accepts
 FACTOR_TOPIC = "/coglab_sim/real_time_factor"
+SHORT_NAMES = {"receive": "exchange_human_to_robot", "give": "exchange_robot_to_human"}
 OBJECT_PARAMETER = "/coglab_sim/cell/object/id"  # object that the simulated person offers
 
 
@@ -46,9 +47,12 @@ def ask_parser(command: str) -> Parser:
             nargs="?",
             default="",
             metavar="ACTION",
-            help="exchange_human_to_robot, exchange_robot_to_human, take, put, initialise, reset",
+            help="receive, give, take, put, initialise, reset, or an action of your own",
         )
         parser.add_argument("object_id", nargs="?", default="", metavar="OBJECT", help="of the object database")
+        parser.add_argument(
+            "delivery", nargs="?", default="", metavar="delivery:=NAME", help="how the object is given, of its file"
+        )
         parser.add_argument("--wait", type=float, default=90.0, metavar="S", help="for the hub, at most (default 90)")
     parser.add_argument(
         "-p", type=master_port, default=0, dest="port", metavar="PORT", help="of the ROS master, if several systems run"
@@ -203,9 +207,22 @@ def choose(master: str, options: argparse.Namespace, state: State) -> tuple[str,
     return action, object_id
 
 
+def delivery_of(options: argparse.Namespace) -> str:
+    """The delivery of `delivery:=NAME`, which may stand in the place of the object. Refused if it is something else."""
+    word = options.delivery
+    if options.object_id.startswith("delivery:="):
+        word, options.object_id = options.object_id, ""
+    name = word.removeprefix("delivery:=")
+    if word and (name == word or not name):
+        raise Refused(f"delivery:=NAME is expected behind the object, got '{word}'")
+    return str(name)
+
+
 def start(brain: Brain, options: argparse.Namespace) -> int:
     """Wait for the hub, then request the action. A refusal that may be temporary is retried until the time limit."""
+    options.action = SHORT_NAMES.get(options.action, options.action)
     deadline, wanted = time.monotonic() + options.wait, options.action
+    delivery = delivery_of(options)
     if not brain.wait_for_state(lambda state: state.in_hub, min(1.0, options.wait)):
         now = brain.state.state.rpartition("/")[2] if brain.state.state else "the brain is starting"
         print(f"[coglab] waiting for the hub, {options.wait:.0f} s at most; now: {now}", file=sys.stderr, flush=True)
@@ -219,7 +236,7 @@ def start(brain: Brain, options: argparse.Namespace) -> int:
                 raise Refused(f"{brain.state.state.rpartition('/')[2]} does not take '{wanted}'; type: {there}")
             continue
         action, object_id = choose(brain.master, options, brain.state)
-        success, message = brain.command("/coglab/start", action, object_id)
+        success, message = brain.command("/coglab/start", action, f"{object_id}/{delivery}" if delivery else object_id)
         if success:
             print(f"{f'{action} {object_id}'.strip()}: {message}; watch: ./coglab status")
             return 0

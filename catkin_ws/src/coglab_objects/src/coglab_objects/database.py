@@ -81,6 +81,25 @@ def _inconsistency(entry: dict[str, Any], dialect: str) -> tuple[Field, str] | N
     return None
 
 
+def checked_delivery(value: Any, origin: str) -> dict[str, Any]:
+    """Check one delivery, as in an object's file. ObjectError: ``origin:line: field: message``."""
+    schema = _schema()
+    one = {**schema["properties"]["deliveries"]["additionalProperties"], "definitions": schema["definitions"]}
+    try:
+        delivery: dict[str, Any] = json.loads(json.dumps(value, default=lambda array: array.tolist()))
+    except (TypeError, ValueError, AttributeError):
+        raise ObjectError(f"{origin}: a dict with 'pose' and 'release' is expected, got {value!r:.80}") from None
+    document = Document(origin, "", delivery, {})
+    try:
+        document.check(one)
+        pose = Pose.from_dict(delivery["pose"])
+        if np.linalg.norm(pose.position) > 1.0:
+            raise YamlError(document.sentence(("pose", "xyz"), "more than 1 m away; lengths are in m"))
+    except (YamlError, ValueError, TypeError) as error:
+        raise ObjectError(str(error)) from None
+    return delivery
+
+
 def _solid(shape: dict[str, Any]) -> tuple[str, list[float]] | None:
     """Name of the shape and the box around it (m); None if the shape has no lengths."""
     if shape["type"] == "box":

@@ -66,6 +66,19 @@ WORD = {"type": "string", "minLength": 1}
 TRIPLE = {"type": "array", "minItems": 3, "maxItems": 3, "items": {"type": "number", "minimum": -10, "maximum": 10}}
 JOINTS = {"type": "array", "minItems": 7, "maxItems": 7, "items": {"type": "number", "minimum": -3.2, "maximum": 3.2}}
 SPEEDS = {"type": "array", "minItems": 7, "maxItems": 7, "items": {"type": "number", "exclusiveMinimum": 0}}
+PART = {"type": "string"}  # "module:function", checked when it is imported
+OWN_ACTION = {
+    "oneOf": [
+        PART,
+        {
+            "type": "object",
+            "additionalProperties": False,
+            "required": ["build"],
+            "properties": {"build": PART, "hand": {"enum": ["empty", "holding", "any"]}},
+        },
+    ]
+}
+LABEL = {"pattern": "^[a-z][a-z0-9_]{0,63}$"}
 ACTIONS = {"offer": "exchange_human_to_robot", "request": "exchange_robot_to_human"}
 PATTERNS = {"centre": "reach_human", "left": "reach_human", "right": "reach_human", "high": "reach_human_high"}
 
@@ -222,6 +235,21 @@ TABLE = (
     _row("take.approach", 0.05, "m", "The last part of the way, straight along the grasp's approach axis.", 0, 0.3),
     _other("take.preshape", "before", "",
            "Preshape before or during the precise motion. Read when the machine is built.", enum=["before", "during"]),
+    _other("grasp.choice", "ranked", "",
+           "Grasp of an object that a person offers. `ranked`: the best one for how it is held; `nominal`: always its "
+           "`default_grasp`, as in D4.10.",
+           enum=["ranked", "nominal"]),
+    _other("actions", {}, "",
+           "Actions of your own: name and `module:function`, or `{build: module:function, hand: empty|holding|any}`. "
+           "Read at the start.",
+           type="object", propertyNames=LABEL, additionalProperties=OWN_ACTION),
+    _other("states", {}, "",
+           "States of your own: `machine/state`, the labels of a shipped state, and the `module:function` of the one "
+           "that replaces it. Read at the start.",
+           type="object", additionalProperties=PART),
+    _other("deliveries", {}, "",
+           "Deliveries of your own, for every object: name and `module:function`. Read at the start.",
+           type="object", propertyNames=LABEL, additionalProperties=PART),
     _other("time_limits", {}, "s",
            "Time limits by state label. They win over the built-in ones.",
            type="object", additionalProperties={"type": "number", "exclusiveMinimum": 0}),

@@ -11,9 +11,10 @@ from typing import Any
 import jsonschema
 
 STARTS = ("initialise", "reset", "exchange_human_to_robot", "exchange_robot_to_human", "take", "put")
-"""Actions of the service coglab/start."""
+"""Actions of the service coglab/start that are shipped. A configuration of the machines can add others."""
 # \Z, because Python's $ also matches before a newline at the end.
 _OBJECT = {"type": "string", "pattern": r"^([a-z][a-z0-9_]{0,31})?\Z"}
+_ACTION = {"type": "string", "pattern": r"^[a-z][a-z0-9_]{0,63}\Z"}
 _NAME = {"type": "string", "pattern": r"^[A-Za-z0-9_./-]{1,64}\Z"}
 _LABEL = {"type": "string", "pattern": r"^[A-Za-z0-9_ .-]{1,40}\Z"}
 # JSON can contain single UTF-16 surrogates, which UTF-8 cannot encode.
@@ -54,8 +55,8 @@ _ALL = (
     Command("parameters", "gives the ROS parameters", {}, operator=False),
     Command("acknowledge", "says that the cause of the stop of this number was read",
             {"stop": {"type": "integer", "minimum": 0}}, ("stop",)),
-    Command("start", "starts an action of the state machine", {"action": {"enum": list(STARTS)}, "object_id": _OBJECT},
-            ("action",), motion=True),
+    Command("start", "starts an action of the state machine",
+            {"action": _ACTION, "object_id": _OBJECT, "delivery": _ACTION}, ("action",), motion=True),
     Command("calibrate", "calibrates the hand", {"mode": {"enum": ["fast", "complete"]}, "force": {"type": "boolean"}},
             ("mode",), motion=True),
     Command("home", "moves the arm to its home posture", {}, motion=True),

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from ..web.fan_out import Documents
-from .commands import BadCommand, judge
+from .commands import STARTS, BadCommand, judge
 from .events import EventLog
 from .experiment import GIVES, TAKES, Experiment, ExperimentError
 from .gates import HeldButton, MotionGuard, Standing, control, reasons
@@ -245,6 +245,7 @@ class Desk:
             "desk",
             {
                 "roles": self.roles.view(),
+                "own": [name for name in now.actions if name not in STARTS],
                 "reasons": reasons(now, self.guard, self.experiment.refusals(now)),
                 "guard": {
                     "stop": self.guard.stops,
@@ -269,7 +270,8 @@ class Desk:
         if command.operator and who != self.roles.operator:
             return f"{who} watches; {self.roles.operator or 'nobody'} is the operator: press Take over first"
         now = self.backend.standing()
-        found = reasons(now, self.guard, self.experiment.refusals(now))
+        asked = [arguments["action"]] if name == "start" else []
+        found = reasons(now, self.guard, self.experiment.refusals(now), asked)
         reason = found.get(control(name, arguments), "")
         return f"{words_of(name, arguments)}: {reason}" if reason else ""
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -223,11 +223,14 @@ def _motion_reason(name: str, now: Standing) -> str:
     return _home_reason(now) if name == "home" else _start_reason(name, now)
 
 
-def reasons(now: Standing, guard: MotionGuard, session: Mapping[str, str] | None = None) -> dict[str, str]:
-    """Reason by control, empty if the control may be used. `session`: reasons of the session and its trials.
+def reasons(
+    now: Standing, guard: MotionGuard, session: Mapping[str, str] | None = None, asked: Sequence[str] = ()
+) -> dict[str, str]:
+    """Reason by control, empty if the control may be used. `session`: reasons of the session and its trials. `asked`:
+    further actions that need a reason, such as one that the machine does not have.
 
     Each browser checks by itself whether it is the operator."""
-    found = {name: _motion_reason(name, now) for name in (*STARTS, *CALIBRATIONS, "home")}
+    found = {name: _motion_reason(name, now) for name in (*STARTS, *now.actions, *CALIBRATIONS, "home", *asked)}
     for name, reason in found.items():
         if not reason and guard.unacknowledged:
             found[name] = "acknowledge the stop first"

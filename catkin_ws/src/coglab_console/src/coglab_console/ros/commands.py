@@ -123,8 +123,8 @@ class RosBackend:
 
     # --- one method per command, in a thread of its own -------------------------------------------------------
 
-    def _start(self, action: str, object_id: str = "") -> Answer:
-        return self._told("coglab/start", Start, action, object_id)
+    def _start(self, action: str, object_id: str = "", delivery: str = "") -> Answer:
+        return self._told("coglab/start", Start, action, f"{object_id}/{delivery}" if delivery else object_id)
 
     def _calibrate(self, mode: str, force: bool = False) -> Answer:
         if self._calibration.get_num_connections() == 0:

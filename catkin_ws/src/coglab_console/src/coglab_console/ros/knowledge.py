@@ -123,6 +123,7 @@ class Knowledge:
                 "mass": self._entries[name].get("mass"),
                 "shape": self._entries[name].get("shape"),
                 "size": self._entries[name].get("size"),
+                "deliveries": list(self._entries[name].get("deliveries") or ()),
                 "text": text[:8000],
             }
             for name, text in sorted(self._texts.items())

@@ -12,6 +12,8 @@ from coglab_py.yaml_file import Document, YamlError, read
 
 from coglab_smach.parameters import BY_NAME, NO_DEFAULT, schema, unknown
 
+AT_START = ("actions", "states", "deliveries")  # parameters that the machines are built from
+
 
 class ConfigError(Exception):
     """The configuration file cannot be used. The sentence names file and field."""
@@ -88,9 +90,15 @@ class Config:
                 return
             self._stamp = stamp
             try:
-                self._values = _read(self.path)
+                values = _read(self.path)
             except ConfigError as error:
                 self._warn(f"{error}; the values read before stay in force")
+                return
+            for name in AT_START:
+                if values.get(name) != self._values.get(name):
+                    self._warn(f"{self.path}: '{name}' has changed; what was read at the start stays in force")
+                values[name] = self._values.get(name, {})
+            self._values = values
 
 
 def _read(path: str) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from coglab_smach.clocks.clock import Clock
 from coglab_smach.context.config import Config
 from coglab_smach.context.holding import HoldingMemory
 from coglab_smach.context.journal import Journal
+from coglab_smach.context.parts import Parts
 from coglab_smach.context.requests import Requests
 from coglab_smach.ports.interfaces import ArmPort, ContactPort, DatabasePort, HandPort, PerceptionPort
 
@@ -51,6 +52,8 @@ class Context:
     config: Config
     journal: Journal
     requests: Requests = None  # type: ignore[assignment]  # made in __post_init__, to report its changes to the journal
+    parts: Parts = None  # type: ignore[assignment]  # made in __post_init__, from the configuration
+    """actions, states and deliveries of a user's package"""
     stop: StopSwitch = field(default_factory=StopSwitch)
     memory: HoldingMemory = field(default_factory=HoldingMemory)
     reachable: Callable[[Pose], bool] = lambda pose: True
@@ -64,6 +67,7 @@ class Context:
 
     def __post_init__(self) -> None:
         self.requests = self.requests or Requests(self.journal.changed)
+        self.parts = self.parts or Parts.load(self.config)
 
     @property
     def holding(self) -> str:

@@ -69,12 +69,15 @@ class ActionRecord:
     causes: tuple[str, ...] = ()
     code: int = 0
     marks: dict[str, float] = field(default_factory=dict)
+    delivery: str = ""
+    """how the object is given; empty where the action gives none"""
 
     def to_dict(self) -> dict[str, Any]:
         """Returns plain types for a result file."""
         return {
             "kind": self.kind,
             "object_id": self.object_id,
+            "delivery": self.delivery,
             "outcome": self.outcome,
             "reason": self.reason,
             "reason_code": self.code,
@@ -212,6 +215,12 @@ class Journal:
         for listener in self._result_listeners:
             listener(action)
         self.changed()
+
+    def delivers(self, name: str) -> None:
+        """The running action gives its object in this way."""
+        with self._lock:
+            if self._action is not None:
+                self._action.delivery = name
 
     def mark(self, name: str) -> None:
         """Store the time of an event of the running action. Only the first event of each name counts."""

@@ -5,17 +5,20 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from coglab_msgs.msg import ReasonCode
 
-from coglab_smach.ports.pending import PortError
+from coglab_smach.context.holding import UNKNOWN
+from coglab_smach.ports.pending import Pending, PortError
 
 if TYPE_CHECKING:
     from coglab_smach.context.context import Context
 
 DATABASE_WAIT = 2.0  # s, time limit of the object database for a trigger
 COMMAND = "./coglab start"  # command that requests an action
+SHORT_NAMES = {"receive": "exchange_human_to_robot", "give": "exchange_robot_to_human"}
+"""Short names of actions that a trigger may use."""
 
 
 def command(*actions: str) -> str:
@@ -25,11 +28,13 @@ def command(*actions: str) -> str:
 
 @dataclass(frozen=True)
 class Request:
-    """One trigger: name of the action, id of its object (may be empty), its source (operator or recognition)."""
+    """One trigger: name of the action, id of its object (may be empty), its source (operator or recognition), and how
+    the object shall be given (empty: its default delivery)."""
 
     action: str
     object_id: str = ""
     source: str = "operator"
+    delivery: str = ""
 
 
 class Answer(NamedTuple):
@@ -105,14 +110,19 @@ class Requests:
             )
         return None
 
-    def submit(self, action: str, object_id: str = "", source: str = "operator") -> Answer:
+    def submit(self, action: str, object_id: str = "", source: str = "operator", delivery: str = "") -> Answer:
         """Request an action. Returns whether a hub accepts it, and one sentence."""
         with self._lock:
             refusal = self._refusal(action, object_id)
             if refusal is not None:
                 return refusal
-            self._request = Request(action, object_id, source)
+            self._request = Request(action, object_id, source, delivery)
             return Answer(True, f"'{action}' accepted by {self._hub}")
+
+    def idle(self) -> bool:
+        """True if a hub waits and no trigger is on its way to it."""
+        with self._lock:
+            return bool(self._hub) and self._request is None
 
     def take(self) -> Request | None:
         """Returns the trigger and removes it; None if there is none."""
@@ -131,32 +141,61 @@ class Requests:
             return self._allowed
 
 
-def ask_for(ctx: Context, action: str, object_id: str = "", source: str = "operator") -> Answer:
-    """Process a trigger from outside. It is refused at once if no hub accepts it or if the database has no such object.
-    Waits at most 2 s for the database."""
+def ask_for(ctx: Context, action: str, object_id: str = "", source: str = "operator", delivery: str = "") -> Answer:
+    """Process a trigger from outside. It is refused at once if no hub accepts it, or if the database has no such object
+    or delivery. Waits at most 2 s for each answer of the database.
+
+    ``action`` may be one of SHORT_NAMES. ``object_id`` may have a delivery behind a slash: "mug/handle_first", or
+    "/handle_first" for the object in the hand.
+    """
+    action = SHORT_NAMES.get(action, action)
+    object_id, _, behind = object_id.partition("/")
+    delivery = delivery or behind
     refusal = ctx.requests.refusal(action, object_id)
     if refusal is not None:
         return refusal
     default = ctx.requests.default_object
     wanted = object_id or default
-    if default is not None and wanted:
-        try:
-            known = _objects(ctx)
-        except PortError as error:
-            again = f"when the database answers, {command(action)} {wanted}"
-            return Answer(False, f"'{action}' refused: {error.sentence}; {again}", error.code)
-        if wanted not in known:
-            return Answer(
-                False,
-                f"'{action}' refused: object '{wanted}' is not in the database; it has: "
-                f"{', '.join(known)}; {command(action)} {known[0] if known else 'OBJECT'}",
-                ReasonCode.OBJECT_UNKNOWN,
-            )
-    return ctx.requests.submit(action, object_id, source)
+    try:
+        if default is not None and wanted:
+            known = sorted(_answer(ctx, ctx.database.list_objects()))
+            if wanted not in known:
+                return Answer(
+                    False,
+                    f"'{action}' refused: object '{wanted}' is not in the database; it has: "
+                    f"{', '.join(known)}; {command(action)} {known[0] if known else 'OBJECT'}",
+                    ReasonCode.OBJECT_UNKNOWN,
+                )
+        refusal = _delivery_refusal(ctx, action, object_id, delivery) if delivery else None
+    except PortError as error:
+        again = f"when the database answers, {command(action)} {wanted or ''}".rstrip()
+        return Answer(False, f"'{action}' refused: {error.sentence}; {again}", error.code)
+    return refusal or ctx.requests.submit(action, object_id, source, delivery)
 
 
-def _objects(ctx: Context) -> list[str]:
-    pending = ctx.database.list_objects()
+def _delivery_refusal(ctx: Context, action: str, object_id: str, delivery: str) -> Answer | None:
+    """Returns the reason why the object in the hand cannot be given in this way; None if it can."""
+    if not ctx.holding or action == "put":
+        why = "'put' puts the object on the board" if ctx.holding else "the hand is empty"
+        return Answer(
+            False,
+            f"'{action}' refused: a delivery is how an object is given, and {why}; leave delivery '{delivery}' out",
+            ReasonCode.INVALID_ARGUMENT,
+        )
+    held = object_id if ctx.holding == UNKNOWN else ctx.holding
+    known = [*_answer(ctx, ctx.database.get_object(held))["deliveries"], *ctx.parts.deliveries]
+    if delivery in known:
+        return None
+    return Answer(
+        False,
+        f"'{action}' refused: '{held}' has no delivery '{delivery}'; it has: {', '.join(known)}; "
+        f"{command(action)} {held} delivery:={known[0]}",
+        ReasonCode.UNKNOWN_NAME,
+    )
+
+
+def _answer(ctx: Context, pending: Pending) -> Any:
+    """Returns the answer of the object database. PortError if it does not come within DATABASE_WAIT."""
     end = ctx.clock.now() + DATABASE_WAIT
     while not pending.done():
         if ctx.clock.now() >= end:
@@ -166,4 +205,4 @@ def _objects(ctx: Context) -> list[str]:
                 code=ReasonCode.NODE_SILENT,
             )
         ctx.clock.sleep(0.01)
-    return sorted(pending.result())
+    return pending.result()

@@ -15,6 +15,7 @@ from coglab_smach.context.config import ConfigError
 from coglab_smach.context.context import Context
 from coglab_smach.context.grip import Grip
 from coglab_smach.context.journal import Failure, Wait
+from coglab_smach.context.parts import built, type_name
 from coglab_smach.context.requests import command
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.motion import end_motion
@@ -288,6 +289,24 @@ class _Placed:
         """Set label, container and transitions of a child."""
         state.label, state.container, state.targets = label, self, dict(transitions)
 
+    def own_or(self, label: str, shipped: Any) -> Any:
+        """Returns the user's state for this place of the machine (``states`` in machines.yaml); without one, the
+        shipped state. ConfigError if the user's state cannot stand there."""
+        parts, place = self.ctx.parts, f"{self.label}/{label}"
+        parts.places.add(place)
+        if place not in parts.states:
+            return shipped
+        state = built(f"states.{place}", parts.states[place], self.ctx)
+        if not isinstance(state, CoglabState | CoglabMachine | CoglabConcurrence):
+            raise ConfigError(f"states.{place}: a CoglabState is expected, its function returned {type_name(state)}")
+        outcomes, allowed = set(state.get_registered_outcomes()), set(shipped.get_registered_outcomes())
+        if outcomes != allowed:
+            raise ConfigError(
+                f"states.{place}: its outcomes have to be {', '.join(sorted(allowed))}; they are "
+                f"{', '.join(sorted(outcomes))}"
+            )
+        return state
+
     def record_end(self, outcome: str | None) -> None:
         """Record the container's own transition; its reason is the first failure. Close the record of an action."""
         if outcome is None:
@@ -336,6 +355,7 @@ class CoglabMachine(_Placed, smach.StateMachine):
         self, label: str, state: Any, transitions: Mapping[str, str], remapping: Mapping[str, str] | None = None
     ) -> Any:
         """Add a state inside ``with machine:``. An outcome without a transition must be an outcome of the machine."""
+        state = self.own_or(label, state)
         smach.StateMachine.add(label, state, transitions=dict(transitions), remapping=dict(remapping or {}))
         self.adopt(label, state, transitions)
         return state
@@ -375,6 +395,7 @@ class CoglabConcurrence(_Placed, smach.Concurrence):
 
     def add_state(self, label: str, state: Any, remapping: Mapping[str, str] | None = None) -> Any:
         """Add a child inside ``with concurrence:``."""
+        state = self.own_or(label, state)
         smach.Concurrence.add(label, state, remapping=dict(remapping or {}))
         self.adopt(label, state, {})
         return state

@@ -53,7 +53,9 @@ class Hub(CoglabState):
 
     def __init__(self, ctx: Context, actions: Sequence[str], with_object: bool) -> None:
         known = ["object_entry", "grasp", "grasp_name"] if with_object else []
-        super().__init__(ctx, outcomes=[*actions, "stopped"], io_keys=["object_id", *known])
+        super().__init__(
+            ctx, outcomes=[*actions, "stopped"], output_keys=["delivery_name"], io_keys=["object_id", *known]
+        )
         self.actions = tuple(actions)
         self.with_object = with_object
         self._blocked_since: float | None = None
@@ -90,6 +92,7 @@ class Hub(CoglabState):
             self.ctx.journal.transition(
                 self.path(), self.label, "refused", self.label, refusal, (), ReasonCode.OBJECT_UNKNOWN
             )
+        ud.delivery_name = request.delivery
         self.reason += f"{request.source} asked for {request.action} of '{ud.object_id}'"
         return request.action
 

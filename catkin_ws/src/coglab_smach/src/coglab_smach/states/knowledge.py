@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from coglab_msgs.msg import ReasonCode, Say
+from coglab_objects.database import ObjectError, checked_delivery
 from coglab_py.pose import Pose, mean_pose
 
 from coglab_smach.context.context import Context
@@ -249,9 +250,12 @@ class SetGraspGoal(CoglabState):
     def _goals(self, entry: Mapping[str, Any], seen: Mapping[str, Any], grip: Grip) -> list[dict[str, Any]]:
         """Returns one goal for each grasp of the object as it was seen, best first."""
         config = self.ctx.config
-        names = ranked(entry, Pose.from_dict(seen), person_at(self), palm_at(self.ctx), self._grasp_name)
-        # Modes that some hands have only as firm are used only for objects without another mode.
-        names = [name for name in names if closes_gently(entry["grasps"][name])] or names
+        if config.text("grasp.choice") == "nominal":
+            names = [entry["default_grasp"]]
+        else:
+            names = ranked(entry, Pose.from_dict(seen), person_at(self), palm_at(self.ctx), self._grasp_name)
+            # Modes that some hands have only as firm are used only for objects without another mode.
+            names = [name for name in names if closes_gently(entry["grasps"][name])] or names
         if names[0] != self._grasp_name:
             self._grasp_name, hand = names[0], gentle(entry["grasps"][names[0]])
             grip.preshaped = False
@@ -307,6 +311,7 @@ class SetTakeGoal(CoglabState):
 
 class SetDeliveryGoal(CoglabState):
     """DMP goal from the delivery mode: the pose of the palm, relative to the person's hand, that offers the object.
+    The request names the delivery, or it is the object's default.
 
     Ends when the person's hand is in the handover region: before, nobody requests the object.
     """
@@ -317,25 +322,46 @@ class SetDeliveryGoal(CoglabState):
         super().__init__(
             ctx,
             input_keys=["object_entry", "grasp"],
-            output_keys=["goal", "delivery", "delivery_name", "delivery_pose"],
+            output_keys=["goal", "delivery", "delivery_pose"],
+            io_keys=["delivery_name"],
         )
 
     def run(self, ud: Any) -> str:
-        entry = ud.object_entry
+        entry, grasp = ud.object_entry, ud.grasp
         self.ctx.say(Say.READY_TO_GIVE, "Please take the object out of my hand.")
-        name = entry["default_delivery"]
-        delivery = entry["deliveries"][name]
-        ud.delivery_name = name
-        ud.delivery = delivery
-        goal = paced(self.ctx, delivery_goal(entry, ud.grasp, delivery, ""))
+        name = ud.delivery_name or entry["default_delivery"]
+        self.reason = f"delivery '{name}'"
+        self.ctx.journal.delivers(name)
+
+        def goals(seen: Mapping[str, Any]) -> list[dict[str, Any]]:
+            ud.delivery = delivery = self._delivery(name, entry, seen)
+            return [paced(self.ctx, delivery_goal(entry, grasp, delivery, ""))]
+
         margin = self.ctx.config.number("handover.hand_margin")
         hand = hand_name(self.ctx)
         # A hand does not fall. A sinking hand has moved lower and is followed, or has gone back.
-        asked = await_offer(self, hand, lambda seen: [goal], margin)
+        asked = await_offer(self, hand, goals, margin)
         goal = unless_withdrawn(self.ctx, asked, margin, may_fall=False)
+        ud.delivery_name = name
         ud.delivery_pose = {"xyz": goal["offset"], "quaternion": goal["orientation"]}
         ud.goal = goal
         return "succeeded"
+
+    def _delivery(self, name: str, entry: Mapping[str, Any], seen: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Returns a delivery of the object's file, or the user's one for the hand as it is seen. PortError if there is
+        none of that name, or if the user's is no delivery."""
+        mine = self.ctx.parts.deliveries.get(name)
+        if mine is None:
+            if name not in entry["deliveries"]:
+                raise PortError(
+                    f"'{entry['id']}' has no delivery '{name}'; it has: {', '.join(entry['deliveries'])}",
+                    code=ReasonCode.UNKNOWN_NAME,
+                )
+            return entry["deliveries"][name]
+        try:
+            return checked_delivery(mine(entry, Pose.from_dict(seen)), f"deliveries.{name}")
+        except ObjectError as error:
+            raise PortError(str(error), code=ReasonCode.BAD_FILE) from None
 
 
 class FindPlace(CoglabState):

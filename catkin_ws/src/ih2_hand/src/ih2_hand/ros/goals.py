@@ -17,7 +17,6 @@ from typing import Any
 
 import actionlib
 import rospy
-from actionlib_msgs.msg import GoalID
 from coglab_msgs.msg import (
     HandCloseAction,
     HandCloseFeedback,
@@ -33,7 +32,8 @@ from coglab_msgs.msg import (
     HandPreshapeResult,
     HandStatus,
 )
-from coglab_py.steady import SteadyTimer, ending, worker
+from coglab_py.action_server import ActionServer
+from coglab_py.steady import ending, worker
 
 from ih2_hand.errors import HandError
 from ih2_hand.progress import RESENDS, Task, Verdict
@@ -82,41 +82,6 @@ class Running:
     watched: float = 0.0  # s since the command; each gap between polls counts at most LONGEST_GAP_S
 
 
-class HandActionServer(actionlib.ActionServer):
-    """An action server that keeps accepting goals after any cancel and any step of the clock.
-
-    actionlib refuses every goal that is older than the newest stamp of a cancel request: after one
-    request with a stamp of the year 2106 it accepts no goal any more. Its timer publishes no status
-    while /clock stands still, and ends when /clock steps back.
-    """
-
-    last_cancel: Any
-
-    @property
-    def status_frequency(self) -> float:
-        """0, so that actionlib creates no timer."""
-        return 0.0
-
-    @status_frequency.setter
-    def status_frequency(self, frequency: float) -> None:
-        self._frequency = frequency
-
-    def initialize(self) -> None:
-        super().initialize()
-        if self._frequency > 0.0:
-            period = 1.0 / self._frequency
-            self.status_timer = SteadyTimer(period, lambda: self.publish_status_async(None), "action_status")
-
-    def internal_goal_callback(self, goal: Any) -> None:
-        if self.last_cancel > rospy.Time.now():  # the clock stepped back
-            self.last_cancel = rospy.Time()
-        super().internal_goal_callback(goal)
-
-    def internal_cancel_callback(self, goal_id: GoalID) -> None:
-        goal_id.stamp = min(goal_id.stamp, rospy.Time.now())
-        super().internal_cancel_callback(goal_id)
-
-
 class GoalQueue:
     """Runs one goal at a time. `owner` is the hand node (driver, preshape and events)."""
 
@@ -127,7 +92,7 @@ class GoalQueue:
         self._newest: Any = None  # the last goal that arrived
         self._servers = {}
         for name, (action, _, _) in SPECS.items():
-            self._servers[name] = HandActionServer(
+            self._servers[name] = ActionServer(
                 rospy.resolve_name("~" + name),
                 action,
                 lambda handle, name=name: self._on_goal(name, handle),
