@@ -69,9 +69,11 @@ add_library(coglab_controllers_plugins
   src/goal/goal_input.cpp
   src/motion/custom_motion_controller.cpp
   src/motion/hold.cpp
+  src/motion/joint_spline.cpp
   src/motion/reference_loop.cpp
   src/plugins/dmp_controller.cpp
   src/plugins/dmp_cycle.cpp
+  src/plugins/joint_trajectory.cpp
   src/plugins/ptp_controller.cpp
   src/plugins/stream_controller.cpp
   src/remote/slot.cpp)

@@ -20,16 +20,7 @@ MotionController* CustomMotionController::make(std::unique_ptr<Motion<>> motion,
 
 CustomMotionController::~CustomMotionController() = default;
 
-void CustomMotionController::report(std::int64_t stamp_ns) {
-  MotionProgress now;
-  now.stamp_ns = stamp_ns;
-  now.id = runningId();
-  now.state = state();
-  now.reason = reason();
-  now.time = time();
-  now.queued = queued();
-  progress_.write(now);
-}
+void CustomMotionController::report(std::int64_t stamp_ns) { progress_.write(progress(stamp_ns)); }
 
 std::string CustomMotionController::describeArguments() const {
   std::ostringstream text;

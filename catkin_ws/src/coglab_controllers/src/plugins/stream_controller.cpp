@@ -18,7 +18,13 @@ Vector shortened(const Vector& vector, double most) {
   return length > most ? Vector(vector * (most / length)) : vector;
 }
 
-/// What both streams share: the newest command, its age, and rest while there is none.
+constexpr double kClocks = 0.05;  // s that the clocks of two computers may differ
+
+double readTimeout(const Parameters& parameters) {
+  return parameters.number("command_timeout", 0.1, 0.005, 10.0);
+}
+
+/// What all streams share: the newest command, its age, and rest while there is none.
 class StreamMotion : public Motion<StreamRequest> {
  public:
   StreamMailbox mailbox;
@@ -26,8 +32,7 @@ class StreamMotion : public Motion<StreamRequest> {
   void configure(MotionConfiguration& configuration) override {
     robot_ = configuration.setup.robot;
     const Parameters& parameters = configuration.parameters;
-    timeout_ns_ =
-        static_cast<std::int64_t>(1e9 * parameters.number("command_timeout", 0.1, 0.005, 10.0));
+    timeout_ns_ = static_cast<std::int64_t>(1e9 * readTimeout(parameters));
     waiting_ = Reason(ReasonCode::GoalStale, "the stream is open and has no command newer than ")
                << 1e-9 * static_cast<double>(timeout_ns_) << " s: the arm stands";
     configureStream(parameters);
@@ -49,7 +54,7 @@ class StreamMotion : public Motion<StreamRequest> {
     }
     if (resting_) restart(commanded(cycle.input));
     resting_ = false;
-    follow(cycle, newest_.velocity, cycle.next - cycle.time, reference);
+    follow(cycle, newest_, cycle.next - cycle.time, reference);
   }
 
   MotionState state() const override {
@@ -67,7 +72,7 @@ class StreamMotion : public Motion<StreamRequest> {
   /// The reference goes on from here.
   virtual void restart(const SetPoint& from) = 0;
   /// @param dt s of motion time until the next cycle
-  virtual void follow(const MotionCycle& cycle, const JointVector& command, double dt,
+  virtual void follow(const MotionCycle& cycle, const StreamCommand& command, double dt,
                       MotionReference& reference) = 0;
 
   const Pose& commandedTool(const CycleInput& input) {
@@ -97,7 +102,8 @@ class StreamMotion : public Motion<StreamRequest> {
   ChainState commanded_;  // kinematics at the commanded joints
 };
 
-class TwistMotion : public StreamMotion {
+/// What twists and poses share: speeds, accelerations, and the leash to the commanded arm.
+class ToolMotion : public StreamMotion {
  protected:
   void configureStream(const Parameters& parameters) override {
     max_speed_ = parameters.number("max_speed", 0.8, 0.01, 5.0);
@@ -116,18 +122,23 @@ class TwistMotion : public StreamMotion {
     turning_ = from.angular_velocity;
   }
 
-  void follow(const MotionCycle& cycle, const JointVector& command, double dt,
-              MotionReference& reference) override {
-    const Vector3 linear = shortened(Vector3(command.head<3>()), max_speed_);
-    const Vector3 angular = shortened(Vector3(command.segment<3>(3)), max_turning_);
-    velocity_ += shortened(Vector3(linear - velocity_), max_acceleration_ * dt);
-    turning_ += shortened(Vector3(angular - turning_), max_turning_acceleration_ * dt);
+  /// Goes on toward this twist in the base frame.
+  void steer(const CycleInput& input, const Vector3& linear, const Vector3& angular, double dt,
+             MotionReference& reference) {
+    const Vector3 way = shortened(linear, max_speed_) - velocity_;
+    const Vector3 turn = shortened(angular, max_turning_) - turning_;
+    velocity_ += shortened(way, max_acceleration_ * dt);
+    turning_ += shortened(turn, max_turning_acceleration_ * dt);
     const Pose next = leashed({pose_.position + dt * velocity_,
                                (expRotation(dt * turning_) * pose_.orientation).normalized()},
-                              commandedTool(cycle.input));
+                              commandedTool(input));
     reference.pose(pose_, next);
     pose_ = next;
   }
+
+  double max_speed_ = 0.8, max_turning_ = 3.0, max_acceleration_ = 3.0;
+  double max_turning_acceleration_ = 12.0, leash_ = 0.02;
+  Pose pose_;  // of the reference, now
 
  private:
   Pose leashed(const Pose& pose, const Pose& tool) const {
@@ -138,11 +149,44 @@ class TwistMotion : public StreamMotion {
 
   static constexpr double kTurnPerWay = 10.0;  // rad/m
 
-  double max_speed_ = 0.8, max_turning_ = 3.0, max_acceleration_ = 3.0;
-  double max_turning_acceleration_ = 12.0, leash_ = 0.02;
-  Pose pose_;                           // of the reference, now
   Vector3 velocity_ = Vector3::Zero();  // m/s of motion time
   Vector3 turning_ = Vector3::Zero();   // rad/s of motion time
+};
+
+class TwistMotion : public ToolMotion {
+  void follow(const MotionCycle& cycle, const StreamCommand& command, double dt,
+              MotionReference& reference) override {
+    Vector3 linear = command.numbers.head<3>(), angular = command.numbers.segment<3>(3);
+    if (command.in_tool) {
+      linear = pose_.orientation * linear;
+      angular = pose_.orientation * angular;
+    }
+    steer(cycle.input, linear, angular, dt, reference);
+  }
+};
+
+class PoseMotion : public ToolMotion {
+  void configureStream(const Parameters& parameters) override {
+    ToolMotion::configureStream(parameters);
+    gain_ = parameters.number("gain", 10.0, 0.1, 50.0);
+  }
+
+  void follow(const MotionCycle& cycle, const StreamCommand& command, double dt,
+              MotionReference& reference) override {
+    const Vector3 goal = robot_->workspace.project(command.numbers.head<3>());
+    const Quaternion orientation(command.numbers.tail<4>());  // x y z w
+    steer(cycle.input, toward(goal - pose_.position, max_acceleration_),
+          toward(rotationBetween(pose_.orientation, orientation), max_turning_acceleration_), dt,
+          reference);
+  }
+
+  /// Velocity for a way (m or rad): by the gain near its end, and from further away one from which
+  /// half of the acceleration is enough to stop there.
+  Vector3 toward(const Vector3& way, double acceleration) const {
+    return shortened(Vector3(gain_ * way), std::sqrt(acceleration * way.norm()));
+  }
+
+  double gain_ = 10.0;  // 1/s
 };
 
 class JointMotion : public StreamMotion {
@@ -160,11 +204,12 @@ class JointMotion : public StreamMotion {
     velocity_ = from.joint_velocity;
   }
 
-  void follow(const MotionCycle& cycle, const JointVector& command, double dt,
+  void follow(const MotionCycle& cycle, const StreamCommand& command, double dt,
               MotionReference& reference) override {
     const coglab_rt::JointLimits& limits = robot_->limits;
-    const double share = std::max(1.0, (command.array() / max_velocity_.array()).abs().maxCoeff());
-    const JointVector wanted = command / share;
+    const double share =
+        std::max(1.0, (command.numbers.array() / max_velocity_.array()).abs().maxCoeff());
+    const JointVector wanted = command.numbers / share;
     delay_ = cycle.input.robot.stop_delay + kDelay;
     JointVector next;
     for (int i = 0; i < kMaxJoints; ++i) {
@@ -219,28 +264,50 @@ MotionAnswer StreamController::open() {
   return offer(begun, {setup().host->now_ns()}, false);
 }
 
-Answer StreamController::send(const std::vector<double>& velocity) {
-  if (velocity.size() != names_.size()) {
-    std::string text = "a command of '" + id() + "' has " + std::to_string(velocity.size()) +
+void StreamController::configure(const MotionSetup& setup) {
+  timeout_ = readTimeout(Parameters(setup.parameters, setup.id));
+  MotionRunner<StreamRequest>::configure(setup);
+}
+
+Answer StreamController::send(const StreamMessage& message) {
+  const std::vector<double>& numbers = message.numbers;
+  if (numbers.size() != names_.size()) {
+    std::string text = "a command of '" + id() + "' has " + std::to_string(numbers.size()) +
                        " numbers; expected " + std::to_string(names_.size()) + " (" + units_ +
                        "), in the order";
     for (const std::string& name : names_) text += " " + name;
     return Answer::invalid(text);
   }
   StreamCommand command;
-  for (std::size_t i = 0; i < velocity.size(); ++i) {
-    if (!std::isfinite(velocity[i])) {
+  command.in_tool = message.in_tool;
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    if (!std::isfinite(numbers[i])) {
       return Answer::invalid(names_[i] + " of a command of '" + id() +
                              "' is not finite; expected finite numbers, " + units_);
     }
-    command.velocity[static_cast<Eigen::Index>(i)] = velocity[i];
+    command.numbers[static_cast<Eigen::Index>(i)] = numbers[i];
+  }
+  if (const std::string text = wrong(numbers); !text.empty())
+    return Answer::invalid("a command of '" + id() + "' has " + text);
+  if (!(message.age <= timeout_)) {
+    return Answer::refusal(ReasonCode::GoalStale,
+                           "a command of '" + id() + "' is " + std::to_string(message.age) +
+                               " s old by its stamp; allowed: " + std::to_string(timeout_) +
+                               " s (command_timeout); compare the computers' clocks");
+  }
+  if (message.age < -kClocks) {
+    return Answer::refusal(ReasonCode::GoalFromFuture,
+                           "a command of '" + id() + "' is from " + std::to_string(-message.age) +
+                               " s in the future by its stamp; compare the computers' clocks");
   }
   if (!isOpen()) {
-    return Answer::refusal(ReasonCode::NotActive, "the stream '" + id() +
-                                                      "' is not open; open it first, also after a "
-                                                      "cancel, a hold or a switch");
+    return Answer::refusal(ReasonCode::NotActive,
+                           "the stream '" + id() +
+                               "' is not open; open it with start_motion, also after a cancel, a "
+                               "hold or a switch");
   }
-  command.stamp_ns = setup().host->now_ns();
+  command.stamp_ns =
+      setup().host->now_ns() - static_cast<std::int64_t>(1e9 * std::max(message.age, 0.0));
   const std::lock_guard<std::mutex> lock(sending_);
   mailbox_.write(command);
   return {};
@@ -251,8 +318,9 @@ void StreamController::adopt(const CycleInput& input) {
   open_.store(stage() != RunnerStage::Rest, std::memory_order_relaxed);
 }
 
-void StreamController::report(std::int64_t) {
+void StreamController::report(std::int64_t stamp_ns) {
   open_.store(stage() != RunnerStage::Rest, std::memory_order_relaxed);
+  progress_.write(progress(stamp_ns));
 }
 
 namespace {
@@ -272,6 +340,22 @@ TwistStream::TwistStream()
         return Parts{
             std::move(motion), mailbox, {"vx", "vy", "vz", "wx", "wy", "wz"}, "m/s and rad/s"};
       }()) {}
+
+PoseStream::PoseStream()
+    : StreamController([] {
+        auto [motion, mailbox] = make<PoseMotion>();
+        return Parts{std::move(motion),
+                     mailbox,
+                     {"x", "y", "z", "qx", "qy", "qz", "qw"},
+                     "m and a unit quaternion"};
+      }()) {}
+
+std::string PoseStream::wrong(const std::vector<double>& numbers) const {
+  const Quaternion orientation(numbers[6], numbers[3], numbers[4], numbers[5]);
+  if (isUnit(orientation)) return {};
+  return "a quaternion of length " + std::to_string(orientation.norm()) +
+         "; expected a unit quaternion qx qy qz qw, for example that of the hand now";
+}
 
 JointVelocityStream::JointVelocityStream()
     : StreamController([] {

@@ -141,6 +141,8 @@ Answer ManagerRos::load(const std::string& id, const std::string& type) {
     RosContext context;
     context.tf = tf_.get();
     context.listener = tf_listener_.get();
+    context.take_arm = [this, id] { return takeArm(id); };
+    context.cancel = [this, id](const std::string& why) { manager_->askCancel(id, why); };
     side->ros->attach(controller, ros::NodeHandle(node_, id), context);
     const std::lock_guard<std::mutex> lock(sides_mutex_);
     sides_.push_back(std::move(side));
@@ -177,6 +179,19 @@ Answer ManagerRos::switchTo(const std::string& id, std::string& type) {
     if (options_.controller_active) options_.controller_active(!id.empty());
   }
   return answer;
+}
+
+Answer ManagerRos::takeArm(const std::string& id) {
+  std::string active, type;
+  manager_->active(active, type);
+  const CycleReport now = manager_->report();
+  const bool moves = now.motion == MotionState::Running || now.motion == MotionState::Holding;
+  if (active != id && moves && !now.fault) {
+    return Answer::refusal(ReasonCode::Busy, "controller '" + active +
+                                                 "' moves the arm; end its motion first (service " +
+                                                 active + "/cancel of the controller manager)");
+  }
+  return switchTo(id, type);
 }
 
 bool ManagerRos::onLoad(coglab_msgs::LoadController::Request& request,

@@ -64,6 +64,11 @@ ManagerSettings readManagerSettings(const ros::NodeHandle& node) {
   ManagerSettings settings =
       readManagerSettings(tree, robotModel(node, parameters), readJointLimits(node), false);
   settings.feedback_file = resolve(settings.feedback_file);
+  // Controllers of which only the ROS side has a library; a program without ROS links them.
+  for (const char* stream :
+       {"coglab/TwistStream", "coglab/PoseStream", "coglab/JointVelocityStream"})
+    settings.types.emplace(stream, "libcoglab_streams.so");
+  settings.types.emplace("coglab/JointTrajectory", "libcoglab_joint_trajectory.so");
   return settings;
 }
 

@@ -19,16 +19,6 @@ struct MotionRequestByName {
   bool queue = false;              ///< true: start after the current motion; false: replace it
 };
 
-/// Progress of the current motion, for motion_feedback.
-struct MotionProgress {
-  std::int64_t stamp_ns = 0;
-  int id = -1;  ///< of the current or last motion; -1: none yet
-  MotionState state = MotionState::Idle;
-  Reason reason;
-  double time = 0.0;  ///< s since the start, in motion time
-  int queued = 0;
-};
-
 /// The numbers of the file that is being compiled, for libraries of motions: what they share with
 /// the program beside what motionAbi() names. The first one is raised when meanings change. Static,
 /// so that a library keeps its own.

@@ -38,6 +38,16 @@ struct EndedMotion {
   Reason reason;          ///< reason of the abort; else empty
 };
 
+/// Progress of the current motion, for motion_feedback.
+struct MotionProgress {
+  std::int64_t stamp_ns = 0;
+  int id = -1;  ///< of the current or last motion; -1: none yet
+  MotionState state = MotionState::Idle;
+  Reason reason;
+  double time = 0.0;  ///< s since the start, in motion time
+  int queued = 0;
+};
+
 /// Settings of a runner.
 struct RunnerPolicy {
   /// true: the motion continues after it has reached its goal, because the goal may move again.
@@ -106,6 +116,10 @@ class MotionRunner : public MotionController {
   int runningId() const { return current_.id; }  ///< control thread; of the current or last motion
   int queued() const { return queued_; }         ///< control thread
   double time() const { return time_; }          ///< control thread; s, motion time
+  /// Control thread.
+  MotionProgress progress(std::int64_t stamp_ns) const {
+    return {stamp_ns, current_.id, state_, reason_, time_, queued_};
+  }
 
  private:
   /// One request, passed to the cycle and kept there.

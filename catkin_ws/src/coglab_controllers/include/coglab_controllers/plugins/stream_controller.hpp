@@ -1,5 +1,6 @@
 /// @file
-/// Motion controllers that follow a stream of velocities: a twist of the hand, or joint velocities.
+/// Motion controllers that follow a stream: twists of the hand, poses of the hand, or joint
+/// velocities.
 #pragma once
 
 #include <atomic>
@@ -14,10 +15,18 @@
 
 namespace coglab_controllers {
 
-/// One command of a stream.
+/// One command of a stream, for the control cycle.
 struct StreamCommand {
-  JointVector velocity = JointVector::Zero();  ///< a twist has six numbers, the seventh is 0
-  std::int64_t stamp_ns = 0;                   ///< when it was sent, MotionHost::now_ns()
+  JointVector numbers = JointVector::Zero();  ///< a twist has six, the seventh is 0
+  std::int64_t stamp_ns = 0;                  ///< when it was made, MotionHost::now_ns()
+  bool in_tool = false;                       ///< a twist in the axes of the tool frame
+};
+
+/// One command of a stream, from a user.
+struct StreamMessage {
+  std::vector<double> numbers;  ///< as the kind of stream says
+  double age = 0.0;             ///< s since it was made; negative: from the future
+  bool in_tool = false;         ///< twists: in the axes of the tool frame, as the hand turns
 };
 
 /// The commands of a stream, from the sender to the control cycle. The cycle reads without waiting.
@@ -35,19 +44,28 @@ struct StreamRequest {
 ///
 /// Commands are reduced to the largest speeds below, in their direction; changes of velocity to the
 /// largest accelerations. The reference stays within `leash` of the commanded arm, so
-/// that it does not run ahead while a limit holds the arm.
+/// that it does not run ahead while a limit holds the arm. Of several commands within a cycle the
+/// newest counts.
 ///
 /// Parameters: those of MotionRunner without a queue, and `command_timeout` (s, default 0.1).
 class StreamController : public MotionRunner<StreamRequest> {
  public:
   /// Opens the stream, or opens it anew. Any thread.
   MotionAnswer open();
-  /// Sends one command; refused if the stream is not open, for a wrong size, and for a number that
-  /// is not finite. Any thread but the control thread.
-  Answer send(const std::vector<double>& velocity);
+  /// Sends one command; refused if the stream is not open, for a wrong size, for a number that
+  /// is not finite, for an age above `command_timeout`, and from the future. Any thread but the
+  /// control thread.
+  Answer send(const StreamMessage& message);
+  Answer send(const std::vector<double>& numbers) { return send({numbers, 0.0, false}); }
   /// True while the stream is open.
   bool isOpen() const { return open_.load(std::memory_order_relaxed); }
+  /// Newest progress; one reader thread.
+  bool readProgress(MotionProgress& progress) { return progress_.read(progress); }
+  const std::string& baseFrame() const { return setup().robot->chain.baseLink(); }
+  const std::vector<std::string>& jointNames() const { return setup().robot->chain.jointNames(); }
+  double commandTimeout() const { return timeout_; }  ///< s
 
+  void configure(const MotionSetup& setup) override;
   void adopt(const CycleInput& input) override;
 
  protected:
@@ -62,7 +80,11 @@ class StreamController : public MotionRunner<StreamRequest> {
 
  private:
   void report(std::int64_t stamp_ns) override;
+  /// What else is wrong with numbers of the right size; empty: nothing.
+  virtual std::string wrong(const std::vector<double>& /*numbers*/) const { return {}; }
 
+  double timeout_ = 0.1;  // s
+  coglab_rt::TripleBuffer<MotionProgress> progress_;
   StreamMailbox& mailbox_;
   const std::vector<std::string> names_;
   const std::string units_;
@@ -70,14 +92,26 @@ class StreamController : public MotionRunner<StreamRequest> {
   std::atomic<bool> open_{false};
 };
 
-/// Follows twists of the tool frame: linear (m/s), then angular (rad/s), axes of the base frame.
-/// Parameters besides those of StreamController: `max_speed` (m/s, default 0.8, and at
-/// most 0.8 times `hand_speed_limit`), `max_turning`
+/// Follows twists of the tool frame: linear (m/s, of its origin), then angular (rad/s), in the axes
+/// of the base frame or of the tool frame. Parameters besides those of StreamController:
+/// `max_speed` (m/s, default 0.8, and at most 0.8 times `hand_speed_limit`), `max_turning`
 /// (rad/s, 3.0), `max_acceleration` (m/s^2, 3.0), `max_turning_acceleration` (rad/s^2, 12.0),
 /// `leash` (m, 0.02; the same number of tenths of a radian for the orientation).
 class TwistStream : public StreamController {
  public:
   TwistStream();
+};
+
+/// Follows poses of the tool frame in the base frame: position (m), then a unit quaternion
+/// x y z w. The hand goes to the newest pose within the limits of TwistStream, whose parameters it
+/// has, and slows before it by `gain` (1/s, default 10). A position outside the workspace is
+/// followed to its border.
+class PoseStream : public StreamController {
+ public:
+  PoseStream();
+
+ private:
+  std::string wrong(const std::vector<double>& numbers) const override;
 };
 
 /// Follows joint velocities (rad/s), seven in wire order. A joint near its stop brakes by itself;

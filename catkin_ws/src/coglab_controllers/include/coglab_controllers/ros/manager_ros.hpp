@@ -91,6 +91,8 @@ class ManagerRos {
   Answer load(const std::string& id, const std::string& type);
   void detach(const std::string& id, std::shared_ptr<const LoadedMotion> motion);
   Answer switchTo(const std::string& id, std::string& type);
+  /// Switches to a controller unless another one moves the arm.
+  Answer takeArm(const std::string& id);
   void loadFromParameters();
   std::vector<std::shared_ptr<Side>> sides();
   void goalLoop();

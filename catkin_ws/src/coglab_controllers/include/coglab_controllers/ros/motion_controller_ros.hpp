@@ -2,6 +2,9 @@
 /// ROS side of a motion controller plug-in: its services and topics below its id.
 #pragma once
 
+#include <functional>
+#include <string>
+
 #include <ros/console.h>
 #include <ros/node_handle.h>
 #include <tf2_ros/buffer.h>
@@ -29,6 +32,12 @@ inline ros::console::Level endLevel(const Reason& why) {
 struct RosContext {
   tf2_ros::Buffer* tf = nullptr;         ///< outlives the ROS sides
   const TfListener* listener = nullptr;  ///< fills the buffer
+  /// Makes this controller the active one; refused while a motion of another one moves the arm. Not
+  /// from the publisher's or the goal thread, because it waits for the cycle.
+  std::function<Answer()> take_arm;
+  /// Ends this controller's motion with the next cycle. Does not wait.
+  /// @param why who or what ends it, for the log
+  std::function<void(const std::string& why)> cancel;
 };
 
 /// Base class of ROS sides. The plug-in's library makes one with each controller

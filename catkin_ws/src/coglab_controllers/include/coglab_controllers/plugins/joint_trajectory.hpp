@@ -1,0 +1,122 @@
+/// @file
+/// Motion controller that follows joint trajectories, as planners make them.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <deque>
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "coglab_controllers/motion/joint_spline.hpp"
+#include "coglab_controllers/motion/motion_runner.hpp"
+#include "coglab_rt/triple_buffer.hpp"
+
+namespace coglab_controllers {
+
+/// What a client of control_msgs/FollowJointTrajectory is told; the numbers are those of the
+/// action.
+enum class TrajectoryError : int {
+  None = 0,
+  InvalidGoal = -1,
+  InvalidJoints = -2,
+  OldHeaderTimestamp = -3,
+  PathToleranceViolated = -4,
+  GoalToleranceViolated = -5
+};
+
+/// The goal of control_msgs/FollowJointTrajectory, without ROS.
+struct TrajectoryRequest {
+  struct Point {
+    double time = 0.0;              ///< s from the start
+    std::vector<double> positions;  ///< rad, in the order of joint_names
+    /// rad/s and rad/s^2; empty in all points: chosen so that the joints do not overshoot. Without
+    /// accelerations the path is a cubic spline, with them a quintic one.
+    std::vector<double> velocities, accelerations;
+  };
+  struct Tolerance {
+    std::string joint;
+    double position = 0.0;  ///< rad; 0: the default, negative: no bound
+    double velocity = 0.0;  ///< rad/s; 0 or negative: no bound
+  };
+
+  std::vector<std::string> joint_names;  ///< all joints of the arm, in any order
+  std::vector<Point> points;
+  std::vector<Tolerance> path_tolerance, goal_tolerance;
+  double goal_time_tolerance = 0.0;  ///< s; 0: parameter `goal_time`
+  double age = 0.0;  ///< s since the stamp of the trajectory, 0 without one; negative: ahead
+};
+
+struct TrajectoryAnswer : MotionAnswer {
+  TrajectoryError error = TrajectoryError::None;
+};
+
+/// Largest differences to the set-point.
+struct TrajectoryTolerance {
+  JointVector position = JointVector::Constant(std::numeric_limits<double>::infinity());  ///< rad
+  JointVector velocity = JointVector::Constant(std::numeric_limits<double>::infinity());  ///< rad/s
+};
+
+/// A checked trajectory. Does not change while the cycle follows it.
+struct JointPath {
+  JointSpline spline;
+  TrajectoryTolerance path, goal;
+  double goal_time = 2.0;  ///< s after the end until the arm is within `goal`
+  std::uint64_t number = 0;
+};
+
+/// What the control cycle takes over.
+struct TrajectoryPlan {
+  const JointPath* trajectory = nullptr;  ///< owned by the controller
+};
+
+/// Where a trajectory wants the arm, and where it is.
+struct TrajectoryProgress {
+  std::int64_t stamp_ns = 0;
+  int id = -1;  ///< of the motion
+  bool moving = false;
+  JointPoint desired, actual;  ///< `actual` without acceleration
+};
+
+/// Follows one trajectory at a time; a new one takes the place of the old one in mid-motion. It
+/// begins at the arm's set-point: what the first point differs by, at most `start_tolerance`, fades
+/// within half a second. While a speed limit or `speed_scale` slows the arm, the trajectory takes
+/// longer, on the same path.
+///
+/// A joint that leaves the path tolerance ends the motion. It has ended well when all joints are
+/// within the goal tolerance, at most `goal_time` after its end.
+///
+/// Parameters besides those of MotionRunner: `path_tolerance` (rad, default 0.2), `goal_tolerance`
+/// (rad, 0.01), `goal_time` (s, 2), `start_tolerance` (rad, 0.05).
+class JointTrajectory : public MotionRunner<TrajectoryPlan> {
+ public:
+  JointTrajectory();
+
+  /// Whether a trajectory could begin now, apart from which controller is active: joints, sizes,
+  /// times, limits, workspace, and where the arm is. Any thread.
+  TrajectoryAnswer check(const TrajectoryRequest& request) const;
+  /// Checks a trajectory and begins it. Any thread.
+  TrajectoryAnswer follow(const TrajectoryRequest& request);
+  /// What a client is told of a motion that ended.
+  static TrajectoryError errorOf(const EndedMotion& end);
+  /// Newest progress; one reader thread.
+  bool readProgress(TrajectoryProgress& progress) { return progress_.read(progress); }
+  const std::vector<std::string>& jointNames() const { return setup().robot->chain.jointNames(); }
+
+  void configure(const MotionSetup& setup) override;
+  void computeReference(const CycleInput& input, References& references) override;
+
+ private:
+  void report(std::int64_t stamp_ns) override;
+  TrajectoryAnswer read(const TrajectoryRequest& request, JointPath& trajectory) const;
+
+  double path_tolerance_ = 0.2, goal_tolerance_ = 0.01, start_tolerance_ = 0.05;  // rad
+  double goal_time_ = 2.0;                                                        // s
+  std::uint64_t made_ = 0;                        // under the host's request lock
+  std::deque<std::unique_ptr<JointPath>> kept_;  // the same; freed once a later one has begun
+  coglab_rt::TripleBuffer<TrajectoryProgress> progress_;
+};
+
+}  // namespace coglab_controllers

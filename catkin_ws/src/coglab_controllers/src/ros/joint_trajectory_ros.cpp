@@ -1,0 +1,195 @@
+// ROS side of joint trajectories: the action that MoveIt and other planners send them to.
+#include <map>
+#include <mutex>
+
+#include <actionlib/server/action_server.h>
+#include <control_msgs/FollowJointTrajectoryAction.h>
+#include <control_msgs/JointTrajectoryControllerState.h>
+#include <ros/ros.h>
+
+#include "coglab_controllers/manager/plugin_registry.hpp"
+#include "coglab_controllers/plugins/joint_trajectory.hpp"
+#include "coglab_controllers/ros/motion_controller_ros.hpp"
+
+namespace coglab_controllers {
+
+namespace {
+
+using Action = control_msgs::FollowJointTrajectoryAction;
+using Server = actionlib::ActionServer<Action>;
+using Result = control_msgs::FollowJointTrajectoryResult;
+
+constexpr bool same(TrajectoryError ours, int theirs) { return static_cast<int>(ours) == theirs; }
+
+// The core is free of ROS and keeps the numbers of the action a second time.
+static_assert(same(TrajectoryError::None, Result::SUCCESSFUL));
+static_assert(same(TrajectoryError::InvalidGoal, Result::INVALID_GOAL));
+static_assert(same(TrajectoryError::InvalidJoints, Result::INVALID_JOINTS));
+static_assert(same(TrajectoryError::OldHeaderTimestamp, Result::OLD_HEADER_TIMESTAMP));
+static_assert(same(TrajectoryError::PathToleranceViolated, Result::PATH_TOLERANCE_VIOLATED));
+static_assert(same(TrajectoryError::GoalToleranceViolated, Result::GOAL_TOLERANCE_VIOLATED));
+
+std::vector<TrajectoryRequest::Tolerance> read(
+    const std::vector<control_msgs::JointTolerance>& tolerances) {
+  std::vector<TrajectoryRequest::Tolerance> read;
+  for (const auto& one : tolerances) read.push_back({one.name, one.position, one.velocity});
+  return read;
+}
+
+TrajectoryRequest read(const control_msgs::FollowJointTrajectoryGoal& goal) {
+  TrajectoryRequest request;
+  request.joint_names = goal.trajectory.joint_names;
+  for (const auto& point : goal.trajectory.points) {
+    request.points.push_back(
+        {point.time_from_start.toSec(), point.positions, point.velocities, point.accelerations});
+  }
+  request.path_tolerance = read(goal.path_tolerance);
+  request.goal_tolerance = read(goal.goal_tolerance);
+  request.goal_time_tolerance = goal.goal_time_tolerance.toSec();
+  const ros::Time& stamp = goal.trajectory.header.stamp;
+  if (!stamp.isZero()) request.age = 1e-9 * static_cast<double>(ageOf(stamp));
+  return request;
+}
+
+Result resultOf(TrajectoryError error, const std::string& sentence) {
+  Result result;
+  result.error_code = static_cast<int>(error);
+  result.error_string = sentence;
+  return result;
+}
+
+void write(const JointPoint& from, std::size_t joints, trajectory_msgs::JointTrajectoryPoint& to) {
+  to.positions.assign(from.position.data(), from.position.data() + joints);
+  to.velocities.assign(from.velocity.data(), from.velocity.data() + joints);
+  to.time_from_start.fromSec(from.time);
+}
+
+}  // namespace
+
+/// Action `<id>/follow_joint_trajectory`; topic `<id>/state` at 50 Hz while the arm follows. A goal
+/// takes the arm if no other motion has it. A newer goal takes the place of the older one.
+class JointTrajectoryRos : public MotionControllerRos {
+ public:
+  void attach(MotionController& controller, const ros::NodeHandle& node,
+              const RosContext& context) override {
+    controller_ = &dynamic_cast<JointTrajectory&>(controller);
+    node_ = node;
+    take_arm_ = context.take_arm;
+    cancel_ = context.cancel;
+    state_ = node_.advertise<control_msgs::JointTrajectoryControllerState>("state", 10);
+    server_ = std::make_unique<Server>(
+        node_, "follow_joint_trajectory", [this](Server::GoalHandle goal) { onGoal(goal); },
+        [this](Server::GoalHandle goal) { onCancel(goal); }, false);
+    server_->start();
+  }
+
+  void spinOnce() override {
+    const std::lock_guard<std::mutex> lock(goals_mutex_);
+    for (EndedMotion end; controller_->readEnd(end);) ends_.push_back(end);
+    settle();
+    if (++calls_ % 4 == 0) publishState();
+  }
+
+ private:
+  /// May wait for the control cycle.
+  void onGoal(Server::GoalHandle goal) {
+    const std::lock_guard<std::mutex> order(order_);
+    const TrajectoryRequest request = read(*goal.getGoal());
+    TrajectoryAnswer answer = controller_->check(request);
+    if (answer.success) {
+      const Answer taken = take_arm_();
+      if (taken.success) {
+        answer = controller_->follow(request);
+      } else {
+        static_cast<Answer&>(answer) = taken;
+        answer.error = TrajectoryError::InvalidGoal;
+      }
+    }
+    if (!answer.success) {
+      ROS_WARN("follow_joint_trajectory refused: %s", answer.message.c_str());
+      return goal.setRejected(resultOf(answer.error, answer.message), answer.message);
+    }
+    goal.setAccepted();
+    const std::lock_guard<std::mutex> lock(goals_mutex_);
+    goals_.emplace(answer.id, goal);
+    if (goal.getGoalStatus().status == actionlib_msgs::GoalStatus::PREEMPTING) cancelMotion();
+    settle();
+  }
+
+  void onCancel(Server::GoalHandle goal) {
+    const std::lock_guard<std::mutex> lock(goals_mutex_);
+    for (const auto& [id, other] : goals_) {
+      if (other == goal) return cancelMotion();
+    }
+  }
+
+  void cancelMotion() { cancel_("the client of the trajectory cancelled it"); }
+
+  /// Ends the goals whose motions have ended. A motion may end before its goal is noted.
+  void settle() {
+    for (auto end = ends_.begin(); end != ends_.end();) {
+      const auto goal = goals_.find(end->id);
+      if (goal == goals_.end()) {
+        ++end;
+        continue;
+      }
+      finish(goal->second, *end);
+      goals_.erase(goal);
+      end = ends_.erase(end);
+    }
+  }
+
+  static void finish(Server::GoalHandle& goal, const EndedMotion& end) {
+    const std::string why = end.reason.str();
+    const Result result = resultOf(JointTrajectory::errorOf(end), why);
+    const ReasonCode code = end.reason.code();
+    if (end.executed) return goal.setSucceeded(result);
+    ROS_LOG(endLevel(end.reason), ROSCONSOLE_DEFAULT_NAME, "the trajectory was not executed: %s",
+            why.c_str());
+    if (code == ReasonCode::Cancelled || code == ReasonCode::Superseded)
+      return goal.setCanceled(result, why);
+    goal.setAborted(result, why);
+  }
+
+  void publishState() {
+    TrajectoryProgress now;
+    if (!controller_->readProgress(now) || !now.moving) return;
+    const std::size_t joints = controller_->jointNames().size();
+    JointPoint error = now.desired;
+    error.position -= now.actual.position;
+    error.velocity -= now.actual.velocity;
+    control_msgs::FollowJointTrajectoryFeedback feedback;
+    feedback.header.stamp = toRos(now.stamp_ns);
+    feedback.joint_names = controller_->jointNames();
+    write(now.desired, joints, feedback.desired);
+    write(now.actual, joints, feedback.actual);
+    write(error, joints, feedback.error);
+    control_msgs::JointTrajectoryControllerState state;
+    state.header = feedback.header;
+    state.joint_names = feedback.joint_names;
+    state.desired = feedback.desired;
+    state.actual = feedback.actual;
+    state.error = feedback.error;
+    state_.publish(state);
+    const auto goal = goals_.find(now.id);
+    if (goal != goals_.end()) goal->second.publishFeedback(feedback);
+  }
+
+  JointTrajectory* controller_ = nullptr;
+  ros::NodeHandle node_;
+  std::function<Answer()> take_arm_;
+  std::function<void(const std::string&)> cancel_;
+  ros::Publisher state_;
+  std::mutex order_;  // goals are taken one after another
+  std::mutex goals_mutex_;
+  std::map<int, Server::GoalHandle> goals_;  // by the id of the motion; those that run
+  std::vector<EndedMotion> ends_;            // of motions whose goal is not noted yet
+  std::uint64_t calls_ = 0;
+  std::unique_ptr<Server> server_;  // ends first: its callbacks use the rest
+};
+
+}  // namespace coglab_controllers
+
+COGLAB_REGISTER_MOTION_CONTROLLER_WITH_ROS("coglab/JointTrajectory",
+                                           coglab_controllers::JointTrajectory,
+                                           coglab_controllers::JointTrajectoryRos)
