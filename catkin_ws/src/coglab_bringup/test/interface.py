@@ -14,6 +14,10 @@ TOPICS = dict(
         /controller_manager/dmp/ik_debug coglab_msgs/IkDebug
         /controller_manager/dmp/feedback coglab_msgs/DmpFeedback
         /controller_manager/ptp/finished_ptp coglab_msgs/FinishedPtp
+        /controller_manager/joint_trajectory/follow_joint_trajectory/goal control_msgs/FollowJointTrajectoryActionGoal
+        /controller_manager/twist_stream/twist geometry_msgs/TwistStamped
+        /controller_manager/pose_stream/pose geometry_msgs/PoseStamped
+        /controller_manager/joint_velocity_stream/joint_velocity std_msgs/Float64MultiArray
         /ih2_hand/hand_calibration std_msgs/String
         /ih2_hand/hand_status coglab_msgs/HandStatus
         /ih2_hand/joint_states sensor_msgs/JointState

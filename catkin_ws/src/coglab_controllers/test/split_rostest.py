@@ -44,8 +44,8 @@ class Split(unittest.TestCase):
 
     def test_1_list_and_active(self) -> None:
         listed = self.robot.manager("list_controllers")
-        self.assertEqual(listed.controller_ids[:2], ["dmp", "ptp"])
-        self.assertEqual(listed.controller_types[:2], ["coglab/DmpController", "coglab/PtpController"])
+        types = dict(zip(listed.controller_ids, listed.controller_types, strict=True))
+        self.assertEqual((types["dmp"], types["ptp"]), ("coglab/DmpController", "coglab/PtpController"))
         active = self.robot.manager("get_active_controller")
         self.assertEqual(active.controller_id, "ptp")
         self.assertEqual(active.controller_type, "coglab/PtpController")

@@ -222,6 +222,8 @@ class Reader {
       numbers(k, "positions", point.positions, true, one.position);
       numbers(k, "velocities", point.velocities, velocities(), one.velocity);
       numbers(k, "accelerations", point.accelerations, accelerations(), one.acceleration);
+      // Before speeds, which are too high where a position is too far.
+      if (one.time > 0.0) checkPosition(one);
       read.push_back(one);
     }
     if (accelerations() && !velocities())
@@ -268,29 +270,22 @@ class Reader {
   /// Every state on the way against limits and workspace.
   void checkWay(const JointSpline& spline) const {
     const coglab_rt::JointLimits& limits = robot_.limits;
-    const double margin = robot_.guard.position_margin;
     const double step = std::max(kCheckStep, spline.duration() / kMostChecks);
     bool inside = false;  // has been, of the workspace: a path may lead into it
     for (double time = 0.0;; time += step) {
       const bool last = time >= spline.duration();
       const JointPoint point = spline.at(time);
-      for (int i = 0; i < robot_.chain.joints(); ++i) {
-        const auto at = [&](const char* what, double value, double least, double most,
-                            const char* unit, const char* hint) {
-          if (value >= least && value <= most) return;
-          outOfRange("joint ", name(i), " has ", what, " ", value, " ", unit, " at ", time,
-                     " s; expected ", least, " to ", most, hint);
-        };
-        if (time > 0.0) {
-          at("position", point.position[i], limits.lower_position[i] + margin,
-             limits.upper_position[i] - margin, "rad", "");
-        }
-        const double velocity = kRounding * limits.velocity[i];
-        at("velocity", point.velocity[i], -velocity, velocity, "rad/s", "; make it slower");
-        const double acceleration = kAccelerationSlack * limits.acceleration[i];
-        at("acceleration", point.acceleration[i], -acceleration, acceleration, "rad/s^2",
-           "; make it slower or smoother");
-      }
+      if (time > 0.0) checkPosition(point);
+      const auto slow = [&](const char* what, const JointVector& values, const JointVector& most,
+                            double slack, const char* unit) {
+        int joint = 0;
+        const auto share = values.array().abs() / most.array();
+        if (share.maxCoeff(&joint) <= slack) return;
+        outOfRange("joint ", name(joint), " has ", what, " ", values[joint], " ", unit, " at ",
+                   time, " s; allowed: ", most[joint], " ", unit, "; make it slower");
+      };
+      slow("velocity", point.velocity, limits.velocity, kRounding, "rad/s");
+      slow("acceleration", point.acceleration, limits.acceleration, kAccelerationSlack, "rad/s^2");
       const WorkspaceBorder border =
           robot_.workspace.violated(robot_.chain.evaluate(point.position).tool.position);
       if (border == WorkspaceBorder::None) inside = true;
@@ -327,6 +322,17 @@ class Reader {
   int jointNamed(const std::string& name) const {
     const auto found = std::find(names_.begin(), names_.end(), name);
     return found == names_.end() ? -1 : static_cast<int>(found - names_.begin());
+  }
+
+  void checkPosition(const JointPoint& point) const {
+    const double margin = robot_.guard.position_margin;
+    for (int i = 0; i < robot_.chain.joints(); ++i) {
+      const double least = robot_.limits.lower_position[i] + margin;
+      const double most = robot_.limits.upper_position[i] - margin;
+      if (point.position[i] >= least && point.position[i] <= most) continue;
+      outOfRange("joint ", name(i), " has position ", point.position[i], " rad at ", point.time,
+                 " s; expected ", least, " to ", most, " rad");
+    }
   }
 
   template <typename... Parts>

@@ -15,8 +15,8 @@
 #include <thread>
 
 #include "coglab_rt/joint_limits_table.hpp"
+#include "motion_types.hpp"
 #include "remote_client.hpp"
-#include "stream_types.hpp"
 #include "system_calls.hpp"
 #include "virtual_robot.hpp"
 
@@ -164,7 +164,9 @@ struct Requests {
   PtpController& ptp;
   StreamController& twists;
   StreamController& joints;
-  int made = 0, accepted = 0, paths = 0, streamed = 0;
+  StreamController& poses;
+  JointTrajectory& trajectory;
+  int made = 0, accepted = 0, paths = 0, streamed = 0, followed = 0;
 
   void count(bool success) {
     ++made;
@@ -217,16 +219,28 @@ struct Requests {
       ptp.askPath();
       count(ptp.add({{-1.4 + turn, -0.6, 1.5, 1.7, 0.2, 0.2, 0.8}, {}, {}}).id >= 0);
     }
-    for (const auto& [id, stream, size] :
-         {std::tuple("twists", &twists, 6), std::tuple("joints", &joints, 7)}) {
+    const double speed = 0.02 * (number % 3 - 1);
+    for (const auto& [id, stream, command] :
+         {std::tuple("twists", &twists, std::vector<double>(6, speed)),
+          std::tuple("joints", &joints, std::vector<double>(7, speed)),
+          std::tuple("poses", &poses, std::vector<double>{0.7, 0.0, 0.5, 0.0, 0.0, 0.0, 1.0})}) {
       count(manager.switchTo(id, type).success);
       count(stream->open().success);
-      const std::vector<double> command(static_cast<std::size_t>(size), 0.02 * (number % 3 - 1));
       const bool sent = stream->send(command).success;
       count(sent);
       if (sent) ++streamed;
       std::this_thread::sleep_for(std::chrono::microseconds(500));
     }
+    count(manager.switchTo("trajectory", type).success);
+    JointVector to = manager.report().robot.position;
+    to[0] += 0.1;
+    TrajectoryRequest path;
+    path.joint_names = trajectory.jointNames();
+    path.points.push_back({1.0, {to.data(), to.data() + 7}, {}, {}});
+    const bool follows = trajectory.follow(path).success;
+    count(follows);
+    if (follows) ++followed;
+    std::this_thread::sleep_for(std::chrono::microseconds(500));
     count(manager.feedback().disable("limits", true).ok());
     IkDebugRecord record;
     while (dmp.readIkDebug(record)) {
@@ -234,11 +248,11 @@ struct Requests {
     EndedMotion end;
     while (ptp.readEnd(end)) {
     }
-    PredictedPath path;
-    if (dmp.readPath(path)) ++paths;
-    if (ptp.readPath(path)) ++paths;
+    PredictedPath predicted;
+    if (dmp.readPath(predicted)) ++paths;
+    if (ptp.readPath(predicted)) ++paths;
     request.primitive_id = "reach_human";
-    if (dmp.predict(request, path).success) ++paths;  // beside the motion under way
+    if (dmp.predict(request, predicted).success) ++paths;  // beside the motion under way
     manager.report();
   }
 };
@@ -285,13 +299,17 @@ TEST(Cycle, NeitherAllocatesNorLocksWhileServicesAreCalled) {
   auto& ptp = dynamic_cast<PtpController&>(*manager.motion("ptp"));
   ASSERT_TRUE(VirtualRobot::ok(manager.load("twists", "coglab/TwistStream")));
   ASSERT_TRUE(VirtualRobot::ok(manager.load("joints", "coglab/JointVelocityStream")));
+  ASSERT_TRUE(VirtualRobot::ok(manager.load("poses", "coglab/PoseStream")));
+  ASSERT_TRUE(VirtualRobot::ok(manager.load("trajectory", "coglab/JointTrajectory")));
   auto& twists = dynamic_cast<StreamController&>(*manager.motion("twists"));
   auto& joints = dynamic_cast<StreamController&>(*manager.motion("joints"));
+  auto& poses = dynamic_cast<StreamController&>(*manager.motion("poses"));
+  auto& trajectory = dynamic_cast<JointTrajectory&>(*manager.motion("trajectory"));
   dmp.setGoalSource(&frames);
   int loaded = 0;
   ASSERT_TRUE(
       VirtualRobot::ok(dmp.loadDmps(std::string(PACKAGE_DIR) + "/config/primitives.xml", loaded)));
-  Requests requests{manager, frames, dmp, ptp, twists, joints};
+  Requests requests{manager, frames, dmp, ptp, twists, joints, poses, trajectory};
   for (int round = 0; counted.cycles < kCycles || round < 30; ++round) requests.round(round);
   stop = true;
   control.join();
@@ -301,6 +319,7 @@ TEST(Cycle, NeitherAllocatesNorLocksWhileServicesAreCalled) {
   EXPECT_GT(requests.accepted, requests.made / 2);
   EXPECT_GT(requests.paths, 20);
   EXPECT_GT(requests.streamed, 20);
+  EXPECT_GT(requests.followed, 10);
   EXPECT_EQ(allocations.load(), 0u);
   EXPECT_EQ(locks.load(), 0u);
   const auto calls = static_cast<int>(SystemCalls::count() - calls_before);

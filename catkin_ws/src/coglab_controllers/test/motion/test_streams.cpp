@@ -7,7 +7,7 @@
 #include "coglab_controllers/plugins/ptp_controller.hpp"
 #include "coglab_controllers/plugins/stream_controller.hpp"
 #include "coglab_controllers/testing/virtual_arm.hpp"
-#include "stream_types.hpp"
+#include "motion_types.hpp"
 
 namespace coglab_controllers {
 namespace {
@@ -78,6 +78,96 @@ TEST_F(Stream, TheHandFollowsATwistInTheBaseFrame) {
   EXPECT_NEAR(turned.z(), 0.2, 0.02);
   EXPECT_NEAR(turned.head<2>().norm(), 0.0, 0.01);
   EXPECT_EQ(arm.state(), MotionState::Running);
+}
+
+TEST_F(Stream, ATwistInTheToolFrameTurnsWithTheHand) {
+  use("coglab/TwistStream");
+  const Pose home = arm.hand();
+  for (int i = 0; i < 20; ++i) {
+    ASSERT_TRUE(stream->send({{0.0, 0.05, 0.0, 0.0, 0.0, 0.4}, 0.0, true}).success);
+    arm.run(0.05);
+  }
+  // Forward in its own y axis while it turns about its own z axis: an arc.
+  const Vector3 way = home.orientation.conjugate() * (arm.hand().position - home.position);
+  EXPECT_NEAR(way.y(), 0.05 / 0.4 * std::sin(0.4), 0.006);
+  EXPECT_NEAR(way.x(), -0.05 / 0.4 * (1.0 - std::cos(0.4)), 0.004);
+  EXPECT_NEAR(way.z(), 0.0, 0.003);
+}
+
+TEST_F(Stream, TheHandGoesToAPoseAndStays) {
+  use("coglab/PoseStream");
+  Pose goal = arm.hand();
+  goal.position += Vector3(0.05, 0.1, 0.05);
+  goal.orientation = expRotation(Vector3(0.0, 0.0, 0.4)) * goal.orientation;
+  const Quaternion& q = goal.orientation;
+  const Numbers command{
+      goal.position.x(), goal.position.y(), goal.position.z(), q.x(), q.y(), q.z(), q.w()};
+  double fastest = 0.0;
+  for (int i = 0; i < 40; ++i) {
+    follow(command);
+    fastest = std::max(fastest, arm.handVelocity().norm());
+  }
+  EXPECT_LT((arm.hand().position - goal.position).norm(), 0.002);
+  EXPECT_LT(rotationBetween(arm.hand().orientation, q).norm(), 0.01);
+  EXPECT_GT(fastest, 0.2);
+  EXPECT_LT(arm.handVelocity().norm(), 0.005);
+}
+
+TEST_F(Stream, RandomPosesKeepEveryLimit) {
+  use("coglab/PoseStream");
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> draw(-2.0, 2.0);
+  for (int command = 0; command < 60; ++command) {
+    const Quaternion q = Quaternion(draw(random), draw(random), draw(random), 0.1).normalized();
+    const Numbers pose{draw(random), draw(random), draw(random), q.x(), q.y(), q.z(), q.w()};
+    for (int times = 0; times < 15; ++times) {
+      ASSERT_TRUE(stream->send(pose).success) << arm.reason();
+      for (int tick = 0; tick < 10; ++tick) {
+        arm.tick();
+        expectWithinLimits();
+        if (HasFatalFailure()) return;
+      }
+    }
+  }
+}
+
+TEST_F(Stream, WhatIsNoPoseIsRefused) {
+  use("coglab/PoseStream");
+  const Answer answer = stream->send({0.5, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0});
+  EXPECT_EQ(answer.code, ReasonCode::InvalidArgument);
+  EXPECT_NE(answer.message.find("expected a unit quaternion"), std::string::npos) << answer.message;
+}
+
+TEST_F(Stream, OldCommandsAndThoseFromTheFutureAreRefused) {
+  use("coglab/TwistStream");
+  const Numbers up{0.0, 0.0, 0.1, 0.0, 0.0, 0.0};
+  EXPECT_EQ(stream->send({up, 0.2, false}).code, ReasonCode::GoalStale);
+  EXPECT_EQ(stream->send({up, std::nan(""), false}).code, ReasonCode::GoalStale);
+  EXPECT_EQ(stream->send({up, -3.0, false}).code, ReasonCode::GoalFromFuture);
+  // One that is valid counts until it is too old by its stamp, not by its arrival.
+  ASSERT_TRUE(stream->send({up, 0.09, false}).success);
+  arm.run(0.03);
+  EXPECT_EQ(arm.state(), MotionState::Holding);
+}
+
+TEST_F(Stream, AtOneHertzTheArmBrakesBetweenTwoCommands) {
+  use("coglab/TwistStream");
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_TRUE(stream->send({0.0, 0.0, 0.1, 0.0, 0.0, 0.0}).success);
+    arm.run(1.0);
+    EXPECT_TRUE(arm.manager->report().standing);
+  }
+}
+
+TEST_F(Stream, AtTwoKilohertzTheNewestCommandOfACycleCounts) {
+  use("coglab/TwistStream");
+  for (int cycle = 0; cycle < 200; ++cycle) {
+    for (int i = 0; i < 9; ++i) ASSERT_TRUE(stream->send({1.0, 1.0, 1.0, 1.0, 1.0, 1.0}).success);
+    ASSERT_TRUE(stream->send({0.0, 0.0, 0.1, 0.0, 0.0, 0.0}).success);
+    arm.tick();
+  }
+  EXPECT_NEAR(arm.handVelocity().z(), 0.1, 0.01);
+  EXPECT_NEAR(arm.handVelocity().head<2>().norm(), 0.0, 0.01);
 }
 
 TEST_F(Stream, JointsFollowTheirVelocities) {
