@@ -60,12 +60,15 @@ class ManagerRegistration {
 ///     managers: [locomotion, feedback]
 ///     joints: 7                 # of the control states
 ///     period: 0.005             # [s]
+///     signals: signals.yaml     # optional; the host reads it
 ///     locomotion: {type: MyLocomotion, step_length: 0.2}
 ///     feedback: {type: Feedback, listFile: feedback.yaml}
 ///
-/// A type of a library also has `libPath`; see CTRL_MORE_REGISTER_MANAGER.
+/// A type of a library may have `libPath`; without it, its library is found by the name of the type
+/// (SearchPath::findLibraryOf()). See CTRL_MORE_REGISTER_MANAGER.
 ///
-/// Each stage runs in all managers, in order, before the next stage begins.
+/// Each stage runs in all managers, in order, before the next stage begins. If a manager other than
+/// Feedback writes a number that is not finite, its writes are undone, and it is off from then on.
 class CentralModule {
  public:
   /// Makes a manager from its block of the file. May throw ConfigError.
@@ -90,10 +93,27 @@ class CentralModule {
   /// As above, from a parsed file or text.
   CentralModule(const ConfigNode& config, const std::string& base, Logger* logger = nullptr);
 
+  /// A robot that owns the stores and starts the stages itself.
+  struct Host {
+    RobotStates& robot;                ///< must outlive the module
+    ControlStates& control;            ///< must outlive the module
+    ManagerOptions feedback;           ///< of the Feedback manager, where the file is silent
+    std::vector<std::string> folders;  ///< searched for libraries of managers
+  };
+
+  /// As above, on a robot. `joints` and `period` may be left out; other values than the robot's are
+  /// refused, and so is a file without a Feedback manager.
+  CentralModule(const ConfigNode& config, const std::string& base, const Host& host,
+                Logger* logger = nullptr);
+  ~CentralModule();
+  CentralModule(CentralModule&&) noexcept;
+
   /// The shared robot states. The user fills them before update().
   RobotStates& robotStates() { return *robot_; }
   /// The shared control states. The user reads them after update().
   ControlStates& controlStates() { return *control_; }
+  /// List file of the feedback manager as the file names it; empty: none.
+  const std::string& feedbackList() const { return feedback_list_; }
   /// The feedback manager; throws std::logic_error if the file lists none.
   FeedbackControllersManager& feedbackControllers();
   /// A manager by name; throws std::invalid_argument with the nearest known one.
@@ -103,9 +123,20 @@ class CentralModule {
   /// Errors of loading, one sentence each.
   const std::vector<std::string>& loadErrors() const { return load_errors_; }
 
-  /// One cycle of all managers. No allocation, no lock.
+  /// One cycle of all managers. No allocation after the first, no lock.
   /// @param cycle time
   void update(const Cycle& cycle) noexcept;
+
+  /// @name The parts of update(), for a host
+  /// @{
+
+  /// Begins a cycle.
+  void begin(const Cycle& cycle) noexcept;
+  /// Runs a stage.
+  void run(Stage stage) noexcept;
+  /// Ends the cycle.
+  void end() noexcept;
+  /// @}
 
   /// One cycle for users without a clock. The time is the newest stamp of the robot states.
   void update() noexcept;
@@ -126,18 +157,27 @@ class CentralModule {
   std::unique_ptr<Manager> makeFeedback(const std::string& name, const ConfigNode& block,
                                         const std::string& base);
   std::unique_ptr<Manager> makeOther(const std::string& name, const ConfigNode& block,
-                                     const ConfigNode& type);
+                                     const ConfigNode& type, const std::string& base);
   std::unique_ptr<Manager> makeFromLibrary(const std::string& name, const ConfigNode& block,
-                                           const std::string& type, const ConfigNode& library,
-                                           const std::string& base);
+                                           const std::string& type, const std::string& path);
+  void isolate(std::size_t manager, Stage stage) noexcept;
+
+  struct Own;  // stores without a host
 
   Logger* logger_;
-  std::unique_ptr<RobotStates> robot_;
-  std::unique_ptr<ControlStates> control_;
+  std::unique_ptr<Own> own_;
+  RobotStates* robot_ = nullptr;
+  ControlStates* control_ = nullptr;
+  ManagerOptions options_;
+  std::vector<std::string> folders_;
   std::vector<std::shared_ptr<PluginLibrary>>
       libraries_;  // before the managers, whose code they are
   std::vector<std::unique_ptr<Manager>> managers_;
+  std::vector<LogSource> logs_;  // of each manager
+  std::vector<bool> off_;        // managers that wrote numbers that are not finite
+  std::vector<double> before_;   // references before a manager
   FeedbackControllersManager* feedback_ = nullptr;
+  std::string feedback_list_;
   std::vector<std::string> load_errors_;
   std::uint64_t number_ = 0;
 };

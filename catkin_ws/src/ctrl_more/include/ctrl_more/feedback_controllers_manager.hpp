@@ -76,7 +76,8 @@ class FeedbackControllersManager : public Manager, public ControllerOwner {
   /// Loads a list file as printed in the paper: `loadControllers: [..]`, and for each name
   /// `libPath` and `configFile`. Further keys per controller: `type`, `enabled`, `overrun_us`,
   /// `on_fault` (hold, fade, zero), `blend_s`. Further keys of the file: `profiles` (name:
-  /// [controllers]), `searchPath` ([folders]), `sharedSignals` (cascade or refuse).
+  /// [controllers]), `searchPath` ([folders]), `sharedSignals` (cascade or refuse), `signals` (a
+  /// file of robot signals that the controllers need; the host reads it, not this manager).
   /// All or nothing: if a controller is refused, nothing of the file is loaded, and the report has
   /// one sentence for each refusal. Controllers that were loaded before keep running.
   /// @param file path of the list file

@@ -40,6 +40,16 @@ Status copySignals(const RobotStates& from, RobotStates& to) {
   return {};
 }
 
+std::string libraryAt(const ConfigNode& node, const SearchPath& files) {
+  try {
+    return files.find(node.text("libPath"));
+  } catch (const ConfigError&) {
+    throw;
+  } catch (const std::exception& e) {
+    throw node.error(std::string("libPath: ") + e.what());
+  }
+}
+
 // Copies all signals of `from`. Adds missing keys to `to`; fails if `to` is frozen.
 Status copySignals(const ControlStates& from, ControlStates& to) {
   for (int i = 0; i < kControlContainers; ++i) {
@@ -75,15 +85,35 @@ bool CentralModule::registerManager(const std::string& type, ManagerMaker maker)
   return types.makers.emplace(type, std::move(maker)).second;
 }
 
+struct CentralModule::Own {
+  RobotStates robot;
+  ControlStates control;
+};
+
 CentralModule::CentralModule(const std::string& file, Logger* logger)
-    : logger_(logger ? logger : &Logger::standard()) {
-  build(ConfigNode::fromFile(file), std::filesystem::path(file).parent_path().string());
-}
+    : CentralModule(ConfigNode::fromFile(file), std::filesystem::path(file).parent_path().string(),
+                    logger) {}
 
 CentralModule::CentralModule(const ConfigNode& config, const std::string& base, Logger* logger)
     : logger_(logger ? logger : &Logger::standard()) {
   build(config, base);
 }
+
+CentralModule::CentralModule(const ConfigNode& config, const std::string& base, const Host& host,
+                             Logger* logger)
+    : logger_(logger ? logger : &Logger::standard()),
+      robot_(&host.robot),
+      control_(&host.control),
+      options_(host.feedback),
+      folders_(host.folders) {
+  build(config, base);
+  if (!feedback_) {
+    throw config.error("a robot needs a manager of type Feedback; add one to the list of managers");
+  }
+}
+
+CentralModule::~CentralModule() = default;
+CentralModule::CentralModule(CentralModule&&) noexcept = default;
 
 void CentralModule::build(const ConfigNode& config, const std::string& base) {
   if (config.kind() != ConfigNode::Kind::Map) {
@@ -93,7 +123,7 @@ void CentralModule::build(const ConfigNode& config, const std::string& base) {
   if (!list) throw config.error("a central module's file needs managers: [names]");
   const std::vector<std::string> names = list->texts("managers");
   std::vector<std::string> known = names;
-  known.insert(known.end(), {"managers", "joints", "period"});
+  known.insert(known.end(), {"managers", "joints", "period", "signals"});
   config.requireKeys("central module", known);
   makeStores(config);
   for (const std::string& name : names) {
@@ -110,9 +140,12 @@ void CentralModule::build(const ConfigNode& config, const std::string& base) {
     const ConfigNode* library = block->find("libPath");
     const std::string type_name = type->text("type");
     managers_.push_back(type_name == kFeedback ? makeFeedback(name, *block, base)
-                        : library ? makeFromLibrary(name, *block, type_name, *library, base)
-                                  : makeOther(name, *block, *type));
+                        : library              ? makeFromLibrary(name, *block, type_name,
+                                                                 libraryAt(*library, SearchPath(base, folders_)))
+                                               : makeOther(name, *block, *type, base));
   }
+  for (const std::string& name : names) logs_.emplace_back(logger_, name);
+  off_.assign(managers_.size(), false);
 }
 
 void CentralModule::makeStores(const ConfigNode& config) {
@@ -129,8 +162,21 @@ void CentralModule::makeStores(const ConfigNode& config) {
     period = node->number("period");
     if (!(period > 0.0 && period < 1.0)) throw node->error("period expects 0 to 1 s");
   }
-  robot_ = std::make_unique<RobotStates>(logger_);
-  control_ = std::make_unique<ControlStates>(joints, period, logger_);
+  if (!control_) {
+    own_ = std::make_unique<Own>(Own{RobotStates(logger_), ControlStates(joints, period, logger_)});
+    robot_ = &own_->robot;
+    control_ = &own_->control;
+    return;
+  }
+  const ConfigNode* const given = config.find("joints");
+  if (given && joints != control_->joints()) {
+    throw given->error("this robot has " + std::to_string(control_->joints()) + " joints");
+  }
+  const ConfigNode* const cycle = config.find("period");
+  if (cycle && std::abs(period - control_->controlPeriod()) > 1e-9) {
+    throw cycle->error("this robot's period is " + std::to_string(control_->controlPeriod()) +
+                       " s");
+  }
 }
 
 std::unique_ptr<Manager> CentralModule::makeFeedback(const std::string& name,
@@ -139,7 +185,7 @@ std::unique_ptr<Manager> CentralModule::makeFeedback(const std::string& name,
   block.requireKeys("manager '" + name + "'",
                     {"type", "listFile", "blend_s", "timed", "check_undeclared"});
   if (feedback_) throw block.error("there is a Feedback manager already");
-  ManagerOptions options;
+  ManagerOptions options = options_;
   if (const ConfigNode* node = block.find("blend_s")) {
     options.blend_s = node->number("blend_s");
     if (options.blend_s < 0.0) throw node->error("blend_s must not be negative");
@@ -151,6 +197,7 @@ std::unique_ptr<Manager> CentralModule::makeFeedback(const std::string& name,
   auto manager = std::make_unique<FeedbackControllersManager>(*robot_, *control_, options, logger_);
   manager->setName(name);
   if (const ConfigNode* node = block.find("listFile")) {
+    feedback_list_ = node->text("listFile");
     std::string file;
     try {
       file = SearchPath(base).find(node->text("listFile"));
@@ -167,7 +214,7 @@ std::unique_ptr<Manager> CentralModule::makeFeedback(const std::string& name,
 }
 
 std::unique_ptr<Manager> CentralModule::makeOther(const std::string& name, const ConfigNode& block,
-                                                  const ConfigNode& type) {
+                                                  const ConfigNode& type, const std::string& base) {
   const std::string type_name = type.text("type");
   ManagerMaker maker;
   std::vector<std::string> types = {kFeedback};
@@ -179,6 +226,12 @@ std::unique_ptr<Manager> CentralModule::makeOther(const std::string& name, const
     if (found != all.makers.end()) maker = found->second;
   }
   if (!maker) {
+    std::string library;
+    try {
+      library = SearchPath(base, folders_).findLibraryOf(type_name);
+    } catch (const std::runtime_error&) {  // then it is no type at all
+    }
+    if (!library.empty()) return makeFromLibrary(name, block, type_name, library);
     throw type.error("manager '" + name + "' has unknown type '" + type_name + "'" +
                      suggestion(type_name, types));
   }
@@ -190,11 +243,9 @@ std::unique_ptr<Manager> CentralModule::makeOther(const std::string& name, const
 std::unique_ptr<Manager> CentralModule::makeFromLibrary(const std::string& name,
                                                         const ConfigNode& block,
                                                         const std::string& type,
-                                                        const ConfigNode& library,
-                                                        const std::string& base) {
+                                                        const std::string& path) {
   std::string complaint;
   try {
-    const std::string path = SearchPath(base).find(library.text("libPath"));
     libraries_.push_back(PluginLibrary::open(path, managerPrototypes()));
     const std::vector<std::string>& types = libraries_.back()->types();
     if (std::count(types.begin(), types.end(), type) == 0) {
@@ -232,12 +283,41 @@ std::vector<std::string> CentralModule::managers() const {
 }
 
 void CentralModule::update(const Cycle& cycle) noexcept {
+  begin(cycle);
+  for (const Stage stage : {Stage::Task, Stage::Joint}) run(stage);
+  end();
+}
+
+void CentralModule::begin(const Cycle& cycle) noexcept {
   number_ = cycle.number;
   for (const auto& manager : managers_) manager->beginCycle(cycle);
-  for (const Stage stage : {Stage::Task, Stage::Joint}) {
-    for (const auto& manager : managers_) manager->updateStage(stage, *robot_, *control_);
+  before_.resize(static_cast<std::size_t>(control_->dataSize()));
+}
+
+void CentralModule::run(Stage stage) noexcept {
+  for (std::size_t i = 0; i < managers_.size(); ++i) {
+    if (managers_[i].get() == feedback_) {  // it guards each of its controllers
+      managers_[i]->updateStage(stage, *robot_, *control_);
+    } else if (!off_[i]) {
+      isolate(i, stage);
+    }
   }
+}
+
+void CentralModule::end() noexcept {
   for (const auto& manager : managers_) manager->endCycle();
+}
+
+/// Runs a stage of a manager, and undoes it if a number is not finite.
+void CentralModule::isolate(std::size_t manager, Stage stage) noexcept {
+  std::copy_n(control_->data(), before_.size(), before_.data());
+  managers_[manager]->updateStage(stage, *robot_, *control_);
+  const double* const data = control_->data();
+  if (std::all_of(data, data + before_.size(), [](double v) { return std::isfinite(v); })) return;
+  std::copy(before_.begin(), before_.end(), control_->data());
+  off_[manager] = true;
+  CTRL_MORE_LOG(logs_[manager], Error,
+                "it wrote a number that is not finite: it is off until the next start");
 }
 
 void CentralModule::update() noexcept {

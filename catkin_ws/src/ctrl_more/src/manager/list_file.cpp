@@ -10,7 +10,7 @@ namespace ctrl_more {
 namespace {
 
 const std::vector<std::string> kFileKeys = {"loadControllers", "profiles", "searchPath",
-                                            "sharedSignals"};
+                                            "sharedSignals", "signals"};
 const std::vector<std::string> kBlockKeys = {"libPath",    "configFile", "type",   "enabled",
                                              "overrun_us", "on_fault",   "blend_s"};
 

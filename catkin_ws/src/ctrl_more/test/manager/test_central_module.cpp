@@ -200,6 +200,57 @@ TEST_F(CentralModuleTest, EverySignalOfTheUserGoesInAndComesOut) {
   EXPECT_FALSE(module.update(other, &control));
 }
 
+/// Writes the pelvis, from the third cycle on with a NaN.
+struct Broken : Manager {
+  std::string name_ = "broken";
+  int cycles = 0;
+  const std::string& name() const override { return name_; }
+  void beginCycle(const Cycle&) noexcept override { ++cycles; }
+  void updateStage(Stage, const RobotStates&, ControlStates& control) noexcept override {
+    auto com = control.view(control.find(ControlContainer::CentreOfMass, "com"));
+    com[0] = cycles;
+    com[1] = cycles < 3 ? 0.0 : std::nan("");
+  }
+};
+
+TEST_F(CentralModuleTest, ManagerThatWritesNoNumberIsUndoneAndOff) {
+  ASSERT_TRUE(CentralModule::registerManager(
+      "Broken", [](const std::string&, const ConfigNode&, RobotStates&, ControlStates&, Logger*) {
+        return std::make_unique<Broken>();
+      }));
+  CentralModule module(ConfigNode::fromText("managers: [b]\nb: {type: Broken}\n", "c"), "",
+                       &logger);
+  for (int i = 0; i < 5; ++i) module.update();
+  EXPECT_EQ(module.controlStates().getCoM()[0], 2.0);
+  EXPECT_EQ(module.controlStates().getCoM()[1], 0.0);
+}
+
+TEST_F(CentralModuleTest, RobotHostsItOnItsOwnStores) {
+  RobotStates robot(&logger);
+  ControlStates control(7, 0.005, &logger);
+  const auto refusal = [&](const std::string& text) -> std::string {
+    try {
+      CentralModule(ConfigNode::fromText(text, "c"), kPlugins, {robot, control, {}, {}}, &logger);
+    } catch (const ConfigError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  const std::string feedback = "managers: [f]\nf: {type: Feedback}\n";
+  EXPECT_EQ(refusal(feedback + "joints: 7\n"), "");
+  EXPECT_TRUE(contains(refusal(feedback + "joints: 6\n"), "this robot has 7 joints"));
+  EXPECT_TRUE(contains(refusal(feedback + "period: 0.01\n"), "period is 0.005"));
+  EXPECT_TRUE(contains(refusal("managers: []\n"), "type Feedback"));
+  CentralModule module(ConfigNode::fromText("managers: [walk, f]\nf: {type: Feedback}\n"
+                                            "walk: {type: Walk, step: 0.5}\n",
+                                            "c"),
+                       kPlugins, {robot, control, {}, {}}, &logger);
+  module.begin({1, 0.005, 1});
+  module.run(Stage::Task);
+  EXPECT_EQ(control.getCoM()[0], 0.5);
+  module.end();
+}
+
 TEST_F(CentralModuleTest, ManagersComeFromLibraries) {
   const auto make = [&](const std::string& block) {
     return CentralModule(
@@ -218,6 +269,7 @@ TEST_F(CentralModuleTest, ManagersComeFromLibraries) {
   EXPECT_TRUE(contains(refusal("type: Wlk, libPath: libwalk.so"), "did you mean 'Walk'"));
   EXPECT_TRUE(contains(refusal("type: Walk, libPath: libgood.so"), "registers no manager"));
   EXPECT_TRUE(contains(refusal("type: Walk, libPath: libnowhere.so"), "libnowhere.so"));
+  EXPECT_TRUE(contains(refusal("type: Walk"), "needs a step")) << "found by the name of the type";
   CentralModule central = make("type: Walk, libPath: libwalk.so, step: 0.5");
   central.update();
   central.update();

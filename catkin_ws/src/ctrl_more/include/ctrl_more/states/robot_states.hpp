@@ -146,6 +146,9 @@ class RobotStates {
   /// @param values `signal.size()` doubles
   /// @param stamp_ns monotonic nanoseconds >= 0
   bool write(RobotSignal signal, const double* values, std::int64_t stamp_ns);
+
+  /// Makes a signal absent, as if it was never written: controllers that need it wait for it.
+  void forget(RobotSignal signal) { stamps_[signal.index()] = kNeverWritten; }
   /// @}
 
   /// Newest stamp of all signals; kNeverWritten if none was written. A manager without a clock uses

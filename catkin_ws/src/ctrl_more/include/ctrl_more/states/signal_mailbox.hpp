@@ -10,13 +10,16 @@
 namespace ctrl_more {
 
 /// Transfers one robot signal from another thread (a driver, a subscriber) into the control cycle.
-/// The cycle reads the newest complete values. Neither side waits for the other. One writer, one
-/// reader.
+/// The cycle reads the newest complete values. Values older than the largest age make the signal
+/// absent. Neither side waits for the other. One writer, one reader.
 class SignalMailbox {
  public:
   /// @param signal handle from RobotStates::find()
-  explicit SignalMailbox(RobotSignal signal)
-      : signal_(signal), letters_({std::vector<double>(signal.size()), kNeverWritten}) {}
+  /// @param max_age_ns largest age of the values
+  explicit SignalMailbox(RobotSignal signal, std::int64_t max_age_ns = INT64_MAX)
+      : signal_(signal),
+        max_age_ns_(max_age_ns),
+        letters_({std::vector<double>(signal.size()), kNeverWritten}) {}
 
   /// Publishes new values (writer's thread). No allocation.
   /// @param values `size` doubles
@@ -31,11 +34,15 @@ class SignalMailbox {
     return true;
   }
 
-  /// Copies the newest values into the robot states (at the start of the cycle).
+  /// Copies the newest values into the robot states (at the start of the cycle), or makes the
+  /// signal absent if they are too old.
+  /// @param now_ns time of the cycle, monotonic nanoseconds
   /// @return true if there were new, finite values
-  bool deliver(RobotStates& robot) {
-    return letters_.take() &&
-           robot.write(signal_, letters_.front().values.data(), letters_.front().stamp_ns);
+  bool deliver(RobotStates& robot, std::int64_t now_ns = 0) {
+    const bool written = letters_.take() && robot.write(signal_, letters_.front().values.data(),
+                                                        letters_.front().stamp_ns);
+    if (now_ns - robot.stamp(signal_) > max_age_ns_) robot.forget(signal_);
+    return written;
   }
 
  private:
@@ -44,6 +51,7 @@ class SignalMailbox {
     std::int64_t stamp_ns;
   };
   RobotSignal signal_;
+  std::int64_t max_age_ns_;
   coglab_rt::TripleBuffer<Letter> letters_;
 };
 
