@@ -54,7 +54,9 @@ add_library(coglab_controllers_manager
   src/manager/feedback_requests.cpp
   src/manager/feedback_stage.cpp
   src/manager/parameters.cpp
-  src/manager/robot_setup.cpp)
+  src/manager/robot_setup.cpp
+  src/manager/signal_file.cpp
+  src/manager/signal_inputs.cpp)
 target_compile_features(coglab_controllers_manager PUBLIC cxx_std_17)
 target_compile_options(coglab_controllers_manager PRIVATE -Wall -Wextra)
 target_include_directories(coglab_controllers_manager

@@ -52,6 +52,7 @@ add_library(coglab_sim
   src/krc/krl_program.cpp
   src/krc/servos.cpp
   src/pace.cpp
+  src/palm_sensors.cpp
   src/real_time_cell.cpp
   src/torque_sensor.cpp)
 target_compile_features(coglab_sim PUBLIC cxx_std_17)

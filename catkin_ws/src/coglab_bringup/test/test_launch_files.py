@@ -36,6 +36,14 @@ def test_learnt_contact_thresholds_reach_the_detector(file):
     assert found["/contact_detector/learnt_file"] == "learnt.yaml"
 
 
+@pytest.mark.parametrize("file", ["coglab.launch", "real.launch"])
+def test_files_of_feedback_controllers_signals_and_managers_reach_the_manager(file):
+    found = parameters("coglab_bringup", file, "feedback:=palm", "signals:=s.yaml", "managers:=m.yaml", REAL)
+    names = ("feedback_file", "signals_file", "central_file")
+    assert [found[f"/controller_manager/{name}"] for name in names] == ["palm", "s.yaml", "m.yaml"]
+    assert not {f"/controller_manager/{name}" for name in names[1:]} & set(parameters("coglab_bringup", file, REAL))
+
+
 def test_touch_sensors_are_read_where_their_driver_publishes():
     simulated = parameters("coglab_bringup", "coglab.launch", "tactile:=true")
     topics = [f"/{node}/tactile_topic" for node in ("controller_manager", "contact_detector")]

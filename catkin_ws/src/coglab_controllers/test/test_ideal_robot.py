@@ -14,13 +14,23 @@ import rosgraph
 import rospy
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from coglab_msgs.msg import ControllerStatus, DmpFeedback, FinishedPtp, LwrState, ReasonCode, UnfinishedPtp
+from coglab_msgs.msg import (
+    ControllerStatus,
+    DmpFeedback,
+    FeedbackStatus,
+    FinishedPtp,
+    LwrState,
+    ReasonCode,
+    UnfinishedPtp,
+)
 from coglab_msgs.srv import (
     AddPtp,
     CancelMotion,
+    FeedbackSelect,
     GetActiveController,
     ListControllers,
     LoadController,
+    LoadFeedback,
     LwrCommand,
     SwitchController,
     UnloadController,
@@ -29,8 +39,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from own_master import built, own_master
 from robot_fixture import JOINTS, wait_until
 from rosgraph_msgs.msg import Log
-from sensor_msgs.msg import JointState
-from std_msgs.msg import String
+from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import Float64MultiArray, String
 
 SOURCES = Path(__file__).resolve().parents[2]
 START = [-1.2, -0.6, 1.4, 1.7, 0.2, 0.2, 0.7]
@@ -52,6 +62,7 @@ def parameters(master: rosgraph.Master) -> None:
         "odd": {"fault": "stall", "after": 0},
         "bad": {"fault": "throw", "after": 0},
         "overrun_time": 5.0,
+        "signals_file": "palm_signals",
     }
     master.setParam("/controller_manager", manager)
 
@@ -194,6 +205,46 @@ def test_commands_have_their_answers(robot: Robot) -> None:
     assert robot.command("start").reason_code == ReasonCode.HELD
     robot.started()
     robot.until(lambda state, _: state.motion_epoch == 3 and not state.hold_latched, "two changes more")
+
+
+def test_a_topic_becomes_a_signal_and_its_stop_makes_the_controller_wait(robot: Robot) -> None:
+    statuses: list[FeedbackStatus] = []
+    corrections: list[Float64MultiArray] = []
+    rospy.Subscriber("controller_manager/feedback/status", FeedbackStatus, statuses.append)
+    rospy.Subscriber("feedback/attitude_correction", Float64MultiArray, corrections.append)
+    file = str(SOURCES / "coglab_controllers" / "config" / "palm_attitude.yaml")
+    loaded = robot.manager("feedback/load", LoadFeedback, "attitude", "Attitude", "", file)
+    assert loaded.success, loaded.message
+    assert robot.manager("feedback/enable", FeedbackSelect, ["attitude"], "").success
+
+    def attitude() -> tuple[str, str]:
+        known = [c for s in statuses[-1:] for c in s.controllers if c.name == "attitude"]
+        return (known[0].activity, known[0].waiting_for) if known else ("", "")
+
+    waits = ("waiting", "measuredData/palm_imu")
+    wait_until(lambda: attitude() == waits, "waiting for the signal")
+    imu = rospy.Publisher("coglab_sim/palm_imu", Imu, queue_size=1)
+    message = Imu()
+    message.orientation.w = 1.0
+
+    def publish(frame: str) -> None:
+        message.header.stamp, message.header.frame_id = rospy.Time.now(), frame
+        imu.publish(message)
+
+    def heard(words: str) -> bool:
+        return any(words in line.msg for line in robot.log)
+
+    wait_until(lambda: publish("world") or heard("expected frame ih2_palm, got 'world'"), "the refusal in words")
+    assert attitude() == waits
+    wait_until(lambda: publish("ih2_palm") or attitude()[0] == "running", "running by the topic")
+    wait_until(lambda: publish("ih2_palm") or bool(corrections), "the correction on its topic")
+    assert len(corrections[-1].data) == 7
+    wait_until(lambda: attitude() == waits, "waiting after the topic has stopped")
+    wait_until(
+        lambda: heard("signal measuredData/palm_imu is absent: nothing new on /coglab_sim/palm_imu"), "its words"
+    )
+    assert robot.manager("feedback/disable", FeedbackSelect, ["attitude"], "").success
+    wait_until(lambda: robot.manager("feedback/unload", FeedbackSelect, ["attitude"], "").success, "unloaded")
 
 
 def test_a_motion_is_made_shown_and_cancelled(robot: Robot) -> None:

@@ -6,6 +6,8 @@
 #include <coglab_msgs/FingertipForces.h>
 #include <coglab_msgs/MotorCommands.h>
 #include <coglab_msgs/MotorStates.h>
+#include <geometry_msgs/WrenchStamped.h>
+#include <sensor_msgs/Imu.h>
 
 #include <stdexcept>
 #include <string>
@@ -92,6 +94,33 @@ inline coglab_msgs::MotorStates motorsMessage(const MotorStates& motors, const r
     message.moving.push_back(motor.moving);
     message.locked.push_back(motor.locked);
   }
+  return message;
+}
+
+/// Measurement of the IMU in the palm.
+inline sensor_msgs::Imu imuMessage(const PalmReading& palm, const PalmNoise& noise,
+                                   const ros::Time& stamp) {
+  sensor_msgs::Imu message;
+  message.header.stamp = stamp;
+  message.header.frame_id = plant::kPalmFrame;
+  message.orientation = poseMessage({Vector3d::Zero(), palm.orientation}).orientation;
+  message.angular_velocity = vectorMessage(palm.angular_velocity);
+  message.linear_acceleration = vectorMessage(palm.linear_acceleration);
+  for (const std::size_t diagonal : {0, 4, 8}) {
+    message.orientation_covariance[diagonal] = noise.orientation * noise.orientation;
+    message.angular_velocity_covariance[diagonal] = noise.rate * noise.rate;
+    message.linear_acceleration_covariance[diagonal] = noise.acceleration * noise.acceleration;
+  }
+  return message;
+}
+
+/// Measurement of the wrench sensor in the palm: load of object, person and push on the hand.
+inline geometry_msgs::WrenchStamped wrenchMessage(const PalmReading& palm, const ros::Time& stamp) {
+  geometry_msgs::WrenchStamped message;
+  message.header.stamp = stamp;
+  message.header.frame_id = plant::kPalmFrame;
+  message.wrench.force = vectorMessage(palm.force);
+  message.wrench.torque = vectorMessage(palm.torque);
   return message;
 }
 

@@ -2,11 +2,12 @@
 ///
 /// Subscribes (relative names) human_hand, motor_commands, ~push (geometry_msgs/Wrench on the palm,
 /// world axes). Publishes truth/cell, motor_states, ~messages (the controller's message window),
-/// /clock if ~publish_clock, fingertip_forces if ~tactile, real_time_factor (std_msgs/Float64,
-/// latched) and, on /diagnostics, whether this computer keeps real time. If it does not and
-/// ~slow_down is set, the cell slows down. Stamps are the times of the physics steps. Serves
-/// ~fault, ~place_object. Parameters: all rows of parameter_table.inc in the private namespace;
-/// fri_period and seed in the parent namespace.
+/// palm_imu (sensor_msgs/Imu), palm_wrench
+/// (geometry_msgs/WrenchStamped), /clock if ~publish_clock, fingertip_forces if ~tactile,
+/// real_time_factor (std_msgs/Float64, latched) and, on /diagnostics, whether this computer keeps
+/// real time. If it does not and ~slow_down is set, the cell slows down. Stamps are the times of
+/// the physics steps. Serves ~fault, ~place_object. Parameters: all rows of parameter_table.inc in
+/// the private namespace; fri_period and seed in the parent namespace.
 #include <fstream>
 #include <memory>
 
@@ -89,6 +90,8 @@ class CellNode {
     messages_ = private_.advertise<std_msgs::String>("messages", 50, true);
     factor_ = node_.advertise<std_msgs::Float64>("real_time_factor", 1, true);
     diagnostics_ = node_.advertise<diagnostic_msgs::DiagnosticArray>("/diagnostics", 5);
+    palm_imu_ = node_.advertise<sensor_msgs::Imu>("palm_imu", kQueue);
+    palm_wrench_ = node_.advertise<geometry_msgs::WrenchStamped>("palm_wrench", kQueue);
     if (settings_.tactile)
       touch_ = node_.advertise<coglab_msgs::FingertipForces>("fingertip_forces", kQueue);
     if (settings_.publish_clock) clock_ = node_.advertise<rosgraph_msgs::Clock>("/clock", 1);
@@ -267,6 +270,10 @@ class CellNode {
       }
       truth_.publish(truthMessage(each.truth, config_.object.id, stamp));
       motor_states_.publish(motorsMessage(each.motors, stamp));
+      if (palm_imu_.getNumSubscribers() > 0)
+        palm_imu_.publish(imuMessage(each.palm, config_.palm_noise, stamp));
+      if (palm_wrench_.getNumSubscribers() > 0)
+        palm_wrench_.publish(wrenchMessage(each.palm, stamp));
       if (touch_) touch_.publish(touchMessage(each.touch, hand_, stamp));
     }
     for (const krc::Message& message : cell_->takeMessages()) {
@@ -371,7 +378,8 @@ class CellNode {
   ros::WallTime measured_at_ = ros::WallTime::now();
   double hand_messages_ = 0.0, hand_rate_ = 0.0;
   std::ofstream log_;
-  ros::Publisher truth_, motor_states_, messages_, clock_, touch_, factor_, diagnostics_;
+  ros::Publisher truth_, motor_states_, messages_, clock_, touch_, palm_imu_, palm_wrench_, factor_,
+      diagnostics_;
   ros::Subscriber human_, motors_, push_;
   ros::ServiceServer fault_, place_;
   ros::SteadyTimer publish_timer_, log_timer_, port_timer_, pace_timer_;

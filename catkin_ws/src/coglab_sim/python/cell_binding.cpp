@@ -115,6 +115,22 @@ PYBIND11_MODULE(_cell, m) {
           },
           "N (3,), sum of the forces of touch().")
       .def(
+          "palm_sensors",
+          [](const PyCell& c) {
+            const PalmReading& palm = c.cell().palmSensors();
+            py::dict result;
+            result["orientation"] = Eigen::Vector4d(palm.orientation.coeffs());
+            result["angular_velocity"] = palm.angular_velocity;
+            result["linear_acceleration"] = palm.linear_acceleration;
+            result["force"] = palm.force;
+            result["torque"] = palm.torque;
+            return result;
+          },
+          "IMU and wrench sensor in the palm, axes of ih2_palm: orientation in the world (x y z "
+          "w), "
+          "angular_velocity rad/s, linear_acceleration m/s^2 (with gravity: +9.81 upward at rest), "
+          "force N and torque Nm of object, person and push on the hand. With noise and bias.")
+      .def(
           "touch", [](const PyCell& c) { return touchDict(c.cell().plant(), c.cell().touch()); },
           "Forces on phalanges and palm, N, axes of ih2_palm.")
       .def(

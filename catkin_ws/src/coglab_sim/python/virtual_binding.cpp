@@ -342,6 +342,33 @@ PYBIND11_MODULE(_virtual, m) {
           "The robot's own ctrl_more.FeedbackControllersManager: load, order, pause and tune "
           "controllers here, C++ and Python ones. The cycle runs it.")
 
+      .def("post_signal", &Robot::postSignal, py::arg("topic"), py::arg("numbers"),
+           py::arg("age") = 0.0, py::arg("frame") = "",
+           py::arg("joints") = std::vector<std::string>(),
+           "Posts a message of a topic of the file of signals (parameter signals_file), as if it "
+           "arrived now. numbers: values of each field by its name; age: s since the measurement; "
+           "frame: frame_id; joints: names of a JointState. Returns why a row refuses it, '' if "
+           "none does. The palm's IMU and wrench sensor post coglab_sim/palm_imu and "
+           "coglab_sim/palm_wrench in each tick. ValueError: no row has the topic, or its type no "
+           "such field.")
+      .def(
+          "robot_signal",
+          [](Robot& robot, const std::string& key) -> py::object {
+            const ctrl_more::RobotStates& states = robot.manager().feedbackStage().robot();
+            for (const auto source :
+                 {ctrl_more::RobotSource::Measured, ctrl_more::RobotSource::Estimated}) {
+              const ctrl_more::RobotSignal signal = states.find(source, key);
+              if (!signal.valid()) continue;
+              if (states.stamp(signal) == ctrl_more::kNeverWritten) return py::none();
+              return py::cast(Eigen::VectorXd(states.view(signal)));
+            }
+            throw std::invalid_argument("there is no robot signal '" + key + "'");
+          },
+          py::arg("key"),
+          "Numbers of a robot signal as feedback controllers read it; None while it is absent.")
+      .def_property_readonly(
+          "start_errors", [](Robot& robot) { return robot.manager().feedbackErrors(); },
+          "Errors from loading the files of signals, managers and feedback controllers.")
       .def("add_motion", &addMotion, py::arg("id"), py::arg("motion"),
            "Loads a motion in Python under an id, see python_motion.hpp; (success, message).")
       .def("start_motion", &startMotion, py::arg("id"), py::arg("arguments") = py::dict(),

@@ -42,6 +42,7 @@ Cell::Cell(const CellConfig& config)
       servos_(config.urdf, config.servos, config.drives.rotor_inertia, config.seed),
       controller_(config.krc, config.servos, config.home),
       torque_sensor_(config.torque_noise, config.seed),
+      palm_sensors_(config.palm_noise, config.seed),
       loss_(config.seed, 2) {
   plant_.setBrakes(true);
   plant_.setArm(config.home);
@@ -115,11 +116,14 @@ const MeasurementBytes& Cell::advance(bool on_time, bool anew) {
     servos_.observe(plant_.position(), plant_.velocity());
     torque_sensor_.advance(plant_.velocity(), dt);
     averageForces(dt);
+    palm_sensors_.observe(plant_, dt);
     torque += plant_.jointTorque() / steps;
     fastest_ = i > 1 ? Vector7(fastest_.cwiseMax(plant_.velocity().cwiseAbs()))
                      : Vector7(plant_.velocity().cwiseAbs());
     acceleration += plant_.acceleration() / steps;
   }
+
+  palm_sensors_.read();
 
   losing_ = lose_next_ > 0;
   if (losing_) --lose_next_;

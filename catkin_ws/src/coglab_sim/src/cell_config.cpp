@@ -108,6 +108,7 @@ std::vector<CellParameter> makeTable() {
 #define SERVOS(type, field, value, ...) row(FIELD(servos.field), false, __VA_ARGS__),
 #define DRIVES(type, field, value, ...) row(FIELD(drives.field), false, __VA_ARGS__),
 #define TORQUE_NOISE(type, field, value, ...) row(FIELD(torque_noise.field), false, __VA_ARGS__),
+#define PALM_NOISE(type, field, value, ...) row(FIELD(palm_noise.field), false, __VA_ARGS__),
 #define OBJECT(type, field, value, ...) row(FIELD(object.field), false, __VA_ARGS__),
 #define PERSON(type, field, value, ...) row(FIELD(person.field), false, __VA_ARGS__),
 #define SURROUNDINGS(type, field, value, ...) row(FIELD(surroundings.field), false, __VA_ARGS__),

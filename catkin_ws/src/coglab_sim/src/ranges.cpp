@@ -17,6 +17,7 @@ Range rangeOf(const std::string& name) {
 #define SERVOS ROW
 #define DRIVES ROW
 #define TORQUE_NOISE ROW
+#define PALM_NOISE ROW
 #define OBJECT ROW
 #define PERSON ROW
 #define SURROUNDINGS ROW

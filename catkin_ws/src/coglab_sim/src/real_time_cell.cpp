@@ -160,11 +160,13 @@ void RealTimeCell::leaveResults(bool answered, bool expected, bool unanswered, d
   const CellTruth truth = cell_.truth();
   const MotorStates motors = cell_.motors();
   const plant::Touch touch = cell_.touch();
+  const PalmReading palm = cell_.palmSensors();
 
   const std::lock_guard<std::mutex> lock(mutex_);
   snapshot_.truth = truth;
   snapshot_.motors = motors;
   snapshot_.touch = touch;
+  snapshot_.palm = palm;
   snapshot_.stepped_ns = stepped_ns;
   ++snapshot_.tick;
   if (answered) ++snapshot_.answers;

@@ -44,6 +44,17 @@ lwr_fri_bridge::BridgeConfig bridgeConfig(const LockstepRobotConfig& config) {
   return bridge;
 }
 
+// Topics of cell_node, in the namespace of the robot.
+const char* const kPalmImu = "coglab_sim/palm_imu";
+const char* const kPalmWrench = "coglab_sim/palm_wrench";
+
+bool sameTopic(const std::string& one, const std::string& other) {
+  const auto begin = [](const std::string& name) { return name[0] == '/' ? 1U : 0U; };
+  return one.compare(begin(one), std::string::npos, other, begin(other)) == 0;
+}
+
+std::vector<double> listOf(const Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
 }  // namespace
 
 void WorldFrames::set(const std::string& frame, const Pose& in_world, std::int64_t stamp_ns) {
@@ -97,6 +108,10 @@ LockstepRobot::LockstepRobot(const LockstepRobotConfig& config)
   settings.logger = &logger_;
   manager_ = std::make_unique<coglab_controllers::ControllerManager>(std::move(settings));
   report_ = manager_->report();
+  for (const auto& row : manager_->feedbackStage().signals().rows()) {
+    has_palm_imu_ = has_palm_imu_ || sameTopic(row.topic, kPalmImu);
+    has_palm_wrench_ = has_palm_wrench_ || sameTopic(row.topic, kPalmWrench);
+  }
 }
 
 LockstepRobot::~LockstepRobot() {
@@ -156,6 +171,7 @@ void LockstepRobot::tick() {
   cell_.step(answered ? bytes.data() : nullptr, bytes.size());
   measured_ = cell_.sent();
   now_ns_ += static_cast<std::int64_t>(std::llround(1e9 * cell_.period()));
+  postPalm();
   limits_.lookAtArm(cell_.plant().position(), cell_.fastest());
   report_ = manager_->report();
   const auto& robot = report_.robot;
@@ -163,6 +179,64 @@ void LockstepRobot::tick() {
     limits_.lookAtCommand(robot.commanded_position, robot.block == coglab_rt::MotionBlock::None,
                           period);
   }
+}
+
+void LockstepRobot::postPalm() {
+  const PalmReading& palm = cell_.palmSensors();
+  if (has_palm_imu_) {
+    const Quaterniond& q = palm.orientation;
+    postSignal(kPalmImu,
+               {{"orientation", {q.x(), q.y(), q.z(), q.w()}},
+                {"angular_velocity", listOf(palm.angular_velocity)},
+                {"linear_acceleration", listOf(palm.linear_acceleration)}},
+               0.0, plant::kPalmFrame, {});
+  }
+  if (has_palm_wrench_) {
+    const Vector3d& f = palm.force;
+    const Vector3d& t = palm.torque;
+    postSignal(kPalmWrench,
+               {{"force", listOf(f)},
+                {"torque", listOf(t)},
+                {"wrench", {f.x(), f.y(), f.z(), t.x(), t.y(), t.z()}}},
+               0.0, plant::kPalmFrame, {});
+  }
+}
+
+std::string LockstepRobot::postSignal(const std::string& topic,
+                                      const std::map<std::string, std::vector<double>>& numbers,
+                                      double age, const std::string& frame,
+                                      const std::vector<std::string>& joints) {
+  auto& inputs = manager_->feedbackStage().signals();
+  coglab_controllers::SignalMessage message;
+  message.stamp_ns = now_ns_ - static_cast<std::int64_t>(std::llround(1e9 * age));
+  message.frame = frame;
+  message.joint_names = joints;
+  std::string refused;
+  for (std::size_t i = 0; i < inputs.rows().size(); ++i) {
+    const coglab_controllers::SignalInput& row = inputs.rows()[i];
+    if (!sameTopic(row.topic, topic)) continue;
+    if (message.fields.empty()) {
+      for (const coglab_controllers::SignalField& field : row.type->fields) {
+        const auto found = numbers.find(field.name);
+        message.fields.emplace_back();
+        if (found == numbers.end()) continue;
+        message.fields.back() = {found->second.data(), found->second.size()};
+      }
+      for (const auto& [name, values] : numbers) {
+        const auto& fields = row.type->fields;
+        if (std::none_of(fields.begin(), fields.end(),
+                         [&name = name](const auto& field) { return field.name == name; })) {
+          throw std::invalid_argument(row.type->name + " has no field '" + name + "'");
+        }
+      }
+    }
+    const coglab_controllers::SignalPost post = inputs.post(i, message, now_ns_);
+    if (!post.text.empty()) refused = row.key + ": " + post.text;
+  }
+  if (message.fields.empty()) {
+    throw std::invalid_argument("no row of the file of signals has the topic '" + topic + "'");
+  }
+  return refused;
 }
 
 bool LockstepRobot::answer(std::array<std::uint8_t, lwr_fri_bridge::fri::kCommandSize>& bytes) {

@@ -119,13 +119,17 @@ void Guard::limit(const ChainState& state, const JointVector& q, const JointVect
       bind(speed, allowed, GuardReason::JointPosition, i, WorkspaceBorder::None);
     }
   }
-  if (parameters_.hand_speed > 0.0) {
+  // 0 of a parameter: no limit of its own.
+  const auto lower = [this](double own) {
+    return own > 0.0 ? std::min(own, speed_limit_) : speed_limit_;
+  };
+  if (const double limit = lower(parameters_.hand_speed); std::isfinite(limit)) {
     const double speed = (state.jacobian.topRows<3>() * request).norm();
-    bind(speed, bound(parameters_.hand_speed), GuardReason::HandSpeed, -1, WorkspaceBorder::None);
+    bind(speed, bound(limit), GuardReason::HandSpeed, -1, WorkspaceBorder::None);
   }
-  if (parameters_.elbow_speed > 0.0) {
+  if (const double limit = lower(parameters_.elbow_speed); std::isfinite(limit)) {
     const double speed = Chain::originVelocity(state, chain_.elbowJoint(), request).norm();
-    bind(speed, bound(parameters_.elbow_speed), GuardReason::ElbowSpeed, -1, WorkspaceBorder::None);
+    bind(speed, bound(limit), GuardReason::ElbowSpeed, -1, WorkspaceBorder::None);
   }
   std::array<Workspace::Margin, Workspace::kBorders> margins;
   workspace_.margins(chain_, state, request, margins);

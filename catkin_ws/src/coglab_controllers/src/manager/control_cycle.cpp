@@ -8,6 +8,8 @@ namespace coglab_controllers {
 
 namespace {
 
+constexpr double kFastest = 1000.0;  // m/s: no limit, and a number that may be published
+
 bool moving(MotionState state) {
   return state == MotionState::Running || state == MotionState::Holding;
 }
@@ -216,6 +218,7 @@ bool ControlCycle::tooSlow(double taken) noexcept {
 void ControlCycle::compute(JointVector& velocity) noexcept {
   References& references = feedback_.references();
   references.states.view<kMaxJoints>(references.joint_velocity).setZero();
+  references.states.view<1>(references.speed_limit)[0] = kFastest;
   if (motion_ == nullptr || fault_) return;
   // Only the time of the motion controller itself is charged to it; feedback controllers between
   // its two parts have their own limits.
@@ -242,6 +245,7 @@ void ControlCycle::compute(JointVector& velocity) noexcept {
   // Step 7: joint-stage feedback controllers.
   feedback_.run(ctrl_more::Stage::Joint);
   velocity = references.states.view<kMaxJoints>(references.joint_velocity);
+  guard_.setSpeedLimit(std::max(0.0, references.states.view<1>(references.speed_limit)[0]));
 }
 
 void ControlCycle::run(const RobotSample& sample, double dt, VelocityCommand& out) noexcept {

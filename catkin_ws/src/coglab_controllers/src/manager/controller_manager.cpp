@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <filesystem>
+#include <optional>
 #include <stdexcept>
 #include <thread>
 #include <utility>
@@ -28,6 +30,23 @@ bool validId(const std::string& id) {
   return std::all_of(id.begin(), id.end(), [](unsigned char letter) {
     return std::isalnum(letter) != 0 || letter == '_';
   });
+}
+
+/// Path of the file of signals that a file of controllers or managers names; empty: none. What is
+/// wrong with that file is reported when it is loaded.
+std::string signalsOf(const std::string& user, const ctrl_more::SearchPath& files) {
+  std::string path;
+  std::optional<ctrl_more::ConfigNode> file;
+  try {
+    path = files.find(user);
+    file = ctrl_more::ConfigNode::fromFile(path);
+  } catch (const std::exception&) {
+    return "";
+  }
+  const ctrl_more::ConfigNode* const signals = file->find("signals");
+  if (signals == nullptr) return "";
+  return ctrl_more::SearchPath(std::filesystem::path(path).parent_path().string())
+      .find(signals->text("signals"));
 }
 
 }  // namespace
@@ -66,6 +85,8 @@ ManagerSettings readManagerSettings(const YAML::Node& node, const std::string& u
   }
   settings.plugin_paths = parameters.texts("plugin_paths");
   settings.feedback_file = parameters.text("feedback_file", "");
+  settings.central_file = parameters.text("central_file", "");
+  settings.signals_file = parameters.text("signals_file", "");
   return settings;
 }
 
@@ -76,11 +97,53 @@ ControllerManager::ControllerManager(ManagerSettings settings)
   if (std::function<void()> wait = cycleWait()) cycle_.plans().setWait(wait);
   const Parameters parameters(settings_.parameters, "controller_manager");
   cycle_.setSpeedScale(parameters.number("speed_scale", 1.0, 0.0, 1.0));
-  if (!settings_.feedback_file.empty()) {
-    feedback_errors_ = feedback_.manager().load(settings_.feedback_file).errors;
-  }
+  loadSignals();
+  loadManagers();
   cycle_.idle(
       now_ns());  // the stores are frozen here, which allocates, and not in the first real cycle
+  if (!outputs_.empty()) feedback_.recordReferences();
+}
+
+void ControllerManager::loadManagers() {
+  const auto report = [this](const std::vector<std::string>& errors) {
+    feedback_errors_.insert(feedback_errors_.end(), errors.begin(), errors.end());
+  };
+  if (!settings_.central_file.empty()) {
+    try {
+      feedback_.loadCentral(
+          ctrl_more::SearchPath("", settings_.plugin_paths).find(settings_.central_file),
+          settings_.plugin_paths);
+      report(feedback_.central().loadErrors());
+    } catch (const std::exception& error) {
+      report({std::string("only feedback controllers run, no other manager: ") + error.what()});
+    }
+  }
+  // A list of the central module's file counts instead.
+  if (settings_.feedback_file.empty() || !feedback_.central().feedbackList().empty()) return;
+  report(feedback_.manager().load(settings_.feedback_file).errors);
+}
+
+void ControllerManager::loadSignals() {
+  try {
+    const ctrl_more::SearchPath files("", settings_.plugin_paths);
+    SignalFile all;
+    const auto read = [&all](const std::string& path) {
+      const SignalFile file = readSignalFile(path);
+      all.in.insert(all.in.end(), file.in.begin(), file.in.end());
+      all.out.insert(all.out.end(), file.out.begin(), file.out.end());
+    };
+    if (!settings_.signals_file.empty()) read(files.find(settings_.signals_file));
+    // The files of controllers and managers may name the signals that they need.
+    for (const std::string& user : {settings_.feedback_file, settings_.central_file}) {
+      const std::string path = user.empty() ? "" : signalsOf(user, files);
+      if (!path.empty()) read(path);
+    }
+    const ctrl_more::Status added = feedback_.addSignals(all.in);
+    if (!added) throw std::runtime_error(added.message());
+    outputs_ = all.out;
+  } catch (const std::exception& error) {
+    feedback_errors_.push_back(std::string("no signals from topics: ") + error.what());
+  }
 }
 
 ControllerManager::~ControllerManager() = default;

@@ -1,5 +1,7 @@
 #include "coglab_controllers/manager/feedback_stage.hpp"
 
+#include <algorithm>
+#include <filesystem>
 #include <stdexcept>
 #include <string>
 
@@ -44,6 +46,8 @@ References makeReferences(double period, ctrl_more::Logger* logger) {
                                                   "Position", "rad", "joints in wire order");
   references.joint_velocity = declare<kMaxJoints>(states, ControlContainer::JointSpaceReference,
                                                   "Velocity", "rad/s", "joints in wire order");
+  references.speed_limit =
+      declare<1>(states, ControlContainer::OtherReference, "speed_limit", "m/s", "hand and elbow");
   references.states.view(references.pose) << 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0;
   return references;
 }
@@ -55,7 +59,11 @@ FeedbackStage::FeedbackStage(const RobotSetup& setup, double period, bool lockst
     : tool_from_wrench_(setup.tool_from_wrench),
       robot_(logger),
       references_(makeReferences(period, logger)),
-      manager_(robot_, references_.states, options(lockstep), logger) {
+      options_(options(lockstep)),
+      logger_(logger),
+      central_(makeCentral(ctrl_more::ConfigNode::fromText(
+                               "{managers: [feedback], feedback: {type: Feedback}}", "default"),
+                           "", {})) {
   using ctrl_more::RobotSource;
   const std::string wire = "joints in wire order";
   position_ = declare(robot_, RobotSource::Measured, "joint_position", kMaxJoints, "rad", wire);
@@ -63,20 +71,46 @@ FeedbackStage::FeedbackStage(const RobotSetup& setup, double period, bool lockst
   torque_ = declare(robot_, RobotSource::Measured, "joint_torque", kMaxJoints, "Nm", wire);
   external_ = declare(robot_, RobotSource::Measured, "external_torque", kMaxJoints, "Nm", wire);
   wrench_ = declare(robot_, RobotSource::Measured, "wrench", 6, "N, Nm", "base");
-  if (setup.tactile)
-    touch_.emplace(declare(robot_, RobotSource::Measured, "touch",
-                           static_cast<int>(TouchForces().size()), "N", "tool"));
   pose_ = declare(robot_, RobotSource::Estimated, "ee", 7, "m, quaternion x y z w", "base");
+  if (!setup.touch_topic.empty()) addSignals({touchSignal(setup.touch_topic, setup.tool_link)});
+}
+
+std::unique_ptr<ctrl_more::CentralModule> FeedbackStage::makeCentral(
+    const ctrl_more::ConfigNode& file, const std::string& base,
+    const std::vector<std::string>& folders) {
+  return std::make_unique<ctrl_more::CentralModule>(
+      file, base, ctrl_more::CentralModule::Host{robot_, references_.states, options_, folders},
+      logger_);
+}
+
+void FeedbackStage::loadCentral(const std::string& file, const std::vector<std::string>& folders) {
+  central_ = makeCentral(ctrl_more::ConfigNode::fromFile(file),
+                         std::filesystem::path(file).parent_path().string(), folders);
+}
+
+std::vector<double> FeedbackStage::snapshotValues() const {
+  const ctrl_more::ControlStates& states = references_.states;
+  return {states.data(), states.data() + states.dataSize()};
 }
 
 void FeedbackStage::begin(std::int64_t now_ns, double dt) noexcept {
-  manager_.beginCycle(ctrl_more::Cycle{now_ns, dt, ++number_});
+  now_ = {now_ns, dt, now_.number + 1};
+  central_->begin(now_);
+}
+
+void FeedbackStage::end() noexcept {
+  central_->end();
+  if (!snapshots_) return;
+  Snapshot& snapshot = snapshots_->back();
+  snapshot.stamp_ns = now_.now_ns;
+  std::copy_n(references_.states.data(), snapshot.values.size(), snapshot.values.data());
+  snapshots_->publish();
 }
 
 bool FeedbackStage::fill(const CycleInput& input) noexcept {
-  if (touch_) touch_->deliver(robot_);
   const RobotSample& sample = input.robot;
   const std::int64_t stamp = sample.stamp_ns;
+  signals_.deliver(robot_, stamp);
   const Quaternion turn = input.chain.tool.orientation * tool_from_wrench_;
   coglab_rt::Vector6 wrench;
   wrench << turn * Vector3(sample.tool_wrench.head<3>()),

@@ -66,17 +66,18 @@ std::shared_ptr<const RobotSetup> makeRobotSetup(const std::string& urdf,
   guard.workspace_deceleration =
       space.number("deceleration", guard.workspace_deceleration, 0.05, 20.0);
 
-  const Chain chain(urdf, parameters.text("base_link", "lwr_base_link"),
-                    parameters.text("tool_link", "ih2_palm"));
+  const std::string tool_link = parameters.text("tool_link", "ih2_palm");
+  const Chain chain(urdf, parameters.text("base_link", "lwr_base_link"), tool_link);
   requireJointsOf(chain, table);
   const Chain to_wrench(urdf, chain.baseLink(), parameters.text("wrench_link", "ih2_palm"));
   const JointVector zero = JointVector::Zero();
   const Quaternion tool_from_wrench =
       chain.evaluate(zero).tool.orientation.conjugate() * to_wrench.evaluate(zero).tool.orientation;
   const Guard check(guard, chain);  // throws here, outside the cycle
+  const std::string touch_topic = parameters.text("tactile_topic", "ih2_hand/fingertip_forces");
   return std::make_shared<const RobotSetup>(
       RobotSetup{chain, limits, guard, Workspace(guard.workspace, chain.reach()), tool_from_wrench,
-                 parameters.flag("tactile", false)});
+                 tool_link, parameters.flag("tactile", false) ? touch_topic : ""});
 }
 
 }  // namespace coglab_controllers

@@ -81,7 +81,7 @@ void ManagerRos::start() {
   speed_ = node_.subscribe("speed_scale", 1, &ManagerRos::onSpeedTopic, this);
   feedback_ = std::make_unique<FeedbackRos>(ros::NodeHandle(node_, "feedback"), *manager_);
   cancel_ = std::make_unique<CancelRos>(node_, *manager_);
-  if (manager_->settings().robot->tactile) touch_ = std::make_unique<TouchTopic>(node_, *manager_);
+  signals_ = std::make_unique<SignalTopics>(node_, *manager_);
   diagnostics_ = std::make_unique<diagnostic_updater::Updater>(node_);
   diagnostics_->setHardwareID("none");
   diagnostics_->add("control cycle", this, &ManagerRos::diagnose);
@@ -105,7 +105,7 @@ void ManagerRos::shutdown() {
   speed_.shutdown();
   feedback_.reset();
   cancel_.reset();
-  touch_.reset();
+  signals_.reset();
   const std::lock_guard<std::mutex> lock(sides_mutex_);
   sides_.clear();
 }
@@ -273,6 +273,7 @@ void ManagerRos::publishLoop() {
       publishTarget(report);
       if (round % 4 == 0) publishStatus(report);
       if (round % 40 == 0) feedback_->publishStatus();
+      signals_->publish();
       if (round % 200 == 20) diagnostics_->force_update();  // not by ROS time
     });
     next = std::max(next + kPublishPeriod, std::chrono::steady_clock::now() - kPublishPeriod);
@@ -353,6 +354,8 @@ void ManagerRos::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   } else if (!warning.empty()) {
     code = ReasonCode::NoRealTime;
     status.summary(DiagnosticStatus::WARN, warning);
+  } else if (!manager_->feedbackErrors().empty()) {
+    status.summary(DiagnosticStatus::WARN, manager_->feedbackErrors().front());
   } else {
     status.summary(DiagnosticStatus::OK, nameOf(report.state));
   }

@@ -26,7 +26,8 @@ std::string readFile(const std::string& path) {
   return text.str();
 }
 
-/// `package://name/path` as a path; other names below this package's config folder.
+/// `package://name/path` as a path; other names below this package's config folder, `.yaml` if they
+/// have no suffix.
 std::string resolve(const std::string& name) {
   const std::string scheme = "package://";
   if (name.rfind(scheme, 0) == 0) {
@@ -39,7 +40,8 @@ std::string resolve(const std::string& name) {
     return path + name.substr(slash);
   }
   if (name.empty() || std::filesystem::path(name).is_absolute()) return name;
-  return ros::package::getPath("coglab_controllers") + "/config/" + name;
+  const std::string suffix = std::filesystem::path(name).has_extension() ? "" : ".yaml";
+  return ros::package::getPath("coglab_controllers") + "/config/" + name + suffix;
 }
 
 std::string robotModel(const ros::NodeHandle& node, const Parameters& parameters) {
@@ -64,6 +66,8 @@ ManagerSettings readManagerSettings(const ros::NodeHandle& node) {
   ManagerSettings settings =
       readManagerSettings(tree, robotModel(node, parameters), readJointLimits(node), false);
   settings.feedback_file = resolve(settings.feedback_file);
+  settings.central_file = resolve(settings.central_file);
+  settings.signals_file = resolve(settings.signals_file);
   return settings;
 }
 

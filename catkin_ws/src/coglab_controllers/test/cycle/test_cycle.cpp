@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <cmath>
 #include <cstdlib>
+#include <fstream>
 #include <mutex>
 #include <shared_mutex>
 #include <thread>
@@ -170,8 +171,23 @@ struct Requests {
     if (success) ++accepted;
   }
 
+  /// A message of each robot signal, and a look at the references.
+  void signals() {
+    FeedbackStage& stage = manager.feedbackStage();
+    const double numbers[3] = {1.0, 2.0, 3.0};
+    SignalMessage message;
+    message.fields.resize(3, {numbers, 3});
+    for (std::size_t row = 0; row < stage.signals().rows().size(); ++row) {
+      message.stamp_ns = manager.now_ns();
+      count(stage.signals().post(row, message, message.stamp_ns).refusal == SignalRefusal::None);
+    }
+    FeedbackStage::Snapshot references;
+    count(stage.readReferences(references));
+  }
+
   void round(int number) {
     std::string type;
+    signals();
     GoalObservation goal;
     goal.position = Vector3(0.80, 0.02 * (number % 5), 0.45);
     goal.stamp_ns = goal.frame_ns = manager.now_ns();
@@ -227,6 +243,20 @@ struct Requests {
   }
 };
 
+/// A file of signals with this many rows of input and an output.
+std::string signalsFile(int count) {
+  const std::string path = ::testing::TempDir() + "/twenty_signals.yaml";
+  std::ofstream file(path);
+  file << "in:\n";
+  for (int i = 0; i < count; ++i) {
+    file << "- {topic: imu" << i << ", type: sensor_msgs/Imu, field: angular_velocity, key: imu"
+         << i << ", max_age: 0.002}\n";
+  }
+  file << "out:\n- {topic: o, type: std_msgs/Float64MultiArray, value: "
+          "taskSpaceReferencePose/ee}\n";
+  return path;
+}
+
 TEST(Cycle, NeitherAllocatesNorLocksWhileServicesAreCalled) {
   constexpr std::uint64_t kCycles = 100000;
   const auto limits =
@@ -239,10 +269,12 @@ TEST(Cycle, NeitherAllocatesNorLocksWhileServicesAreCalled) {
   settings.logger = &logger;
   settings.cycle.overrun_time = 10.0;  // timed, and never over on a busy machine
   settings.plan_timeout = 5.0;
+  settings.signals_file = signalsFile(20);
   ControllerManager manager(std::move(settings));
   std::atomic<bool> stop{false};
   Counted counted;
   const std::uint64_t calls_before = SystemCalls::count();
+  ASSERT_EQ(manager.feedbackStage().signals().rows().size(), 20u);
   ASSERT_TRUE(manager.load("limits", "JointLimits").success);
 
   std::thread control([&] { runCycles(manager, stop, counted); });

@@ -80,6 +80,8 @@ class Cell {
   double period() const { return controller_.parameters().period; }
   CellTruth truth() const;
   MotorStates motors() const;
+  /// What IMU and wrench sensor in the palm measured at the end of the last period.
+  const PalmReading& palmSensors() const { return palm_sensors_.reading(); }
   /// Contact forces on the robot's hand, means over the last period.
   const plant::Touch& touch() const { return touch_; }
   /// Largest speed of each joint within the last period, rad/s.
@@ -98,6 +100,7 @@ class Cell {
   krc::Servos servos_;
   krc::Controller controller_;
   TorqueSensor torque_sensor_;
+  PalmSensors palm_sensors_;
   Random loss_;
   double loss_to_pc_ = 0.0, loss_from_pc_ = 0.0;
   int lose_next_ = 0;

@@ -10,6 +10,7 @@
 
 #include "coglab_sim/krc/parameters.hpp"
 #include "coglab_sim/krc/servos.hpp"
+#include "coglab_sim/palm_sensors.hpp"
 #include "coglab_sim/plant/plant.hpp"
 #include "coglab_sim/torque_sensor.hpp"
 
@@ -28,6 +29,7 @@ struct CellConfig {
   krc::ServoParameters servos;
   plant::Drives drives;
   TorqueNoise torque_noise;
+  PalmNoise palm_noise;
   plant::Object object;
   plant::Surroundings surroundings;
   plant::PersonParameters person;

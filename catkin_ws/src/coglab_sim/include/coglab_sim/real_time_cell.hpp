@@ -30,6 +30,7 @@ struct CellSnapshot {
   CellTruth truth;
   MotorStates motors;
   plant::Touch touch;
+  PalmReading palm;
   std::int64_t stepped_ns = 0;   ///< steady clock, time of the last physics step
   std::uint64_t tick = 0;        ///< number of periods so far
   std::uint64_t late_ticks = 0;  ///< periods that the thread began too late

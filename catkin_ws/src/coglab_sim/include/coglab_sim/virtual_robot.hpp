@@ -72,6 +72,16 @@ class LockstepRobot {
   void setFrozen(bool frozen) { frozen_ = frozen; }
   bool frozen() const { return frozen_; }
 
+  /// Posts a message of a topic of the file of signals, as if it arrived now. IMU and wrench sensor
+  /// of the palm post theirs in every tick, on the topics of cell_node.
+  /// @param numbers of each field, by its name
+  /// @param age s since the measurement
+  /// @return why a row refuses it; empty: taken
+  /// @throws std::invalid_argument if no row has this topic, or its type no such field
+  std::string postSignal(const std::string& topic,
+                         const std::map<std::string, std::vector<double>>& numbers, double age,
+                         const std::string& frame, const std::vector<std::string>& joints);
+
   /// The control cycle's report after the newest tick.
   const coglab_controllers::CycleReport& report() const { return report_; }
   /// Whether commands and true joints kept their limits in every tick so far.
@@ -98,6 +108,7 @@ class LockstepRobot {
  private:
   bool answer(std::array<std::uint8_t, lwr_fri_bridge::fri::kCommandSize>& bytes);
   void controlCycle(bool answered);
+  void postPalm();
 
   Cell cell_;
   lwr_fri_bridge::Bridge bridge_;
@@ -113,6 +124,7 @@ class LockstepRobot {
   std::vector<coglab_controllers::DmpController*> dmps_;
   coglab_controllers::CycleReport report_;
   LimitWatch limits_;
+  bool has_palm_imu_ = false, has_palm_wrench_ = false;  // in the file of signals
 };
 
 }  // namespace coglab_sim

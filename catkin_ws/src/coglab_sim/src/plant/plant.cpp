@@ -521,15 +521,15 @@ void Plant::applyPerson(double dt) {
 }
 
 /// Adds the contact force on one body, world axes; `normal` is its pressing part, N.
-void Plant::addContact(int body, int other, const Vector3d& force, double normal,
-                       Pressing& pressing) {
+void Plant::addContact(int body, int other, const Wrench& load, double normal, Pressing& pressing) {
   const auto phalanx = std::find(model_->phalanges.begin(), model_->phalanges.end(), body);
   const bool on_palm = body == model_->palm;
   if (phalanx == model_->phalanges.end() && !on_palm) return;
   const auto index = static_cast<std::size_t>(phalanx - model_->phalanges.begin());
-  (on_palm ? touch_.palm : touch_.phalanges[index]) += force;
+  (on_palm ? touch_.palm : touch_.phalanges[index]) += load.force;
+  touch_torque_ += load.torque;
   if (other != model_->object) return;
-  pressing.on_object -= force;
+  pressing.on_object -= load.force;
   const bool finger = !on_palm && config_.hand.phalanges[index].finger != Finger::Thumb;
   (finger ? pressing.fingers : pressing.opposing) += normal;
 }
@@ -540,6 +540,7 @@ void Plant::readContacts(double dt) {
   const mjData* d = model_->data();
   touch_.phalanges.assign(model_->phalanges.size(), Vector3d::Zero());
   touch_.palm.setZero();
+  touch_torque_.setZero();
   on_board_ = on_floor_ = false;
   contacts_ = d->ncon;
   Pressing pressing;
@@ -557,8 +558,10 @@ void Plant::readContacts(double dt) {
     // The rows of the frame are normal and tangents. The force acts on the second body.
     const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> frame(contact.frame);
     const Vector3d force = frame.transpose() * Vector3d(local[0], local[1], local[2]);
-    addContact(one, two, -force, local[0], pressing);
-    addContact(two, one, force, local[0], pressing);
+    const Vector3d arm = Eigen::Map<const Vector3d>(contact.pos) - palm().position;
+    const Vector3d torque = arm.cross(force);
+    addContact(one, two, {-force, -torque}, local[0], pressing);
+    addContact(two, one, {force, torque}, local[0], pressing);
   }
   touch_force_ = touch_.palm;
   for (const Vector3d& force : touch_.phalanges) touch_force_ += force;

@@ -6,7 +6,8 @@
 #include <string>
 
 #include "cell_messages.hpp"
-#include "coglab_controllers/ros/touch_topic.hpp"
+#include "coglab_controllers/manager/feedback_stage.hpp"
+#include "coglab_controllers/ros/signal_messages.hpp"
 #include "coglab_controllers/testing/virtual_arm.hpp"
 
 using namespace coglab_sim;
@@ -44,13 +45,16 @@ TEST(TouchSignal, IsWhatThePlantFeels) {
   const plant::Touch& touch = plant.touch();
   ASSERT_LT(touch.palm.x(), -1.0) << "the mug presses into the palm";
 
-  const auto message = touchMessage(touch, plant.config().hand, ros::Time(2.0));
-  const auto forces = coglab_controllers::touchForcesOf(message, "ih2_palm");
+  const auto message =
+      touchMessage(touch, plant.config().hand, (ros::Time::init(), ros::Time::now()));
   coglab_controllers::FeedbackStage stage(*tactileSetup(), 0.005, true);
   const auto signal = stage.robot().find(ctrl_more::RobotSource::Measured, "touch");
-  ASSERT_TRUE(stage.postTouch(forces, 7'000'000));
+  const coglab_controllers::SignalReading reading(message);
+  const std::int64_t now = coglab_rt::steadyNow();
+  const auto post = stage.signals().post(0, reading.message(), now);
+  ASSERT_EQ(post.refusal, coglab_controllers::SignalRefusal::None) << post.text;
   coglab_controllers::CycleInput input;
-  input.robot.stamp_ns = 9'000'000;
+  input.robot.stamp_ns = now;
   ASSERT_TRUE(stage.fill(input));
   const auto read = stage.robot().view(signal);
   ASSERT_EQ(read.size(), 18);

@@ -3,6 +3,8 @@
 /// its direction.
 #pragma once
 
+#include <limits>
+
 #include "coglab_controllers/limits/workspace.hpp"
 
 namespace coglab_controllers {
@@ -73,6 +75,10 @@ class Guard {
     rounding_ = rounding;
   }
 
+  /// Largest speed (m/s, >= 0) of hand and elbow from now on, besides hand_speed and elbow_speed;
+  /// infinite: none.
+  void setSpeedLimit(double limit) noexcept { speed_limit_ = limit; }
+
   /// Largest speed (rad/s, >= 0) of a joint `room` rad before its stop.
   double speedToStop(int joint, double room) const noexcept;
 
@@ -84,6 +90,7 @@ class Guard {
   Chain chain_;
   Workspace workspace_;
   double lost_time_ = 0.0, rounding_ = 0.0;
+  double speed_limit_ = std::numeric_limits<double>::infinity();
 };
 
 }  // namespace coglab_controllers

@@ -29,6 +29,8 @@ struct ManagerSettings {
   std::map<std::string, std::string> types;
   std::vector<std::string> plugin_paths;  ///< folders searched for libraries without a path
   std::string feedback_file;  ///< list file of Ctrl-MORE; empty: no feedback controllers
+  std::string central_file;   ///< Ctrl-MORE's central module; empty: feedback controllers alone
+  std::string signals_file;   ///< see signal_file.hpp; empty: no signals from topics
   double plan_timeout = 2.0;  ///< s, longest wait of a request for the cycle
   bool lockstep = false;      ///< the caller's thread adopts requests; no time limits
   std::function<std::int64_t()>
@@ -38,7 +40,8 @@ struct ManagerSettings {
 
 /// Reads the manager's own parameters: `cycle_time` (0.005 s), `sample_timeout`, `silent_time`,
 /// `overrun_time` (s), `plan_timeout` (s), `speed_scale`, `types` (block: type -> library; the two
-/// of this package are built in), `plugin_paths`, `feedback_file`, and those of makeRobotSetup().
+/// of this package are built in), `plugin_paths`, `feedback_file`, `central_file`, `signals_file`,
+/// and those of makeRobotSetup().
 /// @throws std::runtime_error naming the parameter
 ManagerSettings readManagerSettings(const YAML::Node& parameters, const std::string& urdf,
                                     const coglab_rt::JointLimits& table, bool lockstep);
@@ -121,11 +124,12 @@ class ControllerManager : public MotionHost {
   MotionController* motion(const std::string& id);
 
   ctrl_more::FeedbackControllersManager& feedback() { return feedback_.manager(); }
-  /// Passes on forces of the hand's touch sensors, see FeedbackStage::postTouch().
-  bool postTouch(const TouchForces& forces, std::int64_t stamp_ns) noexcept {
-    return feedback_.postTouch(forces, stamp_ns);
-  }
-  /// Errors from loading the feedback list file, one sentence each.
+  /// The stores of the feedback controllers and the signals from topics.
+  FeedbackStage& feedbackStage() { return feedback_; }
+  /// The topics that the file of signals makes of feedback controllers.
+  const std::vector<SignalOutput>& signalOutputs() const { return outputs_; }
+  /// Errors from loading the files of signals, managers and feedback controllers, one sentence
+  /// each.
   const std::vector<std::string>& feedbackErrors() const { return feedback_errors_; }
   ControlCycle& cycle() { return cycle_; }
   const ManagerSettings& settings() const { return settings_; }
@@ -159,6 +163,8 @@ class ControllerManager : public MotionHost {
            const std::function<void(MotionController&)>& attach);
   Answer loadMotion(const std::string& id, const std::string& type, const Attach& attach);
   Answer loadFeedback(const std::string& id, const std::string& type);
+  void loadSignals();
+  void loadManagers();
   std::string libraryOf(const std::string& type) const;
   Answer planSwitch(const std::string& id, CyclePlan& plan, std::string& type);
   LoadedMotion* find(const std::string& id) const;  // under table_
@@ -168,6 +174,7 @@ class ControllerManager : public MotionHost {
   FeedbackStage feedback_;
   ControlCycle cycle_;
   std::vector<std::string> feedback_errors_;
+  std::vector<SignalOutput> outputs_;
 
   std::atomic<bool> ending_{false};
   mutable std::mutex requests_;  // requests one after another

@@ -41,6 +41,9 @@ struct References {
   ctrl_more::Reference<ctrl_more::Twist> twist;  ///< taskSpaceReferenceVel: m/s, rad/s
   ctrl_more::Reference<kMaxJoints> joint_position;  ///< jointSpaceReference Position, rad
   ctrl_more::Reference<kMaxJoints> joint_velocity;  ///< jointSpaceReference Velocity, rad/s
+  /// otherReference speed_limit, m/s: largest speed of hand and elbow. 1000 at the start of each
+  /// cycle, which is no limit; controllers and managers may lower it. The guard keeps it.
+  ctrl_more::Reference<1> speed_limit;
 };
 
 /// What a motion controller does at the moment.

@@ -19,7 +19,8 @@ struct RobotSetup {
   GuardParameters guard;          ///< limits of step 8
   Workspace workspace;            ///< for goals
   Quaternion tool_from_wrench;    ///< orientation of the measured wrench's frame in the tool
-  bool tactile = false;           ///< the hand has touch sensors
+  std::string tool_link;          ///< name of the chain's end
+  std::string touch_topic;        ///< of the hand's touch sensors; empty: it has none
 };
 
 /// Builds the setup from the robot's model, its table of limits, and the manager's parameters
@@ -28,7 +29,8 @@ struct RobotSetup {
 /// `joint_vel_limit` (rad, rad, rad/s; seven each, wire order; default: the table),
 /// `position_margin` (rad), `hand_speed_limit`, `elbow_speed_limit` (m/s; 0: none), block
 /// `workspace`: `box_min`, `box_max`, `base_centre` (m), `base_radius` (m), `max_stretch` (share of
-/// the reach), `deceleration` (m/s^2); `tactile` (false).
+/// the reach), `deceleration` (m/s^2); `tactile` (false: the hand has no touch
+/// sensors) and their `tactile_topic` (ih2_hand/fingertip_forces).
 /// @param urdf text of the model
 /// @throws std::runtime_error or std::invalid_argument naming the parameter, link or joint
 std::shared_ptr<const RobotSetup> makeRobotSetup(const std::string& urdf,

@@ -23,7 +23,7 @@
 #include "coglab_controllers/ros/cancel_ros.hpp"
 #include "coglab_controllers/ros/feedback_ros.hpp"
 #include "coglab_controllers/ros/motion_controller_ros.hpp"
-#include "coglab_controllers/ros/touch_topic.hpp"
+#include "coglab_controllers/ros/signal_topics.hpp"
 #include "coglab_msgs/ControllerStatus.h"
 #include "coglab_msgs/GetActiveController.h"
 #include "coglab_msgs/ListControllers.h"
@@ -111,7 +111,7 @@ class ManagerRos {
   std::unique_ptr<TfListener> tf_listener_;
   std::unique_ptr<FeedbackRos> feedback_;
   std::unique_ptr<CancelRos> cancel_;
-  std::unique_ptr<TouchTopic> touch_;
+  std::unique_ptr<SignalTopics> signals_;
   std::mutex sides_mutex_;
   std::vector<std::shared_ptr<Side>> sides_;
   std::vector<ros::ServiceServer> services_;

@@ -131,6 +131,9 @@ class Plant {
   const Vector3d& objectForce() const { return object_force_; }  ///< N, object on the robot's hand
   /// Force of all contacts on palm and fingers, N, world axes; contacts between them do not count.
   const Vector3d& touchForce() const { return touch_force_; }
+  /// Torque of the same contacts about the origin of ih2_palm, Nm, world axes.
+  const Vector3d& touchTorque() const { return touch_torque_; }
+  const Wrench& push() const { return push_; }  ///< see setPush()
   /// Force of the object on the person's hand, N, world axes, mean over 20 ms: load of the grip,
   /// minus the force that accelerates the object with the hand. Zero without a grip.
   const Vector3d& personForce() const { return person_force_; }
@@ -160,7 +163,7 @@ class Plant {
   };
 
   Twist twistOf(int body) const;
-  void addContact(int body, int other, const Vector3d& force, double normal, Pressing& pressing);
+  void addContact(int body, int other, const Wrench& load, double normal, Pressing& pressing);
   FreeBody freeBody(int body, int velocity) const;
   void put(int position, int velocity, const Pose& pose, const Twist& twist);
   void keepPlaced();
@@ -206,7 +209,7 @@ class Plant {
   Pose in_hand_;         // pose given to place()
   Touch touch_;
   Vector3d object_force_ = Vector3d::Zero();
-  Vector3d touch_force_ = Vector3d::Zero();  // of all contacts
+  Vector3d touch_force_ = Vector3d::Zero(), touch_torque_ = Vector3d::Zero();  // of all contacts
   double robot_share_ = 0.0, person_share_ = 0.0;
   Vector3d grip_force_ = Vector3d::Zero(), person_force_ = Vector3d::Zero();
   double squeeze_ = 0.0, grasp_force_ = 0.0;  // N, averaged

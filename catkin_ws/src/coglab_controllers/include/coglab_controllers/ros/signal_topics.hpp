@@ -1,0 +1,76 @@
+/// @file
+/// The topics of the file of signals: robot signals in, references, corrections and states out.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <string>
+#include <vector>
+
+#include <ros/ros.h>
+
+#include "coglab_controllers/manager/controller_manager.hpp"
+
+namespace coglab_controllers {
+
+class SignalReading;
+
+/// Subscribes to the topics of the manager's robot signals and publishes its outputs. Relative
+/// names begin in the namespace above the manager's.
+///
+/// A message that cannot be used is logged once, until a good one comes. A topic that stops is
+/// logged once, too; its signals are then absent, and controllers that need them wait.
+class SignalTopics {
+ public:
+  /// @param node namespace of the manager; its callback queue is used
+  SignalTopics(const ros::NodeHandle& node, ControllerManager& manager);
+  SignalTopics(const SignalTopics&) = delete;
+  SignalTopics& operator=(const SignalTopics&) = delete;
+
+  /// Publishes the outputs that are due, and watches the inputs. Publisher thread.
+  void publish();
+
+ private:
+  struct Row {
+    std::size_t index;                            ///< in SignalInputs
+    SignalRefusal refused = SignalRefusal::None;  ///< callback's thread
+    bool absent = false;                          ///< publisher thread
+  };
+  /// A topic with all its rows. Its callbacks come one after another.
+  struct Topic {
+    ros::Subscriber subscriber;
+    std::deque<Row> rows;
+    std::string writer;         ///< node whose messages are taken
+    std::int64_t heard_ns = 0;  ///< from this node
+    bool unreadable = false, two_writers = false;
+    double max_age = 0.0;  ///< s, largest of the rows
+  };
+  struct Output {
+    const SignalOutput* row;
+    ros::Publisher publisher;
+    std::int64_t due_ns = 0;
+    bool unknown = false;  ///< there is no such reference; logged
+  };
+
+  template <typename Message>
+  void listen(const std::string& name, Topic& topic);
+  template <typename Message>
+  void advertise(Output& output);
+  bool isWriter(Topic& topic, const std::string& node);
+  void take(Topic& topic, const SignalReading& reading);
+  void watch();
+  std::vector<double> valueOf(Output& output);
+  void send(const Output& output, const std::vector<double>& values);
+  std::string nameOf(const Row& row) const;
+
+  ControllerManager& manager_;
+  SignalInputs& inputs_;
+  ros::NodeHandle node_;
+  std::int64_t started_ns_;
+  std::deque<Topic> topics_;
+  std::deque<Output> outputs_;
+  FeedbackStage::Snapshot references_;  // of this round
+  ctrl_more::CycleRecord cycle_;
+};
+
+}  // namespace coglab_controllers
