@@ -80,6 +80,9 @@ class World:
         machine: Callable[[Context], Any] = build_master,
         recogniser: Any = None,
         touch: float | None = None,
+        feedback: str = "",
+        signals: str = "",
+        managers: str = "",
     ) -> None:
         """
         ``seed``: of person, noise and tracker. ``person``: "drawn" (by the seed), "patient" or "accustomed"; or fields
@@ -92,6 +95,8 @@ class World:
         ``machine``: builds the state machine from the Context, as coglab_smach.machines.build_master does.
         ``recogniser``: a coglab_perception Recogniser, see VirtualTrial. ``touch``: standard deviation (N) of touch
         sensors in the hand; None: no sensors.
+        ``feedback``, ``signals``, ``managers``: files of feedback controllers, of their signals and of managers, as the
+        arguments of coglab.launch; ``feedback="palm"``: those that use IMU and wrench sensor in the palm.
 
         ValueError: an argument is not one of these. RuntimeError: this thread has an open World.
         """
@@ -107,7 +112,13 @@ class World:
             if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
                 raise ValueError(f"seed: a whole number 0 or more is expected, got {seed!r}")
             self.seed, self.conditions = seed, conditions
-            cell = Cell(seed, conditions, "human_hand" if object_on == "person" else "world")
+            files = {"feedback_file": feedback, "signals_file": signals, "central_file": managers}
+            cell = Cell(
+                seed,
+                conditions,
+                "human_hand" if object_on == "person" else "world",
+                files={name: file for name, file in files.items() if file},
+            )
             self._stack = ExitStack()
             trial = VirtualTrial(world=cell, settings=settings, recogniser=recogniser, touch=touch, machine=machine)
         except ConfigError as error:

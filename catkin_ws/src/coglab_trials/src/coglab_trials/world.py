@@ -55,12 +55,16 @@ def urdf_file() -> str:
     return str(package_path("lwr_description", "urdf", "lwr_ih2.urdf"))
 
 
-def manager_parameters() -> dict[str, Any]:
-    """Returns the parameters of /controller_manager as the launch file loads them."""
-    file = package_path("coglab_controllers", "config", "controllers.yaml")
-    parameters: dict[str, Any] = read(file).value
-    package, _, path = parameters["feedback_file"].removeprefix("package://").partition("/")
-    parameters["feedback_file"] = str(package_path(package, path))
+def manager_parameters(files: Mapping[str, str] | None = None) -> dict[str, Any]:
+    """Returns the parameters of /controller_manager as the launch file loads them. ``files``: their
+    ``feedback_file``, ``signals_file``, ``central_file``; a name without a folder is in coglab_controllers/config."""
+    config = package_path("coglab_controllers", "config")
+    parameters: dict[str, Any] = read(config / "controllers.yaml").value
+    for name, file in (files or {}).items():
+        parameters[name] = file if "/" in file else str(config / (file if "." in file else f"{file}.yaml"))
+    if parameters["feedback_file"].startswith("package://"):
+        package, _, path = parameters["feedback_file"].removeprefix("package://").partition("/")
+        parameters["feedback_file"] = str(package_path(package, path))
     return parameters
 
 
@@ -68,17 +72,21 @@ class Robot:
     """LockstepRobot with the measurements of each period that evaluation and detectors use.
 
     ``cell``: parameters of the simulated cell, with ``__`` for ``/`` in their names. ``limits``: file of joint limits.
+    ``files``: see manager_parameters().
     """
 
-    def __init__(self, seed: int, limits: str = LIMITS, **cell: Any) -> None:
+    def __init__(self, seed: int, limits: str = LIMITS, files: Mapping[str, str] | None = None, **cell: Any) -> None:
         parameters = {
             "seed": int(seed),
             "krc/period": DT,
             "contact/board_center": list(BOARD.position),
             **{name.replace("__", "/"): value for name, value in cell.items()},
         }
-        self.parameters = {**manager_parameters(), "joint_limits_file": limits}
-        self.virtual = LockstepRobot(urdf_file(), limits, parameters, yaml.safe_dump(manager_parameters()))
+        manager = manager_parameters(files)
+        self.parameters = {**manager, "joint_limits_file": limits}
+        self.virtual = LockstepRobot(urdf_file(), limits, parameters, yaml.safe_dump(manager))
+        if files and self.virtual.start_errors:
+            raise ValueError("; ".join(self.virtual.start_errors))
         self.cell = self.virtual.cell
         self.limits = cc.load_joint_limits(limits)
         with open(urdf_file(), encoding="utf-8") as stream:
@@ -301,12 +309,14 @@ class World:
         turned: float = 0.0,
         limits: str = LIMITS,
         recording: Mapping[str, Any] | None = None,
+        files: Mapping[str, str] | None = None,
     ) -> None:
         """
         ``seed``: for person, noise and tracker. ``conditions``: properties of person, tracker and object.
         ``object_on``: "human_hand", or "world" for the middle of the board. ``turned``: rotation (rad) of the object in
         the person's hand about the vertical. ``limits``: path of the arm's joint limits. ``recording``: the person's
-        hand follows a recording; settings of coglab_sim.person.recorded_person.open_recorded_hand.
+        hand follows a recording; settings of coglab_sim.person.recorded_person.open_recorded_hand. ``files``: of
+        feedback controllers, signals and managers, see manager_parameters().
 
         ObjectError: unknown object. RecordingError: unusable recording. ValueError: a value is out of range.
         """
@@ -336,7 +346,7 @@ class World:
         if object_on == "world":
             where["object__position"] = [float(v) for v in BOARD.apply([0.0, 0.0, 0.002])]
             where["object__rotation"] = [float(v) for v in BOARD.orientation]
-        self.robot = Robot(seed, limits, **where)
+        self.robot = Robot(seed, limits, files, **where)
         self.cell = self.robot.cell
         self.hand = Hand(self.cell)
         self.board = conditions.perception.calibration(seed) * BOARD
