@@ -95,7 +95,7 @@ def session(
             "trials_now": len(rows.trials) - before,
             "handovers": len(table),
             "succeeded": sum(int(row["success"]) for row in table),
-            "table": str(write_table(rows)),
+            "table": str(write_table(study, table)),
         }
 
 

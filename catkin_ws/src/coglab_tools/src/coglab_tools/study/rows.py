@@ -85,8 +85,7 @@ class Rows:
             os.fsync(self._stream.fileno())
         except OSError as error:
             raise CheckFailed(
-                f"{self.study.folder / ROWS} cannot be written: {error.strerror}; the trials before are kept: free the "
-                f"disk, then ./coglab study resume {self.study.folder}"
+                f"{self.study.folder / ROWS} cannot be written: {error.strerror}; free the disk"
             ) from None
 
 
@@ -162,15 +161,14 @@ def difference(a: Mapping[str, Any], b: Mapping[str, Any]) -> str:
     return ""
 
 
-def write_table(rows: Rows) -> Path:
+def write_table(study: Study, table: Sequence[Mapping[str, Any]]) -> Path:
     """Write trials.csv, one row per handover. Returns the file."""
-    table = rows.table()
     measures = sorted({name for row in table for name in row} - set(LEADING))
     text = io.StringIO()
     writer = csv.DictWriter(text, [*LEADING, *measures], restval="", lineterminator="\n")
     writer.writeheader()
     writer.writerows(table)
-    path = rows.study.folder / TABLE
+    path = study.folder / TABLE
     write_whole(path, text.getvalue().encode())
     return path
 
