@@ -18,8 +18,9 @@ def run_simulated(study: Study, workers: int = 0, scheduler: str = "") -> dict[s
     ``workers``, ``scheduler``: see cluster.results. Whatever interrupts it, the finished trials are kept.
     """
     with open_rows(study, write=True) as rows:
-        rows.begin(simulate.identity(), simulated=True)
         left = list(undone(study, rows))
+        if left:
+            rows.begin(simulate.identity(), simulated=True)
         jobs = [simulate.job_of(study, trial) for trial in left]
         done = cluster.results(jobs, workers, scheduler) if jobs else iter(())
         try:
