@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from coglab_tools.study.measures import sparc
 from coglab_tools.study.statistics import compare, holm, wilson
 
 
@@ -40,8 +39,3 @@ def test_no_scatter_and_no_pairs_give_no_effect():
 
 def test_holm():
     assert holm([0.01, 0.04, float("nan"), 0.03])[:2] == pytest.approx([0.03, 0.06])
-
-
-def test_sparc_of_a_minimum_jerk_reach():
-    s = np.linspace(0.0, 1.0, 201)
-    assert sparc(30 * s**2 - 60 * s**3 + 30 * s**4, 200.0) == pytest.approx(-1.40, rel=0.01)

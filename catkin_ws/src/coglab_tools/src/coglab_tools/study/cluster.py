@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import logging
 import os
+import signal
 import tempfile
+import threading
 import time
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -54,9 +56,16 @@ def results(jobs: Sequence[simulate.Job], workers: int = 0, scheduler: str = "")
     if scheduler:
         yield from _with_scheduler(jobs, distributed, scheduler)
         return
-    with (
-        tempfile.TemporaryDirectory() as place,
-        distributed.LocalCluster(
+    with tempfile.TemporaryDirectory() as place, _local(distributed, count, place) as cluster:
+        yield from _with_scheduler(jobs, distributed, cluster)
+
+
+def _local(distributed: Any, count: int, place: str) -> Any:
+    """A cluster on this computer's loopback. Ctrl-C is for this process alone: it ends the workers itself."""
+    main = threading.current_thread() is threading.main_thread()
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN) if main else None  # children inherit it
+    try:
+        return distributed.LocalCluster(
             n_workers=count,
             threads_per_worker=1,
             processes=True,
@@ -65,9 +74,10 @@ def results(jobs: Sequence[simulate.Job], workers: int = 0, scheduler: str = "")
             memory_limit=0,
             local_directory=place,
             silence_logs=logging.CRITICAL,
-        ) as cluster,
-    ):
-        yield from _with_scheduler(jobs, distributed, cluster)
+        )
+    finally:
+        if main:
+            signal.signal(signal.SIGINT, before)
 
 
 def _own(job: simulate.Job) -> tuple[list[dict[str, Any]], bytes]:

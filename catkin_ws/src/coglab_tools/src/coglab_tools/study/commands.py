@@ -172,5 +172,5 @@ def _report(options: argparse.Namespace) -> Answer:
 
     study = load(options.folder)
     data = write_report(study, options.pdf)
-    text = "\n".join([data["verdict"], *(f"wrote {file}" for file in data["files"])])
+    text = "\n".join([data["verdict"], *data["problems"], *(f"wrote {file}" for file in data["files"])])
     return Answer(text, data, f"./coglab study status {study.folder}" if data["left"] else "")

@@ -25,6 +25,7 @@ from coglab_tools.study import settings as condition_settings
 from coglab_tools.study.ask import ask
 from coglab_tools.study.plan import Study, Trial
 from coglab_tools.study.questionnaires import write_whole
+from coglab_tools.study.recordings import RECORDINGS
 from coglab_tools.study.rows import Rows, open_rows, undone, write_table
 from coglab_tools.study.simulate import identity
 
@@ -95,7 +96,7 @@ def session(
             "trials_now": len(rows.trials) - before,
             "handovers": len(table),
             "succeeded": sum(int(row["success"]) for row in table),
-            "table": str(write_table(rows)),
+            "table": str(write_table(study, table)),
         }
 
 
@@ -236,7 +237,9 @@ def objects_copy(study: Study) -> Path:
 
 def launch_line(study: Study) -> str:
     """The command that starts the system for this study."""
-    return f"./coglab launch machines:={machines_file(study)} objects:={objects_copy(study)}"
+    text = package_path("coglab_bringup", "launch", "coglab.launch").read_text(encoding="utf-8")
+    record = f" record:={(study.folder / RECORDINGS).resolve()}" if '<arg name="record"' in text else ""
+    return f"./coglab launch machines:={machines_file(study)} objects:={objects_copy(study)}{record}"
 
 
 def prepare(study: Study) -> None:

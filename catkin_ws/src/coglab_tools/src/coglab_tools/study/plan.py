@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import os
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
@@ -159,8 +160,9 @@ def new(folder: Path) -> Path:
     return folder / FILE
 
 
-def load(place: Path) -> Study:
+def load(place: str | os.PathLike[str]) -> Study:
     """Read and check the study in a folder (or its study.yaml). CheckFailed names file and line."""
+    place = Path(place)
     folder = place.parent if place.name == FILE else place
     if not (folder / FILE).is_file():
         raise UsageError(

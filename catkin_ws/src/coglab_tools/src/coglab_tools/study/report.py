@@ -15,9 +15,10 @@ import numpy as np
 from coglab_py.packages import package_path
 
 from coglab_tools.command import CheckFailed
-from coglab_tools.study.measures import MEASURES
+from coglab_tools.report.metrics import METRICS
 from coglab_tools.study.plan import Study
 from coglab_tools.study.questionnaires import answers_of, scores_of, write_whole
+from coglab_tools.study.recordings import joined
 from coglab_tools.study.rows import open_rows, write_table
 from coglab_tools.study.statistics import Comparison, compare, holm, wilson
 
@@ -46,8 +47,9 @@ def write_report(study: Study, pdf: bool = False) -> dict[str, Any]:
     with open_rows(study) as rows:
         if not rows.trials:
             raise CheckFailed(f"no trial of {study.name} is done: ./coglab study run {study.folder}")
-        table, done, header = rows.table(), len(rows.trials), rows.header or {}
-        files = [str(write_table(rows))]
+        table, problems = joined(study, rows.table())
+        done, header = len(rows.trials), rows.header or {}
+        files = [str(write_table(study, table))]
     left = len(study.trials()) - done
     measures = [*_measures(study, table), *_scores(study)]
     verdict = _verdict(study, table, done, left)
@@ -58,7 +60,13 @@ def write_report(study: Study, pdf: bool = False) -> dict[str, Any]:
     if pdf:
         write_whole(study.folder / "report.pdf", _pdf(study, table, measures, figures, verdict))
         files.append(str(study.folder / "report.pdf"))
-    return {"verdict": verdict, "files": files, "left": left, "comparisons": list(_comparison_data(study, measures))}
+    return {
+        "verdict": verdict,
+        "files": files,
+        "left": left,
+        "problems": problems,
+        "comparisons": list(_comparison_data(study, measures)),
+    }
 
 
 # --- numbers ------------------------------------------------------------------------------------------------------
@@ -78,11 +86,11 @@ def _verdict(study: Study, table: Sequence[Mapping[str, Any]], done: int, left: 
 def _measures(study: Study, table: Sequence[Mapping[str, Any]]) -> Iterator[Measure]:
     """Measures of the handovers that succeeded, one per action."""
     for action in dict.fromkeys(study.actions):
-        for name, (title, unit, definition) in MEASURES.items():
+        for name, metric in METRICS.items():
             rows = [r for r in table if r["action"] == action and int(r["success"]) and r.get(name) not in (None, "")]
             if rows:
                 triples = [(str(r["condition"]), str(r["participant"]), float(r[name])) for r in rows]
-                yield _measure(study, f"{action}: {title}", unit, definition, triples)
+                yield _measure(study, f"{action}: {metric.label}", metric.unit, metric.definition, triples)
 
 
 def _scores(study: Study) -> Iterator[Measure]:
@@ -326,6 +334,6 @@ def _page(
         orders=orders,
         rows=table[:MOST_LISTED],
         more=max(0, len(table) - MOST_LISTED),
-        columns=[name for name in MEASURES if any(name in row for row in table)],
-        measures_of_handovers={k: v for k, v in MEASURES.items()},
+        columns=[name for name in METRICS if any(name in row for row in table)],
+        metrics=METRICS,
     )

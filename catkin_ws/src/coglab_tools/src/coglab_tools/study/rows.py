@@ -19,7 +19,7 @@ from typing import IO, Any
 
 from coglab_tools.command import CheckFailed, UsageError
 from coglab_tools.study.plan import FILE, Study
-from coglab_tools.study.questionnaires import write_whole
+from coglab_tools.study.questionnaires import answers_of, scores_of, write_whole
 
 ROWS, TABLE = "rows.jsonl", "trials.csv"
 LEADING = (
@@ -85,8 +85,7 @@ class Rows:
             os.fsync(self._stream.fileno())
         except OSError as error:
             raise CheckFailed(
-                f"{self.study.folder / ROWS} cannot be written: {error.strerror}; the trials before are kept: free the "
-                f"disk, then ./coglab study resume {self.study.folder}"
+                f"{self.study.folder / ROWS} cannot be written: {error.strerror}; free the disk"
             ) from None
 
 
@@ -162,15 +161,25 @@ def difference(a: Mapping[str, Any], b: Mapping[str, Any]) -> str:
     return ""
 
 
-def write_table(rows: Rows) -> Path:
-    """Write trials.csv, one row per handover. Returns the file."""
-    table = rows.table()
+def write_table(study: Study, table: Sequence[Mapping[str, Any]]) -> Path:
+    """Write trials.csv, one row per handover. Returns the file. After the measures come the settings of the condition
+    (set_timing, ...) and the participant's scores under it (nasa_tlx_workload, ...)."""
+    changed = dict.fromkeys(name for settings in study.conditions.values() for name in settings)
+    scores: dict[tuple[str, int, str], dict[str, float]] = {}
+    for score in scores_of(answers_of(study.folder), study.questionnaires):
+        own = scores.setdefault((score["participant"], score["block"], score["condition"]), {})
+        own[f"{score['questionnaire']}_{score['scale']}"] = round(score["value"], 6)
     measures = sorted({name for row in table for name in row} - set(LEADING))
+    asked = sorted({name for own in scores.values() for name in own})
     text = io.StringIO()
-    writer = csv.DictWriter(text, [*LEADING, *measures], restval="", lineterminator="\n")
+    columns = [*LEADING, *measures, *(f"set_{name}" for name in changed), *asked]
+    writer = csv.DictWriter(text, columns, restval="", lineterminator="\n")
     writer.writeheader()
-    writer.writerows(table)
-    path = rows.study.folder / TABLE
+    for row in table:
+        settings = {f"set_{name}": value for name, value in study.conditions[row["condition"]].items()}
+        own = scores.get((row["participant"], row["block"], row["condition"])) or {}
+        writer.writerow({**row, **settings, **own})
+    path = study.folder / TABLE
     write_whole(path, text.getvalue().encode())
     return path
 

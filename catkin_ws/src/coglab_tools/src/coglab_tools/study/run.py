@@ -8,9 +8,8 @@ from typing import Any
 from coglab_tools.command import CheckFailed, CommandError, NotThere, progress
 from coglab_tools.study import cluster, simulate
 from coglab_tools.study.plan import Study
+from coglab_tools.study.recordings import RECORDINGS
 from coglab_tools.study.rows import open_rows, undone, write_table
-
-RECORDINGS = "recordings"
 
 
 def run_simulated(study: Study, workers: int = 0, scheduler: str = "") -> dict[str, Any]:
@@ -19,8 +18,9 @@ def run_simulated(study: Study, workers: int = 0, scheduler: str = "") -> dict[s
     ``workers``, ``scheduler``: see cluster.results. Whatever interrupts it, the finished trials are kept.
     """
     with open_rows(study, write=True) as rows:
-        rows.begin(simulate.identity(), simulated=True)
         left = list(undone(study, rows))
+        if left:
+            rows.begin(simulate.identity(), simulated=True)
         jobs = [simulate.job_of(study, trial) for trial in left]
         done = cluster.results(jobs, workers, scheduler) if jobs else iter(())
         try:
@@ -32,8 +32,8 @@ def run_simulated(study: Study, workers: int = 0, scheduler: str = "") -> dict[s
             kind = NotThere if isinstance(error, NotThere) else CheckFailed
             state = f"{len(rows.trials)} of {len(study.trials())} trials are done and kept"
             raise kind(f"{error}. {state}; to go on: ./coglab study resume {study.folder}") from error
-        table = write_table(rows)
         everything = rows.table()
+        table = write_table(study, everything)
         return {
             "study": study.name,
             "trials": len(rows.trials),

@@ -10,6 +10,7 @@ import zipfile
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import lru_cache
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -21,9 +22,11 @@ from coglab_tools.study.plan import Study, Trial
 
 PACKAGES = (
     "coglab", "coglab_controllers", "coglab_objects", "coglab_perception", "coglab_py", "coglab_sim", "coglab_smach",
-    "coglab_tools", "coglab_trials", "ctrl_more", "ih2_hand", "lwr_description", "lwr_fri_bridge",
+    "coglab_trials", "ctrl_more", "ih2_hand", "lwr_description", "lwr_fri_bridge",
 )  # fmt: skip
 """packages whose Python, configuration and C++ decide about a trial"""
+OWN = tuple(f"coglab_tools.{name}" for name in ("study.simulate", "study.settings", "study.measures", "report.metrics"))
+"""modules of this package that do, too"""
 KINDS = {".py", ".pyi", ".yaml", ".xml", ".json", ".cpp", ".hpp", ".urdf"}
 
 
@@ -75,6 +78,8 @@ def identity() -> Mapping[str, Any]:
                 if file.suffix in KINDS and "test" not in inside.parts and file.is_file():
                     digest.update(f"{package}/{inside}\n".encode())
                     digest.update(file.read_bytes())
+    for module in OWN:
+        digest.update(Path(str(import_module(module).__file__)).read_bytes())
     return {
         "code": digest.hexdigest()[:12],
         "python": ".".join(map(str, sys.version_info[:2])),
