@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from coglab_tools.command import CheckFailed, NotThere
 from coglab_tools.report.metrics import METRICS, activities, metrics_of
-from coglab_tools.trial.explain import explain, headline
+from coglab_tools.trial.explain import explain
 from coglab_tools.trial.read import Measured
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def figure_of_trial(trial: Measured) -> Figure:
         external_torques=series.external_torques[:: 1 + len(series.external_torques) // MOST_ROWS],
     )
     start, end = trial.start, max(trial.end, trial.start + 0.1)
-    return figure_of(thin, f"{trial.record.id}; {headline(trial)[:90]}", start, end)
+    return figure_of(thin, trial.record.id.replace("_", " "), start, end)
 
 
 def figure_of_activity(trial: Measured) -> Figure:
