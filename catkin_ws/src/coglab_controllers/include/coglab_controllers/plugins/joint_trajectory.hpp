@@ -114,7 +114,7 @@ class JointTrajectory : public MotionRunner<TrajectoryPlan> {
 
   double path_tolerance_ = 0.2, goal_tolerance_ = 0.01, start_tolerance_ = 0.05;  // rad
   double goal_time_ = 2.0;                                                        // s
-  std::uint64_t made_ = 0;                        // under the host's request lock
+  std::uint64_t made_ = 0;                       // under the host's request lock
   std::deque<std::unique_ptr<JointPath>> kept_;  // the same; freed once a later one has begun
   coglab_rt::TripleBuffer<TrajectoryProgress> progress_;
 };
