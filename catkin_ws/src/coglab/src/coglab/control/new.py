@@ -133,14 +133,14 @@ class @TYPE@(ctrl_more.FeedbackController):
 
 
 def push(enabled: bool = True) -> np.ndarray:
-    """Positions of the palm (m, one row each 5 ms) in virtual time, while 15 N push it along y for 2 s."""
+    """Positions of the palm (m, one row each 5 ms) in virtual time, while 15 N push it along y for 1 s."""
     with coglab.World(seed=1, person="patient") as world:
         world.feedback.add_controller(@TYPE@(), "@NAME@", enabled=enabled)
         world.step(0.5)
         path: list[np.ndarray] = []
         world.after_period.append(lambda w: path.append(w.cell.robot.palm().position))
-        world.push([0.0, 15.0, 0.0], 2.0)
-        world.step(4.0)
+        world.push([0.0, 15.0, 0.0], 1.0)
+        world.step(2.5)
         assert not world.feedback.status("@NAME@").faults
     return np.array(path)
 
