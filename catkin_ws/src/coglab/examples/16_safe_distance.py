@@ -24,8 +24,8 @@ def files(folder: Path) -> str:
 
 
 def distance_at(time: float) -> float:
-    """Distance (m) of the visitor from the hand: from 3 m at 1 m/s to 0.35 m, 2 s there, and back."""
-    return float(np.interp(time, [0.0, 2.65, 4.65, 7.3], [3.0, 0.35, 0.35, 3.0]))
+    """Distance (m) of the visitor from the hand: from 3 m at 1 m/s to 0.3 m, 2 s there, and back."""
+    return float(np.interp(time, [0.0, 2.7, 4.7, 7.4], [3.0, 0.3, 0.3, 3.0]))
 
 
 rows: list[tuple[float, float, float]] = []

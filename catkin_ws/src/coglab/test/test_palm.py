@@ -45,8 +45,8 @@ def test_signals_of_ones_own_are_posted_in_virtual_time(tmp_path) -> None:
     with coglab.World(seed=3, signals=str(file)) as world:
         robot = world.cell.robot.virtual
         assert robot.robot_signal("person") is None
-        assert robot.post_signal("person", {"position": [1.0, 2.0, 3.0]}) == ""
         assert "max_age" in robot.post_signal("person", {"position": [1.0, 2.0, 3.0]}, age=0.2)
+        assert robot.post_signal("person", {"position": [1.0, 2.0, 3.0]}) == ""
         world.step()
         assert list(robot.robot_signal("person")) == [1.0, 2.0, 3.0]
         world.step(0.2)
