@@ -36,9 +36,7 @@ class StandardClients(unittest.TestCase):
                 MotionFeedback,
                 lambda m, name=name: cls.streams.update({name: m}),
             )
-        cls.robot.load()
-        cls.robot.start()
-        cls.robot.go(HOME)
+        cls.robot.start()  # at HOME
         cls.client = Client()
 
     def open(self, stream: str):
