@@ -15,6 +15,7 @@ add_library(lwr_fri_bridge
   src/requests/configurator.cpp
   src/requests/events.cpp
   src/requests/target_command.cpp
+  src/motion/hand_guiding.cpp
   src/motion/set_point_leash.cpp
   src/motion/tool_frame.cpp
   src/motion/velocity_filter.cpp

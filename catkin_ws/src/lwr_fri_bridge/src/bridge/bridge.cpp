@@ -6,6 +6,8 @@
 #include <iterator>
 #include <thread>
 
+#include "lwr_fri_bridge/motion/hand_guiding.hpp"
+
 namespace lwr_fri_bridge {
 namespace {
 
@@ -285,10 +287,16 @@ void Bridge::follow(const fri::Reception& reception, fri::CommandDatagram& answe
   if (excess > 1.0)
     target /= excess;  // scales the whole vector to keep the direction of the motion
 
-  const bool was_leashed = leash_.joint() >= 0;
-  leash_.update(interpolator_, sample_.position, wanted, leashOf(active_mode_, config_.leash),
-                config_.limits, target);
-  if (!was_leashed && leash_.joint() >= 0) ++counters_.leash_trips;
+  const bool stopping = supervisor_.state() == SupervisorState::Stopping;
+  if (wanted.isZero() && givesWay(active_mode_) && !stopping) {
+    leash_.reset();
+    target = velocityToArm(interpolator_, sample_.position, config_.limits);
+  } else {
+    const bool was_leashed = leash_.joint() >= 0;
+    leash_.update(interpolator_, sample_.position, wanted, leashOf(active_mode_, config_.leash),
+                  config_.limits, target);
+    if (!was_leashed && leash_.joint() >= 0) ++counters_.leash_trips;
+  }
 
   bounded_joints_ = braking_.bound(interpolator_, sample_.cycle_time, target);
   if (bounded_joints_ != 0) ++counters_.position_bounds;

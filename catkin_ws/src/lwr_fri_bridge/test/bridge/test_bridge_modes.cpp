@@ -96,6 +96,26 @@ TEST(Bridge, EveryStrategyFollows) {
   }
 }
 
+/// A person leads the arm; at the end of the mode nothing may pull it back.
+TEST(Bridge, SetPointFollowsAnArmThatIsLedByHand) {
+  Cell cell;
+  cell.run(2);
+  ASSERT_TRUE(
+      runEvent(cell.bridge, cell.robot, "joint_impedance stiffness 0.01 damping 0.3").success());
+  cell.start();
+  cell.robot.blocked = true;  // the hand decides where the arm is
+  Vector7 arm = cell.robot.measured();
+  for (int i = 0; i < 400; ++i) {  // 0.8 rad of joint 1 in 2 s: farther than the leash
+    arm[0] += 0.002;
+    cell.robot.setMeasured(arm);
+    cell.robot.cycle(cell.bridge);
+    ASSERT_LT(std::abs(arm[0] - cell.bridge.snapshot().sample.commanded_position[0]), 0.05) << i;
+  }
+  cell.run(100);
+  EXPECT_NEAR(cell.bridge.snapshot().sample.commanded_position[0], arm[0], 1e-4);
+  EXPECT_EQ(cell.bridge.snapshot().supervisor, SupervisorState::Command);
+}
+
 TEST(Bridge, RefusesLimitsOutOfRangeByName) {
   struct Case {
     const char* name;
