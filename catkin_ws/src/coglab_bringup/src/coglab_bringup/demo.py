@@ -186,7 +186,9 @@ def run(top: Path, options: argparse.Namespace) -> int:
     record_run(top, port, "demo")
     screen = bool(os.environ.get("DISPLAY")) and not options.headless and Path("/usr/bin/rviz").exists()
     launch = [f"seed:={options.seed}", f"rviz:={'true' if screen else 'false'}", f"log_file:={out / 'fri_ticks.csv'}"]
-    launch += [f"console:={'false' if options.no_console else 'true'}", *person]
+    trials = out / "trials"
+    earlier = set(trials.glob("*/trial.yaml"))
+    launch += [f"console:={'false' if options.no_console else 'true'}", *person, f"record:={trials}"]
     (out / "ros_home" / "console.url").unlink(missing_ok=True)  # of an earlier demo
     system = System(environment, port, launch, out / "roslaunch.log")
     pace, problems = PaceWatch(), list[str]()
@@ -223,10 +225,28 @@ def run(top: Path, options: argparse.Namespace) -> int:
         text = json.dumps(result, indent=1) + "\n"
         keep(problems, out, "result.json", lambda path: path.write_text(text))
         system.stop()
+    page = report_on(sorted(set(trials.glob("*/trial.yaml")) - earlier), problems)
     status = summarise(out, result["handovers"], "" if problems else f"{out}/result.json and trial.png, ")
+    if page:
+        print(f"[coglab] report of the last handover: {page}", flush=True)
     for problem in problems:
         print(f"[coglab] error: {problem}; make room, or name another folder: --out DIR", file=sys.stderr)
     return 1 if problems else status
+
+
+def report_on(records: list[Path], problems: list[str]) -> str:
+    """Write a page for each recorded handover. Returns the path of the last one; empty if nothing was recorded."""
+    from coglab_tools.command import CommandError
+    from coglab_tools.report.page import write_report
+    from coglab_tools.trial.read import read_trial
+
+    page = ""
+    for folder in [record.parent for record in records]:
+        try:
+            page = str(write_report(read_trial(folder), folder / "report.html"))
+        except CommandError as error:
+            problems.append(str(error))
+    return page
 
 
 def summarise(out: Path, handovers: list[dict], files: str) -> int:

@@ -259,7 +259,7 @@ def _pdf(
             lines.append(
                 f"{measure.title[:34]:<36}{a} to {b:<18}"[:64].ljust(64)
                 + f"{c.pairs:>4}   {_interval(c.difference, c.low, c.high):<28}"
-                + f"{_interval(c.effect, c.effect_low, c.effect_high):<26}{_number(p)}"
+                + f"{_interval(c.effect, c.effect_low, c.effect_high):<26}{_p(p)}"
             )
     target = io.BytesIO()
     with PdfPages(target, metadata={"Title": f"Study {study.name}", "CreationDate": None}) as pages:
@@ -280,9 +280,11 @@ def _pdf(
 def _number(value: float) -> str:
     if not math.isfinite(value):
         return "–"
-    if value != 0.0 and abs(value) < 0.001:
-        return "< 0.001" if value > 0 else "-0.000"
     return f"{value:.3f}" if abs(value) < 10 else f"{value:.1f}"
+
+
+def _p(value: float) -> str:
+    return "< 0.001" if value < 0.001 else _number(value)
 
 
 def _interval(value: float, low: float, high: float) -> str:
@@ -315,7 +317,7 @@ def _page(
     for trial in study.trials():
         orders.setdefault(trial.participant, {})[trial.block, trial.condition] = None
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    environment.filters |= {"number": _number}
+    environment.filters |= {"number": _number, "p": _p}
     environment.globals |= {"interval": _interval}
     template = package_path("coglab_tools", "templates", "study_report.html").read_text(encoding="utf-8")
     return environment.from_string(template).render(

@@ -1,12 +1,178 @@
-"""`./coglab trial VERB`: recorded handovers: list, show, plot, replay, explain"""
+"""`./coglab trial VERB`: recorded handovers: list, show, plot, explain, report, replay, video"""
 
 from __future__ import annotations
 
 import argparse
+from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
-HELP = "recorded handovers: list, show, plot, replay, explain"
+from coglab_tools.command import OK, Answer, CheckFailed, CommandError, UsageError
+from coglab_tools.trial.record import BAG, TrialRecord, find_trials, trials_folder
+
+HELP = "recorded handovers: list, show, plot, explain, report, replay, video"
+HIDDEN = ".part-"
 
 
 def add(verbs: argparse._SubParsersAction[Any]) -> None:
     """Add the verbs of `trial`."""
+    parser = verbs.add_parser("list", help="the trials of a folder as a table")
+    parser.add_argument("folder", type=Path, nargs="?", help="default: where ./coglab launch records")
+    parser.set_defaults(run=list_trials)
+    for name, run, words in (
+        ("show", show, "outcome, marks, metrics and configuration of a trial"),
+        ("explain", explain_trial, "what happened, in at most ten lines with times"),
+        ("plot", plot, "phases, paths, torques, fingers and forces as a picture"),
+        ("report", report, "one HTML page with outcome, plots and figures"),
+        ("replay", replay, "publishes the bag again, on a ROS master of its own"),
+        ("video", video, "a moving picture of the trial, drawn without a screen"),
+    ):
+        parser = verbs.add_parser(name, help=words)
+        parser.add_argument(
+            "trial", type=str, nargs="?", default="", help='folder of a trial; "" or "last": the newest'
+        )
+        if name in ("plot", "report", "video"):
+            parser.add_argument("--out", type=Path, help="file to write; default: in the folder of the trial")
+        if name == "report":
+            parser.add_argument("--pdf", action="store_true", help="also as PDF, beside the page")
+        if name == "replay":
+            parser.add_argument("--rate", type=float, default=1.0, help="times real time")
+            parser.add_argument("--rviz", action="store_true", help="open rviz")
+        parser.set_defaults(run=run)
+
+
+def _place(options: argparse.Namespace) -> Path:
+    """Folder of the trial that was asked for: a path, a name in the default folder, or the newest."""
+    given = options.trial
+    if given in ("", "last"):
+        found = find_trials(trials_folder()) if trials_folder().is_dir() else []
+        if not found:
+            raise UsageError(
+                f"{trials_folder()} has no trial yet: name the folder of one, or ./coglab launch and start"
+            )
+        return max(found, key=lambda folder: folder.name)
+    place = Path(given)
+    return place if place.exists() or len(place.parts) != 1 else trials_folder() / given
+
+
+def _measured(options: argparse.Namespace) -> tuple[Path, Any]:
+    from coglab_tools.trial.read import read_trial
+
+    place = _place(options)
+    return place, read_trial(place)
+
+
+def list_trials(options: argparse.Namespace) -> Answer:
+    """A row per trial; those that cannot be read are named, with the reason."""
+    folder = options.folder or trials_folder()
+    rows: list[dict[str, Any]] = []
+    bad: list[str] = []
+    for place in find_trials(folder):
+        try:
+            record = TrialRecord.load(place)
+        except CommandError as error:
+            bad.append(str(error))
+            continue
+        row = {
+            name: getattr(record, name) for name in ("id", "started", "action", "object", "participant", "condition")
+        }
+        outcome = "succeeded" if record.outcome.success else record.outcome.reason
+        rows.append({**row, "outcome": outcome, "duration_s": record.duration_s, "folder": str(place)})
+    parts = sorted(str(each) for each in Path(folder).glob(f"{HIDDEN}*")) if Path(folder).is_dir() else []
+    columns = ("id", "object", "participant", "condition", "outcome", "duration_s")
+    table = [columns, *(tuple(str(row[c]) for c in columns) for row in rows)]
+    widths = [max(len(line[k]) for line in table) for k in range(len(columns))]
+    lines = ["  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in table]
+    good = sum(row["outcome"] == "succeeded" for row in rows)
+    lines.append(f"{len(rows)} trials in {folder}, {good} succeeded")
+    lines += [f"cannot be read: {sentence}" for sentence in bad]
+    lines += [f"being recorded, or cut off: {part}; rosbag reindex {part}/{BAG} saves what there is" for part in parts]
+    data = {"trials": rows, "unreadable": bad, "unfinished": parts}
+    following = f"./coglab trial report {rows[-1]['folder']}" if rows else "./coglab launch, then ./coglab start"
+    return Answer("\n".join(lines), data, following, OK)
+
+
+def show(options: argparse.Namespace) -> Answer:
+    """The record and the metrics of a trial."""
+    import yaml
+
+    from coglab_tools.report.metrics import METRICS, metrics_of
+    from coglab_tools.trial.explain import events, headline
+
+    place, trial = _measured(options)
+    data = asdict(trial.record)
+    values = metrics_of(trial)
+    lines = [headline(trial)]
+    lines += [f"{t:+7.2f} s  {text}" for t, text, _ in events(trial)]
+    lines += [
+        f"{metric.label:28} {'-' if values[name] is None else f'{values[name]:.3g} {metric.unit}'}"
+        for name, metric in METRICS.items()
+    ]
+    rest = {k: v for k, v in data.items() if k not in ("marks", "outcome") and v not in ("", None, {})}
+    lines.append(yaml.safe_dump(rest, sort_keys=False, allow_unicode=True, default_flow_style=None).rstrip())
+    return Answer("\n".join(lines), {**data, "metrics": values}, f"./coglab trial report {place}")
+
+
+def explain_trial(options: argparse.Namespace) -> Answer:
+    """What happened, in at most ten lines."""
+    from coglab_tools.trial.explain import explain
+
+    place, trial = _measured(options)
+    lines = explain(trial)
+    return Answer("\n".join(lines), {"lines": lines}, f"./coglab trial plot {place}")
+
+
+def plot(options: argparse.Namespace) -> Answer:
+    """The picture of a trial, as PNG, PDF or SVG by the name of the file."""
+    from coglab_tools.report.page import figure_of_trial, write_whole
+
+    place, trial = _measured(options)
+    file = options.out or place / "trial.png"
+    if file.suffix.lower() not in (".png", ".pdf", ".svg"):
+        raise UsageError(f"{file} ends with {file.suffix or 'nothing'}: .png, .pdf or .svg is expected")
+    figure = figure_of_trial(trial)
+    write_whole(file, lambda part: figure.savefig(part, dpi=160))
+    return Answer(f"{file}", {"file": str(file)}, f"./coglab trial report {place}")
+
+
+def report(options: argparse.Namespace) -> Answer:
+    """The page of a trial."""
+    from coglab_tools.report.page import write_pdf, write_report
+
+    place, trial = _measured(options)
+    file = write_report(trial, options.out or place / "report.html")
+    data = {"file": str(file), "pdf": ""}
+    text = f"{file}"
+    if options.pdf:
+        data["pdf"] = str(write_pdf(file, file.with_suffix(".pdf")))
+        text += f"\n{data['pdf']}"
+    return Answer(text, data, f"./coglab trial replay {place}")
+
+
+def replay(options: argparse.Namespace) -> Answer:
+    """Publish the bag of a trial again, until it ends or Ctrl-C."""
+    from coglab_tools.trial.replay import replay as run
+
+    place = _place(options)
+    TrialRecord.load(place)
+    if not (place / BAG).is_file():
+        raise CheckFailed(f"{place} has no {BAG}: a trial of virtual time is not replayed; ./coglab trial plot {place}")
+    seconds = run(place / BAG, options.rate, options.rviz)
+    return Answer(
+        f"{place / BAG}: replayed in {seconds:.0f} s", {"seconds": seconds}, f"./coglab trial explain {place}"
+    )
+
+
+def video(options: argparse.Namespace) -> Answer:
+    """A moving picture of a trial."""
+    from coglab_tools.report.page import write_whole
+    from coglab_tools.trial.video import KINDS, write_video
+
+    place, trial = _measured(options)
+    file = options.out or place / "trial.gif"
+    if file.suffix.lower() not in KINDS:
+        raise UsageError(f"{file} ends with {file.suffix or 'nothing'}: {' or '.join(KINDS)} is expected")
+    found: dict[str, Any] = {}
+    write_whole(file, lambda part: found.update(write_video(trial, part)))
+    text = f"{file}: {found['frames']} frames, {found['seconds']:.1f} s"
+    return Answer(text, {"file": str(file), **found}, f"./coglab trial report {place}")

@@ -17,6 +17,9 @@ from coglab_tools.trial.record import ARRAYS, BAG, TrialRecord
 
 JOINTS = "lwr/joint_states"
 MOST_SECONDS = 24 * 3600.0  # of tf that is kept
+HALVED = (JOINTS, "lwr/external_torques")  # 100 Hz of them are enough for plots, and are read in half the time
+TRUTH = "coglab_sim/truth/cell"
+WITHOUT_TRUTH = ("tf", "tf_static", "contact_detector/force")
 PALM, PERSON = "ih2_palm", "human_hand"
 WORLD = "world"
 
@@ -61,9 +64,9 @@ def read_trial(folder: str | Path) -> Measured:
     raise CheckFailed(f"{place} has neither {BAG} nor {ARRAYS}: the measurements of this trial are missing")
 
 
-def messages(file: Path, topics: list[str] | None = None) -> Iterator[tuple[str, Any, float]]:
+def messages(file: Path, wanted: Callable[[set[str]], list[str]] = list) -> Iterator[tuple[str, Any, float]]:
     """Topic without leading slash, message and time of receipt (s) of the bag's messages. CheckFailed: it is no bag, or
-    a damaged one. `topics`: those wanted, without leading slash; None: all."""
+    a damaged one. `wanted`: returns the topics to read, given those of the bag; of HALVED every second one is read."""
     import rosbag
 
     if not file.is_file():
@@ -72,9 +75,20 @@ def messages(file: Path, topics: list[str] | None = None) -> Iterator[tuple[str,
         raise CheckFailed(f"{file} is empty: its recording never ended")
     try:
         with rosbag.Bag(str(file)) as bag:
-            names = None if topics is None else [slash + topic for topic in topics for slash in ("", "/")]
-            for topic, message, stamp in bag.read_messages(topics=names):
-                yield topic.lstrip("/"), message, stamp.to_sec()
+            names = {info.topic.lstrip("/"): info.topic for info in bag._get_connections()}
+            chosen = [names[name] for name in wanted(set(names)) if name in names]
+            turn = dict.fromkeys(HALVED, False)
+            if not chosen:
+                return
+            for topic, (_, data, _, _, kind), stamp in bag.read_messages(topics=chosen, raw=True):
+                name = topic.lstrip("/")
+                if name in turn:
+                    turn[name] = not turn[name]
+                    if not turn[name]:
+                        continue
+                message = kind()
+                message.deserialize(data)
+                yield name, message, stamp.to_sec()
     except rosbag.ROSBagUnindexedException:
         raise CheckFailed(
             f"{file} has no index, as its recording was cut off: `rosbag reindex {file}` makes one"
@@ -122,7 +136,7 @@ class _Reader:
         self.take: dict[str, Callable[[Any, float], None]] = {
             JOINTS: self._joints,
             "lwr/external_torques": self._torques,
-            "coglab_sim/truth/cell": self._truth,
+            TRUTH: self._truth,
             "ih2_hand/hand_status": self._hand,
             "controller_manager/dmp/feedback": self._feedback,
             "coglab/transitions": self._transition,
@@ -185,15 +199,19 @@ class _Reader:
             self._buffer = tf2_py.BufferCore(genpy.Duration.from_sec(MOST_SECONDS))
         return self._buffer
 
+    def wanted(self, there: set[str]) -> list[str]:
+        """Topics to read: those from which the hands are seen only where the truth is not there."""
+        return [name for name in self.take if not (TRUTH in there and name in WITHOUT_TRUTH)]
+
     def _frames(self, m: Any, _t: float) -> None:
         for each in m.transforms:
-            self._tree().set_transform(each, "bag")
+            self._tree().set_transform(_own(each), "bag")
             if each.child_frame_id.strip("/") == PERSON:
                 self.person_stamps.append(each.header.stamp.to_sec())
 
     def _static(self, m: Any, _t: float) -> None:
         for each in m.transforms:
-            self._tree().set_transform_static(each, "bag")
+            self._tree().set_transform_static(_own(each), "bag")
 
     def path_of(self, frame: str, stamps: list[float]) -> tuple[np.ndarray, np.ndarray]:
         """Times (s) and positions (m, [n, 3]) of a frame in the world as tf had it."""
@@ -213,9 +231,21 @@ class _Reader:
         return np.array(times), np.array(points).reshape(-1, 3)
 
 
+def _own(frame: Any) -> Any:
+    """The transform as the installed type, which tf wants; that of the bag is made from its own definition."""
+    from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
+
+    found, move, turn = TransformStamped(), frame.transform.translation, frame.transform.rotation
+    found.header.stamp, found.header.frame_id = frame.header.stamp, frame.header.frame_id.lstrip("/")
+    found.child_frame_id = frame.child_frame_id.lstrip("/")
+    found.transform.translation = Vector3(move.x, move.y, move.z)
+    found.transform.rotation = Quaternion(turn.x, turn.y, turn.z, turn.w)
+    return found
+
+
 def _from_bag(file: Path, record: TrialRecord) -> Measured:
     reader = _Reader()
-    for topic, message, received in messages(file, list(reader.take)):
+    for topic, message, received in messages(file, reader.wanted):
         stamp = getattr(getattr(message, "header", None), "stamp", None)
         time = stamp.to_sec() if stamp is not None and stamp.to_sec() > 0.0 else received
         try:
@@ -278,7 +308,7 @@ def _exchange(row: dict[str, Any]) -> Exchange | None:
 
 def _seen(reader: _Reader) -> list[tuple[Any, ...]]:
     """Rows like those of the truth, from what a real robot has: NaN where nothing was seen."""
-    joints = [row[0] for row in reader.series.joints][::4]
+    joints = [row[0] for row in reader.series.joints][::2]
     times, palm = reader.path_of(PALM, joints)
     if not len(times):
         return []

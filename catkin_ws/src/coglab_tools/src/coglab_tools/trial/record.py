@@ -148,6 +148,17 @@ def _virtual(folder: Path, data: Mapping[str, Any]) -> TrialRecord:
     )
 
 
+def trials_folder() -> Path:
+    """Where handovers are recorded unless the launch argument `record` names a folder: out/trials of the workspace for
+    systems that ./coglab launch starts, otherwise trials in ROS_HOME (~/.ros)."""
+    given = os.environ.get("ROS_HOME", "")
+    home = Path(given) if given else Path.home() / ".ros"
+    top = os.environ.get("COGLAB_TOP", "") if not given else ""
+    if home.parent.name == ".coglab":  # home_1, home_2, ... of ./coglab launch
+        top = str(home.parent.parent)
+    return Path(top) / "out" / "trials" if top else home / "trials"
+
+
 def find_trials(folder: str | os.PathLike[str]) -> list[Path]:
     """Folders of the whole trials below `folder`, by name; `folder` itself if it is one. UsageError: it is gone."""
     place = Path(folder)

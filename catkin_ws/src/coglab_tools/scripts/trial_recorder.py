@@ -1,0 +1,9 @@
+#!/usr/bin/python3
+"""The node /trial_recorder: records every handover into a folder of its own, with the seconds before it."""
+
+import sys
+
+from coglab_tools.trial.recorder_node import main
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,151 @@
+"""The recorder without ROS: a handover becomes one whole folder, whatever disk, results and end of the system do."""
+
+import io
+import json
+
+import pytest
+import rosbag
+from coglab_msgs.msg import Transition
+from coglab_tools.trial.record import TrialRecord, find_trials
+from coglab_tools.trial.recorder import Raw, Recorder, configuration_hash
+from rospy import Time
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+ACTION = "exchange_human_to_robot"
+PARAMETERS = {
+    "coglab": {"trial": {"participant": "P03", "condition": "brisk", "study": "timing"}, "speed": 0.5},
+    "coglab_sim": {"person": {"seed": 7}},
+    "run_id": "x",
+}
+
+
+class Cell:
+    """A recorder and what it is fed with; `disk`: free bytes."""
+
+    def __init__(self, folder, disk=1e12):
+        self.disk, self.said = disk, []
+        self.recorder = Recorder(
+            folder, lambda: PARAMETERS, lambda text, wrong: self.said.append((wrong, text)), free=lambda _: self.disk
+        )
+
+    def send(self, time, topic, message, latching="0"):
+        stream = io.BytesIO()
+        message.serialize(stream)
+        header = {
+            "type": message._type, "md5sum": message._md5sum, "message_definition": message._full_text,
+            "callerid": "/coglab", "latching": latching,
+        }  # fmt: skip
+        self.recorder.put(Raw(time, topic, stream.getvalue(), header))
+
+    def move(self, time, source, outcome, target):
+        message = Transition(path="/coglab_master", from_state=source, outcome=outcome, to_state=target)
+        message.header.stamp = Time.from_sec(time)
+        self.send(time, "/coglab/transitions", message)
+
+    def result(self, begun, ended, **changes):
+        row = {
+            "kind": ACTION, "object_id": "mug", "outcome": "succeeded", "reason": "done", "reason_code": 0,
+            "causes": [], "started": begun - 1000.0, "ended": ended - 1000.0, "started_ros": begun,
+            "ended_ros": ended, "marks": {"contact": begun - 1000.0 + 2.0},
+        }  # fmt: skip
+        self.send(ended, "/coglab/results", String(json.dumps({**row, **changes})), latching="1")
+
+    def run(self, begin, end, step=0.1):
+        """Joint states at 10 Hz, and the steps of the recorder."""
+        for k in range(round((end - begin) / step)):
+            now = begin + k * step
+            self.send(now, "/lwr/joint_states", JointState(position=[0.0] * 7, velocity=[0.0] * 7))
+            self.recorder.step(now)
+
+
+def handover(cell, begun=2020.0, ended=2024.0, **changes):
+    cell.send(begun - 15.0, "/tf_static", String("kept, as it is latched"), latching="1")
+    cell.run(begun - 10.0, begun)
+    cell.move(begun, "wait_without_object", ACTION, ACTION)
+    cell.run(begun, ended)
+    cell.result(begun, ended, **changes)
+    cell.move(ended + 0.01, ACTION, "succeeded", "wait_with_object")
+    cell.run(ended, ended + 4.0)
+
+
+def test_a_handover_becomes_a_whole_folder_with_what_came_before(tmp_path):
+    cell = Cell(tmp_path)
+    handover(cell)
+    (place,) = find_trials(tmp_path)
+    assert [each.name for each in tmp_path.iterdir()] == [place.name] == [f"19700101T003340Z_{ACTION}_mug"]
+    record = TrialRecord.load(place)
+    assert record.outcome.success and record.duration_s == 4.0 and record.object == "mug" and record.simulated
+    assert (record.participant, record.condition, record.study, record.seed) == ("P03", "brisk", "timing", 7)
+    assert record.marks == ({"name": "contact", "time_s": 2.0},)
+    with rosbag.Bag(str(place / "trial.bag")) as bag:
+        stamps = [t.to_sec() for _, _, t in bag.read_messages("/lwr/joint_states")]
+        assert stamps[0] == pytest.approx(2015.0, abs=0.2) and stamps[-1] == pytest.approx(2025.0, abs=0.2)
+        (latched,) = bag.read_messages("/tf_static")
+        assert latched.message.data.startswith("kept") and latched.timestamp.to_sec() >= 2014.8
+        assert len(list(bag.read_messages("/coglab/transitions"))) == 2
+
+
+def test_a_failure_keeps_its_code_and_a_second_one_of_the_same_second_its_folder(tmp_path):
+    cell = Cell(tmp_path)
+    handover(cell, outcome="failed_empty", reason_code=40, reason="nobody let go")
+    handover(cell, 2020.5, 2023.0, started_ros=2020.0)
+    first, second = map(TrialRecord.load, find_trials(tmp_path))
+    assert (first.outcome.success, first.outcome.code, first.outcome.text) == (False, 40, "nobody let go")
+    assert second.id == f"{first.id}_2" and second.outcome.success
+
+
+@pytest.mark.parametrize("text", ["no JSON", '{"kind": 3}', "[]", '{"kind": "exchange_human_to_robot"}'])
+def test_a_strange_result_is_no_end_and_the_transition_tells_the_outcome(tmp_path, text):
+    cell = Cell(tmp_path)
+    cell.move(2020.0, "wait_without_object", ACTION, ACTION)
+    cell.run(2020.0, 2021.0)
+    cell.send(2021.0, "/coglab/results", String(text))
+    cell.move(2022.0, ACTION, "failed_empty", "wait_without_object")
+    cell.run(2021.0, 2027.0)
+    (place,) = find_trials(tmp_path)
+    record = TrialRecord.load(place)
+    assert not record.outcome.success and record.duration_s == pytest.approx(2.0)
+
+
+def test_a_full_disk_is_said_and_ends_the_recording_alone(tmp_path):
+    cell = Cell(tmp_path, disk=400e6)
+    handover(cell)
+    assert not any(tmp_path.iterdir()) and "400 MB left" in cell.said[0][1] and cell.said[0][0]
+    cell.disk = 1e12
+    cell.run(2030.0, 2031.0)
+    cell.move(2031.0, "wait_without_object", ACTION, ACTION)
+    cell.run(2031.0, 2033.0)
+    cell.disk = 1e6
+    cell.run(2033.0, 2036.0)
+    (place,) = find_trials(tmp_path)
+    assert "recording stopped before the end" in TrialRecord.load(place).notes
+
+
+def test_a_disk_that_fails_leaves_nothing_half_written_and_the_next_handover_is_recorded(tmp_path, monkeypatch):
+    cell = Cell(tmp_path)
+
+    def full(*_arguments, **_options):
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(rosbag.Bag, "write", full)
+        handover(cell)
+    assert not any(tmp_path.iterdir()) and "No space left" in cell.said[0][1]
+    handover(cell, 2040.0, 2044.0)
+    assert len(find_trials(tmp_path)) == 1
+
+
+def test_the_end_of_the_system_keeps_what_was_recorded(tmp_path):
+    cell = Cell(tmp_path)
+    cell.run(2018.0, 2020.0)
+    cell.move(2020.0, "wait_without_object", ACTION, ACTION)
+    cell.run(2020.0, 2021.0)
+    cell.recorder.close()
+    (place,) = find_trials(tmp_path)
+    assert "ended before the action" in TrialRecord.load(place).outcome.text
+
+
+def test_the_hash_changes_with_a_setting_alone():
+    same = configuration_hash({"/a": 1, "/fri_port_bound": 4000})
+    assert same == configuration_hash({"/fri_port_bound": 4001, "/a": 1}) != configuration_hash({"/a": 2})
