@@ -235,11 +235,17 @@ def objects_copy(study: Study) -> Path:
     return (study.folder / LIVE / "objects").resolve()
 
 
+def recordings_folder(study: Study) -> Path:
+    """Where the recorder writes the handovers of this study."""
+    return (study.folder / RECORDINGS).resolve()
+
+
 def launch_line(study: Study) -> str:
     """The command that starts the system for this study."""
-    text = package_path("coglab_bringup", "launch", "coglab.launch").read_text(encoding="utf-8")
-    record = f" record:={(study.folder / RECORDINGS).resolve()}" if '<arg name="record"' in text else ""
-    return f"./coglab launch machines:={machines_file(study)} objects:={objects_copy(study)}{record}"
+    return (
+        f"./coglab launch machines:={machines_file(study)} objects:={objects_copy(study)} "
+        f"record:={recordings_folder(study)}"
+    )
 
 
 def prepare(study: Study) -> None:
@@ -344,6 +350,9 @@ class RunningSystem:
                 f"the parameter /coglab/config_overrides sets {', '.join(sorted(above))}, which conditions of this "
                 "study set too, and it would win: launch the system without it"
             )
+        if Path(str(rospy.get_param("/trial_recorder/folder", ""))).resolve() != recordings_folder(study):
+            print("  no recorder writes into this study: its report will have no fluency and no forces. To record:")
+            print(f"  {launch_line(study)}")
         self._speed = float(rospy.get_param("/controller_manager/speed_scale", 1.0))
         self._feedback = self._standing_feedback() if "feedback" in self._names else []
 

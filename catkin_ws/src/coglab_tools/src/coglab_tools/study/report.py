@@ -25,6 +25,7 @@ from coglab_tools.study.statistics import Comparison, compare, holm, wilson
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+MOST_DRAWN = 60  # participants with a line in the figures and in the table of orders
 MOST_LISTED = 400  # handovers in the report's table; trials.csv has all
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 
@@ -37,8 +38,6 @@ class Measure:
     unit: str
     definition: str
     values: Mapping[str, Mapping[str, float]]
-    count: Mapping[str, int]
-    """single values behind the means, by condition"""
 
 
 def write_report(study: Study, pdf: bool = False) -> dict[str, Any]:
@@ -110,16 +109,18 @@ def _scores(study: Study) -> Iterator[Measure]:
 def _measure(
     study: Study, title: str, unit: str, definition: str, triples: Sequence[tuple[str, str, float]]
 ) -> Measure:
+    single: dict[tuple[str, str], list[float]] = {}
+    for condition, person, value in triples:
+        single.setdefault((condition, person), []).append(value)
     values = {
         condition: {
-            person: float(np.mean(own))
+            person: float(np.mean(single[condition, person]))
             for person in study.participants
-            if (own := [v for c, p, v in triples if c == condition and p == person])
+            if (condition, person) in single
         }
         for condition in study.conditions
     }
-    count = {condition: sum(c == condition for c, _, _ in triples) for condition in study.conditions}
-    return Measure(title, unit, definition, values, count)
+    return Measure(title, unit, definition, values)
 
 
 def _comparisons(study: Study, measure: Measure) -> list[tuple[str, str, Comparison, float]]:
@@ -207,13 +208,10 @@ def _measure_figures(study: Study, measures: Sequence[Measure]) -> Iterator[Figu
         for place, measure in enumerate(shown, 1):
             axes = figure.add_subplot(rows, 4, place)
             names = list(study.conditions)
-            for person in study.participants:
-                own = [
-                    (x, measure.values[name][person]) for x, name in enumerate(names) if person in measure.values[name]
-                ]
-                axes.plot(
-                    *zip(*own, strict=True), color="0.75", linewidth=0.8, marker=".", markersize=3
-                ) if own else None
+            for person in study.participants[:MOST_DRAWN]:
+                own = [(x, measure.values[n][person]) for x, n in enumerate(names) if person in measure.values[n]]
+                if own:
+                    axes.plot(*zip(*own, strict=True), color="0.75", linewidth=0.8, marker=".", markersize=3)
             for x, name in enumerate(names):
                 values = np.array(list(measure.values[name].values()))
                 if len(values):
@@ -261,7 +259,7 @@ def _pdf(
             lines.append(
                 f"{measure.title[:34]:<36}{a} to {b:<18}"[:64].ljust(64)
                 + f"{c.pairs:>4}   {_interval(c.difference, c.low, c.high):<28}"
-                + f"{_interval(c.effect, c.effect_low, c.effect_high):<26}{_number(p)}"
+                + f"{_interval(c.effect, c.effect_low, c.effect_high):<26}{_p(p)}"
             )
     target = io.BytesIO()
     with PdfPages(target, metadata={"Title": f"Study {study.name}", "CreationDate": None}) as pages:
@@ -282,9 +280,11 @@ def _pdf(
 def _number(value: float) -> str:
     if not math.isfinite(value):
         return "–"
-    if value != 0.0 and abs(value) < 0.001:
-        return "< 0.001" if value > 0 else "-0.000"
     return f"{value:.3f}" if abs(value) < 10 else f"{value:.1f}"
+
+
+def _p(value: float) -> str:
+    return "< 0.001" if value < 0.001 else _number(value)
 
 
 def _interval(value: float, low: float, high: float) -> str:
@@ -313,12 +313,11 @@ def _page(
             cells.append(f"{_number(float(values.mean()))}{spread}" if len(values) else "–")
         summary.append((measure, cells))
     compared = [(measure, _comparisons(study, measure)) for measure in measures]
-    orders = {
-        person: list(dict.fromkeys((t.block, t.condition) for t in study.trials() if t.participant == person))
-        for person in study.participants
-    }
+    orders: dict[str, dict[tuple[int, str], None]] = {}
+    for trial in study.trials():
+        orders.setdefault(trial.participant, {})[trial.block, trial.condition] = None
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    environment.filters |= {"number": _number}
+    environment.filters |= {"number": _number, "p": _p}
     environment.globals |= {"interval": _interval}
     template = package_path("coglab_tools", "templates", "study_report.html").read_text(encoding="utf-8")
     return environment.from_string(template).render(
@@ -331,7 +330,7 @@ def _page(
         summary=summary,
         compared=compared,
         figures=[_svg(figure) for figure in figures],
-        orders=orders,
+        orders=dict(itertools.islice(orders.items(), MOST_DRAWN)),
         rows=table[:MOST_LISTED],
         more=max(0, len(table) - MOST_LISTED),
         columns=[name for name in METRICS if any(name in row for row in table)],
