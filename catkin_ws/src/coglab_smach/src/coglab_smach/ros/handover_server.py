@@ -13,6 +13,7 @@ from typing import Any
 
 import rospy
 from coglab_msgs.msg import HandoverFeedback, HandoverGoal, HandoverMark, HandoverResult, ReasonCode
+from coglab_py.steady import ending
 
 from coglab_smach.context.context import Context
 from coglab_smach.context.journal import ActionRecord
@@ -108,6 +109,8 @@ class HandoverServer:
             else:
                 self._follow(handle)
         except Exception as error:  # nothing from outside ends the node
+            if ending():
+                return
             rospy.logerr("coglab/handover: %s", traceback.format_exc())
             code, what = ReasonCode.UNEXPECTED, f"{type(error).__name__}: {error}"
             handle.set_aborted(self._refused(handle, code, what), what)

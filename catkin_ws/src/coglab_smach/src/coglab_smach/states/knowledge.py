@@ -214,9 +214,9 @@ def paced(ctx: Context, goal: dict[str, Any]) -> dict[str, Any]:
 
 
 class SetGraspGoal(CoglabState):
-    """DMP goal from the best of the object's grasps: the palm relative to the tracked object frame,
-    ``handover.standoff`` m in front of it. Meanwhile the hand moves to the preshape of that grasp, so that it is open
-    on arrival.
+    """DMP goal from the best of the object's grasps, or from its nominal one (``grasp.choice``): the palm
+    relative to the tracked object frame, ``handover.standoff`` m in front of it. Meanwhile the hand moves to the
+    preshape of that grasp, so that it is open on arrival.
 
     Ends when the object is offered, i.e. inside the handover region: the arm must not chase an object that rests with
     the person. If nobody offers it within the limit, the state fails. The arm has not moved then.
