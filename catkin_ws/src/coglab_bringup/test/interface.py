@@ -27,6 +27,8 @@ TOPICS = dict(
         /ih2_hand/hand_preshape_close/goal coglab_msgs/HandPreshapeCloseActionGoal
         /coglab/contact coglab_msgs/Contact
         /coglab/transitions coglab_msgs/Transition
+        /coglab/handover/goal coglab_msgs/HandoverActionGoal
+        /coglab/handover_results coglab_msgs/HandoverResult
         /coglab/scene visualization_msgs/MarkerArray
         /coglab/smach/container_structure smach_msgs/SmachContainerStructure
         /coglab/smach/container_status smach_msgs/SmachContainerStatus

@@ -127,7 +127,7 @@ def test_a_short_name_and_a_delivery_reach_the_brain(brain):
         assert status == 0 and brain.started == [asked], output
     brain.say(*holding, object_id="mug")
     status, output = ask("start", "give", "mug", "rim_first")
-    assert status == 1 and "delivery:=NAME is expected behind the object, got 'rim_first'" in output
+    assert status == 2 and "delivery:=NAME is expected behind the object, got 'rim_first'" in output
     brain.started.clear()
 
 

@@ -43,7 +43,7 @@ REFUSED = {
     "controller new": "controller new expects a NAME",
     "object paint": "object expects one of: new, check, list; got 'paint'",
     "status now": "unrecognized arguments: now",
-    "start take mug cup": "unrecognized arguments: cup",
+    "start take mug cup": "delivery:=NAME is expected behind the object, got 'cup'",
 }
 
 

@@ -32,6 +32,14 @@ SHORT_NAMES = {"receive": "exchange_human_to_robot", "give": "exchange_robot_to_
 OBJECT_PARAMETER = "/coglab_sim/cell/object/id"  # object that the simulated person offers
 
 
+def delivery_name(word: str) -> str:
+    """The name in `delivery:=NAME`."""
+    name = word.removeprefix("delivery:=")
+    if name == word or not name:
+        raise argparse.ArgumentTypeError(f"delivery:=NAME is expected behind the object, got '{word}'")
+    return str(name)
+
+
 def ask_parser(command: str) -> Parser:
     """./coglab start, status, hold, stop"""
     about = {
@@ -49,9 +57,20 @@ def ask_parser(command: str) -> Parser:
             metavar="ACTION",
             help="receive, give, take, put, initialise, reset, or an action of your own",
         )
-        parser.add_argument("object_id", nargs="?", default="", metavar="OBJECT", help="of the object database")
         parser.add_argument(
-            "delivery", nargs="?", default="", metavar="delivery:=NAME", help="how the object is given, of its file"
+            "object_id",
+            nargs="?",
+            default="",
+            type=lambda word: word if not word.startswith("delivery:=") else f"/{delivery_name(word)}",
+            metavar="OBJECT",
+            help="of the object database",
+        )
+        parser.add_argument(
+            "delivery",
+            nargs="?",
+            type=delivery_name,
+            metavar="delivery:=NAME",
+            help="how the object is given, of its file",
         )
         parser.add_argument("--wait", type=float, default=90.0, metavar="S", help="for the hub, at most (default 90)")
     parser.add_argument(
@@ -207,22 +226,10 @@ def choose(master: str, options: argparse.Namespace, state: State) -> tuple[str,
     return action, object_id
 
 
-def delivery_of(options: argparse.Namespace) -> str:
-    """The delivery of `delivery:=NAME`, which may stand in the place of the object. Refused if it is something else."""
-    word = options.delivery
-    if options.object_id.startswith("delivery:="):
-        word, options.object_id = options.object_id, ""
-    name = word.removeprefix("delivery:=")
-    if word and (name == word or not name):
-        raise Refused(f"delivery:=NAME is expected behind the object, got '{word}'")
-    return str(name)
-
-
 def start(brain: Brain, options: argparse.Namespace) -> int:
     """Wait for the hub, then request the action. A refusal that may be temporary is retried until the time limit."""
     options.action = SHORT_NAMES.get(options.action, options.action)
     deadline, wanted = time.monotonic() + options.wait, options.action
-    delivery = delivery_of(options)
     if not brain.wait_for_state(lambda state: state.in_hub, min(1.0, options.wait)):
         now = brain.state.state.rpartition("/")[2] if brain.state.state else "the brain is starting"
         print(f"[coglab] waiting for the hub, {options.wait:.0f} s at most; now: {now}", file=sys.stderr, flush=True)
@@ -236,7 +243,8 @@ def start(brain: Brain, options: argparse.Namespace) -> int:
                 raise Refused(f"{brain.state.state.rpartition('/')[2]} does not take '{wanted}'; type: {there}")
             continue
         action, object_id = choose(brain.master, options, brain.state)
-        success, message = brain.command("/coglab/start", action, f"{object_id}/{delivery}" if delivery else object_id)
+        named = f"{object_id}/{options.delivery}" if options.delivery else object_id
+        success, message = brain.command("/coglab/start", action, named)
         if success:
             print(f"{f'{action} {object_id}'.strip()}: {message}; watch: ./coglab status")
             return 0

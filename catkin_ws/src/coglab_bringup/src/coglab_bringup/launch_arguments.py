@@ -92,6 +92,13 @@ def _address(value: str) -> None:
     _must(fine, f"expected an address of this computer, such as 127.0.0.1, got '{value}'")
 
 
+def _arm(value: str) -> None:
+    if "/" in value:
+        _file(value)
+    elif not value.endswith(".so"):
+        _must(value in ("fri", "ideal"), f"there is no '{value}'; there are: fri, ideal, and a library: libmy_arm.so")
+
+
 def _or_empty(check: Check) -> Check:
     return lambda value: value and check(value)
 
@@ -108,7 +115,7 @@ def _checks(sources: Path, objects: Path) -> dict[str, Check]:
         **dict.fromkeys(written, _or_empty(writable_file)),
         **dict.fromkeys(("fri_port", "console_port"), _whole(0, 65535)),
         **dict.fromkeys(("fri_address", "console_address"), _address),
-        "arm": _one_of("fri", "ideal"),
+        "arm": _arm,
         "seed": seed,
         "fri_period": _number(*_cell_range(sources, "krc/period")),
         "people": _whole(1, 9),

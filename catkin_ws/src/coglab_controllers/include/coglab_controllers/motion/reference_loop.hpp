@@ -46,8 +46,10 @@ class Arrival {
 /// in. Only configure() allocates or throws.
 ///
 /// Parameters: `Kp` (1/s, joints), `pos_clik_gain`, `rot_clik_gain` (1/s),
-/// `correction_speed` (m/s), `singularity_threshold`, `rotation_first_scaling` (poses, eq. 6-12),
-/// `hold_blend` (s), `tolerance` (rad), `arrive_distance` (m). The first four are tunable.
+/// `correction_speed` (m/s), `singularity_threshold`, `rotation_first_scaling`,
+/// `second_task` (orientation, axis, posture or none), `axis` (3, frame of the hand), `posture` (7,
+/// rad), `posture_gain` (1/s) (poses, eq. 6-12), `hold_blend` (s), `tolerance` (rad),
+/// `arrive_distance` (m). The first four are tunable.
 class ReferenceLoop {
  public:
   /// What the references of a controller may be; the gains of the others are not offered.
@@ -88,6 +90,7 @@ class ReferenceLoop {
 
   std::shared_ptr<const RobotSetup> robot_;
   std::unique_ptr<TwoTaskIk> ik_;
+  std::unique_ptr<SecondTask> second_task_;  // none: the orientation
   // null where the controller has no such references
   Tunable *joint_gain_ = nullptr, *position_gain_ = nullptr, *rotation_gain_ = nullptr,
           *correction_speed_ = nullptr;
