@@ -69,8 +69,8 @@ void ReferenceLoop::configure(const MotionSetup& setup, Spaces spaces, Tunables&
   ik.acceleration_limit = robot_->limits.acceleration;
   ik.jerk_limit = robot_->limits.jerk;
   ik_ = std::make_unique<TwoTaskIk>(ik);
-  second_task_ = readSecondTask(parameters, ik.rot_clik_gain,
-                                std::min(200.0, largestGain(setup.cycle_time)));
+  second_task_ =
+      readSecondTask(parameters, ik.rot_clik_gain, std::min(200.0, largestGain(setup.cycle_time)));
   if (spaces != Spaces::Pose) {
     const double most = std::min(100.0, largestGain(setup.cycle_time));
     joint_gain_ =
