@@ -16,6 +16,7 @@
 
 #include "coglab_controllers/ideal/ideal_arm_ros.hpp"
 #include "coglab_controllers/ros/manager_ros.hpp"
+#include "coglab_rt/arm_library.hpp"
 #include "coglab_rt/arm_port.hpp"
 #include "coglab_rt/ros/alone.hpp"
 #include "coglab_rt/ros/exit_limit.hpp"
@@ -28,13 +29,16 @@ namespace {
 volatile std::sig_atomic_t asked_to_end = 0;
 void onSignal(int) { asked_to_end = 1; }
 
-/// The back ends by name. @throws std::exception naming a parameter
+/// The back ends by name, or that of a library. @throws std::exception naming a parameter
 std::unique_ptr<coglab_rt::ArmPort> makeArm(const ros::NodeHandle& lwr) {
-  const auto name = coglab_rt::readParameter<std::string>(lwr, "arm", "fri", "fri or ideal");
+  const auto name =
+      coglab_rt::readParameter<std::string>(lwr, "arm", "fri", "fri, ideal or a library");
   if (name == "fri") return std::make_unique<lwr_fri_bridge::BridgeRos>(lwr, true);
   if (name == "ideal") return std::make_unique<coglab_controllers::IdealArmRos>(lwr);
-  throw std::invalid_argument("parameter " + lwr.resolveName("arm") + " = '" + name +
-                              "': expected fri or ideal");
+  if (name.find(".so") != std::string::npos) return coglab_rt::loadArm(name);
+  throw std::invalid_argument(
+      "parameter " + lwr.resolveName("arm") + " = '" + name +
+      "': expected fri, ideal or the file of a library, such as libmy_arm.so");
 }
 
 }  // namespace

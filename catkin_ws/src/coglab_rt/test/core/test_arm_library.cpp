@@ -1,0 +1,51 @@
+/// An arm from a library: made and run, or refused in words.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <string>
+#include <thread>
+
+#include "coglab_rt/arm_library.hpp"
+
+namespace {
+
+std::string library(const std::string& name) { return ARM_LIBRARIES + name + ".so"; }
+
+std::string refusal(const std::string& file) {
+  try {
+    coglab_rt::loadArm(file);
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(ArmLibrary, AnArmOfALibraryMeasures) {
+  const auto arm = coglab_rt::loadArm(library("shortest"));
+  std::atomic<int> woken{0};
+  arm->start([&woken](bool) { ++woken; });
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  while (woken < 3 && std::chrono::steady_clock::now() < end) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  arm->shutdown();
+  coglab_rt::RobotSample sample;
+  EXPECT_TRUE(arm->mailboxes().newestSample(sample));
+  EXPECT_GE(sample.sequence, 3U);
+}
+
+TEST(ArmLibrary, WhatCannotBeUsedIsRefusedInWords) {
+  for (const auto& [file, words] :
+       {std::pair<std::string, std::string>{library("none"), "has no arm; write COGLAB_ARM"},
+        {library("other_version"), "was made for interface 999 of an arm, expected 1; compile"},
+        {library("throwing"), "its arm could not be made: no cable is plugged in"},
+        {"/nowhere/libmy_arm.so", "cannot be opened: /nowhere/libmy_arm.so"},
+        {__FILE__, "cannot be opened"}}) {
+    const std::string said = refusal(file);
+    EXPECT_NE(said.find("the arm's library " + file + ": "), std::string::npos) << said;
+    EXPECT_NE(said.find(words), std::string::npos) << said;
+  }
+}
+
+}  // namespace
