@@ -30,6 +30,36 @@ void OrientationTask::evaluate(const ChainState& state, const JointVector&,
   constraint.gain = gain_;
 }
 
+AxisTask::AxisTask(const Vector3& axis, double gain)
+    : axis_(axis.normalized()), gain_(requireGain("rot_clik_gain", gain)) {
+  if (!axis.allFinite() || axis.norm() < 1e-6)
+    throw std::invalid_argument("axis: expected three numbers that are not all zero");
+}
+
+void AxisTask::evaluate(const ChainState& state, const JointVector&,
+                        const CartesianReference& reference,
+                        TaskConstraint& constraint) const noexcept {
+  if (!reference.orientation_control) return;
+  const Vector3 now = state.tool.orientation * axis_;
+  const Vector3 wanted = reference.pose.orientation * axis_;
+  // Two directions across the axis: the rotation about it is free.
+  Eigen::Matrix<double, 2, 3> across;
+  across.row(0) = now.unitOrthogonal().transpose();
+  across.row(1) = now.cross(across.row(0).transpose()).transpose();
+  const Vector3 normal = now.cross(wanted);
+  const double sine = normal.norm(), angle = std::atan2(sine, now.dot(wanted));
+  // Exactly opposite: every direction across the axis is a shortest way.
+  const Vector3 turn = sine > 1e-9   ? Vector3(angle / sine * normal)
+                       : angle > 1.0 ? Vector3(angle * across.row(0).transpose())
+                                     : normal;
+  constraint.rows = 2;
+  constraint.reject_whole = true;
+  constraint.jacobian.topRows<2>() = across * state.jacobian.bottomRows<3>();
+  constraint.velocity.head<2>() = across * reference.angular_velocity;
+  constraint.error.head<2>() = across * turn;
+  constraint.gain = gain_;
+}
+
 PostureTask::PostureTask(const JointVector& posture, double gain)
     : posture_(posture), gain_(requireGain("posture gain", gain)) {
   if (!posture.allFinite())

@@ -162,7 +162,10 @@ void TwoTaskIk::solve(const ChainState& state, const JointVector& q,
   const auto task_gain = [&](const JointVector& joint_way) {
     return brakeableGain(joint_way, constraint.gain);
   };
-  if (constraint.rows == 3) {
+  if (constraint.rows == 2) {
+    result.rotation_velocity =
+        secondShare<2>(constraint, result.position_velocity, null_space, limit, task_gain, result);
+  } else if (constraint.rows == 3) {
     result.rotation_velocity =
         secondShare<3>(constraint, result.position_velocity, null_space, limit, task_gain, result);
   } else if (constraint.rows == kMaxJoints) {

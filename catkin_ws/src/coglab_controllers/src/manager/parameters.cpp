@@ -21,7 +21,11 @@ bool Parameters::has(const std::string& name) const {
 
 void Parameters::refuse(const std::string& name, const std::string& expected) const {
   std::ostringstream got;
-  got << YAML::Node(node_[name]);
+  if (has(name)) {
+    got << YAML::Node(node_[name]);
+  } else {
+    got << "nothing";
+  }
   throw std::runtime_error("parameter " + block_ + "/" + name + ": expected " + expected +
                            ", got " + got.str());
 }

@@ -11,6 +11,32 @@ using Space = MotionReference::Space;
 // m/s: a hand that limits have kept from its set-point comes back beside a person.
 constexpr double kCorrectionSpeed = 0.3;
 
+namespace {
+
+// The second task of `second_task`; none for the orientation, which TwoTaskIk has itself.
+std::unique_ptr<SecondTask> readSecondTask(const Parameters& parameters, double rotation_gain,
+                                           double largest_gain) {
+  const std::string task =
+      parameters.choice("second_task", "orientation", {"orientation", "axis", "posture", "none"});
+  if (task == "axis") {
+    const Vector3 axis = parameters.numbers("axis", Vector3(1.0, 0.0, 0.0), 1.0);
+    if (axis.norm() < 1e-3) parameters.refuse("axis", "three numbers that are not all zero");
+    return std::make_unique<AxisTask>(axis, rotation_gain);
+  }
+  if (task == "posture") {
+    if (!parameters.has("posture")) {
+      parameters.refuse("posture", "seven joint positions (rad), because second_task is posture");
+    }
+    const JointVector posture = parameters.numbers("posture", JointVector::Zero(), 6.3);
+    return std::make_unique<PostureTask>(
+        posture, parameters.number("posture_gain", std::min(1.0, largest_gain), 0.0, largest_gain));
+  }
+  if (task == "none") return std::make_unique<NoTask>();
+  return nullptr;
+}
+
+}  // namespace
+
 Reason Arrival::handStuck(double away) noexcept {
   return Reason(ReasonCode::TargetNotReached, "the hand does not come to the goal: ")
          << away << " m are left; is the arm blocked?";
@@ -33,6 +59,7 @@ void ReferenceLoop::configure(const MotionSetup& setup) {
   ik.acceleration_limit = robot_->limits.acceleration;
   ik.jerk_limit = robot_->limits.jerk;
   ik_ = std::make_unique<TwoTaskIk>(ik);
+  second_task_ = readSecondTask(parameters, ik.rot_clik_gain, most);
   const double most_joints = std::min(100.0, largestGain(setup.cycle_time));
   gain_ = parameters.number("Kp", std::min(gain_, most_joints), 0.0, most_joints);
   tolerance_ = parameters.number("tolerance", tolerance_, 1e-5, 0.1);
@@ -120,7 +147,11 @@ void ReferenceLoop::resolvePose(const CycleInput& input, References& references)
   chain.tool.position += blend_.position();
   chain.tool.orientation = expRotation(blend_.rotation()) * chain.tool.orientation;
   blend_.advance(input.dt);
-  ik_->solve(chain, input.robot.position, to, ik_result_);
+  if (second_task_) {
+    ik_->solve(chain, input.robot.position, to, *second_task_, ik_result_);
+  } else {
+    ik_->solve(chain, input.robot.position, to, ik_result_);
+  }
   references.states.view<kMaxJoints>(references.joint_velocity) =
       reference_.share * ik_result_.velocity;
 }

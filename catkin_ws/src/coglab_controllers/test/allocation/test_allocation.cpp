@@ -58,6 +58,7 @@ TEST(Allocation, AWholeCycleTouchesNoHeap) {
   CartesianMotion motion;
   const TwoTaskIk ik;
   const PostureTask posture(JointVector::Zero(), 1.0);
+  const AxisTask axis(Vector3::UnitX(), 1.0);
   Guard guard(GuardParameters{}, robot());
   PhaseGovernor governor;
   const JointVector home = random.posture(1.0);
@@ -83,6 +84,8 @@ TEST(Allocation, AWholeCycleTouchesNoHeap) {
       const CartesianReference& reference = motion.step(0.005, goal, rate);
       if (i % 2) {
         ik.solve(state, q, reference, result);
+      } else if (i % 4) {
+        ik.solve(state, q, reference, axis, result);
       } else {
         ik.solve(state, q, reference, posture, result);
       }

@@ -199,6 +199,51 @@ TEST(TwoTaskIk, APostureIsASecondTaskToo) {
   EXPECT_LT(result.velocity.norm(), 1e-3);  // as near as the hand's place allows
 }
 
+TEST(TwoTaskIk, OneAxisOfTheHandIsASecondTaskToo) {
+  Random random(12);
+  const TwoTaskIk ik(unlimited());
+  const Vector3 axis = Vector3(1.0, 0.3, 0.0);
+  const AxisTask task(axis, 20.0);
+  int judged = 0, turned_about_it = 0;
+  for (int k = 0; k < 200; ++k) {
+    JointVector q = random.posture(0.3);
+    const ChainState begin = robot().evaluate(q);
+    CartesianReference reference;
+    reference.pose = begin.tool;
+    reference.orientation_control = true;
+    reference.pose.orientation =
+        (expRotation(random.point(0.3)) * begin.tool.orientation).normalized();
+    IkResult result;
+    bool rejected = false;
+    for (int i = 0; i < 400; ++i) {
+      ik.solve(robot().evaluate(q), q, reference, task, result);
+      rejected = rejected || result.rotation_rejected;
+      q += 0.002 * result.velocity;
+    }
+    if (rejected) continue;
+    ++judged;
+    const Pose hand = robot().evaluate(q).tool;
+    EXPECT_LT((hand.position - begin.tool.position).norm(), 1e-3);
+    const Vector3 now = hand.orientation * axis, wanted = reference.pose.orientation * axis;
+    EXPECT_LT(now.cross(wanted).norm(), 1e-3) << k;
+    turned_about_it += hand.orientation.angularDistance(reference.pose.orientation) > 0.02 ? 1 : 0;
+  }
+  EXPECT_GT(judged, 100);
+  EXPECT_GT(turned_about_it, judged / 2) << "the rotation about the axis has to stay free";
+}
+
+TEST(TwoTaskIk, WithoutASecondTaskTheHandGoesStraightAndTurnsAsItLikes) {
+  const TwoTaskIk ik(unlimited());
+  Random random(13);
+  const ChainState state = robot().evaluate(random.posture(0.5));
+  CartesianReference reference = randomReference(random, state, 0.05);
+  reference.orientation_control = true;
+  IkResult result;
+  ik.solve(state, JointVector::Zero(), reference, NoTask(), result);
+  EXPECT_TRUE(result.rotation_velocity.isZero(0.0));
+  EXPECT_EQ(result.velocity, result.position_velocity);
+}
+
 TEST(TwoTaskIk, AnArmOfSixJointsKeepsTheSeventhStill) {
   // The robot without its third axis.
   std::string urdf = robotUrdf();
@@ -302,4 +347,6 @@ TEST(TwoTaskIk, RefusesBadParameters) {
   parameters.correction_speed = 0.0;
   EXPECT_THROW(TwoTaskIk{parameters}, std::invalid_argument);
   EXPECT_THROW(OrientationTask(-1.0), std::invalid_argument);
+  EXPECT_THROW(AxisTask(Vector3::Zero(), 1.0), std::invalid_argument);
+  EXPECT_THROW(AxisTask(Vector3::UnitX(), std::nan("")), std::invalid_argument);
 }

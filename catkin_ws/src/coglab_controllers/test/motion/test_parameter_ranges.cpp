@@ -100,6 +100,25 @@ TEST(ParameterRanges, OfDmp) {
   EXPECT_EQ(loading("dmp", "{dmp: {dmp_file: " PACKAGE_DIR "/config/primitives.xml}}"), "");
 }
 
+TEST(ParameterRanges, OfTheSecondTask) {
+  for (const std::string fine :
+       {"orientation", "axis", "none", "axis, axis: [0, 0, 1]",
+        "posture, posture: [0, 0.5, 0.8, -1.2, 0, 0.8, 0.5], posture_gain: 2.0"}) {
+    EXPECT_EQ(loading("dmp", "{dmp: {second_task: " + fine + "}}"), "") << fine;
+  }
+  for (const auto& [bad, words] :
+       {std::pair<std::string, std::string>{
+            "elbow", "dmp/second_task: expected orientation or axis or posture or none, got elbow"},
+        {"axis, axis: [0, 0, 0]", "dmp/axis: expected three numbers that are not all zero"},
+        {"axis, axis: [1, 0]", "dmp/axis: expected 3 finite numbers"},
+        {"posture", "dmp/posture: expected seven joint positions (rad)"},
+        {"posture, posture: [0, 0]", "dmp/posture: expected 7 finite numbers"},
+        {"posture, posture: [0, 0, 0, 0, 0, 0, 0], posture_gain: 101", "dmp/posture_gain: "}}) {
+    const std::string said = loading("dmp", "{dmp: {second_task: " + bad + "}}");
+    EXPECT_NE(said.find(words), std::string::npos) << bad << ": " << said;
+  }
+}
+
 TEST(ParameterRanges, OfPointToPoint) {
   for (const Range& range :
        {Range{"Kp", 0.0, 100.0}, Range{"default_speed", 0.01, 1.0},

@@ -9,7 +9,7 @@ namespace coglab_controllers {
 /// A linear constraint on the joint velocities: jacobian * qd = velocity + gain * error, with
 /// `rows` rows of 7 in use.
 struct TaskConstraint {
-  int rows = 0;  ///< 0: no constraint in this cycle; else 3 or 7
+  int rows = 0;  ///< 0: no constraint in this cycle; else 2, 3 or 7
   Eigen::Matrix<double, kMaxJoints, kMaxJoints> jacobian =
       Eigen::Matrix<double, kMaxJoints, kMaxJoints>::Zero();
   JointVector velocity = JointVector::Zero();
@@ -41,6 +41,28 @@ class OrientationTask : public SecondTask {
 
  private:
   double gain_;
+};
+
+/// The direction of one axis of the hand; the hand may turn about it. Leaves one more degree of
+/// freedom than OrientationTask, for tools and objects that are round.
+class AxisTask : public SecondTask {
+ public:
+  /// @param axis in the frame of the hand, of any length.  @param gain 1/s.
+  /// @throws std::invalid_argument unless the axis has a direction, and gain is finite and >= 0.
+  AxisTask(const Vector3& axis, double gain);
+  void evaluate(const ChainState& state, const JointVector& q, const CartesianReference& reference,
+                TaskConstraint& constraint) const noexcept override;
+
+ private:
+  Vector3 axis_;
+  double gain_;
+};
+
+/// No second task: the null space of the translation stays still.
+class NoTask : public SecondTask {
+ public:
+  void evaluate(const ChainState&, const JointVector&, const CartesianReference&,
+                TaskConstraint&) const noexcept override {}
 };
 
 /// Second task that moves the joints towards a posture, instead of the orientation task.

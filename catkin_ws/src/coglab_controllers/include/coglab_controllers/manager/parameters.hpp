@@ -34,10 +34,10 @@ class Parameters {
   /// Returns a block inside this one; empty if there is none.
   Parameters block(const std::string& name) const;
   const YAML::Node& node() const { return node_; }
-
- private:
+  /// Throws std::runtime_error: expected this, got the parameter's value.
   [[noreturn]] void refuse(const std::string& name, const std::string& expected) const;
 
+ private:
   YAML::Node node_;
   std::string block_;
 };

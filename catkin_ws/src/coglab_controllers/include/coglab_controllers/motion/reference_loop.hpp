@@ -45,7 +45,9 @@ class Arrival {
 /// in. Only configure() allocates or throws.
 ///
 /// Parameters: `Kp` (1/s, joints), `pos_clik_gain`, `rot_clik_gain` (1/s),
-/// `correction_speed` (m/s), `singularity_threshold`, `rotation_first_scaling` (poses, eq. 6-12),
+/// `correction_speed` (m/s), `singularity_threshold`, `rotation_first_scaling`,
+/// `second_task` (orientation, axis, posture or none), `axis` (3, frame of the hand), `posture` (7,
+/// rad), `posture_gain` (1/s) (poses, eq. 6-12),
 /// `hold_blend` (s), `tolerance` (rad), `arrive_distance` (m).
 class ReferenceLoop {
  public:
@@ -82,6 +84,7 @@ class ReferenceLoop {
 
   std::shared_ptr<const RobotSetup> robot_;
   std::unique_ptr<TwoTaskIk> ik_;
+  std::unique_ptr<SecondTask> second_task_;  // none: the orientation
   double gain_ = 5.0, tolerance_ = 0.002, arrive_distance_ = 0.01;
   MotionReference reference_;  // the last one written
   StartBlend blend_;
