@@ -125,7 +125,7 @@ class ContactDetectorNode:
         """Use these settings (coglab_contact.detector.TUNABLE) from now on."""
         with self.lock:
             watches = self.detector.still
-            watches.tune(dataclasses.replace(watches.settings, **gains))
+            watches.use(dataclasses.replace(watches.settings, **gains))
 
     def thresholds(self) -> Thresholds:
         """Returns the thresholds that this robot has learnt, else those of the package."""

@@ -99,9 +99,9 @@ class ContactDetector(_core.ContactDetector):
         super().__init__(settings, jacobian)
         self.settings = settings
 
-    def tune(self, settings: DetectorSettings) -> None:
+    def use(self, settings: DetectorSettings) -> None:
         """Use these settings from the next sample on. `cutoff`, `window` and `learn_samples` stay as they were."""
-        super().tune(settings)
+        self.tune(settings)
         self.settings = settings
 
     def look(self) -> Signal:

@@ -126,12 +126,18 @@ def write_report(trial: Measured, file: Path) -> Path:
 
 def write_pdf(page: Path, file: Path) -> Path:
     """Print a page into a PDF with chromium. NotThere: chromium is not installed. CheckFailed: it failed, and how."""
-    browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    browser: str | None = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     if browser is None:
         raise NotThere(f"--pdf needs chromium: sudo apt install chromium; or print {page} from any browser")
 
     def write(part: Path) -> None:
-        command = [browser, "--headless", "--disable-gpu", "--no-pdf-header-footer", f"--print-to-pdf={part}"]
+        command: list[str] = [
+            str(browser),
+            "--headless",
+            "--disable-gpu",
+            "--no-pdf-header-footer",
+            f"--print-to-pdf={part}",
+        ]
         if os.geteuid() == 0:
             command.append("--no-sandbox")  # chromium refuses to run as root with it
         with tempfile.TemporaryDirectory(prefix="coglab-pdf-") as profile:

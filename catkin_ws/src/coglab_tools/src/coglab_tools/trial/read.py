@@ -119,7 +119,7 @@ def _from_arrays(place: Path, record: TrialRecord) -> Measured:
     return Measured(
         record, start, end, series, trial.results, list(trial.said),
         [(float(t), float(f)) for t, f in zip(trial.time, forces, strict=True)],
-        orientations,
+        orientations, True,
         {"hands": "truth of the simulation", "force": "truth of the simulation"},
     )  # fmt: skip
 

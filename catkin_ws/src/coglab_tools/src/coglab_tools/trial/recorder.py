@@ -15,7 +15,7 @@ import shutil
 import threading
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -222,7 +222,7 @@ class Recorder:
             if not (self.folder / name).exists():
                 break
             name = f"{record.id}_{number}"
-        record = TrialRecord(**{**vars(record), "id": name})
+        record = replace(record, id=name)
         record.save(trial.part)
         trial.part.rename(self.folder / name)
         self._trial = None
@@ -280,7 +280,10 @@ def _record_of(trial: _Trial) -> TrialRecord:
         action=trial.action,
         object=thing,
         outcome=outcome,
-        **{name: str(told.get(name, "")) for name in ("condition", "participant", "session", "study")},
+        condition=str(told.get("condition", "")),
+        participant=str(told.get("participant", "")),
+        session=str(told.get("session", "")),
+        study=str(told.get("study", "")),
         seed=seeds[0] if seeds else None,
         simulated="coglab_sim" in parameters,
         configuration={"hash": configuration_hash(flat), **_short(flat), "files": _files(flat)},
