@@ -14,6 +14,8 @@ namespace {
 
 constexpr double kFirstMessage = 5.0;  // s after the start without a message until it is logged
 constexpr double kOtherWriter = 1.0;   // s of silence after which another node may write a topic
+constexpr double kStopped = 0.5;       // s of silence after which a topic has stopped, for the log
+constexpr double kForgotten = 10.0;    // s after which the same refusal is logged again
 
 double seconds(std::int64_t nanoseconds) { return 1e-9 * static_cast<double>(nanoseconds); }
 
@@ -147,14 +149,13 @@ void SignalTopics::take(Topic& topic, const SignalReading& reading) {
   const std::int64_t now = steadyNow();
   for (Row& row : topic.rows) {
     const SignalPost post = inputs_.post(row.index, reading.message(), now);
-    if (post.refusal == row.refused) continue;
-    if (post.refusal == SignalRefusal::None) {
-      ROS_INFO("signal %s: its messages are right again", nameOf(row).c_str());
-    } else {
+    if (post.refusal == SignalRefusal::None) continue;
+    if (post.refusal != row.refused || seconds(now - row.refused_ns) > kForgotten) {
       ROS_WARN("signal %s: a message on %s is ignored: %s", nameOf(row).c_str(),
                topic.subscriber.getTopic().c_str(), post.text.c_str());
     }
     row.refused = post.refusal;
+    row.refused_ns = now;
   }
 }
 
@@ -182,7 +183,8 @@ void SignalTopics::watch() {
     for (Row& row : topic.rows) {
       const std::int64_t newest = inputs_.newestStamp(row.index);
       const bool never = newest == ctrl_more::kNeverWritten;
-      const double limit = never ? kFirstMessage : inputs_.rows()[row.index].max_age;
+      const double limit =
+          never ? kFirstMessage : std::max(kStopped, inputs_.rows()[row.index].max_age);
       const bool absent = seconds(now - (never ? started_ns_ : newest)) > limit;
       if (absent && !row.absent) {
         ROS_WARN("signal %s is absent: %s on %s for %.3g s; controllers that need it wait",

@@ -18,8 +18,9 @@ class SignalReading;
 /// Subscribes to the topics of the manager's robot signals and publishes its outputs. Relative
 /// names begin in the namespace above the manager's.
 ///
-/// A message that cannot be used is logged once, until a good one comes. A topic that stops is
-/// logged once, too; its signals are then absent, and controllers that need them wait.
+/// Messages that cannot be used are logged once, and again if the same reason comes back after 10
+/// s. A topic that stops for 0.5 s is logged once, too. Its signals are absent from their largest
+/// age on, and controllers that need them wait.
 class SignalTopics {
  public:
   /// @param node namespace of the manager; its callback queue is used
@@ -33,8 +34,9 @@ class SignalTopics {
  private:
   struct Row {
     std::size_t index;                            ///< in SignalInputs
-    SignalRefusal refused = SignalRefusal::None;  ///< callback's thread
-    bool absent = false;                          ///< publisher thread
+    SignalRefusal refused = SignalRefusal::None;  ///< logged last; callback's thread
+    std::int64_t refused_ns = 0;                  ///< last time of this refusal
+    bool absent = false;                          ///< logged; publisher thread
   };
   /// A topic with all its rows. Its callbacks come one after another.
   struct Topic {
