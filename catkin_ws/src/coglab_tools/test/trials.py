@@ -46,7 +46,7 @@ def measured(rate=200.0):
     marks = {"offered": 2.5, "motion_started": 3.0, "contact": 5.0, "released": 7.0}
     result = Exchange("receive", True, 0, "", (), 0.0, 10.0, "mug", "succeeded", marks)
     shared = [(float(t), float(f)) for t, f in zip(times, force, strict=True)]
-    return Measured(record(), 0.0, 10.0, series, (result,), [], shared, True)
+    return Measured(record(), 0.0, 10.0, series, (result,), [], shared, true_hands=True)
 
 
 def write(folder: Path, trial: TrialRecord) -> Path:

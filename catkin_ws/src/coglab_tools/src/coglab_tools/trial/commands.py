@@ -1,4 +1,4 @@
-"""`./coglab trial VERB`: recorded handovers: list, show, plot, explain, report, replay, video"""
+"""`./coglab trial VERB`: recorded handovers: list, show, plot, explain, report, replay"""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 from coglab_tools.command import OK, Answer, CheckFailed, CommandError, UsageError
 from coglab_tools.trial.record import BAG, TrialRecord, find_trials, trials_folder
 
-HELP = "recorded handovers: list, show, plot, explain, report, replay, video"
+HELP = "recorded handovers: list, show, plot, explain, report, replay"
 HIDDEN = ".part-"
 
 
@@ -25,13 +25,12 @@ def add(verbs: argparse._SubParsersAction[Any]) -> None:
         ("plot", plot, "phases, paths, torques, fingers and forces as a picture"),
         ("report", report, "one HTML page with outcome, plots and figures"),
         ("replay", replay, "publishes the bag again, on a ROS master of its own"),
-        ("video", video, "a moving picture of the trial, drawn without a screen"),
     ):
         parser = verbs.add_parser(name, help=words)
         parser.add_argument(
             "trial", type=str, nargs="?", default="", help='folder of a trial; "" or "last": the newest'
         )
-        if name in ("plot", "report", "video"):
+        if name in ("plot", "report"):
             parser.add_argument("--out", type=Path, help="file to write; default: in the folder of the trial")
         if name == "report":
             parser.add_argument("--pdf", action="store_true", help="also as PDF, beside the page")
@@ -161,18 +160,3 @@ def replay(options: argparse.Namespace) -> Answer:
     return Answer(
         f"{place / BAG}: replayed in {seconds:.0f} s", {"seconds": seconds}, f"./coglab trial explain {place}"
     )
-
-
-def video(options: argparse.Namespace) -> Answer:
-    """A moving picture of a trial."""
-    from coglab_tools.report.page import write_whole
-    from coglab_tools.trial.video import KINDS, write_video
-
-    place, trial = _measured(options)
-    file = options.out or place / "trial.gif"
-    if file.suffix.lower() not in KINDS:
-        raise UsageError(f"{file} ends with {file.suffix or 'nothing'}: {' or '.join(KINDS)} is expected")
-    found: dict[str, Any] = {}
-    write_whole(file, lambda part: found.update(write_video(trial, part)))
-    text = f"{file}: {found['frames']} frames, {found['seconds']:.1f} s"
-    return Answer(text, {"file": str(file), **found}, f"./coglab trial report {place}")

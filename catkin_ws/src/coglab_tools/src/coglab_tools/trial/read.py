@@ -39,6 +39,8 @@ class Measured:
     """what the robot said to the person"""
     person_force: list[tuple[float, float]] = field(default_factory=list)
     """N on the person's hand; empty without the simulation's truth"""
+    orientations: list[tuple[float, tuple[float, ...], tuple[float, ...]]] = field(default_factory=list)
+    """(t, person's hand, object): true quaternions x y z w in the world; empty without the truth"""
     true_hands: bool = False
     """False: paths of the hands and the object are those that perception and joints gave"""
     sources: dict[str, str] = field(default_factory=dict)
@@ -109,13 +111,15 @@ def _from_arrays(place: Path, record: TrialRecord) -> Measured:
     except (ValueError, FileNotFoundError) as error:
         raise CheckFailed(str(error)) from None
     series = trial.series()
-    series.poses = []
     start = trial.results[0].started if trial.results else trial.start
     end = trial.results[-1].ended if trial.results else trial.end
     forces = np.linalg.norm(trial.person_force, axis=1)
+    turns = trial.person_orientation.tolist(), trial.object_orientation.tolist()
+    orientations = [(t, tuple(a), tuple(b)) for t, a, b in zip(trial.time.tolist(), *turns, strict=True)]
     return Measured(
         record, start, end, series, trial.results, list(trial.said),
-        [(float(t), float(f)) for t, f in zip(trial.time, forces, strict=True)], True,
+        [(float(t), float(f)) for t, f in zip(trial.time, forces, strict=True)],
+        orientations,
         {"hands": "truth of the simulation", "force": "truth of the simulation"},
     )  # fmt: skip
 
@@ -129,7 +133,7 @@ class _Reader:
         self.results: list[dict[str, Any]] = []
         self.person_force: list[tuple[float, float]] = []
         self.force: list[tuple[float, float]] = []
-        self.stamps: list[float] = []
+        self.orientations: list[tuple[float, tuple[float, ...], tuple[float, ...]]] = []
         self._buffer: Any = None
         self.person_stamps: list[float] = []
         self.objects: dict[str, list[float]] = {}
@@ -160,6 +164,8 @@ class _Reader:
         points = (m.robot_hand.position, m.human_hand.position, m.object.position, m.touch_force)
         robot, human, thing, force = ([p.x, p.y, p.z] for p in points)
         self.series.truth.append((t, robot, human, thing, float(np.linalg.norm(force))))
+        h, o = m.human_hand.orientation, m.object.orientation
+        self.orientations.append((t, (h.x, h.y, h.z, h.w), (o.x, o.y, o.z, o.w)))
         f = m.human_force
         self.person_force.append((t, float(np.linalg.norm([f.x, f.y, f.z]))))
 
@@ -276,7 +282,18 @@ def _from_bag(file: Path, record: TrialRecord) -> Measured:
             "hands": "tf: the palm by the measured joints, the person's hand as the tracker saw it",
             "force": "contact detector, from joint torques",
         }
-    return Measured(record, start, end, series, tuple(wanted), reader.said, reader.person_force, true_hands, sources)
+    return Measured(
+        record,
+        start,
+        end,
+        series,
+        tuple(wanted),
+        reader.said,
+        reader.person_force,
+        reader.orientations,
+        true_hands,
+        sources,
+    )
 
 
 def _span(series: Series, record: TrialRecord) -> tuple[float, float]:

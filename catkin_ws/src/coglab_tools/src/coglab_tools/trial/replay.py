@@ -7,6 +7,7 @@ import os
 import signal
 import socket
 import subprocess
+import tempfile
 import time
 from pathlib import Path
 
@@ -32,7 +33,15 @@ def replay(bag: Path, rate: float, rviz: bool) -> float:
     print(f"in another terminal: export ROS_MASTER_URI=http://127.0.0.1:{port}; rostopic list", flush=True)
     begun = time.monotonic()
     try:
-        process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, start_new_session=True)
+        words = tempfile.TemporaryFile()  # roslaunch calls the end of the bag a death
+        process = subprocess.Popen(
+            command,
+            env=environment,
+            stdout=subprocess.DEVNULL,
+            stderr=words,
+            stdin=subprocess.DEVNULL,
+            start_new_session=True,
+        )
     except FileNotFoundError:
         raise NotThere(
             "roslaunch is not there: . catkin_ws/devel/setup.bash, or sudo apt install python3-roslaunch"
@@ -51,5 +60,7 @@ def replay(bag: Path, rate: float, rviz: bool) -> float:
                 process.kill()
                 process.wait()
     if status:
-        raise CheckFailed(f"roslaunch ended with status {status} while it played {bag}; its words are above")
+        words.seek(0)
+        last = (words.read().decode(errors="replace").strip().splitlines() or ["it said nothing"])[-1]
+        raise CheckFailed(f"roslaunch ended with status {status} while it played {bag}: {last}")
     return time.monotonic() - begun

@@ -1,0 +1,92 @@
+"""`./coglab trial` on whole, damaged and foreign trials, without ROS."""
+
+import json
+
+import numpy as np
+import pytest
+import rosbag
+from coglab_tools.__main__ import run
+from coglab_tools.report.page import page_of
+from coglab_tools.trial.explain import explain
+from coglab_tools.trial.record import Outcome
+from rospy import Time
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from trials import ACTION, MASTER, measured, record, write
+
+
+def bag_of(place, *messages):
+    with rosbag.Bag(str(place / "trial.bag"), "w") as bag:
+        for topic, message, stamp in messages:
+            bag.write(topic, message, Time.from_sec(stamp))
+
+
+def answer(capsys, *words):
+    """Exit code, answer as JSON, and the error."""
+    status = run(["trial", *map(str, words), "--json"])
+    out, error = capsys.readouterr()
+    return status, json.loads(out), error
+
+
+def test_the_list_names_whole_unreadable_and_unfinished_trials(tmp_path, capsys):
+    write(tmp_path, record())
+    write(tmp_path, record(id="failed", outcome=Outcome(False, 41, "NOT_RELEASED", "nobody let go")))
+    (tmp_path / "bad").mkdir()
+    (tmp_path / "bad" / "trial.yaml").write_text("version: 1\nid: [", encoding="utf-8")
+    (tmp_path / ".part-1-2.0").mkdir()
+    status, data, _ = answer(capsys, "list", tmp_path)
+    assert status == 0 and [row["outcome"] for row in data["trials"]] == ["succeeded", "NOT_RELEASED"]
+    assert "bad/trial.yaml is no YAML" in data["unreadable"][0] and len(data["unfinished"]) == 1
+
+
+@pytest.mark.parametrize("kind", ["missing", "empty", "cut", "no bag", "foreign", "wrong type"])
+def test_a_bag_that_cannot_be_used_is_named_and_nothing_is_written(tmp_path, capsys, kind):
+    place = write(tmp_path, record())
+    bag = place / "trial.bag"
+    if kind == "empty":
+        bag.touch()
+    elif kind == "no bag":
+        bag.write_bytes(b"RIFF" + bytes(5000))
+    elif kind == "foreign":
+        bag_of(place, ("/camera", String("x"), 1.0))
+    elif kind == "wrong type":
+        bag_of(place, ("/coglab/transitions", String("x"), 1.0))
+    elif kind == "cut":
+        bag_of(place, *[("/lwr/joint_states", JointState(position=[0.0] * 7), k / 100) for k in range(5000)])
+        bag.write_bytes(bag.read_bytes()[:100000])
+    status, _, error = answer(capsys, "report", place)
+    assert status == 1 and str(place.name) in error
+    assert {each.name for each in place.iterdir()} <= {"trial.yaml", "trial.bag"}
+
+
+def test_a_bag_of_joints_alone_with_nan_gets_a_page(tmp_path, capsys):
+    place = write(tmp_path, record(marks=(), duration_s=2.0))
+    bag_of(place, *[
+        ("/lwr/joint_states", JointState(position=[np.nan] * 7, velocity=[0.0] * 7), 10.0 + k / 100) for k in range(200)
+    ])  # fmt: skip
+    status, data, _ = answer(capsys, "report", place)
+    assert status == 0 and "</html>" in (place / "report.html").read_text(encoding="utf-8")
+    assert answer(capsys, "show", place)[1]["metrics"]["peak_force_n"] is None and data["file"].endswith("report.html")
+
+
+def test_a_failure_is_explained_in_ten_lines_with_what_went_wrong_first():
+    trial = measured()
+    trial.record = record(
+        outcome=Outcome(False, 41, "NOT_RELEASED", "the person did not let go"),
+        marks=tuple({"name": f"mark_{k}", "time_s": float(k) / 3} for k in range(30)),
+        notes="P03 laughed",
+    )
+    trial.series.transitions.insert(1, (4.0, f"{MASTER}/{ACTION}", "reach", "aborted", "failed", "goal lost", 41))
+    lines = explain(trial)
+    assert len(lines) <= 10 and "the person did not let go" in lines[0]
+    assert lines[1].strip().startswith("+4.00 s  first went wrong: reach in exchange human to robot aborted")
+    assert lines[-1] == "notes: P03 laughed"
+
+
+def test_the_page_holds_everything_and_escapes_what_people_typed():
+    trial = measured()
+    trial.record = record(notes="<script>alert(1)</script>")
+    text = page_of(trial)
+    assert "<script" not in text and "&lt;script&gt;" in text
+    assert "http://" not in text and "https://" not in text and text.count("data:image/png;base64,") == 2
+    assert "0.12 s" in text  # detection delay
