@@ -83,6 +83,7 @@ class RobotDouble:
         self.stops: list[str] = []
         self.calls: list[tuple[str, dict]] = []
         self.told: list[tuple[str, str]] = []
+        self.marks: list[dict[str, str]] = []
         self.stop_times: list[float] = []
 
     def standing(self) -> Standing:
@@ -94,6 +95,9 @@ class RobotDouble:
 
     def tell(self, name: str, text: str) -> None:
         self.told.append((name, text))
+
+    def mark(self, names: dict[str, str]) -> None:
+        self.marks.append(names)
 
     async def call(self, name: str, arguments: dict) -> Answer:
         self.calls.append((name, arguments))

@@ -211,3 +211,12 @@ def test_only_what_has_succeeded_is_done(desk):
     assert ask(desk, "a", "trial_end", outcome="done")["success"]  # a trial that names no action
     session = read_session(newest(desk.experiment._folder))
     assert [attempt.outcome for attempt in session.attempts] == ["failed", "done", "done"] and session.passed() == 3
+
+
+def test_recorders_get_the_names_of_the_trial_under_way(desk):
+    opened(desk, "calm")
+    assert ask(desk, "a", "trial_begin")["success"]
+    assert ask(desk, "a", "trial_end", outcome="failed")["success"]
+    during, after = desk.backend.marks
+    assert (during["participant"], during["condition"]) == ("P1", "calm") and during["session"].startswith("P1_")
+    assert set(after.values()) == {""}

@@ -47,6 +47,9 @@ class Backend(Protocol):
     def tell(self, name: str, text: str) -> None:
         """Publishes a note, or the object of the next action, on ROS. Returns at once."""
 
+    def mark(self, names: dict[str, str]) -> None:
+        """Names the trial under way for recorders: study, participant, condition, session. Returns at once."""
+
     def call(self, name: str, arguments: dict) -> Awaitable[Answer]:
         """Runs a command that needs the robot. It ends within its time limit."""
 
@@ -360,8 +363,11 @@ class Desk:
             return Answer(True, session.end())
         if name == "trial_begin":
             told = session.trial_begin()
+            self.backend.mark(session.names())
             self._follow_trial(self.backend.standing())
             return Answer(True, f"{told}; the next object is {self.object_id or 'the default'}")
         if name == "trial_end":
-            return Answer(True, session.trial_end(given["outcome"]))
+            told = session.trial_end(given["outcome"])
+            self.backend.mark(session.names())
+            return Answer(True, told)
         return None

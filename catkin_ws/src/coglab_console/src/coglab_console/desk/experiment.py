@@ -254,6 +254,11 @@ class Experiment:
         phase = self.phase()
         self._write(kind, **fields, **({"phase": phase} if phase else {}))
 
+    def names(self) -> dict[str, str]:
+        """Names for the recordings of the current trial; empty texts if no trial is under way."""
+        trial = (self.participant, self.condition(), self._path.stem) if self.running and self._path else ("", "", "")
+        return {"study": "", **dict(zip(("participant", "condition", "session"), trial, strict=True))}
+
     def view(self) -> dict:
         """The session as the page shows it."""
         return {

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import json
+import queue
 import threading
 import time
 from collections.abc import Callable
@@ -54,6 +55,8 @@ class RosBackend:
         self._view, self._stop = view, stop
         self._calibration = rospy.Publisher("ih2_hand/hand_calibration", String, queue_size=2)
         self._waiting = threading.Semaphore(MAX_WAITING)
+        self._marks: queue.SimpleQueue[dict[str, str]] = queue.SimpleQueue()
+        threading.Thread(target=self._write_marks, name="trial_names", daemon=True).start()
         self._tellers = {
             "note": rospy.Publisher(NOTES, String, queue_size=20),
             "select_object": rospy.Publisher(NEXT_OBJECT, String, queue_size=5, latch=True),
@@ -73,6 +76,19 @@ class RosBackend:
     def tell(self, name: str, text: str) -> None:
         """See Backend."""
         self._tellers[name].publish(String(text))
+
+    def mark(self, names: dict[str, str]) -> None:
+        """See Backend."""
+        self._marks.put(names)
+
+    def _write_marks(self) -> None:
+        """The master may take its time, and the desk does not wait for it."""
+        while not rospy.is_shutdown():
+            names = self._marks.get()
+            try:
+                rospy.set_param("coglab/trial", names)
+            except Exception as error:  # of the master
+                rospy.logwarn("recordings will not have the names of this trial: %s", error)
 
     def standing(self) -> Standing:
         """See Backend."""
