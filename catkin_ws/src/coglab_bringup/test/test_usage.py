@@ -35,7 +35,7 @@ REFUSED = {
     "launch arm:=ideal split:=true": "the ideal arm and its controllers are one process",
     "launch log_file:=/no/such/x": "expected a file in a folder that exists",
     "launch -p high": "expected a port number, such as 11411, got 'high'",
-    "install vizz": "no group named vizz; there are: run, build, test, browser, viz",
+    "install vizz": "no group named vizz; there are: run, build, test, tools, browser, viz",
     "build nosuch": "build takes --upstream-smach, tests, not nosuch",
     "docs foo": "docs takes no arguments, got 'foo'",
     "shell nosuchcmd": "no command named 'nosuchcmd'",
@@ -108,7 +108,7 @@ def test_an_unknown_group_is_refused_where_python_is_missing_too(tmp_path):
         [tmp_path / "coglab", "install", "run", "vizz"], capture_output=True, text=True, timeout=120, check=False
     )
     assert ended.returncode == 2 and "installed" not in ended.stderr
-    assert "no group named 'vizz'; there are: browser build docs film run test viz" in ended.stderr
+    assert "no group named 'vizz'; there are: browser build docs film run test tools viz" in ended.stderr
 
 
 @pytest.mark.parametrize("words, part", [("demo --help", "--seed SEED"), ("launch --help", "fri_period:=0.005")])
