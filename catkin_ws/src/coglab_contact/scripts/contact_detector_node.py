@@ -41,7 +41,7 @@ from coglab_py.pace import Pace
 from coglab_py.packages import package_path
 from coglab_py.pose import Pose
 from coglab_py.publish import can_be_sent, publish
-from coglab_py.reconfigure import Field, serve
+from coglab_py.reconfigure import Field, ReconfigureServer
 from coglab_py.yaml_file import YamlError
 from geometry_msgs.msg import Vector3, Vector3Stamped
 from sensor_msgs.msg import JointState
@@ -119,7 +119,7 @@ class ContactDetectorNode:
         rospy.Service("~learn_motion", LearnMotion, self.on_learn_motion)
         steady.SteadyTimer(0.05, self.on_timer, "signal")
         gains = [Field(name, text, getattr(settings, name), low, high) for name, (low, high, text) in TUNABLE.items()]
-        self.reconfigure = serve(gains, self.tune)
+        self.reconfigure = ReconfigureServer(gains, self.tune)
 
     def tune(self, gains: dict[str, float]) -> None:
         """Use these settings (coglab_contact.detector.TUNABLE) from now on."""

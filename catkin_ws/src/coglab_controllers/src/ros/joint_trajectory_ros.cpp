@@ -2,13 +2,13 @@
 #include <map>
 #include <mutex>
 
-#include <actionlib/server/action_server.h>
 #include <control_msgs/FollowJointTrajectoryAction.h>
 #include <control_msgs/JointTrajectoryControllerState.h>
 #include <ros/ros.h>
 
 #include "coglab_controllers/manager/plugin_registry.hpp"
 #include "coglab_controllers/plugins/joint_trajectory.hpp"
+#include "coglab_controllers/ros/action_server.hpp"
 #include "coglab_controllers/ros/motion_controller_ros.hpp"
 
 namespace coglab_controllers {
@@ -16,7 +16,7 @@ namespace coglab_controllers {
 namespace {
 
 using Action = control_msgs::FollowJointTrajectoryAction;
-using Server = actionlib::ActionServer<Action>;
+using Server = ActionServer<Action>;
 using Result = control_msgs::FollowJointTrajectoryResult;
 
 constexpr bool same(TrajectoryError ours, int theirs) { return static_cast<int>(ours) == theirs; }
@@ -79,7 +79,7 @@ class JointTrajectoryRos : public MotionControllerRos {
     state_ = node_.advertise<control_msgs::JointTrajectoryControllerState>("state", 10);
     server_ = std::make_unique<Server>(
         node_, "follow_joint_trajectory", [this](Server::GoalHandle goal) { onGoal(goal); },
-        [this](Server::GoalHandle goal) { onCancel(goal); }, false);
+        [this](Server::GoalHandle goal) { onCancel(goal); });
     server_->start();
   }
 

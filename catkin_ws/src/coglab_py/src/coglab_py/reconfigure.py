@@ -1,13 +1,18 @@
-"""Numbers of a node that rqt_reconfigure and other clients of dynamic_reconfigure can show and change."""
+"""Numbers of a node that rqt_reconfigure and other clients of dynamic_reconfigure can show and change.
+
+The numbers come from the program at run time, so no .cfg file describes them. The library's own server is not used: it
+cuts values off at their range without a word, and takes no value that is no number for an answer.
+"""
 
 from __future__ import annotations
 
-import math
+import threading
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import rospy
-from dynamic_reconfigure.server import Server
+from dynamic_reconfigure.msg import Config, ConfigDescription, DoubleParameter, Group, GroupState, ParamDescription
+from dynamic_reconfigure.srv import Reconfigure, ReconfigureResponse
 
 
 class Field(NamedTuple):
@@ -21,55 +26,51 @@ class Field(NamedTuple):
     most: float
 
 
-def serve(fields: Sequence[Field], use: Callable[[dict[str, float]], None]) -> Server:
-    """Serve these numbers below the node's name, and call ``use`` with all of them after each change.
+class ReconfigureServer:
+    """Serves numbers below the node's name: service ``~set_parameters``, latched topics ``~parameter_descriptions`` and
+    ``~parameter_updates``. An unknown name, or a value that is no number within its range, is refused with a sentence,
+    and nothing changes."""
 
-    The first values come from the parameters of the node if they are set. A number out of its range becomes the nearest
-    one in it, as with every server of dynamic_reconfigure; one that is no number changes nothing.
-    """
-    first = {each.name: float(each.value) for each in fields}
+    def __init__(self, fields: Sequence[Field], use: Callable[[dict[str, float]], None]) -> None:
+        """``use`` is called with all numbers after each change, from the thread of the service."""
+        self._fields = {each.name: each for each in fields}
+        self._values = {each.name: float(each.value) for each in fields}
+        self._use, self._lock = use, threading.Lock()
+        described = [ParamDescription(each.name, "double", 0, each.text, "") for each in fields]
+        self._descriptions = rospy.Publisher("~parameter_descriptions", ConfigDescription, latch=True, queue_size=1)
+        self._updates = rospy.Publisher("~parameter_updates", Config, latch=True, queue_size=1)
+        self._descriptions.publish(
+            ConfigDescription(
+                [Group("Default", "", described, 0, 0)],
+                self._config({each.name: each.most for each in fields}),
+                self._config({each.name: each.least for each in fields}),
+                self._config(self._values),
+            )
+        )
+        self._updates.publish(self._config(self._values))
+        self._service = rospy.Service("~set_parameters", Reconfigure, self._set)
 
-    class Description:
-        """What a file made from a .cfg has; the protocol's library reads these names."""
+    @staticmethod
+    def _config(values: dict[str, float]) -> Config:
+        doubles = [DoubleParameter(name, float(value)) for name, value in values.items()]
+        return Config(doubles=doubles, groups=[GroupState("Default", True, 0, 0)])
 
-        min = {each.name: float(each.least) for each in fields}
-        max = {each.name: float(each.most) for each in fields}
-        defaults = first
-        level = dict.fromkeys(first, 0)
-        type = dict.fromkeys(first, "double")
-        all_level = 1
-        config_description = {
-            "name": "Default",
-            "type": "",
-            "state": True,
-            "id": 0,
-            "parent": 0,
-            "groups": [],
-            "parameters": [
-                {
-                    "name": each.name,
-                    "type": "double",
-                    "default": float(each.value),
-                    "level": 0,
-                    "description": each.text,
-                    "min": float(each.least),
-                    "max": float(each.most),
-                    "edit_method": "",
-                }
-                for each in fields
-            ],
-        }
-
-    known = dict(first)
-
-    def changed(config: dict[str, float], _level: int) -> dict[str, float]:
-        numbers = {name: config[name] for name in first}
-        if not all(map(math.isfinite, numbers.values())):
-            rospy.logwarn("set_parameters: expected finite numbers, got %s; nothing was changed", numbers)
-            config.update(known)
-            return config
-        use(numbers)
-        known.update(numbers)
-        return config
-
-    return Server(Description, changed)
+    def _set(self, request: Any) -> ReconfigureResponse:
+        asked = request.config
+        changed = {each.name: float(each.value) for each in (*asked.doubles, *asked.ints)}
+        for name in (each.name for each in (*asked.bools, *asked.strs)):
+            raise rospy.ServiceException(f"{name}: expected a number, got a flag or a text")
+        for name, value in changed.items():
+            field = self._fields.get(name)
+            if field is None:
+                raise rospy.ServiceException(f"no number named {name}; there are: {', '.join(self._fields)}")
+            if not field.least <= value <= field.most:
+                raise rospy.ServiceException(
+                    f"{name}: expected a number from {field.least:g} to {field.most:g}, got {value:g}"
+                )
+        with self._lock:
+            self._values.update(changed)
+            self._use(dict(self._values))
+            config = self._config(self._values)
+            self._updates.publish(config)
+        return ReconfigureResponse(config)
