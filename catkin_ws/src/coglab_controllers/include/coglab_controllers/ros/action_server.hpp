@@ -45,8 +45,10 @@ class ActionServer : public actionlib::ActionServerBase<Action> {
     goals_ = node_.template subscribe<ActionGoal>("goal", 50, &ActionServer::onGoal, this);
     cancels_ = node_.template subscribe<actionlib_msgs::GoalID>("cancel", 50,
                                                                 &ActionServer::onCancel, this);
-    timer_ = node_.createTimer(ros::Duration(kStatusPeriod),
-                               [this](const ros::TimerEvent&) { publishStatus(); });
+    timer_ = node_.createTimer(ros::Duration(kStatusPeriod), [this](const ros::TimerEvent&) {
+      forgetOldGoals();
+      publishStatus();
+    });
   }
 
   void onGoal(const boost::shared_ptr<const ActionGoal>& goal) {
@@ -85,16 +87,20 @@ class ActionServer : public actionlib::ActionServerBase<Action> {
 
   void publishStatus() override {
     const boost::recursive_mutex::scoped_lock lock(this->lock_);
-    const ros::Time now = ros::Time::now();
-    const auto over = [&](const auto& goal) {
-      return !goal.handle_destruction_time_.isZero() &&
-             goal.handle_destruction_time_ + this->status_list_timeout_ < now;
-    };
-    this->status_list_.remove_if(over);
     actionlib_msgs::GoalStatusArray message;
-    message.header.stamp = now;
+    message.header.stamp = ros::Time::now();
     for (const auto& goal : this->status_list_) message.status_list.push_back(goal.status_);
     status_.publish(message);
+  }
+
+  /// Only the timer removes goals: actionlib goes through the list while it publishes a result.
+  void forgetOldGoals() {
+    const boost::recursive_mutex::scoped_lock lock(this->lock_);
+    const ros::Time now = ros::Time::now();
+    this->status_list_.remove_if([&](const auto& goal) {
+      return !goal.handle_destruction_time_.isZero() &&
+             goal.handle_destruction_time_ + this->status_list_timeout_ < now;
+    });
   }
 
   ros::NodeHandle node_;
