@@ -37,6 +37,8 @@ from coglab_msgs.srv import (
 )
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from dynamic_reconfigure.client import Client
+from dynamic_reconfigure.msg import Config, DoubleParameter
+from dynamic_reconfigure.srv import Reconfigure
 from own_master import built, own_master
 from robot_fixture import JOINTS, wait_until
 from rosgraph_msgs.msg import Log
@@ -280,17 +282,19 @@ def test_gains_change_by_dynamic_reconfigure(robot: Robot) -> None:
     assert described["pos_clik_gain"]["min"] == 0.0 and described["pos_clik_gain"]["max"] == 0.5 / PERIOD
     assert "eq. (6)" in described["pos_clik_gain"]["description"]
     assert dmp.update_configuration({"pos_clik_gain": 12, "goal_max_speed": 0.2})["pos_clik_gain"] == 12.0
-    assert dmp.get_configuration()["goal_max_speed"] == 0.2
+    wait_until(lambda: dmp.get_configuration()["goal_max_speed"] == 0.2, "the update")
+    asked = Config(doubles=[DoubleParameter("correction_speed", 0.5), DoubleParameter("pos_clik_gain", 60.0)])
     with pytest.raises(rospy.ServiceException, match="pos_clik_gain: expected a number from 0 to 50, got 60"):
-        dmp.update_configuration({"correction_speed": 0.5, "pos_clik_gain": 60.0})
+        robot.manager("dmp/set_parameters", Reconfigure, asked)
     assert dmp.get_configuration()["correction_speed"] == 0.3, "all or nothing"
     assert robot.manager("load_controller", LoadController, "soft", "EeAdmittance").success
     soft = Client("/controller_manager/feedback/soft", timeout=30.0)
     gain = next(name for name in soft.get_configuration(timeout=30.0) if name.startswith("damping"))
     changed = soft.update_configuration({gain: 70.0})
     assert changed[gain] == 70.0
+    asked = Config(doubles=[DoubleParameter(gain, -1.0)])
     with pytest.raises(rospy.ServiceException, match="damping"):
-        soft.update_configuration({gain: -1.0})
+        robot.manager("feedback/soft/set_parameters", Reconfigure, asked)
     assert robot.manager("unload_controller", UnloadController, "soft").success
 
 
@@ -344,7 +348,7 @@ def test_it_ends_in_order_when_it_is_asked_to(system: tuple[Robot, subprocess.Po
 @pytest.mark.parametrize(
     "name, value, words",
     [
-        ("lwr/arm", "toy", "'toy': expected fri or ideal"),
+        ("lwr/arm", "toy", "'toy': expected fri, ideal or the file of a library"),
         ("lwr/start_position", [0.0] * 6, "expected 7 numbers, got 6"),
         ("controller_manager/speed_scale", 1.5, "speed_scale: expected a number from 0 to 1, got 1.5"),
     ],

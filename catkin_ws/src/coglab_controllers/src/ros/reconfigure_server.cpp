@@ -87,13 +87,19 @@ bool ReconfigureServer::onSet(dynamic_reconfigure::Reconfigure::Request& request
   for (const auto& parameter : config.doubles) changed[parameter.name] = parameter.value;
   // A client in Python sends 2 as a whole number.
   for (const auto& parameter : config.ints) changed[parameter.name] = parameter.value;
+  Answer answer;
   if (!config.bools.empty() || !config.strs.empty()) {
     const std::string name = config.bools.empty() ? config.strs[0].name : config.bools[0].name;
-    throw std::runtime_error(name + ": expected a number, got a flag or a text");
+    answer = Answer::invalid(name + ": expected a number, got a flag or a text");
+  } else {
+    answer = write_(changed);
   }
-  const Answer answer = write_(changed);
-  // roscpp sends the text of an exception to the client, which has no other field for it.
-  if (!answer.success) throw std::runtime_error(answer.message);
+  if (!answer.success) {
+    // roscpp sends the text of an exception to the client, which has no other field for it; the
+    // usual client in Python shows none, so the log has it, too.
+    ROS_WARN("%s/set_parameters refused: %s", node_.getNamespace().c_str(), answer.message.c_str());
+    throw std::runtime_error(answer.message);
+  }
   response.config = configOf(read_(), &ReconfigureField::value);
   updates_.publish(response.config);
   return true;

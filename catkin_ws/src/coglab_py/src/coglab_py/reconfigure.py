@@ -56,7 +56,13 @@ class ReconfigureServer:
         return Config(doubles=doubles, groups=[GroupState("Default", True, 0, 0)])
 
     def _set(self, request: Any) -> ReconfigureResponse:
-        asked = request.config
+        try:
+            return self._change(request.config)
+        except rospy.ServiceException as error:  # the usual client does not show its text
+            rospy.logwarn(f"{rospy.get_name()}/set_parameters refused: {error}")
+            raise
+
+    def _change(self, asked: Any) -> ReconfigureResponse:
         changed = {each.name: float(each.value) for each in (*asked.doubles, *asked.ints)}
         for name in (each.name for each in (*asked.bools, *asked.strs)):
             raise rospy.ServiceException(f"{name}: expected a number, got a flag or a text")

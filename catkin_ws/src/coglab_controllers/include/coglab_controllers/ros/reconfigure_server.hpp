@@ -9,6 +9,7 @@
 
 #include <dynamic_reconfigure/Config.h>
 #include <dynamic_reconfigure/Reconfigure.h>
+#include <ros/console.h>
 #include <ros/node_handle.h>
 
 #include "coglab_controllers/names.hpp"
