@@ -6,6 +6,7 @@ find_package(Eigen3 REQUIRED NO_MODULE)
 find_package(orocos_kdl REQUIRED)
 # Not by kdl_parser's own configuration: it asks for the whole of ROS.
 find_library(KDL_PARSER_LIBRARY kdl_parser REQUIRED)
+find_package(urdfdom_headers REQUIRED)  # what the header of kdl_parser includes
 find_library(COGLAB_TINYXML2_LIBRARY tinyxml2 REQUIRED)
 find_package(pybind11 REQUIRED)
 find_package(Threads REQUIRED)
@@ -32,7 +33,8 @@ add_library(coglab_controllers_core
   src/limits/workspace.cpp
   src/ptp/ptp_trajectory.cpp)
 target_include_directories(coglab_controllers_core PUBLIC ${CMAKE_CURRENT_SOURCE_DIR}/include ${coglab_rt_INCLUDE_DIRS})
-target_include_directories(coglab_controllers_core SYSTEM PUBLIC ${orocos_kdl_INCLUDE_DIRS})
+target_include_directories(coglab_controllers_core SYSTEM PUBLIC ${orocos_kdl_INCLUDE_DIRS}
+  PRIVATE ${urdfdom_headers_INCLUDE_DIRS})
 target_link_libraries(coglab_controllers_core
   PUBLIC Eigen3::Eigen ${orocos_kdl_LIBRARIES}
   PRIVATE ${KDL_PARSER_LIBRARY} ${COGLAB_TINYXML2_LIBRARY})
