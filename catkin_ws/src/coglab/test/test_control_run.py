@@ -131,7 +131,8 @@ def test_feedback_controllers_of_a_file_find_slots_and_let_go(robot):
         command_of("remote_controllers.py", "--class=Endless", "height=0.01") as endless,
     ):
         try:
-            slots = {process.stdout.readline().split(" of ")[0].rpartition(" ")[2] for process in (first, endless)}
+            said = [next(line for line in process.stdout if " holds the slot " in line) for process in (first, endless)]
+            slots = {line.split(" of ")[0].rpartition(" ")[2] for line in said}
             assert slots == {"python_feedback", "python_feedback_2"}
             wait(lambda: any(value == pytest.approx(0.02) for value in shifts.values()), f"the shift: {shifts}")
             assert "has not returned" in endless.stdout.readline()
