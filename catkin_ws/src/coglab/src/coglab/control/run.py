@@ -24,6 +24,7 @@ SLOTS = {wire.MOTION: "python_motion", wire.FEEDBACK: "python_feedback"}
 TYPES = {wire.MOTION: "coglab/RemoteMotion", wire.FEEDBACK: "RemoteFeedback"}
 MOST_SLOTS = 4  # feedback controllers that find a slot by themselves
 REPORT = 5.0  # s between two lines about latency and misses
+APPEARS = 3.0  # s until a slot that another process loads can be seen
 LAST = 1.0  # s after Ctrl-C until a controller that does not return is ended
 
 Numbers: TypeAlias = dict[str, float | list[float]]
@@ -115,8 +116,11 @@ def connect(options: argparse.Namespace, kind: int, services: SlotServices) -> w
             try:
                 services.load(slot, TYPES[kind])
             except wire.SlotError:
-                if choose(slot, options.robot) is None:  # else another process has just loaded it
-                    raise
+                late = time.monotonic() + APPEARS  # another process may just be loading it
+                while choose(slot, options.robot) is None:
+                    if time.monotonic() > late:
+                        raise
+                    time.sleep(0.05)
             address = choose(slot, services.robot())
         if address is None:
             raise wire.SlotError(f"the robot loaded '{slot}', but it runs on another computer; run this one there")
