@@ -345,6 +345,29 @@ def test_it_ends_in_order_when_it_is_asked_to(system: tuple[Robot, subprocess.Po
     assert node.wait(timeout=60.0) == 0
 
 
+def test_a_signals_file_that_takes_our_own_topic_leaves_the_robot_without_signals(tmp_path: Path) -> None:
+    file = tmp_path / "signals.yaml"
+    file.write_text(
+        "in:\n  - {topic: lwr/ros_events, type: sensor_msgs/Imu, field: orientation, key: imu, max_age: 0.1}\n"
+    )
+    with own_master() as master:
+        parameters(master)
+        master.setParam("/controller_manager/signals_file", str(file))
+        node = subprocess.Popen(
+            [str(built("lib", "coglab_controllers", "robot_node"))], stderr=subprocess.PIPE, text=True
+        )
+        try:
+            wait_until(
+                lambda: any("add_ptp" in name for name, _ in master.getSystemState()[2]) or node.poll() is not None,
+                "the services",
+            )
+        finally:
+            node.send_signal(signal.SIGINT)
+            said = node.communicate(timeout=60.0)[1]
+    assert node.returncode == 0, said[-2000:]
+    assert "the robot runs without the file of signals" in said
+
+
 @pytest.mark.parametrize(
     "name, value, words",
     [

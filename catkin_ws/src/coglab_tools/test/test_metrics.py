@@ -28,6 +28,14 @@ def test_metrics_equal_their_closed_forms():
         assert found[name] == pytest.approx(value, rel=0.01, abs=0.003), name
 
 
+def test_the_person_alone_with_the_object_gives_no_force_of_both():
+    trial = measured()
+    trial.person_force = [(t, 3.0 if t < 7.0 else 0.0) for t, _ in trial.person_force]  # holds it from the start
+    found = metrics_of(trial)
+    assert found["mean_force_n"] == pytest.approx(6.0, rel=0.01)
+    assert found["impulse_ns"] == pytest.approx(12.0, rel=0.01)
+
+
 @pytest.mark.parametrize("rate", [60.0, 200.0])
 def test_sparc_does_not_depend_on_the_rate(rate):
     s = np.arange(0.0, 1.0, 1.0 / (2.0 * rate))

@@ -81,7 +81,11 @@ void ManagerRos::start() {
   speed_ = node_.subscribe("speed_scale", 1, &ManagerRos::onSpeedTopic, this);
   feedback_ = std::make_unique<FeedbackRos>(ros::NodeHandle(node_, "feedback"), *manager_);
   cancel_ = std::make_unique<CancelRos>(node_, *manager_);
-  signals_ = std::make_unique<SignalTopics>(node_, *manager_);
+  try {
+    signals_ = std::make_unique<SignalTopics>(node_, *manager_);
+  } catch (const std::exception& error) {  // a topic that this node has with another type
+    ROS_ERROR("the robot runs without the file of signals: %s; name other topics", error.what());
+  }
   diagnostics_ = std::make_unique<diagnostic_updater::Updater>(node_);
   diagnostics_->setHardwareID("none");
   diagnostics_->add("control cycle", this, &ManagerRos::diagnose);
@@ -298,7 +302,7 @@ void ManagerRos::publishLoop() {
       publishTarget(report);
       if (round % 4 == 0) publishStatus(report);
       if (round % 40 == 0) feedback_->publishStatus();
-      signals_->publish();
+      if (signals_) signals_->publish();
       if (round % 200 == 20) diagnostics_->force_update();  // not by ROS time
     });
     next = std::max(next + kPublishPeriod, std::chrono::steady_clock::now() - kPublishPeriod);

@@ -147,7 +147,7 @@ def _forces(trial: Measured, times: np.ndarray, force: np.ndarray) -> dict[str, 
     """Force on the robot's hand while both touch the object."""
     if trial.person_force:
         at, size = np.array(trial.person_force).T
-        shared = np.interp(times, at, size) > TOUCH
+        shared = (np.interp(times, at, size) > TOUCH) & (force > TOUCH)
     else:  # a real robot: between contact and release
         marks = trial.exchanges[0].marks if trial.exchanges else {}
         shared = (times >= marks.get("contact", np.inf)) & (times <= marks.get("released", trial.end))
