@@ -16,10 +16,12 @@ def ask(study: Study, participant: str, condition: str = "", block: int = 0, lin
     "skip" leaves an item out, "back" returns to the one before. Returns the number of answers.
     """
     if not study.questionnaires:
-        raise CheckFailed(f"{study.folder}/study.yaml names no questionnaires: add questionnaires: [nasa_tlx]")
+        raise CheckFailed(
+            f"{study.folder}/study.yaml names no questionnaires: add a line such as questionnaires: [nasa_tlx]"
+        )
     if condition and condition not in study.conditions:
         raise UsageError(f"--condition: one of {', '.join(study.conditions)} is expected, got '{condition}'")
-    answered = {row.place for row in answers_of(study.folder)}
+    answered = {row.place for row in answers_of(study)}
     visits = dict.fromkeys((t.block, t.condition) for t in study.trials() if t.participant == participant)
     count = 0
     for visit, shown in visits:
@@ -34,7 +36,7 @@ def ask(study: Study, participant: str, condition: str = "", block: int = 0, lin
                     answers = _items(questionnaire, items, say, line)
                 except EOFError:
                     return count
-                add_answers(study.folder, [AnswerRow(*head, item, answer) for item, answer in answers.items()])
+                add_answers(study, [AnswerRow(*head, item, answer) for item, answer in answers.items()])
                 count += len(answers)
     return count
 
@@ -48,7 +50,7 @@ def _items(questionnaire: Questionnaire, items: list[str], say: str, line: Calla
     answers: dict[str, float] = {}
     place = 0
     while place < len(items):
-        given = line(f"  {place + 1}/{len(items)} {items[place].replace('_', ' ')}: ").strip().lower()
+        given = line(f"  {place + 1}/{len(items)} {questionnaire.shown(items[place])}: ").strip().lower()
         if given == "back":
             place = max(0, place - 1)
         elif given == "skip":

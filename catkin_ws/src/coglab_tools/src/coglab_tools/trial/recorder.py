@@ -14,7 +14,7 @@ import re
 import shutil
 import threading
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 from coglab.results import reason_name
 from coglab_msgs.msg import Transition
 
+from coglab_tools.command import CommandError
 from coglab_tools.trial.record import BAG, Outcome, TrialRecord
 
 PRE_ROLL, POST_ROLL = 5.0, 1.0  # s before the action and after its result
@@ -33,7 +34,7 @@ DISK_CHECK = 1.0  # s between two looks at the free space
 HUBS = ("wait_without_object", "wait_with_object")
 NO_ACTIONS = (*HUBS, "stopped", "fault", "preempted")
 HIDDEN = ".part-"
-TRANSITIONS, RESULTS = "coglab/transitions", "coglab/results"
+TRANSITIONS, RESULTS, NOTE = "coglab/transitions", "coglab/results", "coglab/note"
 RUN_SPECIFIC = ("rosdistro", "roslaunch", "rosversion", "run_id", "robot_description")  # parameters
 
 
@@ -63,6 +64,8 @@ class _Trial:
     """when and how the machine left the action: s, outcome, code, reason"""
     ends: float = float("inf")
     notes: list[str] = field(default_factory=list)
+    said: list[tuple[float, str]] = field(default_factory=list)
+    """notes of the experimenter: s, text"""
 
 
 class Recorder:
@@ -89,6 +92,10 @@ class Recorder:
         self._types: dict[str, type] = {}
         self._looked = 0.0
         self._lost = threading.Event()
+        self._last: tuple[Path, float] | None = None
+        """the newest recording, and when its action began, s"""
+        self._early: list[tuple[float, str]] = []
+        """notes before the first recording"""
 
     def put(self, message: Raw) -> None:
         """Take a message. Returns at once; callable from any thread."""
@@ -142,6 +149,8 @@ class Recorder:
             self._ring.append(raw)
             if name.endswith(RESULTS) and self._trial is not None:
                 self._result(raw)
+            if name.endswith(NOTE) and raw.header.get("latching") != "1":
+                self._note(raw)
 
     def _transition(self, raw: Raw) -> None:
         message = Transition()
@@ -168,6 +177,24 @@ class Recorder:
             return
         if fits and trial is not None and trial.result is None:
             trial.result, trial.ends = row, raw.time + POST_ROLL
+
+    def _note(self, raw: Raw) -> None:
+        """A note is of the handover that runs, otherwise of the last one; before the first one, of the first."""
+        from std_msgs.msg import String
+
+        message = String()
+        message.deserialize(raw.data)
+        said = (raw.time, " ".join(str(message.data).split()))
+        if self._trial is not None:
+            self._trial.said.append(said)
+        elif self._last is None:
+            self._early.append(said)
+        else:
+            folder, begun = self._last
+            try:
+                _with_notes(TrialRecord.load(folder), [said], begun).save(folder)
+            except (CommandError, OSError) as error:  # the recording was moved or removed
+                self._say(f"a note is in no recording ({error}): {said[1]}", True)
 
     def _begin(self, action: str, begun: float) -> None:
         import rosbag
@@ -222,10 +249,11 @@ class Recorder:
             if not (self.folder / name).exists():
                 break
             name = f"{record.id}_{number}"
-        record = replace(record, id=name)
+        begun = datetime.fromisoformat(record.started).timestamp()
+        record = _with_notes(replace(record, id=name), [*self._early, *trial.said], begun)
         record.save(trial.part)
         trial.part.rename(self.folder / name)
-        self._trial = None
+        self._trial, self._last, self._early = None, (self.folder / name, begun), []
         how = "succeeded" if record.outcome.success else f"{record.outcome.reason}: {record.outcome.text}"
         self._say(f"recorded {self.folder / name} ({how})", False)
 
@@ -291,6 +319,13 @@ def _record_of(trial: _Trial) -> TrialRecord:
         marks=tuple({"name": name, "time_s": round(when, 3)} for when, name in marks),
         notes="; ".join(filter(None, [str(told.get("notes", "")), *trial.notes])),
     )
+
+
+def _with_notes(record: TrialRecord, said: Sequence[tuple[float, str]], begun: float) -> TrialRecord:
+    """The record with notes of the experimenter, as marks too. `begun`: start of its action, s."""
+    marks = [{"name": f"note: {text}", "time_s": round(when - begun, 3)} for when, text in said]
+    notes = [record.notes, *(text for _, text in said)]
+    return replace(record, marks=(*record.marks, *marks), notes="; ".join(filter(None, notes)))
 
 
 def _flat(tree: Mapping[str, Any], above: str = "") -> dict[str, Any]:
