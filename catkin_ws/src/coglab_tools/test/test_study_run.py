@@ -262,7 +262,7 @@ def test_a_live_session_notes_repeats_and_goes_on(tmp_path, capsys):
     text = YAML.replace("[receive]", "[receive, give]").replace("simulated:", "questionnaires: [nasa_tlx]\nsimulated:")
     folder, system = make(tmp_path / "kill", text), StubSystem()
     with coglab.World(seed=3, person="accustomed", perfect_perception=True) as world:
-        lines = iter(["what", "n looked away", "", "", *["50"] * 6, "r", "", "l", "n let go early", "q"])
+        lines = iter(["what", "n looked away", "", "", *["50"] * 6, "r", "", "n let go early", "l", "q"])
         data = session(load(folder), world.robot, system, "P02", lambda prompt: next(lines))
     assert (data["trials"], data["trials_now"], data["handovers"], data["succeeded"]) == (1, 1, 2, 2)
     first = system.calls[1]

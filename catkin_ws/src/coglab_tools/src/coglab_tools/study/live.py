@@ -227,7 +227,11 @@ class _Session:
         if not self.study.questionnaires or any((t.block, t.condition) == (trial.block, trial.condition) for t in left):
             return
         how = "questionnaires: Enter asks for them here, or after they were filled in at the console; l: later > "
-        if self.line(how).strip() == "":
+        word = self.line(how).strip()
+        while word.partition(" ")[0] == "n":
+            self._note(word.partition(" ")[2].strip())
+            word = self.line(how).strip()
+        if word == "":
             ask(self.study, trial.participant, trial.condition, trial.block, self.line)
 
 

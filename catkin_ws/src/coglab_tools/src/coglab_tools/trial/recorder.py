@@ -92,9 +92,9 @@ class Recorder:
         self._types: dict[str, type] = {}
         self._looked = 0.0
         self._lost = threading.Event()
-        self._last: tuple[Path, float] | None = None
-        """the newest recording, and when its action began, s"""
-        self._early: list[tuple[float, str]] = []
+        self._last: Path | None = None
+        """the newest recording"""
+        self._early: list[str] = []
         """notes before the first recording"""
 
     def put(self, message: Raw) -> None:
@@ -179,22 +179,22 @@ class Recorder:
             trial.result, trial.ends = row, raw.time + POST_ROLL
 
     def _note(self, raw: Raw) -> None:
-        """A note is of the handover that runs, otherwise of the last one; before the first one, of the first."""
+        """A note is of the handover that runs, with its time as a mark; otherwise of the last one; before the first
+        one, of the first."""
         from std_msgs.msg import String
 
         message = String()
         message.deserialize(raw.data)
-        said = (raw.time, " ".join(str(message.data).split()))
+        text = " ".join(str(message.data).split())
         if self._trial is not None:
-            self._trial.said.append(said)
+            self._trial.said.append((raw.time, text))
         elif self._last is None:
-            self._early.append(said)
+            self._early.append(text)
         else:
-            folder, begun = self._last
             try:
-                _with_notes(TrialRecord.load(folder), [said], begun).save(folder)
+                _noted(TrialRecord.load(self._last), [text]).save(self._last)
             except (CommandError, OSError) as error:  # the recording was moved or removed
-                self._say(f"a note is in no recording ({error}): {said[1]}", True)
+                self._say(f"a note is in no recording ({error}): {text}", True)
 
     def _begin(self, action: str, begun: float) -> None:
         import rosbag
@@ -249,11 +249,10 @@ class Recorder:
             if not (self.folder / name).exists():
                 break
             name = f"{record.id}_{number}"
-        begun = datetime.fromisoformat(record.started).timestamp()
-        record = _with_notes(replace(record, id=name), [*self._early, *trial.said], begun)
+        record = _noted(replace(record, id=name), self._early)
         record.save(trial.part)
         trial.part.rename(self.folder / name)
-        self._trial, self._last, self._early = None, (self.folder / name, begun), []
+        self._trial, self._last, self._early = None, self.folder / name, []
         how = "succeeded" if record.outcome.success else f"{record.outcome.reason}: {record.outcome.text}"
         self._say(f"recorded {self.folder / name} ({how})", False)
 
@@ -294,6 +293,7 @@ def _record_of(trial: _Trial) -> TrialRecord:
     ended = float(row.get("ended_ros", trial.left[0] if trial.left else begun))
     shift = begun - float(row.get("started", begun))
     marks = sorted((float(when) + shift - begun, str(name)) for name, when in dict(row.get("marks", {})).items())
+    marks += [(when - begun, f"note: {text}") for when, text in trial.said]
     told = parameters.get("coglab", {})
     told = told.get("trial", {}) if isinstance(told, Mapping) else {}
     told = told if isinstance(told, Mapping) else {}
@@ -316,16 +316,13 @@ def _record_of(trial: _Trial) -> TrialRecord:
         simulated="coglab_sim" in parameters,
         configuration={"hash": configuration_hash(flat), **_short(flat), "files": _files(flat)},
         versions=_versions(),
-        marks=tuple({"name": name, "time_s": round(when, 3)} for when, name in marks),
-        notes="; ".join(filter(None, [str(told.get("notes", "")), *trial.notes])),
+        marks=tuple({"name": name, "time_s": round(when, 3)} for when, name in sorted(marks)),
+        notes="; ".join(filter(None, [str(told.get("notes", "")), *trial.notes, *(text for _, text in trial.said)])),
     )
 
 
-def _with_notes(record: TrialRecord, said: Sequence[tuple[float, str]], begun: float) -> TrialRecord:
-    """The record with notes of the experimenter, as marks too. `begun`: start of its action, s."""
-    marks = [{"name": f"note: {text}", "time_s": round(when - begun, 3)} for when, text in said]
-    notes = [record.notes, *(text for _, text in said)]
-    return replace(record, marks=(*record.marks, *marks), notes="; ".join(filter(None, notes)))
+def _noted(record: TrialRecord, texts: Sequence[str]) -> TrialRecord:
+    return replace(record, notes="; ".join(filter(None, [record.notes, *texts])))
 
 
 def _flat(tree: Mapping[str, Any], above: str = "") -> dict[str, Any]:
