@@ -300,7 +300,7 @@ class Recording:
             for since, until, state in intervals
             if until >= self._begun - before and since <= end
         ]
-        arrays = {
+        arrays: dict[str, Any] = {
             name: np.array(rows, dtype=int if name == "held_by" else float).reshape(len(rows), *ARRAYS[name])
             for name, rows in self._rows.items()
         }
