@@ -51,10 +51,10 @@ function running(told, session) {
 
 /** The newest recorded handovers, as ./coglab trial list has them. */
 function recorded({ folder = '', recording = false, rows = [] } = {}) {
-  const cells = rows.map((row) => [row.started?.slice(11, 19), row.action, row.object, row.participant, row.condition, row.outcome, row.duration_s, row.notes]);
+  const cells = rows.map((row) => [row.started?.slice(11, 19), [row.action, row.object].join(' '), [row.participant, row.condition].filter(Boolean).join(', '), row.outcome, row.duration_s, row.notes]);
   return [
     h('p', {}, recording ? `Each handover is recorded into ${folder}; ./coglab trial explain last, ./coglab trial report last.` : 'No recorder is there: launch without record:=none, or nothing of a session is written.'),
-    rows.length ? table(['UTC', 'Action', 'Object', 'Participant', 'Condition', 'Outcome', 's', 'Notes'], cells, 'Recorded handovers') : null,
+    rows.length ? table(['UTC', 'Handover', 'Trial of', 'Outcome', 's', 'Notes'], cells, 'Recorded handovers') : null,
   ];
 }
 

@@ -136,6 +136,12 @@ def test_a_trial_begins_with_the_hand_that_its_action_needs(desk):
     assert ask(desk, "a", "trial_end", outcome="done")["success"]
 
 
+def test_a_session_does_not_begin_beside_a_live_study(desk):
+    desk.backend.now = replace(desk.backend.now, study="pilot")
+    refused = opened(desk, "receive")
+    assert not refused["success"] and "pilot is run in a terminal" in refused["message"]
+
+
 def test_a_trial_takes_its_own_action_alone(desk):
     opened(desk, "receive", "give")
     assert ask(desk, "a", "trial_begin")["success"]

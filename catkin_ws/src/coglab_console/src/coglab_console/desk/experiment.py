@@ -158,8 +158,10 @@ class Experiment:
         none = "" if self.participant else "no session is open; begin one first"
         running = f"trial {self.position + 1} is under way; end it first" if self.running else ""
         over = "every trial is done; end the session" if self.position >= len(self.trials) else ""
+        elsewhere = now.study if now is not None else ""
+        live = elsewhere and f"the study {elsewhere} is run in a terminal: end it there first"
         return {
-            "session_begin": self.participant and f"the session of {self.participant} is open; end it first",
+            "session_begin": live or self.participant and f"the session of {self.participant} is open; end it first",
             "session_end": none or running,
             "trial_begin": none or running or over or self._not_ready(now),
             "trial_end": "" if self.running else "no trial is under way",

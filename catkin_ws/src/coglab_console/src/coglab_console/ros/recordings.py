@@ -10,6 +10,8 @@ from typing import Any
 
 import rospy
 
+from ..desk.words import button
+
 SHOWN = 20  # newest recordings
 LABELS = "coglab/trial"  # parameters of the trial that is under way; `./coglab study run --live` adds its folder
 
@@ -47,7 +49,7 @@ def _row(name: str, record: Any) -> dict[str, Any]:
     return {
         "name": name,
         "started": record.started,
-        "action": record.action,
+        "action": button(record.action),
         "object": record.object,
         "participant": record.participant,
         "condition": record.condition,
@@ -62,6 +64,8 @@ class LiveStudy:
     """The study that `./coglab study run --live` runs at this system."""
 
     def __init__(self) -> None:
+        self.name = ""
+        """of the study; empty: none was live at the last document()"""
         self._study: Any = None
         self._read = (Path(), 0)
 
@@ -70,7 +74,8 @@ class LiveStudy:
         from coglab_tools.command import CommandError
 
         named = self._named()
-        if not named.get("study_folder"):
+        self.name = str(named.get("study", "")) if named.get("study_folder") else ""
+        if not self.name:
             return None
         head = {name: str(named.get(name, "")) for name in ("study", "participant", "condition")}
         try:

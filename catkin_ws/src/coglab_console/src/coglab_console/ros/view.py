@@ -195,6 +195,7 @@ class RosView:
             in_hub=machine.in_hub,
             actions=tuple(machine.actions),
             object_id=machine.object_id,
+            study=self.study.name,
             arm_alive=self.there("lwr/state") and self.sources.speaks("arm"),
             motion_allowed=arm.motion_allowed,
             arm_reason=plain(arm.reason),
