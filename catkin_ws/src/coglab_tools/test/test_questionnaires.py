@@ -81,6 +81,21 @@ def test_the_terminal_corrects_goes_back_and_keeps_complete_questionnaires(tmp_p
     assert ask(study, "P01", line=lambda prompt: "30") == 1
 
 
+def test_ctrl_c_keeps_what_was_answered(tmp_path):
+    lines = iter(["10", "20"])
+
+    def line(prompt):
+        try:
+            return next(lines)
+        except StopIteration:
+            raise KeyboardInterrupt from None
+
+    study = study_in(tmp_path)
+    with pytest.raises(KeyboardInterrupt):
+        ask(study, "P01", line=line)
+    assert [row.answer for row in answers_of(study)] == [10.0, 20.0]
+
+
 def test_a_table_of_a_german_excel_is_read(tmp_path):
     rows = read(tmp_path, "\ufeffparticipant;condition;effort;frustration\nP01;calm;50,0;5\n")
     assert [(row.item, row.answer) for row in rows] == [("effort", 50.0), ("frustration", 5.0)]

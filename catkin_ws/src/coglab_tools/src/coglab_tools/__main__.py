@@ -50,7 +50,7 @@ def run(words: list[str]) -> int:
         try:
             import argcomplete
 
-            argcomplete.autocomplete(parser)
+            argcomplete.autocomplete(parser, always_complete_options=False)
         except ImportError:  # completion alone needs it
             pass
         options = parser.parse_args(words)

@@ -10,7 +10,7 @@ from coglab_tools.study.questionnaires import AnswerRow, Questionnaire, add_answ
 
 
 def ask(study: Study, participant: str, condition: str = "", block: int = 0, line: Callable[[str], str] = input) -> int:
-    """Ask for each item that is not answered yet, and write the answers of each questionnaire when it is complete.
+    """Ask for each item that is not answered yet, and write the answers of each questionnaire at its end.
 
     ``condition``: "": all, in the participant's order. ``block``: 0: all. ``line``: reads a line after a prompt. A line
     "skip" leaves an item out, "back" returns to the one before. Returns the number of answers.
@@ -32,22 +32,27 @@ def ask(study: Study, participant: str, condition: str = "", block: int = 0, lin
                 if not items:
                     continue
                 say = f"{participant}, condition {shown}" + (f", block {visit}" if study.blocks > 1 else "")
+                answers: dict[str, float] = {}
                 try:
-                    answers = _items(questionnaire, items, say, line)
+                    _items(questionnaire, items, say, line, answers)
                 except EOFError:
-                    return count
-                add_answers(study, [AnswerRow(*head, item, answer) for item, answer in answers.items()])
+                    return count + len(answers)
+                finally:  # also after Ctrl-C: what was answered is kept, the other items are asked next time
+                    if answers:
+                        add_answers(study, [AnswerRow(*head, item, answer) for item, answer in answers.items()])
                 count += len(answers)
     return count
 
 
-def _items(questionnaire: Questionnaire, items: list[str], say: str, line: Callable[[str], str]) -> dict[str, float]:
+def _items(
+    questionnaire: Questionnaire, items: list[str], say: str, line: Callable[[str], str], answers: dict[str, float]
+) -> None:
+    """Ask for the items, and put what is answered into ``answers``."""
     print(f"\n{questionnaire.title}: {say}")
     print(
         f"  {questionnaire.low:g} = {questionnaire.ends[0]}, {questionnaire.high:g} = {questionnaire.ends[1]}; "
         "skip leaves an item out, back returns to the one before"
     )
-    answers: dict[str, float] = {}
     place = 0
     while place < len(items):
         given = line(f"  {place + 1}/{len(items)} {questionnaire.shown(items[place])}: ").strip().lower()
@@ -67,4 +72,3 @@ def _items(questionnaire: Questionnaire, items: list[str], say: str, line: Calla
             else:
                 answers[items[place]] = answer
                 place += 1
-    return answers

@@ -123,6 +123,8 @@ def _run(options: argparse.Namespace) -> Answer:
         f"{data['trials']} of {total} trials of {study.name} are done, {data['trials_now']} of them now: "
         f"{data['succeeded']} of {data['handovers']} handovers succeeded; {data['table']}"
     )
+    if not live and (study.folder / "machines.yaml").exists():
+        text += f"; {study.folder / 'machines.yaml'} is for live sessions, simulated trials have the shipped one"
     following = "report" if data["trials"] == total else "status"
     return Answer(text, data, f"./coglab study {following} {study.folder}")
 
