@@ -1,6 +1,8 @@
 """Recordings in, primitives out: units, faults, cut, learning, and teaching from the led arm to its motion."""
 
 import json
+import resource
+import signal
 
 import coglab
 import coglab_controllers as cc
@@ -170,6 +172,28 @@ def test_a_file_that_cannot_be_used_is_refused_with_its_name_and_place(tmp_path,
     with pytest.raises(CommandError) as refused:
         cut.reaches(read(path))
     assert words in str(refused.value) and name in str(refused.value)
+
+
+@pytest.fixture
+def full_disk():
+    """No file can grow beyond 100 bytes."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    signal.signal(signal.SIGXFSZ, before)
+
+
+@pytest.mark.parametrize(("verb", "option", "file"), [("export", "-o", "a.npz"), ("inspect", "--plot", "a.png")])
+def test_a_full_disk_leaves_no_half_of_a_file(tmp_path, full_disk, capsys, verb, option, file):
+    assert run(["dmp", verb, "--id", "reach_human", option, str(tmp_path / file)]) == 1
+    assert file in capsys.readouterr().err and list(tmp_path.iterdir()) == []
+
+
+def test_a_goal_that_is_no_number_is_a_wrong_argument(capsys):
+    assert run(["dmp", "inspect", "--id", "reach_human", "--goal", "nan", "0", "0"]) == 2
+    assert "expected a number of metres" in capsys.readouterr().err
 
 
 @pytest.fixture

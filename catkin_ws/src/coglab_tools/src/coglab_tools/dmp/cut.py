@@ -1,6 +1,6 @@
 """Smooths a recorded motion, which also bridges its gaps, and cuts the reaches out of it.
 
-Smoothing is a cubic smoothing spline with a cut-off of 8 Hz and no delay: people's reaches end below 5 Hz, a tracker's
+Smoothing is a cubic smoothing spline with a cut-off of 6 Hz and no delay: people's reaches end below 5 Hz, a tracker's
 noise does not. Onset and end come from the speed, with two thresholds: a reach begins to count at the higher one, and
 goes from where the speed left the lower one to where it comes back to it. A hand that never rests between two motions,
 as in a handover, is cut where it is slowest.
@@ -15,7 +15,7 @@ import numpy as np
 from coglab_tools.command import CheckFailed
 from coglab_tools.dmp.demonstration import Array, Demonstration
 
-CUT_OFF = 8.0  # Hz
+CUT_OFF = 6.0  # Hz; usual for motions of the arm (Winter, Biomechanics and Motor Control of Human Movement)
 SHORTEST = 0.1  # m, farthest point of a reach from its start
 LONGEST_GAP = 0.2  # s without a sample within a reach
 LARGEST_STEP = 0.5  # share of a reach between two samples without a gap; above it the tracker took something else
