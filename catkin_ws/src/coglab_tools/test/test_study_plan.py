@@ -34,7 +34,7 @@ def test_a_new_study_is_valid_and_is_not_overwritten(tmp_path):
 
 
 def test_a_study_that_cannot_be_written_leaves_nothing(tmp_path, monkeypatch):
-    with pytest.raises(CheckFailed, match="/proc/pilot cannot be made"):
+    with pytest.raises(CheckFailed, match="/proc/pilot/study.yaml cannot be written"):
         new(Path("/proc/pilot"))
 
     def full(*_):

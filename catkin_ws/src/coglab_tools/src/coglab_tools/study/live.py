@@ -21,11 +21,11 @@ from coglab_smach.context.config import Config, ConfigError
 from coglab_smach.parameters import BY_NAME
 
 from coglab_tools.command import CheckFailed, NotThere, UsageError
+from coglab_tools.files import write_whole
 from coglab_tools.study import settings as condition_settings
 from coglab_tools.study.ask import ask
 from coglab_tools.study.own_files import PRIMITIVES
 from coglab_tools.study.plan import Study, Trial
-from coglab_tools.study.questionnaires import write_whole
 from coglab_tools.study.recordings import RECORDINGS
 from coglab_tools.study.rows import Rows, open_rows, undone, write_table
 from coglab_tools.study.simulate import identity
@@ -299,7 +299,6 @@ def write_machines(study: Study, settings: Mapping[str, Any]) -> None:
         values = yaml.safe_load(base.read_text(encoding="utf-8"))
         text = yaml.safe_dump(with_settings(values, condition_settings.machines_settings(settings)), sort_keys=False)
         part = machines_file(study).with_name(".machines.check.yaml")
-        _folder(part.parent)
         write_whole(part, text.encode())
         Config.load(str(part))
         part.unlink()
@@ -342,15 +341,7 @@ def write_objects(study: Study, object_id: str, settings: Mapping[str, Any]) -> 
 
 def _write(file: Path, content: bytes) -> None:
     if not file.exists() or file.read_bytes() != content:
-        _folder(file.parent)
         write_whole(file, content)
-
-
-def _folder(place: Path) -> None:
-    try:
-        place.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise CheckFailed(f"{place} cannot be made: {error.strerror}; check who may write there") from None
 
 
 # --- the running system -------------------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ import json
 import os
 import re
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -18,9 +19,10 @@ from coglab_py.yaml_file import Document, YamlError, read
 from coglab_sim.person.participant import BEHAVIOURS, PROFILES, Participant
 
 from coglab_tools.command import CheckFailed, UsageError
+from coglab_tools.files import write_whole
 from coglab_tools.study import settings as condition_settings
 from coglab_tools.study.own_files import OwnFiles
-from coglab_tools.study.questionnaires import Questionnaire, find, write_whole
+from coglab_tools.study.questionnaires import Questionnaire, find
 
 FILE = "study.yaml"
 OWN_FILES = "own files"  # key of their hashes in the plan
@@ -164,16 +166,15 @@ def new(folder: Path) -> Path:
     try:
         if not made and (not folder.is_dir() or any(folder.iterdir())):
             raise UsageError(f"{folder} exists and is not empty: choose another name")
-        folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise CheckFailed(f"{folder} cannot be made: {error.strerror}; choose a place that you may write to") from None
+        raise CheckFailed(f"{folder} cannot be read: {error.strerror}; choose another place") from None
     try:
-        write_whole(folder / FILE, template.replace("NAME", name).encode())
+        return write_whole(folder / FILE, template.replace("NAME", name))
     except CheckFailed:
         if made:
-            folder.rmdir()
+            with suppress(OSError):
+                folder.rmdir()
         raise
-    return folder / FILE
 
 
 def load(place: str | os.PathLike[str]) -> Study:

@@ -10,10 +10,8 @@ from __future__ import annotations
 import csv
 import io
 import math
-import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,6 +20,7 @@ from coglab_py.packages import package_path
 from coglab_py.yaml_file import YamlError, read
 
 from coglab_tools.command import CheckFailed
+from coglab_tools.files import write_whole
 
 if TYPE_CHECKING:
     from coglab_tools.study.plan import Study
@@ -174,23 +173,6 @@ def add_answers(study: Study, rows: Iterable[AnswerRow]) -> tuple[int, int]:
         writer.writerow([*row.place, f"{row.answer:g}"])
     write_whole(study.folder / ANSWERS, text.getvalue().encode())
     return len(new) - replaced, replaced
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file completely or not at all."""
-    part = path.with_name(f".{path.name}.part")
-    try:
-        with part.open("wb") as stream:
-            stream.write(content)
-            stream.flush()
-            os.fsync(stream.fileno())
-        part.replace(path)
-    except OSError as error:
-        with suppress(OSError):
-            part.unlink()
-        raise CheckFailed(
-            f"{path} cannot be written: {error.strerror}; nothing was changed: free the disk, or check who may write it"
-        ) from None
 
 
 def read_answers(path: Path, study: Study) -> list[AnswerRow]:

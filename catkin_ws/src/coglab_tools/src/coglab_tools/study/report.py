@@ -15,9 +15,10 @@ import numpy as np
 from coglab_py.packages import package_path
 
 from coglab_tools.command import CheckFailed
+from coglab_tools.files import write_whole
 from coglab_tools.report.metrics import METRICS
 from coglab_tools.study.plan import Study
-from coglab_tools.study.questionnaires import answers_of, scores_of, write_whole
+from coglab_tools.study.questionnaires import answers_of, scores_of
 from coglab_tools.study.recordings import joined
 from coglab_tools.study.rows import ROWS, open_rows, write_table
 from coglab_tools.study.statistics import Comparison, compare, holm, wilson

@@ -20,8 +20,9 @@ from typing import IO, Any
 from coglab_py.yaml_file import read
 
 from coglab_tools.command import CheckFailed, UsageError
+from coglab_tools.files import write_whole
 from coglab_tools.study.plan import FILE, OWN_FILES, Study
-from coglab_tools.study.questionnaires import answers_of, scores_of, write_whole
+from coglab_tools.study.questionnaires import answers_of, scores_of
 
 ROWS, TABLE = "rows.jsonl", "trials.csv"
 LEADING = (
@@ -206,7 +207,10 @@ def write_table(study: Study, table: Sequence[Mapping[str, Any]]) -> Path:
     writer = csv.DictWriter(text, columns, restval="", lineterminator="\n")
     writer.writeheader()
     for row in table:
-        settings = {f"set_{name}": value for name, value in study.conditions[row["condition"]].items()}
+        settings = {
+            f"set_{name}": json.dumps(value) if isinstance(value, dict | list) else value
+            for name, value in study.conditions[row["condition"]].items()
+        }
         own = scores.get((row["participant"], row["block"], row["condition"])) or {}
         writer.writerow({**row, **settings, **own})
     path = study.folder / TABLE
