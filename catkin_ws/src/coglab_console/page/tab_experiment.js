@@ -1,4 +1,4 @@
-// Experiment: participant, conditions, order of trials, notes. One file per session, written by the server.
+// Experiment: participant, conditions, order of trials, notes; recorded handovers; questionnaires of a live study.
 import { h, setText, table } from './dom.js';
 import { command, onDocs, store } from './link.js';
 import { choice, commandButton } from './controls.js';
@@ -11,6 +11,7 @@ export function field(label, input) {
 const OUTCOMES = [['done', 'The trial is done'], ['failed', 'The robot has failed'], ['repeat', 'Do the trial again'], ['skipped', 'Skip the trial']];
 
 function form(told) {
+  const study = h('input', { type: 'text', maxlength: 40, autocomplete: 'off', pattern: '[a-z0-9][a-z0-9_.\\-]*' });
   const participant = h('input', { type: 'text', maxlength: 32, autocomplete: 'off', placeholder: 'P07' });
   const number = h('input', { type: 'number', min: 0, max: 9999, value: 0 });
   const conditions = h('input', { type: 'text', value: 'receive, give', maxlength: 400 });
@@ -24,10 +25,12 @@ function form(told) {
     conditions: conditions.value.split(',').map((word) => word.trim()).filter(Boolean),
     repetitions: Number(repetitions.value),
     order: order.button.value,
+    study: study.value.trim(),
   }];
   const begin = commandButton('Begin the session', { name: 'session_begin', told, request });
   return h('form', { onsubmit: (event) => event.preventDefault() },
     field('Participant (a pseudonym, never a name)', participant), field('Number of the participant (row of the Latin square, seed)', number),
+    field('Study, for the recordings; may be empty', study),
     field('Conditions, separated by commas; one with an object (receive ball) chooses it', conditions),
     h('div', { class: 'pair' }, field('Repetitions of each', repetitions), field('Order', order.button)), h('div', { class: 'row' }, begin));
 }
@@ -37,13 +40,36 @@ function running(told, session) {
   const rows = session.trials.map((trial, i) => [i + 1, trial.condition, i === session.position && session.running ? 'under way' : trial.outcome || '·']);
   const around = rows.slice(Math.max(0, session.position - 4), session.position + 9);
   return [
-    h('p', {}, `Session of ${session.participant}: ${session.position} of ${session.trials.length} trials. File: ${session.file}; as a table: ./coglab shell rosrun coglab_console console_session.py`),
+    h('p', {}, `Session of ${session.participant}${session.study ? `, study ${session.study}` : ''}: ${session.position} of ${session.trials.length} trials.`),
     h('div', { class: 'row' },
       commandButton(next ? `Begin trial ${session.position + 1}: ${next.condition}` : 'All trials are done', { name: 'trial_begin', told, request: () => ['trial_begin', {}] }),
       ...OUTCOMES.map(([outcome, label]) => commandButton(label, { name: outcome === 'done' ? 'trial_done' : 'trial_end', told, request: () => ['trial_end', { outcome }] })),
       commandButton('End the session', { name: 'session_end', told, request: () => ['session_end', {}] })),
     table(['Trial', 'Condition', 'Outcome'], around, 'Trials around the present one'),
   ];
+}
+
+/** The newest recorded handovers, as ./coglab trial list has them. */
+function recorded({ folder = '', recording = false, rows = [] } = {}) {
+  const cells = rows.map((row) => [row.started?.slice(11, 19), [row.action, row.object].join(' '), [row.participant, row.condition].filter(Boolean).join(', '), row.outcome, row.duration_s, row.notes]);
+  return [
+    h('p', {}, recording ? `Each handover is recorded into ${folder}; ./coglab trial explain last, ./coglab trial report last.` : 'No recorder is there: launch without record:=none, or nothing of a session is written.'),
+    rows.length ? table(['UTC', 'Handover', 'Trial of', 'Outcome', 's', 'Notes'], cells, 'Recorded handovers') : null,
+  ];
+}
+
+/** A questionnaire of the study that is run live: one number per item. What is left empty is asked again. */
+function asked(one, told) {
+  const inputs = one.items.map(([, text]) => h('input', { type: 'number', min: one.low, max: one.high, step: one.step, 'aria-label': text }));
+  const request = () => ['answer', { questionnaire: one.name, answers: Object.fromEntries(one.items.flatMap(([item], i) => (inputs[i].value === '' ? [] : [[item, Number(inputs[i].value)]]))) }];
+  return h('form', { onsubmit: (event) => event.preventDefault() }, h('h3', {}, one.title), h('p', {}, `${one.low}: ${one.ends[0]}; ${one.high}: ${one.ends[1]}`),
+    ...one.items.map(([, text], i) => field(text, inputs[i])), h('div', { class: 'row' }, commandButton('Write the answers', { name: 'answer', told, words: `Write the answers: ${one.title}`, request })));
+}
+
+function questions(study, told) {
+  if (!study) return [];
+  const stands = study.problem || (study.questionnaires.length ? '' : 'Every questionnaire under this condition is answered.');
+  return [h('h2', {}, `Questionnaires of ${study.participant}, condition ${study.condition}, study ${study.study}`), stands ? h('p', {}, stands) : null, ...study.questionnaires.map((one) => asked(one, told))];
 }
 
 export function experimentPage(page) {
@@ -62,9 +88,12 @@ export function experimentPage(page) {
     setText(told, answer.message);
     if (answer.success && text.value === note) text.value = ''; // what was typed meanwhile, or was not taken, stays
   } }, 'Add the note');
+  const open = h('div');
+  const recordings = h('div');
   page.append(
-    h('div', {}, h('h2', {}, 'Session'), left, told),
-    h('div', {}, h('h2', {}, 'Notes'), field('A note with the time of now (M)', text), h('div', { class: 'row' }, add), notes));
+    h('div', {}, h('h2', {}, 'Session'), left, told, open),
+    h('div', {}, h('h2', {}, 'Notes'), field('A note with the time of now (M); the recording has it, too', text), h('div', { class: 'row' }, add), notes,
+      h('h2', {}, 'Recorded handovers'), recordings));
   let shown = '';
   const draw = () => {
     const session = store.docs.desk?.experiment;
@@ -76,8 +105,18 @@ export function experimentPage(page) {
     }
     notes.replaceChildren(table(['Time', 'Who', 'Note'], session.notes.slice().reverse().map((note) => [clock(note.stamp), note.who, note.text]), 'Notes'));
   };
+  let before = '';
+  const drawStudy = () => {
+    const key = JSON.stringify(store.docs.study ?? null);
+    if (key === before) return; // what is being typed stays
+    before = key;
+    open.replaceChildren(...questions(store.docs.study, told).filter(Boolean));
+  };
+  const drawRecordings = () => recordings.replaceChildren(...recorded(store.docs.recordings).filter(Boolean));
   draw();
-  return { docs: { desk: draw } };
+  drawStudy();
+  drawRecordings();
+  return { docs: { desk: draw, study: drawStudy, recordings: drawRecordings } };
 }
 
 /** Fits the band at the top. */

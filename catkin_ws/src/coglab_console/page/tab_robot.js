@@ -109,10 +109,13 @@ export function primitivesPage(page) {
   const list = h('div');
   const bars = h('div');
   const verdict = h('p');
-  page.append(h('div', {}, h('h2', {}, 'Primitives, as demonstrated'), list), h('div', {}, h('h2', {}, 'Recognised reach of the person'), verdict, bars));
+  const answer = h('p', { 'aria-live': 'polite' });
+  const preview = (name, words) => commandButton(words, { name: 'preview', told: answer, words: name ? `${words} of ${name}` : words, request: () => ['preview', { primitive: name }] });
+  page.append(h('div', {}, h('h2', {}, 'Primitives, as demonstrated'),
+    h('p', {}, 'Preview: the cell shows the path that the arm would take with this primitive toward the goal of the next action. Nothing moves.'), h('div', { class: 'row' }, preview('', 'No preview')), answer, list), h('div', {}, h('h2', {}, 'Recognised reach of the person'), verdict, bars));
   const draw = () => {
     const { rows = [], problem = '', file = '' } = store.docs.primitives ?? {};
-    list.replaceChildren(h('p', {}, problem || file || 'The library has not been read yet.'), ...rows.flatMap((row) => [h('h3', {}, `${row.name}, ${row.duration} s, ${row.basis} basis functions, ${row.mapping}`), h('p', {}, row.description), plot(row)]));
+    list.replaceChildren(h('p', {}, problem || file || 'The library has not been read yet.'), ...rows.flatMap((row) => [h('h3', {}, `${row.name}, ${row.duration} s, ${row.basis} basis functions, ${row.mapping}`), h('p', {}, row.description), plot(row), h('div', { class: 'row' }, preview(row.name, 'Preview'))]));
   };
   const recognise = () => {
     const seen = store.docs.recognition;

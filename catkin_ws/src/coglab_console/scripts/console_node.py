@@ -3,7 +3,8 @@
 
 Private parameters: address (default 127.0.0.1), port (default 8790; 0: any free one; where the default is taken, the
 next free one), hosts (further values of the header Host, for a tunnel with another port), real (true on hardware),
-sessions (folder of the session files; default console_sessions in ROS_HOME). The link with its one-time token is
+sessions (folder of session.json, the state of
+the open session; default console_sessions in ROS_HOME). The link with its one-time token is
 printed and kept, readable by this user alone, in console.url of ROS_HOME.
 """
 

@@ -155,3 +155,43 @@ def test_contact_by_joint_against_its_threshold_and_learning(desk):
     press_and_hold(page, button, lambda: desk.robot.calls == [("contact_learn", {})])
     desk.state = {}
     page.tab("Live")
+
+
+def test_a_questionnaire_is_filled_in_recordings_are_listed_and_a_primitive_is_previewed(desk):
+    page = desk.browser
+    page.tab("Experiment")
+    asked = {"name": "tlx", "title": "Workload", "low": 0, "high": 100, "step": 5, "ends": ["low", "high"],
+             "items": [["effort", "How hard?"], ["pace", "How hurried?"]]}  # fmt: skip
+    row = {"name": "x", "started": "2026-11-28T13:41:48.795+00:00", "action": "take", "object": "mug",
+           "participant": "P03", "condition": "calm", "outcome": "succeeded", "duration_s": 9.4,
+           "notes": "looked away"}  # fmt: skip
+    desk.put(
+        study={"study": "s", "participant": "P03", "condition": "calm", "problem": "", "questionnaires": [asked]},
+        recordings={"folder": "/x", "recording": True, "rows": [row]},
+    )
+    field = "document.querySelector('#page input[aria-label=\"How hard?\"]')"
+    page.until(f"return {field} !== null && document.body.innerText.includes('looked away')", 60.0)
+    page.js(f"{field}.value = '55'")
+    desk.put(recordings={"folder": "/y", "recording": True, "rows": [row]})
+    page.until("return document.body.innerText.includes('/y')", 60.0)
+    assert page.js(f"return {field}.value") == "55"  # what is being filled in stays
+    page.js(
+        "[...document.querySelectorAll('#page button')].find((one) => one.innerText === 'Write the answers').click()"
+    )
+    page.until("return document.querySelector('#page p[aria-live]').innerText.includes('done')", 60.0)
+    assert desk.robot.calls[-1] == ("answer", {"questionnaire": "tlx", "answers": {"effort": 55}})
+    page.tab("Primitives")
+    shown = {
+        "name": "reach_me",
+        "description": "",
+        "duration": 1.0,
+        "mapping": "none",
+        "basis": 3,
+        "plot": [[0, 0, 0, 0, 0]],
+    }
+    desk.put(primitives={"file": "f", "problem": "", "rows": [shown]})
+    button = "[...document.querySelectorAll('#page button')].find((one) => one.innerText === 'Preview')"
+    page.until(f"return {button} !== undefined", 60.0)
+    page.js(f"{button}.click()")
+    page.until("return document.querySelector('#page p[aria-live]').innerText.includes('done')", 60.0)
+    assert desk.robot.calls[-1] == ("preview", {"primitive": "reach_me"})

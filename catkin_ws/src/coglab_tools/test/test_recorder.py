@@ -86,6 +86,23 @@ def test_a_handover_becomes_a_whole_folder_with_what_came_before(tmp_path):
         assert len(list(bag.read_messages("/coglab/transitions"))) == 2
 
 
+def test_a_note_is_of_the_handover_that_runs_or_of_the_last_one(tmp_path):
+    cell = Cell(tmp_path)
+    cell.send(2000.0, "/coglab/note", String("before the first"))
+    cell.run(2000.0, 2001.0)
+    cell.move(2020.0, "wait_without_object", ACTION, ACTION)
+    cell.run(2020.0, 2021.0)
+    cell.send(2021.0, "/coglab/note", String("looked\naway"))
+    cell.result(2020.0, 2024.0)
+    cell.run(2021.0, 2026.0)
+    cell.send(2030.0, "/coglab/note", String("let go early"))
+    cell.run(2030.0, 2031.0)
+    (place,) = find_trials(tmp_path)
+    record = TrialRecord.load(place)
+    assert sorted(record.notes.split("; ")) == ["before the first", "let go early", "looked away"]
+    assert [mark for mark in record.marks if "note" in mark["name"]] == [{"name": "note: looked away", "time_s": 1.0}]
+
+
 def test_a_failure_keeps_its_code_and_a_second_one_of_the_same_second_its_folder(tmp_path):
     cell = Cell(tmp_path)
     handover(cell, outcome="failed_empty", reason_code=40, reason="nobody let go")

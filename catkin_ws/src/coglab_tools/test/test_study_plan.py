@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
+from coglab_py.packages import package_path
 from coglab_tools.command import CheckFailed, UsageError
 from coglab_tools.study.live import with_settings
 from coglab_tools.study.plan import load, new
@@ -28,6 +31,39 @@ def test_a_new_study_is_valid_and_is_not_overwritten(tmp_path):
     assert len(load(file).trials()) == 36
     with pytest.raises(UsageError, match="a folder holds one study"):
         new(tmp_path / "pilot")
+
+
+def test_a_study_that_cannot_be_written_leaves_nothing(tmp_path, monkeypatch):
+    with pytest.raises(CheckFailed, match="/proc/pilot/study.yaml cannot be written"):
+        new(Path("/proc/pilot"))
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(CheckFailed, match="No space left"):
+        new(tmp_path / "pilot")
+    assert not any(tmp_path.iterdir())
+
+
+def test_own_primitives_and_objects_are_conditions_until_they_change(tmp_path):
+    text = GOOD.replace("speed: 0.9, delivery: handle_first", "primitive: {receive: reach_high}, object: box_of_mine")
+    with pytest.raises(CheckFailed, match=r"dmp train .*primitives.xml"):
+        study(tmp_path, text)
+    shipped = package_path("coglab_controllers", "config", "primitives.xml").read_text()
+    (tmp_path / "primitives.xml").write_text(shipped.replace('id="reach_human_high"', 'id="reach_high"'))
+    with pytest.raises(CheckFailed, match=r"study.yaml:6: .*objects/ of the study's folder"):
+        study(tmp_path, text)
+    (tmp_path / "objects").mkdir()
+    mug = package_path("coglab_objects", "objects", "mug.yaml").read_text()
+    (tmp_path / "objects" / "box_of_mine.yaml").write_text(mug.replace("id: mug", "id: box_of_mine"))
+    before = study(tmp_path, text)
+    assert {"reach_high", "reach_human_high", "give_human"} <= set(before.own.primitive_names)
+    (tmp_path / "primitives.xml").write_text(shipped.replace('id="reach_human_high"', 'id="reach_high"') + "\n")
+    assert study(tmp_path, text).plan != before.plan
+    (tmp_path / "primitives.xml").write_text(shipped[:2000])
+    with pytest.raises(CheckFailed, match="primitives.xml"):
+        study(tmp_path, text)
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,8 @@ from pathlib import Path
 
 import coglab
 import pytest
+from coglab_py.packages import package_path
+from coglab_tools.__main__ import run
 from coglab_tools.command import CheckFailed, UsageError
 from coglab_tools.study import settings, simulate
 from coglab_tools.study.live import session
@@ -18,6 +20,7 @@ from coglab_tools.study.plan import load
 from coglab_tools.study.report import write_report
 from coglab_tools.study.rows import ROWS, open_rows
 from coglab_tools.study.run import run_simulated
+from coglab_tools.trial.record import TrialRecord, find_trials
 
 YAML = """\
 version: 1
@@ -150,8 +153,8 @@ def test_a_worker_of_another_version_is_refused(undisturbed):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("speed: 0.8", "speed: 0.7", "'conditions' was changed"),
-        ("name: kill", "name: other", "a folder holds one study"),
+        ("speed: 0.8", "speed: 0.7", r"study.yaml:4: 'conditions' was changed"),
+        ("name: kill", "name: other", r"study.yaml:2: .* a folder holds one study"),
     ],
 )
 def test_an_edited_study_is_refused(undisturbed, tmp_path, old, new, words):
@@ -161,6 +164,47 @@ def test_an_edited_study_is_refused(undisturbed, tmp_path, old, new, words):
         run_simulated(load(folder))
     (folder / "study.yaml").write_text(YAML + "# a comment may change\n")
     assert run_simulated(load(folder))["trials_now"] == 0
+
+
+@pytest.mark.parametrize(
+    ("number", "line", "words"),
+    [
+        (1, b"{}", "rows.jsonl:1: .*put it back"),
+        (2, b'{"trial": 1, "rows": [{}]}', "rows.jsonl:2: .*its trial runs again"),
+    ],
+)
+def test_a_line_that_was_edited_by_hand_is_named(undisturbed, tmp_path, number, line, words):
+    folder = make(tmp_path / "kill")
+    lines = (undisturbed / ROWS).read_bytes().splitlines()
+    lines[number - 1] = line
+    (folder / ROWS).write_bytes(b"\n".join(lines) + b"\n")
+    with pytest.raises(CheckFailed, match=words):
+        run_simulated(load(folder))
+
+
+def test_a_study_of_which_all_was_skipped_has_no_report(tmp_path):
+    folder = make(tmp_path / "kill")
+    with open_rows(load(folder), write=True) as rows:
+        rows.begin({}, simulated=False)
+        rows.add(1, [])
+    with pytest.raises(CheckFailed, match="all 1 trials so far were skipped"):
+        write_report(load(folder))
+
+
+@pytest.mark.parametrize(
+    "words", [["--workers", "-3"], ["--workers", "0"], ["--workers", "2", "--scheduler", "tcp://x"]]
+)
+def test_workers_that_cannot_be_are_refused(tmp_path, words, capsys):
+    assert run(["study", "run", str(make(tmp_path / "kill")), *words]) == 2
+
+
+def test_ctrl_c_names_the_way_on(undisturbed, tmp_path, monkeypatch, capsys):
+    folder = make(tmp_path / "kill")
+    lines = (undisturbed / ROWS).read_bytes().splitlines(keepends=True)
+    (folder / ROWS).write_bytes(b"".join(lines[:3]))
+    monkeypatch.setattr(simulate, "run", lambda job: (_ for _ in ()).throw(KeyboardInterrupt))
+    assert run(["study", "resume", str(folder), "--workers", "1"]) == 130
+    assert f"2 of 4 trials are done and kept. To go on: ./coglab study resume {folder}" in capsys.readouterr().err
 
 
 def test_primitive_delivery_and_feedback_reach_the_world():
@@ -177,6 +221,24 @@ def test_primitive_delivery_and_feedback_reach_the_world():
         assert world.feedback.is_enabled("ee_admittance") and world.feedback.get_execution_order()[0] == "ee_admittance"
 
 
+def test_own_files_act_and_the_recording_says_for_whom_it_is(tmp_path):
+    folder = make(tmp_path / "kill", YAML.replace("record: false\n", "").replace("participants: 2", "participants: 1"))
+    (folder / "objects").mkdir()
+    mug = package_path("coglab_objects", "objects", "mug.yaml").read_text()
+    (folder / "objects" / "my_mug.yaml").write_text(
+        mug.replace("id: mug", "id: my_mug").replace("reach_human", "reach_me")
+    )
+    library = package_path("coglab_controllers", "config", "primitives.xml").read_text()
+    (folder / "primitives.xml").write_text(library.replace('id="reach_human"', 'id="reach_me"'))
+    text = (folder / "study.yaml").read_text().replace("  natural: {timing: natural, speed: 0.8}\n", "")
+    (folder / "study.yaml").write_text(text + "object: my_mug\n")
+    assert run_simulated(load(folder), workers=1)["succeeded"] == 1
+    (place,) = find_trials(folder / "recordings")
+    record = TrialRecord.load(place)
+    assert (record.participant, record.condition, record.study, record.object) == ("P01", "calm", "kill", "my_mug")
+    assert coglab.Trial.load(place).results[0].ok
+
+
 class StubSystem:
     """Conditions of a live session, noted only: what the World of the test runs under stays as it is."""
 
@@ -189,6 +251,9 @@ class StubSystem:
     def announce(self, trial, session):
         self.calls.append(f"{trial.participant} {trial.condition}")
 
+    def note(self, text):
+        self.calls.append(text)
+
     def restore(self):
         self.calls.append("restored")
 
@@ -197,13 +262,13 @@ def test_a_live_session_notes_repeats_and_goes_on(tmp_path, capsys):
     text = YAML.replace("[receive]", "[receive, give]").replace("simulated:", "questionnaires: [nasa_tlx]\nsimulated:")
     folder, system = make(tmp_path / "kill", text), StubSystem()
     with coglab.World(seed=3, person="accustomed", perfect_perception=True) as world:
-        lines = iter(["what", "n looked away", "", "", *["50"] * 6, "r", "", "l", "q"])
+        lines = iter(["what", "n looked away", "", "", *["50"] * 6, "r", "", "n let go early", "l", "q"])
         data = session(load(folder), world.robot, system, "P02", lambda prompt: next(lines))
     assert (data["trials"], data["trials_now"], data["handovers"], data["succeeded"]) == (1, 1, 2, 2)
-    first = system.calls[0]
-    assert system.calls == [first, f"P02 {first}", f"P02 {first}", "restored"]
+    first = system.calls[1]
+    assert system.calls == ["looked away", first, f"P02 {first}", f"P02 {first}", "let go early", "restored"]
     with open_rows(load(folder)) as rows:
-        assert [row["attempt"] for row in rows.table()] == [2, 2]
+        assert [(row["attempt"], row["notes"]) for row in rows.table()] == [(2, "let go early")] * 2
     assert b"looked away" in (folder / ROWS).read_bytes()
     with pytest.raises(CheckFailed, match="live trials"):
         run_simulated(load(folder))

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -108,6 +108,8 @@ class Trial:
     """N, shape (n, 3), on the person's hand, base frame; includes the weight of an object in it"""
     held_by: np.ndarray
     """index into HOLDERS, shape (n,)"""
+    labels: Mapping[str, str] = field(default_factory=dict)
+    """whom and what for: participant, condition, study, session, notes, as in the trial.yaml of a recorded handover"""
 
     def __bool__(self) -> bool:
         return bool(self.results) and all(result.ok for result in self.results)
@@ -298,7 +300,7 @@ class Recording:
             for since, until, state in intervals
             if until >= self._begun - before and since <= end
         ]
-        arrays = {
+        arrays: dict[str, Any] = {
             name: np.array(rows, dtype=int if name == "held_by" else float).reshape(len(rows), *ARRAYS[name])
             for name, rows in self._rows.items()
         }

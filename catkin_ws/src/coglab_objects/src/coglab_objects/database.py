@@ -6,6 +6,8 @@ from __future__ import annotations
 import json
 import os
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -26,9 +28,22 @@ class ObjectError(ValueError):
     """An object file is invalid: file, line if known, field, and the expected value."""
 
 
+_chosen: list[Path] = []  # by objects_in, the innermost one last
+
+
 def objects_folder() -> Path:
-    """The folder with the objects of this package."""
-    return package_path("coglab_objects", "objects")
+    """The folder with the objects of this package, or the one that `objects_in` has chosen."""
+    return _chosen[-1] if _chosen else package_path("coglab_objects", "objects")
+
+
+@contextmanager
+def objects_in(folder: Path) -> Iterator[None]:
+    """Within this block the objects of this process are those of ``folder``: those of a simulated World made in it."""
+    _chosen.append(folder)
+    try:
+        yield
+    finally:
+        _chosen.pop()
 
 
 def parse_object(text: str, origin: str, dialect: str = "legacy") -> dict[str, Any]:

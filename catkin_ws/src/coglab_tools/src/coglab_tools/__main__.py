@@ -50,7 +50,7 @@ def run(words: list[str]) -> int:
         try:
             import argcomplete
 
-            argcomplete.autocomplete(parser)
+            argcomplete.autocomplete(parser, always_complete_options=False)
         except ImportError:  # completion alone needs it
             pass
         options = parser.parse_args(words)
@@ -59,8 +59,8 @@ def run(words: list[str]) -> int:
         return _refuse(str(error), error.status, as_json)
     except ModuleNotFoundError as error:
         return _refuse(f"the library {error.name} is missing; ./coglab install tools gets it", NOT_THERE, as_json)
-    except KeyboardInterrupt:
-        return _refuse("ended by Ctrl-C; what was finished is kept", 130, as_json)
+    except KeyboardInterrupt as error:
+        return _refuse(str(error) or "ended by Ctrl-C; what was finished is kept", 130, as_json)
     if as_json:
         print(json.dumps(answer.data, indent=1, default=str))
     else:

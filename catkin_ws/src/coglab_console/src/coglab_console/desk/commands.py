@@ -69,11 +69,19 @@ _ALL = (
         "conditions": {"type": "array", "minItems": 1, "maxItems": 12, "uniqueItems": True, "items": _LABEL},
         "repetitions": {"type": "integer", "minimum": 1, "maximum": 50},
         "order": {"enum": ["as_listed", "latin_square", "random"]},
+        "study": {"type": "string", "pattern": r"^([a-z0-9][a-z0-9_.-]{0,39})?\Z"},
     }, ("participant", "conditions", "repetitions", "order")),
     Command("session_end", "ends the session", {}),
     Command("trial_begin", "begins the next trial of the order", {}),
     Command("trial_end", "ends the trial", {"outcome": {"enum": ["done", "failed", "repeat", "skipped"]}},
             ("outcome",)),
+    Command("answer", "writes answers to a questionnaire of the study that is run live", {
+        "questionnaire": _NAME,
+        "answers": {"type": "object", "minProperties": 1, "maxProperties": 200,
+                    "additionalProperties": {"type": "number"}},
+    }, ("questionnaire", "answers"), operator=False),
+    Command("preview", "shows the path of a primitive toward the goal of the next action; empty: no longer",
+            {"primitive": {"type": "string", "pattern": r"^[A-Za-z0-9_.-]{0,64}\Z"}}, ("primitive",), operator=False),
     Command("contact_learn", "learns the noise of the torques from 5 s at rest", {}),
     Command("contact_arm", "arms the contact detector, to try it", {
         "mode": {"enum": ["contact", "off"]},
@@ -118,10 +126,12 @@ def _values(schema: dict[str, Any]) -> str:
         return ", ".join(f"`{value}`" for value in schema["enum"])
     if schema["type"] == "array":
         return f"list of {_values(schema['items'])}"
+    if schema["type"] == "object":
+        return f"{_values(schema['additionalProperties'])} by name"
     if "minimum" in schema:
         top = f" to {schema['maximum']}" if "maximum" in schema else " or more"
         return f"{schema['type']}, {schema['minimum']}{top}"
-    return {"string": "text", "boolean": "true or false"}[schema["type"]]
+    return {"string": "text", "boolean": "true or false", "number": "number"}[schema["type"]]
 
 
 def table() -> list[str]:

@@ -143,8 +143,12 @@ class Desk:
         self._invite = invite
         self.roles = Roles(lambda text, level: events.add("control", text, level))
         self.guard = MotionGuard(backend.real)
-        self.experiment = Experiment(folder, now, lambda text: events.add("experiment", text, "warning"))
-        self.experiment.phase = lambda: events.phase()
+        self.experiment = Experiment(
+            folder,
+            now,
+            lambda text: events.add("experiment", text, "warning"),
+            lambda text: backend.tell("note", text),
+        )
         goes_on = self.experiment.resume()
         if goes_on:
             events.add("experiment", goes_on, "warning")
@@ -161,7 +165,8 @@ class Desk:
         """STOP: from anybody, any number of times."""
         self.backend.stop(who)
         self.guard.stop(f"{who} pressed STOP")
-        self.experiment.record("stop", who=who)
+        if self.backend.standing().under_way:
+            self.backend.tell("note", f"STOP by {who}")  # a mark in the recording
         self.tick()
         return Answer(True, "STOP was sent to the arm and to the brain", {"stop": self.guard.stops})
 
@@ -236,7 +241,6 @@ class Desk:
         """Whether the arm or the machine stands after a stop, why, and how often it has come to stand."""
         if self.guard.observe(stopped, cause, standstills):
             self.events.add("stop", f"stopped: {cause or 'no reason was told'}", "fault")
-            self.experiment.record("stopped", cause=cause)
             self.tick()
 
     def tick(self) -> None:
@@ -284,7 +288,7 @@ class Desk:
         except ExperimentError as error:
             answer = Answer(False, str(error))
         except OSError as error:
-            answer = Answer(False, f"the session's file cannot be written: {error}")
+            answer = Answer(False, f"a file cannot be written: {error}")
         if answer is None:
             if name == "start" and arguments["action"] in (*TAKES, *GIVES):
                 arguments = {"object_id": self._meant(arguments["action"]), **arguments}
@@ -293,7 +297,7 @@ class Desk:
             answer["message"] = plain(answer["message"])
             if answer["success"] and name in ("start", "home"):  # fingers that calibrate are no motion of the arm
                 self.guard.moved(stops)
-        if name not in ("parameters", "note", "select_object"):
+        if name not in ("parameters", "note", "select_object", "preview"):
             told = f"{who}: {words_of(name, arguments)}: {answer['message']}"
             self.events.add("command", told, "info" if answer["success"] else "warning")
         self.tick()
@@ -357,6 +361,7 @@ class Desk:
                     given["order"],
                     given.get("number", 0),
                     bool(self.backend.standing().object_id),
+                    given.get("study", ""),
                 ),
             )
         if name == "session_end":

@@ -1,33 +1,44 @@
-"""A session with one participant: conditions, order of trials, notes, and the session file (session_file reads it).
+"""A session with one participant: conditions, order of trials, notes.
 
-The file holds one JSON object per line, each with `type` and `stamp` (s since 1970). The types are session,
-trial_begin, trial_end, result (as on coglab/results: its times are of the brain's clock, `began` is like `stamp`),
-note, stop (by the page), stopped (the robot stands, for any reason), resumed (by the next console after one was killed)
-and session_end.
-Use pseudonyms for participants, never names.
+What is done in it is recorded by coglab_tools' recorder, handover by handover: each `trial.yaml` has the participant,
+condition, study and session of its trial, and the notes. The only file of the console is `session.json`, the state of
+the open session, with which a console that was killed goes on. Use pseudonyms for participants, never names.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import re
 from collections.abc import Callable, Sequence
-from datetime import datetime
 from pathlib import Path
 
 from coglab_py.orders import order_of
 
 from ..web.fan_out import to_json
 from .gates import Standing
-from .session_file import Session, SessionFileError, newest, read_session
 from .words import button, outcome
 
+FILE = "session.json"
 MAX_TRIALS = 600
-RESUME = 4 * 3600.0  # s since the last line of the file; the session of a killed console is resumed within this time
+RESUME = 4 * 3600.0  # s since the file was written; the session of a killed console is resumed within this time
 TAKES = ("exchange_human_to_robot", "take")
 """Actions that begin with an empty hand and end with an object in it."""
 GIVES = ("exchange_robot_to_human", "put")
 _ACTION = {word: name for name in (*TAKES, *GIVES) for word in (name, button(name).lower())}
+_KEPT = (
+    "session",
+    "study",
+    "participant",
+    "trials",
+    "position",
+    "running",
+    "notes",
+    "_goes",
+    "_results",
+    "_last_result",
+)
+"""attributes that session.json keeps"""
 
 
 class ExperimentError(Exception):
@@ -57,75 +68,83 @@ def _mark(row: dict) -> tuple:
 
 
 class Experiment:
-    """At most one session at a time. If the file cannot be written, the session goes on in memory, with a warning."""
+    """At most one session at a time. If the file cannot be written, the session goes on in memory, with a warning.
 
-    def __init__(self, folder: Path, now: Callable[[], float], warn: Callable[[str], object]) -> None:
-        self._folder, self._now, self._warn = folder, now, warn
-        self._path: Path | None = None
-        self.participant = ""
-        self.trials: list[dict] = []
-        self.position = 0
-        self.running = False
-        self._goes = 0
+    `tell` hands a note to the recorder."""
+
+    def __init__(
+        self,
+        folder: Path,
+        now: Callable[[], float],
+        warn: Callable[[str], object],
+        tell: Callable[[str], object] = lambda text: None,
+    ) -> None:
+        self._path, self._now, self._warn, self._tell = folder / FILE, now, warn, tell
+        self._close()
         self.notes: list[dict] = []
+        self._goes = 0
         self._last_result: tuple = ()
+
+    def _close(self) -> None:
+        self.session, self.study, self.participant = "", "", ""
+        self.trials: list[dict] = []
+        self.position, self.running = 0, False
         self._results: list[dict] = []
-        """Results of actions with an object in the current trial."""
-        self.phase: Callable[[], str] = lambda: ""
+        """Kind and outcome of the actions with an object in the current trial."""
 
     def resume(self) -> str:
         """Resumes the session that a killed console has left open. Returns a sentence about it, or an empty text."""
+        if not self._path.exists():
+            return ""
         try:
-            path = newest(self._folder)
-            found = read_session(path) if path is not None else None
-        except (SessionFileError, OSError) as error:
-            self._warn(f"no session goes on: {error}")
+            found = json.loads(self._path.read_text(encoding="utf-8"))
+            if self._now() - float(found["written"]) > RESUME:
+                return ""
+            for name in _KEPT:
+                if not isinstance(found[name], type(getattr(self, name)) if name != "_last_result" else list):
+                    raise ValueError(f"{name} is {str(found[name])[:40]}")
+            for name, keys in (
+                ("trials", ("condition", "outcome")),
+                ("notes", ("stamp", "who", "text")),
+                ("_results", ("kind", "outcome")),
+            ):
+                found[name] = [{key: row[key] for key in keys} for row in found[name]]
+            if not 0 <= found["position"] <= len(found["trials"]):
+                raise ValueError(f"position is {found['position']}")
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            self._warn(f"no session goes on, {self._path} is not whole: {error}; remove it")
             return ""
-        if found is None or found.ended is not None or self._now() - found.newest > RESUME:
-            return ""
-        self._restore(found)
-        self._write("resumed")
+        for name in _KEPT:
+            setattr(self, name, found[name])
+        self._last_result = tuple(self._last_result)
         stands = "is under way" if self.running else "is next"
         trial = min(self.position + 1, len(self.trials))
-        return f"the session of {self.participant} goes on: trial {trial} of {len(self.trials)} {stands}; {self._path}"
-
-    def _restore(self, found: Session) -> None:
-        self._path, self.participant = found.path, found.participant
-        self.trials = [{"condition": condition, "outcome": ""} for condition in found.trials]
-        for attempt in found.attempts:
-            if attempt.ended is not None:
-                self.trials[attempt.trial - 1]["outcome"] = attempt.outcome
-        self.position, self.running = min(found.passed(), len(self.trials)), found.running() is not None
-        places = (*found.attempts, found.outside)
-        notes = sorted((note for place in places for note in place.notes), key=lambda note: note["stamp"])
-        self.notes = [{name: note[name] for name in ("stamp", "who", "text")} for note in notes[-100:]]
-        results = [row for place in places for row in place.results]
-        self._last_result = _mark(max(results, key=lambda row: row["stamp"])) if results else ()
-        running = found.running()
-        self._results = [row for row in running.results if row["kind"] in (*TAKES, *GIVES)] if running else []
+        return f"the session of {self.participant} goes on: trial {trial} of {len(self.trials)} {stands}"
 
     def begin(
-        self, participant: str, conditions: list[str], repetitions: int, order: str, number: int, held: bool = False
+        self,
+        participant: str,
+        conditions: list[str],
+        repetitions: int,
+        order: str,
+        number: int,
+        held: bool = False,
+        study: str = "",
     ) -> str:
-        """Opens a session. Returns the answer in words. `held`: something is in the robot's hand."""
+        """Opens a session. Returns the answer in words. `held`: something is in the robot's hand. `study`: its name,
+        for the recordings."""
         self._needs("session_begin")
         if len(conditions) * repetitions > MAX_TRIALS:
             raise ExperimentError(
                 f"{len(conditions) * repetitions} trials are more than {MAX_TRIALS}; use fewer repetitions"
             )
         trials = order_of(conditions, repetitions, order, number)
-        self._folder.mkdir(parents=True, exist_ok=True)
-        stamp = int(self._now())
-        path = self._folder / f"{participant}_{stamp}.jsonl"
-        while path.exists():
-            stamp += 1
-            path = self._folder / f"{participant}_{stamp}.jsonl"
-        self._path, self.participant, self.position, self.running, self.notes = path, participant, 0, False, []
+        self._close()
+        self.session, self.study, self.participant = f"{participant}_{int(self._now())}", study, participant
+        self.notes = []
         self.trials = [{"condition": condition, "outcome": ""} for condition in trials]
-        self._write(
-            "session", participant=participant, number=number, order=order, conditions=conditions, trials=trials
-        )
-        sentence = f"session of {participant}: {len(trials)} trials, written to {path}"
+        self._write()
+        sentence = f"session of {participant}: {len(trials)} trials"
         first = unprepared(trials, held)
         if first:
             listed = ", ".join(map(str, first[:8])) + (" …" if len(first) > 8 else "")
@@ -139,8 +158,10 @@ class Experiment:
         none = "" if self.participant else "no session is open; begin one first"
         running = f"trial {self.position + 1} is under way; end it first" if self.running else ""
         over = "every trial is done; end the session" if self.position >= len(self.trials) else ""
+        elsewhere = now.study if now is not None else ""
+        live = elsewhere and f"the study {elsewhere} is run in a terminal: end it there first"
         return {
-            "session_begin": self.participant and f"the session of {self.participant} is open; end it first",
+            "session_begin": live or self.participant and f"the session of {self.participant} is open; end it first",
             "session_end": none or running,
             "trial_begin": none or running or over or self._not_ready(now),
             "trial_end": "" if self.running else "no trial is under way",
@@ -197,9 +218,13 @@ class Experiment:
     def end(self) -> str:
         """Closes the session."""
         self._needs("session_end")
-        self._write("session_end", done=sum(trial["outcome"] == "done" for trial in self.trials))
-        sentence = f"session of {self.participant} closed; {self._path}"
-        self._path, self.participant, self.trials, self.position, self.running = None, "", [], 0, False
+        done = sum(trial["outcome"] == "done" for trial in self.trials)
+        sentence = f"session of {self.participant} closed, {done} of {len(self.trials)} trials done"
+        self._close()
+        try:
+            self._path.unlink(missing_ok=True)
+        except OSError as error:
+            self._warn(f"{self._path} cannot be removed: {error.strerror}; remove it")
         return sentence
 
     def trial_begin(self) -> str:
@@ -208,83 +233,68 @@ class Experiment:
         self.running = True
         self._goes += 1
         self._results = []
-        condition = self.trials[self.position]["condition"]
-        self._write("trial_begin", trial=self.position + 1, condition=condition)
-        return f"trial {self.position + 1} of {len(self.trials)}: {condition}"
+        self._write()
+        return f"trial {self.position + 1} of {len(self.trials)}: {self.condition()}"
 
     def trial_end(self, outcome: str) -> str:
         """Ends the trial. `repeat`: it is done again; `failed`: the robot has failed, and the next trial follows."""
         self._needs("trial_end")
+        trial = f"trial {self.position + 1}"
+        if self._results:  # the recording of its last action gets the experimenter's judgement
+            self._tell(f"{trial}: {outcome}")
         self.running = False
-        trial = self.position + 1
-        self._write("trial_end", trial=trial, condition=self.trials[self.position]["condition"], outcome=outcome)
         self.trials[self.position]["outcome"] = outcome
         self.position += outcome != "repeat"
-        return f"trial {trial}: {outcome}"
+        self._write()
+        return f"{trial}: {outcome}"
 
     def note(self, who: str, text: str) -> str:
-        """Records a note, also between trials."""
+        """Keeps a note for the page, also between trials; the recorder has its own from coglab/note."""
         self.notes = [*self.notes[-99:], {"stamp": round(self._now(), 3), "who": who, "text": text}]
-        self.record("note", who=who, text=text)
-        return "noted" if self._path is not None else "noted in the event log alone: no session is open"
+        self._write()
+        return "noted"
 
     def result(self, row: dict) -> None:
-        """Records the result of an action. A repeated result is ignored, because the topic is latched."""
+        """Takes the result of an action. A repeated result is ignored, because the topic is latched."""
         if _mark(row) == self._last_result:
             return
         self._last_result = _mark(row)
         kind = row.get("kind")
         if self.running and kind in (*TAKES, *GIVES):
-            self._results.append(row)
+            self._results.append({"kind": kind, "outcome": row.get("outcome")})
             named = actions_in(self.condition())
             if named and kind not in named:
                 self._warn(f"trial {self.position + 1} is '{self.condition()}', and {button(kind)} was done in it")
-        fields = {key: value for key, value in row.items() if key not in ("type", "stamp", "trial", "began")}
-        self._write("result", **fields, began=self._began(row))
-
-    def _began(self, row: dict) -> float:
-        """Start of a result's action in s since 1970: from the brain, or computed from its end, which is now."""
-        try:
-            return datetime.fromisoformat(row["started_utc"]).timestamp()
-        except (KeyError, TypeError, ValueError):
-            return round(self._now() - row.get("duration_s", 0.0), 3)
-
-    def record(self, kind: str, /, **fields: object) -> None:
-        """Writes a note or a stop, with the current phase, into the file of the open session."""
-        phase = self.phase()
-        self._write(kind, **fields, **({"phase": phase} if phase else {}))
+        self._write()
 
     def names(self) -> dict[str, str]:
         """Names for the recordings of the current trial; empty texts if no trial is under way."""
-        trial = (self.participant, self.condition(), self._path.stem) if self.running and self._path else ("", "", "")
-        return {"study": "", **dict(zip(("participant", "condition", "session"), trial, strict=True))}
+        found = (self.study, self.participant, self.condition(), self.session) if self.running else ("",) * 4
+        return dict(zip(("study", "participant", "condition", "session"), found, strict=True))
 
     def view(self) -> dict:
         """The session as the page shows it."""
         return {
             "participant": self.participant,
-            "file": str(self._path or ""),
+            "study": self.study,
             "trials": self.trials,
             "position": self.position,
             "running": self.running,
             "notes": self.notes[-20:],
         }
 
-    def _write(self, kind: str, /, **fields: object) -> None:
-        if self._path is None:
+    def _write(self) -> None:
+        """Keeps the state, completely or not at all."""
+        if not self.session:
             return
-        fields = {"type": kind, "stamp": round(self._now(), 3), **fields}
-        if self.running and "trial" not in fields:
-            fields["trial"] = self.position + 1
+        state = {"written": round(self._now(), 3), **{name: getattr(self, name) for name in _KEPT}}
+        part = self._path.with_name(f".{FILE}.part")
         try:
-            # A full disk or a killed console may have left half a line. End it first, or it would spoil this one.
-            with self._path.open("a+b") as stream:
-                if stream.tell():
-                    stream.seek(-1, os.SEEK_END)
-                whole = not stream.tell() or stream.read(1) == b"\n"
-                stream.write(b"" if whole else b"\n")
-                stream.write(f"{to_json(fields)}\n".encode())
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            part.write_text(to_json(state), encoding="utf-8")
+            os.replace(part, self._path)
         except OSError as error:
             self._warn(
-                f"{self._path} cannot be written ({error.strerror}); free the disk, the session goes on unwritten"
+                f"{self._path} cannot be written ({error.strerror}); free the disk: a new console would not know the "
+                "session, which goes on here"
             )

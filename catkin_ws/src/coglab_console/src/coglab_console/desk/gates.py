@@ -154,6 +154,8 @@ class Standing:
     database_alive: bool = False
     objects: tuple[str, ...] = ()
     """Identifiers of the objects in the database."""
+    study: str = ""
+    """Name of the study that `./coglab study run --live` runs now."""
 
     @property
     def leaf(self) -> str:

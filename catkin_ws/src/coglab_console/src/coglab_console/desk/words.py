@@ -170,6 +170,9 @@ def command(name: str, arguments: Mapping[str, Any]) -> str:
         words = f"{forced}{given.pop('mode')} calibration of the hand"
     elif name == "acknowledge":
         return "Acknowledge"
+    elif name == "answer":
+        words = "Questionnaire"
+        given.pop("answers", None)  # what a participant answered is nobody else's business
     else:
         words = COMMANDS.get(name) or button(name)
     rest = (" ".join(map(str, value)) if isinstance(value, list) else str(value) for value in given.values() if value)
@@ -187,6 +190,7 @@ COMMANDS = {
     "invite": "Link for one more browser",
     "contact_learn": "Learn the noise of the torques",
     "contact_arm": "Contact detector",
+    "preview": "Preview of the primitive",
     "objects_reload": "Read the object files again",
     "feedback": "Feedback controller",
     "feedback_order": "Order of the feedback controllers",

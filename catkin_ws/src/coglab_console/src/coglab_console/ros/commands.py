@@ -182,8 +182,23 @@ class RosBackend:
 
     def _objects_reload(self) -> Answer:
         answer = self._told("object_database/reload", Reload)
-        self._view.objects_read()
+        self._view.files_changed()
         return answer
+
+    def _answer(self, questionnaire: str, answers: dict[str, float]) -> Answer:
+        from coglab_tools.command import CommandError
+
+        try:
+            told = self._view.study.answer(questionnaire, answers)
+        except CommandError as error:
+            return Answer(False, str(error))
+        self._view.files_changed()
+        return Answer(True, told)
+
+    def _preview(self, primitive: str) -> Answer:
+        self._view.preview = primitive
+        shown = f"the cell shows the path of {primitive} toward the goal of the next action" if primitive else ""
+        return Answer(True, shown or "the cell shows the path of the next action")
 
     def _feedback(self, verb: str, name: str) -> Answer:
         return self._told(f"controller_manager/feedback/{verb}", FeedbackSelect, [name], "console")

@@ -1,4 +1,5 @@
-"""Files and services that change seldom: objects, configuration of the machines, primitives; and the path ahead.
+"""Files and services that change seldom: objects, configuration of the machines, primitives, recordings and
+questionnaires; and the path ahead.
 
 Each in a thread that may wait for the ROS master without anybody else waiting.
 """
@@ -21,6 +22,7 @@ from geometry_msgs.msg import Point, Quaternion
 from ..scene import path_ahead
 from ..scene.primitives import LibraryError, load_library
 from ..scene.primitives import document as library_document
+from .recordings import Recordings
 from .view import RosView
 
 PERIOD = 5.0  # s between two looks at files and at the object database
@@ -60,10 +62,11 @@ class Knowledge:
         self._own_frames = view.named
         self._ask: rospy.ServiceProxy | None = None
         self._asked = False
+        self._recordings = Recordings()
         view.entry = self._entry
         view.objects = lambda: tuple(sorted(self._entries)) if self._asked else None
         view.config = lambda: self._config
-        view.objects_read = self.read_again
+        view.files_changed = self.read_again
         threading.Thread(target=self._look, name="knowledge", daemon=True).start()
         threading.Thread(target=self._paths, name="path_ahead", daemon=True).start()
 
@@ -73,7 +76,7 @@ class Knowledge:
         return self._entries.get(name, {})
 
     def read_again(self) -> None:
-        """After the object database has read its files."""
+        """After the object database has read its files, or a questionnaire was filled in."""
         self._now.set()
 
     def _look(self) -> None:
@@ -82,6 +85,8 @@ class Knowledge:
                 ("objects", self._objects),
                 ("machines", self._machines),
                 ("primitives", self._primitives),
+                ("recordings", lambda: self._put("recordings", self._recordings.document())),
+                ("study", lambda: self._put("study", self._view.study.document())),
             ):
                 try:
                     work()
@@ -180,9 +185,13 @@ class Knowledge:
         leaf_parent = view.machine.state.split("/")[-2:-1]
         if not actions and leaf_parent and leaf_parent[0] in path_ahead.ROLES:
             actions = leaf_parent  # the action has begun, the reach has not
+        if view.preview:
+            actions = [*actions, "exchange_human_to_robot"]  # where nothing may begin now, the reach for the object
         wanted = path_ahead.aim(actions[0], view.entry(), view.hand_frame) if actions else None
         if wanted is None:
             return None
+        if view.preview:
+            wanted["primitive_id"] = view.preview
         wanted["dmp_ratio"] *= self._pace()
         answer = self._predict(wanted)
         if answer is None:

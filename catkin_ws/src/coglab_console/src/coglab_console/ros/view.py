@@ -30,6 +30,7 @@ from ..desk.gates import STANDSTILL, Standing, Standstills
 from ..desk.words import outcome, phase, plain, supervisor, transition
 from ..scene import path_ahead
 from ..scene.urdf_model import RobotModel
+from .recordings import LiveStudy
 from .tables import Tables
 
 PALM = "ih2_palm"
@@ -142,7 +143,10 @@ class RosView:
         self.config: Callable[[], dict] = dict
         self.objects: Callable[[], tuple[str, ...] | None] = lambda: None
         """Identifiers of the objects in the database; None if there is no database."""
-        self.objects_read: Callable[[], None] = lambda: None
+        self.files_changed: Callable[[], None] = lambda: None
+        self.study = LiveStudy()
+        self.preview = ""
+        """primitive whose path is shown instead of the next motion's; empty: none"""
         self.named = frozenset({self.hand_frame, self._board_frame, GOAL_FRAME})
         """Frames that the picture may show. Knowledge adds those of the objects."""
         self._moving = frozenset(model.moving()) if model else None
@@ -191,6 +195,7 @@ class RosView:
             in_hub=machine.in_hub,
             actions=tuple(machine.actions),
             object_id=machine.object_id,
+            study=self.study.name,
             arm_alive=self.there("lwr/state") and self.sources.speaks("arm"),
             motion_allowed=arm.motion_allowed,
             arm_reason=plain(arm.reason),

@@ -10,16 +10,18 @@ from coglab_tools.study.questionnaires import AnswerRow, Questionnaire, add_answ
 
 
 def ask(study: Study, participant: str, condition: str = "", block: int = 0, line: Callable[[str], str] = input) -> int:
-    """Ask for each item that is not answered yet, and write the answers of each questionnaire when it is complete.
+    """Ask for each item that is not answered yet, and write the answers of each questionnaire at its end.
 
     ``condition``: "": all, in the participant's order. ``block``: 0: all. ``line``: reads a line after a prompt. A line
     "skip" leaves an item out, "back" returns to the one before. Returns the number of answers.
     """
     if not study.questionnaires:
-        raise CheckFailed(f"{study.folder}/study.yaml names no questionnaires: add questionnaires: [nasa_tlx]")
+        raise CheckFailed(
+            f"{study.folder}/study.yaml names no questionnaires: add a line such as questionnaires: [nasa_tlx]"
+        )
     if condition and condition not in study.conditions:
         raise UsageError(f"--condition: one of {', '.join(study.conditions)} is expected, got '{condition}'")
-    answered = {row.place for row in answers_of(study.folder)}
+    answered = {row.place for row in answers_of(study)}
     visits = dict.fromkeys((t.block, t.condition) for t in study.trials() if t.participant == participant)
     count = 0
     for visit, shown in visits:
@@ -30,25 +32,30 @@ def ask(study: Study, participant: str, condition: str = "", block: int = 0, lin
                 if not items:
                     continue
                 say = f"{participant}, condition {shown}" + (f", block {visit}" if study.blocks > 1 else "")
+                answers: dict[str, float] = {}
                 try:
-                    answers = _items(questionnaire, items, say, line)
+                    _items(questionnaire, items, say, line, answers)
                 except EOFError:
-                    return count
-                add_answers(study.folder, [AnswerRow(*head, item, answer) for item, answer in answers.items()])
+                    return count + len(answers)
+                finally:  # also after Ctrl-C: what was answered is kept, the other items are asked next time
+                    if answers:
+                        add_answers(study, [AnswerRow(*head, item, answer) for item, answer in answers.items()])
                 count += len(answers)
     return count
 
 
-def _items(questionnaire: Questionnaire, items: list[str], say: str, line: Callable[[str], str]) -> dict[str, float]:
+def _items(
+    questionnaire: Questionnaire, items: list[str], say: str, line: Callable[[str], str], answers: dict[str, float]
+) -> None:
+    """Ask for the items, and put what is answered into ``answers``."""
     print(f"\n{questionnaire.title}: {say}")
     print(
         f"  {questionnaire.low:g} = {questionnaire.ends[0]}, {questionnaire.high:g} = {questionnaire.ends[1]}; "
         "skip leaves an item out, back returns to the one before"
     )
-    answers: dict[str, float] = {}
     place = 0
     while place < len(items):
-        given = line(f"  {place + 1}/{len(items)} {items[place].replace('_', ' ')}: ").strip().lower()
+        given = line(f"  {place + 1}/{len(items)} {questionnaire.shown(items[place])}: ").strip().lower()
         if given == "back":
             place = max(0, place - 1)
         elif given == "skip":
@@ -65,4 +72,3 @@ def _items(questionnaire: Questionnaire, items: list[str], say: str, line: Calla
             else:
                 answers[items[place]] = answer
                 place += 1
-    return answers

@@ -39,10 +39,8 @@ def results(jobs: Sequence[simulate.Job], workers: int = 0, scheduler: str = "")
     CheckFailed: a trial raised an exception, or a worker has other code. NotThere: the scheduler or its workers are
     lost. Results that came before are valid.
     """
-    if scheduler and workers:
-        raise UsageError("give --workers or --scheduler, not both: a scheduler has its own workers")
-    if not 0 <= workers <= MOST_WORKERS:
-        raise UsageError(f"--workers: 1 to {MOST_WORKERS} is expected, got {workers}")
+    if not 0 <= workers <= MOST_WORKERS or (scheduler and workers):
+        raise UsageError(f"0 to {MOST_WORKERS} workers are expected, and none beside a scheduler; got {workers}")
     count = min(workers or cores(), max(1, len(jobs)))
     if not scheduler and count == 1:
         for job in jobs:

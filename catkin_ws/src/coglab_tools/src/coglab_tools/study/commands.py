@@ -22,7 +22,9 @@ def add(verbs: argparse._SubParsersAction[Any]) -> None:
     ):
         parser = verbs.add_parser(verb, help=text)
         _folder(parser)
-        parser.add_argument("--workers", type=int, default=0, help="processes on this computer; default: one per core")
+        parser.add_argument(
+            "--workers", type=_workers, default=0, metavar="N", help="processes on this computer; default: one per core"
+        )
         parser.add_argument(
             "--scheduler", default="", metavar="ADDRESS", help="Dask scheduler, such as tcp://127.0.0.1:8786"
         )
@@ -51,6 +53,14 @@ def _folder(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "folder", type=Path, nargs="?", default=Path(), metavar="FOLDER", help="of the study; default: here"
     )
+
+
+def _workers(text: str) -> int:
+    from coglab_tools.study.cluster import MOST_WORKERS
+
+    if not text.isdecimal() or not 1 <= int(text) <= MOST_WORKERS:
+        raise argparse.ArgumentTypeError(f"1 to {MOST_WORKERS} processes are expected, got {text}")
+    return int(text)
 
 
 def _init(options: argparse.Namespace) -> Answer:
@@ -86,22 +96,35 @@ def _run(options: argparse.Namespace) -> Answer:
         )
     if not options.fresh and not done and not live:
         raise UsageError(f"nothing was interrupted, no trial is done: ./coglab study run {study.folder}")
-    if live:
-        if options.workers or options.scheduler:
-            raise UsageError("--workers and --scheduler are for simulated studies, and this one is live")
-        from coglab_tools.study.live import run_live
+    if live and (options.workers or options.scheduler):
+        raise UsageError("--workers and --scheduler are for simulated studies, and this one is live")
+    if not live and options.participant:
+        raise UsageError("--participant is for live sessions: add --live")
+    if options.workers and options.scheduler:
+        raise UsageError("give --workers or --scheduler, not both: a scheduler has its own workers")
+    try:
+        if live:
+            from coglab_tools.study.live import run_live
 
-        data = run_live(study, options.participant)
-    else:
-        if options.participant:
-            raise UsageError("--participant is for live sessions: add --live")
-        from coglab_tools.study.run import run_simulated
+            data = run_live(study, options.participant)
+        else:
+            from coglab_tools.study.run import run_simulated
 
-        data = run_simulated(study, options.workers, options.scheduler)
+            data = run_simulated(study, options.workers, options.scheduler)
+    except KeyboardInterrupt:
+        with open_rows(study) as rows:
+            done = len(rows.trials)
+        verb = "resume" if done or live else "run"
+        raise KeyboardInterrupt(
+            f"ended by Ctrl-C; {done} of {total} trials are done and kept. To go on: ./coglab study {verb} "
+            f"{study.folder}{' --live' if live else ''}"
+        ) from None
     text = (
         f"{data['trials']} of {total} trials of {study.name} are done, {data['trials_now']} of them now: "
         f"{data['succeeded']} of {data['handovers']} handovers succeeded; {data['table']}"
     )
+    if not live and (study.folder / "machines.yaml").exists():
+        text += f"; {study.folder / 'machines.yaml'} is for live sessions, simulated trials have the shipped one"
     following = "report" if data["trials"] == total else "status"
     return Answer(text, data, f"./coglab study {following} {study.folder}")
 
@@ -113,7 +136,7 @@ def _status(options: argparse.Namespace) -> Answer:
 
     study = load(options.folder)
     trials = study.trials()
-    answered = {(row.participant, row.condition) for row in answers_of(study.folder)}
+    answered = {(row.participant, row.condition) for row in answers_of(study)}
     with open_rows(study) as rows:
         done, started, simulated = set(rows.trials), rows.header is not None, rows.simulated
         table = rows.table()
@@ -159,9 +182,11 @@ def _import(options: argparse.Namespace) -> Answer:
 
     study = load(options.folder)
     if not study.questionnaires:
-        raise CheckFailed(f"{study.folder}/study.yaml names no questionnaires: add questionnaires: [nasa_tlx]")
-    rows = read_answers(options.file, study.participants, list(study.conditions), study.questionnaires, study.blocks)
-    new, replaced = add_answers(study.folder, rows)
+        raise CheckFailed(
+            f"{study.folder}/study.yaml names no questionnaires: add a line such as questionnaires: [nasa_tlx]"
+        )
+    rows = read_answers(options.file, study)
+    new, replaced = add_answers(study, rows)
     text = f"{new} new answers, {replaced} replaced, from {options.file}"
     return Answer(text, {"new": new, "replaced": replaced}, f"./coglab study report {study.folder}")
 

@@ -15,25 +15,27 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import yaml
-from coglab_objects.database import ObjectError, objects_folder, parse_object
+from coglab_objects.database import ObjectError, parse_object
 from coglab_py.packages import package_path
 from coglab_smach.context.config import Config, ConfigError
 from coglab_smach.parameters import BY_NAME
 
 from coglab_tools.command import CheckFailed, NotThere, UsageError
+from coglab_tools.files import write_whole
 from coglab_tools.study import settings as condition_settings
 from coglab_tools.study.ask import ask
+from coglab_tools.study.own_files import PRIMITIVES
 from coglab_tools.study.plan import Study, Trial
-from coglab_tools.study.questionnaires import write_whole
 from coglab_tools.study.recordings import RECORDINGS
 from coglab_tools.study.rows import Rows, open_rows, undone, write_table
 from coglab_tools.study.simulate import identity
 
 LIVE = "live"
 ANSWER = 5.0  # s, limit for an answer of a node
-PARAMETERS = "/coglab/trial"
+PARAMETERS, NOTES = "/coglab/trial", "/coglab/note"
 HELP = (
-    "Enter starts, n TEXT notes, r does the last trial again, s skips this one, c resets the robot, q ends the session"
+    "Enter starts, n TEXT notes something about the trial that was just done (before the first: about that one), r "
+    "does the last one again, s skips this one, c resets the robot, q ends the session"
 )
 
 
@@ -45,6 +47,9 @@ class System(Protocol):
 
     def announce(self, trial: Trial, session: str) -> None:
         """Say which trial is next, for recorders."""
+
+    def note(self, text: str) -> None:
+        """Tell recorders a note of the experimenter."""
 
     def restore(self) -> None:
         """Put everything back as it was before the session."""
@@ -76,7 +81,7 @@ def session(
             study.participant(participant)
         if not left:
             who = participant or "every participant"
-            raise UsageError(f"all trials of {who} are done; ./coglab study report {study.folder}")
+            raise UsageError(f"{study.folder}: all trials of {who} are done; ./coglab study report {study.folder}")
         left = [trial for trial in left if trial.participant == left[0].participant]
         rows.begin(identity(), simulated=False)
         name = f"{study.name}_{left[0].participant}_{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
@@ -107,6 +112,9 @@ class _Session:
         self.study, self.robot, self.system, self.rows, self.name, self.line = study, robot, system, rows, name, line
         self._condition = ""
         self._notes: list[str] = []
+        """before the first trial of the session"""
+        self._last: tuple[int, list[dict[str, Any]]] | None = None
+        """number and rows of the trial that was just done"""
         self._attempts: dict[int, int] = {}
 
     def run(self, left: list[Trial]) -> None:
@@ -121,7 +129,7 @@ class _Session:
             if word == "q":
                 return
             if word == "n":
-                self._notes.append(text)
+                self._note(text.strip())
             elif word == "c":
                 self._reset()
             elif word == "r" and place > 0:
@@ -190,10 +198,23 @@ class _Session:
             rows.append(row | result_fields(result))
             if not result.ok:
                 break
-        notes = "; ".join(self._notes)
-        self.rows.add(trial.number, [row | {"notes": notes} for row in rows])
-        self._notes, self._attempts[trial.number] = [], attempt
+        rows = [row | {"notes": "; ".join(self._notes)} for row in rows]
+        self.rows.add(trial.number, rows)
+        self._notes, self._attempts[trial.number], self._last = [], attempt, (trial.number, rows)
         return True
+
+    def _note(self, text: str) -> None:
+        if not text:
+            print("  n TEXT: the text is missing")
+            return
+        self.system.note(text)
+        if self._last is None:
+            self._notes.append(text)
+            return
+        number, rows = self._last
+        rows = [row | {"notes": "; ".join(filter(None, [row["notes"], text]))} for row in rows]
+        self.rows.add(number, rows)  # the newer line of a trial counts
+        self._last = number, rows
 
     def _reset(self) -> None:
         try:
@@ -205,7 +226,12 @@ class _Session:
         """After the last trial under a condition: its questionnaires."""
         if not self.study.questionnaires or any((t.block, t.condition) == (trial.block, trial.condition) for t in left):
             return
-        if self.line("questionnaires now? Enter: yes, l: later > ").strip() == "":
+        how = "questionnaires: Enter asks for them here, or after they were filled in at the console; l: later > "
+        word = self.line(how).strip()
+        while word.partition(" ")[0] == "n":
+            self._note(word.partition(" ")[2].strip())
+            word = self.line(how).strip()
+        if word == "":
             ask(self.study, trial.participant, trial.condition, trial.block, self.line)
 
 
@@ -235,6 +261,11 @@ def objects_copy(study: Study) -> Path:
     return (study.folder / LIVE / "objects").resolve()
 
 
+def primitives_copy(study: Study) -> Path:
+    """The library of primitives during a session, where the study has primitives of its own."""
+    return (study.folder / LIVE / PRIMITIVES).resolve()
+
+
 def recordings_folder(study: Study) -> Path:
     """Where the recorder writes the handovers of this study."""
     return (study.folder / RECORDINGS).resolve()
@@ -242,18 +273,20 @@ def recordings_folder(study: Study) -> Path:
 
 def launch_line(study: Study) -> str:
     """The command that starts the system for this study."""
+    own = f"primitives:={primitives_copy(study)} " if study.own.primitives else ""
     return (
-        f"./coglab launch machines:={machines_file(study)} objects:={objects_copy(study)} "
+        f"./coglab launch machines:={machines_file(study)} objects:={objects_copy(study)} {own}"
         f"record:={recordings_folder(study)}"
     )
 
 
 def prepare(study: Study) -> None:
-    """Write both as they are without a condition: from the study's own machines.yaml and objects/, else as shipped."""
-    objects_copy(study).mkdir(parents=True, exist_ok=True)
+    """Write them as they are without a condition: from the study's own machines.yaml, primitives.xml and objects/,
+    beside what is shipped. CheckFailed: they cannot be written."""
     write_machines(study, {})
-    for file in sorted(_objects(study).glob("*.yaml")):
-        _write(objects_copy(study) / file.name, file.read_bytes())
+    write_objects(study, "", {})
+    if study.own.primitives:
+        _write(primitives_copy(study), study.own.library())
 
 
 def write_machines(study: Study, settings: Mapping[str, Any]) -> None:
@@ -295,26 +328,19 @@ def with_settings(values: Mapping[str, Any], settings: Mapping[str, Any]) -> dic
 
 def write_objects(study: Study, object_id: str, settings: Mapping[str, Any]) -> None:
     """Write the objects, one of them with the primitive and delivery of a condition."""
-    for file in sorted(_objects(study).glob("*.yaml")):
-        content = file.read_bytes()
-        if file.stem == object_id and ("primitive" in settings or "delivery" in settings):
+    for name, text in study.own.object_texts.items():
+        file = objects_copy(study) / f"{name}.yaml"
+        if name == object_id and ("primitive" in settings or "delivery" in settings):
             try:
-                changed = condition_settings.object_with(parse_object(content.decode(), file.name), settings)
-                content = yaml.safe_dump(changed, sort_keys=False).encode()
-                parse_object(content.decode(), file.name)
-            except (ObjectError, UnicodeDecodeError) as error:
+                text = yaml.safe_dump(condition_settings.object_with(study.own.object(name), settings), sort_keys=False)
+                parse_object(text, str(file))
+            except ObjectError as error:
                 raise CheckFailed(str(error)) from None
-        _write(objects_copy(study) / file.name, content)
-
-
-def _objects(study: Study) -> Path:
-    own = study.folder / "objects"
-    return own if own.is_dir() else objects_folder()
+        _write(file, text.encode())
 
 
 def _write(file: Path, content: bytes) -> None:
     if not file.exists() or file.read_bytes() != content:
-        file.parent.mkdir(parents=True, exist_ok=True)
         write_whole(file, content)
 
 
@@ -326,6 +352,7 @@ class RunningSystem:
 
     def __init__(self, study: Study) -> None:
         import rospy
+        from std_msgs.msg import String
 
         self.study = study
         changes = [set(settings) for settings in study.conditions.values()]
@@ -336,6 +363,7 @@ class RunningSystem:
             for parameter, wanted in (
                 ("/coglab/config_file", machines_file(study)),
                 ("/object_database/folder", objects_copy(study)),
+                *([("/coglab/dmp_library", primitives_copy(study))] if study.own.primitives else []),
             )
             if Path(str(rospy.get_param(parameter, ""))).resolve() != wanted
         ]
@@ -353,6 +381,7 @@ class RunningSystem:
         if Path(str(rospy.get_param("/trial_recorder/folder", ""))).resolve() != recordings_folder(study):
             print("  no recorder writes into this study: its report will have no fluency and no forces. To record:")
             print(f"  {launch_line(study)}")
+        self._publisher = rospy.Publisher(NOTES, String, queue_size=20)
         self._speed = float(rospy.get_param("/controller_manager/speed_scale", 1.0))
         self._feedback = self._standing_feedback() if "feedback" in self._names else []
 
@@ -370,7 +399,8 @@ class RunningSystem:
             self._set_feedback(settings.get("feedback", self._feedback))
 
     def announce(self, trial: Trial, session: str) -> None:
-        """See System: sets the parameters /coglab/trial/study, participant, condition and session."""
+        """See System: sets the parameters below /coglab/trial: study, participant, condition and session for recorders,
+        study_folder and block for the console's questionnaires."""
         import rospy
 
         values = {
@@ -378,8 +408,16 @@ class RunningSystem:
             "participant": trial.participant,
             "condition": trial.condition,
             "session": session,
+            "study_folder": str(self.study.folder.resolve()),
+            "block": trial.block,
         }
         rospy.set_param(PARAMETERS, values)
+
+    def note(self, text: str) -> None:
+        """See System: publishes it on /coglab/note, where recorder and console hear it."""
+        from std_msgs.msg import String
+
+        self._publisher.publish(String(text))
 
     def restore(self) -> None:
         """See System."""

@@ -7,6 +7,7 @@ import json
 import os
 import re
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -18,10 +19,13 @@ from coglab_py.yaml_file import Document, YamlError, read
 from coglab_sim.person.participant import BEHAVIOURS, PROFILES, Participant
 
 from coglab_tools.command import CheckFailed, UsageError
+from coglab_tools.files import write_whole
 from coglab_tools.study import settings as condition_settings
+from coglab_tools.study.own_files import OwnFiles
 from coglab_tools.study.questionnaires import Questionnaire, find
 
 FILE = "study.yaml"
+OWN_FILES = "own files"  # key of their hashes in the plan
 ORDERS = ("latin_square", "random", "fixed")
 TAKES, GIVES = ("receive", "take"), ("give", "put")
 MOST_TRIALS = 100_000
@@ -104,7 +108,9 @@ class Study:
     record: bool
     simulated: Mapping[str, Any]
     plan: Mapping[str, Any]
-    """the file's values: what must not change after the first trial"""
+    """the file's values, and the hashes of the own files: what must not change after the first trial"""
+    own: OwnFiles
+    """primitives and objects of the study's own"""
 
     def trials(self) -> list[Trial]:
         """The whole plan, participant by participant."""
@@ -134,7 +140,10 @@ class Study:
     def participant(self, name: str) -> str:
         """The name itself. UsageError if the study has no such participant."""
         if name not in self.participants:
-            raise UsageError(f"participant: one of {', '.join(self.participants)} is expected, got '{name}'")
+            raise UsageError(
+                f"participant: one of {', '.join(self.participants)} is expected, got '{name}'; {self.folder / FILE} "
+                "lists them"
+            )
         return name
 
 
@@ -152,12 +161,20 @@ def new(folder: Path) -> Path:
         )
     if (folder / FILE).exists():
         raise UsageError(f"{folder / FILE} exists: a folder holds one study; choose another name")
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise UsageError(f"{folder} exists and is not empty: choose another name")
-    folder.mkdir(parents=True, exist_ok=True)
     template = package_path("coglab_tools", "templates", FILE).read_text(encoding="utf-8")
-    (folder / FILE).write_text(template.replace("NAME", name), encoding="utf-8")
-    return folder / FILE
+    made = not folder.exists()
+    try:
+        if not made and (not folder.is_dir() or any(folder.iterdir())):
+            raise UsageError(f"{folder} exists and is not empty: choose another name")
+    except OSError as error:
+        raise CheckFailed(f"{folder} cannot be read: {error.strerror}; choose another place") from None
+    try:
+        return write_whole(folder / FILE, template.replace("NAME", name))
+    except CheckFailed:
+        if made:
+            with suppress(OSError):
+                folder.rmdir()
+        raise
 
 
 def load(place: str | os.PathLike[str]) -> Study:
@@ -184,8 +201,9 @@ def _study(folder: Path, document: Document) -> Study:
 
     if not NAME.match(value["name"]):
         raise refuse(("name",), f"letters a-z, digits, _ . - are expected, at most 40, got '{value['name']}'")
+    own = OwnFiles.read(folder)
     object_id = value.get("object", "mug")
-    if sentence := condition_settings.problem("object", object_id, set()):
+    if sentence := condition_settings.problem("object", object_id, set(), own):
         raise refuse(("object",), sentence)
     held = False
     for place, action in enumerate(value["trial"]):
@@ -193,7 +211,7 @@ def _study(folder: Path, document: Document) -> Study:
             stands = "holds the object already" if held else "is empty: receive or take comes first"
             raise refuse(("trial", place), f"'{action}' cannot follow: the hand {stands}")
         held = action in TAKES
-    conditions = dict(_conditions(document, object_id))
+    conditions = dict(_conditions(document, object_id, own))
     questionnaires = []
     for place, name in enumerate(value.get("questionnaires", [])):
         try:
@@ -215,7 +233,8 @@ def _study(folder: Path, document: Document) -> Study:
         float(value.get("limit_s", 60.0)),
         value.get("record", True),
         value.get("simulated", {}),
-        json.loads(json.dumps(value)),
+        json.loads(json.dumps({**value, OWN_FILES: own.hashes} if own else value)),
+        own,
     )
     _check_person(document)
     total = len(study.participants) * len(conditions) * study.blocks * study.repetitions
@@ -242,7 +261,7 @@ def _participants(document: Document) -> tuple[str, ...]:
     return tuple(given)
 
 
-def _conditions(document: Document, object_id: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
+def _conditions(document: Document, object_id: str, own: OwnFiles) -> Iterator[tuple[str, Mapping[str, Any]]]:
     given = document.value["conditions"]
     if all(isinstance(levels, list) for levels in given.values()):
         paths: dict[str, dict[str, tuple[Any, ...]]] = {}
@@ -250,7 +269,6 @@ def _conditions(document: Document, object_id: str) -> Iterator[tuple[str, Mappi
     else:
         made = [(str(name), changes if changes is not None else {}) for name, changes in given.items()]
         paths = {}
-    objects = {object_id, *(str(c["object"]) for _, c in made if isinstance(c, dict) and "object" in c)}
     seen: set[str] = set()
     for name, changes in made:
         path: tuple[Any, ...] = ("conditions",) if name in paths else ("conditions", name)
@@ -264,9 +282,9 @@ def _conditions(document: Document, object_id: str) -> Iterator[tuple[str, Mappi
                     path, "settings such as {timing: calm} are expected; or a list of levels for every setting"
                 )
             )
-        own = {str(changes.get("object", object_id))} if "object" in changes else objects & {object_id}
+        handed = {str(changes.get("object", object_id))}
         for setting, value in changes.items():
-            if sentence := condition_settings.problem(str(setting), value, own):
+            if sentence := condition_settings.problem(str(setting), value, handed & set(own.object_texts), own):
                 where = paths.get(name, {}).get(setting, (*path, setting))
                 raise YamlError(document.sentence(where, sentence))
         yield name, dict(changes)

@@ -1,7 +1,8 @@
 """Questionnaires: their items, scales and scores, and the answers of a study (``questionnaires.csv``, row per answer).
 
-A questionnaire is a YAML file: title, source, low, high, step, ends, scales (scale: [item, ...]), reversed ([item]).
-The score of a scale is the mean of its items; a reversed item counts low + high - answer.
+A questionnaire is a YAML file: title, source, low, high, step, ends, scales (scale: [item, ...]), reversed ([item]),
+wording (item: sentence that is shown). The score of a scale is the mean of its items; a reversed item counts
+low + high - answer.
 """
 
 from __future__ import annotations
@@ -9,16 +10,20 @@ from __future__ import annotations
 import csv
 import io
 import math
-import os
+import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from coglab_py.packages import package_path
 from coglab_py.yaml_file import YamlError, read
 
 from coglab_tools.command import CheckFailed
+from coglab_tools.files import write_whole
+
+if TYPE_CHECKING:
+    from coglab_tools.study.plan import Study
 
 ANSWERS = "questionnaires.csv"
 COLUMNS = ("participant", "block", "condition", "questionnaire", "item", "answer")
@@ -37,6 +42,7 @@ _SCHEMA = {
         "ends": {"type": "array", "minItems": 2, "maxItems": 2, "items": {"type": "string"}},
         "scales": {"type": "object", "minProperties": 1, "additionalProperties": _WORDS},
         "reversed": _WORDS,
+        "wording": {"type": "object", "additionalProperties": {"type": "string", "minLength": 1}},
     },
 }
 
@@ -57,6 +63,12 @@ class Questionnaire:
     scales: Mapping[str, tuple[str, ...]]
     """items of each scale"""
     reversed: frozenset[str]
+    wording: Mapping[str, str] = field(default_factory=dict)
+    """sentences by item; an item without one is shown by its name"""
+
+    def shown(self, item: str) -> str:
+        """What participants read."""
+        return self.wording.get(item) or item.replace("_", " ")
 
     @property
     def items(self) -> tuple[str, ...]:
@@ -120,9 +132,9 @@ def find(name: str, folder: Path) -> Questionnaire:
         twice = next((item for item in items if items.count(item) > 1), "")
         if twice:
             raise YamlError(document.sentence(("scales",), f"the item '{twice}' appears twice"))
-        unknown = next((item for item in value.get("reversed", []) if item not in items), "")
-        if unknown:
-            raise YamlError(document.sentence(("reversed",), f"'{unknown}' is no item of the scales"))
+        for key in ("reversed", "wording"):
+            if unknown := next((item for item in value.get(key, ()) if item not in items), ""):
+                raise YamlError(document.sentence((key,), f"'{unknown}' is no item of the scales"))
         if not value["low"] < value["high"]:
             raise YamlError(document.sentence(("high",), "high must be above low"))
     except YamlError as error:
@@ -138,21 +150,20 @@ def find(name: str, folder: Path) -> Questionnaire:
         (ends[0], ends[1]),
         {scale: tuple(items) for scale, items in value["scales"].items()},
         frozenset(value.get("reversed", [])),
+        value.get("wording", {}),
     )
 
 
-def answers_of(folder: Path) -> list[AnswerRow]:
-    """All answers of a study. An empty list if there are none."""
-    path = folder / ANSWERS
-    if not path.exists():
-        return []
-    return [AnswerRow(r[0], int(r[1]), r[2], r[3], r[4], float(r[5])) for r in list(csv.reader(_text(path)))[1:]]
+def answers_of(study: Study) -> list[AnswerRow]:
+    """All answers of a study. An empty list if there are none. CheckFailed names file and line."""
+    path = study.folder / ANSWERS
+    return read_answers(path, study) if path.exists() else []
 
 
-def add_answers(folder: Path, rows: Iterable[AnswerRow]) -> tuple[int, int]:
+def add_answers(study: Study, rows: Iterable[AnswerRow]) -> tuple[int, int]:
     """Add answers to the study's file, or replace older answers to the same items. The file is written completely or
     not at all. Returns the numbers of new and of replaced answers."""
-    known = {row.place: row for row in answers_of(folder)}
+    known = {row.place: row for row in answers_of(study)}
     new = {row.place: row for row in rows}
     replaced = len(known.keys() & new.keys())
     text = io.StringIO()
@@ -160,37 +171,20 @@ def add_answers(folder: Path, rows: Iterable[AnswerRow]) -> tuple[int, int]:
     writer.writerow(COLUMNS)
     for row in sorted({**known, **new}.values(), key=lambda row: row.place):
         writer.writerow([*row.place, f"{row.answer:g}"])
-    write_whole(folder / ANSWERS, text.getvalue().encode())
+    write_whole(study.folder / ANSWERS, text.getvalue().encode())
     return len(new) - replaced, replaced
 
 
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file completely or not at all."""
-    part = path.with_name(f".{path.name}.part")
-    try:
-        with part.open("wb") as stream:
-            stream.write(content)
-            stream.flush()
-            os.fsync(stream.fileno())
-        part.replace(path)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise CheckFailed(f"{path} cannot be written: {error.strerror}; nothing was changed") from None
-
-
-def read_answers(
-    path: Path, participants: Sequence[str], conditions: Sequence[str], known: Sequence[Questionnaire], blocks: int = 1
-) -> list[AnswerRow]:
+def read_answers(path: Path, study: Study) -> list[AnswerRow]:
     """Answers from a CSV file, all of it or nothing. CheckFailed names file and line.
 
     Two forms: one row per answer, with the columns of COLUMNS (block may be left out); or one row per participant and
     condition, with the columns participant, condition, block (may be left out) and one column per item, as a form on
-    the web exports it. An empty cell is no answer.
+    the web exports it. An empty cell is no answer. Cells are separated by commas, semicolons (with a decimal comma, as
+    a German Excel writes them) or tabs.
     """
-    lines = list(csv.reader(_text(path)))
-    if not lines:
-        raise CheckFailed(f"{path}:1: a line of column names is expected, got an empty file")
-    header = [cell.strip().lstrip("\ufeff") for cell in lines[0]]
+    known = study.questionnaires
+    header, lines = _table(path)
     missing = [name for name in ("participant", "condition") if name not in header]
     if missing:
         raise CheckFailed(f"{path}:1: the column {missing[0]} is expected, got {', '.join(header)[:200]}")
@@ -209,13 +203,9 @@ def read_answers(
                     f"{path}:1: the column '{name}' is no item of {', '.join(by_name) or 'any questionnaire'}"
                 )
     found: dict[tuple[str, int, str, str, str], AnswerRow] = {}
-    for number, cells in enumerate(lines[1:], 2):
-        if not any(cell.strip() for cell in cells):
-            continue
-        if len(cells) != len(header):
-            raise CheckFailed(f"{path}:{number}: {len(header)} cells are expected, got {len(cells)}")
-        row = {name: cell.strip() for name, cell in zip(header, cells, strict=True)}
-        head = _head(f"{path}:{number}", row, participants, conditions, blocks)
+    for number, cells in lines:
+        row = dict(zip(header, cells, strict=True))
+        head = _head(f"{path}:{number}", row, study)
         pairs: list[tuple[Questionnaire, str, str]]
         if long:
             each = by_name.get(row["questionnaire"])
@@ -239,15 +229,38 @@ def read_answers(
     return list(found.values())
 
 
-def _head(
-    where: str, row: Mapping[str, str], participants: Sequence[str], conditions: Sequence[str], blocks: int
-) -> tuple[str, int, str]:
-    for name, known in (("participant", participants), ("condition", conditions)):
+def _table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """Column names, and the rows that are not empty with their line numbers; cells without spaces around them."""
+    text = _text(path)
+    first = text.readline()
+    text.seek(0)
+    mark = max(",;\t", key=first.count)
+    reader = csv.reader(text, delimiter=mark, strict=True)
+    rows: list[tuple[int, list[str]]] = []
+    try:
+        for cells in reader:
+            if any(cell.strip() for cell in cells):
+                rows.append((reader.line_num, [cell.strip() for cell in cells]))
+    except csv.Error as error:
+        raise CheckFailed(f"{path}:{reader.line_num}: a row of a CSV table is expected: {error}") from None
+    if not rows:
+        raise CheckFailed(f"{path}:1: a line of column names is expected, got an empty file")
+    (_, header), *lines = rows
+    for number, cells in lines:
+        if len(cells) != len(header):
+            raise CheckFailed(f"{path}:{number}: {len(header)} cells are expected, got {len(cells)}")
+    if mark == ";":
+        lines = [(number, [re.sub(r"^(-?\d+),(\d+)\Z", r"\1.\2", cell) for cell in cells]) for number, cells in lines]
+    return header, lines
+
+
+def _head(where: str, row: Mapping[str, str], study: Study) -> tuple[str, int, str]:
+    for name, known in (("participant", study.participants), ("condition", tuple(study.conditions))):
         if row[name] not in known:
             raise CheckFailed(f"{where}: {name}: one of {', '.join(known)} is expected, got '{row[name]}'")
     block = _number(f"{where}: block", row.get("block") or "1")
-    if block not in range(1, blocks + 1):
-        raise CheckFailed(f"{where}: block: a whole number 1 to {blocks} is expected, got {block:g}")
+    if block not in range(1, study.blocks + 1):
+        raise CheckFailed(f"{where}: block: a whole number 1 to {study.blocks} is expected, got {block:g}")
     return row["participant"], int(block), row["condition"]
 
 
@@ -263,7 +276,7 @@ def _text(path: Path) -> io.StringIO:
     try:
         if path.stat().st_size > LARGEST:
             raise CheckFailed(f"{path}: at most {LARGEST} bytes are expected, got {path.stat().st_size}")
-        return io.StringIO(path.read_text(encoding="utf-8"), newline="")
+        return io.StringIO(path.read_text(encoding="utf-8-sig"), newline="")
     except OSError as error:
         raise CheckFailed(f"{path} cannot be read: {error.strerror}") from None
     except UnicodeDecodeError as error:

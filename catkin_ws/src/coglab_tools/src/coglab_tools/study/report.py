@@ -15,11 +15,12 @@ import numpy as np
 from coglab_py.packages import package_path
 
 from coglab_tools.command import CheckFailed
+from coglab_tools.files import write_whole
 from coglab_tools.report.metrics import METRICS
 from coglab_tools.study.plan import Study
-from coglab_tools.study.questionnaires import answers_of, scores_of, write_whole
+from coglab_tools.study.questionnaires import answers_of, scores_of
 from coglab_tools.study.recordings import joined
-from coglab_tools.study.rows import open_rows, write_table
+from coglab_tools.study.rows import ROWS, open_rows, write_table
 from coglab_tools.study.statistics import Comparison, compare, holm, wilson
 
 if TYPE_CHECKING:
@@ -45,7 +46,12 @@ def write_report(study: Study, pdf: bool = False) -> dict[str, Any]:
     trials that are left. CheckFailed without a finished trial."""
     with open_rows(study) as rows:
         if not rows.trials:
-            raise CheckFailed(f"no trial of {study.name} is done: ./coglab study run {study.folder}")
+            raise CheckFailed(f"{study.folder}: no trial of {study.name} is done: ./coglab study run {study.folder}")
+        if not rows.table():
+            raise CheckFailed(
+                f"{study.folder / ROWS} has no handover: all {len(rows.trials)} trials so far were skipped; "
+                f"./coglab study status {study.folder} shows what is left"
+            )
         table, problems = joined(study, rows.table())
         done, header = len(rows.trials), rows.header or {}
         files = [str(write_table(study, table))]
@@ -93,7 +99,7 @@ def _measures(study: Study, table: Sequence[Mapping[str, Any]]) -> Iterator[Meas
 
 
 def _scores(study: Study) -> Iterator[Measure]:
-    scores = scores_of(answers_of(study.folder), study.questionnaires)
+    scores = scores_of(answers_of(study), study.questionnaires)
     for each in study.questionnaires:
         for scale, items in each.scales.items():
             own = [s for s in scores if s["questionnaire"] == each.name and s["scale"] == scale]

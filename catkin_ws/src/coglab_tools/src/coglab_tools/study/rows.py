@@ -17,9 +17,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
+from coglab_py.yaml_file import read
+
 from coglab_tools.command import CheckFailed, UsageError
-from coglab_tools.study.plan import FILE, Study
-from coglab_tools.study.questionnaires import answers_of, scores_of, write_whole
+from coglab_tools.files import write_whole
+from coglab_tools.study.plan import FILE, OWN_FILES, Study
+from coglab_tools.study.questionnaires import answers_of, scores_of
 
 ROWS, TABLE = "rows.jsonl", "trials.csv"
 LEADING = (
@@ -124,33 +127,61 @@ def _read(study: Study, content: bytes, stream: IO[bytes] | None) -> Rows:
             if number == 1:
                 rows.header = {name: value[name] for name in ("study", "simulated", "plan", "identity")}
             else:
-                rows.trials[int(value["trial"])] = list(value["rows"])
+                rows.trials[int(value["trial"])] = [_row(row) for row in value["rows"]]
         except (ValueError, KeyError, TypeError):
+            then = "remove this line, and its trial runs again"
+            if number == 1:
+                then = (
+                    "the first line has plan and version, and without it the others mean nothing: put it back from a "
+                    "copy, or move the file away and run the study again"
+                )
+            got = line[:60].decode("utf-8", "replace")
             raise CheckFailed(
-                f"{path}:{number}: a line of a study's results is expected, got {line[:60]!r}; remove this line, and "
-                "its trial runs again"
+                f"{path}:{number}: a line of a study's results is expected, got '{got}'; {then}"
             ) from None
     if rows.trials and rows.header is not None:
         _check_plan(study, rows.header)
+        for number, found in rows.trials.items():
+            if strange := next((row for row in found if row["condition"] not in study.conditions), None):
+                raise CheckFailed(
+                    f"{path}: trial {number} has the condition '{strange['condition']}', which {study.folder / FILE} "
+                    "does not have; remove its line, and it runs again"
+                )
     else:  # no trial has ended: the plan may still change
         rows.header, rows.dropped = None, len(content)
     return rows
+
+
+def _row(value: Mapping[str, Any]) -> dict[str, Any]:
+    """One row of a handover. KeyError, TypeError or ValueError: it is none."""
+    row = dict(value)
+    for name in ("participant", "condition", "action", "outcome", "reason_code"):
+        row[name] = str(row[name])
+    int(row["block"]), int(row["success"])
+    return row
 
 
 def _check_plan(study: Study, header: Mapping[str, Any]) -> None:
     plan, path = header["plan"], study.folder / FILE
     if header["study"] != study.name:
         raise CheckFailed(
-            f"{study.folder} has the results of study '{header['study']}', and {path} describes '{study.name}': a "
-            "folder holds one study; ./coglab study init makes another"
+            f"{_line(path, 'name')}: {study.folder} has the results of study '{header['study']}', and this file "
+            f"describes '{study.name}': a folder holds one study; ./coglab study init makes another"
         )
     for name in sorted(plan.keys() | study.plan.keys()):
         if plan.get(name) != study.plan.get(name):
             before, now = json.dumps(plan.get(name))[:100], json.dumps(study.plan.get(name))[:100]
+            where = str(study.folder) if name == OWN_FILES else _line(path, name)
             raise CheckFailed(
-                f"{path}: '{name}' was changed after the first trial, from {before} to {now}: put it back, or start a "
+                f"{where}: '{name}' was changed after the first trial, from {before} to {now}: put it back, or start a "
                 "new study with ./coglab study init"
             )
+
+
+def _line(path: Path, name: str) -> str:
+    """File and line of a key of study.yaml; of the file alone where the key is gone."""
+    line = read(path).lines.get((name,))
+    return f"{path}:{line}" if line else str(path)
 
 
 def difference(a: Mapping[str, Any], b: Mapping[str, Any]) -> str:
@@ -166,7 +197,7 @@ def write_table(study: Study, table: Sequence[Mapping[str, Any]]) -> Path:
     (set_timing, ...) and the participant's scores under it (nasa_tlx_workload, ...)."""
     changed = dict.fromkeys(name for settings in study.conditions.values() for name in settings)
     scores: dict[tuple[str, int, str], dict[str, float]] = {}
-    for score in scores_of(answers_of(study.folder), study.questionnaires):
+    for score in scores_of(answers_of(study), study.questionnaires):
         own = scores.setdefault((score["participant"], score["block"], score["condition"]), {})
         own[f"{score['questionnaire']}_{score['scale']}"] = round(score["value"], 6)
     measures = sorted({name for row in table for name in row} - set(LEADING))
@@ -176,7 +207,10 @@ def write_table(study: Study, table: Sequence[Mapping[str, Any]]) -> Path:
     writer = csv.DictWriter(text, columns, restval="", lineterminator="\n")
     writer.writeheader()
     for row in table:
-        settings = {f"set_{name}": value for name, value in study.conditions[row["condition"]].items()}
+        settings = {
+            f"set_{name}": json.dumps(value) if isinstance(value, dict | list) else value
+            for name, value in study.conditions[row["condition"]].items()
+        }
         own = scores.get((row["participant"], row["block"], row["condition"])) or {}
         writer.writerow({**row, **settings, **own})
     path = study.folder / TABLE

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from coglab_tools.command import CheckFailed, CommandError, NotThere, progress
+from coglab_tools.command import CheckFailed, CommandError, progress
 from coglab_tools.study import cluster, simulate
 from coglab_tools.study.plan import Study
 from coglab_tools.study.recordings import RECORDINGS
@@ -29,7 +29,7 @@ def run_simulated(study: Study, workers: int = 0, scheduler: str = "") -> dict[s
                     _keep(recording, study.folder / RECORDINGS / job.trial.label)
                 rows.add(job.trial.number, found)
         except CommandError as error:
-            kind = NotThere if isinstance(error, NotThere) else CheckFailed
+            kind = type(error)
             state = f"{len(rows.trials)} of {len(study.trials())} trials are done and kept"
             raise kind(f"{error}. {state}; to go on: ./coglab study resume {study.folder}") from error
         everything = rows.table()

@@ -8,14 +8,15 @@ import math
 from collections.abc import Mapping
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
-from xml.etree import ElementTree
 
 import jsonschema
-from coglab_objects.database import ObjectError, objects_folder, read_object
+from coglab_objects.database import ObjectError
 from coglab_py.packages import package_path
 from coglab_py.yaml_file import read
 from coglab_smach.context.config import Config, ConfigError
 from coglab_smach.parameters import BY_NAME
+
+from coglab_tools.study.own_files import OBJECTS, PRIMITIVES, OwnFiles
 
 if TYPE_CHECKING:
     from coglab import World
@@ -35,11 +36,12 @@ ROLES = ("receive", "give", "take", "put")
 SLOWEST = 0.05  # of `speed`
 
 
-def problem(name: str, value: Any, objects: set[str]) -> str:
-    """Why a condition cannot have this setting; empty if it can. ``objects``: ids of the study's objects."""
+def problem(name: str, value: Any, objects: set[str], own: OwnFiles) -> str:
+    """Why a condition cannot have this setting; empty if it can. ``objects``: ids of the study's objects. ``own``:
+    primitives and objects of the study's own."""
     check = _CHECKS.get(name)
     if check is not None:
-        return check(value, objects)
+        return check(value, objects, own)
     if name not in BY_NAME or name in CLOSED:
         known = [*OWN, *(each for each in BY_NAME if each not in CLOSED)]
         near = next(iter(difflib.get_close_matches(name, known, 1, 0.5)), "")
@@ -109,41 +111,39 @@ def _feedback() -> Any:
     return read(package_path("ctrl_more", "config", "feedback.yaml")).value
 
 
-@lru_cache(maxsize=1)
-def _primitives() -> tuple[str, ...]:
-    tree = ElementTree.parse(package_path("coglab_controllers", "config", "primitives.xml"))
-    return tuple(each.get("id", "") for each in tree.getroot().iter("primitive"))
+def _object(value: Any, objects: set[str], own: OwnFiles) -> str:
+    known = sorted(own.object_texts)
+    hint = f"; objects of your own are files in {OBJECTS}/ of the study's folder"
+    return "" if value in known else f"one of {', '.join(known)} is expected, got {value!r}{hint}"
 
 
-def _object(value: Any, objects: set[str]) -> str:
-    known = sorted(file.stem for file in objects_folder().glob("*.yaml"))
-    return "" if value in known else f"one of {', '.join(known)} is expected, got {value!r}"
-
-
-def _speed(value: Any, objects: set[str]) -> str:
+def _speed(value: Any, objects: set[str], own: OwnFiles) -> str:
     fits = isinstance(value, int | float) and not isinstance(value, bool) and SLOWEST <= value <= 1.0
     return "" if fits else f"a number from {SLOWEST:g} to 1 is expected, got {value!r}"
 
 
-def _profile(value: Any, objects: set[str]) -> str:
+def _profile(value: Any, objects: set[str], own: OwnFiles) -> str:
     known = ["", *_feedback().get("profiles", {})]
     return "" if value in known else f'one of {", ".join(known[1:])} or "" is expected, got {value!r}'
 
 
-def _primitive(value: Any, objects: set[str]) -> str:
+def _primitive(value: Any, objects: set[str], own: OwnFiles) -> str:
     named = value if isinstance(value, Mapping) else {"receive": value}
     for role, name in named.items():
         if role not in ROLES:
             return f"a name, or a mapping of {', '.join(ROLES)} to names, is expected, got '{role}'"
-        if name not in _primitives():
-            return f"one of {', '.join(_primitives())} is expected, got {name!r}"
+        if name not in own.primitive_names:
+            return (
+                f"one of {', '.join(own.primitive_names)} is expected, got {name!r}; primitives of your own are in "
+                f"{PRIMITIVES} of the study's folder: ./coglab dmp train ... -o STUDY/{PRIMITIVES}"
+            )
     return ""
 
 
-def _delivery(value: Any, objects: set[str]) -> str:
+def _delivery(value: Any, objects: set[str], own: OwnFiles) -> str:
     for object_id in sorted(objects):
         try:
-            known = read_object(objects_folder() / f"{object_id}.yaml")[0]["deliveries"]
+            known = own.object(object_id)["deliveries"]
         except ObjectError as error:
             return str(error)
         if value not in known:
@@ -151,7 +151,7 @@ def _delivery(value: Any, objects: set[str]) -> str:
     return ""
 
 
-def _feedback_list(value: Any, objects: set[str]) -> str:
+def _feedback_list(value: Any, objects: set[str], own: OwnFiles) -> str:
     known = _feedback().get("loadControllers", [])
     if not isinstance(value, list) or len(set(map(str, value))) != len(value) or any(v not in known for v in value):
         return f"a list of {', '.join(known)} is expected, each once, got {value!r}"

@@ -8,16 +8,18 @@ import sys
 import tempfile
 import zipfile
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from coglab_objects.database import objects_in
 from coglab_py.packages import package_path
 
 from coglab_tools.study import settings as condition_settings
+from coglab_tools.study.own_files import OBJECTS, PRIMITIVES, OwnFiles
 from coglab_tools.study.plan import Study, Trial
 
 PACKAGES = (
@@ -25,7 +27,10 @@ PACKAGES = (
     "coglab_trials", "ctrl_more", "ih2_hand", "lwr_description", "lwr_fri_bridge",
 )  # fmt: skip
 """packages whose Python, configuration and C++ decide about a trial"""
-OWN = tuple(f"coglab_tools.{name}" for name in ("study.simulate", "study.settings", "study.measures", "report.metrics"))
+OWN = tuple(
+    f"coglab_tools.{name}"
+    for name in ("study.simulate", "study.settings", "study.own_files", "study.measures", "report.metrics")
+)
 """modules of this package that do, too"""
 KINDS = {".py", ".pyi", ".yaml", ".xml", ".json", ".cpp", ".hpp", ".urdf"}
 
@@ -38,6 +43,7 @@ class OtherVersion(RuntimeError):
 class Job:
     """What a worker needs for one trial."""
 
+    study: str
     trial: Trial
     actions: tuple[str, ...]
     object_id: str
@@ -45,12 +51,14 @@ class Job:
     simulated: Mapping[str, Any]
     limit: float
     record: bool
+    own: OwnFiles
     identity: Mapping[str, Any]
 
 
 def job_of(study: Study, trial: Trial) -> Job:
     """The job for one trial of a study."""
     return Job(
+        study.name,
         trial,
         study.actions,
         study.object_of(trial.condition),
@@ -58,6 +66,7 @@ def job_of(study: Study, trial: Trial) -> Job:
         study.simulated,
         study.limit,
         study.record,
+        study.own,
         identity(),
     )
 
@@ -94,6 +103,16 @@ def run(job: Job) -> tuple[list[dict[str, Any]], bytes]:
 
     if change := difference(job.identity, identity()):
         raise OtherVersion(change)
+    if not job.own:
+        return _run(job, {})
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        job.own.write(folder)
+        with objects_in(folder / OBJECTS):
+            return _run(job, {"dmp_library": str(folder / PRIMITIVES)})
+
+
+def _run(job: Job, files: Mapping[str, Any]) -> tuple[list[dict[str, Any]], bytes]:
     import coglab
     from coglab_sim.tracker.tracker import PerceptionSettings
 
@@ -106,7 +125,7 @@ def run(job: Job) -> tuple[list[dict[str, Any]], bytes]:
             perception=PerceptionSettings(perfect=job.simulated.get("perfect_perception", False)),
             object_id=job.object_id,
         ),
-        settings=condition_settings.machines_settings(job.settings),
+        settings={**condition_settings.machines_settings(job.settings), **files},
         object_on="board" if job.actions[0] == "take" else "person",
     )
     failure = ""
@@ -124,7 +143,10 @@ def run(job: Job) -> tuple[list[dict[str, Any]], bytes]:
                 if not result.ok:
                     break
         record = recording.trial
-    return rows_of(trial, job, record, failure), _packed(record) if job.record else b""
+    if not job.record:
+        return rows_of(trial, job, record, failure), b""
+    labels = {"participant": trial.participant, "condition": trial.condition, "study": job.study, "notes": failure}
+    return rows_of(trial, job, record, failure), _packed(replace(record, labels=labels))
 
 
 def _person(job: Job) -> dict[str, Any]:

@@ -125,7 +125,7 @@ def _virtual(folder: Path, data: Mapping[str, Any]) -> TrialRecord:
     """The record of a trial that coglab.Trial.save() wrote."""
     from coglab.results import ACTIONS, reason_name
 
-    results = data["results"]
+    results, labels = data["results"], data.get("labels") or {}
     bad = next((row for row in results if not row["ok"]), None)
     outcome = Outcome(bad is None and bool(results))
     if bad is not None:
@@ -139,6 +139,11 @@ def _virtual(folder: Path, data: Mapping[str, Any]) -> TrialRecord:
         action="+".join(ACTIONS.get(row["what"], row["what"]) for row in results),
         outcome=outcome,
         object=str(results[0]["object_id"]) if results else "",
+        participant=str(labels.get("participant", "")),
+        condition=str(labels.get("condition", "")),
+        study=str(labels.get("study", "")),
+        session=str(labels.get("session", "")),
+        notes=str(labels.get("notes", "")),
         seed=int(data["seed"]),
         simulated=True,
         configuration=dict(data["conditions"]),

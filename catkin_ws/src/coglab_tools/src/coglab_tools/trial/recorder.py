@@ -14,7 +14,7 @@ import re
 import shutil
 import threading
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 from coglab.results import reason_name
 from coglab_msgs.msg import Transition
 
+from coglab_tools.command import CommandError
 from coglab_tools.trial.record import BAG, Outcome, TrialRecord
 
 PRE_ROLL, POST_ROLL = 5.0, 1.0  # s before the action and after its result
@@ -33,7 +34,7 @@ DISK_CHECK = 1.0  # s between two looks at the free space
 HUBS = ("wait_without_object", "wait_with_object")
 NO_ACTIONS = (*HUBS, "stopped", "fault", "preempted")
 HIDDEN = ".part-"
-TRANSITIONS, RESULTS = "coglab/transitions", "coglab/results"
+TRANSITIONS, RESULTS, NOTE = "coglab/transitions", "coglab/results", "coglab/note"
 RUN_SPECIFIC = ("rosdistro", "roslaunch", "rosversion", "run_id", "robot_description")  # parameters
 
 
@@ -63,6 +64,8 @@ class _Trial:
     """when and how the machine left the action: s, outcome, code, reason"""
     ends: float = float("inf")
     notes: list[str] = field(default_factory=list)
+    said: list[tuple[float, str]] = field(default_factory=list)
+    """notes of the experimenter: s, text"""
 
 
 class Recorder:
@@ -89,6 +92,10 @@ class Recorder:
         self._types: dict[str, type] = {}
         self._looked = 0.0
         self._lost = threading.Event()
+        self._last: Path | None = None
+        """the newest recording"""
+        self._early: list[str] = []
+        """notes before the first recording"""
 
     def put(self, message: Raw) -> None:
         """Take a message. Returns at once; callable from any thread."""
@@ -142,6 +149,8 @@ class Recorder:
             self._ring.append(raw)
             if name.endswith(RESULTS) and self._trial is not None:
                 self._result(raw)
+            if name.endswith(NOTE) and raw.header.get("latching") != "1":
+                self._note(raw)
 
     def _transition(self, raw: Raw) -> None:
         message = Transition()
@@ -168,6 +177,24 @@ class Recorder:
             return
         if fits and trial is not None and trial.result is None:
             trial.result, trial.ends = row, raw.time + POST_ROLL
+
+    def _note(self, raw: Raw) -> None:
+        """A note is of the handover that runs, with its time as a mark; otherwise of the last one; before the first
+        one, of the first."""
+        from std_msgs.msg import String
+
+        message = String()
+        message.deserialize(raw.data)
+        text = " ".join(str(message.data).split())
+        if self._trial is not None:
+            self._trial.said.append((raw.time, text))
+        elif self._last is None:
+            self._early.append(text)
+        else:
+            try:
+                _noted(TrialRecord.load(self._last), [text]).save(self._last)
+            except (CommandError, OSError) as error:  # the recording was moved or removed
+                self._say(f"a note is in no recording ({error}): {text}", True)
 
     def _begin(self, action: str, begun: float) -> None:
         import rosbag
@@ -222,10 +249,10 @@ class Recorder:
             if not (self.folder / name).exists():
                 break
             name = f"{record.id}_{number}"
-        record = replace(record, id=name)
+        record = _noted(replace(record, id=name), self._early)
         record.save(trial.part)
         trial.part.rename(self.folder / name)
-        self._trial = None
+        self._trial, self._last, self._early = None, self.folder / name, []
         how = "succeeded" if record.outcome.success else f"{record.outcome.reason}: {record.outcome.text}"
         self._say(f"recorded {self.folder / name} ({how})", False)
 
@@ -266,6 +293,7 @@ def _record_of(trial: _Trial) -> TrialRecord:
     ended = float(row.get("ended_ros", trial.left[0] if trial.left else begun))
     shift = begun - float(row.get("started", begun))
     marks = sorted((float(when) + shift - begun, str(name)) for name, when in dict(row.get("marks", {})).items())
+    marks += [(when - begun, f"note: {text}") for when, text in trial.said]
     told = parameters.get("coglab", {})
     told = told.get("trial", {}) if isinstance(told, Mapping) else {}
     told = told if isinstance(told, Mapping) else {}
@@ -288,9 +316,13 @@ def _record_of(trial: _Trial) -> TrialRecord:
         simulated="coglab_sim" in parameters,
         configuration={"hash": configuration_hash(flat), **_short(flat), "files": _files(flat)},
         versions=_versions(),
-        marks=tuple({"name": name, "time_s": round(when, 3)} for when, name in marks),
-        notes="; ".join(filter(None, [str(told.get("notes", "")), *trial.notes])),
+        marks=tuple({"name": name, "time_s": round(when, 3)} for when, name in sorted(marks)),
+        notes="; ".join(filter(None, [str(told.get("notes", "")), *trial.notes, *(text for _, text in trial.said)])),
     )
+
+
+def _noted(record: TrialRecord, texts: Sequence[str]) -> TrialRecord:
+    return replace(record, notes="; ".join(filter(None, [record.notes, *texts])))
 
 
 def _flat(tree: Mapping[str, Any], above: str = "") -> dict[str, Any]:
