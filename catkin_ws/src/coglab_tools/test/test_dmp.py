@@ -1,6 +1,8 @@
 """Recordings in, primitives out: units, faults, cut, learning, and teaching from the led arm to its motion."""
 
 import json
+import resource
+import signal
 
 import coglab
 import coglab_controllers as cc
@@ -37,6 +39,11 @@ def write(path, header, columns):
     return path
 
 
+def follows(found, times, places):
+    """Whether positions are those of the file; samples that repeat the one before were left out of them."""
+    return np.allclose(found.positions, [[np.interp(t, times, c) for c in places.T] for t in found.times], atol=1e-5)
+
+
 def test_units_and_lost_samples_are_found_and_said(tmp_path):
     times, places = reach()
     yaw = np.degrees(0.6 * share((times - REST) / DURATION))
@@ -56,6 +63,61 @@ def test_units_and_lost_samples_are_found_and_said(tmp_path):
     assert abs(found[0].duration - DURATION) < 0.2
     assert 2 * np.arccos(found[0].orientations[-1][3]) == pytest.approx(0.6, abs=0.02)
     assert found[0].closing[-1] == pytest.approx(1.0, abs=0.02)
+
+
+def test_each_column_has_the_unit_of_its_name(tmp_path):
+    times, places = reach()
+    yaw = 3.0 * share((times - REST) / DURATION)  # degrees, as small as radians could be
+    columns = [times, 1000 * places[:, 0], 100 * places[:, 1], places[:, 2], 0 * times, 0 * times, yaw]
+    found = read(write(tmp_path / "a.csv", "t,x_mm,y [cm],z_m,roll,pitch,yaw_deg", columns))
+    assert follows(found, times, places)
+    assert 2 * np.arccos(found.orientations[-1][3]) == pytest.approx(np.radians(3.0), abs=1e-4)
+    said = "; ".join(found.notes)
+    assert "x is in mm" in said and "y is in cm" in said and "yaw is in deg" in said
+
+
+@pytest.mark.parametrize(("scale", "said"), [(100.0, "lengths are in cm"), (1000.0, "lengths are in mm")])
+def test_lengths_without_a_unit_are_judged(tmp_path, scale, said):
+    times, places = reach()
+    found = read(write(tmp_path / "a.csv", "t,x,y,z", [times, *(scale * places).T]))
+    assert follows(found, times, places) and any(said in note for note in found.notes)
+
+
+def test_turns_without_a_unit_are_told(tmp_path):
+    times, places = reach()
+    columns = [times, *places.T, 0 * times, 0 * times, 5.0 * share(times)]
+    found = read(write(tmp_path / "a.csv", "t,x,y,z,roll,pitch,yaw", columns))
+    assert any("taken as rad" in note and "--angle deg" in note for note in found.notes)
+
+
+def test_a_table_with_semicolons_and_decimal_commas_is_read(tmp_path):
+    times, places = reach()
+    path = write(tmp_path / "a.csv", "t,x,y,z", [times, *places.T])
+    text = path.read_text().replace(",", ";").replace(".", ",")
+    path.write_bytes(b"\xef\xbb\xbf" + text.encode())
+    assert follows(read(path), times, places)
+
+
+def test_what_is_imported_can_be_learnt(tmp_path):
+    """Noise makes the speed uneven where a reach begins: the cut is where the hand rests all the same."""
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        times, places = reach(duration=float(rng.uniform(0.8, 1.6)))
+        slow = 0.02 * np.exp(-(((times - REST - 0.2) / 0.05) ** 2))  # hesitates at the onset
+        noisy = places - np.outer(slow, WAY) + rng.normal(0.0, 0.001, places.shape)
+        path = tmp_path / f"d{seed}.csv"
+        cut.reaches(Demonstration("d", times, noisy))[0].save(path)
+        part = cut.reaches(read(path))[0]
+        assert np.linalg.norm(part.positions[0] - START) < 0.01
+        train("d", [part], 20, "none")
+
+
+def test_a_jump_of_a_resting_hand_is_no_reach(tmp_path):
+    times = np.arange(0.0, 3.0, 1.0 / 30.0)
+    places = np.repeat(START[None], len(times), axis=0) + np.random.default_rng(1).normal(0.0, 0.0005, (len(times), 3))
+    places[45:, 0] += 0.12
+    with pytest.raises(CheckFailed, match=r"jumps by 0\.12 m at 1\.5"):
+        cut.reaches(read(write(tmp_path / "a.csv", "t,x,y,z", [times, *places.T])))
 
 
 def test_ways_back_and_pauses_are_cut(tmp_path):
@@ -92,7 +154,7 @@ def faulty(name, tmp_path):
         times[100:] -= 0.5
         return write(path, "t,x,y,z", [times, *places.T]), "time goes back by 0.49"
     if name == "unit":
-        return write(path, "t,x,y,z", [times, *(30 * places).T]), "name the unit with --length"
+        return write(path, "t,x,y,z", [times, *(10 * places).T]), "name the unit with --length"
     if name == "quaternion":
         q = [0 * times, 0 * times, 0 * times, 0 * times + 0.5]
         return write(path, "t,x,y,z,qx,qy,qz,qw", [times, *places.T, *q]), "quaternion of length 0.50"
@@ -110,6 +172,28 @@ def test_a_file_that_cannot_be_used_is_refused_with_its_name_and_place(tmp_path,
     with pytest.raises(CommandError) as refused:
         cut.reaches(read(path))
     assert words in str(refused.value) and name in str(refused.value)
+
+
+@pytest.fixture
+def full_disk():
+    """No file can grow beyond 100 bytes."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    signal.signal(signal.SIGXFSZ, before)
+
+
+@pytest.mark.parametrize(("verb", "option", "file"), [("export", "-o", "a.npz"), ("inspect", "--plot", "a.png")])
+def test_a_full_disk_leaves_no_half_of_a_file(tmp_path, full_disk, capsys, verb, option, file):
+    assert run(["dmp", verb, "--id", "reach_human", option, str(tmp_path / file)]) == 1
+    assert file in capsys.readouterr().err and list(tmp_path.iterdir()) == []
+
+
+def test_a_goal_that_is_no_number_is_a_wrong_argument(capsys):
+    assert run(["dmp", "inspect", "--id", "reach_human", "--goal", "nan", "0", "0"]) == 2
+    assert "expected a number of metres" in capsys.readouterr().err
 
 
 @pytest.fixture

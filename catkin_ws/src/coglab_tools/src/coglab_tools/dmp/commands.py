@@ -12,6 +12,7 @@ from coglab_tools.command import CHECK_FAILED, OK, Answer, CheckFailed, NotThere
 
 HELP = "teach motions: record, import, learn, inspect and check primitives"
 MAPPINGS = ("none", "similarity", "upright")
+LARGEST = 10.0  # m, number of a goal on the command line
 FAULTS = ("short", "brief", "jump", "moving", "noisy")
 
 
@@ -52,11 +53,11 @@ def add(verbs: argparse._SubParsersAction[Any]) -> None:
     parser = verbs.add_parser("inspect", help="shows one primitive: figures and a picture")
     _of_library(parser)
     parser.add_argument("--id", required=True)
-    parser.add_argument("--goal", type=float, nargs=3, metavar=("X", "Y", "Z"), help="m, base frame, of the courses")
+    parser.add_argument("--goal", type=_metres, nargs=3, metavar=("X", "Y", "Z"), help="m, base frame, of the courses")
     parser.add_argument(
         "--with", dest="demonstrations", type=Path, nargs="+", default=[], help="demonstrations to show"
     )
-    parser.add_argument("--plot", type=Path, help="the picture (default: ID.png here)")
+    parser.add_argument("--plot", type=Path, help="the picture (default: ID_inspected.png here)")
     parser.set_defaults(run=inspect)
 
     parser = verbs.add_parser("list", help="lists the primitives of a library")
@@ -73,7 +74,7 @@ def add(verbs: argparse._SubParsersAction[Any]) -> None:
     _of_library(parser)
     parser.add_argument("--id", required=True)
     parser.add_argument(
-        "--goal", type=float, nargs=3, metavar=("X", "Y", "Z"), help="m from the start (default: taught)"
+        "--goal", type=_metres, nargs=3, metavar=("X", "Y", "Z"), help="m from the start (default: taught)"
     )
     parser.add_argument("--ratio", type=float, default=1.0, help="dmp_ratio")
     parser.add_argument("-o", "--out", type=Path, required=True, help="a .csv, .npz or .json file")
@@ -89,6 +90,16 @@ def _reading(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--time", default="", help="unit s, ms, us or ns (default: judged)")
     parser.add_argument("--angle", default="", help="unit rad or deg (default: judged)")
     parser.add_argument("--back", action="store_true", help="ways back are reaches, too")
+
+
+def _metres(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not abs(value) <= LARGEST:
+        raise argparse.ArgumentTypeError(f"expected a number of metres up to {LARGEST:g}, got '{text}'")
+    return value
 
 
 def _of_library(parser: argparse.ArgumentParser) -> None:
@@ -281,7 +292,7 @@ def inspect(options: argparse.Namespace) -> Answer:
     goal = np.array(options.goal) if options.goal else check.region_middle()
     turn, closing = (np.array(entry[name]) if name in entry else None for name in ("turn_rad", "closing"))
     rmse = np.array(entry.get("rmse_mm", [])) / 1000.0
-    path = options.plot or Path(f"{options.id}.png")
+    path = options.plot or Path(f"{options.id}_inspected.png")
     plot.draw(path, primitive, found, rmse, turn, closing, goal)
     courses = [check.run(primitive, goal, ratio) for ratio in plot.RATIOS]
     lines = [
@@ -382,12 +393,14 @@ def validate(options: argparse.Namespace) -> Answer:
 
 def export(options: argparse.Namespace) -> Answer:
     """`dmp export`."""
+    import io
     import json
 
     import numpy as np
 
-    from coglab_tools.dmp.demonstration import Demonstration, write_whole
+    from coglab_tools.dmp.demonstration import Demonstration
     from coglab_tools.dmp.train import course
+    from coglab_tools.files import write_whole
 
     kind = options.out.suffix.lower()
     if kind not in (".csv", ".npz", ".json"):
@@ -401,17 +414,16 @@ def export(options: argparse.Namespace) -> Answer:
     if kind == ".csv":
         Demonstration(options.id, times, path).save(options.out)
     elif kind == ".npz":
-        try:
-            np.savez(options.out, t=times, position=path, centres=p.centres, widths=p.widths, weights=p.weights)
-        except OSError as error:
-            raise CheckFailed(f"{options.out} cannot be written: {error.strerror}") from None
+        content = io.BytesIO()
+        np.savez(content, t=times, position=path, centres=p.centres, widths=p.widths, weights=p.weights)
+        write_whole(options.out, content.getvalue())
     else:
         values = {name: getattr(p, name) for name in ("id", "description", "duration", "alpha", "stiffness", "damping",
                                                       "mapping")}  # fmt: skip
         arrays = {name: np.asarray(getattr(p, name)).tolist() for name in ("start", "goal", "start_velocity", "centres",
                                                                            "widths", "weights")}  # fmt: skip
-        content = {**values, **arrays, "t": times.tolist(), "position": path.tolist()}
-        write_whole(options.out, json.dumps(content, indent=1) + "\n")
+        whole = {**values, **arrays, "t": times.tolist(), "position": path.tolist()}
+        write_whole(options.out, json.dumps(whole, indent=1) + "\n")
     return Answer(
         f"wrote {options.out}: {len(times)} samples, {times[-1]:.2f} s, from 0 to {np.round(line, 3).tolist()} m",
         {"file": str(options.out), "samples": len(times), "duration_s": float(times[-1])},

@@ -1,6 +1,6 @@
 """Smooths a recorded motion, which also bridges its gaps, and cuts the reaches out of it.
 
-Smoothing is a cubic smoothing spline with a cut-off of 8 Hz and no delay: people's reaches end below 5 Hz, a tracker's
+Smoothing is a cubic smoothing spline with a cut-off of 6 Hz and no delay: people's reaches end below 5 Hz, a tracker's
 noise does not. Onset and end come from the speed, with two thresholds: a reach begins to count at the higher one, and
 goes from where the speed left the lower one to where it comes back to it. A hand that never rests between two motions,
 as in a handover, is cut where it is slowest.
@@ -15,9 +15,10 @@ import numpy as np
 from coglab_tools.command import CheckFailed
 from coglab_tools.dmp.demonstration import Array, Demonstration
 
-CUT_OFF = 8.0  # Hz
+CUT_OFF = 6.0  # Hz; usual for motions of the arm (Winter, Biomechanics and Motor Control of Human Movement)
 SHORTEST = 0.1  # m, farthest point of a reach from its start
 LONGEST_GAP = 0.2  # s without a sample within a reach
+LARGEST_STEP = 0.5  # share of a reach between two samples without a gap; above it the tracker took something else
 LOW, LOW_SHARE = 0.02, 0.05  # m/s, and share of the peak speed: below the larger one the hand rests
 HIGH_SHARE = 0.25  # share of the largest speed that a motion must reach
 PAUSE_SHARE = 0.35  # slowest point between two motions, share of the smaller of their peaks
@@ -56,7 +57,7 @@ def smooth(raw: Demonstration) -> Demonstration:
 def reaches(raw: Demonstration, back: bool = False) -> list[Demonstration]:
     """The reaches of a recording, in order, smoothed and each from time 0; ways back too if `back`.
 
-    CheckFailed if there is none, or if a gap lies in one.
+    CheckFailed if there is none, or if a gap or a jump lies in one.
     """
     whole = smooth(raw)
     found: list[Demonstration] = []
@@ -74,6 +75,7 @@ def reaches(raw: Demonstration, back: bool = False) -> list[Demonstration]:
             continue
         origin = part.positions[0]
         _refuse_gap(raw, whole.times[begin], whole.times[end])
+        _refuse_jump(raw, whole.times[begin], whole.times[end], way)
         found.append(part)
     if not found:
         raise CheckFailed(
@@ -88,30 +90,29 @@ def reaches(raw: Demonstration, back: bool = False) -> list[Demonstration]:
 def motions(times: Array, speed: Array) -> list[tuple[int, int]]:
     """First and last index of each motion, from the speed (m/s)."""
     high = max(2.0 * LOW, HIGH_SHARE * float(speed.max()))
-    found: list[tuple[int, int]] = []
-    i, last = 0, len(speed) - 1
-    while i <= last:
-        if speed[i] < high:
-            i += 1
+    around = np.pad(speed, 1)
+    tops = (speed >= around[:-2]) & (speed > around[2:]) & (speed >= high)
+    peaks: list[int] = []  # the fastest point of each motion
+    valleys: list[int] = []  # the slowest point between two motions
+    for i in np.flatnonzero(tops).tolist():
+        if not peaks:
+            peaks.append(i)
             continue
-        peak, end = i, i
-        while end < last and not _pauses(speed, end, speed[peak]):
-            end += 1
-            peak = end if speed[end] > speed[peak] else peak
-        begin, floor = peak, (found[-1][1] if found else 0)
-        while begin > floor and not _pauses(speed, begin, speed[peak]):
-            begin -= 1
-        found.append((begin, end))
-        i = end + 1
+        valley = peaks[-1] + int(np.argmin(speed[peaks[-1] : i]))
+        if speed[valley] <= max(LOW, PAUSE_SHARE * min(speed[peaks[-1]], speed[i])):
+            peaks.append(i)
+            valleys.append(valley)
+        elif speed[i] > speed[peaks[-1]]:
+            peaks[-1] = i
+    if not peaks:
+        return []
+    bounds = [0, *valleys, len(speed) - 1]
+    found = []
+    for peak, first, last in zip(peaks, bounds[:-1], bounds[1:], strict=True):
+        rests = speed <= max(LOW, LOW_SHARE * speed[peak])
+        before, after = np.flatnonzero(rests[first:peak]), np.flatnonzero(rests[peak:last])
+        found.append((first + int(before[-1]) if len(before) else first, peak + int(after[0]) if len(after) else last))
     return found
-
-
-def _pauses(speed: Array, i: int, peak: float) -> bool:
-    """Whether the hand rests at i, or is slowest there between two motions."""
-    if speed[i] <= max(LOW, LOW_SHARE * peak):
-        return True
-    around = speed[max(0, i - 3) : i + 4]
-    return bool(speed[i] <= PAUSE_SHARE * peak and speed[i] == around.min() and 3 <= i < len(speed) - 3)
 
 
 def _part(whole: Demonstration, begin: int, end: int) -> Demonstration:
@@ -139,4 +140,16 @@ def _refuse_gap(raw: Demonstration, begin: float, end: float) -> None:
         raise CheckFailed(
             f"{raw.name}: a gap of {gaps[worst]:.2f} s at {t[inside[worst]]:.2f} s, within a reach; at most "
             f"{LONGEST_GAP:g} s can be bridged: record it again, or cut the file"
+        )
+
+
+def _refuse_jump(raw: Demonstration, begin: float, end: float, way: float) -> None:
+    t = raw.times
+    steps = np.linalg.norm(np.diff(raw.positions, axis=0), axis=1)
+    steps[(t[1:] < begin) | (t[:-1] > end) | (np.diff(t) > 2.0 * float(np.median(np.diff(t))))] = 0.0
+    worst = int(np.argmax(steps))
+    if steps[worst] > LARGEST_STEP * way:
+        raise CheckFailed(
+            f"{raw.name}: the hand jumps by {steps[worst]:.2f} m at {t[worst + 1]:.2f} s, from one sample to the next: "
+            "the tracker took something else for it; cut the file there, or record again"
         )

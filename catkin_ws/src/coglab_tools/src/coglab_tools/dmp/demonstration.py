@@ -6,15 +6,13 @@ per sample. t in s, x y z in m, quaternion of length 1, closing of the fingers 0
 
 from __future__ import annotations
 
-import os
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from coglab_tools.command import CheckFailed
+from coglab_tools.files import write_whole
 
 Array = npt.NDArray[np.float64]
 
@@ -61,20 +59,6 @@ class Demonstration:
             columns, header = [*columns, self.closing], header + ",closing"
         lines = [header, *(",".join(f"{value:.9g}" for value in row) for row in np.column_stack(columns))]
         write_whole(path, "\n".join(lines) + "\n")
-
-
-def write_whole(path: Path, text: str) -> None:
-    """Write a text file under another name first, so that nobody ever reads a half of it."""
-    half = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        half.write_text(text, encoding="utf-8")
-        os.replace(half, path)
-    except OSError as error:
-        raise CheckFailed(f"{path} cannot be written: {error.strerror}; what was there before is kept") from None
-    finally:
-        with suppress(OSError):
-            half.unlink(missing_ok=True)
 
 
 def for_shell(path: Path) -> str:

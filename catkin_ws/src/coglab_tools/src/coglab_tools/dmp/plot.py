@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -9,11 +10,13 @@ from typing import Any
 import coglab_controllers as cc
 import numpy as np
 
-from coglab_tools.command import CheckFailed
+from coglab_tools.command import UsageError
 from coglab_tools.dmp import check
 from coglab_tools.dmp.demonstration import Array, Demonstration
 from coglab_tools.dmp.train import SHARES, course
+from coglab_tools.files import write_whole
 
+KINDS = (".png", ".pdf", ".svg")
 RATIOS = (1.0, 1.5, 2.0)
 """dmp_ratio of the three speeds"""
 SHIFT = 0.1
@@ -49,14 +52,12 @@ def picture(
 
 
 def draw(path: Path, *args: Any, **named: Any) -> Path:
-    """Write `picture(...)` as a PNG and return its path."""
-    figure = picture(*args, **named)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path, dpi=90)
-    except (OSError, ValueError) as error:
-        raise CheckFailed(f"the picture {path} cannot be written: {error}") from None
-    return path
+    """Write `picture(...)` as a PNG, PDF or SVG, by the name's ending, and return its path."""
+    if path.suffix.lower() not in KINDS:
+        raise UsageError(f"{path}: expected a picture of the kind {', '.join(KINDS)}")
+    content = io.BytesIO()
+    picture(*args, **named).savefig(content, format=path.suffix[1:].lower(), dpi=90)
+    return write_whole(path, content.getvalue())
 
 
 def _over_time(axis: Any, primitive: cc.Primitive, demonstrations: Sequence[Demonstration], rmse: Array | None) -> None:

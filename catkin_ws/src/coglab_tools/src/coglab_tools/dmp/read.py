@@ -8,8 +8,9 @@ Columns of a CSV, arrays of an npz (each (n,), or `position` (n, 3) and `orienta
 * fingers: `closing`, 0 open .. 1 closed, or in percent, or as the hand's bytes 0 .. 254;
 * `frame`: several hands or objects in one file.
 
-A unit may stand behind a name: `x_mm`, `x [mm]`, `t_ms`, `roll_deg`. Without one it is judged from the numbers, and a
-note says so.
+A unit may stand behind a name: `x_mm`, `x [mm]`, `t_ms`, `yaw_deg`; each column has its own. Columns without one are
+judged together from the numbers, and a note says so. A CSV may have commas, semicolons or tabs between its columns;
+with the latter two, a comma in a number is a decimal comma.
 """
 
 from __future__ import annotations
@@ -78,8 +79,11 @@ def read(path: Path, source: Source = Source()) -> Demonstration:
 
 
 def _read_csv(path: Path, source: Source) -> tuple[Table, dict[str, str], str]:
-    with open(path, newline="", encoding="utf-8", errors="replace") as stream:
-        rows = csv.reader(stream)
+    with open(path, newline="", encoding="utf-8-sig", errors="replace") as stream:
+        first = stream.readline()
+        stream.seek(0)
+        between = max(",;\t", key=first.count)
+        rows = csv.reader(stream, delimiter=between)
         header = next(rows, None)
         if header is None:
             raise CheckFailed(f"{path}: the file is empty; expected a header line t,x,y,z and samples")
@@ -103,6 +107,8 @@ def _read_csv(path: Path, source: Source) -> tuple[Table, dict[str, str], str]:
                     continue
             if len(kept) >= MOST_SAMPLES:
                 raise CheckFailed(f"{path}: more than {MOST_SAMPLES} samples; cut the file")
+            if between != ",":
+                row = [word.replace(",", ".") for word in row]
             kept.append([*row, str(rows.line_num)])
     if not kept:
         seen = f"; its frames are {', '.join(sorted(frames))}" if frames else ""
@@ -280,7 +286,8 @@ def _judge(path: Path, table: Table, units: dict[str, str], what: str, source: S
         raise CheckFailed(f"{path}: expected at least 10 finite samples, got {int(whole.sum())}")
     table = {name: value[whole] for name, value in table.items()}
 
-    times = table["t"] * _time_unit(path, table["t"], source.time or units.get("t", ""), notes)
+    _convert_named(table, units, source, notes)
+    times = table["t"] * _time_unit(table["t"], source.time or units.get("t", ""), notes)
     if np.any(np.diff(times) < 0.0):
         at = int(np.argmax(np.diff(times) < 0.0))
         raise CheckFailed(
@@ -310,7 +317,8 @@ def _judge(path: Path, table: Table, units: dict[str, str], what: str, source: S
 
 def _moves(places: Array) -> Array:
     """Where the hand moves within 5 samples on both sides: only there a repeated sample is a lost one."""
-    far = np.linalg.norm(np.roll(places, -5, axis=0) - np.roll(places, 5, axis=0), axis=1)
+    at, last = np.arange(len(places)), len(places) - 1
+    far = np.linalg.norm(places[np.minimum(at + 5, last)] - places[np.maximum(at - 5, 0)], axis=1)
     return np.asarray(far > 1e-6)
 
 
@@ -321,7 +329,28 @@ def _turn_names(table: Table) -> tuple[str, ...]:
     return ()
 
 
-def _time_unit(path: Path, t: Array, given: str, notes: list[str]) -> float:
+def _convert_named(table: Table, units: dict[str, str], source: Source, notes: list[str]) -> None:
+    """Bring columns of one kind whose names have units to m and rad, each by its own unit. A column without a unit has
+    that of its neighbours. Nothing to do where no name has one, or where the caller has said the unit."""
+    for names, known, given in (
+        (("x", "y", "z"), LENGTH, source.length),
+        (("roll", "pitch", "yaw"), ANGLE, source.angle),
+        (JOINTS, ANGLE, source.angle),
+    ):
+        named = {name: units[name] for name in names if units.get(name) in known}
+        if given or not named:
+            continue
+        base = next(iter(known))
+        for name in names:
+            unit = named.get(name, next(iter(named.values())))
+            if name in table:
+                table[name] = table[name] * known[unit]
+                units[name] = base
+                if unit != base:
+                    notes.append(f"{name} is in {unit}, converted to {base}")
+
+
+def _time_unit(t: Array, given: str, notes: list[str]) -> float:
     if given:
         return TIME[given]
     step = float(np.median(np.diff(t)))
@@ -332,6 +361,7 @@ def _time_unit(path: Path, t: Array, given: str, notes: list[str]) -> float:
 
 
 def _length_unit(path: Path, places: Array, given: str, notes: list[str]) -> float:
+    """Judged by how far the hand moves: between 0.1 m, the shortest reach, and 3 m."""
     if given:
         if given != "m":
             notes.append(f"lengths are in {given}, converted to m")
@@ -339,18 +369,23 @@ def _length_unit(path: Path, places: Array, given: str, notes: list[str]) -> flo
     extent = float(np.linalg.norm(np.percentile(places, 99, axis=0) - np.percentile(places, 1, axis=0)))
     if extent <= 3.0:
         return 1.0
-    if extent < 60.0:
+    unit = "cm" if 10.0 <= extent < 90.0 else "mm" if 200.0 <= extent <= 3000.0 else ""
+    if not unit:
         raise CheckFailed(
-            f"{path}: the hand moves over {extent:.3g}: too far for m, too little for mm; name the unit with --length"
+            f"{path}: the hand moves over {extent:.3g}; expected up to 3 (m), 10 to 90 (cm) or 200 to 3000 (mm); name "
+            "the unit with --length"
         )
-    notes.append(f"lengths are in mm (the hand moves over {extent:.0f}), converted to m")
-    return 1e-3
+    notes.append(f"lengths are in {unit} (the hand moves over {extent:.0f}), converted to m")
+    return LENGTH[unit]
 
 
 def _angle_unit(angles: Array, largest: float, given: str, what: str, notes: list[str]) -> float:
-    degrees = given == "deg" or (not given and float(np.abs(angles).max()) > largest)
+    most = float(np.abs(angles).max())
+    degrees = given == "deg" or (not given and most > largest)
     if degrees:
-        notes.append(f"{what} are in degrees (up to {np.abs(angles).max():.0f}), converted to rad")
+        notes.append(f"{what} are in degrees (up to {most:.0f}), converted to rad")
+    elif not given and what == "turns" and most > 0.5:
+        notes.append(f"turns are taken as rad (up to {most:.1f}); if they are degrees: --angle deg")
     return ANGLE["deg" if degrees else "rad"]
 
 

@@ -19,7 +19,8 @@ import numpy as np
 import yaml
 
 from coglab_tools.command import CheckFailed, UsageError
-from coglab_tools.dmp.demonstration import Array, Demonstration, write_whole
+from coglab_tools.dmp.demonstration import Array, Demonstration
+from coglab_tools.files import write_whole
 
 SHARES = np.linspace(0.0, 1.0, 51)
 """shares of the duration at which demonstrations are compared and turn and fingers are kept"""

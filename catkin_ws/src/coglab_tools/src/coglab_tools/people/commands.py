@@ -82,7 +82,8 @@ def import_recordings(options: argparse.Namespace) -> Answer:
 
 def learn(options: argparse.Namespace) -> Answer:
     """`people learn`."""
-    from coglab_tools.dmp.demonstration import for_shell, write_whole
+    from coglab_tools.dmp.demonstration import for_shell
+    from coglab_tools.files import write_whole
     from coglab_tools.people.learn import PRIMITIVES, base_library, learn_patterns, learn_primitives
 
     if options.primitives is None and options.patterns is None:

@@ -14,7 +14,8 @@ import numpy as np
 
 from coglab_tools.command import CheckFailed, UsageError
 from coglab_tools.dmp.cut import reaches, smooth
-from coglab_tools.dmp.demonstration import Array, Demonstration, write_whole
+from coglab_tools.dmp.demonstration import Array, Demonstration
+from coglab_tools.files import write_whole
 
 REST = 0.5  # s before the reach that a recording begins with
 MEETING = np.array([0.86, 0.03, 0.44])  # m, base frame: a person's palm at a handover, as the simulated people hold it

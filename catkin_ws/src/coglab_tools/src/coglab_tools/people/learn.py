@@ -16,8 +16,9 @@ import numpy as np
 from coglab_perception.recogniser import RecogniserSettings, save_patterns, train_patterns
 
 from coglab_tools.command import CheckFailed
-from coglab_tools.dmp.demonstration import Array, Demonstration, write_whole
+from coglab_tools.dmp.demonstration import Array, Demonstration
 from coglab_tools.dmp.train import load_library, train
+from coglab_tools.files import write_whole
 from coglab_tools.people.handover import Handover
 
 PLACES = {

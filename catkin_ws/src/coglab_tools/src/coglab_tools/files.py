@@ -1,0 +1,29 @@
+"""Files that are there whole or not at all."""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from pathlib import Path
+
+from coglab_tools.command import CheckFailed
+
+
+def write_whole(path: Path, content: str | bytes) -> Path:
+    """Write a file under another name first and move it to its place, so that nobody ever reads a half of it. Its
+    folder is made if need be. Returns the path. CheckFailed: it cannot be written; what was there before is kept."""
+    half = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with half.open("wb") as stream:
+            stream.write(content.encode() if isinstance(content, str) else content)
+            stream.flush()
+            os.fsync(stream.fileno())
+        half.replace(path)
+    except OSError as error:
+        why = error.strerror or error
+        raise CheckFailed(f"{path} cannot be written: {why}; what was there before is kept") from None
+    finally:
+        with suppress(OSError):
+            half.unlink(missing_ok=True)
+    return path
