@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+import tempfile
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from coglab_tools.command import CheckFailed, NotThere
+from coglab_tools.command import CheckFailed, NotThere, progress
+from coglab_tools.files import write_by
 from coglab_tools.trial.read import Measured
 
 RATE = 12.0  # frames per second
+BEFORE = 0.5  # s before the action that are drawn, too
 LONGEST = 120.0  # s of a trial that are drawn
 COLOURS = 96  # of a GIF
 KINDS = (".gif", ".mp4")
@@ -89,36 +94,35 @@ def _at(table: tuple[np.ndarray, np.ndarray] | None, now: float) -> np.ndarray |
 def write_video(trial: Measured, file: Path) -> dict[str, float]:
     """Draw a trial into a GIF, or an MP4 with ffmpeg. Returns `frames` and `seconds`. NotThere: the camera or ffmpeg is
     missing. CheckFailed: the trial has no joint positions, or nothing can draw here."""
-    if file.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
+    moving = file.suffix.lower() == ".mp4"
+    if moving and shutil.which("ffmpeg") is None:
         raise NotThere("an .mp4 needs ffmpeg: sudo apt install ffmpeg; a .gif does not")
     if not trial.series.joints:
         raise CheckFailed(f"{trial.record.id} has no joint positions, so there is nothing to draw")
     try:
         from coglab_bringup.film import Painter
     except ImportError as error:
-        raise NotThere(f"the camera is not built ({error}); ./coglab film builds it") from None
-    from PIL import Image
+        raise NotThere(f"the camera is not built ({error}); ./coglab trial video builds it") from None
 
     world: Any = _World(trial)
-    begin, end = trial.start - 0.5, min(trial.end, trial.start + LONGEST)
     try:
         painter = Painter(SimpleNamespace(cell=world.solids, robot=world.robot))
     except RuntimeError as error:
         raise CheckFailed(f"nothing can be drawn here: {error}") from None
     painter.world = world
-    if not hasattr(painter.camera, "pose"):
-        raise NotThere("the camera is of an older build; ./coglab film builds it anew")
-    frames = []
-    for now in np.arange(begin, end, 1.0 / RATE):
-        world.move(painter.camera, float(now))
-        frames.append(_with_caption(painter.frame(), trial, float(now)))
-    if file.suffix.lower() == ".mp4":
-        _mp4(frames, file)
+    times = np.arange(trial.start - BEFORE, min(trial.end, trial.start + LONGEST), 1.0 / RATE)
+
+    def frame(now: float) -> Any:
+        world.move(painter.camera, now)
+        return _with_caption(painter.frame(), trial, now)
+
+    frames = (frame(float(now)) for now in progress(times, len(times), "drawing"))
+    if moving:
+        write_by(file, lambda part: _mp4(frames, frame(float(times[0])).size, part))
     else:
-        palette = frames[len(frames) // 2].quantize(COLOURS, method=Image.Quantize.FASTOCTREE)
-        small = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
-        small[0].save(file, save_all=True, append_images=small[1:], duration=round(1000.0 / RATE), loop=0)
-    return {"frames": len(frames), "seconds": len(frames) / RATE}
+        palette = frame(float(times[len(times) // 2])).quantize(COLOURS)
+        write_by(file, lambda part: _gif(frames, palette, part))
+    return {"frames": len(times), "seconds": len(times) / RATE}
 
 
 def _with_caption(frame: Any, trial: Measured, now: float) -> Any:
@@ -134,12 +138,23 @@ def _with_caption(frame: Any, trial: Measured, now: float) -> Any:
     return frame
 
 
-def _mp4(frames: list[Any], file: Path) -> None:
-    width, height = frames[0].size
-    command = ["ffmpeg", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}"]
+def _gif(frames: Iterator[Any], palette: Any, file: Path) -> None:
+    small = [frame.quantize(palette=palette, dither=0) for frame in frames]
+    small[0].save(file, save_all=True, append_images=small[1:], duration=round(1000.0 / RATE), loop=0)
+
+
+def _mp4(frames: Iterator[Any], size: tuple[int, int], file: Path) -> None:
+    command = ["ffmpeg", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}"]
     command += ["-r", f"{RATE:g}", "-i", "-", "-pix_fmt", "yuv420p", "-y", str(file)]
-    raw = b"".join(frame.convert("RGB").tobytes() for frame in frames)
-    done = subprocess.run(command, input=raw, capture_output=True, timeout=FFMPEG_LIMIT)
-    if done.returncode:
-        last = (done.stderr.decode(errors="replace").strip().splitlines() or ["it said nothing"])[-1]
-        raise CheckFailed(f"ffmpeg could not make the video: {last}")
+    with tempfile.TemporaryFile() as errors:
+        with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=errors) as process:
+            assert process.stdin is not None
+            with suppress(BrokenPipeError):  # it ended early, and said why
+                for frame in frames:
+                    process.stdin.write(frame.convert("RGB").tobytes())
+                process.stdin.close()
+            status = process.wait(FFMPEG_LIMIT)
+        if status:
+            errors.seek(0)
+            said = errors.read().decode(errors="replace").strip().splitlines() or ["it said nothing"]
+            raise CheckFailed(f"ffmpeg could not make {file.name}: {said[-1]}")
