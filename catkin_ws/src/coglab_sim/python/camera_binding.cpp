@@ -34,7 +34,7 @@ struct CellCamera {
   /// Puts arm, fingers and object where a recording had them. Only pictures are right afterwards:
   /// neither forces nor the robot controller follow.
   void pose(const Vector7& arm, const std::array<double, 5>& fingers, const Pose& object) {
-    auto& model = *cell.cell().plant().model();
+    auto& model = cell.cell().plant().model();
     mjModel* m = model.get();
     mjData* d = model.data();
     for (std::size_t i = 0; i < 7; ++i)

@@ -126,14 +126,16 @@ def write_video(trial: Measured, file: Path) -> dict[str, float]:
 
 
 def _with_caption(frame: Any, trial: Measured, now: float) -> Any:
-    """The picture with the time, and the last event before it."""
+    """The picture with the time since the action began, the action and the last event."""
     from PIL import ImageDraw, ImageFont
 
-    passed = [mark for mark in trial.record.marks if mark["time_s"] <= now - trial.start]
-    what = max(passed, key=lambda mark: mark["time_s"])["name"] if passed else trial.record.action
+    parts = trial.parts()
+    part = next((each for each in reversed(parts) if each.start <= now), parts[0])
+    passed = [mark for mark in part.record.marks if mark["time_s"] <= now - part.start]
+    event = max(passed, key=lambda mark: mark["time_s"])["name"] if passed else ""
+    words = f"{now - part.start:+6.2f} s   {part.record.action}   {event}".replace("_", " ")
     draw, (width, height) = ImageDraw.Draw(frame), frame.size
     draw.rectangle([0, height - 24, width, height], fill=(33, 37, 41))
-    words = f"{now - trial.start:+6.2f} s   {what.replace('_', ' ')}"
     draw.text((10, height - 19), words, font=ImageFont.load_default(), fill=(255, 255, 255))
     return frame
 
