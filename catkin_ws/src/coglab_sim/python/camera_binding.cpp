@@ -12,6 +12,15 @@ namespace {
 
 using Rgb = std::array<float, 3>;
 
+/// Motor that moves a phalanx, by the phalanx's name.
+std::size_t motorOf(const std::string& phalanx) {
+  const auto has = [&](const char* word) { return phalanx.find(word) != std::string::npos; };
+  if (has("thumb_base")) return 0;
+  if (has("thumb")) return 1;
+  if (has("index")) return 2;
+  return has("middle") ? 3 : 4;
+}
+
 /// The camera and its cell.
 struct CellCamera {
   CellCamera(PyCell& cell, int width, int height)
@@ -20,6 +29,31 @@ struct CellCamera {
   py::array_t<std::uint8_t> draw() {
     const auto& pixels = camera.draw(*cell.cell().plant().model().data());
     return py::array_t<std::uint8_t>({camera.height(), camera.width(), 3}, pixels.data());
+  }
+
+  /// Puts arm, fingers and object where a recording had them. Only pictures are right afterwards:
+  /// neither forces nor the robot controller follow.
+  void pose(const Vector7& arm, const std::array<double, 5>& fingers, const Pose& object) {
+    auto& model = cell.cell().plant().model();
+    mjModel* m = model.get();
+    mjData* d = model.data();
+    for (std::size_t i = 0; i < 7; ++i)
+      d->qpos[model.arm_position[i]] = arm[static_cast<Eigen::Index>(i)];
+    for (std::size_t i = 0; i < model.phalanges.size(); ++i) {
+      const int joint = m->body_jntadr[model.phalanges[i]];
+      const std::size_t motor = motorOf(mj_id2name(m, mjOBJ_BODY, model.phalanges[i]));
+      const mjtNum low = m->jnt_range[2 * joint], high = m->jnt_range[2 * joint + 1];
+      d->qpos[model.phalanx_position[i]] = low + fingers[motor] * (high - low);
+    }
+    mjtNum* q = d->qpos + model.object_position;
+    for (Eigen::Index i = 0; i < 3; ++i) q[i] = object.position[i];
+    q[3] = object.rotation.w();
+    q[4] = object.rotation.x();
+    q[5] = object.rotation.y();
+    q[6] = object.rotation.z();
+    mj_kinematics(m, d);
+    mj_comPos(m, d);
+    mj_camlight(m, d);
   }
 
   PyCell& cell;
@@ -65,6 +99,15 @@ PYBIND11_MODULE(_camera, m) {
           py::arg("shape"), py::arg("size"), py::arg("position"), py::arg("rotation"),
           py::arg("rgb"),
           "Adds a sphere, capsule, ellipsoid, cylinder or box to the next picture; half sizes, m.")
+      .def(
+          "pose",
+          [](CellCamera& c, const Vector7& arm, const std::array<double, 5>& fingers,
+             const Vector3d& object,
+             const Eigen::Vector4d& rotation) { c.pose(arm, fingers, makePose(object, rotation)); },
+          py::arg("arm"), py::arg("fingers"), py::arg("object"), py::arg("rotation"),
+          "Puts arm (7 joints, rad), fingers (five motors, 0 open .. 1 closed) and object (m, x y "
+          "z "
+          "w) into place for the next picture. For recordings: the cell is of no use afterwards.")
       .def("draw", &CellCamera::draw, "The picture now: an array height x width x 3 of bytes.")
       .def(
           "depth",

@@ -1,5 +1,7 @@
 """Metrics of a trial equal their closed forms within 1 %."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from coglab_tools.report.metrics import METRICS, activities, metrics_of, sparc_of_speed
@@ -17,15 +19,15 @@ def test_metrics_equal_their_closed_forms():
     found = metrics_of(measured())
     robot, begun = fast_part()
     expected = {
-        "duration_s": 10.0, "reaction_s": 0.5, "approach_s": 2.0, "transfer_s": 2.0, "human_idle": 0.8,
+        "duration_s": 10.0, "reaction_s": 2.0, "approach_s": 2.0, "transfer_s": 2.0, "human_idle": 0.8,
         "robot_idle": 1.0 - robot / 10.0, "concurrent_activity": 0.0, "functional_delay": (begun - 3.0) / 10.0,
         "peak_force_n": 6.0, "mean_force_n": 6.0, "impulse_ns": 12.0, "sparc": -1.40, "detection_delay_s": 0.12,
         "peak_palm_speed": 1.875 * 0.3, "nearest_m": 1.0,
     }  # fmt: skip
     assert set(expected) == set(METRICS)
     for name, value in expected.items():
-        # 30 ms: the smoothing of the speed moves an edge by that much
-        assert found[name] == pytest.approx(value, rel=0.01, abs=0.003), name
+        # the smoothing of the speed moves an edge by up to 30 ms
+        assert found[name] == pytest.approx(value, rel=0.01, abs=0.03 if name == "reaction_s" else 0.003), name
 
 
 def test_the_person_alone_with_the_object_gives_no_force_of_both():
@@ -49,3 +51,14 @@ def test_a_hand_that_nobody_sees_gives_no_figures_of_the_person():
     assert found["human_idle"] is None and found["nearest_m"] is None and found["peak_force_n"] is None
     assert found["robot_idle"] == pytest.approx(1.0 - fast_part()[0] / 10.0, rel=0.01)
     assert activities(trial)[0] == []
+
+
+def test_two_actions_of_a_recording_have_figures_of_their_own():
+    trial = measured()
+    first = trial.exchanges[0]
+    marks = {"motion_started": 6.0, "motion_reached": 8.0, "contact": 9.0, "opening": 9.0}
+    trial.exchanges = (first, replace(first, what="give", started=5.5, ended=10.0, marks=marks))
+    receive, give = (metrics_of(part) for part in trial.parts())
+    assert receive["transfer_s"] == pytest.approx(2.0) and give["transfer_s"] == pytest.approx(1.0)
+    assert give["approach_s"] == pytest.approx(2.0) and give["duration_s"] == pytest.approx(4.5)
+    assert [part.record.action for part in trial.parts()] == ["exchange_human_to_robot", "exchange_robot_to_human"]

@@ -9,6 +9,7 @@ from coglab_tools.__main__ import run
 from coglab_tools.report.page import page_of
 from coglab_tools.trial.explain import explain
 from coglab_tools.trial.record import Outcome
+from coglab_tools.trial.video import write_video
 from rospy import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -90,3 +91,17 @@ def test_the_page_holds_everything_and_escapes_what_people_typed():
     assert "<script" not in text and "&lt;script&gt;" in text
     assert "http://" not in text and "https://" not in text and text.count("data:image/png;base64,") == 2
     assert "0.12 s" in text  # detection delay
+
+
+def test_a_trial_is_drawn_without_a_screen(tmp_path):
+    pytest.importorskip("coglab_sim._camera", reason="./coglab film builds the camera")
+    image = pytest.importorskip("PIL.Image")
+    trial = measured()
+    trial.start, trial.end = 0.0, 0.5
+    trial.series.joints = [(k / 10, (0.0, 0.3 + k / 10, 0.0, -1.2, 0.0, 0.5, 0.0), (0.0,) * 7) for k in range(6)]
+    found = write_video(trial, tmp_path / "a.gif")
+    with image.open(tmp_path / "a.gif") as film:
+        assert film.n_frames == found["frames"] > 5
+        first = np.asarray(film.convert("L"), dtype=int)
+        film.seek(film.n_frames - 1)
+        assert np.abs(np.asarray(film.convert("L"), dtype=int) - first).max() > 50, "the arm moves"

@@ -80,10 +80,12 @@ def colours_of(names: list[str]) -> dict[str, tuple]:
 
 
 def _label(axis: Axes, x: float, y: float, name: str, space: Bbox) -> None:
-    """Write a name into its bar, in one line or one word per line. Omit it if neither fits."""
+    """Write a name into its bar: in one line, one word per line, or upwards and small. Omit it if nothing fits."""
     renderer = axis.figure.canvas.get_renderer()
-    for words in (name, name.replace(" ", "\n")):
-        label = axis.text(x, y, words, ha="center", va="center", fontsize=TEXT, linespacing=0.9, clip_on=True)
+    for words, turn, size in ((name, 0, TEXT), (name.replace(" ", "\n"), 0, TEXT), (name, 90, TEXT - 2)):
+        label = axis.text(
+            x, y, words, ha="center", va="center", fontsize=size, rotation=turn, linespacing=0.9, clip_on=True
+        )
         needed = label.get_window_extent(renderer)
         if needed.width <= space.width - 2 and needed.height <= space.height + 2:
             return

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import tempfile
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -26,4 +28,19 @@ def write_whole(path: Path, content: str | bytes) -> Path:
     finally:
         with suppress(OSError):
             half.unlink(missing_ok=True)
+    return path
+
+
+def write_by(path: Path, write: Callable[[Path], object]) -> Path:
+    """The same for a program or library that writes by itself: `write` gets a path beside the place, with the same
+    name. CheckFailed as above; other exceptions of `write` pass through, and nothing is left of its file."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".part-", dir=path.parent) as part:
+            made = Path(part) / path.name
+            write(made)
+            made.replace(path)
+    except OSError as error:
+        why = error.strerror or error
+        raise CheckFailed(f"{path} cannot be written: {why}; what was there before is kept") from None
     return path

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,9 +31,13 @@ _PERSON = f"The person is active while their hand moves faster than {PERSON_SPEE
 _ROBOT = f"the robot while its palm moves faster than {PALM_SPEED} m/s or a finger by {FINGER_SPEED:g} of 254 counts/s"
 METRICS = {
     "duration_s": Metric("duration", "s", "From the start of the action to its end, when the robot is ready again."),
-    "reaction_s": Metric("reaction", "s", "From the moment in which offer or request is believed to the arm's start."),
-    "approach_s": Metric("approach", "s", "From the arm's start to the contact."),
-    "transfer_s": Metric("transfer", "s", "From the contact until the object is let go."),
+    "reaction_s": Metric(
+        "reaction", "s", "From the beginning of the person's last motion before the arm's start to the arm's start."
+    ),
+    "approach_s": Metric("approach", "s", "From the arm's start until it is at its goal or feels a contact."),
+    "transfer_s": Metric(
+        "transfer", "s", "From there until the giver lets go: the person (receiving), or the opening hand (giving)."
+    ),
     "human_idle": Metric("person idle", "", f"1 - |H| / T (Hoffman 2019). {_PERSON}, {_ROBOT}; T is the duration."),
     "robot_idle": Metric("robot idle", "", "1 - |R| / T, active as above."),
     "concurrent_activity": Metric("both active", "", "|H and R| / T: share of the time in which both are active."),
@@ -48,7 +52,7 @@ METRICS = {
     "sparc": Metric(
         "smoothness (SPARC)",
         "",
-        f"Spectral arc length of the palm's speed from the arm's start to the contact (Balasubramanian 2015; "
+        f"Spectral arc length of the palm's speed over the approach (Balasubramanian 2015; "
         f"cut at {CUT:g} Hz, amplitude {SHARE:g}). Nearer to 0 is smoother; a minimum-jerk reach has -1.40.",
     ),
     "detection_delay_s": Metric(
@@ -62,18 +66,24 @@ METRICS = {
 """Name of each metric -> what it is."""
 
 
+def spans_of(marks: Mapping[str, float]) -> dict[str, float]:
+    """approach_s and transfer_s of one action from its marks (s), as far as it has them."""
+    arrived = min((marks[name] for name in ("motion_reached", "contact") if name in marks), default=None)
+    let_go = marks.get("released", marks.get("opening"))
+    found = {}
+    if arrived is not None and "motion_started" in marks:
+        found["approach_s"] = arrived - marks["motion_started"]
+    if arrived is not None and let_go is not None:
+        found["transfer_s"] = let_go - arrived
+    return found
+
+
 def metrics_of(trial: Measured) -> dict[str, float | None]:
-    """Value of each of METRICS; None: this trial has no measurement for it."""
+    """Value of each of METRICS for a trial of one action (`Measured.parts`); None: there is no measurement for it."""
     found: dict[str, float | None] = dict.fromkeys(METRICS)
     found["duration_s"] = trial.end - trial.start
-    marks = trial.exchanges[0].marks if len(trial.exchanges) == 1 else trial.marks
-    for name, first, last in (
-        ("reaction_s", "offered", "motion_started"),
-        ("approach_s", "motion_started", "contact"),
-        ("transfer_s", "contact", "released"),
-    ):
-        if first in marks and last in marks:
-            found[name] = marks[last] - marks[first]
+    marks = trial.exchanges[0].marks if trial.exchanges else {k: v + trial.start for k, v in trial.marks.items()}
+    found.update(spans_of(marks))
     rows = [row for row in trial.series.truth if trial.start <= row[0] <= trial.end]
     if len(rows) < 3:
         return _numbers(found)
@@ -81,14 +91,18 @@ def metrics_of(trial: Measured) -> dict[str, float | None]:
     times, first_of = np.unique(times, return_index=True)
     palm, person = (np.array([rows[i][k] for i in first_of], dtype=float) for k in (1, 2))
     force = np.array([rows[i][4] for i in first_of], dtype=float)
-    found.update(_fluency(trial, times, palm, person))
+    human, robot = _active(trial, times, palm, person)
+    begun = [start for start, _ in human if start <= marks.get("motion_started", -np.inf)]
+    if begun:
+        found["reaction_s"] = marks["motion_started"] - begun[-1]
+    found.update(_fluency(trial, human, robot, bool(np.isfinite(person).any())))
     found.update(_forces(trial, times, force))
     speed = speed_of(times, palm)
     found["peak_palm_speed"] = float(np.nanmax(speed, initial=0.0))
     if np.isfinite(person).any():
         found["nearest_m"] = float(np.nanmin(np.linalg.norm(palm - person, axis=1)))
-    absolute = trial.exchanges[0].marks if trial.exchanges else {}
-    reach = (times >= absolute.get("motion_started", np.inf)) & (times <= absolute.get("contact", -np.inf))
+    begin = marks.get("motion_started", np.inf)
+    reach = (times >= begin) & (times <= begin + found["approach_s"] if found["approach_s"] is not None else False)
     if reach.sum() >= 20:
         found["sparc"] = sparc(times[reach], palm[reach])
     felt = next((t for t, contact, *_ in trial.series.contacts if contact and trial.start <= t <= trial.end), None)
@@ -131,16 +145,12 @@ def _active(
     return active_intervals(times, human), active_intervals(times, robot)
 
 
-def _fluency(trial: Measured, times: np.ndarray, palm: np.ndarray, person: np.ndarray) -> dict[str, float | None]:
-    human, robot = _active(trial, times, palm, person)
+def _fluency(trial: Measured, human: list[Interval], robot: list[Interval], seen: bool) -> dict[str, float | None]:
     if not trial.end > trial.start:
         return {}
     found = fluency_of(human, robot, trial.start, trial.end)
-    if not np.isfinite(person).any():
-        return {"robot_idle": found.robot_idle}
-    return {
-        name: getattr(found, name) for name in ("human_idle", "robot_idle", "concurrent_activity", "functional_delay")
-    }
+    names = ("human_idle", "robot_idle", "concurrent_activity", "functional_delay") if seen else ("robot_idle",)
+    return {name: getattr(found, name) for name in names}
 
 
 def _forces(trial: Measured, times: np.ndarray, force: np.ndarray) -> dict[str, float | None]:

@@ -8,12 +8,12 @@ import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coglab_tools.command import CheckFailed, NotThere
+from coglab_tools.files import write_by, write_whole
 from coglab_tools.report.metrics import METRICS, activities, metrics_of
 from coglab_tools.trial.explain import explain
 from coglab_tools.trial.read import Measured
@@ -24,21 +24,6 @@ if TYPE_CHECKING:
 MOST_ROWS = 3000  # of a series in a plot
 PDF_LIMIT = 60.0  # s for chromium
 BLUE, ORANGE, DARK = "#0072B2", "#E69F00", "#1B1F24"
-
-
-def write_whole(file: Path, write: Callable[[Path], object]) -> Path:
-    """Let `write` write a file beside its place and move it there. CheckFailed: it cannot be; nothing is left of it."""
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix=".part-", dir=file.parent) as part:
-            made = Path(part) / file.name
-            write(made)
-            made.replace(file)
-    except OSError as error:
-        raise CheckFailed(
-            f"{file} cannot be written: {error.strerror or error}; make room or name another file"
-        ) from None
-    return file
 
 
 def figure_of_trial(trial: Measured) -> Figure:
@@ -109,7 +94,7 @@ def page_of(trial: Measured) -> str:
         record=record,
         lines=explain(trial),
         metrics=METRICS,
-        values=metrics_of(trial),
+        columns=[(part.record.action.replace("_", " "), metrics_of(part)) for part in trial.parts()],
         sources=trial.sources or {"hands": "unknown", "force": "unknown"},
         fluency=_png(figure_of_activity(trial)),
         plot=_png(figure_of_trial(trial)),
@@ -121,7 +106,7 @@ def page_of(trial: Measured) -> str:
 def write_report(trial: Measured, file: Path) -> Path:
     """Write the page of a trial, completely or not at all. Returns its path. CheckFailed: it cannot be written."""
     text = page_of(trial)
-    return write_whole(file, lambda part: part.write_text(text, encoding="utf-8"))
+    return write_whole(file, text)
 
 
 def write_pdf(page: Path, file: Path) -> Path:
@@ -150,4 +135,4 @@ def write_pdf(page: Path, file: Path) -> Path:
             last = (done.stderr.strip().splitlines() or ["it said nothing"])[-1]
             raise CheckFailed(f"{browser} did not print {page}: {last}; print it from a browser")
 
-    return write_whole(file, write)
+    return write_by(file, write)

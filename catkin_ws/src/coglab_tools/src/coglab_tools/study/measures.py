@@ -35,14 +35,10 @@ def measures_of(trial: Trial, exchange: Exchange) -> dict[str, float]:
 
 
 def times_of(exchange: Exchange) -> dict[str, float]:
-    """The measures that need no recording: duration, and the times between the marks that the handover has; s."""
-    marks = exchange.marks
-    found = {"duration_s": exchange.duration}
-    for name, first, last in (
-        ("reaction_s", "offered", "motion_started"),
-        ("approach_s", "motion_started", "contact"),
-        ("transfer_s", "contact", "released"),
-    ):
-        if first in marks and last in marks:
-            found[name] = marks[last] - marks[first]
-    return {name: round(value, DIGITS) for name, value in found.items()}
+    """The measures that need no recording: duration, approach and transfer, s."""
+    from coglab_tools.report.metrics import spans_of
+
+    return {
+        name: round(value, DIGITS)
+        for name, value in {"duration_s": exchange.duration, **spans_of(exchange.marks)}.items()
+    }

@@ -1,8 +1,9 @@
-"""`./coglab trial VERB`: recorded handovers: list, show, plot, explain, report, replay"""
+"""`./coglab trial VERB`: recorded handovers: list, show, plot, explain, report, video, replay"""
 
 from __future__ import annotations
 
 import argparse
+import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ from typing import Any
 from coglab_tools.command import OK, Answer, CheckFailed, CommandError, UsageError
 from coglab_tools.trial.record import BAG, TrialRecord, find_trials, trials_folder
 
-HELP = "recorded handovers: list, show, plot, explain, report, replay"
+HELP = "recorded handovers: list, show, plot, explain, report, video, replay"
 HIDDEN = ".part-"
 
 
@@ -24,13 +25,14 @@ def add(verbs: argparse._SubParsersAction[Any]) -> None:
         ("explain", explain_trial, "what happened, in at most ten lines with times"),
         ("plot", plot, "phases, paths, torques, fingers and forces as a picture"),
         ("report", report, "one HTML page with outcome, plots and figures"),
+        ("video", video, "a moving picture, drawn from the recording without a screen"),
         ("replay", replay, "publishes the bag again, on a ROS master of its own"),
     ):
         parser = verbs.add_parser(name, help=words)
         parser.add_argument(
             "trial", type=str, nargs="?", default="", help='folder of a trial; "" or "last": the newest'
         )
-        if name in ("plot", "report"):
+        if name in ("plot", "report", "video"):
             parser.add_argument("--out", type=Path, help="file to write; default: in the folder of the trial")
         if name == "report":
             parser.add_argument("--pdf", action="store_true", help="also as PDF, beside the page")
@@ -76,7 +78,7 @@ def list_trials(options: argparse.Namespace) -> Answer:
             name: getattr(record, name) for name in ("id", "started", "action", "object", "participant", "condition")
         }
         outcome = "succeeded" if record.outcome.success else record.outcome.reason
-        rows.append({**row, "outcome": outcome, "duration_s": record.duration_s, "folder": str(place)})
+        rows.append({**row, "outcome": outcome, "duration_s": round(record.duration_s, 2), "folder": str(place)})
     parts = sorted(str(each) for each in Path(folder).glob(f"{HIDDEN}*")) if Path(folder).is_dir() else []
     columns = ("id", "object", "participant", "condition", "outcome", "duration_s")
     table = [columns, *(tuple(str(row[c]) for c in columns) for row in rows)]
@@ -100,16 +102,22 @@ def show(options: argparse.Namespace) -> Answer:
 
     place, trial = _measured(options)
     data = asdict(trial.record)
-    values = metrics_of(trial)
-    lines = [headline(trial)]
-    lines += [f"{t:+7.2f} s  {text}" for t, text, _ in events(trial)]
-    lines += [
-        f"{metric.label:28} {'-' if values[name] is None else f'{values[name]:.3g} {metric.unit}'}"
-        for name, metric in METRICS.items()
-    ]
+    values, lines = [], []
+    for part in trial.parts():
+        values.append(metrics_of(part))
+        lines.append(headline(part))
+        lines += [f"{t:+7.2f} s  {text}" for t, text, _ in events(part)]
+        lines += [
+            f"{metric.label:28} {'-' if values[-1][name] is None else f'{values[-1][name]:.3g} {metric.unit}'}"
+            for name, metric in METRICS.items()
+        ]
     rest = {k: v for k, v in data.items() if k not in ("marks", "outcome") and v not in ("", None, {})}
     lines.append(yaml.safe_dump(rest, sort_keys=False, allow_unicode=True, default_flow_style=None).rstrip())
-    return Answer("\n".join(lines), {**data, "metrics": values}, f"./coglab trial report {place}")
+    return Answer(
+        "\n".join(lines),
+        {**data, "metrics": values[0] if len(values) == 1 else values},
+        f"./coglab trial report {place}",
+    )
 
 
 def explain_trial(options: argparse.Namespace) -> Answer:
@@ -123,14 +131,15 @@ def explain_trial(options: argparse.Namespace) -> Answer:
 
 def plot(options: argparse.Namespace) -> Answer:
     """The picture of a trial, as PNG, PDF or SVG by the name of the file."""
-    from coglab_tools.report.page import figure_of_trial, write_whole
+    from coglab_tools.files import write_by
+    from coglab_tools.report.page import figure_of_trial
 
     place, trial = _measured(options)
     file = options.out or place / "trial.png"
     if file.suffix.lower() not in (".png", ".pdf", ".svg"):
         raise UsageError(f"{file} ends with {file.suffix or 'nothing'}: .png, .pdf or .svg is expected")
     figure = figure_of_trial(trial)
-    write_whole(file, lambda part: figure.savefig(part, dpi=160))
+    write_by(file, lambda part: figure.savefig(part, dpi=160))
     return Answer(f"{file}", {"file": str(file)}, f"./coglab trial report {place}")
 
 
@@ -148,6 +157,19 @@ def report(options: argparse.Namespace) -> Answer:
     return Answer(text, data, f"./coglab trial replay {place}")
 
 
+def video(options: argparse.Namespace) -> Answer:
+    """The moving picture of a trial, as GIF or MP4 by the name of the file."""
+    from coglab_tools.trial.video import KINDS, write_video
+
+    place, trial = _measured(options)
+    file = options.out or place / "trial.gif"
+    if file.suffix.lower() not in KINDS:
+        raise UsageError(f"{file} ends with {file.suffix or 'nothing'}: {' or '.join(KINDS)} is expected")
+    data = write_video(trial, file)
+    text = f"{file}: {data['frames']} pictures, {data['seconds']:.0f} s, {file.stat().st_size / 1e6:.1f} MB"
+    return Answer(text, {"file": str(file), **data}, f"./coglab trial report {place}")
+
+
 def replay(options: argparse.Namespace) -> Answer:
     """Publish the bag of a trial again, until it ends or Ctrl-C."""
     from coglab_tools.trial.replay import replay as run
@@ -156,7 +178,7 @@ def replay(options: argparse.Namespace) -> Answer:
     TrialRecord.load(place)
     if not (place / BAG).is_file():
         raise CheckFailed(f"{place} has no {BAG}: a trial of virtual time is not replayed; ./coglab trial plot {place}")
-    seconds = run(place / BAG, options.rate, options.rviz)
+    seconds = run(place / BAG, options.rate, options.rviz, sys.stderr if options.json else sys.stdout)
     return Answer(
         f"{place / BAG}: replayed in {seconds:.0f} s", {"seconds": seconds}, f"./coglab trial explain {place}"
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from coglab.results import reason_name
+from coglab.results import ACTIONS, reason_name
 
 from coglab_tools.report.metrics import metrics_of
 from coglab_tools.trial.read import Measured
@@ -50,11 +50,14 @@ def first_failure(trial: Measured) -> tuple[float, str] | None:
 
 def events(trial: Measured) -> list[tuple[float, str, bool]]:
     """What happened: s after the start, sentence, and whether it can be left out, by time."""
-    found = [(mark["time_s"], MARKS.get(mark["name"], mark["name"].replace("_", " ")), mark["name"] in LESS)
+    words = MARKS | ({"offered": MARKS["requested"]} if trial.record.action == ACTIONS["give"] else {})
+    found = [(mark["time_s"], words.get(mark["name"], mark["name"].replace("_", " ")), mark["name"] in LESS)
              for mark in trial.record.marks]  # fmt: skip
     inside = (trial.start, trial.end + 1.0)
     found += [
-        (t - trial.start, f'the robot said "{text}"', True) for t, text in trial.said if inside[0] <= t <= inside[1]
+        (t - trial.start, f'the robot said "{_said(text)}"', True)
+        for t, text in trial.said
+        if inside[0] <= t <= inside[1]
     ]
     for t, contact, margin, text in trial.series.contacts:
         if inside[0] <= t <= inside[1]:
@@ -63,8 +66,19 @@ def events(trial: Measured) -> list[tuple[float, str, bool]]:
     return sorted(found)
 
 
+def _said(text: str) -> str:
+    """A sentence, or the name of one in virtual time, such as YOU_HAVE_IT."""
+    return text.replace("_", " ").lower() if text.isupper() else text
+
+
 def explain(trial: Measured) -> list[str]:
-    """At most ten lines: outcome, what went wrong first, why, and what happened when (s after the start)."""
+    """At most ten lines for each action: outcome, what went wrong first, why, and what happened when (s after its
+    start)."""
+    lines = [line for part in trial.parts() for line in _explain(part)]
+    return [*lines, f"notes: {trial.record.notes}"] if trial.record.notes and len(trial.exchanges) > 1 else lines
+
+
+def _explain(trial: Measured) -> list[str]:
     lines = [headline(trial)]
     if not trial.record.outcome.success:
         if wrong := first_failure(trial):

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from coglab.results import ACTIONS, Exchange
+from coglab.results import ACTIONS, Exchange, reason_name
 from coglab.series import Series
 
 from coglab_tools.command import CheckFailed, UsageError
-from coglab_tools.trial.record import ARRAYS, BAG, TrialRecord
+from coglab_tools.trial.record import ARRAYS, BAG, Outcome, TrialRecord
 
 JOINTS = "lwr/joint_states"
 MOST_SECONDS = 24 * 3600.0  # of tf that is kept
@@ -53,6 +53,29 @@ class Measured:
         for mark in self.record.marks:
             found.setdefault(mark["name"], mark["time_s"])
         return found
+
+    def parts(self) -> list[Measured]:
+        """One trial per action, where several were recorded together; else this one."""
+        if len(self.exchanges) < 2:
+            return [self]
+        return [
+            replace(
+                self,
+                record=replace(
+                    self.record,
+                    action=ACTIONS.get(e.what, e.what),
+                    object=e.object_id,
+                    outcome=Outcome(e.ok, e.code, reason_name(e.code), e.sentence),
+                    duration_s=e.duration,
+                    marks=tuple({"name": name, "time_s": when - e.started} for name, when in e.marks.items()),
+                    notes="",
+                ),
+                start=e.started,
+                end=e.ended,
+                exchanges=(e,),
+            )
+            for e in self.exchanges
+        ]
 
 
 def read_trial(folder: str | Path) -> Measured:
