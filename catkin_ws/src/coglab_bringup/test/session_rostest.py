@@ -136,11 +136,11 @@ class Session(Handover):
         os.kill(pid, signal.SIGKILL)
         start = rospy.ServiceProxy("/coglab/start", Start)
         end = time.monotonic() + 60.0
-        answer = start("juggle", "")
+        answer = start("put", "")
         waits = ("takes initialise", "takes reset")
         while not any(words in answer.message for words in waits) and time.monotonic() < end:
             time.sleep(0.2)
-            answer = start("juggle", "")
+            answer = start("put", "")
         why = rospy.ServiceProxy("/coglab/why", Trigger)().message
         self.assertRegex(why, "robot is silent|arm is blocked|arm does not follow")
         action = "initialise" if "takes initialise" in answer.message else "reset"
@@ -148,7 +148,7 @@ class Session(Handover):
         end = time.monotonic() + READY_LIMIT
         while "wait_without_object takes" not in answer.message and time.monotonic() < end:
             time.sleep(0.5)
-            answer = start("juggle", "")
+            answer = start("put", "")
             if "takes initialise" in answer.message:
                 start("initialise", "")
         self.assertIn("wait_without_object takes", answer.message)

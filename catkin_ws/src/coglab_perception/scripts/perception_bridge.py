@@ -11,6 +11,7 @@ Parameters: perception/frames (mapping of frames.yaml); private: mapping (file, 
 from __future__ import annotations
 
 import sys
+import threading
 import time
 from functools import partial
 from typing import Any
@@ -18,6 +19,7 @@ from typing import Any
 import numpy as np
 import rospy
 import tf2_ros
+from coglab_msgs.srv import ListObjects
 from coglab_perception.frames import FrameNames
 from coglab_perception.ros_services import PerceptionServices
 from coglab_perception.sights import Board, Sight, Sights
@@ -32,6 +34,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 TF_PERIOD = 0.01  # s between two looks at the tracker's tf frames
 AHEAD = 0.05  # s, largest difference of synchronised clocks
+DATABASE_WAIT = 60.0  # s
 QUIET = 5.0  # s between two warnings about the same frame
 BOARD_MOVED = 1e-3  # m and rad; a board that moves more is broadcast again
 
@@ -67,8 +70,23 @@ class BridgeNode:
                 markers.setdefault(source.topic, []).append(source)
         for topic, sources in markers.items():
             rospy.Subscriber(topic, MarkerArray, partial(self.on_markers, sources), queue_size=5, tcp_nodelay=True)
+        threading.Thread(target=self.name_unknown_objects, daemon=True).start()
         self._tf_sources = [source for source in self.mapping.sources if source.tf]
         steady.SteadyTimer(TF_PERIOD, self.look_at_tf, "tf")
+
+    def name_unknown_objects(self) -> None:
+        """Warn of objects in the mapping that the object database does not have."""
+        try:
+            rospy.wait_for_service("object_database/list_objects", DATABASE_WAIT)
+            known = rospy.ServiceProxy("object_database/list_objects", ListObjects)().object_ids
+        except (rospy.ROSException, rospy.ServiceException):  # no database: perception alone
+            return
+        frames = {self.names.object_frame(each) for each in known}
+        for source in self.mapping.sources:
+            if source.frame not in frames | {self.names.human_hand, self.names.board}:
+                rospy.logwarn(
+                    f"{source.frame} of the mapping is of no object in the database; it has: {', '.join(known)}"
+                )
 
     # -- seeing ----------------------------------------------------------------------------------
 

@@ -38,6 +38,15 @@ class OtherOutcomes(CoglabState):
         super().__init__(ctx, outcomes=["succeeded", "maybe"])
 
 
+def without_arguments():
+    pass
+
+
+class ReturnsNonsense(CoglabState):
+    def run(self, ud):
+        return "nonsense"
+
+
 def no_delivery(entry, hand):
     return {"pose": {"xyz": [3, 0, 0]}, "release": {}}
 
@@ -201,3 +210,43 @@ def test_a_machine_with_its_own_recovery_stays_as_it_is():
 
     trial.run(script)
     assert "hand_close" in trial.labels("/coglab_master/fetch")
+
+
+@pytest.mark.parametrize(
+    ("group", "name", "call"),
+    [
+        ("actions", "wipe", "without_arguments(ctx)"),
+        ("states", "exchange_human_to_robot/query_database", "without_arguments(ctx)"),
+        ("deliveries", "low", "without_arguments(entry, hand)"),
+    ],
+)
+def test_a_function_that_takes_other_arguments_is_refused_with_its_line(group, name, call):
+    with pytest.raises(ConfigError) as refused:
+        Trial(**{group: {name: f"{__name__}:without_arguments"}})
+    line = without_arguments.__code__.co_firstlineno
+    assert call in str(refused.value) and f"test_own_parts.py:{line}" in str(refused.value)
+
+
+def test_an_outcome_that_does_not_exist_is_a_failure_and_the_machine_goes_on():
+    trial = Trial(states={"exchange_human_to_robot/query_database": f"{__name__}:ReturnsNonsense"})
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        assert asks(t, "receive", "mug").ok
+        t.until(lambda: t.ctx.journal.results[-1].kind == "exchange_human_to_robot")
+        assert t.result().outcome == "failed_empty" and "'nonsense'" in t.result().reason
+        t.wait_hub("wait_without_object")
+
+    trial.run(script)
+
+
+def test_an_action_that_does_not_exist_is_refused_with_those_that_do_while_another_runs():
+    trial = Trial(actions=WIPE)
+
+    def script(t):
+        t.wait_hub("wait_without_object")
+        assert asks(t, "receive", "mug").ok
+        answer = asks(t, "polish")  # no hub is open now
+        assert answer.code == ReasonCode.UNKNOWN_NAME and "wipe" in answer.message
+
+    trial.run(script)

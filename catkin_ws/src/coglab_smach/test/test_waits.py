@@ -131,7 +131,7 @@ def raising(error):
         (PortError("no", ("because",), 7), "Probe: no", 7),
         (ConfigError("no field"), "Probe: no field", ReasonCode.BAD_FILE),
         (smach.InvalidUserCodeError("no key"), "Probe: no key", ReasonCode.BAD_FILE),
-        (ValueError("odd"), "Probe: ValueError: odd (work:", ReasonCode.UNEXPECTED),
+        (ValueError("odd"), "Probe: ValueError: odd (test_waits.py:", ReasonCode.UNEXPECTED),
     ],
 )
 def test_whatever_a_state_raises_is_a_failure_with_a_sentence_and_a_code(error, sentence, code):

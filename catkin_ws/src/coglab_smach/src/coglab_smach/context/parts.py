@@ -6,6 +6,7 @@ start with a ConfigError, so that nothing is half-loaded.
 
 from __future__ import annotations
 
+import inspect
 import os
 import sys
 import traceback
@@ -18,6 +19,10 @@ from coglab_smach.context.config import Config, ConfigError
 
 HANDS = ("empty", "holding", "any")
 """What the hand holds when an action may start."""
+BUILD = ("ctx",)
+"""arguments of a function that builds an action or a state: the Context"""
+DELIVER = ("entry", "hand")
+"""arguments of a delivery: entry of the object, and the Pose of the person's hand"""
 
 
 @dataclass(frozen=True)
@@ -53,11 +58,11 @@ class Parts:
         own = []
         for name, value in actions.items():
             given = {"build": value} if isinstance(value, str) else value
-            own.append(OwnAction(name, given.get("hand", "empty"), imported(f"actions.{name}", given["build"])))
+            own.append(OwnAction(name, given.get("hand", "empty"), imported(f"actions.{name}", given["build"], BUILD)))
         return Parts(
             tuple(own),
-            {place: imported(f"states.{place}", value) for place, value in states.items()},
-            {name: imported(f"deliveries.{name}", value) for name, value in deliveries.items()},
+            {place: imported(f"states.{place}", value, BUILD) for place, value in states.items()},
+            {name: imported(f"deliveries.{name}", value, DELIVER) for name, value in deliveries.items()},
         )
 
     def all_placed(self) -> None:
@@ -69,8 +74,9 @@ class Parts:
                 raise ConfigError(f"states.{place}: there is no such state; there are: {', '.join(there)}")
 
 
-def imported(name: str, spec: str) -> Callable[..., Any]:
-    """Returns the function ``module:function`` that the field ``name`` of machines.yaml gives. ConfigError in words."""
+def imported(name: str, spec: str, arguments: tuple[str, ...]) -> Callable[..., Any]:
+    """Returns the function ``module:function`` that the field ``name`` of machines.yaml gives, and that takes
+    ``arguments``. ConfigError in words."""
     module, _, function = spec.partition(":")
     if not function.isidentifier() or not all(word.isidentifier() for word in module.split(".")):
         raise ConfigError(f"{name}: 'module:function' is expected, such as my_lab.machines:build_polish, got '{spec}'")
@@ -90,6 +96,15 @@ def imported(name: str, spec: str) -> Callable[..., Any]:
         there = [each for each, value in vars(found).items() if callable(value) and not each.startswith("_")]
         what = "no function" if part is None else f"{type_name(part)}, no function,"
         raise ConfigError(f"{name}: module '{module}' has {what} '{function}'; it has: {', '.join(there) or 'none'}")
+    try:
+        inspect.signature(part).bind(*arguments)
+    except TypeError:
+        raise ConfigError(
+            f"{name}: {function}{inspect.signature(part)} of {_file_and_line(part)} is called as "
+            f"{function}({', '.join(arguments)}): give it these arguments"
+        ) from None
+    except ValueError:  # of a compiled function: nobody can tell
+        pass
     return part
 
 
@@ -109,6 +124,14 @@ def _where(error: BaseException) -> str:
     last = frames[-1] if frames else None
     place = f" ({os.path.basename(last.filename)}:{last.lineno})" if last else ""
     return f"{type(error).__name__}: {error}{place}"
+
+
+def _file_and_line(part: Any) -> str:
+    """File and line of a function or class of the user."""
+    try:
+        return f"{os.path.basename(inspect.getsourcefile(part) or '?')}:{inspect.getsourcelines(part)[1]}"
+    except (OSError, TypeError):
+        return str(getattr(part, "__module__", "its module"))
 
 
 def type_name(value: Any) -> str:

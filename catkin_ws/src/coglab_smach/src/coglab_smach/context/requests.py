@@ -57,6 +57,8 @@ class Requests:
         self._names_object = False
         self.default_object: str | None = None
         """object of a trigger without an object id; None if triggers do not refer to an object of the database"""
+        self.known: tuple[str, ...] = ()
+        """every action of this machine, in whatever hub; empty: not told"""
 
     def open(
         self, hub: str, allowed: Iterable[str], names_object: bool = False, default_object: str | None = None
@@ -149,6 +151,12 @@ def ask_for(ctx: Context, action: str, object_id: str = "", source: str = "opera
     "/handle_first" for the object in the hand.
     """
     action = SHORT_NAMES.get(action, action)
+    known = ctx.requests.known
+    if known and action not in known:
+        there = ", ".join([*SHORT_NAMES, *(each for each in known if each not in SHORT_NAMES.values())])
+        return Answer(
+            False, f"'{action}' refused: there is no such action; there are: {there}", ReasonCode.UNKNOWN_NAME
+        )
     object_id, _, behind = object_id.partition("/")
     delivery = delivery or behind
     refusal = ctx.requests.refusal(action, object_id)
@@ -158,12 +166,12 @@ def ask_for(ctx: Context, action: str, object_id: str = "", source: str = "opera
     wanted = object_id or default
     try:
         if default is not None and wanted:
-            known = sorted(_answer(ctx, ctx.database.list_objects()))
-            if wanted not in known:
+            objects = sorted(_answer(ctx, ctx.database.list_objects()))
+            if wanted not in objects:
                 return Answer(
                     False,
                     f"'{action}' refused: object '{wanted}' is not in the database; it has: "
-                    f"{', '.join(known)}; {command(action)} {known[0] if known else 'OBJECT'}",
+                    f"{', '.join(objects)}; {command(action)} {objects[0] if objects else 'OBJECT'}",
                     ReasonCode.OBJECT_UNKNOWN,
                 )
         refusal = _delivery_refusal(ctx, action, object_id, delivery) if delivery else None

@@ -45,6 +45,7 @@ def build_master(ctx: Context) -> CoglabMachine:
         if own.name in TAKEN:
             raise ConfigError(f"actions.{own.name}: this name is in use; choose another one")
     empty, holding = actions_of(ctx, ACTIONS_EMPTY, "empty"), actions_of(ctx, ACTIONS_HOLDING, "holding")
+    ctx.requests.known = tuple(dict.fromkeys([*empty, *holding, "initialise", "reset"]))
     master = CoglabMachine(ctx, LABEL, ["preempted"])
     master.userdata.object_id = master.userdata.grasp_name = master.userdata.delivery_name = ""
     master.userdata.object_entry, master.userdata.grasp = {}, {}

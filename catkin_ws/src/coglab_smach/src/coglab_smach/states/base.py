@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import traceback
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
@@ -123,6 +124,10 @@ class CoglabState(smach.State):
         try:
             self.check()
             outcome = self.run(ud)
+            if outcome not in self.get_registered_outcomes():  # of a user's state; the machine must go on
+                known = ", ".join(self.get_registered_outcomes())
+                text = f"{self.label}: run() of {type(self).__name__} returned {outcome!r}; expected one of {known}"
+                return "failed", Failure(text, (), ReasonCode.UNEXPECTED)
             return outcome, Failure(self.reason or (f"{self.label} failed" if outcome == "failed" else ""))
         except Interrupted as interrupt:
             code = ReasonCode.STOP_LATCHED if interrupt.stop else ReasonCode.PREEMPTED
@@ -135,7 +140,9 @@ class CoglabState(smach.State):
             last = traceback.extract_tb(error.__traceback__)[-1]
             smach.logerr(traceback.format_exc())
             return "failed", Failure(
-                f"{self.label}: {type(error).__name__}: {error} ({last.name}:{last.lineno})", (), ReasonCode.UNEXPECTED
+                f"{self.label}: {type(error).__name__}: {error} ({os.path.basename(last.filename)}:{last.lineno})",
+                (),
+                ReasonCode.UNEXPECTED,
             )
 
     def time_limit(self) -> float:

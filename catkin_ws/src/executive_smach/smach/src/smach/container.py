@@ -168,9 +168,9 @@ class Container(Callbacks, State):
             self.close()
             return
         logged_when_made = (InvalidStateError, InvalidTransitionError)
-        if not isinstance(error, logged_when_made):
-            text = "".join(traceback.format_exception(kind, error, trace))
-            smach.logerr(f"construction of {self._name()} failed: {text}")
+        outermost = Container._construction_stack[0] is self if Container._construction_stack else True
+        if outermost and not isinstance(error, logged_when_made):  # one line: the error itself goes on to the caller
+            smach.logerr(f"construction of {self._name()} failed: {type(error).__name__}: {error}")
         # After any error inside, the construction lock must be free for other threads.
         if any(container is self for container in Container._construction_stack):
             while not self.is_opened():
