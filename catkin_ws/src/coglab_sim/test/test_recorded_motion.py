@@ -133,10 +133,6 @@ def test_of_a_bag_only_what_a_tracker_sees(tmp_path):
         Playback.open(PlaybackSettings(file=path), "world", names.is_tracked)
 
 
-def test_rename(tmp_path):
-    assert list(playback(tmp_path, rename={"human_hand": "object_mug"}).frames(0.0)) == ["object_mug"]
-
-
 def test_the_recorded_hand_waits_for_the_robot(tmp_path):
     far, near = Pose(np.array([0.2, 0.0, 0.4])), Pose(POSITIONS[5] + [0.1, 0.0, 0.0])
     play = playback(tmp_path, wait_at=0.5, wait_limit=3.0)
@@ -165,9 +161,6 @@ def test_bad_npz_files_are_named(tmp_path):
         load_recording(str(path))
     np.savez(path, t=np.array([Bomb()], dtype=object), position=np.zeros((1, 3)))
     with pytest.raises(RecordingError, match="not an npz file of plain arrays"):
-        load_recording(str(path))
-    np.savez(path, t=STAMPS, position=POSITIONS[:5])
-    with pytest.raises(RecordingError, match=r"'position' of shape \(N, 3\)"):
         load_recording(str(path))
     np.savez(path, time=STAMPS)
     with pytest.raises(RecordingError, match="no array 't' in it; it has time"):
