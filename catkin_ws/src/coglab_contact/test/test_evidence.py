@@ -9,16 +9,14 @@ import pytest
 from coglab_contact.detector import ContactDetector, DetectorSettings
 from coglab_contact.evidence import (
     MOMENTUM,
-    SIGHT,
     Evidence,
     Fingers,
     InPalm,
     Touch,
     probability,
-    together,
 )
 from coglab_contact.fused_detector import IN_MOTION, LIFT, RELEASE, FusedDetector
-from coglab_contact.load import GripAndLoad, LeavingLoad
+from coglab_contact.load import LeavingLoad
 from coglab_msgs.msg import ReasonCode
 
 
@@ -32,13 +30,6 @@ class Motor:
     moving: bool = False
     target_reached: bool = False
     over_current: bool = False
-
-
-def test_a_source_at_its_threshold_is_sure_to_99_in_100():
-    assert [probability(m) for m in (1.0, 0.8, 0.6)] == pytest.approx([0.99, 0.8998, 0.4490], abs=1e-3)
-    assert probability(0.0) == pytest.approx(6.08e-4, rel=1e-2) and probability(50.0) == 1.0
-    two = [Evidence(name, 0.0, 1.0, 0.6) for name in (MOMENTUM, SIGHT)]
-    assert together(two) == pytest.approx(1.0 - (1.0 - 0.4490) ** 2, abs=1e-3) and together([]) == 0.0
 
 
 @pytest.mark.parametrize(
@@ -121,18 +112,6 @@ def test_a_finger_that_stops_before_its_target_is_a_contact_and_stands_for_itsel
         fingers = Fingers()
         fingers.feed(0.0, [Motor(moving=True)])
         assert fingers.feed(0.1, [Motor(position=90, **end)]).margin == 0.0
-
-
-def held(**rest):
-    return GripAndLoad(lambda q: np.eye(3), **rest)
-
-
-@pytest.mark.parametrize(("differs", "share"), [(0.49, 0.0), (-0.49, 0.0), (0.51, 0.51), (-0.51, -0.51)])
-def test_half_a_newton_between_postures_is_the_models_error(differs, share):
-    load = LeavingLoad(0.5, 0.5, 100.0, 5.0)
-    for k in range(30):
-        load.feed(0.005 * k, 5.0 - differs, True, False)
-    assert load.share * load.weight == pytest.approx(share)
 
 
 def test_a_share_has_to_be_gone_for_50_ms_and_a_fresh_estimate_begins_anew():
@@ -235,38 +214,3 @@ def test_a_clock_that_was_set_leaves_an_arming_its_time(jump):
     assert detector.state() == "watching"
     measured(detector, 1.05 + jump, 1.1 + jump)
     assert detector.state() != "watching"
-
-
-def test_a_force_is_told_against_the_rest_before_the_reach():
-    detector, moving = fused()
-    moving.change = None
-    detector.arm(IN_MOTION, 0.0, 1.0)
-    assert detector.state() == "waiting", "too little of a past"
-    detector, moving = fused()
-    assert detector.force() is None
-    moving.before, moving.hangs = np.full(7, 0.5), 2.0
-    detector.arm("contact", 0.0, 1.0)
-    assert detector.force() is None
-    detector.arm(IN_MOTION, 0.0, 1.0)
-    assert detector.force() == pytest.approx([1.5] * 3)
-    detector.disarm()
-    assert detector.force() == pytest.approx([1.5] * 3), "whether somebody watches or not"
-
-
-def test_a_release_tells_its_share_and_its_margin():
-    detector, moving = fused()
-    moving.hangs = moving.before = 0.5 * 9.81
-    detector.arm(RELEASE, 0.0, 5.0, mass=0.5, load_share=0.8)
-    assert detector.state() == "waiting" and detector.share_gone() is None
-    measured(detector, 0.0, 0.2)
-    assert detector.state() == "watching" and detector.share_gone() == pytest.approx(0.0)
-    moving.hangs = 0.6 * 0.5 * 9.81
-    assert measured(detector, 0.2, 0.5)[0] is None
-    seen = detector.look()
-    assert (seen.mode, seen.state) == (RELEASE, "watching") and seen.margin == pytest.approx(0.5)
-    assert detector.margin == pytest.approx(0.5)
-    moving.hangs = 0.1 * 0.5 * 9.81
-    event, when = measured(detector, 0.5, 1.0)
-    assert when == pytest.approx(0.55) and not event.contact and event.source == MOMENTUM
-    assert event.message == f"{0.9 * 0.5 * 9.81:.1f} N of the load are gone (needed {0.8 * 0.5 * 9.81:.1f} N)"
-    assert detector.share_gone() == pytest.approx(0.9), "told until the watch ends"

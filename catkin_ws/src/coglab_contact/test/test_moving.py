@@ -19,13 +19,10 @@ from coglab_contact.motion_thresholds import (
     Change,
     ThresholdError,
     Thresholds,
-    largest_confirmed,
     learn,
-    limit_of,
 )
 from coglab_contact.moving_contact import MotionRecorder, MovingContact
 from coglab_msgs.msg import ReasonCode
-from scipy.stats import gumbel_r
 
 
 def test_terms_of_the_arm_obey_their_definitions():
@@ -84,16 +81,6 @@ def test_what_is_no_number_and_short_gaps_leave_the_estimate_alone():
     assert np.allclose(other.torque, 1.0, atol=0.05)
 
 
-def test_stamps_that_jitter_are_whole_periods():
-    arm, rng = Arm(begin=0.0), np.random.default_rng(3)
-    observer, worst = MomentumObserver(cc.ArmDynamics(URDF), period=DT), 0.0
-    for k in range(150):
-        q, _, tau = arm.at(k * DT)
-        residual = observer.feed(k * DT + rng.uniform(-0.0012, 0.0012), q, tau)
-        worst = max(worst, 0.0 if residual is None else float(np.max(np.abs(residual.torque))))
-    assert worst < 0.05
-
-
 def test_a_stamp_that_could_be_of_either_period_is_no_push():
     """As a computer under load stamps: some samples half a period late. Without a word of it they are 27 Nm."""
     arm, rng = Arm(begin=0.0), np.random.default_rng(5)
@@ -115,14 +102,6 @@ def test_a_push_on_the_moving_arm_is_found_within_eighty_milliseconds(direction,
     assert event is not None and event.source == MOMENTUM and event.code == ReasonCode.CONTACT_FOUND
     assert 1.02 < when <= 1.10
     assert event.confidence >= 0.99 and detector.state() == "off"
-
-
-def test_a_push_at_rest_is_found_too_and_nothing_without_one():
-    arm, detector = Arm(begin=99.0, sigma=0.05), fused()
-    assert feed(detector, arm, 0.0, 1.0)[0] is None
-    detector.arm(IN_MOTION, 1.0, 5.0)
-    event, when = feed(detector, arm, 1.0, 2.0, ramp((0, 1, 0), 1.5))
-    assert event is not None and 1.5 < when <= 1.6
 
 
 def test_no_alarm_without_contact():
@@ -388,17 +367,6 @@ def thresholds(constant=0.04, **rest):
     return Thresholds(variance, 5.0, seven(0.3), 4.0, **rest)
 
 
-def test_a_limit_is_exceeded_with_the_chosen_probability():
-    rng = np.random.default_rng(5)
-    largest = rng.gumbel(3.0, 0.4, 400)
-    spread = np.std(largest) * math.sqrt(6.0) / math.pi
-    mode = np.mean(largest) - np.euler_gamma * spread
-    assert limit_of(largest, 0.01) == pytest.approx(max(gumbel_r.isf(0.01, mode, spread), 1.05 * largest.max()))
-    assert limit_of([1.0, 2.0, 3.0], 1e-3) == pytest.approx(gumbel_r.isf(1e-3, 2.0 - 0.36747, 0.63662), rel=1e-4)
-    assert limit_of([2.0, 2.0], 1e-3) == pytest.approx(2.1), "never less than was seen"
-    assert largest_confirmed([1.0, 9.0, 2.0, 3.0, 4.0, 1.0]) == 3.0
-
-
 def reaches(lag=0.0, count=20, samples=40):
     """Changes with 0.2 Nm of noise, and what a lag (s) adds."""
     rng, found = np.random.default_rng(2), []
@@ -465,23 +433,3 @@ def test_a_push_at_rest_is_forgotten_as_fast_at_every_period(period):
     moved.feed((0.0, 0.0, -8.0), int(1.0 / period))
     moved.feed((0.0, 0.0, 0.0), int(0.5 / period))
     assert -contact.before_motion()[2] == pytest.approx(8.0 * np.exp(-0.5 / 0.25), abs=0.25)
-
-
-@pytest.mark.parametrize(("samples", "speed", "kept"), [(40, 0.11, 1), (39, 0.11, 0), (60, 0.09, 0)])
-def test_a_motion_counts_with_40_samples_and_a_tenth_of_a_radian_per_second(samples, speed, kept):
-    moving = SimpleNamespace(change=None, load=0.0, still=lambda: False, offset_of_motion=lambda: "offset")
-    recorder = MotionRecorder(moving)
-    recorder.look()
-    for k in range(samples):
-        moving.change = SimpleNamespace(stamp=1.0 + k, features=np.full((7, 6), speed))
-        recorder.look()
-        recorder.look()
-    recorder.end()
-    assert (len(recorder.reaches), len(recorder.offsets)) == (kept, kept)
-    assert not kept or len(recorder.reaches[0]) == samples, "each sample once"
-    moving.load = 0.3
-    for k in range(60):
-        moving.change = SimpleNamespace(stamp=100.0 + k, features=np.full((7, 6), 0.2))
-        recorder.look()
-    recorder.end()
-    assert (len(recorder.reaches), len(recorder.offsets)) == (kept + 1, kept), "a load leaves an offset of its own"

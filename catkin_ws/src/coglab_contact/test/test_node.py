@@ -93,43 +93,6 @@ def joints(stamp, position=0.0, velocity=(), effort=(), names=JOINTS):
     return message
 
 
-def test_velocities_are_those_of_the_message_or_of_two_positions(node):
-    node.on_joints(joints(1.0, 0.1))
-    assert node.velocity is None and node.position == [0.1] * 7
-    node.on_joints(joints(1.5, 0.2))
-    assert node.velocity == pytest.approx([0.2] * 7)
-    node.on_joints(joints(1.5, 0.3))
-    assert node.velocity is None, "no time has passed"
-    node.on_joints(joints(2.0, 0.3, velocity=[0.5] * 7))
-    assert node.velocity == [0.5] * 7 and node.detector.fed == []
-    for bad in (joints(3.0, 9.0, names=JOINTS[1:]), JointState(name=JOINTS, position=[9.0] * 6)):
-        node.on_joints(bad)
-        assert node.position == [0.3] * 7
-    mixed = joints(4.0, names=[*JOINTS[::-1], "more"])
-    mixed.position = [*[float(k) for k in range(7)], 99.0]
-    mixed.effort = mixed.position
-    node.on_joints(mixed)
-    assert node.detector.fed == [
-        ("feed_measured", 4.0, [6.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.0], [6, 5, 4, 3, 2, 1, 0], None)
-    ]
-
-
-def test_torques_count_once_the_joints_are_known(node):
-    node.on_torques(joints(1.0, effort=ZERO))
-    node.position = ZERO
-    node.on_torques(joints(1.0, effort=ZERO))
-    assert node.detector.fed == [] and node.last_sample is None
-    node.velocity = ZERO
-    node.on_torques(joints(1.0, effort=[0.0] * 6))
-    assert node.last_sample is None
-    event = SimpleNamespace(source="s", contact=True, margin=2.0, confidence=0.75, code=5, message="m")
-    node.detector.event = event
-    node.on_torques(joints(1.0, effort=ZERO))
-    ((to, told),) = node.sent
-    assert (to, told.source, told.contact, told.margin, told.confidence) == ("publisher", "s", True, 2.0, 0.75)
-    assert (told.reason_code, told.message, told.header.stamp.to_sec()) == (5, "m", 1.0) and node.last_sample == 1.0
-
-
 @pytest.mark.parametrize(
     ("connected", "holding", "load", "holds", "payload"),
     [
@@ -146,36 +109,6 @@ def test_an_empty_hand_carries_nothing(node, connected, holding, load, holds, pa
     node.on_hand(message)
     assert (node.detector.holds, node.detector.payload) == (holds, payload)
     assert node.detector.fed == [("feed_hand", 1.0, ["m"])]
-
-
-def test_touch_of_fingers_and_palm_and_the_signal_that_fingers_follow(node):
-    at = lambda x: SimpleNamespace(x=x, y=0.0, z=1.0)  # noqa: E731
-    message = SimpleNamespace(forces=[at(1.0), at(2.0)], palm=at(3.0), deviation=0.05, header=joints(1.0).header)
-    node.on_touch(message)
-    assert node.detector.fed == [("feed_touch", 1.0, [(1.0, 0.0, 1.0), (2.0, 0.0, 1.0), (3.0, 0.0, 1.0)], 0.05)]
-    assert node.sent == []
-    node.detector.gone, node.last_sample = 0.0, 1.0
-    node.on_touch(message)
-    assert [to for to, _ in node.sent] == ["margin", "signal"]
-    node.on_state(SimpleNamespace(cycle_time=0.005))
-    assert node.moving.observer.period == 0.005
-
-
-def test_a_signal_is_told_once_for_a_sample_and_every_ten_milliseconds_at_most(node):
-    node.publish_signal()
-    assert [to for to, _ in node.sent] == ["margin"], "no torques have come"
-    for stamp in (6.0, 6.0, 6.005, 6.011):
-        node.last_sample, node.last_stamp = stamp, rospy.Time.from_sec(stamp)
-        node.publish_signal()
-    signals = [message for to, message in node.sent if to == "signal"]
-    assert [round(s.header.stamp.to_sec(), 3) for s in signals] == [6.0, 6.011]
-    assert (signals[0].margin, signals[0].window, signals[0].k, signals[0].grip) == (0.4, 0.04, 6.0, 3.0)
-    assert signals[0].rest_samples == 99 and not signals[0].learnt
-    node.detector.seen.rest_samples, node.detector.seen.state, node.last_sample = 100, "off", 3.0
-    before = len([to for to, _ in node.sent if to == "margin"])
-    node.publish_signal()
-    assert node.sent[-1][1].learnt and math.isnan(node.sent[-1][1].grip)
-    assert len([to for to, _ in node.sent if to == "margin"]) == before, "it does not watch"
 
 
 def request(mode="contact", **fields):
@@ -314,18 +247,3 @@ def test_a_stamp_that_no_message_can_carry_is_refused(node, callback, secs, take
     }[callback]
     getattr(node, callback)(stamped(message, secs))
     assert bool(node.detector.fed) is taken and len(node.said) == (not taken)
-
-
-def test_without_a_robot_description_or_with_a_bad_parameter_it_ends_with_status_1(monkeypatch):
-    module, said = script(), []
-    monkeypatch.setattr(module, "init_node", lambda name: None)
-    monkeypatch.setattr(rospy, "logfatal", lambda *words: said.append(words))
-    monkeypatch.setattr(module.parameters, "found_above", lambda name, kind: None)
-    assert module.main() == 1 and "robot_description" in said[-1][0]
-
-    def bad(*_):
-        raise module.parameters.ParameterError("no")
-
-    monkeypatch.setattr(module.parameters, "found_above", lambda name, kind: "<robot/>")
-    monkeypatch.setattr(module.ContactDetectorNode, "__init__", bad)
-    assert module.main() == 1 and len(said) == 2

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 """check_person.py BEHAVIOUR PROFILE RECORDING WAY OBJECT SOURCE: whether the virtual person can use these settings.
 
-For launch files (<param command=...>), which would otherwise start a person again and again who cannot begin. Prints
-"usable", or ends with 1 and one sentence per setting on the error output.
+For launch files (<param command=...>): without it the launch would start a person that cannot run again and again.
+Prints "usable", or ends with 1 and one sentence per setting on the error output.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ import rostest
 from coglab_msgs.msg import CellTruth, FingertipForces, HumanHand, MotorCommands, MotorStates, ReasonCode
 from coglab_msgs.srv import InjectFault, PlaceObject
 from coglab_objects.database import ObjectError, objects_folder, read_object
-from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3, Wrench
+from geometry_msgs.msg import Point, Pose, Quaternion, Vector3, Wrench
 from std_msgs.msg import String
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
@@ -178,30 +178,6 @@ class CellNode(unittest.TestCase):
             finally:
                 rospy.delete_param("/coglab_sim/cell/objects")
 
-    def test_3c_what_no_hand_can_do_is_ignored(self) -> None:
-        self.assertTrue(self.place("", "world", Pose(Point(1.5, 1.0, 0.3), Quaternion(0, 0, 0, 1))).success)
-        here, there = (Pose(Point(1.0, y, 0.5), Quaternion(0, 0, 0, 1)) for y in (0.2, 0.4))
-        aside = lambda: abs(self.truth[-1].human_hand.position.y - 0.2)  # noqa: E731
-        self.human.publish(HumanHand(pose=here, grip=1.0, grip_force=20.0))
-        self.assertTrue(wait_for(lambda: aside() < 0.01))
-        for wrong in (
-            {"grip": 1.01},
-            {"grip_force": 1001.0},
-            {"velocity": Twist(linear=Vector3(0, 100.5, 0))},
-            {"velocity": Twist(angular=Vector3(0, 0, 100.5))},
-            {"pose": Pose(there.position, Quaternion(0, 0, 0, 0.9))},
-        ):
-            self.human.publish(HumanHand(**{"pose": there, "grip": 1.0, "grip_force": 20.0} | wrong))
-            ticks = len(self.truth)
-            self.assertTrue(wait_for(lambda ticks=ticks: len(self.truth) > ticks + 20))
-            self.assertLess(aside(), 0.01, wrong)
-        push = rospy.Publisher("/coglab_sim/cell/push", Wrench, queue_size=1, latch=True)
-        before = self.truth[-1].robot_hand.position
-        push.publish(Wrench(force=Vector3(1001, 0, 0)))
-        ticks = len(self.truth)
-        self.assertTrue(wait_for(lambda: len(self.truth) > ticks + 20))
-        self.assertLess(abs(self.truth[-1].robot_hand.position.x - before.x), 0.01)
-
     def test_4_bad_requests_are_refused_with_words(self) -> None:
         answer = self.place("", "moon", Pose(Point(), Quaternion(0, 0, 0, 1)))
         self.assertFalse(answer.success)
@@ -231,41 +207,6 @@ class CellNode(unittest.TestCase):
         measured = np.array([float(row["measured_lwr_a1"]) for row in rows])
         self.assertTrue(np.all(np.abs(measured) <= 2.97))
         os.unlink(path)
-
-    def test_6_friopen_with_another_period(self) -> None:
-        refused = self.fault("reopen", 0.5, 0.0)
-        self.assertFalse(refused.success)
-        self.assertIn("0.001", refused.message)
-        self.assertTrue(self.fault("reopen", 0.02, 0.0).success)
-        self.assertTrue(wait_for(lambda: abs(self.bridge.fields["command_period"] - 0.02) < 1e-6))
-        self.assertTrue(wait_for(lambda: self.bridge.fields["quality"] >= 2))
-        self.command_mode()
-
-    def test_9_sends_from_the_source_port_of_its_parameter_or_ends(self) -> None:
-        """For clients that know the controller by its port. A port that is taken is not replaced by another."""
-        with (
-            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client,
-            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken,
-        ):
-            for end in (client, taken):
-                end.bind(("127.0.0.1", 0))
-            client.settimeout(60.0)
-            source_port = taken.getsockname()[1]
-            command = [cell_binary(), "__name:=with_source_port", f"_fri_port:={client.getsockname()[1]}"]
-            command.append(f"_fri_source_port:={source_port}")
-            refused = subprocess.run(
-                command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=60, check=False
-            )
-            self.assertNotEqual(refused.returncode, 0)
-            self.assertIn(f"from port {source_port}", refused.stdout)
-            taken.close()
-            node = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-            try:
-                data, peer = client.recvfrom(2048)
-                self.assertEqual((len(data), peer), (916, ("127.0.0.1", source_port)))
-            finally:
-                node.terminate()
-                node.wait(60.0)
 
     def test_8_parameters_out_of_range_are_refused_at_start(self) -> None:
         binary = cell_binary()

@@ -1,6 +1,5 @@
 #!/usr/bin/python3
-"""The perception stand-in on ROS: frames, services, two people, a recording that is recognised, and who says that one
-is played."""
+"""The perception stand-in on ROS: frames, services, and a recording whose pattern is recognised."""
 
 from __future__ import annotations
 
@@ -20,8 +19,6 @@ from coglab_msgs.msg import CellTruth, ReasonCode, Recognition
 from coglab_msgs.srv import FreePlaces, InitVision, LocateObject
 from coglab_sim.person.reach import Reach
 from geometry_msgs.msg import Point, Pose, Quaternion
-from rosgraph_msgs.msg import Log
-from std_msgs.msg import UInt8
 
 SOURCES = Path(__file__).resolve().parents[2]
 HAND, OBJECT, PALM = (1.05, 0.20, 0.35), (0.97, 0.20, 0.30), (0.5, 0.0, 0.4)
@@ -51,7 +48,7 @@ class Cell(threading.Thread):
 
 
 class Perception(unittest.TestCase):
-    """In alphabetical order: before the cell, with it, two people, a recording."""
+    """In alphabetical order: before the cell, with it, a recording."""
 
     @classmethod
     def setUpClass(cls):
@@ -61,9 +58,6 @@ class Perception(unittest.TestCase):
             cls.services[name] = rospy.ServiceProxy(f"perception/{name}", kind)
         cls.buffer = tf2_ros.Buffer()
         cls.listener = tf2_ros.TransformListener(cls.buffer)
-        cls.people = rospy.Publisher("perception/people", UInt8, queue_size=1)
-        cls.logged = []
-        rospy.Subscriber("/rosout", Log, lambda m: cls.logged.append((m.name, m.msg)))
         cls.cell = None
 
     def call(self, name, **arguments):
@@ -74,10 +68,6 @@ class Perception(unittest.TestCase):
         while not condition():
             self.assertLess(time.monotonic(), end, text)
             time.sleep(0.02)
-
-    def wait_for_line(self, node, words):
-        """Until a node has logged this. Of what it logs before it is known here, the last line comes."""
-        self.wait(lambda: any(name == node and words in text for name, text in self.logged), f"{node}: {words}")
 
     def test_a_without_a_cell_everything_fails_with_a_sentence(self):
         answer = self.call("init_vision", timeout=0.2)
@@ -108,17 +98,7 @@ class Perception(unittest.TestCase):
         self.assertEqual((answer.success, len(answer.places)), (True, 3))
         self.assertEqual(answer.places[0].header.frame_id, "board")
 
-    def test_c_two_people(self):
-        self.wait(lambda: self.people.get_num_connections() > 0, "subscriber of people")
-        self.people.publish(2)
-        self.wait(lambda: not self.call("locate_object", object_id="human_hand", timeout=0.05).success, "doubt")
-        for target in ("human_hand", "mug"):
-            answer = self.call("locate_object", object_id=target, timeout=0.1)
-            self.assertIn("2 people are in view; one partner is expected", answer.message)
-        self.people.publish(1)
-        self.assertTrue(self.call("locate_object", object_id="human_hand", timeout=60.0).success)
-
-    def test_d_a_recording_is_played_and_recognised(self):
+    def test_c_a_recording_is_played_and_recognised(self):
         if self.cell:
             self.cell.running = False
         path = Path(tempfile.mkdtemp()) / "reach.csv"
@@ -162,28 +142,6 @@ class Perception(unittest.TestCase):
             errors = [node.communicate(timeout=LIMIT_S)[1] for node in nodes]
         for text in errors:
             self.assertNotIn("Traceback", text)
-
-    def test_e_the_person_says_by_which_recording_their_hand_goes(self):
-        """The last line until the cell has put the object into the hand, for which there is none here."""
-        path = Path(tempfile.mkdtemp()) / "handover.csv"
-        reach = Reach(np.array([1.30, 0.20, 0.15]), np.array([0.86, 0.05, 0.66]), 1.0, 1.2)
-        with open(path, "w", encoding="utf-8") as stream:
-            stream.write("t,x,y,z,frame\n")
-            for t in np.arange(0.0, 4.01, 0.02):
-                for frame in ("human_hand", "object_mug"):
-                    stream.write(f"{t},{','.join(str(float(v)) for v in reach.at(t)[0])},{frame}\n")
-        rospy.set_param("recorded/virtual_human/recording", {"file": str(path), "person": "no_wait"})
-        script = SOURCES / "coglab_sim" / "scripts" / "virtual_human.py"
-        node = subprocess.Popen([sys.executable, str(script), "__ns:=recorded", "__name:=virtual_human"])
-        try:
-            self.wait_for_line(
-                "/recorded/virtual_human", f"the person's hand goes as recorded in {path} (no_wait), 4.0 s"
-            )
-        finally:
-            # Not by SIGTERM: where that comes while the program speaks with the master, rospy's handler waits for ever
-            # for a lock that the same thread holds.
-            node.kill()
-            node.wait(LIMIT_S)
 
 
 if __name__ == "__main__":

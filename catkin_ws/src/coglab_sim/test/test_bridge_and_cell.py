@@ -50,23 +50,6 @@ def test_blocked_for_5_s_then_released(mode, moving, period):
         assert not torque and wire.cell.fri_state == 2
 
 
-@pytest.mark.parametrize("burst", [1, 2, 3, 5])
-def test_losses_within_tolerance_are_ridden_through(burst):
-    wire = Wire(krc__period=0.001)
-    wire.start()
-    wire.velocity = np.array([0.5, -0.3, 0.2, 0.1, -0.5, 0.4, 0.6])
-    wire.run(0.5)
-    last = wire.cell.set_point.copy()
-    for i in range(600):
-        if i % 60 == 0:
-            wire.cell.lose_next(burst)
-        wire.tick()
-        step = np.abs(wire.cell.set_point - last).max()
-        assert step <= 2.3 * 0.001
-        last = wire.cell.set_point.copy()
-    assert wire.cell.fri_state == 2, wire.cell.messages
-
-
 @pytest.mark.parametrize("how", ["10 % both ways", "burst of 50 ms"])
 @pytest.mark.parametrize("seed", range(5))
 def test_losses_beyond_tolerance_end_mirrored_in_monitor_mode(how, seed):
@@ -113,24 +96,6 @@ def test_losses_beyond_tolerance_end_mirrored_in_monitor_mode(how, seed):
     assert wire.request("start")[0]
     wire.run(0.3)
     assert wire.cell.fri_state == 2
-
-
-def test_no_position_limit_is_crossed_at_top_speed():
-    limits = bridge_module.JointLimits(LIMITS)
-    random = np.random.default_rng(3)
-    for case in range(200 if LONG else 14):
-        joint, side = case % 7, 1.0 if case % 14 < 7 else -1.0
-        home = random.uniform(-0.6, 0.6, 7)
-        home[joint] = side * random.uniform(0.3, 0.8) * limits.upper_position[joint]
-        wire = Wire(krc__period=0.005, home=list(home))
-        wire.start()
-        wire.velocity = np.zeros(7)
-        wire.velocity[joint] = side * limits.velocity[joint]
-        for _ in range(800):
-            wire.tick()
-            assert abs(wire.cell.set_point[joint]) <= limits.upper_position[joint]
-        assert wire.cell.fri_state == 2, wire.cell.messages
-        assert abs(wire.cell.set_point[joint]) > limits.upper_position[joint] - 0.05
 
 
 @pytest.mark.parametrize("period", [0.001, 0.01])
@@ -216,61 +181,6 @@ def test_rubbish_toward_the_controller():
     assert all(count > 0 for count in counted.values()), counted
 
 
-def test_a_well_formed_answer_with_random_content_is_refused_and_moves_nothing():
-    """Right header and counters, anything behind them: the controller says why and brakes; the set-point stays."""
-    random = np.random.default_rng(4)
-    for _ in range(200 if LONG else 30):
-        wire = Wire()
-        wire.start()
-        wire.velocity = random.uniform(-0.3, 0.3, 7)
-        wire.run(0.2)
-        data = bytearray(wire.bridge.answer(wire.measurement, wire.now))
-        data[140:] = random.bytes(236)
-        before = wire.cell.set_point.copy()
-        wire.measurement = wire.cell.step(bytes(data))
-        assert wire.cell.fri_state == 1 and wire.cell.messages
-        assert np.abs(wire.cell.set_point - before).max() < 0.01
-        for _ in range(100):
-            wire.tick()
-            assert np.all(np.isfinite(wire.cell.position))
-        assert np.abs(wire.cell.velocity).max() == 0.0
-
-
-@pytest.mark.parametrize("convention", ["coglab", "rcprg_tum"])
-def test_friopen_with_another_period(convention):
-    """1, 5, 100, 2 ms in one session of the bridge: closed and opened again, then it moves as before."""
-    wire = Wire({"krl_convention": convention}, krc__period=0.001, krc__convention=convention)
-    mode = "joint_impedance" if convention == "rcprg_tum" else "position"
-    wire.start(mode)
-    limits = bridge_module.JointLimits(LIMITS)
-    for changes, period in enumerate([0.001, 0.005, 0.1, 0.002]):
-        if changes > 0:
-            wire.cell.restart_program(period, 0.0 if period == 0.005 else 0.5)
-            wire.run(0.01)
-            wire.start(mode)
-        assert wire.cell.period == pytest.approx(period)
-        assert parse(wire.measurement)["command_period"] == pytest.approx(period)
-        snapshot = wire.bridge.snapshot()
-        assert snapshot["cycle_time"] == pytest.approx(period)
-        before, last = wire.cell.set_point.copy(), wire.cell.set_point.copy()
-        wire.velocity = np.array([0.2, 0, 0, 0, 0, 0.2, 0])
-        speed = np.zeros(7)
-        for _ in range(round(2.0 / period)):
-            wire.tick()
-            now = (wire.cell.set_point - last) / period
-            assert (np.abs(now) <= limits.velocity + 5e-4).all()
-            assert (np.abs(now - speed) <= limits.acceleration * period + 1.0 * period + 1e-3).all()
-            last, speed = wire.cell.set_point.copy(), now
-        moved = wire.cell.set_point - before
-        assert moved[0] == pytest.approx(0.4, abs=0.06) and moved[5] == pytest.approx(0.4, abs=0.06)
-        assert abs(wire.bridge.snapshot()["velocity"][0] - 0.2) < 0.05
-        wire.velocity = -wire.velocity
-        wire.run(2.0)
-        wire.velocity = None
-        assert wire.request("stop")[0]
-        assert wire.cell.fri_state == 1, wire.cell.messages
-
-
 @pytest.mark.parametrize("pause", [0.0, 0.1, 0.6])
 @pytest.mark.parametrize("convention", ["coglab", "centro_epiaggio", "stanford", "rtt_lwr"])
 def test_friopen_in_the_middle_of_a_motion(convention, pause):
@@ -321,40 +231,3 @@ def test_t1_profile_is_slow_enough_for_t1():
             wire.tick()
         assert (wire.cell.fri_state == 2) == good, wire.cell.messages
         assert any("FRI speed limit" in text for _, text in wire.cell.messages) != good
-
-
-@pytest.mark.parametrize("mode", ["joint_impedance stiffness 25", "cartesian_impedance stiffness 60 10"])
-@pytest.mark.parametrize("leash_load", [10.0, 0.0])
-def test_a_soft_arm_with_a_load_moves_on(mode, leash_load):
-    """0.8 kg that the load data do not know, in a soft impedance: its sag is no block; without the allowance it was."""
-    wire = Wire({"leash_load": leash_load}, arm__unknown_load=0.8)
-    wire.start(mode)
-    wire.run(1.0)
-    sag = 0.0
-    for velocity in ([0.2, 0.2, 0, -0.2, 0, 0.2, 0], [-0.2, -0.2, 0, 0.2, 0, -0.2, 0]):
-        wire.velocity = np.array(velocity)
-        for _ in range(round(1.5 / wire.cell.period)):
-            wire.tick()
-            sag = max(sag, np.abs(wire.bridge.snapshot()["commanded_position"] - wire.cell.position).max())
-    assert wire.cell.fri_state == 2, wire.cell.messages
-    assert sag > 0.10
-    assert (wire.bridge.snapshot()["leash_trips"] == 0) == (leash_load > 0.0)
-
-
-def test_command_goes_on_from_the_reported_set_point_after_a_gap():
-    wire = Wire(krc__period=0.001)
-    wire.start()
-    wire.velocity = np.array([0.5, -0.3, 0.2, 0.1, -0.5, 0.4, 0.6])
-    wire.run(0.5)
-    for gap in (1, 2, 3, 5):
-        wire.cell.lose_next(gap)
-        for _ in range(gap + 1):
-            wire.tick()
-        assert wire.measurement is not None
-        reported = np.array(set_point(parse(wire.measurement)))
-        resumed = wire.bridge.snapshot()["resumed_after_gap"]
-        wire.tick()
-        assert wire.bridge.snapshot()["resumed_after_gap"] == resumed + 1
-        assert np.abs(wire.commands[-1] - reported - wire.velocity * 0.001).max() < 1e-5
-        wire.run(0.05)
-    assert wire.cell.fri_state == 2, wire.cell.messages

@@ -3,10 +3,8 @@ reads of them."""
 
 import numpy as np
 import pytest
-from coglab_sim import _cell
-from conftest import URDF
 from fri_client import COMMAND, parse, set_point
-from grasp_trial import BOX, HOME, STEP, G, run
+from grasp_trial import G
 from test_object import EXACT
 
 WEIGHT = 0.31 * G
@@ -40,18 +38,6 @@ def test_the_next_packets_are_lost_both_ways(session):
     missed = parse(s.measurement)["miss_counter"]
     assert [s.tick() is None for _ in range(6)] == [True, True, True, False, False, False]
     assert s.tick()["miss_counter"] == missed + 3
-
-
-@pytest.mark.parametrize("period, steps", [(0.001, 1), (0.0015, 2), (0.005, 5), (0.0042, 5)])
-def test_steps_of_the_physics_are_a_millisecond_at_most(session, period, steps):
-    """An object that falls in a semi-implicit integrator tells its step."""
-    s = session(krc__period=period, object__start="world", object__position=[1.5, 1.0, 3.0])
-    dt, periods = period / steps, round(0.1 / period)
-    begin = s.cell.truth()["object"]["position"][2]
-    for _ in range(periods):
-        s.tick()
-    n = periods * steps
-    assert begin - s.cell.truth()["object"]["position"][2] == pytest.approx(G * dt**2 * n * (n + 1) / 2, rel=1e-6)
 
 
 def test_a_load_that_nobody_knows_of_pulls_at_the_palm(session):
@@ -109,27 +95,6 @@ def test_a_block_holds_stiffly_and_is_felt(session):
     s.run(1.0, position=target)
     assert s.cell.position[0] == pytest.approx(target[0], abs=5e-4)
     assert np.abs(s.cell.truth()["external_torque"]).max() == 0.0
-
-
-def test_brakes_stop_an_arm_with_their_torque():
-    """352 Nm on the first joint, which alone turns: it stops at an even rate, then it stands exactly."""
-    plant = _cell.Plant(URDF, HOME, BOX, board=False)
-    plant.set_arm(HOME, [1.0, 0, 0, 0, 0, 0, 0])
-    inertia = plant.terms()["mass"][plant.terms()["arm"][0], plant.terms()["arm"][0]]
-    plant.set_brakes(True)
-    speeds = []
-    for _ in range(60):
-        plant.step(np.full(7, 50.0))  # motors have no torque now
-        speeds.append(plant.state()["velocity"][0])
-    rate = (speeds[1] - speeds[6]) / (5 * STEP)
-    assert rate == pytest.approx(352.0 / inertia, rel=0.12)
-    assert speeds[-1] == 0.0 and not plant.state()["velocity"].any()
-    held = plant.state()["position"]
-    run(plant, 0.2, torque=np.full(7, 30.0))
-    assert np.array_equal(plant.state()["position"], held)
-    plant.set_brakes(False)
-    run(plant, 0.05)
-    assert np.abs(plant.state()["velocity"]).max() > 0.05, "let go, it falls"
 
 
 def test_poses_of_the_cell_are_taken_turned(session):

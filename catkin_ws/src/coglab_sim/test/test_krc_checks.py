@@ -113,16 +113,6 @@ def test_a_frame_may_move_and_turn_so_fast_and_no_faster(session, axis):
         assert followed(s, "frame", wire(turned, position + (0.0098 + faster) * along)) == "FRI speed limit TCP"
 
 
-@pytest.mark.parametrize("mode, limit", [("AUT", 2.0943951), ("T2", 2.0943951), ("T1", 0.24)])
-def test_a_joint_may_step_five_percent_farther_than_its_limit_in_this_mode(session, mode, limit):
-    for share, ok in ((1.045, True), (1.055, False)):
-        s = session(krc__mode=mode)
-        target = np.array(set_point(s.command()))
-        target[0] += share * limit * 0.005
-        assert (s.tick(position=target)["state"] == COMMAND) is ok
-        assert (s.texts()[-1:] == ["FRI speed limit J1 (A1)"]) is not ok
-
-
 NAMES = ("A1", "A2", "E1", "A3", "A4", "A5", "A6")
 
 

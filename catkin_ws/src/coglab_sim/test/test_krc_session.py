@@ -73,66 +73,6 @@ def test_not_a_number_is_not_followed(session, bad):
     assert np.all(np.isfinite(s.cell.set_point)) and np.abs(s.cell.set_point - before).max() < 0.01
 
 
-def test_strategies_move_the_arm(session):
-    s = session()
-    start = np.array(set_point(s.command(30)))
-    target = start.copy()
-    for i in range(400):
-        target[3] = start[3] - 0.1 * (1 - math.cos(min(i, 314) * 0.01))
-        fields = s.tick(position=target)
-    s.run(1.0, position=target)
-    assert abs(parse(s.measurement)["position"][3] - target[3]) < 0.01
-
-    s = session()
-    fields = s.command(20)
-    frame = list(fields["commanded_frame"])
-    s.client.frame = frame
-    for _ in range(200):
-        frame[7] += 0.0005
-        s.client.frame = list(frame)
-        fields = s.tick()
-    fields = s.run(1.0)
-    assert fields["state"] == COMMAND
-    assert fields["frame"][7] == pytest.approx(frame[7], abs=0.005)
-    assert fields["frame"][3] == pytest.approx(frame[3], abs=0.005)
-
-
-@pytest.mark.parametrize("period", [0.001, 0.002, 0.005, 0.012, 0.1])
-def test_periods(session, period):
-    s = session(krc__period=period)
-    s.command()
-    before = s.cell.time
-    s.tick()
-    assert s.cell.time - before == pytest.approx(period)
-
-
-def test_first_counter_of_the_peer_is_free_and_wraps(session):
-    s = session()
-    s.client.counter = 65500
-    s.command()
-    assert s.cell.rejections == {"wrong_size": 0, "wrong_header": 0, "stale": 0, "repeated": 0}
-
-
-def test_same_seed_same_bytes(session):
-    def record(seed):
-        s = session(seed=seed, krc__period=0.002)
-        s.command()
-        s.cell.set_loss(0.02, 0.02)
-        s.cell.set_human([0.6, 0.1, 0.6], grip=1.0)
-        out = []
-        start = s.cell.set_point.copy()
-        for i in range(2000):
-            target = start.copy()
-            target[2] += 0.05 * (1 - math.cos(i * 0.005))
-            s.tick(position=target)
-            out.append(s.measurement)
-        return out
-
-    first = record(9)
-    assert first == record(9)
-    assert first != record(10)
-
-
 @pytest.mark.parametrize("lost, ridden", [(1, True), (3, True), (5, True), (6, False), (20, False)])
 def test_losses_are_bridged_by_extrapolation(session, lost, ridden):
     s = session()

@@ -44,24 +44,6 @@ def test_coglab_changes_strategy_by_leaving_command_mode(session):
     assert MONITOR in states and states[-1] == COMMAND and fields["control"] == 3
 
 
-def test_centro_epiaggio(session):
-    s = session(krc__convention="centro_epiaggio")
-    s.monitor()
-    assert ints(s)[1] == 10
-    s.client.ints[0:2] = [30, 1]
-    s.client.flags = JOINT_IMPEDANCE
-    s.run(1.5)
-    assert ints(s)[1] == 1 and s.cell.fri_state == COMMAND and parse(s.measurement)["control"] == 3
-    s.client.ints[1] = 0
-    s.run(0.5)
-    assert ints(s)[1] == 0 and s.cell.fri_state == MONITOR
-    s.client.ints[1] = 1
-    s.run(1.5)
-    s.cell.leave_command_mode("fault injected")
-    s.run(3.0)
-    assert s.cell.fri_state == MONITOR  # a level left standing does not start the robot again
-
-
 def test_stanford(session):
     s = session(krc__convention="stanford")
     s.monitor()
@@ -94,66 +76,6 @@ def test_a_client_that_waits_for_each_datagram_hears_the_end(session):
             s.client.ints[15], asked = fields["ints"][14], True
         measurement = s.cell.step(s.client.answer(measurement))
     assert fields["ints"][15] == 30
-
-
-def openkc(s, command):
-    """One command as OpenKC's client gives it: flag and code until it is acknowledged, then the flag back."""
-    s.client.ints[15], s.client.bools = command, 1
-    for _ in range(400):
-        s.tick()
-        if to_bool(s, 1):
-            break
-    told = ints(s)[13:16]
-    s.client.ints[15], s.client.bools = 0, 0
-    for _ in range(100):
-        s.tick()
-        if not to_bool(s, 1):
-            return told
-    raise AssertionError("the flag stays")
-
-
-def test_openkc(session):
-    s = session(krc__convention="openkc")
-    s.monitor()
-    s.client.flags = JOINT_IMPEDANCE
-    assert openkc(s, 7) == (1, 7, 105) and parse(s.measurement)["control"] == 3
-    s.client.ints[8:15], s.client.reals[9:16] = [300] * 7, [0.5] * 7
-    assert openkc(s, 5) == (2, 5, 103)
-    assert openkc(s, 1) == (3, 1, 100) and s.cell.fri_state == COMMAND
-    s.run(0.3)
-    assert openkc(s, 2) == (4, 2, 101) and s.cell.fri_state == MONITOR
-    assert openkc(s, 9) == (5, 9, 107) and parse(s.measurement)["control"] == 1
-    assert openkc(s, 6) == (6, 6, 104) and parse(s.measurement)["control"] == 2
-    assert openkc(s, 3) == (0, 3, 111)  # the count begins anew
-    s.client.ints[1] = 30
-    openkc(s, 30)
-    assert parse(s.measurement)["control"] == 3
-    s.client.ints[15], s.client.bools = 10, 1
-    s.run(0.3)
-    assert not to_bool(s, 1) and any("command 10" in text for text in s.texts())  # said, and not acknowledged
-    s.client.ints[15], s.client.bools = 0, 0
-    s.run(0.2)
-    s.client.ints[15], s.client.bools = 99, 1
-    s.run(0.3)
-    assert s.cell.fri_state == 0
-
-
-def test_rcprg_tum(session):
-    s = session(krc__convention="rcprg_tum")
-    s.monitor()
-    assert parse(s.measurement)["control"] == 3
-    s.client.flags = JOINT_IMPEDANCE
-    s.client.ints[0], s.client.bools = 1, 1
-    busy = []
-    for _ in range(200):
-        s.tick()
-        busy.append(to_bool(s, 1))
-    assert any(busy) and not busy[-1] and s.cell.fri_state == COMMAND
-    s.client.bools = 0
-    s.run(0.2)
-    s.client.ints[0], s.client.bools = 2, 1
-    s.run(0.5)
-    assert s.cell.fri_state == MONITOR
 
 
 def test_rtt_lwr(session):

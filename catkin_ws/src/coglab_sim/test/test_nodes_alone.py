@@ -1,16 +1,10 @@
 """The nodes /perception and /coglab_sim/virtual_human without a master: their parameters, what they subscribe, answer
 and publish."""
 
-import threading
-from dataclasses import replace
-
 import pytest
 import rospy
 from coglab_msgs.msg import CellTruth, Say
-from coglab_sim.person.participant import Participant
-from coglab_sim.person.recorded_person import RecordedPerson
-from coglab_sim.person.scene import shipped
-from geometry_msgs.msg import Point, Quaternion, Vector3
+from geometry_msgs.msg import Point, Quaternion
 from geometry_msgs.msg import Pose as PoseMessage
 from node_alone import Alone, script
 from std_msgs.msg import String, UInt8
@@ -78,13 +72,6 @@ def test_a_clock_that_is_set_costs_no_sight(monkeypatch):
     assert seen["human_hand"].header.stamp.to_sec() == pytest.approx(one.ros.now)
 
 
-class Request:
-    """Of a service."""
-
-    def __init__(self, **fields):
-        self.__dict__.update(fields)
-
-
 def test_tf_that_is_closed_at_the_end_is_no_error(monkeypatch):
     one = Perception(monkeypatch)
 
@@ -111,57 +98,6 @@ class Person:
         self.ros.parameters = parameters
         self.module = script("virtual_human")
         self.node = self.module.VirtualHumanNode()
-
-
-def test_a_person_begins_with_their_parameters(monkeypatch):
-    one = Person(monkeypatch)
-    human = one.node.human
-    assert human.participant == Participant.draw(7) and human.holds() and not isinstance(human, RecordedPerson)
-    assert one.node.object_id == "mug" and human.scene.object_mass == shipped("mug")["mass"]
-    assert set(one.ros.subscribed) == {"truth/cell", "human_command", "/a/say", "real_time_factor"}
-    assert one.ros.made["human_state"]["latch"] is True
-    parameters = {"~seed": 3, "~behaviour": "tug", "~profile": "patient", "cell/object/id": "bottle"}
-    parameters |= {"~holds_object": False, "~object_mass": 0.7, "~rest": [1.0, 0.1, 0.2], "~say": "/other/say"}
-    parameters |= {"~object_in_hand": [-0.1, 0.0, -0.1], "~handover_object": [0.7, 0.0, 0.4]}
-    one = Person(monkeypatch, **parameters)
-    human = one.node.human
-    assert human.participant == Participant.draw(3, "tug", "patient") and not human.holds()
-    assert human.scene.object_mass == 0.7 and list(human.scene.rest) == [1.0, 0.1, 0.2]
-    assert list(human.scene.object_in_hand) == [-0.1, 0.0, -0.1] and list(human.scene.handover_object) == [
-        0.7,
-        0.0,
-        0.4,
-    ]
-    assert "/other/say" in one.ros.subscribed and one.node.object_id == "bottle"
-    assert "/a/say" not in Person(monkeypatch, **{"~react": False}).ros.subscribed
-    assert Person(monkeypatch, seed=5).node.human.participant.seed == 5
-    fields = {"seed": 9, "behaviour": "slow", "trust": 0.3}
-    person = Person(monkeypatch, **{"~participant": fields, "~seed": 2, "~behaviour": "tug"}).node.human.participant
-    assert person == replace(Participant.draw(9, "slow"), trust=0.3)
-    for wrong in ({"~object_mass": -0.1}, {"~object_mass": 101.0}, {"~rest": [1.0, 2.0]}, {"~behaviour": "silly"}):
-        with pytest.raises(ValueError):
-            Person(monkeypatch, **wrong)
-    assert Person(monkeypatch, **{"~object_mass": 100.0}).node.human.scene.object_mass == 100.0
-
-
-def test_what_the_truth_says_is_what_the_person_may_perceive(monkeypatch):
-    one = Person(monkeypatch)
-    feel = one.ros.subscribed["truth/cell"]
-    feel(truth(hand_closure=0.4, human_force=Vector3(1.0, 2.0, -3.0)))
-    view = one.node.view
-    assert view.hand_closure == 0.4 and list(view.load) == [1.0, 2.0, -3.0]
-    assert list(view.robot_hand.position) == list(PALM) and list(view.object.position) == list(MUG)
-    for wrong in (
-        truth(hand_closure=float("nan")),
-        truth(human_force=Vector3(0.0, float("inf"), 0.0)),
-        truth(object=message((1e9, 0, 0))),
-        truth(robot_hand=message(PALM, (0, 0, 0, 0))),
-    ):
-        feel(wrong)
-        assert one.node.view is view and "truth/cell ignored" in one.ros.said[-1]
-    feel(truth("", object=message((1e9, 0, 0))))
-    assert one.node.view is not view, "without an object nothing is wrong with it"
-    assert isinstance(one.node.lock, type(threading.Lock()))
 
 
 def test_commands_and_words_reach_the_person(monkeypatch):

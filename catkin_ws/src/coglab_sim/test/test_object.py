@@ -176,16 +176,6 @@ def test_fingers_folded_before_the_object_came_do_not_grasp(session):
     assert s.cell.truth()["held_by"] == "both"
 
 
-def test_weak_fingers_let_it_slip(session):
-    """Motors that stop 4 counts above what they draw freely pull with 0.9 N: the palm's 4 N alone carry 0.6 x 4 N, less
-    than the weight of 3 N."""
-    s, hand = scene(session)
-    preshape(s)
-    hand, _ = approach(s, hand)
-    close(s, hand, current=44.0)
-    assert let_go(s, hand)[-1]["dropped"]
-
-
 def test_robot_hands_over_to_a_person(session):
     s = session(object__start="robot_hand", object__position=[0.04, 0.0, 0.0], object__rotation=[-0.5, -0.5, -0.5, 0.5])
     s.monitor()

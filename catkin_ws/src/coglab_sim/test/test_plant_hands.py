@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from coglab_sim import _cell
-from grasp_trial import BOARD_TOP, BOX, DIRECTIONS, HOME, STEP, URDF, G, GraspTrial, objects, product, rotated, run
+from grasp_trial import BOX, DIRECTIONS, HOME, STEP, URDF, G, GraspTrial, objects, rotated, run
 from ih2_hand.clock import SteppedClock
 from ih2_hand.emulator.hand import EmulatedHand
 from ih2_hand.emulator.physical_motor import MotorState
@@ -39,31 +39,6 @@ def bent(plant, phalanges):
     return sum(positions[joints[i]] for i in phalanges)
 
 
-def test_relaxed_fingers_give_way():
-    """A finger that no tendon pulls is moved by a touch and comes back by its spring: the end of a person's forearm
-    comes to the back of the index, presses it 35 mm toward the palm's side, and leaves."""
-    plant = _cell.Plant(URDF, HOME, BOX)
-    plant.place("world", BOARD_TOP)
-    palm, turn = plant.state()["palm"]
-    towards = product(turn, [0.0, 0.0, 1.0, 0.0])  # the forearm lies behind its hand, here behind the fingers
-
-    def press(begin, end):
-        for x in np.linspace(begin, end, 300):
-            plant.set_person(palm + rotated(turn, np.array([x, 0.03, 0.10])), towards)
-            plant.hold(HOME)
-
-    press(-0.04, -0.01)
-    straight = bent(plant, INDEX)
-    press(-0.01, 0.05)
-    plant.hold(HOME, steps=100)
-    assert bent(plant, INDEX) > straight + 0.2, bent(plant, INDEX)
-    assert np.linalg.norm(plant.touch()["index_distal"]) + np.linalg.norm(plant.touch()["index_proximal"]) > 0.1
-    assert all(motor["position"] == 0.0 and not motor["locked"] for motor in plant.motors()), "no motor has moved"
-    press(0.05, -0.04)
-    plant.hold(HOME, steps=1000)  # joints are damped: 0.3 s to 1/e of the way
-    assert bent(plant, INDEX) == pytest.approx(straight, abs=0.02)
-
-
 def test_relaxed_by_the_hands_own_command_a_grasp_lets_go():
     """The bytes 6F 00 to the emulated hand, whose motors the plant turns: the tendons unwind, the object is free."""
     trial, clock = GraspTrial(objects()["mug"], "index up"), SteppedClock()
@@ -90,15 +65,6 @@ def test_relaxed_by_the_hands_own_command_a_grasp_lets_go():
     assert np.linalg.norm(trial.in_palm()[0] - held) > 0.1
     assert all(motor["position"] < 0.001 for motor in plant.motors()[1:])
     assert bent(plant, INDEX + MIDDLE) < 0.05
-
-
-def test_what_an_open_hand_was_placed_at_falls():
-    trial = GraspTrial(objects()["ball"], "palm down", grasped=False)  # the hand never closes
-    trial.plant.place("world", *trial.before_palm())
-    middle, _ = trial.in_palm()
-    trial.plant.hold(HOME, steps=400)
-    assert trial.plant.state()["held_by"] == "none"
-    assert np.linalg.norm(trial.in_palm()[0] - middle) > 0.1, "nothing but its placing held the ball"
 
 
 def test_in_the_robots_hand_nothing_but_contact_holds():

@@ -24,23 +24,3 @@ def test_no_answer_ever_trips_a_limit_of_the_controller():
                 wire.tick()
                 ticks += 1
                 assert wire.cell.fri_state == 2, (period, wire.cell.messages)
-
-
-def test_an_arm_that_runs_into_the_board_is_stopped_by_the_torque_of_a_drive():
-    """Traced: the hand meets the board at 3.2 s, which asks more of J6 than its drive's 38 Nm; it stays behind its
-    set-point, and the controller trips. Nothing trips before the contact."""
-    random = np.random.default_rng(8)
-    random.uniform(-3.0, 3.0, (858, 7))  # those of the period of 1 ms
-    wire = Wire(krc__period=0.005)
-    wire.start()
-    asked, touched = 0.0, False
-    for tick in range(1200):
-        if tick % 7 == 0:
-            wire.velocity = random.uniform(-3.0, 3.0, 7)
-        wire.tick()
-        touched = touched or touching(wire)
-        asked = max(asked, abs(wire.cell.truth()["external_torque"][5]))
-        if wire.cell.fri_state != 2:
-            break
-    assert touched and asked > 38.0
-    assert wire.cell.messages[-1][1] == "maximum torque exceeded J6"

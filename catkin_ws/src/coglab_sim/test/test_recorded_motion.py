@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import groupby
-
 import numpy as np
 import pytest
 from coglab_perception.frames import FrameNames
@@ -135,10 +133,6 @@ def test_of_a_bag_only_what_a_tracker_sees(tmp_path):
         Playback.open(PlaybackSettings(file=path), "world", names.is_tracked)
 
 
-def test_rename(tmp_path):
-    assert list(playback(tmp_path, rename={"human_hand": "object_mug"}).frames(0.0)) == ["object_mug"]
-
-
 def test_the_recorded_hand_waits_for_the_robot(tmp_path):
     far, near = Pose(np.array([0.2, 0.0, 0.4])), Pose(POSITIONS[5] + [0.1, 0.0, 0.0])
     play = playback(tmp_path, wait_at=0.5, wait_limit=3.0)
@@ -151,18 +145,6 @@ def test_the_recorded_hand_waits_for_the_robot(tmp_path):
     for k in range(30):
         frames = patient.frames(0.1 * k, far)
     assert frames["human_hand"].position == pytest.approx(POSITIONS[-1]), "not for ever"
-
-
-CSV_FAULTS = {
-    "x,y,z\n1,2,3\n": r":1: the header must name .* missing: t",
-    "t,x,y,z\n0,1,2,here\n": r":2: expected numbers",
-    "t,x,y,z\n0,1,2\n": r":2: expected numbers",
-    "t,x,y,z\n0,1,2,3\n0,1,2,3\n": "time must increase, sample 2",
-    "t,x,y,z\n0,1,2,3\n1,nan,2,3\n": "sample 2 is not finite",
-    "t,x,y,z,qx,qy,qz,qw\n0,1,2,3,0,0,0,0.5\n": "quaternion of length 0.50",
-    "t,x,y,z\n": "no samples",
-    "": "the header must name",
-}
 
 
 class Bomb:
@@ -179,9 +161,6 @@ def test_bad_npz_files_are_named(tmp_path):
         load_recording(str(path))
     np.savez(path, t=np.array([Bomb()], dtype=object), position=np.zeros((1, 3)))
     with pytest.raises(RecordingError, match="not an npz file of plain arrays"):
-        load_recording(str(path))
-    np.savez(path, t=STAMPS, position=POSITIONS[:5])
-    with pytest.raises(RecordingError, match=r"'position' of shape \(N, 3\)"):
         load_recording(str(path))
     np.savez(path, time=STAMPS)
     with pytest.raises(RecordingError, match="no array 't' in it; it has time"):
@@ -222,25 +201,6 @@ def test_a_track_that_jumps_is_refused_unless_allowed(tmp_path) -> None:
 
 
 ROWS = "".join(f"{0.5 * i},{i},0,0\n" for i in range(5))
-
-
-@pytest.mark.parametrize(
-    "settings, words",
-    [
-        ({"time_scale": 0.0}, "time_scale must be above 0, got 0.0"),
-        ({"time_scale": -1.0}, "time_scale must be above 0"),
-        ({"time_scale": float("inf")}, "time_scale must be above 0"),
-        ({"end_at": (1.0, 2.0)}, "end_at needs three finite numbers"),
-        ({"end_at": (1.0, 2.0, float("nan"))}, "end_at needs three finite numbers"),
-        ({"wait_distance": 0.0}, "wait_distance must be above 0 m and wait_limit not negative"),
-        ({"wait_limit": -0.1}, "wait_distance must be above 0 m and wait_limit not negative"),
-    ],
-)
-def test_settings_that_cannot_be_used_are_refused(settings, words):
-    with pytest.raises(RecordingError, match=words):
-        PlaybackSettings(**settings)
-    PlaybackSettings(time_scale=0.01, wait_distance=0.01, wait_limit=0.0, end_at=(0.0, 0.0, 0.0))
-    assert PlaybackSettings.from_mapping({"end_at": [1, 2, 3], "at_end": "loop"}).end_at == (1, 2, 3)
 
 
 def in_csv(tmp_path, text):
@@ -303,13 +263,3 @@ def test_time_runs_from_the_first_look_on_and_never_back():
     slow = playing(time_scale=4.0)
     x_at(slow, 0.0)
     assert x_at(slow, 4.0) == pytest.approx(1.0)
-
-
-def test_without_a_robot_it_waits_and_every_loop_waits_anew():
-    play = playing(wait_at=1.0, wait_limit=2.0, at_end="loop")
-    seen = [x_at(play, 0.25 * i) for i in range(60)]
-    waits = [len(list(same)) for x, same in groupby(seen) if x == 1.0]
-    assert len(waits) >= 2 and waits[0] == waits[1] == 8, "2 s each time"
-    assert playing(wait_at=None).settings.wait_at is None
-    begin = playing(wait_at=0.0, wait_limit=1.0)
-    assert [x_at(begin, t) for t in (0.0, 0.5, 0.9, 1.5)] == pytest.approx([0.0, 0.0, 0.0, 0.6])

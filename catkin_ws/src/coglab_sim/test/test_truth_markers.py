@@ -87,12 +87,3 @@ def test_an_object_has_its_shape_about_its_middle(shown, name, kind):
     large = shipped(name)["size"]
     assert marker.type == kind and size(marker) == pytest.approx(large)
     assert place(marker) == pytest.approx(np.array(MUG) + [large[2] / 2, 0.0, 0.0])
-
-
-def test_an_object_without_a_file_is_a_box_and_said_once(shown):
-    for _ in range(2):
-        marker = shown.show(truth("elephant"))[0]["object"]
-        assert marker.type == Marker.CUBE and size(marker) == (0.08, 0.08, 0.1) and place(marker) == pytest.approx(MUG)
-        shown.clock += 1.0
-    assert len(shown.ros.said) == 1 and "truth markers: 'elephant' is drawn as a box" in shown.ros.said[0]
-    assert shown.show(truth("../x"))[0]["object"].type == Marker.CUBE

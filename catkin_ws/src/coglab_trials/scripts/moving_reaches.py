@@ -1,14 +1,17 @@
 """Reaches of the shipped DMP plug-in in the virtual world, with and without a push, as the robot measures them.
 
-A reach: the arm stands at home, a hand moves into the handover region (minimum jerk, seen by the shipped tracker), the
-arm reaches for it with the shipped primitives, orientation and configuration; nothing touches it unless a push is
-asked for. Drawn per seed: model errors of the robot controller and of the observer (payload +-10 %, inertia +-5 %, each
-drawn on its own), friction of the drives x 0.5 .. 1.5, offsets, bias and noise of the torque sensors, place, turn and
-time of the hand, duration x 0.8 .. 1.3 of the shipped one, and in half of the reaches an object in the closed fingers,
-whose true mass is 0.7 .. 1.3 times what its file, and so the observer, says.
+In a reach the arm stands at home, a hand moves into the handover region (minimum jerk, seen by the shipped tracker),
+and the arm reaches for it with the shipped primitives, orientation and configuration. Without a push nothing touches
+the arm. Drawn per seed:
 
-A push is a force on the palm, across the way, applied in the physics: from 0 to ``NEWTON`` N in ``RISE`` s, then
-constant. It begins where the way that remains falls below a share of the whole that is uniform in the last third.
+* model errors of the robot controller and, independently, of the observer (payload +-10 %, inertia +-5 %);
+* friction of the drives x 0.5 .. 1.5; offsets, bias and noise of the torque sensors;
+* place, turn and time of the hand; duration x 0.8 .. 1.3 of the shipped one;
+* in half of the reaches an object in the closed fingers. Its true mass is 0.7 .. 1.3 times the one in its file, which
+  the observer uses.
+
+A push is a force on the palm, across the path, in the physics: from 0 to ``NEWTON`` N in ``RISE`` s, then constant. It
+begins in the last third of the path, at a uniformly drawn share of it.
 """
 
 from __future__ import annotations
@@ -86,7 +89,7 @@ class Recording:
 
     seed: int
     payload: tuple[float, np.ndarray]
-    """(kg, m in ih2_palm) as told to the observer"""
+    """(kg, m in ih2_palm) that the observer uses"""
     begun: float = 0.0
     """s, start of the motion"""
     reached: float | None = None
@@ -97,13 +100,13 @@ class Recording:
     torque: list[np.ndarray] = field(default_factory=list)
     external: list[np.ndarray] = field(default_factory=list)
     velocity: list[np.ndarray] = field(default_factory=list)
-    """as lwr/joint_states has it"""
+    """as on lwr/joint_states"""
     touch: list[dict[str, np.ndarray]] = field(default_factory=list)
     """N on phalanges and palm, without noise; empty where a force is put on the palm itself"""
     hand: list[Any] = field(default_factory=list)
     """motors of the hand as its node reads them at rest, 5 times a second; the same object until they are read again"""
     sight: list[tuple[float, Pose] | None] = field(default_factory=list)
-    """when (s) and where what is reached for was seen last"""
+    """(s, pose) of the newest sight of the target of the reach"""
     aborted: str = ""
     """why the motion ended early; it counts as a reach all the same"""
 
@@ -116,7 +119,7 @@ def urdf() -> str:
 
 
 def wrong_urdf(seed: int, payload_error: float = 0.10, inertia_error: float = 0.05) -> str:
-    """The robot description as somebody knows it who is wrong by so much about hand and inertias."""
+    """The robot description with drawn errors of the mass of the hand and of the inertias."""
     rng = np.random.default_rng([seed, 59])
     robot = ElementTree.fromstring(urdf())
     hand = 1.0 + payload_error * rng.uniform(-1.0, 1.0)

@@ -1,7 +1,6 @@
 """The world in one process: what it is made of, what tracker and person are shown, the hand's tasks in it, and the
 limits of the arm as they are counted."""
 
-import dataclasses
 import importlib
 import sys
 from dataclasses import replace
@@ -10,11 +9,11 @@ import numpy as np
 import pytest
 from coglab_objects.database import ObjectError
 from coglab_py.pose import Pose
-from coglab_sim.person.in_cell import pose_of_truth, seen_in
+from coglab_sim.person.in_cell import pose_of_truth
 from coglab_sim.person.scene import shipped
 from coglab_sim.tracker.tracker import PerceptionSettings
 from coglab_trials import Conditions, World
-from coglab_trials.conditions import CAREFUL, CONSIDERATE, HARDSHIPS, PATIENT, hardship
+from coglab_trials.conditions import CONSIDERATE, PATIENT
 from coglab_trials.world import BOARD, DT, Robot
 from ih2_hand.reasons import Reason
 
@@ -44,23 +43,6 @@ def test_an_object_on_the_board_lies_in_its_middle():
     assert world.cell.truth()["object"]["position"] == pytest.approx([0.45, -0.55, 0.052], abs=1e-6)
 
 
-def test_hardships_change_one_thing_each():
-    plain = Conditions()
-    assert hardship("", 1) == plain
-    for name in HARDSHIPS:
-        for seed in (1, 2):
-            changed = [
-                f.name
-                for f in dataclasses.fields(plain)
-                if getattr(hardship(name, seed), f.name) != getattr(plain, f.name)
-            ]
-            assert len(changed) == 1, name
-    assert hardship("mass +-30 %", 1).mass == 1.3 and hardship("mass +-30 %", 2).mass == 0.7
-    with pytest.raises(ValueError, match="none of"):
-        hardship("rain", 1)
-    assert CAREFUL.participant(3) != plain.participant(3)
-
-
 @pytest.mark.parametrize("module", ["coglab_sim._cell", "coglab_sim._virtual"])
 def test_a_library_that_is_missing_is_named_with_what_to_do(monkeypatch, module):
     monkeypatch.setitem(sys.modules, module, None)
@@ -70,17 +52,6 @@ def test_a_library_that_is_missing_is_named_with_what_to_do(monkeypatch, module)
 
 
 # --- what is seen -----------------------------------------------------------------------------------------------------
-
-
-def test_what_people_and_trackers_see_is_the_truth():
-    world = World(4, CONSIDERATE)
-    world.human.command("give mug")
-    truth, (view, hand) = stepped(world, 1.5).truth, seen_in(world.cell)
-    for name, pose in (("robot_hand", view.robot_hand), ("object", view.object), ("human_hand", hand)):
-        assert pose.position == pytest.approx(truth[name]["position"], abs=1e-15)
-        assert pose.orientation == pytest.approx(truth[name]["rotation"], abs=1e-15)
-    assert view.hand_closure == truth["hand_closure"] and view.load.tolist() == list(truth["human_force"])
-    assert world.cell.touch_total.tolist() == pytest.approx(sum(world.cell.touch().values()))
 
 
 def test_the_tracker_sees_the_hand_where_it_is():

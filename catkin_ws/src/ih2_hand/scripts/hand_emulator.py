@@ -101,13 +101,13 @@ def main() -> int:
         print(f"hand_emulator: {error}", file=sys.stderr)
         return 2
 
-    def tell(path: str) -> None:
+    def show(path: str) -> None:
         print(f"port {path or 'none (unplugged)'}", flush=True)
         if announce:
             announce(path)
 
     server = PtyServer(
-        hand, Faults(hand, seed=options.seed), options.link, tell, tracer_to(options.trace) if options.trace else None
+        hand, Faults(hand, seed=options.seed), options.link, show, tracer_to(options.trace) if options.trace else None
     )
     for fault in options.fault:
         try:

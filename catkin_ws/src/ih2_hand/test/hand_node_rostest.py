@@ -75,12 +75,6 @@ class HandNode(unittest.TestCase):
         told = {value.value for status in self.diagnostics for value in status.values if value.key == "reason_code"}
         self.assertLessEqual({str(ReasonCode.HAND_STARTED), str(ReasonCode.HAND_ENDED)}, told)
 
-    def test_d_preshape_close_without_preshape(self) -> None:
-        result = self.hand.run("hand_preshape_close")
-        self.assertFalse(result.isOk)
-        self.assertIn("hand_preshape first", result.message)
-        self.assertEqual(result.reason_code, ReasonCode.HAND_REFUSED)
-
     def test_f_grasp_an_object(self) -> None:
         self.hand.touch(OBJECT)
         result = self.hand.run("hand_preshape", "cylindrical", "medium")
@@ -108,11 +102,6 @@ class HandNode(unittest.TestCase):
         self.assertTrue(self.hand.fresh_status().holding)
         self.assertTrue(any("grasp cylindrical medium by current" in line for line in self.trace))
         self.assertGreater(min(self.hand.fingers.effort[1:]), 100.0)
-
-    def test_g_calibration_would_drop_the_object(self) -> None:
-        self.hand.calibrate("fast")
-        self.hand.wait(lambda: "may hold an object" in self.hand.status.message, "refusal")
-        self.assertFalse(self.hand.status.calibrating)
 
     def test_h_open(self) -> None:
         result = self.hand.run("hand_open", 400)
@@ -208,16 +197,6 @@ class HandNode(unittest.TestCase):
         status = self.hand.fresh_status()
         self.assertTrue(all(motor.mode == "stop" for motor in status.motors))
         self.assertTrue(self.hand.stop_service().success)
-
-    def test_o_no_goal_during_calibration(self) -> None:
-        self.assertTrue(self.hand.run("hand_open", 511).isOk)
-        self.hand.calibrate("complete force")
-        self.hand.wait(lambda: self.hand.status.calibrating, "calibration")
-        result = self.hand.run("hand_open", 511)
-        self.assertIn("calibrates", result.message)
-        self.assertEqual(result.reason_code, ReasonCode.HAND_CALIBRATING)
-        self.assertFalse(self.hand.stop_service().success)
-        self.hand.wait(lambda: self.hand.status.calibrated, "end of the calibration")
 
     def test_p_extreme_input_ends_nothing(self) -> None:
         for words in ("", " ", "fast" * 250_000, "fast force force", "\0", "\u00e9", "fast;force"):

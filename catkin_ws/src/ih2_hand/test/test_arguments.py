@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 from ih2_hand import grasps
 from ih2_hand.driver import HandSerialDriver
@@ -77,11 +76,6 @@ def test_a_read_time_limit_out_of_range_is_refused_before_the_port_is_opened(sec
 def test_options_out_of_range_are_refused_before_the_port_is_opened(options):
     with pytest.raises(ValueError):
         HandSerialDriver("/dev/there-is-no-such-port", **options)
-
-
-def test_numpy_integers_are_whole_numbers(bench):
-    bench.driver.set_finger_position(np.int64(2), np.uint8(7))
-    assert bench.sent() == "44 02 07"
 
 
 @pytest.mark.parametrize(

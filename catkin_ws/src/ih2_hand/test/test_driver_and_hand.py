@@ -12,7 +12,6 @@ from ih2_hand.errors import (
     HandCalibratingError,
     HandCalibrationError,
     HandConnectionLost,
-    HandInconsistentError,
     HandPortError,
 )
 
@@ -24,15 +23,6 @@ def test_postures_are_spaced(make_bench):
     bench.driver.move_motor(1, 100, True)
     assert bench.hand.counters.too_fast == 0
     assert bench.clock.now >= 20 * 0.003
-
-
-def test_calibration_polls_until_the_hand_answers(make_bench):
-    bench = make_bench(greeting=False, positions=[90] * 5)
-    bench.driver.calibration("fast")
-    assert 1.5 <= bench.clock.now < 2.1
-    assert bench.hand.calibrated
-    bench.driver.calibration("complete")
-    assert 11.5 <= bench.clock.now < 12.7
 
 
 def test_calibration_that_never_ends(make_bench):
@@ -62,39 +52,11 @@ def test_grasp_holds_an_object(make_bench, dialect):
     assert bench.driver.get_finger_force(2) > 0
 
 
-def test_read_motors_has_every_field(bench):
-    readings = bench.driver.read_motors()
-    assert [reading["force"] for reading in readings] == [-1, 0, 0, 0, 0]
-    assert set(readings[0]) == {
-        "motor",
-        "raw",
-        "mode",
-        "mode_code",
-        "target_reached",
-        "fully_open",
-        "fully_closed",
-        "over_current",
-        "moving",
-        "com_error",
-        "position",
-        "force",
-        "current",
-    }
-
-
 def test_bus_error_says_nothing_else(bench):
     bench.link.to_host = lambda data: b"\xff" if len(data) == 1 else data
     status = bench.driver.get_finger_status(1)
     assert status["com_error"] and status["mode"] == "bus_error"
     assert status["target_reached"] is None and status["moving"] is None
-
-
-def test_contradicting_readings_are_an_error(bench):
-    values = iter(range(0, 100000, 50))
-    bench.link.to_host = lambda data: bytes((next(values) % 256,)) if len(data) == 1 else data
-    with pytest.raises(HandInconsistentError, match="contradict each other"):
-        bench.driver.get_raw_position(2)
-    assert bench.driver.counters.resynchronisations >= 1
 
 
 def test_resynchronisation_completes_what_the_hand_waits_for(bench):
@@ -104,14 +66,6 @@ def test_resynchronisation_completes_what_the_hand_waits_for(bench):
         assert bench.hand.parser.waiting == b"", stump
         assert bench.driver.get_finger_status(2)["mode"] == "stop"
         assert bench.driver.get_finger_position(2) == 0
-
-
-def test_resting_hand_is_asked_once_for_each_value(bench):
-    bench.driver.read_motors()
-    bench.driver.read_motors()
-    bench.sent()
-    bench.driver.read_motors()
-    assert len(bench.sent().split()) == 5 * 6 + 4
 
 
 def link_that_loses(count: int) -> VirtualLink:

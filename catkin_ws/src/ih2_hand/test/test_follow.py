@@ -47,14 +47,6 @@ def test_every_grasp_closes_on_nothing(make_bench, mode):
     assert verdict.ok and verdict.holding is False, verdict.text
 
 
-@pytest.mark.parametrize("speed", [60, 300, 511])
-def test_close_on_an_object_at_any_speed(bench, speed):
-    bench.hand.set_contacts([255, 90, 90, 90, 90], [30] * 5)
-    verdict = follow(bench.driver, CloseTask(speed))
-    assert verdict.ok and verdict.holding
-    assert all(motor.mode == "stop" for motor in bench.hand.motors)
-
-
 @pytest.mark.parametrize("begun", [0.0, 1000.0])
 def test_a_movement_is_judged_thirty_times_a_second_from_its_beginning(bench, begun):
     bench.clock.now += begun
@@ -96,16 +88,6 @@ def test_a_resynchronisation_on_the_way_is_survived(bench):
 
     assert follow(bench.driver, CloseTask(200), on_poll=lose).ok
     assert bench.driver.counters.fillers == 2
-
-
-def test_a_line_that_slips_again_and_again_is_reported(bench):
-    def lose(verdict, motors):
-        bench.faults.lose = 1
-        return False
-
-    verdict = follow(bench.driver, CloseTask(100), on_poll=lose)
-    assert verdict.done and not verdict.ok and "resynchronised 3 times" in verdict.text
-    assert verdict.reason is Reason.HAND_LINK_LOST
 
 
 def test_core_needs_pyserial_alone():

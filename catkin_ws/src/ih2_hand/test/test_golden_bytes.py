@@ -97,23 +97,6 @@ def test_readings(call, motor, ask, tell, value):
     assert line.frames == [ask], "a known value of a resting hand costs one request"
 
 
-def test_status_byte():
-    driver, line = connect({"4B 00": "50"})
-    assert driver.get_finger_status(0) == {
-        "motor": 0,
-        "raw": 0x50,
-        "mode": "position",
-        "mode_code": 2,
-        "target_reached": True,
-        "fully_open": False,
-        "fully_closed": False,
-        "over_current": False,
-        "moving": False,
-        "com_error": False,
-    }
-    assert set(line.frames) == {"4B 00"}
-
-
 def test_all_status_asks_motor_by_motor():
     driver, line = connect({f"4B 0{motor}": "08" for motor in range(5)})
     driver.get_all_finger_status()
@@ -181,14 +164,6 @@ def test_v17_grasps(grasp, expected):
     driver.set_grasp_mode(*grasp)
     driver.grasp_mode_close()
     assert line.frames[-1] == expected
-
-
-def test_legacy_never_sends_the_newer_grasp_byte():
-    driver, line = connect()
-    for grasp in LEGACY:
-        driver.set_grasp_mode(*grasp)
-        driver.grasp_mode_close()
-    assert not any(frame.startswith("6F") for frame in line.frames)
 
 
 def test_preshape_can_be_left_to_the_hand():

@@ -37,13 +37,6 @@ OPEN = [finger(motor, fully_open=True) for motor in range(5)]
 GRIPPING = [finger(motor, mode="tension", target_reached=True) for motor in range(5)]
 
 
-def test_a_hand_just_connected_may_hold_something_and_is_not_calibrated(memory):
-    assert memory.holding and not memory.calibrated and not memory.calibrating
-    memory.holding, memory.calibrated = False, True
-    memory.forget()
-    assert memory.holding and not memory.calibrated
-
-
 def test_each_action_has_its_task(memory):
     opened, closed = ask(memory, "hand_open", speed=100), ask(memory, "hand_close", speed=200)
     assert isinstance(opened, OpenTask) and opened.speed == 100

@@ -108,15 +108,6 @@ def test_speed_moves_end_at_the_end_sensors_and_stop_holds():
     assert bench.driver.get_finger_status(2)["raw"] == 0x08
 
 
-def test_calibration_opens_all():
-    bench = Bench()
-    bench.driver.set_hand_posture([200] * 5)
-    bench.run(1.2)
-    bench.hand.receive(b"\x46")
-    bench.run(2.0)
-    assert [round(m.position) for m in bench.hand.motors] == [0] * 5
-
-
 @pytest.mark.parametrize(
     "states, words",
     [

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import os
-import pty
 import socket
 import threading
 import time
-import tty
 
 import pytest
 from ih2_hand import transport
@@ -42,13 +40,6 @@ def driver(server):
         yield driver
 
 
-def test_reads_and_moves_over_a_pty(server, driver):
-    driver.set_hand_posture([10, 20, 30, 40, 50])
-    time.sleep(0.4)
-    assert [driver.get_finger_position(motor) for motor in range(5)] == [10, 20, 30, 40, 50]
-    assert driver.counters.resynchronisations == 0
-
-
 def test_link_follows_the_pty(server, tmp_path):
     assert os.path.realpath(tmp_path / "hand") == server.path
     with HandSerialDriver(str(tmp_path / "hand")) as driver:
@@ -78,21 +69,6 @@ def test_answers_slower_than_the_limit_end_in_one_exception(server, driver):
     time.sleep(1.5)
     assert driver.get_finger_status(1)["mode"] == "stop"
     assert driver.get_finger_position(1) == 0
-
-
-def test_lost_byte_is_asked_for_again(server, driver):
-    server.fault("lose 1")
-    assert driver.get_motor_current(1) == 0
-    assert driver.counters.resynchronisations == 1
-
-
-def test_silence(server, driver):
-    server.fault("mute")
-    started = time.monotonic()
-    with pytest.raises(HandTimeoutError, match=f"hand on {server.path} gave no complete answer"):
-        driver.get_finger_position(1)
-    assert driver.counters.fillers == 2
-    assert time.monotonic() - started >= 1.0
 
 
 def test_unplugged_cable_names_port_and_last_byte(server, driver):
@@ -189,17 +165,6 @@ def test_socket_url():
 def test_busy_port(server, driver):
     with pytest.raises(HandPortError, match=f"port {server.path} is busy: end the other program"):
         HandSerialDriver(server.path)
-
-
-def test_no_hand_on_the_port():
-    master, slave = pty.openpty()
-    tty.setraw(slave)
-    try:
-        with pytest.raises(HandPortError, match="no hand answers on .*powered"):
-            HandSerialDriver(os.ttyname(slave))
-    finally:
-        os.close(master)
-        os.close(slave)
 
 
 @pytest.mark.parametrize(

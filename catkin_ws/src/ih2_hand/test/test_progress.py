@@ -33,14 +33,6 @@ def poll(raws: str, positions: list[int]) -> list[SimpleNamespace]:
     return motors
 
 
-def test_open_ends_at_the_open_sensors():
-    task = OpenTask(511)
-    assert not task.judge(poll("21 21 21 21 21", [9] * 5), 0.1).done
-    assert not task.judge(poll("08 08 08 21 08", [0, 0, 0, 9, 0]), 0.2).done
-    verdict = task.judge(poll("08 08 08 08 08", [0] * 5), 0.3)
-    assert verdict.done and verdict.ok and verdict.holding is False
-
-
 @pytest.mark.parametrize("raw", ["02", "20"])
 def test_close_on_an_object_counts_as_closed(raw):
     task = CloseTask(300)
@@ -51,36 +43,10 @@ def test_close_on_an_object_counts_as_closed(raw):
     assert verdict.done and verdict.ok and verdict.holding and "index" in verdict.text
 
 
-def test_close_on_nothing():
-    verdict = CloseTask(300).judge(poll("08 04 04 04 04", [0, 254, 254, 254, 254]), 1.0)
-    assert verdict.done and verdict.ok and verdict.holding is False
-
-
-def test_slow_fingers_are_not_taken_for_stalled():
-    task = CloseTask(2)  # one count a second
-    for step in range(30):
-        verdict = task.judge(poll("08 21 21 21 21", [0] + [step // 10] * 4), step * 0.1)
-        assert not verdict.done
-
-
-def test_motor_stopped_by_somebody_else():
-    task = CloseTask(300)
-    assert not task.judge(poll("08 00 00 00 00", [0] + [90] * 4), 0.1).done
-    verdict = task.judge(poll("08 00 00 00 00", [0] + [90] * 4), 0.6)
-    assert verdict.done and not verdict.ok and "without a reason" in verdict.text
-
-
 def preshape() -> PreshapeTask:
     task = PreshapeTask("lateral", "high", True, 10.0)
     task.targets = (110, 5, 160, 245, 245)
     return task
-
-
-def test_preshape_is_reached_by_status_and_position():
-    task = preshape()
-    assert not task.judge(poll("41 50 41 41 41", [50, 5, 50, 50, 50]), 0.1).done
-    verdict = task.judge(poll("50 50 50 50 50", [110, 5, 160, 245, 245]), 1.0)
-    assert verdict.done and verdict.ok and verdict.holding is None
 
 
 def test_an_old_reached_bit_is_not_believed():
@@ -113,14 +79,6 @@ def test_grasp_interrupted_by_a_stop():
 def test_bus_error_ends_every_task():
     verdict = OpenTask(100).judge(poll("08 e0 08 08 08", [0] * 5), 0.1)
     assert verdict.done and not verdict.ok and "bus error of thumb" in verdict.text
-
-
-def test_what_shows_an_empty_hand():
-    assert shown_empty(poll("50 08 08 08 08", [90, 0, 0, 0, 0]))
-    assert not shown_empty(poll("08 08 08 08 00", [0, 0, 0, 0, 9]))
-    assert not shown_empty([])
-    assert shown_holding(poll("08 08 d0 08 08", [0, 0, 90, 0, 0]))
-    assert not shown_holding(poll("50 50 50 50 50", [90] * 5))
 
 
 FREE = {"calibrated": False, "holding": False, "busy": None}

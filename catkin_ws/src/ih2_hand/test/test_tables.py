@@ -39,16 +39,6 @@ def test_table_2_constructor_and_defaults():
     assert inspect.signature(HandSerialDriver.set_grasp_mode).parameters["is_current"].default
 
 
-def test_table_2_what_the_readings_return(bench):
-    driver = bench.driver
-    assert isinstance(driver.get_finger_position(1), int)
-    assert isinstance(driver.get_finger_force(1), int)
-    assert isinstance(driver.get_motor_current(1), int)
-    assert isinstance(driver.get_finger_status(1), dict)
-    statuses = driver.get_all_finger_status()
-    assert [status["motor"] for status in statuses] == [0, 1, 2, 3, 4]
-
-
 def test_reasons_have_the_numbers_of_the_message():
     from coglab_msgs.msg import ReasonCode as codes
 

@@ -41,18 +41,6 @@ def test_frames(frame, meaning):
     assert meaning in lines[0]
 
 
-def test_answers_follow_their_requests():
-    tracer = Tracer()
-    said(tracer, ">", "4B 00 45 01 49 03")
-    lines = said(tracer, "<", "50 1E 03 D4")
-    assert [
-        "status: position, target reached" in lines[0],
-        "position 30" in lines[1],
-        "current 980 counts" in lines[2],
-    ] == [True] * 3
-    assert "nobody asked" in said(tracer, "<", "99")[0]
-
-
 @pytest.mark.parametrize(
     ("request_hex", "answer", "meaning"),
     [

@@ -33,10 +33,6 @@ class UdpController:
         self._thread = threading.Thread(target=self._run, daemon=True)
 
     @property
-    def source_port(self) -> int:
-        return self._socket.getsockname()[1]
-
-    @property
     def position(self) -> list[float]:
         return [a + b for a, b in zip(self.own, self.offset, strict=True)]
 

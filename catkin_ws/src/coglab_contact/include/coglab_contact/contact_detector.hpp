@@ -46,7 +46,7 @@ class RestTorque {
   std::optional<Joints> travelled_;  // rad, travel since the last rest; none: at rest
 };
 
-/// What somebody asks the detector to watch.
+/// What the detector has to watch: a request of the service `arm`.
 struct Request {
   std::string mode;         ///< contact, load or release
   double now = 0.0;         ///< s

@@ -1,5 +1,5 @@
 /// @file
-/// What a source says about a contact, and the event that follows.
+/// Evidence of one source for a contact, and the event that follows.
 #pragma once
 
 #include <string>
@@ -23,7 +23,7 @@ struct Evidence {
   std::string message;
 };
 
-/// What an event says, as in coglab_msgs/ReasonCode.
+/// Code of an event, as in coglab_msgs/ReasonCode.
 enum class Found : int { contact = 620, early = 621, carried = 622, released = 623 };
 
 /// Contact detected (`contact`) or load released (not `contact`); fields of coglab_msgs/Contact.

@@ -19,7 +19,7 @@ import numpy as np
 Joints = Sequence[float] | np.ndarray
 
 SMOOTH = 0.015  # s, time constant of the low-pass of each force
-USUAL = 0.5  # s, time constant of the average load while nobody takes it
+USUAL = 0.5  # s, time constant of the average load before a person takes it
 NOISE = 3.0  # standard deviations of one component; smaller low-passed forces count as zero
 OLDEST = 0.1  # s, oldest touch data that is used; a longer gap restarts the filters
 COVERED = 0.3  # largest difference of the average load from the weight (share); else some contacts miss the sensors
@@ -143,7 +143,7 @@ class LeavingLoad:
         self.weight, self._asked, self.until = mass * GRAVITY, needed, until
         self.share: float | None = None
         """1: all of the weight; None until there is a reference load"""
-        self.told = False
+        self.reported = False
         self._from = carried  # N, reference load of the share
         self._posture: Joints = ()  # rad, posture of the newest sample
         self._counted: Joints | None = None  # rad, posture of the reference load; None: another one
@@ -197,9 +197,9 @@ class LeavingLoad:
         self.share = share
         self._doubt = 0.0 if felt is not None else SAME * min(1.0, self._turned(self._counted) / FAR)
         self._since = None if share < self.needed else stamp if self._since is None else self._since
-        if self.told or self._since is None or stamp - self._since < CONFIRMED:
+        if self.reported or self._since is None or stamp - self._since < CONFIRMED:
             return False
-        self.told = True
+        self.reported = True
         return True
 
     def clock_was_set(self, step: float) -> None:

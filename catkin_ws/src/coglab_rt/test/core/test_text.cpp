@@ -28,20 +28,6 @@ TEST(Reason, EveryBlockHasWordsACodeOfItsOwnAndTheWayBack) {
   EXPECT_EQ(motionBlockOf(12345), MotionBlock::NotStarted);
 }
 
-TEST(Reason, IsEmptyOnlyWithoutACode) {
-  Reason reason;
-  EXPECT_TRUE(reason.empty());
-  reason = Reason(ReasonCode::GoalStale, "the goal is ") << 0.25 << " s old";
-  EXPECT_FALSE(reason.empty());
-  EXPECT_EQ(reason.str(), "the goal is 0.250 s old");
-  const Answer answer = Answer::refusal(reason);
-  EXPECT_FALSE(answer.success);
-  EXPECT_EQ(answer.number(), 301);
-  EXPECT_EQ(answer.message, reason.str());
-  reason.clear();
-  EXPECT_TRUE(reason.empty());
-}
-
 TEST(FixedText, IsCutAndAlwaysTerminated) {
   FixedText<8> text("abc");
   text << "defghij" << std::uint64_t{42};
@@ -69,14 +55,6 @@ TEST(FixedText, NumbersReadAsTheCLibraryWritesThem) {
   FixedText<64> odd;
   odd << std::nan("") << " " << INFINITY << " " << 1e300;
   EXPECT_EQ(odd.str(), "nan inf >1e15");
-}
-
-TEST(FixedText, EqualityIsThatOfTheText) {
-  FixedText<8> one("abc"), other("abd");
-  EXPECT_NE(one, other);
-  other.clear();
-  other << "abc";
-  EXPECT_EQ(one, other);
 }
 
 }  // namespace

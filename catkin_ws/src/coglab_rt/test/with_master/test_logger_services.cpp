@@ -38,15 +38,6 @@ class Loggers : public ::testing::Test {
   LoggerServices services_;
 };
 
-TEST_F(Loggers, EveryLevelIsTakenInSmallAndInLargeLettersAndTold) {
-  for (const char* level :
-       {"debug", "info", "warn", "error", "fatal", "DEBUG", "INFO", "WARN", "ERROR", "FATAL"}) {
-    EXPECT_TRUE(set("ros", level)) << level;
-    EXPECT_EQ(levels()["ros"], level);
-    EXPECT_EQ(levels()[own_], "info");
-  }
-}
-
 TEST_F(Loggers, ALevelDecidesAtOnceWhatIsLogged) {
   const auto logged = [](auto log) {
     ::testing::internal::CaptureStderr();

@@ -19,14 +19,6 @@ class RosTime : public ::testing::Test {
   static void SetUpTestSuite() { ros::Time::init(); }
 };
 
-TEST_F(RosTime, ThereAndBack) {
-  for (const std::int64_t age : {0LL, 1'000'000LL, 10'000'000'000LL}) {
-    const std::int64_t steady = steadyNow() - age;
-    EXPECT_NEAR(static_cast<double>(toSteady(toRos(steady)) - steady), 0.0, kJitter_ns);
-    EXPECT_NEAR(static_cast<double>(ageOf(toRos(steady)) - age), 0.0, kJitter_ns);
-  }
-}
-
 TEST_F(RosTime, AnyStampHasAnAge) {
   std::mt19937 random(5);
   for (int i = 0; i < 10000; ++i) {

@@ -118,21 +118,21 @@ class VirtualCondition:
 
     def wait(self, timeout: float | None = None) -> bool:
         """Release the lock and wait for a notification, at most `timeout` s. Returns True if it was notified."""
-        told = self._clock.event()
-        self._waiters.append(told)
+        event = self._clock.event()
+        self._waiters.append(event)
         self.release()
         try:
-            return told.wait(timeout)
+            return event.wait(timeout)
         finally:
             self.acquire()
-            if told in self._waiters:
-                self._waiters.remove(told)
+            if event in self._waiters:
+                self._waiters.remove(event)
 
     def notify(self, n: int = 1) -> None:
         """Wake the first `n` waiting threads."""
         woken, self._waiters = self._waiters[:n], self._waiters[n:]
-        for told in woken:
-            told.set()
+        for event in woken:
+            event.set()
 
     def notify_all(self) -> None:
         """Wake all waiting threads."""

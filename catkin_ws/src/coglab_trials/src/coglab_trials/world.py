@@ -265,8 +265,8 @@ class Hand(HandMemory):
 
 
 class _Dropped:
-    """Frees the worlds that nobody uses any more. Each holds several MB that Python does not see, so that its collector
-    of cycles would come too late."""
+    """Frees unused worlds early. Each holds several MB that Python does not count, so that its garbage collector would
+    run too late."""
 
     def __init__(self) -> None:
         self._alive: weakref.WeakSet[Any] = weakref.WeakSet()

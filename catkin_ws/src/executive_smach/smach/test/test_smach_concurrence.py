@@ -24,11 +24,6 @@ def test_bad_arguments(wrong):
         smach.Concurrence(**{"outcomes": ["done"], "default_outcome": "done", **wrong})
 
 
-def test_no_child():
-    with pytest.raises(smach.InvalidStateError):
-        smach.Concurrence(["done"], "done").execute()
-
-
 def test_a_taken_label_is_refused_better():
     with smach.Concurrence(["done"], "done"):
         smach.Concurrence.add("A", Says("done"))
@@ -80,15 +75,6 @@ def test_transition_callbacks_at_each_childs_start_and_end():
     assert len(seen) == 4 and seen[-1] == []
 
 
-def test_start_and_termination_callbacks():
-    seen = []
-    both = concurrence(children={"A": Says("done"), "B": Says("done")}, default="done")
-    both.register_start_cb(lambda ud, labels: seen.append(labels))
-    both.register_termination_cb(lambda ud, labels, outcome: seen.append((sorted(labels), outcome)))
-    both.execute()
-    assert seen == [["A", "B"], (["A", "B"], "done")]
-
-
 def test_child_termination_cb_true_preempts_the_rest():
     slow = Serves(patience=20)
     calls = []
@@ -105,15 +91,6 @@ def test_child_termination_cb_true_preempts_the_rest():
     assert both.execute() == "done"
     assert calls == [{"A": "done", "B": None}, {"A": "done", "B": "preempted"}]
     assert not slow.preempt_requested() and not both.preempt_requested()
-
-
-def test_child_termination_cb_false_waits():
-    both = concurrence(
-        children={"A": Says("done"), "B": Serves(patience=0.1)},
-        outcome_map=ALL_DONE,
-        child_termination_cb=lambda outcomes: False,
-    )
-    assert both.execute() == "done"
 
 
 def test_child_termination_cb_is_serialised():
@@ -137,32 +114,6 @@ def test_outcome_cb_comes_first():
         outcome_cb=lambda outcomes: got.append(outcomes) or "failed",
     )
     assert both.execute() == "failed" and got == [{"A": "done", "B": "done"}]
-
-
-@pytest.mark.parametrize("value", [None, "", False])
-def test_outcome_cb_without_an_answer_leaves_it_to_the_map(value):
-    both = concurrence(
-        children={"A": Says("done"), "B": Says("done")},
-        outcome_map=ALL_DONE,
-        outcome_cb=lambda o: value,
-    )
-    assert both.execute() == "done"
-
-
-def test_outcome_cb_non_string_is_logged_and_ignored(log):
-    both = concurrence(
-        children={"A": Says("done"), "B": Says("done")},
-        outcome_map=ALL_DONE,
-        outcome_cb=lambda o: 3,
-    )
-    assert both.execute() == "done" and "outcome_cb" in log.text("error")
-
-
-def test_outcome_cb_that_raises():
-    both = concurrence(children={"A": Says("done")}, outcome_cb=lambda o: 1 / 0)
-    with pytest.raises(smach.InvalidUserCodeError, match="ZeroDivisionError"):
-        both.execute()
-    assert not both.is_running()
 
 
 def test_the_map_entry_with_most_conditions_wins():

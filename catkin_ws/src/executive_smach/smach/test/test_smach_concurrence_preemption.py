@@ -1,7 +1,6 @@
 """Preemption, shutdown and errors of a Concurrence."""
 
 import os
-import pickle
 import signal
 import subprocess
 import sys
@@ -10,7 +9,7 @@ import time
 
 import pytest
 import smach
-from machine_parts import ALL_DONE, Calls, Ignores, Says, Serves, concurrence, in_thread, machine, wait_for
+from machine_parts import ALL_DONE, Ignores, Says, Serves, concurrence, in_thread, machine
 
 
 def test_preempt_served_by_all():
@@ -22,12 +21,6 @@ def test_preempt_served_by_all():
     run.join(60.0)
     assert run.result == "preempted" and not both.preempt_requested()
     assert not any(child.preempt_requested() for child in children.values())
-
-
-def test_preempt_served_gives_preempted_even_unregistered():
-    both = concurrence(outcomes=["done"], default="done", children={"A": Serves(patience=20)})
-    both.request_preempt()
-    assert both.execute() == "preempted"
 
 
 def test_preempt_ignored_by_one(log):
@@ -78,12 +71,6 @@ def test_ignored_requests_do_not_poison_the_next_run_better():
     assert both.execute() == "done" and polite.seen[-1] is False and not both.preempt_requested()
 
 
-def test_a_request_after_all_children_have_ended_is_carried_on():
-    both = concurrence(children={"A": Says("done")}, outcome_map={"done": {"A": "done"}})
-    both._outcome_cb = lambda outcomes: both.request_preempt()
-    assert both.execute() == "done" and both.preempt_requested()
-
-
 @pytest.mark.parametrize("moment", ["transition_cb", "child_termination_cb"])
 @pytest.mark.parametrize("whom", ["concurrence", "machine around"])
 def test_a_request_when_the_last_child_has_just_ended_gives_preempted(moment, whom):
@@ -116,24 +103,6 @@ def test_a_request_that_a_child_did_not_take_is_carried_on(log):
     both.register_start_cb(lambda ud, labels: outer.request_preempt())
     assert outer.execute() == "preempted" and after.seen == [True]
     assert "deaf" in log.text("error")
-
-
-def test_states_and_edges():
-    seen = []
-    first = threading.Event()
-    both = concurrence(
-        children={"A": Calls(lambda ud: first.set()), "B": Calls(lambda ud: seen.append(wait()))},
-        outcome_map=ALL_DONE,
-    )
-
-    def wait():
-        wait_for(lambda: both.get_active_states() == ["B"])
-        return both.get_active_states()
-
-    assert both.get_initial_states() == ["A", "B"] and both.get_active_states() == []
-    assert both.get_internal_edges() == [("done", "A", "done"), ("done", "B", "done")]
-    both.execute()
-    assert seen == [["B"]] and both.get_active_states() == []
 
 
 def test_shutdown_takes_the_children_along_better():
@@ -190,8 +159,3 @@ def test_too_few_threads_is_an_error_and_nothing_runs(monkeypatch):
         both.execute()
     monkeypatch.undo()
     assert children["A"].runs == 0 and both.execute() == "failed"
-
-
-def test_pickles():
-    both = concurrence(children={"A": Says("done"), "B": Says("done")}, outcome_map=ALL_DONE)
-    assert pickle.loads(pickle.dumps(both)).execute() == "done"

@@ -7,21 +7,6 @@ import smach
 from machine_parts import Calls, Raises, Says, in_thread, machine
 
 
-def test_abstract_methods():
-    container = smach.Container(["a"])
-    for call in (
-        lambda: container["x"],
-        container.get_children,
-        container.get_initial_states,
-        lambda: container.set_initial_state([]),
-        container.get_active_states,
-        container.get_internal_edges,
-        container.check_consistency,
-    ):
-        with pytest.raises(NotImplementedError):
-            call()
-
-
 def test_getitem_and_unknown_label():
     state = Says("done")
     sm = machine(state)
@@ -31,12 +16,6 @@ def test_getitem_and_unknown_label():
     for container in (sm, both, each):
         with pytest.raises(KeyError, match="nothing"):
             container["nothing"]
-
-
-def test_user_data_is_kept_between_runs():
-    sm = machine(Calls(lambda ud: setattr(ud, "n", (ud.n if "n" in ud else 0) + 1), io_keys=["n"]))
-    sm.execute(), sm.execute()
-    assert sm.userdata.n == 2
 
 
 def test_keys_are_copied_in_and_out():
@@ -121,26 +100,6 @@ def test_open_close_and_stack():
     assert not smach.Container._construction_stack
     with pytest.raises(smach.InvalidStateError):
         a.close()
-
-
-def test_opened_again_and_in_itself():
-    sm = smach.StateMachine(["done"])
-    with sm:
-        with sm:
-            smach.StateMachine.add("A", Says("done"), {"done": "B"})
-        smach.StateMachine.add("B", Says("done"))
-    with sm:
-        smach.StateMachine.add("C", Says("done"))
-    assert list(sm.get_children()) == ["A", "B", "C"]
-
-
-def test_with_gives_the_container_better_and_opened_too():
-    sm = smach.StateMachine(["done"])
-    with sm as x:
-        smach.StateMachine.add("A", Says("done"))
-    with sm.opened() as y:
-        assert y.is_opened()
-    assert x is sm and y is sm
 
 
 def test_a_with_block_that_raises_is_closed_better(log):

@@ -1,10 +1,8 @@
 """Iterator."""
 
-import pickle
-
 import pytest
 import smach
-from machine_parts import Calls, Ignores, Raises, Says, Serves, in_thread, machine
+from machine_parts import Calls, Ignores, Raises, Says, Serves, in_thread
 
 
 def iterator(state, it=(), outcomes=("done", "failed"), label="it_data", exhausted="exhausted", **contained):
@@ -12,12 +10,6 @@ def iterator(state, it=(), outcomes=("done", "failed"), label="it_data", exhaust
     with result:
         smach.Iterator.set_contained_state("CHILD", state, **contained)
     return result
-
-
-def test_exhausted_outcome_is_added_and_the_callers_list_untouched_better():
-    outcomes = ["done"]
-    each = smach.Iterator(outcomes, [], [])
-    assert outcomes == ["done"] and each.get_registered_outcomes() == ("done", "exhausted")
 
 
 def test_items_iterable_or_function_evaluated_each_time():
@@ -39,18 +31,6 @@ def test_loop_outcomes_given_all_others_break():
     state = Says("go", "go", "stop", registered=["go", "stop", "x"])
     each = iterator(state, range(10), outcomes=["stop"], loop_outcomes=["go"])
     assert each.execute() == "stop" and state.runs == 3
-
-
-def test_neither_given_breaks_after_the_first_item():
-    state = Says("done")
-    assert iterator(state, range(10)).execute() == "done" and state.runs == 1
-
-
-def test_the_child_gets_the_containers_user_data_itself():
-    got = []
-    each = iterator(Calls(lambda ud: got.append(ud)), [1], loop_outcomes=["done"])
-    each.execute()
-    assert got == [each.userdata]
 
 
 def test_transition_callbacks_after_looping_items_only():
@@ -117,38 +97,6 @@ def test_a_child_that_raises():
     assert not each.is_running() and each.get_active_states() == []
 
 
-def test_a_child_with_an_unknown_outcome():
-    with pytest.raises(smach.InvalidTransitionError):
-        iterator(Says(None, registered=["done"]), [1]).execute()
-
-
-def test_termination_callback_gets_the_label_after_the_output_keys():
-    seen, parent = [], smach.UserData()
-    each = smach.Iterator(["done"], [], ["o"], [1], exhausted_outcome="done")
-    with each:
-        state = Calls(lambda ud: setattr(ud, "o", 5))
-        smach.Iterator.set_contained_state("C", state, loop_outcomes=["done"])
-    each.register_termination_cb(lambda ud, states, outcome: seen.append((states, outcome, parent.o)))
-    assert each.execute(parent) == "done" and seen == [("C", "done", 5)]
-
-
-def test_edges_and_states():
-    seen = []
-    state = Calls(
-        lambda ud: seen.append((each.get_active_states(), each.is_running())) or "go",
-        ["go", "a", "b"],
-    )
-    each = iterator(state, [1], ["a", "z"], loop_outcomes=["go"], final_outcome_map={"b": "z"})
-    assert each.get_internal_edges() == [
-        ("go", "CHILD", "CHILD"),
-        ("a", "CHILD", None),
-        ("b", "CHILD", "z"),
-    ]
-    assert each.get_active_states() == [] and each.get_initial_states() == ["CHILD"]
-    each.execute()
-    assert seen == [(["CHILD"], True)] and each.get_active_states() == [] and not each.is_running()
-
-
 @pytest.mark.parametrize(
     "contained, named",
     [
@@ -163,11 +111,6 @@ def test_outcomes_that_nobody_has_are_found_better(contained, named):
     iterator(state, loop_outcomes=["ok"], final_outcome_map={"bad": "failed"}).check_consistency()
     with pytest.raises(smach.InvalidTransitionError, match=rf"\['{named}'\]"):
         iterator(state, **contained).check_consistency()
-
-
-def test_in_a_machine_and_pickled():
-    each = iterator(Says("done"), [1, 2], outcomes=["done"], exhausted="done", loop_outcomes=["done"])
-    assert machine(pickle.loads(pickle.dumps(each))).execute() == "done"
 
 
 def test_shutdown_ends_the_iteration_better():

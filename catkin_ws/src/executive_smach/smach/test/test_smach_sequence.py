@@ -40,18 +40,3 @@ def test_other_outcomes_leave_the_sequence():
 def test_a_state_without_the_connector_is_logged_only(log):
     seq = sequence(("A", Says("other"), {"other": "B"}), ("B", Says("done"), None))
     assert "connector" in log.text("error") and seq.execute() == "done"
-
-
-def test_user_data_and_remapping():
-    seq = smach.Sequence(["done"], "done", input_keys=["a"], output_keys=["b"])
-    with seq:
-        state = smach.CBState(
-            lambda ud: setattr(ud, "y", ud.x) or "done",
-            outcomes=["done"],
-            input_keys=["x"],
-            output_keys=["y"],
-        )
-        assert smach.Sequence.add("A", state, remapping={"x": "a", "y": "b"}) is state
-    ud = smach.UserData()
-    ud.a = 3
-    assert seq.execute(ud) == "done" and ud.b == 3

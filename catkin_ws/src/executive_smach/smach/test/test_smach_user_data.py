@@ -28,10 +28,6 @@ def test_missing_key_is_a_key_error_after_an_error_log(log):
     assert len(log.error) == 2
 
 
-def test_hasattr_is_false_better():
-    assert not hasattr(smach.UserData(), "x")
-
-
 def test_no_deletion_length_or_iteration():
     ud = smach.UserData()
     ud.x = 1
@@ -57,12 +53,6 @@ def test_extract_and_merge_with_remapping():
     assert ud.a == [9] and ud.a is not local.x
     with pytest.raises(KeyError):
         ud.extract(["nothing"], {})
-
-
-def test_pickles_and_copies():
-    ud = smach.UserData()
-    ud.a = 1
-    assert pickle.loads(pickle.dumps(ud)).a == 1 and copy.deepcopy(ud).a == 1
 
 
 def test_locked_makes_transactions_better():
@@ -145,12 +135,6 @@ def test_remapper_renames():
     assert ud.outer_w == 5 and "w" not in ud
 
 
-def test_remapper_gives_the_very_object_without_dict():
-    for value in (3, 2.5, "s", [1], {"a": 1}, None, (1,)):
-        assert view_of(value)[0].v is value
-    assert view_of(list)[0].v is list
-
-
 def test_remapper_wraps_instances_and_functions_in_const():
     for value in (Thing(), lambda: 3):
         assert issubclass(type(view_of(value)[0].v), Const)
@@ -207,25 +191,7 @@ def test_const_copies_are_free_better():
         assert type(clone) is Thing and thing.x == 1
 
 
-def test_const_with_locks_and_events():
-    event = threading.Event()
-    const = view_of(event)[0].v
-    const.set()
-    assert event.is_set() and const.wait(0)
-    condition = threading.Condition()
-    with view_of(condition)[0].v:
-        assert not condition.acquire(blocking=False) or condition.release() is None
-
-
 def test_remapper_keys_are_the_states_own_names_better():
     ud = smach.UserData()
     ud.outer, ud.other = 1, 2
     assert smach.Remapper(ud, ["mine", "gone"], [], {"mine": "outer"}).keys() == ["mine"]
-
-
-def test_remapper_update_writes_through():
-    view, ud = view_of(1)
-    other = smach.UserData()
-    other.anything = 3
-    view.update(other)
-    assert ud.anything == 3

@@ -70,32 +70,6 @@ def test_the_core_does_not_import_ros():
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
 
 
-def test_the_beat_spares_a_viewer_that_has_just_connected():
-    beat = _Beat(100.0, 2.0)
-    beat.done(100.0)
-    assert beat.due == 102.0
-    beat.newcomer(101.9)  # its window does not exist at 102.0 s: the others alone get that beat
-    assert beat.due == 102.0
-    beat.done(102.0, spared_until=101.9 + WELCOME_DELAY)
-    assert beat.due == 101.9 + WELCOME_DELAY
-    beat.done(beat.due)
-    assert beat.due == pytest.approx(101.9 + WELCOME_DELAY + 2.0)
-    beat.newcomer(beat.last + 0.1)  # nor does it wait for the whole period
-    assert beat.due == pytest.approx(beat.last + 0.1 + WELCOME_DELAY)
-
-
-def test_a_stream_of_new_viewers_does_not_hold_up_the_beat():
-    beat, now, beats = _Beat(0.0, 2.0), 0.0, []
-    beat.done(now)
-    while now < 35.0:
-        now += 0.5
-        if now >= beat.due:
-            beat.done(now)
-            beats.append(now)
-        beat.newcomer(now)
-    assert len(beats) >= 8
-
-
 class Topic:
     """Stands for a publisher; connections are names, and what each was sent is kept with its time."""
 
@@ -135,9 +109,3 @@ def test_no_viewer_gets_a_beat_before_its_window_exists_and_all_get_theirs(seed,
         gaps = [after - before for before, after in itertools.pairwise([*sent, end])]
         assert max(gaps) <= 2.02, "a beat was left out"
         assert sent[-1] < end
-
-
-def test_beats_that_were_missed_are_not_made_up_for():
-    beat = _Beat(0.0, 2.0)
-    beat.done(1000.0)
-    assert beat.due == 1002.0

@@ -244,10 +244,10 @@ class Concurrence(Container):
                 thread.join()
 
     def _await_children(self, all_ended: threading.Event) -> None:
-        told = False
+        logged = False
         while not all_ended.wait(SHUTDOWN_POLL):
-            if not told and smach.is_shutdown():
-                told = True
+            if not logged and smach.is_shutdown():
+                logged = True
                 self._preempt_children()
 
     def _run_child(self, label: str, released: threading.Event, all_ended: threading.Event) -> None:

@@ -89,7 +89,7 @@ class IntrospectionClient:
         limit = time.monotonic() + 2.0
         while publisher.get_num_connections() == 0:
             if time.monotonic() > limit or rospy.is_shutdown():
-                smach.logerr(f"nobody takes commands on {publisher.name}; is the introspection server running?")
+                smach.logerr(f"no subscriber on {publisher.name}; is the introspection server running?")
                 return False
             time.sleep(0.02)
         publisher.publish(command)

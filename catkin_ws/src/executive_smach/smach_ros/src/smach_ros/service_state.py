@@ -104,15 +104,15 @@ class ServiceState(smach.State):
 
     def _await_service(self) -> str | None:
         """None when the service exists, otherwise the outcome."""
-        said = False
+        logged = False
         while not service_answers(self._service_name):
             if self.preempt_requested():
                 self.service_preempt()
                 return "preempted"
             if rospy.is_shutdown():
                 return "aborted"
-            if not said:
-                said = True
+            if not logged:
+                logged = True
                 smach.logwarn(f"waiting for service '{rospy.resolve_name(self._service_name)}'")
             time.sleep(SERVICE_POLL)
         return None

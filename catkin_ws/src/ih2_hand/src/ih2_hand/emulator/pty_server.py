@@ -146,7 +146,7 @@ class PtyServer:
         try:
             os.write(self._master, answer)
         except BlockingIOError:
-            return  # nobody reads and the buffer is full: a cable would lose the bytes, too
+            return  # no reader and a full buffer: a cable would lose the bytes, too
         if self._trace:
             self._trace("<", answer, time.time())
 
