@@ -14,7 +14,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import fields
 from pathlib import Path
 from types import SimpleNamespace, TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from coglab_msgs.msg import ReasonCode
 from coglab_objects.database import objects_folder
@@ -42,6 +42,9 @@ from coglab.results import ACTIONS, Event, Exchange, MotionResult, Refused
 from coglab.robot import Robot
 from coglab.trial import Recording, Trial
 from coglab.values import finite, number, path_of, whole
+
+if TYPE_CHECKING:
+    from ctrl_more import FeedbackControllersManager
 
 LOG = logging.getLogger("coglab")
 START_LIMIT = 60.0  # s of virtual time until the robot waits for its first action
@@ -273,11 +276,12 @@ class World:
     # -- own controllers -------------------------------------------------------------------------
 
     @property
-    def feedback(self) -> Any:
+    def feedback(self) -> FeedbackControllersManager:
         """The robot's own ``ctrl_more.FeedbackControllersManager``: load a list file with C++ and Python controllers,
         order, enable, pause and tune them here. The control cycle runs them."""
         self._check()
-        return self.cell.robot.virtual.feedback
+        manager: FeedbackControllersManager = self.cell.robot.virtual.feedback
+        return manager
 
     def add_motion(self, name: str, motion: OwnMotion) -> None:
         """Load a motion of ``coglab.control`` into the control cycle, as ``./coglab controller run`` does on the

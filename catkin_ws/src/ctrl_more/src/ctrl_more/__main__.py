@@ -109,7 +109,10 @@ def read_signals(arguments: argparse.Namespace) -> dict[str, Numbers]:
         name, equals, values = text.partition("=")
         if not equals:
             raise Refused(f"--signal {text}: expected map/key=1,2,3")
-        signals[name] = np.array([[float(part) for part in values.split(",")]])
+        try:
+            signals[name] = np.array([[float(part) for part in values.split(",")]])
+        except ValueError:
+            raise Refused(f"--signal {text}: expected numbers after '=', such as 1,2,3") from None
     if arguments.record:
         with open(arguments.record, newline="", encoding="utf-8") as file:
             rows = list(csv.DictReader(file))
@@ -133,6 +136,8 @@ def write_signal(loaded: Loaded, name: str, values: Numbers, now_ns: int) -> Non
 
 
 def run(arguments: argparse.Namespace) -> int:
+    if arguments.cycles < 1:
+        raise Refused(f"--cycles: 1 or more is expected, got {arguments.cycles}")
     loaded = Loaded(arguments.file, arguments.joints, arguments.period)
     manager = loaded.manager
     if arguments.enable_all:
