@@ -226,6 +226,8 @@ class World:
 
         def on_interrupt(*_: object) -> None:
             self._interrupted += 1
+            if self._interrupted == 2:
+                os.write(2, b"the control cycle does not return; Ctrl-C once more ends it at once\n")
             if self._interrupted > 2:
                 raise KeyboardInterrupt
 
