@@ -310,13 +310,13 @@ class World:
         self._check()
         robot, begun = self.cell.robot, self.time
         arguments = {each: number(value, each, "argument", -math.inf) for each, value in arguments.items()}
-        accepted, sentence, number = robot.virtual.start_motion(name, arguments)
+        accepted, sentence, begun_as = robot.virtual.start_motion(name, arguments)
         if not accepted:
             raise Refused(sentence, robot.virtual.reason_code)
 
         def over() -> bool:
             progress = robot.virtual.motion_progress(name)
-            return progress["number"] == number and progress["state"] in ("reached", "aborted")
+            return progress["number"] == begun_as and progress["state"] in ("reached", "aborted")
 
         try:
             self.run_until(over, limit, f"the end of motion '{name}'")
