@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import csv
+import os
 import sys
 from collections import Counter
 from pathlib import Path
@@ -204,7 +205,12 @@ def main() -> int:
     """Run a command: 0 it is well, 1 something is wrong with the file, 2 wrong usage."""
     arguments = parser().parse_args()
     try:
-        return int(arguments.function(arguments))
+        code = int(arguments.function(arguments))
+        sys.stdout.flush()
+        return code
+    except BrokenPipeError:  # `... | head` has read enough; nothing is written at the end either
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
     except (Refused, RuntimeError, OSError, ValueError) as error:
         print(error, file=sys.stderr)
         return 1
