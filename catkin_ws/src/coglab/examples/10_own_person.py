@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""People of one's own: how long a handover takes with a person who trusts the robot's hand sooner or later."""
+"""People of one's own: how long giving takes with a person who trusts the robot's hand sooner or later."""
 
 import coglab
 from coglab_trials import Conditions
@@ -18,12 +18,13 @@ for behaviour in ("normal", "hesitant"):
         for seed in range(options.seeds):
             person = Conditions(behaviour, "patient", {"trust": trust, "reaction_median": 0.3})
             with coglab.World(seed, conditions=person) as world:
-                result = world.robot.receive()
+                world.robot.receive()
+                result = world.robot.give()
             print(f"{behaviour}, trust after {trust} s, seed {seed}: {result}")
             if result.ok:
                 rows.append((trust, result.duration))
     axes.plot(*zip(*rows, strict=True), "o", label=behaviour)
 axes.set_xlabel("the person trusts a hand that rests for [s]")
-axes.set_ylabel("duration of the handover [s]")
+axes.set_ylabel("duration of giving [s]")
 axes.legend()
 save(figure, __file__, options.out)

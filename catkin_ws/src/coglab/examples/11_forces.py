@@ -12,7 +12,8 @@ with coglab.World(seed=5, person="accustomed", object="bottle") as world:
 
     def push(world: coglab.World) -> None:
         """Somebody knocks against the arm once, while it carries the bottle."""
-        if not pushes and not any(world.truth["human_force"]) and world.truth["held_by"] == "robot":
+        touched = np.linalg.norm(world.truth["human_force"]) > 0.1  # N, the person still lets go
+        if not pushes and not touched and world.truth["held_by"] == "robot":
             pushes.append(world.time)
             world.push([0.0, 25.0, 0.0], seconds=0.2)
 

@@ -91,6 +91,7 @@ def draw(history, before, after, path):
     number = np.arange(1, len(history) + 1)
     left.plot(number, [one[0] for one in history], "o-", label="all candidates")
     left.plot(number, [one[1] for one in history], "o-", label="the best quarter")
+    left.set_xticks(number)
     left.set_xlabel("generation")
     left.set_ylabel("mean return, people of train")
     left.legend()

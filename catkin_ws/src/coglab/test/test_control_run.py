@@ -136,9 +136,10 @@ def test_feedback_controllers_of_a_file_find_slots_and_let_go(robot):
             assert slots == {"python_feedback", "python_feedback_2"}
             wait(lambda: any(value == pytest.approx(0.02) for value in shifts.values()), f"the shift: {shifts}")
             assert "has not returned" in endless.stdout.readline()
-            for process in (first, endless):
+            for process in 3 * (first, endless):  # an impatient user presses Ctrl-C several times
                 process.send_signal(signal.SIGINT)
             assert first.wait(timeout=LIMIT) == 0 and endless.wait(timeout=LIMIT) == 1
+            assert "Traceback" not in first.stdout.read() + endless.stdout.read()
             wait(lambda: not any(shifts.values()), f"the end of the shifts: {shifts}")
         finally:
             first.kill()

@@ -96,7 +96,7 @@ def raises():
 def test_a_motion_that_does_wrong_is_aborted_and_the_arm_brakes(world, motion, named):
     world.add_motion("mine", motion)
     end = world.run_motion("mine")
-    assert not end.ok and end.reason == "CONTROLLER_FAULT" and named in end.causes[0]
+    assert not end.ok and end.reason == "CONTROLLER_FAULT" and named in end.causes[0] and "\n" not in end.causes[0]
     world.step(1.0)
     robot = world.cell.robot.virtual
     assert robot.report()["standing"] and robot.limits()["commanded"] == 0
@@ -106,6 +106,13 @@ def test_limits_hold_for_a_motion_that_asks_for_too_much(world):
     world.add_motion("circle", Circle())
     world.run_motion("circle", radius=0.15, duration=1.0)
     assert world.cell.robot.virtual.limits()["commanded"] == 0
+
+
+def test_a_motion_that_does_not_end_is_stopped_at_its_limit(world):
+    world.add_motion("circle", Circle())
+    with pytest.raises(TimeoutError, match="circle"):
+        world.run_motion("circle", duration=5.0, limit=1.0)
+    assert world.robot.state.standing
 
 
 def test_requests_that_are_wrong_are_refused_in_words(world):
@@ -118,6 +125,11 @@ def test_requests_that_are_wrong_are_refused_in_words(world):
         world.run_motion("circle", radius=3.0)
     with pytest.raises(ValueError, match="add_motion"):
         world.run_motion("nobody")
+    with pytest.raises(ValueError, match="radius"):
+        world.run_motion("circle", radius="large")
+    for wrong in (Circle, 3):
+        with pytest.raises(ValueError, match="coglab.control.Motion"):
+            world.add_motion("other", wrong)
 
 
 CONTROLLER = """

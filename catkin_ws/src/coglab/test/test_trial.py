@@ -24,6 +24,7 @@ def trial() -> coglab.Trial:
 
 
 def test_a_trial_holds_results_phases_and_traces(trial):
+    assert repr(trial).startswith("<coglab.Trial seed=3 mug, ") and len(repr(trial)) < 200
     assert trial and [result.what for result in trial.results] == ["receive", "give"]
     count = len(trial.time)
     assert count == pytest.approx((trial.end - trial.start) / 0.01, abs=3) and np.all(np.diff(trial.time) > 0.0)

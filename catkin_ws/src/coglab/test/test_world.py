@@ -60,6 +60,11 @@ def test_palm_comes_to_poses_and_frames(world):
     for result in (arm.move_to(there), arm.reach("reach_human", here), arm.reach("reach_human", here.position + 0.05)):
         assert result.ok, str(result)
     assert np.linalg.norm(arm.palm.position - here.position - 0.05) < 0.006
+    seven = [*here.position, *here.orientation]
+    for target, where in ((seven, here.position), (there.position, there.position)):  # a position keeps the orientation
+        assert arm.move_to(target).ok
+        assert np.linalg.norm(arm.palm.position - where) < 0.001
+        assert abs(np.dot(arm.palm.orientation, here.orientation)) > 0.9999
     with pytest.raises(coglab.Refused, match="cannot be brought") as refused:
         arm.move_to((here.position + [2.0, 0.0, 0.0], here.orientation))
     assert refused.value.name == "GOAL_UNREACHABLE"
@@ -162,7 +167,7 @@ def test_wrong_joints_are_refused_in_words(world, joints):
 
 def test_wrong_poses_and_names_are_refused_in_words(world):
     arm, place = world.robot.arm, [0.6, 0.0, 0.5]
-    for wrong in (place, (place, [0, 0, 0, 0]), (place, [0, 0, 1]), (place[:2], [0, 0, 0, 1]), 2.0 * np.eye(4)):
+    for wrong in ([0.6], (place, [0, 0, 0, 0]), (place, [0, 0, 1]), (place[:2], [0, 0, 0, 1]), 2.0 * np.eye(4)):
         with pytest.raises(ValueError, match="target"):
             arm.move_to(wrong)
     with pytest.raises(coglab.Refused, match="never seen"):
@@ -242,6 +247,23 @@ def test_arguments_of_a_world_are_checked(world):
     assert "trust" in other(person={"trsut": 1.0}) and "pull_back" in other(behaviour="rude")
     assert "calm" in other(settings={"timing": "frantic"})
     assert "board" in other(object_on="moon") and "seed" in other(seed=-1)
+    assert "trust" in other(person={"trust": float("nan")}) and "touch" in other(touch=-1.0)
+    assert "settings" in other(settings=[1]) and "machine" in other(machine=lambda ctx: None)
+
+
+def test_a_world_that_fails_leaves_its_thread_free(alone):
+    with pytest.raises(AttributeError, match="update"):
+        coglab.World(seed=1, recogniser=object())
+    coglab.World(seed=1)
+    coglab.World.opened().close()
+    assert coglab.World.opened() is None
+
+
+def test_an_action_without_an_object_takes_that_of_the_world(alone):
+    with coglab.World(seed=3, person="accustomed", object="ball", perfect_perception=True) as world:
+        with pytest.raises(coglab.Refused, match="'dance' is no action.*receive"):
+            world.robot.do("dance")
+        assert world.robot.receive().object_id == "ball"
 
 
 def test_hidden_things_and_losses_are_named(world):

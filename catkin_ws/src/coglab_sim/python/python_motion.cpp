@@ -36,6 +36,21 @@ Eigen::Matrix<double, 6, 1> joined(const Vector3& first, const Vector3& second) 
   return both;
 }
 
+/// A Python exception as "file.py:12: ValueError: text". The place is the last one of the user:
+/// frames of coglab.control are left out.
+std::string inWords(const py::error_already_set& error) {
+  const auto name = error.type().attr("__name__").cast<std::string>();
+  const auto text = py::str(error.value()).cast<std::string>();
+  std::string place;
+  for (py::object trace = error.trace(); trace && !trace.is_none(); trace = trace.attr("tb_next")) {
+    const auto file = trace.attr("tb_frame").attr("f_code").attr("co_filename").cast<std::string>();
+    if (file.find("/coglab/control/") != std::string::npos || file.front() == '<') continue;
+    place = file.substr(file.rfind('/') + 1) + ":" +
+            std::to_string(trace.attr("tb_lineno").cast<int>()) + ": ";
+  }
+  return place + name + (text.empty() ? "" : ": " + text);
+}
+
 }  // namespace
 
 void PythonMotion::configure(MotionConfiguration& configuration) {
@@ -47,7 +62,7 @@ void PythonMotion::configure(MotionConfiguration& configuration) {
       ++arguments_;
     }
   } catch (const py::error_already_set& error) {
-    throw std::runtime_error(error.what());
+    throw std::runtime_error(inWords(error));
   }
 }
 
@@ -64,6 +79,8 @@ void PythonMotion::start(const MotionStart<>& start) {
                          Eigen::Vector3d(from_.pose.position),
                          Eigen::Vector4d(from_.pose.orientation.coeffs()),
                          joined(from_.velocity, from_.angular_velocity));
+  } catch (const py::error_already_set& error) {
+    fail(inWords(error));
   } catch (const std::exception& error) {
     fail(error.what());
   }
@@ -78,6 +95,9 @@ void PythonMotion::computeReference(const MotionCycle& cycle, MotionReference& r
     if (!began_) checkBegin(reference);
     began_ = true;
     if (steps_.attr("done")().cast<bool>()) state_ = MotionState::Reached;
+  } catch (const py::error_already_set& error) {
+    reference.rest();
+    fail(inWords(error));
   } catch (const std::exception& error) {
     reference.rest();
     fail(error.what());

@@ -280,3 +280,21 @@ def test_ctrl_c_in_update_reaches_the_program() -> None:
     finally:
         signal.signal(signal.SIGINT, before)
     assert cell.manager.status("lift").fault == "exception"
+
+
+def test_help_of_compiled_methods_has_their_text() -> None:
+    text = ctrl_more.RobotStates.set_measured_data.__doc__ or ""
+    assert text.startswith("set_measured_data(") and "Write" in text and "ns" in text
+
+
+def test_bare_numbers_of_numpy_are_gains_and_signals() -> None:
+    cell, robot = Cell(), RobotStates()
+    add(cell, Lift())
+    cell.manager.set_gains("lift", {"height": np.float32(0.5)})
+    robot.set_measured_data("height", np.float64(0.2), 1)
+    assert robot.get_measured_data("height").tolist() == [0.2]
+
+
+def test_a_library_that_is_none_is_refused() -> None:
+    with pytest.raises(Refused, match="nowhere.so"):
+        ctrl_more.describe(Path("/nowhere.so"))

@@ -170,8 +170,9 @@ class Arm:
     ) -> MotionResult:
         """Bring the palm to a pose, in joint space. A frame is where it is now; it is not followed.
 
-        ``target``: a Pose in the base frame, (position [3] m, quaternion [4]), a 4 x 4 matrix, or the name of a frame,
-        such as "object_mug". ``offset``: pose of the palm relative to the target. Refused: out of reach.
+        ``target``: a Pose in the base frame, (position [3] m, quaternion [4]), 7 numbers, a 4 x 4 matrix, the name of a
+        frame, such as "object_mug", or a position [3], which keeps the orientation of the palm. ``offset``: pose of the
+        palm relative to the target. Refused: out of reach.
         """
         return self.start_to(target, offset, duration, limit=limit).wait()
 
@@ -184,7 +185,12 @@ class Arm:
         limit: float = 30.0,
     ) -> Motion:
         """Start ``move_to`` and return it while it runs."""
-        pose = self._robot.frame(target) if isinstance(target, str) else pose_of(target, "target")
+        if isinstance(target, str):
+            pose = self._robot.frame(target)
+        elif not isinstance(target, Pose) and has_shape(target, (3,)):
+            pose = Pose(finite(target, "target", (3,)), self.palm.orientation)
+        else:
+            pose = pose_of(target, "target")
         if offset is not None:
             pose = pose * pose_of(offset, "offset")
         posture = _posture(pose, self.joints)
@@ -487,7 +493,8 @@ class Robot:
     # --- actions of the state machines ---
 
     def receive(self, object: str | None = None, *, limit: float = 60.0) -> Exchange:
-        """Take an object that a person offers. ``object``: its id; None: the default object of the machines."""
+        """Take an object that a person offers. ``object``: its id; None: the object of the World, or the
+        default object of a running robot's machines."""
         return self._act("receive", object, limit)
 
     def give(self, object: str | None = None, *, delivery: str | None = None, limit: float = 60.0) -> Exchange:
@@ -496,7 +503,7 @@ class Robot:
         return self.do("give", object, delivery=delivery, limit=limit)
 
     def take(self, object: str | None = None, *, limit: float = 60.0) -> Exchange:
-        """Take an object from the board."""
+        """Take an object from the board. ``object``: as in ``receive``."""
         return self._act("take", object, limit)
 
     def put(self, object: str | None = None, *, limit: float = 60.0) -> Exchange:
@@ -512,7 +519,9 @@ class Robot:
             raise ValueError(f"delivery: a name of the object's file is expected, got {delivery!r}")
         if object is not None and (not isinstance(object, str) or "/" in object):
             raise ValueError(f"object: an id such as 'mug' is expected, got {object!r}")
-        return self._act(str(action), f"{object or ''}/{delivery}" if delivery else object, limit)
+        if not isinstance(action, str):
+            raise ValueError(f"action: a name such as 'receive' is expected, got {action!r}")
+        return self._act(action, f"{object or ''}/{delivery}" if delivery else object, limit)
 
     def stop(self, reason: str = "stopped from Python", *, limit: float = STOPPING) -> Result:
         """STOP: the arm brakes, the brain ends its action, the hand keeps its object. Latched until ``reset()``. No
@@ -732,6 +741,11 @@ class Robot:
         state = self.state
         if self._resettable():
             return f"'{name}' is refused: {_for_python(state.why) or 'the robot is stopped'}; call robot.reset()"
+        if name not in self._cell.actions and name not in state.actions:
+            known = ", ".join(
+                [*self._cell.actions, *(each for each in state.actions if each not in self._cell.actions)]
+            )
+            return f"'{name}' is no action that can be asked for now; there are {known}"
         held = f"the hand holds the {state.holding}" if state.holding else "the hand is empty"
         own = [each for each in state.actions if each not in self._cell.actions]
         can = " or ".join(f"do('{each}')" if each in own else f"{each}()" for each in state.actions)

@@ -6,12 +6,13 @@ import multiprocessing
 import pickle
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
-from typing import Any
+from typing import Any, TypeVar, overload
 
 from coglab.trial import Trial
 from coglab.world import World
 
 MOST_WORKERS = 256
+Value = TypeVar("Value")
 
 
 class TrialFailed(RuntimeError):
@@ -25,6 +26,26 @@ class TrialFailed(RuntimeError):
         return str(self.args[0])
 
 
+@overload
+def trials(
+    n: int | None = None,
+    *actions: str,
+    seeds: Iterable[int] | None = None,
+    workers: int = 2,
+    each: None = None,
+    limit: float = 60.0,
+    **world: Any,
+) -> list[Trial]: ...
+@overload
+def trials(
+    n: int | None = None,
+    *,
+    seeds: Iterable[int] | None = None,
+    workers: int = 2,
+    each: Callable[[World], Value],
+    limit: float = 60.0,
+    **world: Any,
+) -> list[Value]: ...
 def trials(
     n: int | None = None,
     *actions: str,
@@ -54,7 +75,7 @@ def trials(
     if each is not None and actions:
         raise ValueError("give actions, or a function 'each', not both")
     jobs = [(seed, actions or ("receive",), limit, world, each) for seed in chosen]
-    if workers == 1 or len(jobs) == 1:
+    if workers == 1 or (len(jobs) == 1 and World.opened() is None):
         return [_one(job) for job in jobs]
     try:
         pickle.dumps((world, each))  # what multiprocessing does to send them; here the reason can be named

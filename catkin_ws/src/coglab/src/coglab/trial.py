@@ -61,7 +61,7 @@ class Phase:
     end: float
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Trial:
     """Record of one trial in a World. Arrays have one row per sample, every 10 ms. Poses in the base frame: positions
     in m, orientations as quaternions x y z w. All of it is the truth of the simulation, not what the robot sees.
@@ -110,6 +110,11 @@ class Trial:
     """index into HOLDERS, shape (n,)"""
     labels: Mapping[str, str] = field(default_factory=dict)
     """whom and what for: participant, condition, study, session, notes, as in the trial.yaml of a recorded handover"""
+
+    def __repr__(self) -> str:
+        said = "; ".join(map(str, self.results)) or "no action"
+        thing = self.conditions.get("object_id", "")
+        return f"<coglab.Trial seed={self.seed} {thing}, {self.end - self.start:.1f} s: {said}>"
 
     def __bool__(self) -> bool:
         return bool(self.results) and all(result.ok for result in self.results)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -45,8 +46,23 @@ def number(value: Any, name: str, unit: str, above: float) -> float:
     return float(value)
 
 
+def whole(value: Any, name: str) -> int:
+    """A whole number 0 or more, of Python or of numpy."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 0:
+        raise ValueError(f"{name}: a whole number 0 or more is expected, got {value!r}")
+    return int(value)
+
+
+def path_of(value: Any, name: str) -> str:
+    """The path of a file as text; empty for none."""
+    if not isinstance(value, str | PathLike):
+        raise ValueError(f"{name}: the path of a file is expected, got {value!r}")
+    return str(value)
+
+
 def pose_of(value: Any, name: str) -> Pose:
-    """A Pose from a Pose, from (position [3] m, quaternion [4] x y z w), or from a 4 x 4 matrix."""
+    """A Pose from a Pose, from (position [3] m, quaternion [4] x y z w), from these 7 numbers, or from a 4 x 4
+    matrix."""
     if isinstance(value, Pose):
         position, orientation = value.position, value.orientation
     elif has_shape(value, (4, 4)):
@@ -55,11 +71,14 @@ def pose_of(value: Any, name: str) -> Pose:
         if np.abs(turn @ turn.T - np.eye(3)).max() > 1e-6 or np.linalg.det(turn) < 0.0:
             raise ValueError(f"{name}: the upper left 3 x 3 of the matrix is no rotation")
         return Pose(matrix[:3, 3], Rotation.from_matrix(turn).as_quat())
+    elif has_shape(value, (7,)):
+        position, orientation = value[:3], value[3:]
     elif isinstance(value, tuple | list) and len(value) == 2:
         position, orientation = value
     else:
         raise ValueError(
-            f"{name}: a coglab.Pose, (position [3], quaternion [4]) or a 4 x 4 matrix is expected, got {value!r}"
+            f"{name}: a coglab.Pose, (position [3], quaternion [4]), 7 numbers or a 4 x 4 matrix is expected, "
+            f"got {value!r}"
         )
     where = finite(position, f"{name} position", (3,))
     quaternion = finite(orientation, f"{name} quaternion", (4,))

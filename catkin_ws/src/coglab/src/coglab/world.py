@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import os
 import signal
 import threading
@@ -11,8 +12,9 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import fields
+from pathlib import Path
 from types import SimpleNamespace, TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from coglab_msgs.msg import ReasonCode
 from coglab_objects.database import objects_folder
@@ -39,7 +41,10 @@ from coglab.control.motion import Motion as OwnMotion
 from coglab.results import ACTIONS, Event, Exchange, MotionResult, Refused
 from coglab.robot import Robot
 from coglab.trial import Recording, Trial
-from coglab.values import finite, number
+from coglab.values import finite, number, path_of, whole
+
+if TYPE_CHECKING:
+    from ctrl_more import FeedbackControllersManager
 
 LOG = logging.getLogger("coglab")
 START_LIMIT = 60.0  # s of virtual time until the robot waits for its first action
@@ -80,9 +85,9 @@ class World:
         machine: Callable[[Context], Any] = build_master,
         recogniser: Any = None,
         touch: float | None = None,
-        feedback: str = "",
-        signals: str = "",
-        managers: str = "",
+        feedback: str | Path = "",
+        signals: str | Path = "",
+        managers: str | Path = "",
     ) -> None:
         """
         ``seed``: of person, noise and tracker. ``person``: "drawn" (by the seed), "patient" or "accustomed"; or fields
@@ -106,16 +111,27 @@ class World:
         self._pid, self._thread = os.getpid(), threading.get_ident()
         self._claim_thread()
         try:
-            conditions = conditions or _conditions(person, object, behaviour, perfect_perception)
+            if conditions is None:
+                conditions = _conditions(person, object, behaviour, perfect_perception)
+            elif not isinstance(conditions, Conditions):
+                raise ValueError(f"conditions: a coglab.Conditions is expected, got {conditions!r}")
             _check_object(conditions.object_id)
             if object_on not in ("person", "board"):
                 raise ValueError(f"object_on: 'person' or 'board' is expected, got {object_on!r}")
-            if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
-                raise ValueError(f"seed: a whole number 0 or more is expected, got {seed!r}")
-            self.seed, self.conditions = seed, conditions
-            files = {"feedback_file": feedback, "signals_file": signals, "central_file": managers}
+            if settings is not None and not isinstance(settings, Mapping):
+                raise ValueError(f"settings: a dict of names and values is expected, got {settings!r}")
+            if touch is not None and number(touch, "touch", "N", -math.inf) < 0.0:
+                raise ValueError(f"touch: 0 N or more is expected, got {touch!r}")
+            if not callable(machine):
+                raise ValueError(f"machine: a function of the Context is expected, got {machine!r}")
+            self.seed, self.conditions = whole(seed, "seed"), conditions
+            files = {
+                "feedback_file": path_of(feedback, "feedback"),
+                "signals_file": path_of(signals, "signals"),
+                "central_file": path_of(managers, "managers"),
+            }
             cell = Cell(
-                seed,
+                self.seed,
                 conditions,
                 "human_hand" if object_on == "person" else "world",
                 files={name: file for name, file in files.items() if file},
@@ -210,6 +226,8 @@ class World:
 
         def on_interrupt(*_: object) -> None:
             self._interrupted += 1
+            if self._interrupted == 2:
+                os.write(2, b"the control cycle does not return; Ctrl-C once more ends it at once\n")
             if self._interrupted > 2:
                 raise KeyboardInterrupt
 
@@ -260,16 +278,22 @@ class World:
     # -- own controllers -------------------------------------------------------------------------
 
     @property
-    def feedback(self) -> Any:
+    def feedback(self) -> FeedbackControllersManager:
         """The robot's own ``ctrl_more.FeedbackControllersManager``: load a list file with C++ and Python controllers,
         order, enable, pause and tune them here. The control cycle runs them."""
         self._check()
-        return self.cell.robot.virtual.feedback
+        manager: FeedbackControllersManager = self.cell.robot.virtual.feedback
+        return manager
 
     def add_motion(self, name: str, motion: OwnMotion) -> None:
         """Load a motion of ``coglab.control`` into the control cycle, as ``./coglab controller run`` does on the
-        running robot. Refused: the name is in use, or ``configure`` raised."""
+        running robot. Refused: the name is in use. ValueError: no motion; and whatever ``configure`` raises."""
         self._check()
+        missing = [each for each in ("configure", "start", "reference", "done") if not hasattr(motion, each)]
+        if isinstance(motion, type) or missing:
+            raise ValueError(
+                f"motion: an object of a class derived from coglab.control.Motion is expected, got {motion!r}"
+            )
         robot = self.cell.robot
         in_cycle = InCycle(motion, SimpleNamespace(chain=robot.chain, limits=robot.limits))
         loaded, sentence = robot.virtual.add_motion(name, in_cycle)
@@ -280,19 +304,25 @@ class World:
         """Start a motion of ``add_motion`` with these arguments and wait for its end. A motion that raises, or returns
         no reference, is aborted: the arm brakes, and ``causes`` has the Python message.
 
-        ``limit``: virtual time, s; TimeoutError after it. Refused: unknown argument, out of range, or not now.
+        ``limit``: virtual time, s; TimeoutError after it, and the arm is stopped, as by Ctrl-C. Refused: unknown
+        argument, out of range, or not now. ValueError: no finite number, or no such motion.
         """
         self._check()
         robot, begun = self.cell.robot, self.time
-        accepted, sentence, number = robot.virtual.start_motion(name, arguments)
+        arguments = {each: number(value, each, "argument", -math.inf) for each, value in arguments.items()}
+        accepted, sentence, begun_as = robot.virtual.start_motion(name, arguments)
         if not accepted:
             raise Refused(sentence, robot.virtual.reason_code)
 
         def over() -> bool:
             progress = robot.virtual.motion_progress(name)
-            return progress["number"] == number and progress["state"] in ("reached", "aborted")
+            return progress["number"] == begun_as and progress["state"] in ("reached", "aborted")
 
-        self.run_until(over, limit, f"the end of motion '{name}'")
+        try:
+            self.run_until(over, limit, f"the end of motion '{name}'")
+        except BaseException:
+            self.robot._halt(f"the caller of motion '{name}' has given up waiting")
+            raise
         end = robot.virtual.motion_progress(name)
         return MotionResult(
             what=name,
@@ -327,9 +357,10 @@ class World:
     def lose(self, to_pc: float = 0.0, from_pc: float = 0.0) -> None:
         """Share of datagrams between robot controller and computer that are lost from now on, 0 .. 1 each way."""
         self._check()
-        if not (0.0 <= to_pc <= 1.0 and 0.0 <= from_pc <= 1.0):
+        shares = [number(each, "to_pc, from_pc", "share", -math.inf) for each in (to_pc, from_pc)]
+        if not all(0.0 <= each <= 1.0 for each in shares):
             raise ValueError(f"to_pc, from_pc: shares 0 .. 1 are expected, got {to_pc!r}, {from_pc!r}")
-        self.cell.cell.set_loss(float(to_pc), float(from_pc))
+        self.cell.cell.set_loss(*shares)
 
     def leave_command_mode(self, reason: str = "the robot controller left command mode") -> None:
         """The robot controller falls back to monitor mode, as after a fault of its own."""
@@ -366,8 +397,7 @@ class World:
                 raise ValueError(f"actions: one of {', '.join(known)} is expected, got {action!r}")
         with self.record() as recording:
             for action in actions:
-                thing = None if self.robot.state.holding else self.conditions.object_id
-                result: Exchange = self.robot.do(action, thing, limit=limit)
+                result: Exchange = self.robot.do(action, limit=limit)
                 self._await_person()
                 if not result.ok:
                     break
@@ -412,15 +442,21 @@ class World:
         except (TimeoutError, RuntimeError) as error:
             LOG.warning("the arm did not come to rest before the World was closed: %s", error)
         finally:
-            trial.master.request_preempt()
-            trial.clock.let_think(False)
-            deadline = trial.clock.now() + START_LIMIT
-            while hasattr(self, "_machine") and self._machine.is_alive() and trial.clock.now() < deadline:
-                trial.period()  # a state that ends its motion waits for the arm
-                trial.clock.sleep(DT)
-            self._trial = None
-            self._stack.close()
-            self._release_thread()
+            try:
+                self._end_machine(trial)
+            finally:  # whatever an own part raised, this thread may open another World
+                self._trial = None
+                self._stack.close()
+                self._release_thread()
+
+    def _end_machine(self, trial: VirtualTrial) -> None:
+        """Preempt the machines and let time pass until they have ended."""
+        trial.master.request_preempt()
+        trial.clock.let_think(False)
+        deadline = trial.clock.now() + START_LIMIT
+        while hasattr(self, "_machine") and self._machine.is_alive() and trial.clock.now() < deadline:
+            trial.period()  # a state that ends its motion waits for the arm
+            trial.clock.sleep(DT)
 
     def __enter__(self) -> World:
         self._check()
@@ -431,15 +467,22 @@ class World:
     ) -> None:
         self.close()
 
-    def _claim_thread(self) -> None:
+    @staticmethod
+    def opened() -> World | None:
+        """Returns the open World of this thread, or None: to close one that no variable names any more."""
         with _HERE:
-            there = _open_worlds.get(self._thread)
-            other = there() if there is not None else None
-            if other is not None and other._trial is not None and other._pid == self._pid:
-                raise RuntimeError(
-                    f"this thread has an open World (seed {other.seed}): close() it first, or use "
-                    "'with coglab.World(...)'; several at a time: coglab.trials()"
-                )
+            there = _open_worlds.get(threading.get_ident())
+        world = there() if there is not None else None
+        return None if world is None or world._trial is None or world._pid != os.getpid() else world
+
+    def _claim_thread(self) -> None:
+        other = self.opened()
+        if other is not None:
+            raise RuntimeError(
+                f"this thread has an open World (seed {other.seed}): close() it first (coglab.World.opened() returns "
+                "it), or use 'with coglab.World(...)'; several at a time: coglab.trials()"
+            )
+        with _HERE:
             _open_worlds[self._thread] = weakref.ref(self)
 
     def _release_thread(self) -> None:
@@ -510,6 +553,8 @@ class _VirtualBackEnd:
 
     def submit(self, action: str, object_id: str) -> Answer:
         before = len(self._trial.results)
+        if not object_id and action in ACTIONS.values() and not self.state().object_id:
+            object_id = self._world.conditions.object_id  # the only object of this world
         answer = ask_for(self._trial.ctx, action, object_id)
         if answer.ok:
             self._before = before

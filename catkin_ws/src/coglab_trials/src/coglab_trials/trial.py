@@ -138,6 +138,8 @@ class VirtualTrial:
         self.ctx.journal.listen(self._on_transition)
         with using(self.clock):
             self.master = machine(self.ctx)
+        if not isinstance(self.master, smach.State):
+            raise ValueError(f"machine: it has to return a state machine (smach.State), got {self.master!r}")
         self.beside: Callable[[VirtualTrial], None] = lambda trial: None
         self.reach: Reach | None = None
         self.reaches: list[Reach] = []

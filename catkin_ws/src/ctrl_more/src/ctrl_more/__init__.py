@@ -15,6 +15,7 @@ from pkgutil import extend_path
 
 __path__ = extend_path(__path__, __name__)  # a new process may find this folder before that of the compiled module
 
+from ctrl_more import _core
 from ctrl_more._core import (
     INTERFACE,
     Attribution,
@@ -43,8 +44,10 @@ from ctrl_more._core import (
     logger,
     register_manager,
 )
+from ctrl_more._texts import add_texts
 from ctrl_more.drain import to_logging
 
+add_texts(_core)
 to_logging(logger)
 
 __all__ = [

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import csv
+import os
 import sys
 from collections import Counter
 from pathlib import Path
@@ -109,7 +110,10 @@ def read_signals(arguments: argparse.Namespace) -> dict[str, Numbers]:
         name, equals, values = text.partition("=")
         if not equals:
             raise Refused(f"--signal {text}: expected map/key=1,2,3")
-        signals[name] = np.array([[float(part) for part in values.split(",")]])
+        try:
+            signals[name] = np.array([[float(part) for part in values.split(",")]])
+        except ValueError:
+            raise Refused(f"--signal {text}: expected numbers after '=', such as 1,2,3") from None
     if arguments.record:
         with open(arguments.record, newline="", encoding="utf-8") as file:
             rows = list(csv.DictReader(file))
@@ -133,6 +137,8 @@ def write_signal(loaded: Loaded, name: str, values: Numbers, now_ns: int) -> Non
 
 
 def run(arguments: argparse.Namespace) -> int:
+    if arguments.cycles < 1:
+        raise Refused(f"--cycles: 1 or more is expected, got {arguments.cycles}")
     loaded = Loaded(arguments.file, arguments.joints, arguments.period)
     manager = loaded.manager
     if arguments.enable_all:
@@ -199,7 +205,12 @@ def main() -> int:
     """Run a command: 0 it is well, 1 something is wrong with the file, 2 wrong usage."""
     arguments = parser().parse_args()
     try:
-        return int(arguments.function(arguments))
+        code = int(arguments.function(arguments))
+        sys.stdout.flush()
+        return code
+    except BrokenPipeError:  # `... | head` has read enough; nothing is written at the end either
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
     except (Refused, RuntimeError, OSError, ValueError) as error:
         print(error, file=sys.stderr)
         return 1

@@ -56,7 +56,8 @@ class Logger:
         """Give each drained record to a function, or append it to a file."""
     def set_level(self, level: str) -> None:
         """Drop records below `debug`, `info`, `warning` or `error`."""
-    def log(self, level: str, source: str, text: str) -> None: ...
+    def log(self, level: str, source: str, text: str) -> None:
+        """Add a record."""
     def drain(self) -> int:
         """Give all waiting records to the sinks; returns their number."""
     @property
@@ -150,14 +151,16 @@ class RobotStates:
         """Forbid new keys; views need it."""
     @property
     def frozen(self) -> bool: ...
-    def find(self, source: str, key: str) -> RobotSignal: ...
+    def find(self, source: str, key: str) -> RobotSignal:
+        """Handle of a signal, for `size` and `valid`."""
     def view(self, source: str, key: str) -> Array:
         """The numbers of a signal on the memory of the store, read-only; after freeze()."""
-    def signals(self, source: str) -> list[SignalInfo]: ...
+    def signals(self, source: str) -> list[SignalInfo]:
+        """Every signal of `measuredData` or `estimatedData`."""
     @property
     def newest_stamp(self) -> int: ...
     def set_measured_data(self, key: str, value: ArrayLike, stamp_ns: int) -> Status:
-        """Write a measurement; a new key is added."""
+        """Write a measurement, (n,), SI units; `stamp_ns`: when it was taken, ns. A new key is added."""
     def setMeasuredData(self, key: str, value: ArrayLike, stamp_ns: int) -> Status: ...
     def set_estimated_data(self, key: str, value: ArrayLike, stamp_ns: int) -> Status:
         """Write an estimate; a new key is added."""
@@ -186,14 +189,16 @@ class RobotView:
 
     def view(self, handle: Read) -> Array:
         """The numbers of a signal, read-only, without a copy."""
-    def stamp(self, handle: Read) -> int: ...
+    def stamp(self, handle: Read) -> int:
+        """When the signal was measured, ns."""
 
 class ControlStates:
     """References. `container` is a name of the paper, such as `taskSpaceReferencePose`."""
 
     def __init__(self, joints: int = 0, period: float = 0.005, logger: Logger | None = None) -> None:
         """`joints`: size of every joint reference, 0: the first one decides. `period`: in s."""
-    def declare(self, container: str, key: str, size: int, unit: str = "", frame: str = "") -> Status: ...
+    def declare(self, container: str, key: str, size: int, unit: str = "", frame: str = "") -> Status:
+        """Add a reference without a value, for a controller that is loaded before it is written."""
     def freeze(self) -> None:
         """Forbid new keys; views need it."""
     @property
@@ -201,7 +206,8 @@ class ControlStates:
     def find(self, container: str, key: str) -> ControlSignal: ...
     def view(self, container: str, key: str) -> Array:
         """The numbers of a signal on the memory of the store, writable; after freeze()."""
-    def signals(self, container: str) -> list[SignalInfo]: ...
+    def signals(self, container: str) -> list[SignalInfo]:
+        """Every reference of a container."""
     @property
     def joints(self) -> int: ...
     period: float
@@ -298,7 +304,8 @@ class ModifiedControlStates:
     def __getitem__(self, handle: Modify) -> Array:
         """The numbers of a signal, writable until update() returns."""
     def __setitem__(self, handle: Modify, value: ArrayLike) -> None: ...
-    def set(self, handle: Modify, value: ArrayLike) -> None: ...
+    def set(self, handle: Modify, value: ArrayLike) -> None:
+        """Replace the numbers of a signal, as `modified[handle] = value` does."""
 
 class RobotSignalUse:
     """A robot signal that a controller reads."""
@@ -552,12 +559,18 @@ class Gain:
 class Setup:
     """Argument of initialize(): handles of declared signals, gains and settings."""
 
-    def read(self, role: str, size: int = 0) -> Read: ...
-    def reference(self, role: str, size: int = 0) -> Reference: ...
-    def modify(self, role: str, size: int = 0) -> Modify: ...
-    def gain(self, name: str) -> Gain: ...
-    def text(self, name: str) -> str: ...
-    def numbers(self, name: str) -> Array: ...
+    def read(self, role: str, size: int = 0) -> Read:
+        """Handle of a robot signal that describe() declares; `robot.view(handle)` reads it in update()."""
+    def reference(self, role: str, size: int = 0) -> Reference:
+        """Handle of a reference that is read alone."""
+    def modify(self, role: str, size: int = 0) -> Modify:
+        """Handle of a reference that is corrected: `modified[handle][:3] += shift`."""
+    def gain(self, name: str) -> Gain:
+        """Handle of a gain; `self.scalar(handle)` reads it in update()."""
+    def text(self, name: str) -> str:
+        """Text of a setting."""
+    def numbers(self, name: str) -> Array:
+        """Numbers of a setting."""
     @property
     def joints(self) -> int: ...
     @property
@@ -615,7 +628,8 @@ class FeedbackController:
     def disable(self) -> Status: ...
     def pause(self) -> Status: ...
     def resume(self) -> Status: ...
-    def declaration(self) -> Description: ...
+    def declaration(self) -> Description:
+        """What describe() returned, with the settings of its file."""
     def plot(self) -> str:
         """Text with description, state, gains and signals."""
     def is_enabled(self) -> bool:
@@ -742,15 +756,24 @@ class Change:
     """Steps that the cycle adopts together, or none of them."""
 
     def __init__(self) -> None: ...
-    def enable(self, name: str) -> Change: ...
-    def disable(self, name: str, force: bool = False) -> Change: ...
-    def pause(self, name: str, reason: str = "user", force: bool = False) -> Change: ...
-    def resume(self, name: str, reason: str = "user") -> Change: ...
-    def order(self, names: Sequence[str]) -> Change: ...
-    def gains(self, name: str, gains: Mapping[str, float | ArrayLike]) -> Change: ...
-    def gain_file(self, name: str, file: str) -> Change: ...
-    def profile(self, name: str) -> Change: ...
-    def motion_switched(self) -> Change: ...
+    def enable(self, name: str) -> Change:
+        """Enable a controller; it blends in."""
+    def disable(self, name: str, force: bool = False) -> Change:
+        """Disable a controller; its correction fades. `force`: a safety controller too."""
+    def pause(self, name: str, reason: str = "user", force: bool = False) -> Change:
+        """Pause a controller for a reason; reasons do not cancel each other."""
+    def resume(self, name: str, reason: str = "user") -> Change:
+        """Withdraw one reason of a pause."""
+    def order(self, names: Sequence[str]) -> Change:
+        """Order of execution: every loaded controller once."""
+    def gains(self, name: str, gains: Mapping[str, float | ArrayLike]) -> Change:
+        """Set gains, all or none."""
+    def gain_file(self, name: str, file: str) -> Change:
+        """Read gains from a file."""
+    def profile(self, name: str) -> Change:
+        """Enable exactly the controllers of a profile."""
+    def motion_switched(self) -> Change:
+        """Say that another motion begins: controllers with `reset` begin anew."""
 
 class Manager:
     """A manager of a central module."""
@@ -777,21 +800,31 @@ class FeedbackControllersManager(Manager):
         """Load a list file. Strict: all of it or nothing, else what can be loaded."""
     def load_text(self, text: str, folder: Path = ".", strict: bool = True) -> LoadReport:
         """The same from YAML text; `folder` is for relative paths."""
-    def unload(self, name: str) -> Status: ...
-    def apply(self, change: Change) -> Status: ...
-    def prepare(self, change: Change) -> Status: ...
-    def withdraw(self, generation: int) -> Status: ...
+    def unload(self, name: str) -> Status:
+        """Remove a controller that is disabled and whose correction has faded."""
+    def apply(self, change: Change) -> Status:
+        """Let the next cycle adopt all steps of a change, or none."""
+    def prepare(self, change: Change) -> Status:
+        """Check a change and hold it ready, without adopting it."""
+    def withdraw(self, generation: int) -> Status:
+        """Withdraw a change that the cycle has not adopted."""
     def enable(self, name: str = "") -> Status:
         """Enable one, or all."""
-    def disable(self, name: str = "", force: bool = False) -> Status: ...
-    def pause(self, name: str = "", force: bool = False) -> Status: ...
+    def disable(self, name: str = "", force: bool = False) -> Status:
+        """Disable one, or all; corrections fade. `force`: safety controllers too."""
+    def pause(self, name: str = "", force: bool = False) -> Status:
+        """Pause one, or all, with the reason `user`."""
     def resume(self, name: str = "", reason: str = "user") -> Status:
         """Withdraw one reason of a pause; `fault` clears a fault."""
     def __contains__(self, name: str) -> bool: ...
-    def describe(self, name: str) -> Description: ...
-    def status(self, name: str) -> ControllerStatus: ...
-    def attribution(self) -> list[Attribution]: ...
-    def plot(self, name: str = "") -> str: ...
+    def describe(self, name: str) -> Description:
+        """What the controller declares: signals, gains, texts."""
+    def status(self, name: str) -> ControllerStatus:
+        """State of one controller: enabled, paused and why, fault."""
+    def attribution(self) -> list[Attribution]:
+        """Who changed which reference in the last cycle."""
+    def plot(self, name: str = "") -> str:
+        """Text about one controller, or all."""
     def freeze(self) -> None:
         """Fix the layout of both stores; the first cycle does it otherwise."""
     @overload
@@ -935,15 +968,18 @@ class CentralModule:
     """Runs managers in the order of its file."""
 
     def __init__(self, file: Path, logger: Logger | None = None) -> None: ...
-    def manager(self, name: str) -> Any: ...
-    def managers(self) -> list[str]: ...
+    def manager(self, name: str) -> Any:
+        """A manager by its name."""
+    def managers(self) -> list[str]:
+        """Names of the managers, in their order."""
     @overload
     def update(self) -> None: ...
     @overload
     def update(self, cycle: Cycle) -> None: ...
     @overload
     def update(self, robot: RobotStates, control: ControlStates) -> Status: ...
-    def plot(self) -> str: ...
+    def plot(self) -> str:
+        """Text about all managers."""
     @staticmethod
     def register_manager(
         type: str, maker: Callable[[str, dict[str, Any], RobotStates, ControlStates], object]

@@ -363,7 +363,8 @@ void Slot::fillStatus(ControllerStatus& status) const {
   if (status.fault != FaultKind::None) {
     const std::lock_guard<std::mutex> lock(fault_text_mutex_);
     fault_texts_.take();
-    status.fault_text = std::string(nameOf(status.fault)) + ": " + fault_texts_.front().str();
+    const std::string kind = nameOf(status.fault), text = fault_texts_.front().str();
+    status.fault_text = text == kind ? kind : kind + ": " + text;
     status.fault_cycle = fault_cycle_.load(std::memory_order_relaxed);
   }
   status.faults = faults_.load(std::memory_order_relaxed);

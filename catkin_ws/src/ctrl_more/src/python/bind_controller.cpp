@@ -168,10 +168,15 @@ void bindController(py::module_& module) {
 
   module.def(
       "describe",
-      [](const std::string& library, const std::string& controller) {
-        py::gil_scoped_release unlocked;
-        const ControllerInstance instance = makeController(library, controller);
-        return instance.controller->declaration();
+      [](const py::object& library, const std::string& controller) {
+        const std::string path = pathOf(library);
+        try {
+          py::gil_scoped_release unlocked;
+          const ControllerInstance instance = makeController(path, controller);
+          return instance.controller->declaration();
+        } catch (const std::runtime_error& error) {
+          refuse(error.what());
+        }
       },
       py::arg("library"), py::arg("type") = "");
   setScriptLoader(&makeFromFile);

@@ -35,10 +35,6 @@ void requireStores(const OwnManager& manager, const RobotStates* robot,
   }
 }
 
-std::string pathOf(const py::object& file) {
-  return py::module_::import("os").attr("fspath")(file).cast<std::string>();
-}
-
 LoadReport judged(LoadReport report, bool strict) {
   if (strict && !report.ok()) refuse(report.text(), Cause::BadFile);
   return report;

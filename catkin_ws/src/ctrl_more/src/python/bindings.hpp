@@ -25,6 +25,9 @@ namespace py = pybind11;
 /// The Python class ctrl_more.Refused, a ValueError.
 py::object& refusedClass();
 
+/// A path that Python gave as text or as os.PathLike.
+std::string pathOf(const py::object& file);
+
 /// Raises Refused with a sentence.
 [[noreturn]] void refuse(const std::string& text, Cause cause = Cause::InvalidArgument);
 

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cstdlib>
 #include <cstring>
 #include <vector>
 
@@ -10,6 +11,10 @@ namespace ctrl_more::python {
 py::object& refusedClass() {
   static auto* the_class = new py::object();  // never destroyed: Python may have ended before
   return *the_class;
+}
+
+std::string pathOf(const py::object& file) {
+  return py::module_::import("os").attr("fspath")(file).cast<std::string>();
 }
 
 void refuse(const std::string& text, Cause cause) {
@@ -33,7 +38,7 @@ Eigen::VectorXd toVector(const py::handle& value, const std::string& name) {
     refuse(name + ": expected real numbers, got an array of " +
            py::str(array.dtype()).cast<std::string>());
   }
-  if (array.ndim() != 1) {
+  if (array.ndim() > 1) {  // a bare number, also one of numpy, counts as an array of one
     refuse(name + ": expected an array of one dimension, got shape " +
            py::str(array.attr("shape")).cast<std::string>());
   }
@@ -124,6 +129,15 @@ PYBIND11_MODULE(_core, module) {
                                 "came and what to do; nothing has changed.",
                                 PyExc_ValueError, nullptr));
   module.attr("Refused") = refusedClass();
+  // The text of a compiled function is no attribute that Python may set; pybind11 replaces it in
+  // the same way when it adds an overload, and frees it at the end.
+  module.def("_set_doc", [](const py::function& function, const std::string& text) {
+    const py::handle compiled = function.cpp_function();
+    if (!compiled || !PyCFunction_Check(compiled.ptr())) return;
+    const char*& doc = reinterpret_cast<PyCFunctionObject*>(compiled.ptr())->m_ml->ml_doc;
+    std::free(const_cast<char*>(doc));
+    doc = strdup(text.c_str());
+  });
   py::register_exception_translator([](std::exception_ptr pointer) {
     try {
       if (pointer) std::rethrow_exception(pointer);

@@ -31,6 +31,21 @@ Numbers: TypeAlias = dict[str, float | list[float]]
 Host: TypeAlias = MotionHost | FeedbackHost
 
 
+class Flag:
+    """Whether the command shall end. A signal may set it at any time, also twice: no lock, no new thread."""
+
+    def __init__(self) -> None:
+        self._up = False
+
+    def set(self) -> None:
+        """End."""
+        self._up = True
+
+    def is_set(self) -> bool:
+        """Return whether it shall end."""
+        return self._up
+
+
 def parser() -> argparse.ArgumentParser:
     """Arguments of the command."""
     result = argparse.ArgumentParser(
@@ -135,15 +150,12 @@ def connect(options: argparse.Namespace, kind: int, services: SlotServices) -> w
 def run(words: list[str]) -> int:
     """Run the command. Return its exit status."""
     options = parser().parse_intermixed_args(words)  # so that options may come before NAME=VALUE
-    ended = threading.Event()
-    last = threading.Timer(LAST, _leave)
-    last.daemon = True
+    ended, over = Flag(), threading.Event()
 
     def end(_signal: int, _frame: FrameType | None) -> None:
-        if not ended.is_set():
-            last.start()
         ended.set()
 
+    threading.Thread(target=_watch, args=(ended, over), daemon=True).start()
     try:
         host, kind = make_host(options)
         services = SlotServices()
@@ -172,12 +184,12 @@ def run(words: list[str]) -> int:
         print(f"error: {error}", file=sys.stderr)
         return 1
     finally:
-        last.cancel()
+        over.set()
     print("let go", flush=True)
     return 0
 
 
-def _act(act: Callable[[str], None], slot: str, ended: threading.Event) -> None:
+def _act(act: Callable[[str], None], slot: str, ended: Flag) -> None:
     try:
         act(slot)
     except wire.SlotError as error:
@@ -185,13 +197,13 @@ def _act(act: Callable[[str], None], slot: str, ended: threading.Event) -> None:
         ended.set()
 
 
-def _listen(host: Host, ended: threading.Event) -> None:
+def _listen(host: Host, ended: Flag) -> None:
     """Take NAME=VALUE from the terminal."""
     while not ended.is_set():
         ready, _, _ = select.select([sys.stdin], [], [], 0.2)
         # A process in the background would be stopped if it read.
         if not ready or os.tcgetpgrp(sys.stdin.fileno()) != os.getpgrp():
-            ended.wait(0.2)
+            time.sleep(0.2)
             continue
         line = sys.stdin.readline()
         if not line:
@@ -203,8 +215,13 @@ def _listen(host: Host, ended: threading.Event) -> None:
             _tell(f"not changed: {error}")
 
 
-def _leave() -> None:
-    """End a process whose controller does not return; the robot sees its end."""
+def _watch(ended: Flag, over: threading.Event) -> None:
+    """End a process whose controller does not return after Ctrl-C; the robot sees its end."""
+    while not ended.is_set():
+        if over.wait(0.1):
+            return
+    if over.wait(LAST):
+        return
     print("the controller does not return; this process ends", file=sys.stderr, flush=True)
     os._exit(1)
 

@@ -41,6 +41,10 @@ HABITS: Mapping[str, Any] = {
 """Habits of a giver that make a handover easier for the robot. Only `accustomed` people have them."""
 
 
+def _is_number(value: Any) -> bool:
+    return isinstance(value, bool | int | float | np.number)
+
+
 @dataclass(frozen=True)
 class Participant:
     """Parameters of one person. Times in s, lengths in m, forces in N, angles in deg."""
@@ -124,6 +128,14 @@ class Participant:
     def __post_init__(self) -> None:
         if self.behaviour not in BEHAVIOURS:
             raise ValueError(f"behaviour '{self.behaviour}' is none of {', '.join(BEHAVIOURS)}")
+        for name, value in vars(self).items():
+            if name == "behaviour":
+                continue
+            if name in ("point_offset", "point_sigma"):
+                if np.shape(value) != (3,) or not all(_is_number(each) and math.isfinite(each) for each in value):
+                    raise ValueError(f"person: {name}: three finite numbers (m) are expected, got {value!r}")
+            elif not _is_number(value) or math.isnan(value) or (value < 0 and name != "weight_error"):
+                raise ValueError(f"person: {name}: a number 0 or more is expected, got {value!r}")
 
     @staticmethod
     def draw(seed: int, behaviour: str = "normal", profile: str = "drawn") -> Participant:
