@@ -29,9 +29,10 @@ def add(verbs: argparse._SubParsersAction[Any]) -> None:
         ("replay", replay, "publishes the bag again, on a ROS master of its own"),
     ):
         parser = verbs.add_parser(name, help=words)
-        parser.add_argument(
-            "trial", type=str, nargs="?", default="", help='folder of a trial; "" or "last": the newest'
+        given = parser.add_argument(
+            "trial", type=str, nargs="?", default="", help='folder of a trial, or its name; "" or "last": the newest'
         )
+        given.completer = _names  # type: ignore[attr-defined]  # of argcomplete
         if name in ("plot", "report", "video"):
             parser.add_argument("--out", type=Path, help="file to write; default: in the folder of the trial")
         if name == "report":
@@ -40,6 +41,11 @@ def add(verbs: argparse._SubParsersAction[Any]) -> None:
             parser.add_argument("--rate", type=float, default=1.0, help="times real time")
             parser.add_argument("--rviz", action="store_true", help="open rviz")
         parser.set_defaults(run=run)
+
+
+def _names(prefix: str, **_: Any) -> list[str]:
+    """Names of recordings that begin like this, for the Tab key."""
+    return ["last", *(each.parent.name for each in sorted(trials_folder().glob(f"{prefix}*/trial.yaml")))]
 
 
 def _place(options: argparse.Namespace) -> Path:
