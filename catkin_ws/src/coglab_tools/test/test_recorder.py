@@ -160,7 +160,17 @@ def test_the_end_of_the_system_keeps_what_was_recorded(tmp_path):
     cell.run(2020.0, 2021.0)
     cell.recorder.close()
     (place,) = find_trials(tmp_path)
-    assert "ended before the action" in TrialRecord.load(place).outcome.text
+    record = TrialRecord.load(place)
+    assert "ended before the action" in record.outcome.text and record.duration_s == pytest.approx(0.9)
+
+
+def test_a_handover_that_began_before_the_recorder_is_said_to_be_missing(tmp_path):
+    cell = Cell(tmp_path)
+    cell.move(2020.0, ACTION, "succeeded", "wait_with_object")
+    cell.run(2020.0, 2021.0)
+    assert [wrong for wrong, _ in cell.said] == [True] and ACTION in cell.said[0][1]
+    handover(cell)
+    assert len(find_trials(tmp_path)) == 1 and not cell.said[-1][0]
 
 
 def test_the_hash_changes_with_a_setting_alone():

@@ -1,6 +1,7 @@
 """`./coglab trial` on whole, damaged and foreign trials, without ROS."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -37,7 +38,7 @@ def test_the_list_names_whole_unreadable_and_unfinished_trials(tmp_path, capsys)
     (tmp_path / ".part-1-2.0").mkdir()
     status, data, _ = answer(capsys, "list", tmp_path)
     assert status == 0 and [row["outcome"] for row in data["trials"]] == ["succeeded", "NOT_RELEASED"]
-    assert "bad/trial.yaml is no YAML" in data["unreadable"][0] and len(data["unfinished"]) == 1
+    assert "bad/trial.yaml:2 is no YAML" in data["unreadable"][0] and len(data["unfinished"]) == 1
 
 
 @pytest.mark.parametrize("kind", ["missing", "empty", "cut", "no bag", "foreign", "wrong type"])
@@ -91,6 +92,27 @@ def test_the_page_holds_everything_and_escapes_what_people_typed():
     assert "<script" not in text and "&lt;script&gt;" in text
     assert "http://" not in text and "https://" not in text and text.count("data:image/png;base64,") == 2
     assert "0.12 s" in text  # detection delay
+
+
+def test_two_actions_of_one_recording_have_their_own_figures_and_plots():
+    trial = measured()
+    second = replace(
+        trial.exchanges[0], what="give", started=6.0, ended=10.0, ok=False, code=41, sentence="nobody took it", marks={}
+    )
+    trial.exchanges = (replace(trial.exchanges[0], ended=6.0), second)
+    text = page_of(trial)
+    assert text.count("data:image/png;base64,") == 4 and text.count('class="verdict') == 2
+    assert "succeeded in 6.00 s" in text and "nobody took it" in text
+
+
+def test_a_trial_is_named_by_the_beginning_of_its_name_if_one_fits(tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("ROS_HOME", str(tmp_path))
+    write(tmp_path / "trials", record(id="20261128T1000_a"))
+    write(tmp_path / "trials", record(id="20261128T1100_b"))
+    status, _, error = answer(capsys, "explain", "20261128")
+    assert status == 2 and "20261128T1000_a, 20261128T1100_b" in error
+    status, _, error = answer(capsys, "explain", "20261128T11")
+    assert status == 1 and "20261128T1100_b has neither trial.bag" in error
 
 
 def test_a_trial_is_drawn_without_a_screen(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -10,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from matplotlib.transforms import Bbox
 
 from coglab.series import Series, state_intervals
@@ -19,6 +21,7 @@ COLOURS = ["#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#CC79A7", "#1
 CONTACT = COLOURS[3]
 JOINTS = ["A1", "A2", "E1", "A3", "A4", "A5", "A6"]
 FINGERS = ["thumb abduction", "thumb", "index", "middle", "ring+little"]
+MOST_ENTRIES = 12  # of the legend beside the phases
 TEXT = 7  # pt, smallest text of the figure, which has the width of a page (7.2 inch)
 STYLE = {
     "font.size": 8,
@@ -79,8 +82,8 @@ def colours_of(names: list[str]) -> dict[str, tuple]:
     return {name: palette[k % len(palette)] for k, name in enumerate(dict.fromkeys(names))}
 
 
-def _label(axis: Axes, x: float, y: float, name: str, space: Bbox) -> None:
-    """Write a name into its bar: in one line, one word per line, or upwards and small. Omit it if nothing fits."""
+def _label(axis: Axes, x: float, y: float, name: str, space: Bbox) -> bool:
+    """Write a name into its bar: in one line, one word per line, or upwards and small. False: nothing fits."""
     renderer = axis.figure.canvas.get_renderer()
     for words, turn, size in ((name, 0, TEXT), (name.replace(" ", "\n"), 0, TEXT), (name, 90, TEXT - 2)):
         label = axis.text(
@@ -88,15 +91,17 @@ def _label(axis: Axes, x: float, y: float, name: str, space: Bbox) -> None:
         )
         needed = label.get_window_extent(renderer)
         if needed.width <= space.width - 2 and needed.height <= space.height + 2:
-            return
+            return True
         label.remove()
+    return False
 
 
-def _phases(axis: Axes, trial: Series, start: float, end: float) -> None:
+def _phases(axis: Axes, trial: Series, start: float, end: float) -> list[Any]:
     """One lane per active container, one bar per state. Parallel children share the height of the lane. A name is
-    written if it fits into its bar."""
+    written if it fits into its bar. Returns entries of a legend for the others."""
     lanes = lanes_of(trial, start, end)
     colours = colours_of([name for _, rows in lanes for row in rows for _, _, name in row])
+    unnamed: dict[str, Any] = {}
     axis.set_xlim(0.0, end - start)
     axis.set_ylim(len(lanes) - 0.5, -0.5)
     axis.figure.canvas.draw()  # to know the width of the bars
@@ -116,11 +121,14 @@ def _phases(axis: Axes, trial: Series, start: float, end: float) -> None:
                     edgecolor=COLOURS[6],
                     lw=0.4,
                 )
-                _label(
-                    axis, (since + until) / 2 - start, centre, name.replace("_", " "), bar.get_window_extent(renderer)
-                )
+                words, middle = name.replace("_", " "), (since + until) / 2 - start
+                if not _label(axis, middle, centre, words, bar.get_window_extent(renderer)):
+                    unnamed.setdefault(
+                        words, Patch(facecolor=colours[name], alpha=0.6, edgecolor=COLOURS[6], label=words)
+                    )
     axis.set_yticks(range(len(lanes)), [name.replace("_", " ") for name, _ in lanes])
     axis.tick_params(axis="y", length=0)
+    return list(unnamed.values())
 
 
 def _hands(path_axis: Axes, speed_axis: Axes, truth: list[tuple], start: float) -> None:
@@ -156,16 +164,14 @@ def _fingers(axis: Axes, rows: list[tuple], start: float) -> None:
         axis.plot(times, positions[:, k], color=COLOURS[k], label=name)
 
 
-def _contact_lines(axes: list[Axes], contacts: list[tuple], start: float) -> None:
-    """Vertical lines at the events of the contact detector, explained beside the phases."""
+def _contact_lines(axes: list[Axes], contacts: list[tuple], start: float) -> list[Any]:
+    """Vertical lines at the events of the contact detector. Returns entries of a legend."""
     kinds = {True: ("contact or load felt", ":"), False: ("load taken over", "--")}
     for axis in axes:
         for t, found, *_ in contacts:
             axis.axvline(t - start, color=CONTACT, lw=0.9, ls=kinds[bool(found)][1])
     shown = [kinds[found] for found in (True, False) if any(bool(c[1]) is found for c in contacts)]
-    handles = [Line2D([], [], color=CONTACT, lw=0.9, ls=style, label=label) for label, style in shown]
-    if handles:
-        axes[0].legend(handles=handles, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return [Line2D([], [], color=CONTACT, lw=0.9, ls=style, label=label) for label, style in shown]
 
 
 def figure_of(trial: Series, title: str, start: float, end: float) -> Figure:
@@ -201,8 +207,10 @@ def figure_of(trial: Series, title: str, start: float, end: float) -> Figure:
             if axis.get_legend_handles_labels()[0]:
                 axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
         axes[-1].set_xlabel("time, s")
-        _contact_lines(list(axes), [row for row in trial.contacts if start <= row[0] <= end], start)
-        _phases(axes[0], trial, start, end)
+        entries = _contact_lines(list(axes), [row for row in trial.contacts if start <= row[0] <= end], start)
+        entries += _phases(axes[0], trial, start, end)
+        if entries:
+            axes[0].legend(handles=entries[:MOST_ENTRIES], loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return figure
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from coglab_tools.command import CheckFailed, NotThere
 from coglab_tools.files import write_by, write_whole
 from coglab_tools.report.metrics import METRICS, activities, metrics_of
-from coglab_tools.trial.explain import explain
+from coglab_tools.trial.explain import explain, headline
 from coglab_tools.trial.read import Measured
 
 if TYPE_CHECKING:
@@ -77,6 +77,7 @@ def page_of(trial: Measured) -> str:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     record = trial.record
+    parts = trial.parts()
     names = Environment(
         loader=FileSystemLoader(str(package_path("coglab_tools", "templates"))),
         autoescape=True, undefined=StrictUndefined, trim_blocks=True,
@@ -92,12 +93,19 @@ def page_of(trial: Measured) -> str:
     ]
     return names.get_template("trial.html").render(
         record=record,
-        lines=explain(trial),
+        verdicts=[(part.record.outcome.success, headline(part)) for part in parts],
         metrics=METRICS,
-        columns=[(part.record.action.replace("_", " "), metrics_of(part)) for part in trial.parts()],
+        columns=[(part.record.action.replace("_", " "), metrics_of(part)) for part in parts],
         sources=trial.sources or {"hands": "unknown", "force": "unknown"},
-        fluency=_png(figure_of_activity(trial)),
-        plot=_png(figure_of_trial(trial)),
+        parts=[
+            {
+                "name": part.record.action.replace("_", " "),
+                "lines": explain(part)[1:],
+                "activity": _png(figure_of_activity(part)),
+                "plot": _png(figure_of_trial(part)),
+            }
+            for part in parts
+        ],
         facts=[(name, value) for name, value in facts if value not in ("", None)],
         configuration=[(name, value) for name, value in record.configuration.items() if name != "hash"],
     )

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import glob
 import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from coglab_tools.command import OK, Answer, CheckFailed, CommandError, UsageError
-from coglab_tools.trial.record import BAG, TrialRecord, find_trials, trials_folder
+from coglab_tools.trial.record import BAG, FILE, TrialRecord, find_trials, trials_folder
 
 HELP = "recorded handovers: list, show, plot, explain, report, video, replay"
 HIDDEN = ".part-"
@@ -30,11 +31,11 @@ def add(verbs: argparse._SubParsersAction[Any]) -> None:
     ):
         parser = verbs.add_parser(name, help=words)
         given = parser.add_argument(
-            "trial", type=str, nargs="?", default="", help='folder of a trial, or its name; "" or "last": the newest'
+            "trial", nargs="?", default="", help='folder of a trial, or how its name begins; "" or "last": the newest'
         )
         given.completer = _names  # type: ignore[attr-defined]  # of argcomplete
         if name in ("plot", "report", "video"):
-            parser.add_argument("--out", type=Path, help="file to write; default: in the folder of the trial")
+            parser.add_argument("-o", "--out", type=Path, help="file to write; default: in the folder of the trial")
         if name == "report":
             parser.add_argument("--pdf", action="store_true", help="also as PDF, beside the page")
         if name == "replay":
@@ -49,7 +50,7 @@ def _names(prefix: str, **_: Any) -> list[str]:
 
 
 def _place(options: argparse.Namespace) -> Path:
-    """Folder of the trial that was asked for: a path, a name in the default folder, or the newest."""
+    """Folder of the trial that was asked for: a path, how a name in the default folder begins, or the newest."""
     given = options.trial
     if given in ("", "last"):
         found = find_trials(trials_folder()) if trials_folder().is_dir() else []
@@ -59,7 +60,13 @@ def _place(options: argparse.Namespace) -> Path:
             )
         return max(found, key=lambda folder: folder.name)
     place = Path(given)
-    return place if place.exists() or len(place.parts) != 1 else trials_folder() / given
+    if place.exists() or len(place.parts) != 1:
+        return place
+    found = sorted(trials_folder().glob(f"{glob.escape(given)}*/{FILE}"))
+    if len(found) > 1 and (trials_folder() / given / FILE) not in found:
+        names = ", ".join(file.parent.name for file in found[:5])
+        raise UsageError(f"{len(found)} trials in {trials_folder()} begin with {given}: {names}; type more of the name")
+    return found[0].parent if found else trials_folder() / given
 
 
 def _measured(options: argparse.Namespace) -> tuple[Path, Any]:

@@ -18,11 +18,15 @@ MARKS = {
     "preshaped": "the hand was preshaped",
     "paused": "the arm paused",
     "contact": "contact was found",
+    "closing": "the hand began to close",
+    "closing_on_the_way": "the hand began to close on the way",
     "closed": "the hand was closed",
     "loaded": "the load came",
     "opening": "the hand began to open",
     "released": "the object was let go",
     "placed": "the object was placed",
+    "tightened": "the grip was tightened",
+    "switch_dmp": "the primitive was changed",
 }
 """marks in words; others are named as they are"""
 LESS = ("preshaped", "paused", "closing", "closing_on_the_way", "tightened")  # marks that are left out first

@@ -115,7 +115,10 @@ def _read(file: Path) -> dict[str, Any]:
     except (OSError, UnicodeDecodeError) as error:
         raise CheckFailed(f"{file} cannot be read: {error}") from None
     except yaml.YAMLError as error:
-        raise CheckFailed(f"{file} is no YAML: {' '.join(str(error).split())}") from None
+        mark = getattr(error, "problem_mark", None)
+        where = f"{file}:{mark.line + 1}" if mark else str(file)
+        why = getattr(error, "problem", None) or str(error)
+        raise CheckFailed(f"{where} is no YAML: {' '.join(why.split())}; take the file from a copy") from None
     if not isinstance(data, dict):
         raise CheckFailed(f"{file} holds a {type(data).__name__}; a mapping with version, id, started, ... is expected")
     return data
@@ -135,7 +138,7 @@ def _virtual(folder: Path, data: Mapping[str, Any]) -> TrialRecord:
     return TrialRecord(
         id=folder.resolve().name,
         started="",
-        duration_s=end - start,
+        duration_s=round(end - start, 3),
         action="+".join(ACTIONS.get(row["what"], row["what"]) for row in results),
         outcome=outcome,
         object=str(results[0]["object_id"]) if results else "",
@@ -148,7 +151,9 @@ def _virtual(folder: Path, data: Mapping[str, Any]) -> TrialRecord:
         simulated=True,
         configuration=dict(data["conditions"]),
         marks=tuple(
-            {"name": str(name), "time_s": float(when) - start} for row in results for name, when in row["marks"].items()
+            {"name": str(name), "time_s": round(float(when) - start, 3)}
+            for row in results
+            for name, when in row["marks"].items()
         ),
     )
 

@@ -20,7 +20,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from coglab.results import reason_name
+from coglab.results import ACTIONS, reason_name
 from coglab_msgs.msg import Transition
 
 from coglab_tools.command import CommandError
@@ -63,6 +63,8 @@ class _Trial:
     left: tuple[float, str, int, str] | None = None
     """when and how the machine left the action: s, outcome, code, reason"""
     ends: float = float("inf")
+    last: float = 0.0
+    """time of the newest message, s"""
     notes: list[str] = field(default_factory=list)
     said: list[tuple[float, str]] = field(default_factory=list)
     """notes of the experimenter: s, text"""
@@ -89,6 +91,7 @@ class Recorder:
         self._ring: deque[Raw] = deque()
         self._latched: dict[tuple[str, str], Raw] = {}
         self._trial: _Trial | None = None
+        self._begun = ""  # action whose beginning was seen last
         self._types: dict[str, type] = {}
         self._looked = 0.0
         self._lost = threading.Event()
@@ -160,7 +163,11 @@ class Recorder:
         trial = self._trial
         if trial is not None and message.from_state == trial.action and trial.left is None:
             trial.left = (raw.time, message.outcome, int(message.reason_code), message.reason)
+        if trial is None and message.from_state in ACTIONS.values() and message.from_state != self._begun:
+            words = f"the handover that ended now ({message.from_state}) is not recorded: it began before this node ran"
+            self._say(words, True)
         if message.from_state in HUBS and message.to_state not in NO_ACTIONS:
+            self._begun = message.to_state
             if trial is not None:
                 self._finish()
             self._begin(message.to_state, raw.time)
@@ -234,6 +241,7 @@ class Recorder:
         for name in ("callerid", "latching"):
             if name in header:
                 connection[name] = header[name]
+        self._trial.last = max(self._trial.last, time)
         self._trial.bag.write(raw.topic, message, genpy.Time.from_sec(time), raw=True, connection_header=connection)
 
     def _finish(self) -> None:
@@ -290,7 +298,7 @@ def _record_of(trial: _Trial) -> TrialRecord:
     else:
         outcome = Outcome(False, 0, "NONE", "the recording ended before the action did")
     begun = float(row.get("started_ros", trial.begun))
-    ended = float(row.get("ended_ros", trial.left[0] if trial.left else begun))
+    ended = float(row.get("ended_ros", trial.left[0] if trial.left else max(begun, trial.last)))
     shift = begun - float(row.get("started", begun))
     marks = sorted((float(when) + shift - begun, str(name)) for name, when in dict(row.get("marks", {})).items())
     marks += [(when - begun, f"note: {text}") for when, text in trial.said]
