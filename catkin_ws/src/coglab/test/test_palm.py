@@ -29,6 +29,18 @@ def test_palm_sensors_drive_feedback_controllers_in_a_handover() -> None:
     assert np.median(forces, axis=0)[2] == pytest.approx(-9.81 * mass, abs=0.5)
 
 
+def test_after_a_stop_of_a_corrected_reach_the_robot_hands_over_again() -> None:
+    with coglab.World(seed=7, feedback="palm") as world:
+        robot, virtual = world.robot, world.cell.robot.virtual
+        with pytest.raises(TimeoutError, match="monitor_dmp"):
+            robot.receive(limit=2.0)  # then it is stopped, in the middle of the reach
+        assert virtual.report()["active"] == "dmp"
+        assert virtual.report()["standing"]
+        assert virtual.feedback.status("attitude").waiting_for == "a motion"
+        assert robot.reset()
+        assert robot.receive()
+
+
 def test_a_file_that_is_wrong_is_refused_with_its_line(tmp_path) -> None:
     file = tmp_path / "signals.yaml"
     file.write_text("in:\n- {topic: a, type: sensor_msgs/Imuu, field: orientation, key: a, max_age: 1}\n")

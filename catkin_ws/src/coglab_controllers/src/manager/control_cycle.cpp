@@ -127,6 +127,7 @@ void ControlCycle::adopt() noexcept {
     fault_ = false;
     fault_reason_.clear();
     overruns_in_row_ = 0;
+    cancelled_ = false;
     watched_ = -1;
     // Cancels of the time when it was not the active one have nothing to end.
     Reason old;
@@ -145,6 +146,7 @@ void ControlCycle::takeCancel() noexcept {
     const bool given_up = motionState() == MotionState::Aborted;
     abortMotion(reason);
     cancel_->confirm(!given_up && motionState() == MotionState::Aborted);
+    cancelled_ = true;
   }
   input_.cancels = cancel_->taken();
 }
@@ -273,7 +275,10 @@ void ControlCycle::run(const RobotSample& sample, double dt, VelocityCommand& ou
   }
   // Step 3: adopt the newest plan, a cancel and new motions.
   adopt();
+  if (moving(motionState())) cancelled_ = false;
+  input_.resting = cancelled_ || !input_.motion_allowed;
   if (fine) {
+    feedback_.letGo(input_.resting);
     compute(velocity);
     // Step 8: guard.
     guard_.setInterfaceReserve(sample.stop_delay, sample.stop_rounding);

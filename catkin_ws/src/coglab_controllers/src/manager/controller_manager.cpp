@@ -97,8 +97,10 @@ ControllerManager::ControllerManager(ManagerSettings settings)
   if (std::function<void()> wait = cycleWait()) cycle_.plans().setWait(wait);
   const Parameters parameters(settings_.parameters, "controller_manager");
   cycle_.setSpeedScale(parameters.number("speed_scale", 1.0, 0.0, 1.0));
+  const std::size_t own_rows = feedback_.signals().rows().size();
   loadSignals();
   loadManagers();
+  checkOutputs(own_rows);
   cycle_.idle(
       now_ns());  // the stores are frozen here, which allocates, and not in the first real cycle
   if (!outputs_.empty()) feedback_.recordReferences();
@@ -138,11 +140,70 @@ void ControllerManager::loadSignals() {
       const std::string path = user.empty() ? "" : signalsOf(user, files);
       if (!path.empty()) read(path);
     }
+    SignalFile checked = all;
+    const auto& own = feedback_.signals().rows();
+    checked.in.insert(checked.in.begin(), own.begin(), own.end());
+    checkSignals(checked, settings_.topics);
     const ctrl_more::Status added = feedback_.addSignals(all.in);
     if (!added) throw std::runtime_error(added.message());
     outputs_ = all.out;
   } catch (const std::exception& error) {
     feedback_errors_.push_back(std::string("no signals from topics: ") + error.what());
+  }
+}
+
+void ControllerManager::checkOutputs(std::size_t own_rows) {
+  try {
+    for (const SignalOutput& row : outputs_) checkOutput(row);
+  } catch (const std::exception& error) {
+    outputs_.clear();
+    feedback_.signals().keepFirst(own_rows);
+    feedback_errors_.push_back(std::string("no signals from topics: ") + error.what());
+  }
+}
+
+/// Refuses an output of a controller, state or reference that there is not.
+void ControllerManager::checkOutput(const SignalOutput& row) {
+  const ctrl_more::FeedbackControllersManager& feedback = feedback_.manager();
+  const auto require = [&row](const std::string& what, const std::string& name,
+                              const std::vector<std::string>& known) {
+    if (std::count(known.begin(), known.end(), name) != 0) return;
+    throw ctrl_more::ConfigError(row.place + ": there is no " + what + " '" + name +
+                                 "'; there is: " + joined(known));
+  };
+  if (row.kind != SignalOutput::Kind::Reference) {
+    require("feedback controller", row.controller, feedback.getControllersNames());
+  }
+  if (row.kind == SignalOutput::Kind::State) {
+    std::vector<std::string> states;
+    for (const auto& state : feedback.describe(row.controller).states) states.push_back(state.name);
+    if (states.empty()) {
+      throw ctrl_more::ConfigError(row.place + ": controller '" + row.controller +
+                                   "' has no states");
+    }
+    if (!row.key.empty()) require("state of '" + row.controller + "'", row.key, states);
+    return;
+  }
+  const std::string name = std::string(ctrl_more::nameOf(row.container)) + "/" + row.key;
+  if (row.kind == SignalOutput::Kind::Correction) {
+    require("correction by '" + row.controller + "' of", name,
+            feedback.getCorrected(row.controller));
+    return;
+  }
+  const ctrl_more::ControlStates& references = feedback_.references().states;
+  std::vector<std::string> known;
+  for (int i = 0; i < ctrl_more::kControlContainers; ++i) {
+    const auto container = static_cast<ctrl_more::ControlContainer>(i);
+    for (const ctrl_more::SignalInfo& info : references.signals(container)) {
+      known.push_back(std::string(ctrl_more::nameOf(container)) + "/" + info.key);
+    }
+  }
+  require("reference", name, known);
+  const int size = references.find(row.container, row.key).size();
+  if (row.type == SignalOutput::Type::Joints && size != kMaxJoints) {
+    throw ctrl_more::ConfigError(row.place + ": " + name + " has " + std::to_string(size) +
+                                 " numbers, a sensor_msgs/JointState of this arm has " +
+                                 std::to_string(kMaxJoints) + "; use std_msgs/Float64MultiArray");
   }
 }
 

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
-#include <set>
 #include <utility>
 
 #include "ctrl_more/log/words.hpp"
@@ -74,7 +74,8 @@ std::string topicOf(const ConfigNode& row) {
       std::all_of(topic.begin(), topic.end(), allowed)) {
     return topic;
   }
-  throw node.error("'" + topic + "' is no name of a topic; expected letters, digits, _ and /");
+  throw node.error("'" + topic +
+                   "' is no name of a topic; expected letters, digits, _ and / (without ~)");
 }
 
 /// Index of a name in a list. @throws ConfigError that suggests the nearest one
@@ -167,6 +168,7 @@ SignalInput inputOf(const ConfigNode& row) {
   row.requireKeys("a row of `in`", {"topic", "type", "field", "key", "source", "size", "unit",
                                     "max_age", "frame", "stamp"});
   SignalInput input;
+  input.place = row.place();
   input.topic = topicOf(row);
   const ConfigNode& type = required(row, "type");
   const std::vector<SignalType>& types = signalTypes();
@@ -222,6 +224,7 @@ void checkType(const ConfigNode& node, const SignalOutput& out) {
 SignalOutput outputOf(const ConfigNode& row) {
   row.requireKeys("a row of `out`", {"topic", "type", "value", "rate"});
   SignalOutput out;
+  out.place = row.place();
   out.topic = topicOf(row);
   const ConfigNode& type = required(row, "type");
   out.type = static_cast<SignalOutput::Type>(indexOf(type, "type", type.text("type"), kOutTypes));
@@ -319,35 +322,59 @@ const std::vector<SignalType>& signalTypes() {
   return types;
 }
 
+const std::string& nameOf(SignalOutput::Type type) {
+  return kOutTypes[static_cast<std::size_t>(type)];
+}
+
+void checkSignals(const SignalFile& all, const TopicRules& rules) {
+  struct Use {
+    std::string type, place;
+    bool out;
+  };
+  std::map<std::string, std::string> writers;  // of a key, and where
+  std::map<std::string, Use> topics;           // by their full names
+  const auto check = [&](const std::string& place, const std::string& topic,
+                         const std::string& type, bool out) {
+    std::string name;
+    try {
+      name = rules.resolve ? rules.resolve(topic) : topic[0] == '/' ? topic : "/" + topic;
+    } catch (const std::exception& error) {
+      throw ctrl_more::ConfigError(place + ": topic " + topic + ": " + error.what());
+    }
+    const std::string called =
+        place + ": topic " + topic + (topic == name ? "" : ", " + name + ",");
+    const auto [other, first] = topics.insert({name, {type, place, out}});
+    if (!first && (out || other->second.out)) {
+      throw ctrl_more::ConfigError(called + " is in the row of " + other->second.place +
+                                   " already; an output needs a topic of its own");
+    }
+    if (!first && other->second.type != type) {
+      throw ctrl_more::ConfigError(called + " is a " + type + " here and a " + other->second.type +
+                                   " in the row of " + other->second.place +
+                                   "; a topic has one type");
+    }
+    const std::string refusal = rules.refusal ? rules.refusal(name, type, out) : "";
+    if (!refusal.empty()) throw ctrl_more::ConfigError(called + " " + refusal);
+  };
+  for (const SignalInput& row : all.in) {
+    const std::string key = std::string(ctrl_more::nameOf(row.source)) + "/" + row.key;
+    const auto [other, first] = writers.insert({key, row.place});
+    if (!first) {
+      throw ctrl_more::ConfigError(row.place + ": two rows write " + key +
+                                   ", the other one is that of " + other->second +
+                                   "; give each a key of its own");
+    }
+    check(row.place, row.topic, row.type->name, false);
+  }
+  for (const SignalOutput& row : all.out) check(row.place, row.topic, nameOf(row.type), true);
+}
+
 SignalFile readSignals(const ConfigNode& file) {
   file.requireKeys("the file of signals", {"in", "out"});
   SignalFile result;
   readRows(file, "in", result.in, inputOf);
   readRows(file, "out", result.out, outputOf);
-  std::set<std::string> written;
-  const ConfigNode* in = file.find("in");
-  for (std::size_t i = 0; i < result.in.size(); ++i) {
-    const SignalInput& row = result.in[i];
-    const std::string name = std::string(ctrl_more::nameOf(row.source)) + "/" + row.key;
-    if (!written.insert(name).second) {
-      throw in->items()[i].error("two rows write " + name + "; give each a key of its own");
-    }
-    for (std::size_t j = 0; j < i; ++j) {
-      if (result.in[j].topic == row.topic && result.in[j].type != row.type) {
-        throw in->items()[i].error("topic " + row.topic + " has the type " +
-                                   result.in[j].type->name + " in a row above");
-      }
-    }
-  }
-  std::set<std::string> topics;
-  for (const SignalInput& row : result.in) topics.insert(row.topic);
-  const ConfigNode* out = file.find("out");
-  for (std::size_t i = 0; i < result.out.size(); ++i) {
-    if (!topics.insert(result.out[i].topic).second) {
-      throw out->items()[i].error("topic " + result.out[i].topic +
-                                  " is in another row already; an output needs its own");
-    }
-  }
+  checkSignals(result, {});
   return result;
 }
 
@@ -357,6 +384,7 @@ SignalFile readSignalFile(const std::string& path) {
 
 SignalInput touchSignal(const std::string& topic, const std::string& tool) {
   SignalInput input;
+  input.place = "the hand's touch sensors";
   input.topic = topic;
   for (const SignalType& type : signalTypes()) {
     if (type.name == "coglab_msgs/FingertipForces") input.type = &type;

@@ -100,9 +100,9 @@ SignalPost SignalInputs::post(std::size_t index, const SignalMessage& message,
   // Also where a stamp converts to a time before the clock's beginning.
   if (stamp < 0 || stamp <= before || now_ns - stamp > nanoseconds(row.max_age)) {
     return {SignalRefusal::Past,
-            stamp >= 0 && stamp <= before
-                ? "its stamp is not newer than that of the message before"
-                : "its stamp is older than max_age, " + std::to_string(row.max_age) + " s"};
+            stamp < 0 || now_ns - stamp > nanoseconds(row.max_age)
+                ? "its stamp is older than max_age, " + std::to_string(row.max_age) + " s"
+                : "its stamp is not newer than that of the message before"};
   }
   box.mailbox.post(box.values.data(), row.size, stamp);
   box.newest.store(stamp, std::memory_order_relaxed);

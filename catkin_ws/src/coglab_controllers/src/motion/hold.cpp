@@ -19,6 +19,28 @@ constexpr double kAsSlow = 0.8;
 constexpr double kSpeedingUp = 0.02;
 }  // namespace
 
+PoseCorrection PoseCorrection::between(const Eigen::Matrix<double, 7, 1>& before,
+                                       const Eigen::Matrix<double, 7, 1>& after) noexcept {
+  PoseCorrection correction;
+  if (before == after) return correction;
+  correction.shift = after.head<3>() - before.head<3>();
+  const Eigen::Vector4d from = before.tail<4>(), to = after.tail<4>();
+  if (from != to) {
+    correction.turn = (Quaternion(to.data()) * Quaternion(from.data()).conjugate()).normalized();
+  }
+  return correction;
+}
+
+Pose PoseCorrection::onto(const Pose& pose) const noexcept {
+  if (none()) return pose;
+  return {pose.position + shift, (turn * pose.orientation).normalized()};
+}
+
+Pose PoseCorrection::outOf(const Pose& pose) const noexcept {
+  if (none()) return pose;
+  return {pose.position - shift, (turn.conjugate() * pose.orientation).normalized()};
+}
+
 void StartBlend::advance(double dt) noexcept {
   const double left = blend_ > 0.0 ? std::exp(-dt / blend_) : 0.0;
   position_ *= left;
@@ -53,12 +75,13 @@ JointVector Hold::braked(const RobotSample& robot, const coglab_rt::JointLimits&
 }
 
 void Hold::computeReference(const CycleInput& input, const RobotSetup& setup,
-                            References& references) noexcept {
+                            const PoseCorrection& correction, References& references) noexcept {
   const Chain& chain = setup.chain;
   const RobotSample& robot = input.robot;
   chain.evaluate(robot.commanded_position, commanded_);
   if (!latched_) {
-    pose_ << commanded_.tool.position, commanded_.tool.orientation.coeffs();
+    const Pose held = correction.outOf(commanded_.tool);
+    pose_ << held.position, held.orientation.coeffs();
     joints_ = robot.commanded_position;
     latched_ = robot.commanded_velocity.lpNorm<Eigen::Infinity>() < kStill;
   }

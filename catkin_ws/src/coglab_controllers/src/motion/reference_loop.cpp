@@ -83,6 +83,11 @@ void ReferenceLoop::configure(const MotionSetup& setup, Spaces spaces, Tunables&
   blend_.setTime(parameters.number("hold_blend", 0.15, 0.0, 5.0));
 }
 
+void ReferenceLoop::begin() noexcept {
+  correction_ = {};
+  open();
+}
+
 void ReferenceLoop::open() noexcept {
   reference_.rest();
   hold_.begin();
@@ -92,9 +97,16 @@ void ReferenceLoop::write(const CycleInput& input, const MotionReference& refere
                           References& references) noexcept {
   const Space before = reference_.space;
   reference_ = reference;
+  // Corrections end at once when the arm is to rest, and it may be moved by hand until it no longer
+  // is: in both cases it holds where it is then.
+  const bool anew = input.resting != resting_;
+  resting_ = input.resting;
   if (reference.space == Space::Rest) {
-    if (before != Space::Rest) hold_.begin();
-    hold_.computeReference(input, *robot_, references);
+    if (before != Space::Rest || anew) hold_.begin();
+    // A correction that ends in this cycle is part of where the arm rests.
+    if (anew && input.resting) correction_ = {};
+    hold_.computeReference(input, *robot_, correction_, references);
+    pose_ = references.states.view<7>(references.pose);
     return;
   }
   if (reference.jumps || reference.space != before) beginBlend(input);
@@ -109,6 +121,7 @@ void ReferenceLoop::write(const CycleInput& input, const MotionReference& refere
     references.states.view<6>(references.twist) << reference.tool.velocity,
         reference.tool.angular_velocity;
   }
+  pose_ = references.states.view<7>(references.pose);
 }
 
 void ReferenceLoop::beginBlend(const CycleInput& input) noexcept {
@@ -118,9 +131,9 @@ void ReferenceLoop::beginBlend(const CycleInput& input) noexcept {
     return;
   }
   const Pose& measured = input.chain.tool;
-  blend_.begin(reference_.tool.pose.position - measured.position,
-               rotationBetween(measured.orientation, reference_.tool.pose.orientation),
-               JointVector::Zero());
+  const Pose reference = correction_.onto(reference_.tool.pose);
+  blend_.begin(reference.position - measured.position,
+               rotationBetween(measured.orientation, reference.orientation), JointVector::Zero());
 }
 
 /// Fades to gains that were changed.
@@ -133,6 +146,7 @@ void ReferenceLoop::takeGains(double dt) noexcept {
 
 void ReferenceLoop::resolve(const CycleInput& input, References& references) noexcept {
   takeGains(input.dt);
+  correction_ = PoseCorrection::between(pose_, references.states.view<7>(references.pose));
   switch (reference_.space) {
     case Space::Rest:
       ik_result_.scale = 1.0;
@@ -194,7 +208,7 @@ SetPoint ReferenceLoop::setPoint(const CycleInput& input, bool at_rest) const no
   ChainState state;
   robot_->chain.evaluate(from.joints, state);
   const Eigen::Matrix<double, 6, 1> twist = state.jacobian * from.joint_velocity;
-  from.pose = state.tool;
+  from.pose = reference_.space == Space::Rest ? correction_.outOf(state.tool) : state.tool;
   from.velocity = twist.head<3>();
   from.angular_velocity = twist.tail<3>();
   if (reference_.space == Space::Pose) {

@@ -46,6 +46,7 @@ ManagerRos::ManagerRos(const ros::NodeHandle& node, coglab_rt::ArmMailboxes& mai
   logger_->startDraining();
   ManagerSettings settings = readManagerSettings(node_);
   settings.logger = logger_.get();
+  settings.topics = topicRules(node_);
   options_.thread.priority =
       coglab_rt::readParameter(node_, "priority", options_.thread.priority, "a whole number");
   if (options_.thread.priority > options_.highest_priority) {
@@ -83,8 +84,8 @@ void ManagerRos::start() {
   cancel_ = std::make_unique<CancelRos>(node_, *manager_);
   try {
     signals_ = std::make_unique<SignalTopics>(node_, *manager_);
-  } catch (const std::exception& error) {  // a topic that this node has with another type
-    ROS_ERROR("the robot runs without the file of signals: %s; name other topics", error.what());
+  } catch (const std::exception& error) {
+    ROS_ERROR("the robot runs without signals from topics: %s; name other topics", error.what());
   }
   diagnostics_ = std::make_unique<diagnostic_updater::Updater>(node_);
   diagnostics_->setHardwareID("none");

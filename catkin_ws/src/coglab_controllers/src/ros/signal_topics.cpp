@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 #include <stdexcept>
 
 #include <Eigen/Geometry>
@@ -35,15 +36,73 @@ std::vector<double> changeOf(const ctrl_more::Attribution& change, ctrl_more::Si
   return values;
 }
 
-geometry_msgs::Vector3 vectorAt(const std::vector<double>& values, std::size_t first) {
-  geometry_msgs::Vector3 vector;
-  vector.x = values[first];
-  vector.y = values[first + 1];
-  vector.z = values[first + 2];
-  return vector;
+void setVectors(geometry_msgs::Vector3& first, geometry_msgs::Vector3& second,
+                const std::vector<double>& values) {
+  first.x = values[0];
+  first.y = values[1];
+  first.z = values[2];
+  second.x = values[3];
+  second.y = values[4];
+  second.z = values[5];
+}
+
+bool isBelow(const std::string& topic, const std::string& space) {
+  return topic.rfind(space + "/", 0) == 0;
+}
+
+/// Types of the topics that nodes publish or subscribe to now, by the ROS master; none if it does
+/// not answer. The master also knows the types of topics that nobody has any more.
+std::map<std::string, std::string> typesInUse() {
+  XmlRpc::XmlRpcValue request, response, types, state;
+  std::map<std::string, std::string> used;
+  request[0] = ros::this_node::getName();
+  if (!ros::master::execute("getTopicTypes", request, response, types, false) ||
+      !ros::master::execute("getSystemState", request, response, state, false)) {
+    return used;
+  }
+  for (const int side : {0, 1}) {
+    for (int i = 0; i < state[side].size(); ++i) used[std::string(state[side][i][0])];
+  }
+  for (int i = 0; i < types.size(); ++i) {
+    const auto found = used.find(std::string(types[i][0]));
+    if (found != used.end()) found->second = std::string(types[i][1]);
+  }
+  return used;
 }
 
 }  // namespace
+
+TopicRules topicRules(const ros::NodeHandle& node) {
+  const ros::NodeHandle above(ros::names::parentNamespace(node.getNamespace()));
+  const std::string arm = above.resolveName("lwr");
+  std::vector<std::string> published, subscribed;
+  ros::this_node::getAdvertisedTopics(published);
+  ros::this_node::getSubscribedTopics(subscribed);
+  std::set<std::string> own = {"/tf",         "/tf_static",   "/rosout",
+                               "/rosout_agg", "/diagnostics", "/clock"};
+  own.insert(published.begin(), published.end());
+  own.insert(subscribed.begin(), subscribed.end());
+  TopicRules rules;
+  rules.resolve = [above](const std::string& topic) { return above.resolveName(topic); };
+  rules.refusal = [own, arm, manager = node.getNamespace(), types = typesInUse()](
+                      const std::string& topic, const std::string& type, bool out) -> std::string {
+    if (isBelow(topic, manager)) {
+      return "belongs to the controller manager itself; choose a topic outside of " + manager;
+    }
+    const bool mine = own.count(topic) != 0 || isBelow(topic, arm);
+    if (out && mine) return "is one that this node or the arm has already; choose another name";
+    const auto known = types.find(topic);
+    const std::string other = known == types.end() ? "" : known->second;
+    if (other.empty() || other == "*" || other == type) return "";
+    if (!out && !mine) {  // its publisher may be another one later
+      ROS_WARN("%s is a %s at present, and the file of signals expects a %s: waiting for that",
+               topic.c_str(), other.c_str(), type.c_str());
+      return "";
+    }
+    return "is a " + other + " and not a " + type + "; choose another topic or type";
+  };
+  return rules;
+}
 
 SignalTopics::SignalTopics(const ros::NodeHandle& node, ControllerManager& manager)
     : manager_(manager),
@@ -63,7 +122,7 @@ SignalTopics::SignalTopics(const ros::NodeHandle& node, ControllerManager& manag
   std::map<std::string, Topic*> by_name;
   for (std::size_t i = 0; i < inputs_.rows().size(); ++i) {
     const SignalInput& row = inputs_.rows()[i];
-    Topic*& topic = by_name[row.topic];
+    Topic*& topic = by_name[node_.resolveName(row.topic)];
     if (topic == nullptr) topic = &topics_.emplace_back();
     topic->rows.push_back({i});
     topic->max_age = std::max(topic->max_age, row.max_age);
@@ -72,26 +131,20 @@ SignalTopics::SignalTopics(const ros::NodeHandle& node, ControllerManager& manag
     (this->*types.at(inputs_.rows()[topic->rows.front().index].type->name))(name, *topic);
     ROS_INFO("robot signals from %s", topic->subscriber.getTopic().c_str());
   }
+  using Type = SignalOutput::Type;
   for (const SignalOutput& row : manager_.signalOutputs()) {
+    const auto advertise = [&](auto message) {
+      return node_.advertise<decltype(message)>(row.topic, 10);
+    };
     Output& output = outputs_.emplace_back();
     output.row = &row;
-    switch (row.type) {
-      case SignalOutput::Type::Pose:
-        advertise<geometry_msgs::PoseStamped>(output);
-        break;
-      case SignalOutput::Type::Twist:
-        advertise<geometry_msgs::TwistStamped>(output);
-        break;
-      case SignalOutput::Type::Wrench:
-        advertise<geometry_msgs::WrenchStamped>(output);
-        break;
-      case SignalOutput::Type::Joints:
-        advertise<sensor_msgs::JointState>(output);
-        break;
-      case SignalOutput::Type::Array:
-        advertise<std_msgs::Float64MultiArray>(output);
-        break;
-    }
+    output.publisher = row.type == Type::Pose     ? advertise(geometry_msgs::PoseStamped())
+                       : row.type == Type::Twist  ? advertise(geometry_msgs::TwistStamped())
+                       : row.type == Type::Wrench ? advertise(geometry_msgs::WrenchStamped())
+                       : row.type == Type::Joints ? advertise(sensor_msgs::JointState())
+                                                  : advertise(std_msgs::Float64MultiArray());
+    if (!output.publisher)
+      throw std::runtime_error(row.place + ": " + row.topic + " was not advertised");
   }
 }
 
@@ -115,11 +168,7 @@ void SignalTopics::listen(const std::string& name, Topic& topic) {
   options.initByFullCallbackType<const Event&>(name, 1, callback);
   options.transport_hints = ros::TransportHints().tcpNoDelay();
   topic.subscriber = node_.subscribe(options);
-}
-
-template <typename Message>
-void SignalTopics::advertise(Output& output) {
-  output.publisher = node_.advertise<Message>(output.row->topic, 10);
+  if (!topic.subscriber) throw std::runtime_error("topic " + name + " was not subscribed");
 }
 
 std::string SignalTopics::nameOf(const Row& row) const {
@@ -150,12 +199,12 @@ void SignalTopics::take(Topic& topic, const SignalReading& reading) {
   for (Row& row : topic.rows) {
     const SignalPost post = inputs_.post(row.index, reading.message(), now);
     if (post.refusal == SignalRefusal::None) continue;
-    if (post.refusal != row.refused || seconds(now - row.refused_ns) > kForgotten) {
+    const auto [last, first] = row.refused.insert({post.refusal, now});
+    if (first || seconds(now - last->second) > kForgotten) {
       ROS_WARN("signal %s: a message on %s is ignored: %s", nameOf(row).c_str(),
                topic.subscriber.getTopic().c_str(), post.text.c_str());
     }
-    row.refused = post.refusal;
-    row.refused_ns = now;
+    last->second = now;
   }
 }
 
@@ -187,9 +236,12 @@ void SignalTopics::watch() {
           never ? kFirstMessage : std::max(kStopped, inputs_.rows()[row.index].max_age);
       const bool absent = seconds(now - (never ? started_ns_ : newest)) > limit;
       if (absent && !row.absent) {
+        const bool alone = never && topic.subscriber.getNumPublishers() == 0;
+        const std::string what =
+            alone ? "no node publishes it as " + inputs_.rows()[row.index].type->name
+                  : std::string(never ? "no usable message" : "nothing new");
         ROS_WARN("signal %s is absent: %s on %s for %.3g s; controllers that need it wait",
-                 nameOf(row).c_str(), never ? "no usable message came" : "nothing new",
-                 topic.subscriber.getTopic().c_str(), limit);
+                 nameOf(row).c_str(), what.c_str(), topic.subscriber.getTopic().c_str(), limit);
       } else if (!absent && row.absent) {
         ROS_INFO("signal %s is there", nameOf(row).c_str());
       }
@@ -204,14 +256,6 @@ std::vector<double> SignalTopics::valueOf(Output& output) {
   if (row.kind == SignalOutput::Kind::Reference) {
     const ctrl_more::ControlSignal signal =
         manager_.feedbackStage().references().states.find(row.container, row.key);
-    if (!signal.valid()) {
-      if (!output.unknown) {
-        ROS_WARN("%s: there is no reference %s/%s", output.publisher.getTopic().c_str(),
-                 ctrl_more::nameOf(row.container), row.key.c_str());
-      }
-      output.unknown = true;
-      return {};
-    }
     const auto first = references_.values.begin() + signal.offset();
     return {first, first + signal.size()};
   }
@@ -237,13 +281,14 @@ std::vector<double> SignalTopics::valueOf(Output& output) {
 void SignalTopics::send(const Output& output, const std::vector<double>& values) {
   const SignalOutput& row = *output.row;
   const RobotSetup& robot = *manager_.settings().robot;
-  std_msgs::Header header;
-  header.stamp = coglab_rt::toRos(references_.stamp_ns);
-  header.frame_id = robot.chain.baseLink();
+  const auto stamped = [&](auto message) {
+    message.header.stamp = coglab_rt::toRos(references_.stamp_ns);
+    message.header.frame_id = robot.chain.baseLink();
+    return message;
+  };
   switch (row.type) {
     case SignalOutput::Type::Pose: {
-      geometry_msgs::PoseStamped message;
-      message.header = header;
+      auto message = stamped(geometry_msgs::PoseStamped());
       message.pose.position.x = values[0];
       message.pose.position.y = values[1];
       message.pose.position.z = values[2];
@@ -255,24 +300,19 @@ void SignalTopics::send(const Output& output, const std::vector<double>& values)
       break;
     }
     case SignalOutput::Type::Twist: {
-      geometry_msgs::TwistStamped message;
-      message.header = header;
-      message.twist.linear = vectorAt(values, 0);
-      message.twist.angular = vectorAt(values, 3);
+      auto message = stamped(geometry_msgs::TwistStamped());
+      setVectors(message.twist.linear, message.twist.angular, values);
       output.publisher.publish(message);
       break;
     }
     case SignalOutput::Type::Wrench: {
-      geometry_msgs::WrenchStamped message;
-      message.header = header;
-      message.wrench.force = vectorAt(values, 0);
-      message.wrench.torque = vectorAt(values, 3);
+      auto message = stamped(geometry_msgs::WrenchStamped());
+      setVectors(message.wrench.force, message.wrench.torque, values);
       output.publisher.publish(message);
       break;
     }
     case SignalOutput::Type::Joints: {
-      sensor_msgs::JointState message;
-      message.header.stamp = header.stamp;
+      auto message = stamped(sensor_msgs::JointState());
       message.name = robot.chain.jointNames();
       (row.key == "Velocity" ? message.velocity
        : row.key == "Torque" ? message.effort

@@ -282,6 +282,7 @@ TEST(Manager, MotionAndItsFeedbackProfileBeginInTheSameCycle) {
     RobotSample sample;
     sample.position = kHome;
     sample.commanded_position = sample.position;
+    sample.block = MotionBlock::None;
     VelocityCommand command;
     while (!stop) {
       ++sample.sequence;

@@ -79,7 +79,14 @@ TEST(SignalFile, WrongRowsAreRefusedWithTheLineAndWhatToDo) {
        "correction/CONTROLLER/CONTAINER/KEY"},
       {refusal("in:\n- {" + kImu +
                "}\nout:\n- {topic: imu, type: std_msgs/Float64MultiArray, value: state/a}\n"),
-       "in another row already"},
+       "is in the row of signals.yaml:2 already"},
+      {in("topic: '~imu', type: sensor_msgs/Imu, key: i, field: orientation, max_age: 1"),
+       "without ~"},
+      {refusal("in:\n- {topic: lab/x, type: sensor_msgs/Imu, key: a, field: orientation, max_age: "
+               "1}\n- {topic: /lab/x, type: geometry_msgs/PoseStamped, key: b, field: pose, "
+               "max_age: 1}\n"),
+       "signals.yaml:3: topic /lab/x is a geometry_msgs/PoseStamped here and a sensor_msgs/Imu in "
+       "the row of signals.yaml:2"},
       {refusal("inn: []\n"), "did you mean 'in'?"}};
   for (const auto& [text, words] : cases) {
     EXPECT_NE(text.find(words), std::string::npos) << "'" << text << "' lacks '" << words << "'";
@@ -112,6 +119,70 @@ TEST(SignalFile, IsLoadedWholeOrNotAtAll) {
              there);
   EXPECT_NE(taken.find("estimatedData/ee has a writer already"), std::string::npos) << taken;
   EXPECT_FALSE(there) << "nothing of the file";
+}
+
+TEST(SignalFile, TopicsAreComparedByTheirFullNames) {
+  const SignalFile file = read(
+      "in:\n- {topic: imu, type: sensor_msgs/Imu, key: a, field: orientation, max_age: 1}\n"
+      "out:\n- {topic: lab/hand, type: geometry_msgs/PoseStamped, value: "
+      "taskSpaceReferencePose/ee}\n");
+  const auto refused = [&](const TopicRules& rules) {
+    try {
+      checkSignals(file, rules);
+    } catch (const std::exception& error) {
+      return std::string(error.what());
+    }
+    return std::string("taken");
+  };
+  TopicRules rules;
+  EXPECT_EQ(refused(rules), "taken");
+  rules.resolve = [](const std::string& name) { return name == "imu" ? "/lab/hand" : "/" + name; };
+  EXPECT_EQ(refused(rules),
+            "signals.yaml:4: topic lab/hand, /lab/hand, is in the row of signals.yaml:2 already; "
+            "an output needs a topic of its own");
+  rules.resolve = nullptr;
+  rules.refusal = [](const std::string& topic, const std::string& type, bool out) {
+    EXPECT_EQ(type, out ? "geometry_msgs/PoseStamped" : "sensor_msgs/Imu");
+    return out && topic == "/lab/hand" ? "is the arm's" : "";
+  };
+  EXPECT_EQ(refused(rules), "signals.yaml:4: topic lab/hand, /lab/hand, is the arm's");
+  rules.resolve = [](const std::string&) -> std::string { throw std::runtime_error("no name"); };
+  EXPECT_EQ(refused(rules), "signals.yaml:2: topic imu: no name");
+}
+
+TEST(SignalFile, OutputsOfWhatThereIsNotRefuseTheWholeFile) {
+  const auto said = [](const std::string& value) {
+    const std::string file = fileOf(
+        "outputs.yaml",
+        "in:\n- {" + kImu +
+            "}\nout:\n- {topic: o, type: std_msgs/Float64MultiArray, value: " + value + "}\n");
+    VirtualRobot robot("{feedback_file: " PACKAGE_DIR "/config/palm.yaml, signals_file: " + file +
+                       ", plugin_paths: [" PLUGIN_DIR "]}");
+    const auto& errors = robot.manager->feedbackErrors();
+    const bool whole = !robot.manager->signalOutputs().empty() &&
+                       !robot.manager->feedbackStage().signals().rows().empty();
+    const bool none = robot.manager->signalOutputs().empty() &&
+                      robot.manager->feedbackStage().signals().rows().empty();
+    EXPECT_TRUE(errors.empty() ? whole : none) << value;
+    return errors.empty() ? std::string("taken") : errors.front();
+  };
+  const std::pair<const char*, const char*> cases[] = {
+      {"taskSpaceReferencePose/ee", "taken"},
+      {"state/attitude/integral_x", "taken"},
+      {"correction/attitude/taskSpaceReferencePose/ee", "taken"},
+      {"taskSpaceReferencePose/hand",
+       "outputs.yaml:4: there is no reference 'taskSpaceReferencePose/hand'; there is: "},
+      {"state/atitude",
+       "outputs.yaml:4: there is no feedback controller 'atitude'; there is: attitude, "
+       "ee_admittance, joint_limits"},
+      {"state/attitude/integral",
+       "there is no state of 'attitude' 'integral'; there is: integral_x, "},
+      {"correction/attitude/taskSpaceReferenceVel/ee",
+       "there is no correction by 'attitude' of 'taskSpaceReferenceVel/ee'; there is: "
+       "taskSpaceReferencePose/ee"}};
+  for (const auto& [value, words] : cases) {
+    EXPECT_NE(said(value).find(words), std::string::npos) << said(value);
+  }
 }
 
 TEST(SignalInputs, MessagesThatCannotBeUsedAreRefused) {

@@ -44,7 +44,7 @@ class HoldTest : public ::testing::Test {
   JointVector asked(const JointVector& velocity, const JointVector& acceleration = joints(0, 0)) {
     input.robot.commanded_velocity = velocity;
     input.robot.commanded_acceleration = acceleration;
-    hold.computeReference(input, setup, stage.references());
+    hold.computeReference(input, setup, {}, stage.references());
     return stage.references().states.view(stage.references().joint_velocity);
   }
   void expectAsked(const JointVector& expected, const JointVector& velocity,

@@ -231,6 +231,8 @@ class FeedbackControllersManager : public Manager, public ControllerOwner {
   std::vector<std::string> getUsedRobotStates(bool enabled_only = false) const;
   /// Union of `container/key` over loaded (or enabled) controllers, sorted.
   std::vector<std::string> getUsedControlStates(bool enabled_only = false) const;
+  /// `container/key` of the references that one controller may correct.
+  std::vector<std::string> getCorrected(const std::string& name) const;
   /// Declaration of one controller.
   Description describe(const std::string& name) const;
   /// Status of one controller.
@@ -265,6 +267,11 @@ class FeedbackControllersManager : public Manager, public ControllerOwner {
   void beginCycle(const Cycle& cycle) noexcept override;
   /// Adopts the plan of prepare(), if any. Call it between beginCycle() and the first stage.
   void adoptPrepared() noexcept;
+  /// While `let_go`, no controller runs and every correction is gone at once, held ones too. A
+  /// controller that is enabled begins anew after that: reset(), then its correction is blended in.
+  /// For a host whose set-point stays where it is in this cycle, so that the end of a correction
+  /// moves nothing. Call it between beginCycle() and the first stage.
+  void letGo(bool let_go) noexcept;
   /// Snapshots the references as `original`, then runs the controllers of the stage in order.
   /// Both stores must be those of the constructor, or copies of them.
   void updateStage(Stage stage, const RobotStates& robot, ControlStates& control) noexcept override;

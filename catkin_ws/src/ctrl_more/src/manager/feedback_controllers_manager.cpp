@@ -61,6 +61,9 @@ class CycleSide {
     adopt(second);
   }
 
+  /// See FeedbackControllersManager::letGo().
+  void letGo(bool let_go) noexcept { let_go_ = let_go; }
+
   /// Copies the references to `original`, then runs the controllers of a stage in order.
   void runStage(Stage stage, const RobotStates& robot, ControlStates& control) noexcept {
     if (!plan_ || plan_->stages[static_cast<int>(stage)].empty()) return;
@@ -78,6 +81,7 @@ class CycleSide {
                  control,
                  options_.check_undeclared ? &compared_ : nullptr,
                  options_.timed || plan_->timed,
+                 let_go_,
                  records_.backIndex(),
                  0};
     if (run.timed) run.boundary_ns = coglab_rt::steadyNow();
@@ -118,6 +122,7 @@ class CycleSide {
   coglab_rt::TripleBuffer<std::uint64_t> records_{0};
   bool recorded_ = false;  // true if this cycle has records
   bool laid_out_ = false;  // freeze() was called
+  bool let_go_ = false;    // no controller runs
   const Plan* plan_ = nullptr;
   Cycle cycle_;
   ControlStates original_;
@@ -160,6 +165,8 @@ void FeedbackControllersManager::freeze() { cycle_->freeze(); }
 void FeedbackControllersManager::beginCycle(const Cycle& cycle) noexcept { cycle_->begin(cycle); }
 
 void FeedbackControllersManager::adoptPrepared() noexcept { cycle_->adoptPrepared(); }
+
+void FeedbackControllersManager::letGo(bool let_go) noexcept { cycle_->letGo(let_go); }
 
 void FeedbackControllersManager::updateStage(Stage stage, const RobotStates& robot,
                                              ControlStates& control) noexcept {
@@ -570,6 +577,15 @@ std::vector<std::string> FeedbackControllersManager::getUsedRobotStates(bool ena
 std::vector<std::string> FeedbackControllersManager::getUsedControlStates(bool enabled_only) const {
   const ListLock lock(list_->mutex);
   return namesOf(*list_, enabled_only, [](const Slot& slot) { return slot.controlUses(); });
+}
+
+std::vector<std::string> FeedbackControllersManager::getCorrected(const std::string& name) const {
+  const ListLock lock(list_->mutex);
+  std::vector<std::string> names;
+  for (const ResolvedControlUse& use : list_->at(name).slot->controlUses()) {
+    if (use.use.modifies) names.push_back(use.name());
+  }
+  return names;
 }
 
 Description FeedbackControllersManager::describe(const std::string& name) const {

@@ -9,6 +9,9 @@
 namespace ctrl_more {
 namespace {
 
+// Not an index of a robot signal; see Slot::waiting_.
+constexpr int kWaitsForNothing = -1, kWaitsForMotion = -2;
+
 std::int64_t toNanoseconds(double seconds) {
   return seconds >= 9e9 ? INT64_MAX : static_cast<std::int64_t>(1e9 * seconds);
 }
@@ -122,10 +125,14 @@ void Slot::adopt(const PlanEntry& entry) noexcept {
   }
 }
 
-// The correction of the newest record.
+// The correction of the newest record; none after letGo().
 void Slot::lastCorrection(double* correction) noexcept {
   const Record& record = records_[last_];
   for (const WrittenSignal& w : guard_.written()) {
+    if (let_go_) {
+      correction::setIdentity(w.kind, w.size, correction + w.local);
+      continue;
+    }
     correction::difference(w.kind, w.size, record.before.data() + w.local,
                            record.after.data() + w.local, correction + w.local);
   }
@@ -179,6 +186,7 @@ void Slot::latch(const Cycle& cycle, FaultKind kind, const char* text) noexcept 
 
 void Slot::run(StageRun& run) noexcept {
   if (activity_ == Activity::Off && !wanted_) return;
+  if (run.let_go) return letGo(run);
   guard_.note(run.control.data());
   if (gain_weight_ < 1.0) advanceGains(run.cycle.dt);
   if (!wanted_) {
@@ -190,6 +198,19 @@ void Slot::run(StageRun& run) noexcept {
   } else {
     if (activity_ != Activity::Running) start();
     runActive(run);
+  }
+}
+
+// Ends its correction at once. If it is wanted, it begins anew when it may.
+void Slot::letGo(const StageRun& run) noexcept {
+  let_go_ = true;
+  reset_pending_ = true;
+  if (!findStale(run)) waiting_.store(kWaitsForMotion, std::memory_order_relaxed);
+  if (wanted_) {
+    if (activity_ != Activity::Waiting) stop(Why::Stale);
+  } else {
+    captureCorrection();
+    setActivity(Activity::Off);
   }
 }
 
@@ -317,6 +338,7 @@ StopPolicy Slot::policyOf(const WrittenSignal& written) const {
 void Slot::commit(const StageRun& run) noexcept {
   Record& record = records_[run.buffer];
   last_ = run.buffer;
+  let_go_ = false;
   record.any = true;
   record.cycle = run.cycle.number;
   const double* const data = run.control.data();
@@ -371,8 +393,8 @@ void Slot::fillStatus(ControllerStatus& status) const {
   status.overruns = overruns_.load(std::memory_order_relaxed);
   status.last_us = 1e-3 * static_cast<double>(last_ns_.load(std::memory_order_relaxed));
   const int waiting = waiting_.load(std::memory_order_relaxed);
-  if (status.activity == Activity::Waiting && waiting >= 0) {
-    status.waiting_for = robotUses()[waiting].name();
+  if (status.activity == Activity::Waiting && waiting != kWaitsForNothing) {
+    status.waiting_for = waiting == kWaitsForMotion ? "a motion" : robotUses()[waiting].name();
   }
 }
 

@@ -25,6 +25,7 @@ struct StageRun {
   ControlStates& control;
   std::vector<double>* compared;  ///< test mode: buffer for all of `control`; else null
   bool timed;
+  bool let_go;               ///< see FeedbackControllersManager::letGo()
   unsigned buffer;           ///< the cycle's buffer of records
   std::int64_t boundary_ns;  ///< steady clock between the last controller and this one
 };
@@ -105,6 +106,7 @@ class Slot {
   void runActive(StageRun& run) noexcept;
   FaultKind callController(StageRun& run);
   void runStopped(StageRun& run) noexcept;
+  void letGo(const StageRun& run) noexcept;
   void blendIn(double* data) noexcept;
   void takeFault(StageRun& run, FaultKind kind, const char* text) noexcept;
   bool isLate(StageRun& run) noexcept;
@@ -142,6 +144,7 @@ class Slot {
   bool enabled_ = false;
   bool paused_ = false;
   bool reset_pending_ = false;
+  bool let_go_ = false;  // its correction has ended since the newest record
   bool gains_pending_ = true;
   int overruns_in_row_ = 0;
   std::uint32_t fault_clears_ = 0;

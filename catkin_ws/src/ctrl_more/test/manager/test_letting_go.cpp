@@ -97,6 +97,41 @@ TEST(LettingGoTest, CorrectionOfAPauseFadesWhenItResumesWithoutItsSensor) {
   }
 }
 
+// For a host whose arm is told to stop: it must stand, whatever a controller or a pause would hold.
+TEST(LettingGoTest, AHostThatLetsGoHasNoCorrectionAndThenANewOne) {
+  Rig rig(0.1);
+  TestController* raw = rig.add(adder("pose", "ee", 1.0), "c");
+  rig.add(adder("vel", "ee", 1.0), "paused");
+  rig.step(40);
+  rig.manager->pause("paused");
+  rig.manager->letGo(true);
+  const int updates = raw->updates, resets = raw->resets;
+  for (int i = 0; i < 10; ++i) {
+    rig.step();
+    ASSERT_EQ(rig.pose()[0], 0.0);
+    ASSERT_EQ(rig.twist()[0], 0.0);
+  }
+  EXPECT_EQ(raw->updates, updates);
+  EXPECT_EQ(rig.manager->status("c").activity, Activity::Waiting);
+  EXPECT_EQ(rig.manager->status("c").waiting_for, "a motion");
+  rig.manager->letGo(false);
+  for (int i = 1; i <= 20; ++i) {
+    rig.step();
+    ASSERT_NEAR(rig.pose()[0], i / 20.0, 1e-12) << "blended in over 100 ms";
+  }
+  EXPECT_EQ(raw->resets, resets + 1);
+  EXPECT_EQ(rig.twist()[0], 0.0) << "what the pause held is gone";
+
+  rig.manager->letGo(true);
+  rig.step();
+  rig.manager->disable("c");
+  rig.step();
+  rig.manager->letGo(false);
+  rig.step(3);
+  EXPECT_EQ(rig.pose()[0], 0.0) << "nothing old comes back";
+  EXPECT_EQ(rig.manager->status("c").activity, Activity::Off);
+}
+
 TEST(LettingGoTest, ZeroDropsTheCorrectionInTheSameCycle) {
   for (const bool fault : {false, true}) {
     Rig rig(0.1);

@@ -140,6 +140,7 @@ class ControlCycle {
   Reason input_reason_;
   double limit_scale_ = 1.0;
   std::uint64_t numbers_ = 0;  // number of cycles with a joint state
+  bool cancelled_ = false;     // a cancel came, and no motion since
   bool asked_still_ = false;   // the last cycle with a joint state sent zero velocity
   int overruns_in_row_ = 0;
   int watched_ = 0;  // id of the motion that progress_ watches

@@ -31,6 +31,7 @@ struct ManagerSettings {
   std::string feedback_file;  ///< list file of Ctrl-MORE; empty: no feedback controllers
   std::string central_file;   ///< Ctrl-MORE's central module; empty: feedback controllers alone
   std::string signals_file;   ///< see signal_file.hpp; empty: no signals from topics
+  TopicRules topics;          ///< for the topics of that file
   double plan_timeout = 2.0;  ///< s, longest wait of a request for the cycle
   bool lockstep = false;      ///< the caller's thread adopts requests; no time limits
   std::function<std::int64_t()>
@@ -165,6 +166,8 @@ class ControllerManager : public MotionHost {
   Answer loadFeedback(const std::string& id, const std::string& type);
   void loadSignals();
   void loadManagers();
+  void checkOutputs(std::size_t own_rows);
+  void checkOutput(const SignalOutput& row);
   std::string libraryOf(const std::string& type) const;
   Answer planSwitch(const std::string& id, CyclePlan& plan, std::string& type);
   LoadedMotion* find(const std::string& id) const;  // under table_

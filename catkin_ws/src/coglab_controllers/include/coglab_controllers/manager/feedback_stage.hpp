@@ -77,6 +77,8 @@ class FeedbackStage {
   void begin(std::int64_t now_ns, double dt) noexcept;
   /// Applies the feedback profile of a motion controller, in the cycle that switches to it.
   void switchProfile() noexcept { manager().adoptPrepared(); }
+  /// True: feedback controllers give up their corrections, because the arm is to rest where it is.
+  void letGo(bool let_go) noexcept { manager().letGo(let_go); }
   /// Step 2: writes the measurement to the robot states. If a number is not finite, it writes
   /// nothing and returns false.
   bool fill(const CycleInput& input) noexcept;

@@ -27,6 +27,9 @@ struct CycleInput {
   double dt = 0.0;          ///< true time since the last cycle, s, > 0
   double time_scale = 1.0;  ///< 0..1: how fast the reference's own time runs (speed_scale, limits)
   bool motion_allowed = false;  ///< target velocities are followed now
+  /// The arm is to rest: no motion is allowed, or a cancel came and no motion since. There are no
+  /// corrections of feedback controllers then.
+  bool resting = false;
   std::uint64_t cancels = 0;    ///< newest cancel of the active controller
 };
 

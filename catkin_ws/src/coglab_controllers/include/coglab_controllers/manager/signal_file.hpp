@@ -26,6 +26,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -70,7 +71,8 @@ struct SignalPick {
 
 /// One row of `in`: a robot signal from a topic.
 struct SignalInput {
-  std::string topic;
+  std::string place;  ///< file:line
+  std::string topic;  ///< as in the file
   const SignalType* type = nullptr;
   std::vector<SignalPick> picks;
   std::string key;
@@ -86,7 +88,8 @@ struct SignalInput {
 struct SignalOutput {
   enum class Kind { Reference, Correction, State };
   enum class Type { Pose, Twist, Wrench, Joints, Array };
-  std::string topic;
+  std::string place;  ///< file:line
+  std::string topic;  ///< as in the file
   Type type = Type::Array;
   Kind kind = Kind::Reference;
   std::string controller;  ///< of a correction or state
@@ -95,11 +98,28 @@ struct SignalOutput {
   double rate = 50.0;  ///< Hz
 };
 
+/// The message type of an output, package/Type.
+const std::string& nameOf(SignalOutput::Type type);
+
 /// Content of the file.
 struct SignalFile {
   std::vector<SignalInput> in;
   std::vector<SignalOutput> out;
 };
+
+/// What the program around the signals knows of topics.
+struct TopicRules {
+  /// Full name of a topic of the file, after remapping. May throw. Empty: `/` before the name.
+  std::function<std::string(const std::string& topic)> resolve;
+  /// Why a row cannot have this topic (full name, type of the row, true: it is an output); empty:
+  /// it can. No function: every row can.
+  std::function<std::string(const std::string& topic, const std::string& type, bool out)> refusal;
+};
+
+/// Checks all rows together, of one or more files: each key and each output has one row, one topic
+/// has one type, none is input and output, and the program has no other use for it.
+/// @throws ctrl_more::ConfigError with file and line of the rows
+void checkSignals(const SignalFile& all, const TopicRules& rules);
 
 /// Reads a file. @throws ctrl_more::ConfigError with file, line, expected and actual value
 SignalFile readSignalFile(const std::string& path);

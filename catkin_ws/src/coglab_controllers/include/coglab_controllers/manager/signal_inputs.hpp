@@ -55,6 +55,11 @@ class SignalInputs {
   /// @return failure if a signal has another writer already
   ctrl_more::Status add(const std::vector<SignalInput>& rows, ctrl_more::RobotStates& robot);
 
+  /// Gives up all rows but the first ones; before the first cycle. Their signals stay absent.
+  void keepFirst(std::size_t rows) {
+    while (rows_.size() > rows) rows_.pop_back(), boxes_.pop_back();
+  }
+
   /// All rows, in the order in which they were added.
   const std::deque<SignalInput>& rows() const { return rows_; }
 

@@ -32,9 +32,26 @@ class StartBlend {
   JointVector joints_ = JointVector::Zero();
 };
 
+/// What feedback controllers made of a pose: p' = p + shift, R' = turn R.
+struct PoseCorrection {
+  Vector3 shift = Vector3::Zero();  ///< m
+  Quaternion turn = Quaternion::Identity();
+
+  static PoseCorrection between(const Eigen::Matrix<double, 7, 1>& before,
+                                const Eigen::Matrix<double, 7, 1>& after) noexcept;
+  bool none() const noexcept {
+    return shift.isZero(0.0) && turn.coeffs() == Quaternion::Identity().coeffs();
+  }
+  Pose onto(const Pose& pose) const noexcept;   ///< the corrected pose; the same bits if none()
+  Pose outOf(const Pose& pose) const noexcept;  ///< the pose that is corrected to this one
+};
+
 /// The arm brakes within its limits; once it stands, the commanded posture is remembered as the
 /// reference. If feedback controllers leave the reference alone, the velocity is exactly zero; if
 /// they move it, the hand follows. No allocation, no throw.
+///
+/// The reference is the commanded pose without the correction that it has already: a constant
+/// correction moves nothing.
 ///
 /// All joints brake together, each in proportion to its speed, in the time that the slowest one
 /// needs: where each braked as fast as it can, joints that cancel each other's motion, as in a hand
@@ -48,8 +65,9 @@ class Hold {
   }
 
   /// Writes pose, zero twist, joint position and the joint velocity of braking, at rest zero.
+  /// @param correction of the pose in the cycle before
   void computeReference(const CycleInput& input, const RobotSetup& setup,
-                        References& references) noexcept;
+                        const PoseCorrection& correction, References& references) noexcept;
 
   /// @param solve makes joint velocities from a chain state, joints and a Cartesian reference:
   /// (const ChainState&, const

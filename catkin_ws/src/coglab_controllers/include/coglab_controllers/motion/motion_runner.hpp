@@ -220,7 +220,7 @@ void MotionRunner<Request>::start(const CycleInput& input) {
   reason_.clear();
   queued_ = 0;
   motion_->stop();
-  loop_.open();
+  loop_.begin();
   stamp_ns_ = input.robot.stamp_ns;
   report(stamp_ns_);
 }

@@ -59,6 +59,8 @@ class ReferenceLoop {
   /// @throws std::runtime_error naming the parameter
   void configure(const MotionSetup& setup, Spaces spaces, Tunables& tunables);
 
+  /// Begins to control the arm, which brakes and stands.
+  void begin() noexcept;
   /// Ends the motion: the arm brakes and stands.
   void open() noexcept;
 
@@ -95,9 +97,12 @@ class ReferenceLoop {
   Tunable *joint_gain_ = nullptr, *position_gain_ = nullptr, *rotation_gain_ = nullptr,
           *correction_speed_ = nullptr;
   double gain_ = 5.0, tolerance_ = 0.002, arrive_distance_ = 0.01;
-  MotionReference reference_;  // the last one written
+  MotionReference reference_;                                               // the last one written
+  Eigen::Matrix<double, 7, 1> pose_ = Eigen::Matrix<double, 7, 1>::Zero();  // as written
+  PoseCorrection correction_;  // by feedback controllers, in the last cycle
   StartBlend blend_;
   Hold hold_;
+  bool resting_ = false;  // input.resting of the last cycle
   IkResult ik_result_;
 };
 

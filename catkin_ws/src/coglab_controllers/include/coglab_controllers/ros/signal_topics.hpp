@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,12 @@
 namespace coglab_controllers {
 
 class SignalReading;
+
+/// The rules of this process for the topics of a file of signals: names are resolved with its
+/// remappings; topics of this node, the arm, tf and rosout are not for outputs, and nodes of ROS
+/// agree on one type for a topic.
+/// @param node namespace of the manager
+TopicRules topicRules(const ros::NodeHandle& node);
 
 /// Subscribes to the topics of the manager's robot signals and publishes its outputs. Relative
 /// names begin in the namespace above the manager's.
@@ -33,10 +40,9 @@ class SignalTopics {
 
  private:
   struct Row {
-    std::size_t index;                            ///< in SignalInputs
-    SignalRefusal refused = SignalRefusal::None;  ///< logged last; callback's thread
-    std::int64_t refused_ns = 0;                  ///< last time of this refusal
-    bool absent = false;                          ///< logged; publisher thread
+    std::size_t index;                                   ///< in SignalInputs
+    std::map<SignalRefusal, std::int64_t> refused = {};  ///< last time, ns; callback's thread
+    bool absent = false;                                 ///< logged; publisher thread
   };
   /// A topic with all its rows. Its callbacks come one after another.
   struct Topic {
@@ -51,13 +57,10 @@ class SignalTopics {
     const SignalOutput* row;
     ros::Publisher publisher;
     std::int64_t due_ns = 0;
-    bool unknown = false;  ///< there is no such reference; logged
   };
 
   template <typename Message>
   void listen(const std::string& name, Topic& topic);
-  template <typename Message>
-  void advertise(Output& output);
   bool isWriter(Topic& topic, const std::string& node);
   void take(Topic& topic, const SignalReading& reading);
   void watch();

@@ -38,7 +38,7 @@ enum class Activity : std::uint8_t {
   Off,       ///< contributes nothing; the control states pass unchanged
   Running,   ///< update() is called each cycle
   Stopping,  ///< disabled, paused or faulted: the last correction is held or fading
-  Waiting,   ///< enabled, but a robot signal it needs is missing or too old
+  Waiting,   ///< enabled, but a robot signal it needs is missing or too old, or letGo() holds
 };
 
 /// `off`, `running`, `stopping` or `waiting`.
@@ -84,7 +84,7 @@ struct ControllerStatus {
   std::uint64_t faults = 0;           ///< number of faults since loading
   std::uint64_t overruns = 0;         ///< number of overruns since loading
   double last_us = 0.0;               ///< duration of the last update() [us], 0 unless timed
-  std::string waiting_for;            ///< robot signal it waits for, "" if none
+  std::string waiting_for;  ///< robot signal it waits for; `a motion` after letGo(); "" if none
 };
 
 /// Change of one reference by one controller in one cycle.
