@@ -13,11 +13,12 @@ options = parser(__doc__).parse_args()
 
 
 def files(folder: Path) -> str:
-    """Copies the shipped files into the folder, with one change: nobody in sight is no reason to stand."""
+    """Copies the shipped files into the folder, with two changes: a visitor is handed nothing, so nobody may touch the
+    palm, and nobody in sight is no reason to be slow."""
     folder.mkdir(parents=True, exist_ok=True)
     config = package_path("coglab_controllers", "config")
     central = yaml.safe_load((config / "safe_distance.yaml").read_text())
-    central["safe_distance"]["absent_speed"] = 1.0
+    central["safe_distance"] |= {"absent_speed": 1.0, "touch": []}
     central["signals"] = str(config / "safe_distance_signals.yaml")
     (folder / "safe_distance.yaml").write_text(yaml.safe_dump(central))
     return str((folder / "safe_distance.yaml").resolve())
@@ -26,6 +27,14 @@ def files(folder: Path) -> str:
 def distance_at(time: float) -> float:
     """Distance (m) of the visitor from the hand: from 3 m at 1 m/s to 0.3 m, 2 s there, and back."""
     return float(np.interp(time, [0.0, 2.7, 4.7, 7.4], [3.0, 0.3, 0.3, 3.0]))
+
+
+def from_arm(world: coglab.World, person: np.ndarray) -> float:
+    """Distance (m) of the person from the lines elbow - wrist - palm, as the robot knows them."""
+    points = world.cell.robot.virtual.robot_signal("arm_points").reshape(3, 3)
+    share = np.linspace(0.0, 1.0, 101)[:, None]
+    lines = np.concatenate([a + share * (b - a) for a, b in zip(points, points[1:], strict=False)])
+    return float(np.linalg.norm(lines - person, axis=1).min())
 
 
 rows: list[tuple[float, float, float]] = []
@@ -39,10 +48,11 @@ with coglab.World(seed=3, managers=files(options.out)) as world:
         hand = world.true_pose("robot_hand").position
         distance = distance_at(world.time - start)
         person = hand + distance * np.array([0.0, -1.0, 0.0])
-        world.cell.robot.virtual.post_signal("person", {"position": person}, frame="lwr_base_link")
-        rows.append((world.time - start, distance, float(np.linalg.norm(hand - before)) / 0.005))
+        world.cell.robot.virtual.post_signal("person/human_hand", {"position": person}, frame="lwr_base_link")
+        rows.append((world.time - start, from_arm(world, person), float(np.linalg.norm(hand - before)) / 0.005))
         before = hand
 
+    world.cell.blind.add("human_hand")  # the simulated tracker sees the visitor alone
     world.after_period.append(visit)
     home = np.asarray(world.robot.arm.home)
     other = home + [0.5, 0.3, 0.0, -0.4, 0.0, 0.0, 0.0]
@@ -51,7 +61,7 @@ with coglab.World(seed=3, managers=files(options.out)) as world:
             world.robot.arm.move_joints(goal, duration=1.5)
 
 time, distance, speed = np.array(rows).T
-fast, reaction, brake, kept = 1.6, 0.1, 2.0, 0.12 + 0.05 + 0.01  # of safe_distance.yaml
+fast, reaction, brake, kept = 1.6, 0.1, 2.0, 0.12 + 0.05 + 0.01 + 0.1  # of safe_distance.yaml
 b = reaction + fast / brake
 free = np.maximum(0.0, distance - fast * reaction - kept)
 allowed = brake * (np.sqrt(b * b + 2.0 * free / brake) - b)

@@ -1,11 +1,12 @@
 """The detector of an arm at rest: what it learns, its thresholds and times, and what it finds in synthetic torques."""
 
+import dataclasses
 import math
 
 import numpy as np
 import pytest
 from arms import DT, ContactTrial, found_within, jacobian, push
-from coglab_contact.detector import ContactDetector, DetectorSettings
+from coglab_contact.detector import TUNABLE, ContactDetector, DetectorSettings
 from coglab_msgs.msg import ReasonCode
 
 STEP = 1.0 / 128.0
@@ -287,3 +288,21 @@ def test_the_noise_is_learnt_anew_at_rest_alone(posture):
     moving.feed(0.1, velocity=lambda t: np.full(7, 0.1))
     with pytest.raises(ValueError, match="moves"):
         moving.detector.learn()
+
+
+def test_settings_that_jump_while_the_arm_moves_are_no_contact():
+    for name, (low, high, _) in TUNABLE.items():
+        trial = Rest()
+        trial.feed(samples=150)
+        for k in range(400):
+            if k % 40 == 0:
+                value = low if k % 80 == 0 else high
+                trial.detector.use(dataclasses.replace(trial.detector.settings, **{name: value}))
+            if k == 100:
+                trial.detector.arm("contact", trial.t, 100.0)
+            event, _ = trial.feed(2.0 * math.sin(0.05 * k), speed=0.5)
+            assert event is None, name
+        trial.detector.use(DetectorSettings())
+        assert trial.feed(samples=300)[0] is None, name
+        event, samples = trial.feed(joint(2, 1.0), samples=20)
+        assert event is not None and event.contact, f"{name}: a push is found afterwards"

@@ -1,8 +1,10 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -27,14 +29,22 @@ namespace ctrl_more {
 ///     v_r = a (-b + sqrt(b^2 + 2 (d - v_h T_r - C - Z_d - Z_r) / a)),  b = T_r + v_h / a
 ///
 /// and 0 where the root has no positive value. It becomes `otherReference/speed_limit` [m/s], which
-/// the robot keeps for hand and elbow in every direction.
+/// the robot keeps for hand and elbow in every direction. d is the shortest distance from any point
+/// of the person to the lines between the points of the arm. The lowest limit counts.
 ///
-/// Block in the central module's file, all optional: `person` (key in estimatedData or
-/// measuredData: position in the base frame, 3 numbers [m], or a pose, 7; `person`), `robot` (pose
-/// of the hand in estimatedData; `ee`), `person_speed` (v_h, 1.6 m/s), `reaction_time` (T_r, 0.1
+/// A handover ends in touch, which separation would never allow. For the points of the person in
+/// `touch` the limit does not fall below `touch_speed` where the last line of the arm, wrist to
+/// palm, is the nearest one: power and force limiting there (5.5.5), separation everywhere else.
+/// The force of a touch is at most v_r sqrt(mu k), mu = 1 / (1/m_person + 1/m_robot).
+///
+/// Block in the central module's file, all optional: `person` (key or list of keys in estimatedData
+/// or measuredData: positions in the base frame, 3 numbers [m], or poses, 7; `person`), `touch`
+/// (those of them that may touch the palm; none), `touch_speed` (0.25 m/s), `robot` (points of the
+/// arm in estimatedData, 3 numbers [m] each, or a pose, 7; `arm_points`, else `ee`), `robot_radius`
+/// (of the arm about those lines, 0 m), `person_speed` (v_h, 1.6 m/s), `reaction_time` (T_r, 0.1
 /// s), `deceleration` (a, 2 m/s^2), `intrusion` (C, 0.12 m), `person_uncertainty` (Z_d, 0.05 m),
 /// `robot_uncertainty` (Z_r, 0.01 m), `max_age` of the person's position (0.2 s), `absent_speed`
-/// (limit while it is missing or too old, 0 m/s).
+/// (limit while all points of the person are missing or too old, 0 m/s).
 class SafeDistance : public Manager {
  public:
   SafeDistance(const std::string& name, const ConfigNode& block, RobotStates& robot,
@@ -44,12 +54,22 @@ class SafeDistance : public Manager {
   void updateStage(Stage stage, const RobotStates& robot, ControlStates& control) noexcept override;
 
  private:
-  double largestSpeed(double distance) const;
+  /// A tracked point of the person.
+  struct Point {
+    RobotSignal position;
+    bool may_touch;
+  };
+
+  double largestSpeed(double distance) const noexcept;
+  double speedFor(const Eigen::Vector3d& person, bool may_touch,
+                  const RobotStates& robot) const noexcept;
 
   std::string name_;
-  double person_speed_, reaction_time_, deceleration_, kept_, absent_speed_;
+  double person_speed_, reaction_time_, deceleration_, kept_, absent_speed_, touch_speed_;
   std::int64_t max_age_ns_;
-  RobotSignal person_, hand_;
+  std::vector<Point> person_;
+  RobotSignal arm_;
+  int arm_points_ = 1;
   ControlSignal limit_;
   LogSource log_;
   bool standing_ = false;
@@ -67,9 +87,31 @@ double number(const ConfigNode& block, const char* key, double otherwise, double
                     std::to_string(most) + ", got " + std::to_string(value));
 }
 
-std::string text(const ConfigNode& block, const char* key, const char* otherwise) {
+/// A text or a list of texts.
+std::vector<std::string> texts(const ConfigNode& block, const char* key,
+                               std::vector<std::string> otherwise) {
   const ConfigNode* node = block.find(key);
-  return node ? node->text(key) : otherwise;
+  if (node == nullptr) return otherwise;
+  if (node->kind() == ConfigNode::Kind::Scalar) return {node->text(key)};
+  return node->texts(key);
+}
+
+RobotSignal findPerson(const RobotStates& robot, const std::string& key, const ConfigNode& block) {
+  RobotSignal found = robot.find(RobotSource::Estimated, key);
+  if (!found.valid()) found = robot.find(RobotSource::Measured, key);
+  if (found.size() == 3 || found.size() == 7) return found;
+  throw block.error("it needs a robot signal '" + key +
+                    "' with a position of the person (3 numbers) or a pose (7); a file of signals "
+                    "brings it from a topic");
+}
+
+/// Distance of a point to the line from `a` to `b`.
+double distanceToLine(const Eigen::Vector3d& point, const Eigen::Vector3d& a,
+                      const Eigen::Vector3d& b) noexcept {
+  const Eigen::Vector3d way = b - a;
+  const double length = way.squaredNorm();
+  const double share = length > 0.0 ? std::clamp((point - a).dot(way) / length, 0.0, 1.0) : 0.0;
+  return (point - a - share * way).norm();
 }
 
 }  // namespace
@@ -77,54 +119,81 @@ std::string text(const ConfigNode& block, const char* key, const char* otherwise
 SafeDistance::SafeDistance(const std::string& name, const ConfigNode& block, RobotStates& robot,
                            ControlStates& control, Logger* logger)
     : name_(name), log_(logger, name) {
-  block.requireKeys(
-      "manager '" + name + "'",
-      {"type", "libPath", "person", "robot", "person_speed", "reaction_time", "deceleration",
-       "intrusion", "person_uncertainty", "robot_uncertainty", "max_age", "absent_speed"});
+  block.requireKeys("manager '" + name + "'",
+                    {"type", "libPath", "person", "touch", "touch_speed", "robot", "robot_radius",
+                     "person_speed", "reaction_time", "deceleration", "intrusion",
+                     "person_uncertainty", "robot_uncertainty", "max_age", "absent_speed"});
   person_speed_ = number(block, "person_speed", 1.6, 0.0, 10.0);
   reaction_time_ = number(block, "reaction_time", 0.1, 0.0, 5.0);
   deceleration_ = number(block, "deceleration", 2.0, 0.01, 100.0);
   kept_ = number(block, "intrusion", 0.12, 0.0, 5.0) +
           number(block, "person_uncertainty", 0.05, 0.0, 5.0) +
-          number(block, "robot_uncertainty", 0.01, 0.0, 5.0) + person_speed_ * reaction_time_;
+          number(block, "robot_uncertainty", 0.01, 0.0, 5.0) +
+          number(block, "robot_radius", 0.0, 0.0, 1.0) + person_speed_ * reaction_time_;
   max_age_ns_ = static_cast<std::int64_t>(1e9 * number(block, "max_age", 0.2, 0.001, 60.0));
   absent_speed_ = number(block, "absent_speed", 0.0, 0.0, 10.0);
-  const std::string person = text(block, "person", "person");
-  person_ = robot.find(RobotSource::Estimated, person);
-  if (!person_.valid()) person_ = robot.find(RobotSource::Measured, person);
-  if (person_.size() != 3 && person_.size() != 7) {
-    throw block.error("it needs a robot signal '" + person +
-                      "' with the person's position (3 numbers) or pose (7); a file of signals "
-                      "brings it from a topic");
+  touch_speed_ = number(block, "touch_speed", 0.25, 0.0, 10.0);
+  const std::vector<std::string> touch = texts(block, "touch", {});
+  const std::vector<std::string> person = texts(block, "person", {"person"});
+  if (person.empty()) throw block.error("person expects a key or a list of keys, got none");
+  for (const std::string& key : person) {
+    const bool may_touch = std::find(touch.begin(), touch.end(), key) != touch.end();
+    person_.push_back({findPerson(robot, key, block), may_touch});
   }
-  const std::string hand = text(block, "robot", "ee");
-  hand_ = robot.find(RobotSource::Estimated, hand);
-  if (hand_.size() < 3) {
-    throw block.error("there is no pose estimatedData/" + hand + " of the robot's hand");
+  for (const std::string& key : touch) {
+    if (std::find(person.begin(), person.end(), key) != person.end()) continue;
+    throw block.error("touch has '" + key + "', which is not in person");
   }
+  const bool has_points = robot.find(RobotSource::Estimated, "arm_points").valid();
+  const std::string arm = texts(block, "robot", {has_points ? "arm_points" : "ee"}).at(0);
+  arm_ = robot.find(RobotSource::Estimated, arm);
+  if (arm_.size() != 7 && (arm_.size() < 3 || arm_.size() % 3 != 0)) {
+    throw block.error(
+        "there are no points (3 numbers each) and no pose (7) of the robot in "
+        "estimatedData/" +
+        arm);
+  }
+  arm_points_ = arm_.size() == 7 ? 1 : arm_.size() / 3;
   const Status declared =
       control.declare(ControlContainer::OtherReference, "speed_limit", 1, "m/s", "hand and elbow");
   if (!declared) throw std::runtime_error(declared.message());
   limit_ = control.find(ControlContainer::OtherReference, "speed_limit");
 }
 
-double SafeDistance::largestSpeed(double distance) const {
+double SafeDistance::largestSpeed(double distance) const noexcept {
   const double free = distance - kept_;
   if (free <= 0.0) return 0.0;
   const double b = reaction_time_ + person_speed_ / deceleration_;
   return deceleration_ * (std::sqrt(b * b + 2.0 * free / deceleration_) - b);
 }
 
+double SafeDistance::speedFor(const Eigen::Vector3d& person, bool may_touch,
+                              const RobotStates& robot) const noexcept {
+  const auto arm = robot.view(arm_);
+  const auto point = [&arm](int index) { return Eigen::Vector3d(arm.segment<3>(3 * index)); };
+  const int last = std::max(1, arm_points_ - 1);  // line, counted from 1
+  double nearest = std::numeric_limits<double>::infinity(), hand = nearest;
+  for (int line = 1; line <= last; ++line) {
+    hand = distanceToLine(person, point(line - 1), point(std::min(line, arm_points_ - 1)));
+    nearest = std::min(nearest, hand);
+  }
+  const double speed = largestSpeed(nearest);
+  return may_touch && hand <= nearest ? std::max(speed, touch_speed_) : speed;
+}
+
 void SafeDistance::updateStage(Stage stage, const RobotStates& robot,
                                ControlStates& control) noexcept {
   if (stage != Stage::Task) return;
-  double speed = absent_speed_;
-  const bool seen = robot.isFresh(person_, now_ns_, max_age_ns_);
-  if (seen && robot.stamp(hand_) != kNeverWritten) {
-    const Eigen::Vector3d person = robot.view(person_).head<3>();
-    const Eigen::Vector3d hand = robot.view(hand_).head<3>();
-    speed = largestSpeed((person - hand).norm());
+  double speed = std::numeric_limits<double>::infinity();
+  bool seen = false;
+  for (const Point& point : person_) {
+    if (!robot.isFresh(point.position, now_ns_, max_age_ns_)) continue;
+    if (robot.stamp(arm_) == kNeverWritten) continue;
+    seen = true;
+    const Eigen::Vector3d person = robot.view(point.position).head<3>();
+    speed = std::min(speed, speedFor(person, point.may_touch, robot));
   }
+  if (!seen) speed = absent_speed_;
   const bool stands = speed <= 0.0;
   if (stands && !standing_) {
     CTRL_MORE_LOG(log_, Warning,

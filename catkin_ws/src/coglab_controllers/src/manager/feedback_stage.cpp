@@ -72,6 +72,10 @@ FeedbackStage::FeedbackStage(const RobotSetup& setup, double period, bool lockst
   external_ = declare(robot_, RobotSource::Measured, "external_torque", kMaxJoints, "Nm", wire);
   wrench_ = declare(robot_, RobotSource::Measured, "wrench", 6, "N, Nm", "base");
   pose_ = declare(robot_, RobotSource::Estimated, "ee", 7, "m, quaternion x y z w", "base");
+  arm_points_ = declare(robot_, RobotSource::Estimated, "arm_points", 9,
+                        "m: elbow, wrist, tool frame", "base");
+  elbow_joint_ = setup.chain.elbowJoint();
+  wrist_joint_ = setup.chain.wristJoint();
   if (!setup.touch_topic.empty()) addSignals({touchSignal(setup.touch_topic, setup.tool_link)});
 }
 
@@ -117,11 +121,15 @@ bool FeedbackStage::fill(const CycleInput& input) noexcept {
       turn * Vector3(sample.tool_wrench.tail<3>());
   Eigen::Matrix<double, 7, 1> pose;
   pose << input.chain.tool.position, input.chain.tool.orientation.coeffs();
+  Eigen::Matrix<double, 9, 1> points;
+  points << input.chain.origins.col(elbow_joint_), input.chain.origins.col(wrist_joint_),
+      input.chain.tool.position;
   return robot_.write(position_, sample.position.data(), stamp) &&
          robot_.write(velocity_, sample.velocity.data(), stamp) &&
          robot_.write(torque_, sample.torque.data(), stamp) &&
          robot_.write(external_, sample.external_torque.data(), stamp) &&
-         robot_.write(wrench_, wrench.data(), stamp) && robot_.write(pose_, pose.data(), stamp);
+         robot_.write(wrench_, wrench.data(), stamp) && robot_.write(pose_, pose.data(), stamp) &&
+         robot_.write(arm_points_, points.data(), stamp);
 }
 
 }  // namespace coglab_controllers

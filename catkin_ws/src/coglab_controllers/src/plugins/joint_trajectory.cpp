@@ -11,17 +11,32 @@ namespace coglab_controllers {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kJoinTime = 0.5;    // s in which a difference at the start fades
-constexpr double kJoinShare = 0.2;   // of the arm's acceleration that this may take
-constexpr double kLatest = 1.0;      // s after its stamp that a trajectory may begin
-constexpr double kEarliest = 0.05;   // s before its stamp: two clocks differ by so much
-constexpr double kLongest = 3600.0;  // s
-constexpr std::size_t kMostPoints = 100000;
+constexpr double kJoinTime = 0.5;     // s in which a difference at the start fades
+constexpr double kJoinShare = 0.2;    // of the arm's acceleration that this may take
+constexpr double kLatest = 1.0;       // s after its stamp that a trajectory may begin
+constexpr double kEarliest = 0.05;    // s before its stamp: two clocks differ by so much
+constexpr double kLongest = 3600.0;   // s
+constexpr double kErased = -1.0;      // a tolerance that the client takes away
 constexpr double kCheckStep = 0.005;  // s between the states that are checked
 constexpr double kMostChecks = 20000.0;
-constexpr double kRest = 1e-3;              // rad/s: a last point slower than this is at rest
-constexpr double kRounding = 1.001;         // planners come this close to a limit
+constexpr int kLeastChecks = 4;      // between two points, so that none are too close to be checked
+constexpr double kRest = 1e-3;       // rad/s: a last point slower than this is at rest
+constexpr double kRounding = 1.001;  // planners come this close to a limit
 constexpr double kAccelerationSlack = 1.2;  // the arm's interpolator smooths short peaks
+
+/// Appends a number with six decimals, which show an error just beyond a tolerance, without zeros
+/// at their end. Control thread.
+void append(Reason& reason, double value) noexcept {
+  std::uint64_t millionths = static_cast<std::uint64_t>(std::min(value, 1e9) * 1e6 + 0.5);
+  reason << millionths / 1000000;
+  millionths %= 1000000;
+  if (millionths == 0) return;
+  reason << ".";
+  for (std::uint64_t digit = 100000; millionths > 0; digit /= 10) {
+    reason << millionths / digit;
+    millionths %= digit;
+  }
+}
 
 /// The motion in the control cycle.
 class TrajectoryMotion : public Motion<TrajectoryPlan> {
@@ -107,15 +122,15 @@ class TrajectoryMotion : public Motion<TrajectoryPlan> {
     const JointPoint &desired = progress_.desired, &actual = progress_.actual;
     state_ = MotionState::Aborted;
     reason_ = Reason(code, "joint ") << names_[static_cast<std::size_t>(i)].c_str() << " is ";
-    if (speed) {
-      reason_ << std::abs(desired.velocity[i] - actual.velocity[i])
-              << " rad/s off its speed; the tolerance of " << what << " is "
-              << tolerance.velocity[i] << " rad/s";
-    } else {
-      reason_ << std::abs(desired.position[i] - actual.position[i])
-              << " rad off its set-point; the tolerance of " << what << " is "
-              << tolerance.position[i] << " rad";
-    }
+    const double off =
+        speed ? desired.velocity[i] - actual.velocity[i] : desired.position[i] - actual.position[i];
+    const double most = speed ? tolerance.velocity[i] : tolerance.position[i];
+    const char* const unit = speed ? " rad/s" : " rad";
+    append(reason_, std::abs(off));
+    reason_ << unit << (speed ? " off its speed" : " off its set-point")
+            << ", more than the tolerance of " << what << ", ";
+    append(reason_, most);
+    reason_ << unit;
   }
 
   void arrive(double dt) noexcept {
@@ -142,6 +157,7 @@ RunnerPolicy trajectoryPolicy() {
   RunnerPolicy policy;
   policy.id_name = nullptr;
   policy.longest_queue = 0;
+  policy.spaces = ReferenceLoop::Spaces::Joint;
   return policy;
 }
 
@@ -175,11 +191,13 @@ class Reader {
   Reader(const RobotSetup& robot, const TrajectoryRequest& request)
       : robot_(robot), request_(request), names_(robot.chain.jointNames()) {}
 
-  void checkStamp() const {
-    if (!std::isfinite(request_.age) || request_.age < -kEarliest) {
+  /// @param begins false: the trajectory waits for the time of its stamp
+  void checkStamp(bool begins) const {
+    const double longest = begins ? kEarliest : TrajectoryRequest::kLongestWait;
+    if (!std::isfinite(request_.age) || request_.age < -longest) {
       refuse(TrajectoryError::InvalidGoal, ReasonCode::GoalFromFuture, "the trajectory begins in ",
-             -request_.age,
-             " s by its stamp; send it when it shall begin, or with stamp 0 to begin at once");
+             -request_.age, " s by its stamp; expected at most ", longest,
+             " s; send it later, or with stamp 0 to begin at once");
     }
     if (request_.age > kLatest) {
       refuse(TrajectoryError::OldHeaderTimestamp, ReasonCode::TooLate, "the trajectory is ",
@@ -206,8 +224,11 @@ class Reader {
   std::vector<JointPoint> readPoints() {
     const auto& points = request_.points;
     if (points.empty()) invalid("the trajectory has no points; expected one or more");
-    if (points.size() > kMostPoints)
-      invalid("the trajectory has ", points.size(), " points; expected at most ", kMostPoints);
+    if (points.size() > TrajectoryRequest::kMostPoints) {
+      invalid("the trajectory has ", points.size(), " points; expected at most ",
+              TrajectoryRequest::kMostPoints,
+              "; leave out points between which the path is smooth");
+    }
     std::vector<JointPoint> read;
     for (std::size_t k = 0; k < points.size(); ++k) {
       const TrajectoryRequest::Point& point = points[k];
@@ -237,20 +258,16 @@ class Reader {
   }
 
   /// Lets the path begin at the arm's set-point.
-  void join(std::vector<JointPoint>& points, const RobotSample& now, double tolerance) const {
+  /// @param start, goal start_tolerance and goal_tolerance, rad
+  void join(std::vector<JointPoint>& points, const RobotSample& now, double start,
+            double goal) const {
     if (points.front().time > 0.0) {
       JointPoint begin;
       begin.position = now.commanded_position;
       begin.velocity = now.commanded_velocity;
       points.insert(points.begin(), begin);
     } else {
-      int joint = 0;
-      const JointVector away = points.front().position - now.commanded_position;
-      if (away.cwiseAbs().maxCoeff(&joint) > tolerance) {
-        outOfRange("the trajectory begins ", std::abs(away[joint]), " rad from where joint ",
-                   name(joint), " is (", now.commanded_position[joint],
-                   " rad); allowed: ", tolerance, " rad (start_tolerance); plan again from there");
-      }
+      checkStart(points.front().position - now.commanded_position, points.back().time, start, goal);
     }
     if (!velocities()) {
       if (points.front().time == 0.0 && points.size() > 1)
@@ -267,34 +284,24 @@ class Reader {
     }
   }
 
+  /// A trajectory that begins later: the way to its first point is checked when it begins.
+  void leaveStartOpen(std::vector<JointPoint>& points) const {
+    if (!velocities()) JointSpline::estimateVelocities(points);
+  }
+
   /// Every state on the way against limits and workspace.
-  void checkWay(const JointSpline& spline) const {
-    const coglab_rt::JointLimits& limits = robot_.limits;
-    const double step = std::max(kCheckStep, spline.duration() / kMostChecks);
+  void checkWay(const std::vector<JointPoint>& points) const {
+    const double step = std::max(kCheckStep, points.back().time / kMostChecks);
     bool inside = false;  // has been, of the workspace: a path may lead into it
-    for (double time = 0.0;; time += step) {
-      const bool last = time >= spline.duration();
-      const JointPoint point = spline.at(time);
-      if (time > 0.0) checkPosition(point);
-      const auto slow = [&](const char* what, const JointVector& values, const JointVector& most,
-                            double slack, const char* unit) {
-        int joint = 0;
-        const auto share = values.array().abs() / most.array();
-        if (share.maxCoeff(&joint) <= slack) return;
-        outOfRange("joint ", name(joint), " has ", what, " ", values[joint], " ", unit, " at ",
-                   time, " s; allowed: ", most[joint], " ", unit, "; make it slower");
-      };
-      slow("velocity", point.velocity, limits.velocity, kRounding, "rad/s");
-      slow("acceleration", point.acceleration, limits.acceleration, kAccelerationSlack, "rad/s^2");
-      const WorkspaceBorder border =
-          robot_.workspace.violated(robot_.chain.evaluate(point.position).tool.position);
-      if (border == WorkspaceBorder::None) inside = true;
-      if (border != WorkspaceBorder::None && (inside || last)) {
-        refuse(TrajectoryError::InvalidGoal, ReasonCode::GoalOutsideWorkspace,
-               "the hand leaves the workspace at ", time, " s: ", describe(border));
+    for (std::size_t k = 1; k < points.size(); ++k) {
+      const JointPoint &from = points[k - 1], &to = points[k];
+      const double length = to.time - from.time;
+      const int parts = std::max(kLeastChecks, static_cast<int>(std::ceil(length / step)));
+      for (int part = 0; part <= parts; ++part) {
+        checkState(hermite(from, to, quintic(), from.time + part * length / parts), false, inside);
       }
-      if (last) return;
     }
+    checkState(points.back(), true, inside);
   }
 
   TrajectoryTolerance readTolerance(const char* field,
@@ -305,17 +312,69 @@ class Reader {
     for (const TrajectoryRequest::Tolerance& one : given) {
       const int joint = jointNamed(one.joint);
       if (joint < 0) invalidJoints(field, " has '", one.joint, "', which is no joint of the arm");
-      if (!std::isfinite(one.position) || !std::isfinite(one.velocity))
-        invalid(field, " of ", one.joint, " is not finite; expected rad and rad/s");
+      for (const double number : {one.position, one.velocity, one.acceleration}) {
+        if (std::isfinite(number) && (number >= 0.0 || number == kErased)) continue;
+        invalid(field, " of ", one.joint, " has ", number,
+                "; expected a positive number (rad, rad/s), 0 for the default, or -1 for no bound");
+      }
       if (one.position != 0.0) read.position[joint] = one.position > 0 ? one.position : kInfinity;
       if (one.velocity > 0.0) read.velocity[joint] = one.velocity;
     }
     return read;
   }
 
+  /// s after the end of the trajectory in which the arm comes within its goal tolerance.
+  double readGoalTime(double fallback) const {
+    const double given = request_.goal_time_tolerance;
+    if (!(given >= 0.0 && given <= kLongest)) {
+      invalid("goal_time_tolerance is ", given, " s; expected 0 for the default, ", fallback,
+              " s, or up to ", kLongest, " s");
+    }
+    return given > 0.0 ? given : fallback;
+  }
+
   bool quintic() const { return accelerations(); }
 
  private:
+  /// The arm is where the trajectory begins, or so near that the difference can fade on the way.
+  void checkStart(const JointVector& away, double duration, double start, double goal) const {
+    const double time = std::min(kJoinTime, duration);
+    for (int i = 0; i < robot_.chain.joints(); ++i) {
+      // The third-order fade of a difference d within T needs accelerations up to 6 d / T^2.
+      const double fades = kJoinShare * robot_.limits.acceleration[i] * time * time / 6.0;
+      const double most = std::min(start, std::max(goal, fades));
+      if (std::abs(away[i]) <= most) continue;
+      outOfRange("the trajectory begins ", std::abs(away[i]), " rad from where joint ", name(i),
+                 " is; allowed: ", most,
+                 most < start ? " rad, because the trajectory is too short to make up for more; "
+                                "give it a time to go there"
+                              : " rad (start_tolerance); plan again from there");
+    }
+  }
+
+  /// @param inside of the workspace, before this state and then with it
+  void checkState(const JointPoint& point, bool last, bool& inside) const {
+    const coglab_rt::JointLimits& limits = robot_.limits;
+    if (point.time > 0.0) checkPosition(point);
+    const auto slow = [&](const char* what, const JointVector& values, const JointVector& most,
+                          double slack, const char* unit) {
+      int joint = 0;
+      const auto share = values.array().abs() / most.array();
+      if (share.maxCoeff(&joint) <= slack) return;
+      outOfRange("joint ", name(joint), " has ", what, " ", values[joint], " ", unit, " at ",
+                 point.time, " s; allowed: ", most[joint], " ", unit, "; make it slower");
+    };
+    slow("velocity", point.velocity, limits.velocity, kRounding, "rad/s");
+    slow("acceleration", point.acceleration, limits.acceleration, kAccelerationSlack, "rad/s^2");
+    const WorkspaceBorder border =
+        robot_.workspace.violated(robot_.chain.evaluate(point.position).tool.position);
+    if (border == WorkspaceBorder::None) inside = true;
+    if (border != WorkspaceBorder::None && (inside || last)) {
+      refuse(TrajectoryError::InvalidGoal, ReasonCode::GoalOutsideWorkspace,
+             "the hand leaves the workspace at ", point.time, " s: ", describe(border));
+    }
+  }
+
   bool velocities() const { return !request_.points.front().velocities.empty(); }
   bool accelerations() const { return !request_.points.front().accelerations.empty(); }
   const std::string& name(int joint) const { return names_[static_cast<std::size_t>(joint)]; }
@@ -375,7 +434,7 @@ void JointTrajectory::configure(const MotionSetup& setup) {
   MotionRunner<TrajectoryPlan>::configure(setup);
 }
 
-TrajectoryAnswer JointTrajectory::read(const TrajectoryRequest& request,
+TrajectoryAnswer JointTrajectory::read(const TrajectoryRequest& request, bool begins,
                                        JointPath& trajectory) const {
   TrajectoryAnswer answer;
   try {
@@ -385,18 +444,21 @@ TrajectoryAnswer JointTrajectory::read(const TrajectoryRequest& request,
              "no joint state from the robot yet; start the robot's interface first");
     }
     Reader reader(*setup().robot, request);
-    reader.checkStamp();
+    reader.checkStamp(begins);
     reader.readNames();
     std::vector<JointPoint> points = reader.readPoints();
     trajectory.path =
         reader.readTolerance("path_tolerance", request.path_tolerance, path_tolerance_);
     trajectory.goal =
         reader.readTolerance("goal_tolerance", request.goal_tolerance, goal_tolerance_);
-    trajectory.goal_time =
-        request.goal_time_tolerance > 0.0 ? request.goal_time_tolerance : goal_time_;
-    reader.join(points, now, start_tolerance_);
+    trajectory.goal_time = reader.readGoalTime(goal_time_);
+    if (begins) {
+      reader.join(points, now, start_tolerance_, goal_tolerance_);
+    } else {
+      reader.leaveStartOpen(points);
+    }
+    reader.checkWay(points);
     trajectory.spline = JointSpline(std::move(points), reader.quintic());
-    reader.checkWay(trajectory.spline);
   } catch (const Refused& refused) {
     static_cast<Answer&>(answer) = Answer::refusal(refused.code, refused.sentence);
     answer.error = refused.error;
@@ -406,15 +468,40 @@ TrajectoryAnswer JointTrajectory::read(const TrajectoryRequest& request,
 
 TrajectoryAnswer JointTrajectory::check(const TrajectoryRequest& request) const {
   JointPath trajectory;
-  return read(request, trajectory);
+  return read(request, request.age >= 0.0, trajectory);
+}
+
+TrajectoryAnswer JointTrajectory::accept(WaitingTrajectory& waiting) {
+  const MotionRequest begun = setup().host->beginRequest(id());
+  waiting.accepted = begun.stamp;
+  TrajectoryAnswer answer;
+  if (begun.welcome.success) {
+    answer = check(waiting.request);
+  } else {
+    static_cast<Answer&>(answer) = begun.welcome;
+    answer.error = TrajectoryError::InvalidGoal;
+  }
+  return answer;
 }
 
 TrajectoryAnswer JointTrajectory::follow(const TrajectoryRequest& request) {
+  return begin(request, nullptr);
+}
+
+TrajectoryAnswer JointTrajectory::follow(const WaitingTrajectory& waiting) {
+  TrajectoryRequest request = waiting.request;
+  request.age = 0.0;
+  return begin(request, &waiting.accepted);
+}
+
+TrajectoryAnswer JointTrajectory::begin(const TrajectoryRequest& request,
+                                        const RequestStamp* accepted) {
   TrajectoryAnswer answer;
-  const MotionRequest begun = setup().host->beginRequest(id());
+  MotionRequest begun = setup().host->beginRequest(id());
+  if (accepted != nullptr) begun.stamp = *accepted;
   if (begun.welcome.success) {
     auto trajectory = std::make_unique<JointPath>();
-    answer = read(request, *trajectory);
+    answer = read(request, true, *trajectory);
     if (!answer.success) return answer;
     const auto& motion = static_cast<const TrajectoryMotion&>(inner());
     const std::uint64_t in_use = motion.begun.load(std::memory_order_acquire);

@@ -148,7 +148,7 @@ TEST_F(Following, ASlowClockTakesLongerOnTheSamePath) {
   ASSERT_TRUE(arm.manager->setSpeedScale(0.5).success);
   TrajectoryRequest request = through({home(0.3)});
   request.points[0].time = 1.0;
-  request.path_tolerance = {{controller->jointNames()[0], 0.03, 0.0}};
+  request.path_tolerance = {{controller->jointNames()[0], 0.03, 0.0, 0.0}};
   ASSERT_TRUE(controller->follow(request).success);
   arm.run(1.5);
   EXPECT_LT(arm.sample.position[0], kHome[0] + 0.28);
@@ -158,7 +158,7 @@ TEST_F(Following, ASlowClockTakesLongerOnTheSamePath) {
 TEST_F(Following, AJointThatLeavesThePathEndsIt) {
   TrajectoryRequest request = through({home(0.8)});
   request.points[0].time = 1.5;
-  request.path_tolerance = {{controller->jointNames()[6], 0.05, 0.0}};
+  request.path_tolerance = {{controller->jointNames()[6], 0.05, 0.0, 0.0}};
   ASSERT_TRUE(controller->follow(request).success);
   arm.run(0.3);
   arm.interpolator.reset();  // somebody pushes the last joint away
@@ -166,19 +166,68 @@ TEST_F(Following, AJointThatLeavesThePathEndsIt) {
   arm.tick();
   const EndedMotion end = runToEnd();
   EXPECT_EQ(JointTrajectory::errorOf(end), TrajectoryError::PathToleranceViolated);
-  EXPECT_NE(end.reason.str().find("tolerance of the path is 0.050 rad"), std::string::npos)
+  EXPECT_NE(end.reason.str().find("more than the tolerance of the path, 0.05 rad"),
+            std::string::npos)
       << end.reason.str();
 }
 
 TEST_F(Following, AnArmThatDoesNotArriveInTimeEndsIt) {
   TrajectoryRequest request = through({home(0.4)});
   request.points[0].time = 1.0;
-  request.goal_tolerance = {{controller->jointNames()[0], 1e-6, 0.0}};
+  request.goal_tolerance = {{controller->jointNames()[0], 1e-6, 0.0, 0.0}};
   request.goal_time_tolerance = 0.02;
   ASSERT_TRUE(controller->follow(request).success);
   const EndedMotion end = runToEnd();
   EXPECT_EQ(JointTrajectory::errorOf(end), TrajectoryError::GoalToleranceViolated)
       << end.reason.str();
+  EXPECT_NE(end.reason.str().find("tolerance of the goal, 0.000001 rad"), std::string::npos)
+      << end.reason.str();
+}
+
+TEST_F(Following, OneThatBeginsLaterWaitsAndAStopMakesItVoid) {
+  WaitingTrajectory waiting{through({home(0.0), home(0.3)}), {}};
+  waiting.request.age = -1.0;
+  expectRefused(waiting.request, TrajectoryError::InvalidGoal, "begins in 1 s");
+  ASSERT_TRUE(controller->accept(waiting).success);
+  arm.run(1.0);
+  EXPECT_TRUE(arm.manager->report().standing);
+  const TrajectoryAnswer begun = controller->follow(waiting);
+  ASSERT_TRUE(begun.success) << begun.message;
+  EXPECT_TRUE(runToEnd().executed);
+
+  WaitingTrajectory second{through({home(0.3), home(0.0)}), {}};
+  second.request.age = -1.0;
+  ASSERT_TRUE(controller->accept(second).success);
+  arm.manager->askCancel("trajectory", "enough");
+  arm.tick();
+  const TrajectoryAnswer cancelled = controller->follow(second);
+  EXPECT_EQ(cancelled.code, ReasonCode::Cancelled) << cancelled.message;
+  ASSERT_TRUE(controller->accept(second).success);
+  ++arm.sample.motion_epoch;  // the robot stopped meanwhile
+  arm.tick();
+  EXPECT_FALSE(controller->follow(second).success);
+  arm.run(0.1);
+  EXPECT_TRUE(arm.manager->report().standing);
+}
+
+TEST_F(Following, APointAtTheStartIsWhereTheArmIs) {
+  const TrajectoryRequest there = through({home(0.005)});
+  ASSERT_TRUE(controller->follow(there).success);
+  EXPECT_TRUE(runToEnd().executed);
+  expectRefused(through({home(0.04)}), TrajectoryError::InvalidGoal, "too short to make up");
+  TrajectoryRequest quick = through({home(0.045), home(0.045)});
+  quick.points[1].time = 0.1;
+  expectRefused(quick, TrajectoryError::InvalidGoal, "too short to make up");
+  quick.points[1].time = 1.0;
+  ASSERT_TRUE(controller->follow(quick).success);
+  EXPECT_TRUE(runToEnd().executed);
+  EXPECT_LE(steepest, 10.0 + 1e-6);
+}
+
+TEST_F(Following, OffersTheGainsThatItHas) {
+  std::vector<std::string> names;
+  for (const Tunable& gain : controller->tunables()->all()) names.push_back(gain.name);
+  EXPECT_EQ(names, std::vector<std::string>{"Kp"});
 }
 
 TEST_F(Following, WhatCannotBeFollowedIsRefusedBeforeAnythingMoves) {
@@ -215,15 +264,39 @@ TEST_F(Following, WhatCannotBeFollowedIsRefusedBeforeAnythingMoves) {
                 Error::InvalidGoal, "joint lwr_a5 has position");
   expectRefused(goal([](Request r) { r.points[1].time = 0.1; }), Error::InvalidGoal,
                 "make it slower");
+  // Between the states that are 5 ms apart.
+  expectRefused(goal([](Request r) {
+                  r.points[1].positions = r.points[0].positions;
+                  r.points[2].positions[0] = r.points[1].positions[0] + 0.01;
+                  r.points[2].time = r.points[1].time + 0.002;
+                }),
+                Error::InvalidGoal, "make it slower");
+  expectRefused(goal([](Request r) { r.points.resize(10001, r.points[0]); }), Error::InvalidGoal,
+                "10001 points; expected at most 10000");
   expectRefused(goal([](Request r) {
                   for (auto& point : r.points) point.velocities.assign(7, 0.0);
                   r.points[2].velocities[0] = 0.2;
                 }),
                 Error::InvalidGoal, "expected a last point at rest");
   expectRefused(goal([](Request r) { r.age = 5.0; }), Error::OldHeaderTimestamp, "5 s old");
-  expectRefused(goal([](Request r) { r.age = -5.0; }), Error::InvalidGoal, "begins in 5 s");
+  TrajectoryRequest later = through({home(0.0), home(0.3)});
+  later.age = -61.0;
+  EXPECT_NE(controller->check(later).message.find("begins in 61 s by its stamp; expected at most"),
+            std::string::npos);
+  for (const double odd : {-0.5, -2.0, nan}) {
+    expectRefused(goal([odd](Request r) { r.goal_time_tolerance = odd; }), Error::InvalidGoal,
+                  "goal_time_tolerance is");
+    expectRefused(goal([odd](Request r) {
+                    r.goal_tolerance = {{"lwr_a1", odd, 0.0, 0.0}};
+                  }),
+                  Error::InvalidGoal, "or -1 for no bound");
+    expectRefused(goal([odd](Request r) {
+                    r.goal_tolerance = {{"lwr_a1", 0.0, 0.0, odd}};
+                  }),
+                  Error::InvalidGoal, "or -1 for no bound");
+  }
   expectRefused(goal([nan](Request r) {
-                  r.path_tolerance = {{"lwr_a1", nan, 0.0}};
+                  r.path_tolerance = {{"lwr_a1", nan, 0.0, 0.0}};
                 }),
                 Error::InvalidGoal, "path_tolerance");
   JointVector low = JointVector::Zero();  // stretched out, the hand below the floor

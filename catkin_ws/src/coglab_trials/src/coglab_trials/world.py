@@ -47,6 +47,7 @@ BOARD = Pose(np.array([0.45, -0.55, 0.05]), about_z(-np.pi / 2))  # frame `board
 DT = 0.005  # s, FRI period
 TASK_LIMIT = 8.0  # s, time limit of a preshape or a grasp
 OLDEST = 1e9  # s, age of a frame that was never seen
+PERSON_TOPIC = "person/human_hand"  # of the file of signals of the manager SafeDistance
 DROPPED = 2  # number of worlds that may wait for Python's collector
 
 
@@ -112,6 +113,14 @@ class Robot:
         if self._report is None:
             self._report = self.virtual.report()
         return self._report
+
+    def has_signal(self, topic: str) -> bool:
+        """True if the file of signals has a row with this topic."""
+        try:
+            self.virtual.post_signal(topic, {}, age=OLDEST)
+        except ValueError:
+            return False
+        return True
 
     @property
     def outside(self) -> dict[str, int]:
@@ -351,6 +360,7 @@ class World:
         self.hand = Hand(self.cell)
         self.board = conditions.perception.calibration(seed) * BOARD
         """pose of the board as the tracker measures it, with the calibration error"""
+        self._person_topic = self.robot.has_signal(PERSON_TOPIC)
         self.robot.virtual.set_fixed_frame("board", self.board.position, self.board.orientation)
         self.trackers = {name: Tracker(name, conditions.perception, seed) for name in (self.object_frame, "human_hand")}
         self.after_period: list[Callable[[], None]] = []
@@ -398,3 +408,11 @@ class World:
                     self.robot.virtual.set_frame(
                         name, sight.frame.position, sight.frame.orientation, self.t - sight.captured
                     )
+                    if name == "human_hand" and self._person_topic:
+                        self._post_person(sight)
+
+    def _post_person(self, sight: Sight) -> None:
+        """Posts where the person is, as the node /person_points does. A sight that comes too late is refused."""
+        place = {"position": list(sight.frame.position), "orientation": list(sight.frame.orientation)}
+        age = self.t - sight.captured
+        self.robot.virtual.post_signal(PERSON_TOPIC, place, age=age, frame="lwr_base_link")

@@ -70,6 +70,47 @@ TEST_F(SafeDistanceTest, StandsWithoutANewPosition) {
   EXPECT_EQ(limit(slow), 0.25);
 }
 
+struct ArmDistanceTest : SafeDistanceTest {
+  ArmDistanceTest() {
+    robot.declare(RobotSource::Estimated, "arm_points", 9, "m", "base");
+    robot.declare(RobotSource::Estimated, "hand", 7, "m, 1", "base");
+    robot.declare(RobotSource::Estimated, "head", 3, "m", "base");
+  }
+  /// Elbow, wrist and palm on a line along x, at 0, 0.4 and 0.6 m.
+  double limitWith(CentralModule& module, const Eigen::Vector3d& hand,
+                   const Eigen::Vector3d& head) {
+    now += 5'000'000;
+    robot.setEstimatedData("arm_points", vectorOf({0, 0, 0, 0.4, 0, 0, 0.6, 0, 0}), now);
+    robot.setEstimatedData("hand", vectorOf({hand.x(), hand.y(), hand.z(), 0, 0, 0, 1}), now);
+    robot.setEstimatedData("head", vectorOf({head.x(), head.y(), head.z()}), now);
+    return limit(module);
+  }
+};
+
+TEST_F(ArmDistanceTest, TheNearestPointOfThePersonAndOfTheWholeArmCount) {
+  CentralModule module = make(", person: [hand, head], robot_radius: 0.1");
+  CentralModule single = make(", robot: ee");  // one point, without a radius
+  const Eigen::Vector3d away(0.0, 5.0, 0.0);
+  const double allowed = limitWith(module, {0.2, 1.0, 0.0}, away);  // beside the forearm
+  EXPECT_NEAR(allowed, limitAt(single, 0.9), 1e-12);
+  EXPECT_NEAR(limitWith(module, away, {0.2, 0.0, 1.0}), allowed, 1e-12);
+  EXPECT_EQ(limitWith(module, away, {-0.2, 0.0, 0.0}), 0.0) << "behind the elbow";
+  EXPECT_EQ(limitWith(module, {0.65, 0.0, 0.0}, away), 0.0) << "nobody may touch";
+  now += 1'000'000'000;
+  robot.setEstimatedData("head", vectorOf({0.2, 1.0, 0.0}), now);
+  EXPECT_NEAR(limit(module), allowed, 1e-12) << "the hand is out of sight, the head is seen";
+}
+
+TEST_F(ArmDistanceTest, WhoMayTouchComesToThePalmOfASlowArmAndToNoOtherPlace) {
+  CentralModule module =
+      make(", person: [hand, head], touch: [hand], touch_speed: 0.25, robot_radius: 0.1");
+  const Eigen::Vector3d away(0.0, 5.0, 0.0), palm(0.65, 0.0, 0.0);
+  EXPECT_EQ(limitWith(module, palm, away), 0.25);
+  EXPECT_GT(limitWith(module, {1.9, 0.0, 0.0}, away), 0.25);
+  EXPECT_EQ(limitWith(module, {0.1, 0.1, 0.0}, away), 0.0) << "the hand at the forearm";
+  EXPECT_EQ(limitWith(module, palm, {0.7, 0.1, 0.0}), 0.0) << "the head";
+}
+
 TEST_F(SafeDistanceTest, WrongBlocksAreRefused) {
   const auto refusal = [&](const std::string& settings) -> std::string {
     try {
@@ -82,6 +123,9 @@ TEST_F(SafeDistanceTest, WrongBlocksAreRefused) {
   EXPECT_TRUE(contains(refusal(", deceleration: 0"), "deceleration expects"));
   EXPECT_TRUE(contains(refusal(", person: nobody"), "needs a robot signal 'nobody'"));
   EXPECT_TRUE(contains(refusal(", persn: person"), "did you mean 'person'"));
+  EXPECT_TRUE(contains(refusal(", person: []"), "person expects a key"));
+  EXPECT_TRUE(contains(refusal(", touch: [hand]"), "touch has 'hand', which is not in person"));
+  EXPECT_TRUE(contains(refusal(", robot: nowhere"), "no points"));
 }
 
 }  // namespace

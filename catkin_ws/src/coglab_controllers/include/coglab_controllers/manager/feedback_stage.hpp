@@ -97,7 +97,8 @@ class FeedbackStage {
   Quaternion tool_from_wrench_;
   ctrl_more::RobotStates robot_;
   References references_;
-  ctrl_more::RobotSignal position_, velocity_, torque_, external_, wrench_, pose_;
+  ctrl_more::RobotSignal position_, velocity_, torque_, external_, wrench_, pose_, arm_points_;
+  int elbow_joint_ = 0, wrist_joint_ = 0;
   SignalInputs signals_;
   std::optional<coglab_rt::TripleBuffer<Snapshot>> snapshots_;
   ctrl_more::ManagerOptions options_;

@@ -38,15 +38,20 @@ struct TrajectoryRequest {
   };
   struct Tolerance {
     std::string joint;
-    double position = 0.0;  ///< rad; 0: the default, negative: no bound
-    double velocity = 0.0;  ///< rad/s; 0 or negative: no bound
+    double position = 0.0;      ///< rad; 0: the default, -1: no bound
+    double velocity = 0.0;      ///< rad/s; 0 or -1: no bound
+    double acceleration = 0.0;  ///< rad/s^2; 0, -1 or more; not used
   };
 
   std::vector<std::string> joint_names;  ///< all joints of the arm, in any order
   std::vector<Point> points;
   std::vector<Tolerance> path_tolerance, goal_tolerance;
   double goal_time_tolerance = 0.0;  ///< s; 0: parameter `goal_time`
-  double age = 0.0;  ///< s since the stamp of the trajectory, 0 without one; negative: ahead
+  /// s since the stamp of the trajectory, 0 without one; negative: it begins in so many seconds
+  double age = 0.0;
+
+  static constexpr std::size_t kMostPoints = 10000;
+  static constexpr double kLongestWait = 60.0;  ///< s that a stamp may be ahead
 };
 
 struct TrajectoryAnswer : MotionAnswer {
@@ -67,6 +72,12 @@ struct JointPath {
   std::uint64_t number = 0;
 };
 
+/// A trajectory that was accepted and begins at the time of its stamp.
+struct WaitingTrajectory {
+  TrajectoryRequest request;
+  RequestStamp accepted;  ///< a cancel, or a stop of the robot, after this makes it void
+};
+
 /// What the control cycle takes over.
 struct TrajectoryPlan {
   const JointPath* trajectory = nullptr;  ///< owned by the controller
@@ -82,8 +93,8 @@ struct TrajectoryProgress {
 
 /// Follows one trajectory at a time; a new one takes the place of the old one in mid-motion. It
 /// begins at the arm's set-point: what the first point differs by, at most `start_tolerance`, fades
-/// within half a second. While a speed limit or `speed_scale` slows the arm, the trajectory takes
-/// longer, on the same path.
+/// within half a second, or within the trajectory if it is shorter. While a speed limit or
+/// `speed_scale` slows the arm, the trajectory takes longer, on the same path.
 ///
 /// A joint that leaves the path tolerance ends the motion. It has ended well when all joints are
 /// within the goal tolerance, at most `goal_time` after its end.
@@ -94,11 +105,16 @@ class JointTrajectory : public MotionRunner<TrajectoryPlan> {
  public:
   JointTrajectory();
 
-  /// Whether a trajectory could begin now, apart from which controller is active: joints, sizes,
-  /// times, limits, workspace, and where the arm is. Any thread.
+  /// Whether a trajectory could begin, apart from which controller is active: joints, sizes, times,
+  /// limits, workspace, and where the arm is. Where the arm is does not count for a trajectory that
+  /// begins later (age < 0). Any thread.
   TrajectoryAnswer check(const TrajectoryRequest& request) const;
-  /// Checks a trajectory and begins it. Any thread.
+  /// Checks a trajectory that begins later. The caller keeps it until then. Any thread.
+  TrajectoryAnswer accept(WaitingTrajectory& waiting);
+  /// Checks a trajectory and begins it at once. Any thread.
   TrajectoryAnswer follow(const TrajectoryRequest& request);
+  /// The same for one that has waited; refused if it has become void.
+  TrajectoryAnswer follow(const WaitingTrajectory& waiting);
   /// What a client is told of a motion that ended.
   static TrajectoryError errorOf(const EndedMotion& end);
   /// Newest progress; one reader thread.
@@ -110,7 +126,8 @@ class JointTrajectory : public MotionRunner<TrajectoryPlan> {
 
  private:
   void report(std::int64_t stamp_ns) override;
-  TrajectoryAnswer read(const TrajectoryRequest& request, JointPath& trajectory) const;
+  TrajectoryAnswer read(const TrajectoryRequest& request, bool begins, JointPath& trajectory) const;
+  TrajectoryAnswer begin(const TrajectoryRequest& request, const RequestStamp* accepted);
 
   double path_tolerance_ = 0.2, goal_tolerance_ = 0.01, start_tolerance_ = 0.05;  // rad
   double goal_time_ = 2.0;                                                        // s
