@@ -20,6 +20,7 @@ GROUPS = {  # title: name of the plot, programs
     "Motion": ("motion", ("primitives", "kinematics")),
     "Wire, limits, dynamics": ("wire", ("wire", "limits", "dynamics")),
     "Hand, state machines, feedback, console": ("machines", ("hand", "machines", "feedback", "console")),
+    "Python and the researcher's commands": ("python", ("remote", "tools")),
 }
 HEAD = """# Benchmarks
 
