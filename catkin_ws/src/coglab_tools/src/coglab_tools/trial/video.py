@@ -45,7 +45,7 @@ class _World:
         self.solids = _cell.Cell(str(urdf), parameters)
         self.cell = self
         self.robot = SimpleNamespace(chain=cc.Chain(urdf.read_text(encoding="utf-8")))
-        self._trial, self._truth = trial, {}
+        self._truth: dict[str, Any] = {}
         self._joints = _table(trial.series.joints, 1)
         self._fingers = _table(trial.series.fingers, 1)
         self._hands = _table(trial.series.truth, 2)
@@ -107,8 +107,9 @@ def write_video(trial: Measured, file: Path) -> dict[str, float]:
         raise NotThere(f"the camera is not built ({error}); ./coglab trial video builds it") from None
 
     world: Any = _World(trial)
+    at_first: Any = SimpleNamespace(cell=world.solids, robot=world.robot)
     try:
-        painter = Painter(SimpleNamespace(cell=world.solids, robot=world.robot))
+        painter = Painter(at_first)
     except RuntimeError as error:
         raise CheckFailed(f"nothing can be drawn here: {error}") from None
     painter.world = world
