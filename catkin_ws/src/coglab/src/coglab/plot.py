@@ -104,7 +104,7 @@ def _phases(axis: Axes, trial: Series, start: float, end: float) -> list[Any]:
     unnamed: dict[str, Any] = {}
     axis.set_xlim(0.0, end - start)
     axis.set_ylim(len(lanes) - 0.5, -0.5)
-    axis.figure.canvas.draw()  # to know the width of the bars
+    axis.figure.draw_without_rendering()  # to know the width of the bars
     renderer = axis.figure.canvas.get_renderer()
     for lane, (_, rows) in enumerate(lanes):
         height = 0.84 / len(rows)

@@ -175,7 +175,7 @@ def video(options: argparse.Namespace) -> Answer:
     from coglab_tools.trial.video import KINDS, write_video
 
     place, trial = _measured(options)
-    file = options.out or place / "trial.gif"
+    file: Path = options.out or place / "trial.gif"
     if file.suffix.lower() not in KINDS:
         raise UsageError(f"{file} ends with {file.suffix or 'nothing'}: {' or '.join(KINDS)} is expected")
     data = write_video(trial, file)

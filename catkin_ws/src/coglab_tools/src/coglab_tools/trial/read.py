@@ -296,7 +296,7 @@ def _from_bag(file: Path, record: TrialRecord) -> Measured:
     if wanted:
         start, end = wanted[0].started, wanted[0].ended
     else:
-        start, end = _span(series, record)
+        start, end = _span(file, series, record)
     sources = {"hands": "truth of the simulation", "force": "truth of the simulation"}
     true_hands = len(series.truth) > 2
     if not true_hands:
@@ -319,12 +319,13 @@ def _from_bag(file: Path, record: TrialRecord) -> Measured:
     )
 
 
-def _span(series: Series, record: TrialRecord) -> tuple[float, float]:
+def _span(file: Path, series: Series, record: TrialRecord) -> tuple[float, float]:
     """Start and end of the action without a result: by the transitions, else all that was recorded."""
     every = [row[0] for rows in (series.joints, series.truth, series.transitions) for row in rows]
     if not every:
         raise CheckFailed(
-            f"the bag of {record.id} has no message of a handover: no {JOINTS}, coglab/transitions or truth"
+            f"{file} has no message of a handover: no {JOINTS}, coglab/transitions or {TRUTH}; `rosbag info` lists "
+            "what it has"
         )
     begun = [row[0] for row in series.transitions if row[4] == record.action]
     start = begun[0] if begun else min(every)

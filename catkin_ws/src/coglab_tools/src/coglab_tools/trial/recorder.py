@@ -266,7 +266,8 @@ class Recorder:
 
     def _give_up(self, error: Exception) -> None:
         trial, self._trial = self._trial, None
-        where = f"{self.folder}: {' '.join(str(error).split()) or type(error).__name__}"
+        why = getattr(error, "strerror", None) or " ".join(str(error).split()) or type(error).__name__
+        where = f"{self.folder}: {why}"
         self._say(f"this handover is not recorded, {where}; the robot goes on. Make room or name another folder", True)
         if trial is not None:
             try:

@@ -17,7 +17,7 @@ from coglab_tools.command import CheckFailed, NotThere, progress
 from coglab_tools.files import write_by
 from coglab_tools.trial.read import Measured
 
-RATE = 12.0  # frames per second
+RATE = 12.5  # frames per second; a GIF shows each for whole hundredths of a second
 BEFORE = 0.5  # s before the action that are drawn, too
 LONGEST = 120.0  # s of a trial that are drawn
 COLOURS = 96  # of a GIF
@@ -45,7 +45,7 @@ class _World:
         self.solids = _cell.Cell(str(urdf), parameters)
         self.cell = self
         self.robot = SimpleNamespace(chain=cc.Chain(urdf.read_text(encoding="utf-8")))
-        self._trial, self._truth = trial, {}
+        self._truth: dict[str, Any] = {}
         self._joints = _table(trial.series.joints, 1)
         self._fingers = _table(trial.series.fingers, 1)
         self._hands = _table(trial.series.truth, 2)
@@ -98,15 +98,18 @@ def write_video(trial: Measured, file: Path) -> dict[str, float]:
     if moving and shutil.which("ffmpeg") is None:
         raise NotThere("an .mp4 needs ffmpeg: sudo apt install ffmpeg; a .gif does not")
     if not trial.series.joints:
-        raise CheckFailed(f"{trial.record.id} has no joint positions, so there is nothing to draw")
+        raise CheckFailed(
+            f"the trial {trial.record.id} has no joint positions (lwr/joint_states), so there is nothing to draw"
+        )
     try:
         from coglab_bringup.film import Painter
     except ImportError as error:
         raise NotThere(f"the camera is not built ({error}); ./coglab trial video builds it") from None
 
     world: Any = _World(trial)
+    at_first: Any = SimpleNamespace(cell=world.solids, robot=world.robot)
     try:
-        painter = Painter(SimpleNamespace(cell=world.solids, robot=world.robot))
+        painter = Painter(at_first)
     except RuntimeError as error:
         raise CheckFailed(f"nothing can be drawn here: {error}") from None
     painter.world = world
