@@ -99,7 +99,8 @@ def reports(quick: bool) -> Iterator[Row]:
 
 def workers(quick: bool) -> Iterator[Row]:
     """Virtual trials on two workers over one."""
-    plan = "version: 1\nname: pilot\nconditions:\n  usual: {timing: natural}\nparticipants: %d\nblocks: 1\nrepetitions: 4\ntrial: [receive, give]\n"
+    plan = "version: 1\nname: pilot\nconditions: {usual: {timing: natural}}\nrepetitions: 4\ntrial: [receive, give]\n"
+    plan += "participants: %d\n"
     spent = []
     with tempfile.TemporaryDirectory() as place:
         for count in (1, 2):
@@ -112,8 +113,8 @@ def workers(quick: bool) -> Iterator[Row]:
 
 def environment(quick: bool) -> Iterator[Row]:
     """Steps of an environment without the shipped brain, over the processor time of one core."""
-    import gymnasium
     import coglab.envs  # noqa: F401  (registers the environments)
+    import gymnasium
     from coglab.envs.policies import StraightReach
     from coglab.envs.referee import RECEIVE
 

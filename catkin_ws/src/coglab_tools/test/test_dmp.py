@@ -69,7 +69,7 @@ def test_each_column_has_the_unit_of_its_name(tmp_path):
     times, places = reach()
     yaw = 3.0 * share((times - REST) / DURATION)  # degrees, as small as radians could be
     columns = [times, 1000 * places[:, 0], 100 * places[:, 1], places[:, 2], 0 * times, 0 * times, yaw]
-    found = read(write(tmp_path / "a.csv", "t,x_mm,y [cm],z_m,roll,pitch,yaw_deg", columns))
+    found = read(write(tmp_path / "a.csv", "t,x_mm,y [cm],z_m,roll_rad,pitch_rad,yaw_deg", columns))
     assert follows(found, times, places)
     assert 2 * np.arccos(found.orientations[-1][3]) == pytest.approx(np.radians(3.0), abs=1e-4)
     said = "; ".join(found.notes)
@@ -152,9 +152,14 @@ def faulty(name, tmp_path):
         return write(path, "t,x,y,z", [times, *places.T]), "jumps by 1.5"
     if name == "backward":
         times[100:] -= 0.5
-        return write(path, "t,x,y,z", [times, *places.T]), "time goes back by 0.49"
+        return write(path, "t,x,y,z", [times, *places.T]), "102: time goes back by 0.49"
     if name == "unit":
         return write(path, "t,x,y,z", [times, *(10 * places).T]), "name the unit with --length"
+    if name == "half_named":
+        return write(path, "t,x_mm,y,z", [times, 1000 * places[:, 0], *places[:, 1:].T]), "y, z none"
+    if name == "step":
+        places[120:, 0] += 0.1
+        return write(path, "t,x,y,z", [times, *places.T]), "jumps by 0.1"
     if name == "quaternion":
         q = [0 * times, 0 * times, 0 * times, 0 * times + 0.5]
         return write(path, "t,x,y,z,qx,qy,qz,qw", [times, *places.T, *q]), "quaternion of length 0.50"
@@ -163,7 +168,21 @@ def faulty(name, tmp_path):
     return path, "no npz file" if name == "npz" else "no readable bag"
 
 
-FAULTS = ("empty", "words", "columns", "no_reach", "gap", "swap", "backward", "unit", "quaternion", "npz", "bag")
+FAULTS = (
+    "empty",
+    "words",
+    "columns",
+    "no_reach",
+    "gap",
+    "swap",
+    "step",
+    "backward",
+    "unit",
+    "half_named",
+    "quaternion",
+    "npz",
+    "bag",
+)
 
 
 @pytest.mark.parametrize("name", FAULTS)

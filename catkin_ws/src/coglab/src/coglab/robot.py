@@ -297,13 +297,15 @@ class Arm:
                 robot.pause(10.0)  # lead the hand
             print(robot.arm.joints)
 
-        Refused: the brain acts, or the arm has no such mode (``arm:=ideal``). On a real arm the load data of tool and
-        object must be right, or the arm sinks: hold it.
+        Refused: the brain acts, the hand holds an object (the arm would sink under its weight), or the arm has no such
+        mode (``arm:=ideal``). On a real arm the load data of the tool must be right, or the arm sinks: hold it.
         """
         robot, arm = self._robot, self._cell.arm
         robot._check()
         robot._end_own_motion("hand guiding of the same caller")
         robot._await_hub("hand guiding")
+        if held := robot.state.holding:
+            raise Refused(f"the hand holds '{held}', and the arm would sink under its weight: give it or put it first")
 
         def command(*events: str) -> None:
             for event in events:

@@ -130,6 +130,10 @@ def demonstrations(options: argparse.Namespace) -> list[Any]:
 def record(options: argparse.Namespace) -> Answer:
     """`dmp record`."""
     import re
+    import signal
+    import tempfile
+
+    from coglab_tools.files import write_whole
 
     if not re.fullmatch(r"[A-Za-z0-9_.-]{1,64}", options.name):
         raise UsageError(f"the name '{options.name}': expected 1 to 64 letters, digits, '_', '-' or '.'")
@@ -145,8 +149,14 @@ def record(options: argparse.Namespace) -> Answer:
     from coglab_tools.dmp.cut import reaches
 
     terminal = recorder.Terminal()
+    write_whole(path, "")  # a folder that cannot be written is found out before anything moves
+    path.unlink()
+    for number in (signal.SIGHUP, signal.SIGTERM):  # as Ctrl-C: hand guiding has to end
+        signal.signal(number, signal.default_int_handler)
     try:
         with coglab.connect(options.master or _running_master()) as robot:
+            if not options.frame:
+                recorder.check_free(robot)
             button = recorder.Button(options.button) if options.button else None
             if not options.frame:
                 terminal.say("hand guiding: take the robot's hand. The arm gives way as soon as the count is over")
@@ -170,11 +180,16 @@ def record(options: argparse.Namespace) -> Answer:
         raise NotThere(str(error)) from None
     except (coglab.Refused, TimeoutError) as error:
         raise CheckFailed(str(error)) from None
-    recorded.save(path)
+    try:
+        recorded.save(path)
+    except CheckFailed as error:
+        kept = recorded.save(Path(tempfile.mkdtemp(prefix="coglab-")) / path.name)
+        raise CheckFailed(f"{error}. What was recorded is in {kept}") from None
     try:
         found = reaches(recorded)
     except CheckFailed as error:
-        raise CheckFailed(f"{error}. What was recorded is in {path}") from None
+        kept = path.rename(path.with_name(f"{path.name}.failed"))
+        raise CheckFailed(f"{error}. What was recorded is in {kept}") from None
     lines = [f"wrote {path}: {recorded.duration:.1f} s, {len(recorded.times)} samples", *_table(found)]
     return Answer(
         "\n".join([*lines, *([state] if state else [])]),

@@ -50,15 +50,15 @@ class Demonstration:
         """m/s, (n,)"""
         return np.asarray(np.linalg.norm(np.gradient(self.positions, self.times, axis=0), axis=1), dtype=float)
 
-    def save(self, path: Path) -> None:
-        """Write the demonstration file. It is there whole or not at all."""
+    def save(self, path: Path) -> Path:
+        """Write the demonstration file. It is there whole or not at all. Returns its path."""
         columns, header = [self.times - self.times[0], *self.positions.T], "t,x,y,z"
         if self.orientations is not None:
             columns, header = [*columns, *self.orientations.T], header + ",qx,qy,qz,qw"
         if self.closing is not None:
             columns, header = [*columns, self.closing], header + ",closing"
         lines = [header, *(",".join(f"{value:.9g}" for value in row) for row in np.column_stack(columns))]
-        write_whole(path, "\n".join(lines) + "\n")
+        return write_whole(path, "\n".join(lines) + "\n")
 
 
 def for_shell(path: Path) -> str:

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -38,6 +38,8 @@ MOTOR_CLOSED = 254.0  # position of a closed motor of the IH2 hand
 
 Table = dict[str, Array]
 """Numbers by column name, each (n,)"""
+Place = Callable[[int], str]
+"""Where a sample is in its file, in words, by its index"""
 
 
 @dataclass(frozen=True)
@@ -69,16 +71,16 @@ def read(path: Path, source: Source = Source()) -> Demonstration:
     if not path.is_file():
         raise NotThere(f"{path}: no such file")
     try:
-        table, units, lines = reader(path, source)
+        table, units, place = reader(path, source)
     except OSError as error:
         raise CheckFailed(f"{path} cannot be read: {error.strerror or error}") from None
-    return _judge(path, table, units, lines, source)
+    return _judge(path, table, units, place, source)
 
 
 # --- the three kinds of file: numbers by column name, units by column name, and where sample i is in the file ---
 
 
-def _read_csv(path: Path, source: Source) -> tuple[Table, dict[str, str], str]:
+def _read_csv(path: Path, source: Source) -> tuple[Table, dict[str, str], Place]:
     with open(path, newline="", encoding="utf-8-sig", errors="replace") as stream:
         first = stream.readline()
         stream.seek(0)
@@ -122,7 +124,7 @@ def _read_csv(path: Path, source: Source) -> tuple[Table, dict[str, str], str]:
         except ValueError:
             bad = next(row for row in kept if not _is_number(row[i]))
             raise CheckFailed(f"{path}:{bad[-1]}: expected a number for {header[i]}, got '{bad[i]}'") from None
-    return table, units, "line"
+    return table, units, lambda i: f"line {kept[i][-1]}"
 
 
 def _is_number(text: str) -> bool:
@@ -147,7 +149,7 @@ def _named(header: list[str]) -> tuple[list[str], dict[str, str]]:
     return names, units
 
 
-def _read_npz(path: Path, source: Source) -> tuple[Table, dict[str, str], str]:
+def _read_npz(path: Path, source: Source) -> tuple[Table, dict[str, str], Place]:
     try:
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: np.asarray(file[name], dtype=float) for name in file.files}
@@ -172,10 +174,10 @@ def _read_npz(path: Path, source: Source) -> tuple[Table, dict[str, str], str]:
     wrong = [f"{name} has {len(value)}" for name, value in table.items() if len(value) != n]
     if wrong:
         raise CheckFailed(f"{path}: expected {n} values in each array as in t, but {', '.join(wrong)}")
-    return table, {}, "sample"
+    return table, {}, lambda i: f"sample {i + 1}"
 
 
-def _read_bag(path: Path, source: Source) -> tuple[Table, dict[str, str], str]:
+def _read_bag(path: Path, source: Source) -> tuple[Table, dict[str, str], Place]:
     try:
         import rosbag
     except ImportError as error:
@@ -195,8 +197,10 @@ def _read_bag(path: Path, source: Source) -> tuple[Table, dict[str, str], str]:
             fingers = _fingers(bag, info)
     except rosbag.ROSBagException as error:
         raise CheckFailed(f"{path}: no readable bag ({error}); if it was cut off: rosbag reindex {path}") from None
-    except (OSError, ValueError, KeyError) as error:
-        raise CheckFailed(f"{path}: no readable bag ({error})") from None
+    except CheckFailed:
+        raise
+    except Exception as error:  # of rosbag, genpy, struct or the file: a foreign or damaged bag
+        raise CheckFailed(f"{path}: no readable bag ({' '.join(str(error).split())})") from None
     if not rows:
         what = f"'{source.world}' -> '{source.frame or 'human_hand'}'" if "tf" in topic else "a pose or seven joints"
         raise CheckFailed(f"{path}: {topic} has no {what}; choose with --frame, --world or --topic")
@@ -204,7 +208,7 @@ def _read_bag(path: Path, source: Source) -> tuple[Table, dict[str, str], str]:
     if len(fingers):
         order = np.argsort(fingers[:, 0])
         table["closing"] = np.interp(table["t"], fingers[order, 0], fingers[order, 1])
-    return table, {"t": "s"}, "message"
+    return table, {"t": "s"}, lambda i: f"message {i + 1}"
 
 
 POSES = ("geometry_msgs/PoseStamped", "geometry_msgs/PoseWithCovarianceStamped", "geometry_msgs/TransformStamped")
@@ -236,12 +240,12 @@ def _rows(message: Any, when: Any, source: Source) -> list[dict[str, float]]:
             for item in message.transforms
             if item.child_frame_id.lstrip("/") == frame and item.header.frame_id.lstrip("/") == source.world
         ]
-        return [_pose_row(i.header.stamp, i.transform.translation, i.transform.rotation) for i in found]
+        return [_pose_row(i.header.stamp, when, i.transform.translation, i.transform.rotation) for i in found]
     if hasattr(message, "transform"):
-        return [_pose_row(message.header.stamp, message.transform.translation, message.transform.rotation)]
+        return [_pose_row(message.header.stamp, when, message.transform.translation, message.transform.rotation)]
     if hasattr(message, "pose"):
         pose = getattr(message.pose, "pose", message.pose)
-        return [_pose_row(message.header.stamp, pose.position, pose.orientation)]
+        return [_pose_row(message.header.stamp, when, pose.position, pose.orientation)]
     if hasattr(message, "position") and hasattr(message, "name"):
         by_name = dict(zip(message.name, message.position, strict=False))
         if all(name in by_name for name in JOINTS):
@@ -249,8 +253,17 @@ def _rows(message: Any, when: Any, source: Source) -> list[dict[str, float]]:
     return []
 
 
-def _pose_row(stamp: Any, p: Any, q: Any) -> dict[str, float]:
-    return {"t": stamp.to_sec(), "x": p.x, "y": p.y, "z": p.z, "qx": q.x, "qy": q.y, "qz": q.z, "qw": q.w}
+def _pose_row(stamp: Any, when: Any, p: Any, q: Any) -> dict[str, float]:
+    return {
+        "t": stamp.to_sec() or when.to_sec(),
+        "x": p.x,
+        "y": p.y,
+        "z": p.z,
+        "qx": q.x,
+        "qy": q.y,
+        "qz": q.z,
+        "qw": q.w,
+    }
 
 
 def _fingers(bag: Any, info: Mapping[str, Any]) -> Array:
@@ -269,7 +282,7 @@ def _fingers(bag: Any, info: Mapping[str, Any]) -> Array:
 # --- judging ---
 
 
-def _judge(path: Path, table: Table, units: dict[str, str], what: str, source: Source) -> Demonstration:
+def _judge(path: Path, table: Table, units: dict[str, str], place: Place, source: Source) -> Demonstration:
     notes: list[str] = []
     n = len(table["t"])
     joints = all(name in table for name in JOINTS)
@@ -279,25 +292,28 @@ def _judge(path: Path, table: Table, units: dict[str, str], what: str, source: S
     whole = np.isfinite(np.column_stack([table[name] for name in used])).all(axis=1)
     if not whole.all():
         first = int(np.argmin(whole))
-        notes.append(
-            f"{n - int(whole.sum())} of {n} samples are not finite and were left out, first {what} {first + 1}"
-        )
+        notes.append(f"{n - int(whole.sum())} of {n} samples are not finite and were left out, first {place(first)}")
     if whole.sum() < 10:
         raise CheckFailed(f"{path}: expected at least 10 finite samples, got {int(whole.sum())}")
-    table = {name: value[whole] for name, value in table.items()}
+    table, index = {name: value[whole] for name, value in table.items()}, np.flatnonzero(whole)
+    if len(np.unique(table["t"])) < 10:
+        raise CheckFailed(f"{path}: expected at least 10 different times, got {len(np.unique(table['t']))}")
+    lonely = [name for name in ("roll", "pitch", "yaw", "qx", "qy", "qz", "qw") if name in table and name not in used]
+    if lonely:
+        notes.append(f"{', '.join(lonely)} alone tell no turn and were left out: qx, qy, qz, qw or roll, pitch, yaw")
 
-    _convert_named(table, units, source, notes)
+    _convert_named(path, table, units, source, notes)
     times = table["t"] * _time_unit(table["t"], source.time or units.get("t", ""), notes)
     if np.any(np.diff(times) < 0.0):
         at = int(np.argmax(np.diff(times) < 0.0))
         raise CheckFailed(
-            f"{path}: {what} {at + 2}: time goes back by {times[at] - times[at + 1]:.4f} s; cut the file there"
+            f"{path}: {place(int(index[at + 1]))}: time goes back by {times[at] - times[at + 1]:.4f} s; cut the file there"
         )
     if joints:
         table.update(_palm_of(np.column_stack([table[name] for name in JOINTS]), source, units, notes))
     places = np.column_stack([table[name] for name in "xyz"])
     places = places * _length_unit(path, places, source.length or units.get("x", "m" if joints else ""), notes)
-    turns = _turns(path, table, source.angle or units.get("roll", ""), notes)
+    turns = _turns(path, table, source.angle or units.get("roll", ""), notes, lambda i: place(int(index[i])))
 
     same = np.zeros(len(times), dtype=bool)
     same[1:] = (np.diff(times) <= 0.0) | (np.all(np.diff(places, axis=0) == 0.0, axis=1) & _moves(places)[1:])
@@ -329,9 +345,9 @@ def _turn_names(table: Table) -> tuple[str, ...]:
     return ()
 
 
-def _convert_named(table: Table, units: dict[str, str], source: Source, notes: list[str]) -> None:
-    """Bring columns of one kind whose names have units to m and rad, each by its own unit. A column without a unit has
-    that of its neighbours. Nothing to do where no name has one, or where the caller has said the unit."""
+def _convert_named(path: Path, table: Table, units: dict[str, str], source: Source, notes: list[str]) -> None:
+    """Bring columns of one kind whose names have units to m and rad, each by its own unit. Nothing to do where no name
+    has one, or where the caller has said the unit. CheckFailed: some of them have one, others have none."""
     for names, known, given in (
         (("x", "y", "z"), LENGTH, source.length),
         (("roll", "pitch", "yaw"), ANGLE, source.angle),
@@ -340,10 +356,16 @@ def _convert_named(table: Table, units: dict[str, str], source: Source, notes: l
         named = {name: units[name] for name in names if units.get(name) in known}
         if given or not named:
             continue
+        bare = [name for name in names if name in table and name not in named]
+        option = "--length" if known is LENGTH else "--angle"
+        if bare and all(name in table for name in names):
+            raise CheckFailed(
+                f"{path}: {', '.join(named)} have a unit in their names, {', '.join(bare)} none: write one behind each "
+                f"name, or name the unit of all with {option}"
+            )
         base = next(iter(known))
-        for name in names:
-            unit = named.get(name, next(iter(named.values())))
-            if name in table:
+        for name, unit in named.items():
+            if name in table and all(each in table for each in names):
                 table[name] = table[name] * known[unit]
                 units[name] = base
                 if unit != base:
@@ -400,7 +422,7 @@ def _palm_of(joints: Array, source: Source, units: dict[str, str], notes: list[s
     return dict(zip(("x", "y", "z", "qx", "qy", "qz", "qw"), (*places.T, *turns.T), strict=True))
 
 
-def _turns(path: Path, table: Table, given: str, notes: list[str]) -> Array | None:
+def _turns(path: Path, table: Table, given: str, notes: list[str], place: Place) -> Array | None:
     """Quaternions (n, 4) without changes of sign."""
     names = _turn_names(table)
     if not names:
@@ -415,9 +437,7 @@ def _turns(path: Path, table: Table, given: str, notes: list[str]) -> Array | No
         lengths = np.linalg.norm(values, axis=1)
         if np.any(np.abs(lengths - 1.0) > 0.05):
             at = int(np.argmax(np.abs(lengths - 1.0)))
-            raise CheckFailed(
-                f"{path}: sample {at + 1}: a quaternion of length {lengths[at]:.2f}, expected 1 (x y z w)"
-            )
+            raise CheckFailed(f"{path}: {place(at)}: a quaternion of length {lengths[at]:.2f}, expected 1 (x y z w)")
         q = values / lengths[:, None]
     signs = np.cumprod(np.where(np.sum(q[1:] * q[:-1], axis=1) < 0.0, -1.0, 1.0))
     q[1:] *= signs[:, None]
@@ -439,22 +459,29 @@ def _closing(table: Table, notes: list[str]) -> Array | None:
 def _without_jumps(path: Path, times: Array, places: Array, kept: Any, notes: list[str]) -> Any:
     """Indices of the samples that can be true. A jump that is taken back soon is left out; another one is refused."""
     good: list[int] = []
-    left, since = 0, -1
+    left, since, before = 0, -1, -1  # samples left out; where the hand jumped away; the sample before
     for i in np.flatnonzero(kept):
-        if good:
-            last = good[-1]
-            if np.linalg.norm(places[i] - places[last]) > FASTEST * (times[i] - times[last]):
-                since = i if since < 0 else since
-                left += 1
-                if times[i] - times[since] > BRIEF_JUMP:
-                    way = np.linalg.norm(places[since] - places[last])
-                    raise CheckFailed(
-                        f"{path}: the hand jumps by {way:.2f} m at {times[since] - times[0]:.2f} s and stays there: "
-                        "the tracker took something else for it; cut the file there, or record again"
-                    )
-                continue
-        since = -1
-        good.append(int(i))
+        jumps = before >= 0 and _faster(places, times, before, i)
+        before = i
+        if since < 0 and not jumps:
+            good.append(int(i))
+        elif since >= 0 and jumps and not _faster(places, times, good[-1], i):  # it jumps back
+            since = -1
+            good.append(int(i))
+        else:
+            since = i if since < 0 else since
+            left += 1
+            if times[i] - times[since] > BRIEF_JUMP:
+                way = np.linalg.norm(places[since] - places[good[-1]])
+                raise CheckFailed(
+                    f"{path}: the hand jumps by {way:.2f} m at {times[since] - times[0]:.2f} s and stays there: "
+                    "the tracker took something else for it; cut the file there, or record again"
+                )
     if left:
         notes.append(f"{left} samples jump faster than {FASTEST:g} m/s and were left out")
     return np.array(good)
+
+
+def _faster(places: Array, times: Array, a: int, b: int) -> bool:
+    """Whether the hand would be faster than FASTEST from sample a to sample b."""
+    return bool(np.linalg.norm(places[b] - places[a]) > FASTEST * (times[b] - times[a]))

@@ -97,6 +97,8 @@ def record(
     rests for 0.5 s after a reach, or after `limit` s. `show` gets a line ten times a second. CheckFailed if the arm
     runs away, the brain begins to act, or nothing was recorded.
     """
+    if not frame:
+        check_free(robot)
     trace = Trace()
     problem = ""
     try:
@@ -141,6 +143,17 @@ def _follow(
             if not frame and robot.state.state != hub:
                 raise CheckFailed(f"the brain left {hub}: somebody started an action; hand guiding was ended")
         robot.pause(SEEN_PERIOD if frame else PERIOD)
+
+
+def check_free(robot: Any) -> None:
+    """CheckFailed unless the arm can be led now: no action runs, and the hand is empty."""
+    state = robot.state
+    if state.holding:
+        raise CheckFailed(
+            f"the hand holds '{state.holding}', and the arm would sink under its weight: give it or put it first"
+        )
+    if state.state and not state.actions:
+        raise CheckFailed(f"an action runs ({state.state}): record when it has ended; ./coglab status shows it")
 
 
 def settle(robot: Any, terminal: Terminal, stay: bool) -> str:
