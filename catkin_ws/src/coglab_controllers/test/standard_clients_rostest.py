@@ -83,6 +83,26 @@ class StandardClients(unittest.TestCase):
         self.assertEqual(self.client.trajectories.get_state(), GoalStatus.PREEMPTED)
         wait_until(lambda: self.robot.status.standing, "the arm stands")
 
+    def test_3b_a_goal_for_later_waits_for_its_stamp_and_can_be_cancelled(self) -> None:
+        here = {JOINTS[0]: self.robot.arm()[0] + 0.1}
+        goal = self.client.goal([(1.0, here)])
+        goal.trajectory.header.stamp = begin = rospy.Time.now() + rospy.Duration(2.0)
+        self.client.trajectories.send_goal(goal)
+        self.assertTrue(self.client.trajectories.wait_for_result(rospy.Duration(60.0)))
+        result = self.client.trajectories.get_result()
+        self.assertEqual(result.error_code, Result.SUCCESSFUL, result.error_string)
+        self.assertGreater(rospy.Time.now(), begin + rospy.Duration(0.9))
+        goal.trajectory.header.stamp = rospy.Time.now() + rospy.Duration(50.0)
+        self.client.trajectories.send_goal(goal)
+        wait_until(lambda: self.client.trajectories.get_state() == GoalStatus.ACTIVE, "the goal")
+        self.client.trajectories.cancel_goal()
+        self.assertTrue(self.client.trajectories.wait_for_result(rospy.Duration(20.0)))
+        self.assertEqual(self.client.trajectories.get_state(), GoalStatus.PREEMPTED)
+        goal.trajectory.header.stamp = rospy.Time.now() + rospy.Duration(90.0)
+        late = self.client.follow(goal)
+        self.assertEqual(late.error_code, Result.INVALID_GOAL)
+        self.assertIn("expected at most 60 s", late.error_string)
+
     def test_4_a_stream_of_twists_moves_the_palm_and_ends_in_rest(self) -> None:
         before = self.robot.arm()
         answer = self.open("twist_stream")

@@ -11,35 +11,29 @@ using Space = MotionReference::Space;
 // m/s: a hand that limits have kept from its set-point comes back beside a person.
 constexpr double kCorrectionSpeed = 0.3;
 
-namespace {
+Reason Arrival::handStuck(double away) noexcept {
+  return Reason(ReasonCode::TargetNotReached, "the hand does not come to the goal: ")
+         << away << " m are left; is the arm blocked?";
+}
 
 // The second task of `second_task`; none for the orientation, which TwoTaskIk has itself.
-std::unique_ptr<SecondTask> readSecondTask(const Parameters& parameters, double rotation_gain,
-                                           double largest_gain) {
+void ReferenceLoop::configureSecondTask(const Parameters& parameters, double largest_gain) {
   const std::string task =
       parameters.choice("second_task", "orientation", {"orientation", "axis", "posture", "none"});
   if (task == "axis") {
     const Vector3 axis = parameters.numbers("axis", Vector3(1.0, 0.0, 0.0), 1.0);
     if (axis.norm() < 1e-3) parameters.refuse("axis", "three numbers that are not all zero");
-    return std::make_unique<AxisTask>(axis, rotation_gain);
-  }
-  if (task == "posture") {
+    second_task_ = std::make_unique<AxisTask>(axis, rotation_gain_->wanted());
+  } else if (task == "posture") {
     if (!parameters.has("posture")) {
       parameters.refuse("posture", "seven joint positions (rad), because second_task is posture");
     }
     const JointVector posture = parameters.numbers("posture", JointVector::Zero(), 6.3);
-    return std::make_unique<PostureTask>(
+    second_task_ = std::make_unique<PostureTask>(
         posture, parameters.number("posture_gain", std::min(1.0, largest_gain), 0.0, largest_gain));
+  } else if (task == "none") {
+    second_task_ = std::make_unique<NoTask>();
   }
-  if (task == "none") return std::make_unique<NoTask>();
-  return nullptr;
-}
-
-}  // namespace
-
-Reason Arrival::handStuck(double away) noexcept {
-  return Reason(ReasonCode::TargetNotReached, "the hand does not come to the goal: ")
-         << away << " m are left; is the arm blocked?";
 }
 
 void ReferenceLoop::configure(const MotionSetup& setup, Spaces spaces, Tunables& tunables) {
@@ -61,6 +55,7 @@ void ReferenceLoop::configure(const MotionSetup& setup, Spaces spaces, Tunables&
     ik.pos_clik_gain = position_gain_->wanted();
     ik.rot_clik_gain = rotation_gain_->wanted();
     ik.correction_speed = correction_speed_->wanted();
+    configureSecondTask(parameters, most);
   }
   ik.singularity_threshold =
       parameters.number("singularity_threshold", ik.singularity_threshold, 1e-6, 1.0);
@@ -69,8 +64,6 @@ void ReferenceLoop::configure(const MotionSetup& setup, Spaces spaces, Tunables&
   ik.acceleration_limit = robot_->limits.acceleration;
   ik.jerk_limit = robot_->limits.jerk;
   ik_ = std::make_unique<TwoTaskIk>(ik);
-  second_task_ =
-      readSecondTask(parameters, ik.rot_clik_gain, std::min(200.0, largestGain(setup.cycle_time)));
   if (spaces != Spaces::Pose) {
     const double most = std::min(100.0, largestGain(setup.cycle_time));
     joint_gain_ =
@@ -139,9 +132,10 @@ void ReferenceLoop::beginBlend(const CycleInput& input) noexcept {
 /// Fades to gains that were changed.
 void ReferenceLoop::takeGains(double dt) noexcept {
   if (joint_gain_ != nullptr) gain_ = joint_gain_->step(dt);
-  if (position_gain_ != nullptr) {
-    ik_->setGains(position_gain_->step(dt), rotation_gain_->step(dt), correction_speed_->step(dt));
-  }
+  if (position_gain_ == nullptr) return;
+  const double rotation = rotation_gain_->step(dt);
+  ik_->setGains(position_gain_->step(dt), rotation, correction_speed_->step(dt));
+  if (second_task_) second_task_->setGain(rotation);
 }
 
 void ReferenceLoop::resolve(const CycleInput& input, References& references) noexcept {

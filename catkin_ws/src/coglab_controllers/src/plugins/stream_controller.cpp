@@ -32,6 +32,7 @@ class StreamMotion : public Motion<StreamRequest> {
   void configure(MotionConfiguration& configuration) override {
     robot_ = configuration.setup.robot;
     const Parameters& parameters = configuration.parameters;
+    declareGains(configuration);
     timeout_ns_ = static_cast<std::int64_t>(1e9 * readTimeout(parameters));
     waiting_ = Reason(ReasonCode::GoalStale, "the stream is open and has no command newer than ")
                << 1e-9 * static_cast<double>(timeout_ns_) << " s: the arm stands";
@@ -69,6 +70,8 @@ class StreamMotion : public Motion<StreamRequest> {
 
  protected:
   virtual void configureStream(const Parameters& parameters) = 0;
+  /// Declares gains that may change at run time.
+  virtual void declareGains(MotionConfiguration& /*configuration*/) {}
   /// The reference goes on from here.
   virtual void restart(const SetPoint& from) = 0;
   /// @param dt s of motion time until the next cycle
@@ -166,27 +169,28 @@ class TwistMotion : public ToolMotion {
 };
 
 class PoseMotion : public ToolMotion {
-  void configureStream(const Parameters& parameters) override {
-    ToolMotion::configureStream(parameters);
-    gain_ = parameters.number("gain", 10.0, 0.1, 50.0);
+  void declareGains(MotionConfiguration& configuration) override {
+    gain_ = &configuration.tunable("gain", "1/s, speed of the hand for the way that is left", 10.0,
+                                   0.1, 50.0);
   }
 
   void follow(const MotionCycle& cycle, const StreamCommand& command, double dt,
               MotionReference& reference) override {
+    const double gain = gain_->step(cycle.input.dt);
     const Vector3 goal = robot_->workspace.project(command.numbers.head<3>());
     const Quaternion orientation(command.numbers.tail<4>());  // x y z w
-    steer(cycle.input, toward(goal - pose_.position, max_acceleration_),
-          toward(rotationBetween(pose_.orientation, orientation), max_turning_acceleration_), dt,
-          reference);
+    steer(cycle.input, toward(goal - pose_.position, gain, max_acceleration_),
+          toward(rotationBetween(pose_.orientation, orientation), gain, max_turning_acceleration_),
+          dt, reference);
   }
 
   /// Velocity for a way (m or rad): by the gain near its end, and from further away one from which
   /// half of the acceleration is enough to stop there.
-  Vector3 toward(const Vector3& way, double acceleration) const {
-    return shortened(Vector3(gain_ * way), std::sqrt(acceleration * way.norm()));
+  static Vector3 toward(const Vector3& way, double gain, double acceleration) {
+    return shortened(Vector3(gain * way), std::sqrt(acceleration * way.norm()));
   }
 
-  double gain_ = 10.0;  // 1/s
+  Tunable* gain_ = nullptr;  // 1/s
 };
 
 class JointMotion : public StreamMotion {
@@ -242,8 +246,9 @@ class JointMotion : public StreamMotion {
   JointVector velocity_ = JointVector::Zero();  // rad/s of motion time
 };
 
-RunnerPolicy streamPolicy() {
+RunnerPolicy streamPolicy(ReferenceLoop::Spaces spaces) {
   RunnerPolicy policy;
+  policy.spaces = spaces;
   policy.open_end = true;
   policy.id_name = nullptr;
   policy.longest_queue = 0;
@@ -253,7 +258,7 @@ RunnerPolicy streamPolicy() {
 }  // namespace
 
 StreamController::StreamController(Parts parts)
-    : MotionRunner<StreamRequest>(std::move(parts.motion), streamPolicy()),
+    : MotionRunner<StreamRequest>(std::move(parts.motion), streamPolicy(parts.spaces)),
       mailbox_(*parts.mailbox),
       names_(std::move(parts.names)),
       units_(std::move(parts.units)) {}
@@ -337,8 +342,11 @@ std::pair<std::unique_ptr<Made>, StreamMailbox*> make() {
 TwistStream::TwistStream()
     : StreamController([] {
         auto [motion, mailbox] = make<TwistMotion>();
-        return Parts{
-            std::move(motion), mailbox, {"vx", "vy", "vz", "wx", "wy", "wz"}, "m/s and rad/s"};
+        return Parts{std::move(motion),
+                     mailbox,
+                     {"vx", "vy", "vz", "wx", "wy", "wz"},
+                     "m/s and rad/s",
+                     ReferenceLoop::Spaces::Pose};
       }()) {}
 
 PoseStream::PoseStream()
@@ -347,7 +355,8 @@ PoseStream::PoseStream()
         return Parts{std::move(motion),
                      mailbox,
                      {"x", "y", "z", "qx", "qy", "qz", "qw"},
-                     "m and a unit quaternion"};
+                     "m and a unit quaternion",
+                     ReferenceLoop::Spaces::Pose};
       }()) {}
 
 std::string PoseStream::wrong(const std::vector<double>& numbers) const {
@@ -360,8 +369,11 @@ std::string PoseStream::wrong(const std::vector<double>& numbers) const {
 JointVelocityStream::JointVelocityStream()
     : StreamController([] {
         auto [motion, mailbox] = make<JointMotion>();
-        return Parts{
-            std::move(motion), mailbox, {"a1", "a2", "e1", "a3", "a4", "a5", "a6"}, "rad/s"};
+        return Parts{std::move(motion),
+                     mailbox,
+                     {"a1", "a2", "e1", "a3", "a4", "a5", "a6"},
+                     "rad/s",
+                     ReferenceLoop::Spaces::Joint};
       }()) {}
 
 }  // namespace coglab_controllers

@@ -11,6 +11,7 @@
 #include "coglab_controllers/plugins/dmp_controller.hpp"
 #include "coglab_controllers/ros/motion_controller_ros.hpp"
 #include "coglab_controllers/ros/path_topic.hpp"
+#include "coglab_controllers/ros/sentence_throttle.hpp"
 #include "coglab_controllers/ros/tf_listener.hpp"
 #include "coglab_msgs/DmpFeedback.h"
 #include "coglab_msgs/DmpGoal.h"
@@ -162,8 +163,9 @@ class DmpControllerRos : public MotionControllerRos {
       return;
     }
     ++goals_refused_;
-    ROS_WARN_THROTTLE(1.0, "%s; %llu refused so far", answer.message.c_str(),
-                      static_cast<unsigned long long>(goals_refused_));
+    if (!warned_.may(answer.message, steadyNow())) return;
+    ROS_WARN("%s; %llu refused so far", answer.message.c_str(),
+             static_cast<unsigned long long>(goals_refused_));
   }
 
   void publishDebug() {
@@ -253,6 +255,7 @@ class DmpControllerRos : public MotionControllerRos {
   DmpProgress progress_;
   std::uint64_t calls_ = 0, last_feedback_ = 0, last_goal_ = 0;
   std::uint64_t goals_refused_ = 0;  // dmp_goal
+  SentenceThrottle warned_{1.0};
 };
 
 }  // namespace coglab_controllers

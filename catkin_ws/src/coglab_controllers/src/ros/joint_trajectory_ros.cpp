@@ -1,9 +1,11 @@
 // ROS side of joint trajectories: the action that MoveIt and other planners send them to.
 #include <map>
 #include <mutex>
+#include <optional>
 
 #include <control_msgs/FollowJointTrajectoryAction.h>
 #include <control_msgs/JointTrajectoryControllerState.h>
+#include <ros/callback_queue_interface.h>
 #include <ros/ros.h>
 
 #include "coglab_controllers/manager/plugin_registry.hpp"
@@ -19,6 +21,8 @@ using Action = control_msgs::FollowJointTrajectoryAction;
 using Server = ActionServer<Action>;
 using Result = control_msgs::FollowJointTrajectoryResult;
 
+constexpr std::size_t kLargest = 4'000'000;  // bytes of a goal; 10000 full points have 2.5 million
+
 constexpr bool same(TrajectoryError ours, int theirs) { return static_cast<int>(ours) == theirs; }
 
 // The core is free of ROS and keeps the numbers of the action a second time.
@@ -32,7 +36,8 @@ static_assert(same(TrajectoryError::GoalToleranceViolated, Result::GOAL_TOLERANC
 std::vector<TrajectoryRequest::Tolerance> read(
     const std::vector<control_msgs::JointTolerance>& tolerances) {
   std::vector<TrajectoryRequest::Tolerance> read;
-  for (const auto& one : tolerances) read.push_back({one.name, one.position, one.velocity});
+  for (const auto& one : tolerances)
+    read.push_back({one.name, one.position, one.velocity, one.acceleration});
   return read;
 }
 
@@ -68,12 +73,17 @@ void write(const JointPoint& from, std::size_t joints, trajectory_msgs::JointTra
 
 /// Action `<id>/follow_joint_trajectory`; topic `<id>/state` at 50 Hz while the arm follows. A goal
 /// takes the arm if no other motion has it. A newer goal takes the place of the older one.
+///
+/// A goal whose stamp is ahead is accepted and waits. What runs goes on until then. A cancel by its
+/// client and a newer goal end the wait. It does not begin after a cancel of a motion, a stop of
+/// the robot or a switch to another controller.
 class JointTrajectoryRos : public MotionControllerRos {
  public:
   void attach(MotionController& controller, const ros::NodeHandle& node,
               const RosContext& context) override {
     controller_ = &dynamic_cast<JointTrajectory&>(controller);
     node_ = node;
+    queue_ = node.getCallbackQueue();
     take_arm_ = context.take_arm;
     cancel_ = context.cancel;
     state_ = node_.advertise<control_msgs::JointTrajectoryControllerState>("state", 10);
@@ -83,41 +93,142 @@ class JointTrajectoryRos : public MotionControllerRos {
     server_->start();
   }
 
+  ~JointTrajectoryRos() override {
+    if (queue_ != nullptr) queue_->removeByID(callbackId());  // waits for one that runs
+    server_.reset();
+  }
+
   void spinOnce() override {
     const std::lock_guard<std::mutex> lock(goals_mutex_);
     for (EndedMotion end; controller_->readEnd(end);) ends_.push_back(end);
     settle();
+    if (waiting_ && !waiting_->called && steadyNow() >= waiting_->due_ns) {
+      waiting_->called = true;
+      // Not here: it may wait for the control cycle.
+      queue_->addCallback(boost::make_shared<Due>(*this), callbackId());
+    }
     if (++calls_ % 4 == 0) publishState();
   }
 
  private:
+  struct Waiting {
+    Server::GoalHandle goal;
+    WaitingTrajectory trajectory;
+    std::int64_t due_ns = 0;  // steady clock
+    bool called = false;
+  };
+
+  /// Begins the trajectory that waits, in a thread of the services.
+  class Due : public ros::CallbackInterface {
+   public:
+    explicit Due(JointTrajectoryRos& side) : side_(side) {}
+    CallResult call() override {
+      side_.onDue();
+      return Success;
+    }
+
+   private:
+    JointTrajectoryRos& side_;
+  };
+
+  std::uint64_t callbackId() const { return reinterpret_cast<std::uint64_t>(this); }
+
   /// May wait for the control cycle.
   void onGoal(Server::GoalHandle goal) {
     const std::lock_guard<std::mutex> order(order_);
-    const TrajectoryRequest request = read(*goal.getGoal());
-    TrajectoryAnswer answer = controller_->check(request);
+    const std::size_t size = ros::serialization::serializationLength(*goal.getGoal());
+    if (size > kLargest) {
+      return refuse(goal, refusal(Answer::refusal(
+                              ReasonCode::OutOfRange,
+                              "the goal has " + std::to_string(size) + " bytes; expected at most " +
+                                  std::to_string(kLargest) + "; send fewer points")));
+    }
+    Waiting waiting;
+    waiting.goal = goal;
+    waiting.trajectory.request = read(*goal.getGoal());
+    TrajectoryAnswer answer = controller_->check(waiting.trajectory.request);
     if (answer.success) {
       const Answer taken = take_arm_();
-      if (taken.success) {
-        answer = controller_->follow(request);
+      if (!taken.success) {
+        answer = refusal(taken);
+      } else if (waiting.trajectory.request.age < 0.0) {
+        answer = controller_->accept(waiting.trajectory);
+        if (answer.success) return wait(waiting);
       } else {
-        static_cast<Answer&>(answer) = taken;
-        answer.error = TrajectoryError::InvalidGoal;
+        answer = controller_->follow(waiting.trajectory.request);
       }
     }
-    if (!answer.success) {
-      ROS_WARN("follow_joint_trajectory refused: %s", answer.message.c_str());
-      return goal.setRejected(resultOf(answer.error, answer.message), answer.message);
-    }
+    if (!answer.success) return refuse(goal, answer);
     goal.setAccepted();
+    endWait("a newer trajectory took its place");
+    run(goal, answer.id);
+  }
+
+  static TrajectoryAnswer refusal(const Answer& why) {
+    TrajectoryAnswer answer;
+    static_cast<Answer&>(answer) = why;
+    answer.error = TrajectoryError::InvalidGoal;
+    return answer;
+  }
+
+  static void refuse(Server::GoalHandle& goal, const TrajectoryAnswer& answer) {
+    ROS_WARN("follow_joint_trajectory refused: %s", answer.message.c_str());
+    goal.setRejected(resultOf(answer.error, answer.message), answer.message);
+  }
+
+  void wait(Waiting& waiting) {
+    const double time = -waiting.trajectory.request.age;
+    waiting.goal.setAccepted();
+    endWait("a newer trajectory took its place");
+    ROS_INFO("the trajectory begins in %.2f s, by its stamp", time);
     const std::lock_guard<std::mutex> lock(goals_mutex_);
-    goals_.emplace(answer.id, goal);
+    waiting.due_ns = steadyNow() + static_cast<std::int64_t>(1e9 * time);
+    waiting_ = waiting;
+    if (waiting.goal.getGoalStatus().status == actionlib_msgs::GoalStatus::PREEMPTING)
+      cancelWait("the client of the trajectory cancelled it");
+  }
+
+  void onDue() {
+    const std::lock_guard<std::mutex> order(order_);
+    std::optional<Waiting> begins;
+    {
+      const std::lock_guard<std::mutex> lock(goals_mutex_);
+      // A newer one may have taken its place.
+      if (!waiting_ || !waiting_->called) return;
+      begins.swap(waiting_);
+    }
+    const TrajectoryAnswer answer = controller_->follow(begins->trajectory);
+    if (answer.success) return run(begins->goal, answer.id);
+    ROS_WARN("the trajectory that waited does not begin: %s", answer.message.c_str());
+    const Result result = resultOf(answer.error, answer.message);
+    if (answer.code == ReasonCode::Cancelled)
+      return begins->goal.setCanceled(result, answer.message);
+    begins->goal.setAborted(result, answer.message);
+  }
+
+  void endWait(const std::string& why) {
+    const std::lock_guard<std::mutex> lock(goals_mutex_);
+    cancelWait(why);
+  }
+
+  /// With goals_mutex_.
+  void cancelWait(const std::string& why) {
+    if (!waiting_) return;
+    waiting_->goal.setCanceled(resultOf(TrajectoryError::None, why), why);
+    waiting_.reset();
+  }
+
+  void run(Server::GoalHandle goal, int id) {
+    const std::lock_guard<std::mutex> lock(goals_mutex_);
+    goals_.emplace(id, goal);
     if (goal.getGoalStatus().status == actionlib_msgs::GoalStatus::PREEMPTING) cancelMotion();
     settle();
   }
 
   void onCancel(Server::GoalHandle goal) {
     const std::lock_guard<std::mutex> lock(goals_mutex_);
+    if (waiting_ && waiting_->goal == goal)
+      return cancelWait("the client of the trajectory cancelled it");
     for (const auto& [id, other] : goals_) {
       if (other == goal) return cancelMotion();
     }
@@ -184,6 +295,8 @@ class JointTrajectoryRos : public MotionControllerRos {
   std::mutex goals_mutex_;
   std::map<int, Server::GoalHandle> goals_;  // by the id of the motion; those that run
   std::vector<EndedMotion> ends_;            // of motions whose goal is not noted yet
+  std::optional<Waiting> waiting_;           // begins at the time of its stamp
+  ros::CallbackQueueInterface* queue_ = nullptr;
   std::uint64_t calls_ = 0;
   std::unique_ptr<Server> server_;  // ends first: its callbacks use the rest
 };

@@ -1,6 +1,5 @@
 #include "coglab_controllers/ros/reconfigure_server.hpp"
 
-#include <stdexcept>
 #include <utility>
 
 #include <dynamic_reconfigure/ConfigDescription.h>
@@ -94,11 +93,11 @@ bool ReconfigureServer::onSet(dynamic_reconfigure::Reconfigure::Request& request
   } else {
     answer = write_(changed);
   }
+  // A client of this protocol reads the values in force from the answer and from the topic; it has
+  // no field for a sentence, and the usual one shows no error of the service.
   if (!answer.success) {
-    // roscpp sends the text of an exception to the client, which has no other field for it; the
-    // usual client in Python shows none, so the log has it, too.
-    ROS_WARN("%s/set_parameters refused: %s", node_.getNamespace().c_str(), answer.message.c_str());
-    throw std::runtime_error(answer.message);
+    ROS_WARN("%s/set_parameters refused: %s; nothing changed", node_.getNamespace().c_str(),
+             answer.message.c_str());
   }
   response.config = configOf(read_(), &ReconfigureField::value);
   updates_.publish(response.config);

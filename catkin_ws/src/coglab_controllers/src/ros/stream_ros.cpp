@@ -8,6 +8,7 @@
 #include "coglab_controllers/plugins/stream_controller.hpp"
 #include "coglab_controllers/ros/motion_controller_ros.hpp"
 #include "coglab_controllers/ros/motion_feedback_topic.hpp"
+#include "coglab_controllers/ros/sentence_throttle.hpp"
 #include "coglab_msgs/StartMotion.h"
 #include "coglab_rt/ros/parameter.hpp"
 
@@ -90,8 +91,9 @@ class StreamRos : public MotionControllerRos {
   }
 
   void refuse(const std::string& publisher, const std::string& why) {
-    ROS_WARN_THROTTLE(2.0, "%s: command of %s refused: %s", controller_->id().c_str(),
-                      publisher.c_str(), why.c_str());
+    if (!warned_.may(publisher + why, steadyNow())) return;
+    ROS_WARN("%s: command of %s refused: %s", controller_->id().c_str(), publisher.c_str(),
+             why.c_str());
   }
 
  private:
@@ -123,6 +125,7 @@ class StreamRos : public MotionControllerRos {
   // the subscriber's callbacks, which come one after another
   std::string publisher_;
   std::int64_t sent_ns_ = 0;
+  SentenceThrottle warned_{2.0};
   ros::Subscriber commands_;
   ros::ServiceServer service_;
 };

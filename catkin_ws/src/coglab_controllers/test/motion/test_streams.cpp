@@ -235,6 +235,34 @@ TEST_F(Stream, AJointAtItsStopLeavesTheOthersFree) {
   EXPECT_NEAR(arm.sample.position[5] - stop, -0.3, 0.05);
 }
 
+TEST(StreamGains, TheGainOfTheRotationIsThatOfTheAxisToo) {
+  VirtualArm arm{DESCRIPTION_DIR, "plugin_paths: [" PLUGIN_DIR
+                                  "]\nstream: {second_task: axis, axis: [0, 0, 1], "
+                                  "rot_clik_gain: 0}"};
+  std::string active;
+  ASSERT_TRUE(arm.manager->load("stream", "coglab/PoseStream").success);
+  ASSERT_TRUE(arm.manager->switchTo("stream", active).success);
+  auto& stream = dynamic_cast<StreamController&>(*arm.manager->motion("stream"));
+  ASSERT_TRUE(stream.open().success);
+  const Pose home = arm.hand();
+  const Quaternion& q = home.orientation;
+  const auto tilt = [&] {
+    for (int i = 0; i < 20; ++i) {
+      const Vector3& p = home.position;
+      EXPECT_TRUE(stream.send({p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()}).success);
+      arm.run(0.05);
+    }
+    const Vector3 axis = arm.hand().orientation * Vector3::UnitZ();
+    return std::acos(std::min(1.0, axis.dot(home.orientation * Vector3::UnitZ())));
+  };
+  tilt();
+  arm.sample.position[5] += 0.1;  // somebody pushes the hand
+  arm.sample.commanded_position = arm.sample.position;
+  EXPECT_GT(tilt(), 0.05);
+  ASSERT_TRUE(stream.tunables()->set({{"rot_clik_gain", 10.0}}).success);
+  EXPECT_LT(tilt(), 0.01);
+}
+
 TEST_F(Stream, WhatIsNoCommandIsRefusedAndTheArmGoesOn) {
   use("coglab/TwistStream");
   follow({0.0, 0.0, 0.1, 0.0, 0.0, 0.0});

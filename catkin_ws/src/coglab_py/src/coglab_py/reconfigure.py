@@ -28,8 +28,8 @@ class Field(NamedTuple):
 
 class ReconfigureServer:
     """Serves numbers below the node's name: service ``~set_parameters``, latched topics ``~parameter_descriptions`` and
-    ``~parameter_updates``. An unknown name, or a value that is no number within its range, is refused with a sentence,
-    and nothing changes."""
+    ``~parameter_updates``. If a name is unknown, or a value is no number within its range, nothing changes: the answer
+    has the values in force, the log the reason."""
 
     def __init__(self, fields: Sequence[Field], use: Callable[[dict[str, float]], None]) -> None:
         """``use`` is called with all numbers after each change, from the thread of the service."""
@@ -56,27 +56,25 @@ class ReconfigureServer:
         return Config(doubles=doubles, groups=[GroupState("Default", True, 0, 0)])
 
     def _set(self, request: Any) -> ReconfigureResponse:
-        try:
-            return self._change(request.config)
-        except rospy.ServiceException as error:  # the usual client does not show its text
-            rospy.logwarn(f"{rospy.get_name()}/set_parameters refused: {error}")
-            raise
-
-    def _change(self, asked: Any) -> ReconfigureResponse:
-        changed = {each.name: float(each.value) for each in (*asked.doubles, *asked.ints)}
-        for name in (each.name for each in (*asked.bools, *asked.strs)):
-            raise rospy.ServiceException(f"{name}: expected a number, got a flag or a text")
-        for name, value in changed.items():
-            field = self._fields.get(name)
-            if field is None:
-                raise rospy.ServiceException(f"no number named {name}; there are: {', '.join(self._fields)}")
-            if not field.least <= value <= field.most:
-                raise rospy.ServiceException(
-                    f"{name}: expected a number from {field.least:g} to {field.most:g}, got {value:g}"
-                )
+        """Answers with the values in force: clients of this protocol have no field for a sentence."""
         with self._lock:
-            self._values.update(changed)
-            self._use(dict(self._values))
+            try:
+                self._change(request.config)
+            except ValueError as error:
+                rospy.logwarn(f"{rospy.get_name()}/set_parameters refused: {error}; nothing changed")
             config = self._config(self._values)
             self._updates.publish(config)
         return ReconfigureResponse(config)
+
+    def _change(self, asked: Any) -> None:
+        changed = {each.name: float(each.value) for each in (*asked.doubles, *asked.ints)}
+        for name in (each.name for each in (*asked.bools, *asked.strs)):
+            raise ValueError(f"{name}: expected a number, got a flag or a text")
+        for name, value in changed.items():
+            field = self._fields.get(name)
+            if field is None:
+                raise ValueError(f"no number named {name}; there are: {', '.join(self._fields)}")
+            if not field.least <= value <= field.most:
+                raise ValueError(f"{name}: expected a number from {field.least:g} to {field.most:g}, got {value:g}")
+        self._use({**self._values, **changed})
+        self._values.update(changed)

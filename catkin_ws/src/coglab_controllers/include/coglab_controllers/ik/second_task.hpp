@@ -25,6 +25,8 @@ struct TaskConstraint {
 class SecondTask {
  public:
   virtual ~SecondTask() = default;
+  /// Changes K_rot (1/s, finite and >= 0), between two cycles; nothing for a task without it.
+  virtual void setGain(double /*gain*/) noexcept {}
   /// @param state kinematics at q (rad).
   virtual void evaluate(const ChainState& state, const JointVector& q,
                         const CartesianReference& reference,
@@ -36,8 +38,7 @@ class OrientationTask : public SecondTask {
  public:
   /// @param gain K_rot (rot_clik_gain), 1/s.  @throws std::invalid_argument unless finite and >= 0.
   explicit OrientationTask(double gain);
-  /// Changes K_rot (1/s, finite and >= 0), between two cycles.
-  void setGain(double gain) noexcept { gain_ = gain; }
+  void setGain(double gain) noexcept override { gain_ = gain; }
   void evaluate(const ChainState& state, const JointVector& q, const CartesianReference& reference,
                 TaskConstraint& constraint) const noexcept override;
 
@@ -52,6 +53,7 @@ class AxisTask : public SecondTask {
   /// @param axis in the frame of the hand, of any length.  @param gain 1/s.
   /// @throws std::invalid_argument unless the axis has a direction, and gain is finite and >= 0.
   AxisTask(const Vector3& axis, double gain);
+  void setGain(double gain) noexcept override { gain_ = gain; }
   void evaluate(const ChainState& state, const JointVector& q, const CartesianReference& reference,
                 TaskConstraint& constraint) const noexcept override;
 

@@ -85,6 +85,7 @@ class ReferenceLoop {
   const IkResult& ik() const noexcept { return ik_result_; }  ///< of the last cycle
 
  private:
+  void configureSecondTask(const Parameters& parameters, double largest_gain);
   void takeGains(double dt) noexcept;
   void beginBlend(const CycleInput& input) noexcept;
   void resolveJoints(const CycleInput& input, References& references) noexcept;

@@ -75,6 +75,7 @@ class StreamController : public MotionRunner<StreamRequest> {
     StreamMailbox* mailbox;          ///< a member of the motion
     std::vector<std::string> names;  ///< of the numbers of a command
     std::string units;
+    ReferenceLoop::Spaces spaces;  ///< of the reference
   };
   explicit StreamController(Parts parts);
 
@@ -104,8 +105,8 @@ class TwistStream : public StreamController {
 
 /// Follows poses of the tool frame in the base frame: position (m), then a unit quaternion
 /// x y z w. The hand goes to the newest pose within the limits of TwistStream, whose parameters it
-/// has, and slows before it by `gain` (1/s, default 10). A position outside the workspace is
-/// followed to its border.
+/// has, and slows before it by `gain` (1/s, default 10, tunable). A position outside the workspace
+/// is followed to its border.
 class PoseStream : public StreamController {
  public:
   PoseStream();

@@ -26,8 +26,8 @@ struct ReconfigureField {
 
 /// Speaks the protocol of dynamic_reconfigure below its node: service `set_parameters`, latched
 /// topics `parameter_descriptions` and `parameter_updates`. The numbers come from the program at
-/// run time, so no .cfg file describes them. A value out of its range, an unknown name or a value
-/// that is no double is refused with a sentence (the error of the service), and nothing changes.
+/// run time, so no .cfg file describes them. If a value is out of its range or no number, or a name
+/// is unknown, nothing changes: the answer has the values in force, the log the reason.
 class ReconfigureServer {
  public:
   using Read = std::function<std::vector<ReconfigureField>()>;

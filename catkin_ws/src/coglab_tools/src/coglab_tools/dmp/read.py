@@ -306,9 +306,8 @@ def _judge(path: Path, table: Table, units: dict[str, str], place: Place, source
     times = table["t"] * _time_unit(table["t"], source.time or units.get("t", ""), notes)
     if np.any(np.diff(times) < 0.0):
         at = int(np.argmax(np.diff(times) < 0.0))
-        raise CheckFailed(
-            f"{path}: {place(int(index[at + 1]))}: time goes back by {times[at] - times[at + 1]:.4f} s; cut the file there"
-        )
+        where, by = place(int(index[at + 1])), times[at] - times[at + 1]
+        raise CheckFailed(f"{path}: {where}: time goes back by {by:.4f} s; cut the file there")
     if joints:
         table.update(_palm_of(np.column_stack([table[name] for name in JOINTS]), source, units, notes))
     places = np.column_stack([table[name] for name in "xyz"])
