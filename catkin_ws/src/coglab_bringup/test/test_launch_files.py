@@ -1,11 +1,15 @@
 """Arguments of the launch files reach the nodes that they are for."""
 
 import pytest
+from coglab_bringup.launch_arguments import whole_path
+from coglab_bringup.launch_files import check
 from coglab_py.packages import package_path
 from roslaunch.config import load_config_default
+from roslaunch.core import RLException
 from roslaunch.node_args import shlex
 
 REAL = "fri_address:=127.0.0.1"
+OTHERS = ("signals:=signals", "managers:=safe_distance")  # shipped files, by name
 
 
 def load(package, file, *arguments):
@@ -31,16 +35,17 @@ def test_arm_and_controller_manager_read_the_same_limits(package, file, profile)
 
 
 @pytest.mark.parametrize("file", ["coglab.launch", "real.launch"])
-def test_learnt_contact_thresholds_reach_the_detector(file):
-    found = parameters("coglab_bringup", file, "contact_learnt_file:=learnt.yaml", REAL)
-    assert found["/contact_detector/learnt_file"] == "learnt.yaml"
+def test_learnt_contact_thresholds_reach_the_detector(file, tmp_path):
+    learnt = str(tmp_path / "learnt.yaml")  # is not there before the first learning
+    found = parameters("coglab_bringup", file, f"contact_learnt_file:={learnt}", REAL)
+    assert found["/contact_detector/learnt_file"] == learnt
 
 
 @pytest.mark.parametrize("file", ["coglab.launch", "real.launch"])
 def test_files_of_feedback_controllers_signals_and_managers_reach_the_manager(file):
-    found = parameters("coglab_bringup", file, "feedback:=palm", "signals:=s.yaml", "managers:=m.yaml", REAL)
+    found = parameters("coglab_bringup", file, "feedback:=palm", *OTHERS, REAL)
     names = ("feedback_file", "signals_file", "central_file")
-    assert [found[f"/controller_manager/{name}"] for name in names] == ["palm", "s.yaml", "m.yaml"]
+    assert [found[f"/controller_manager/{name}"] for name in names] == ["palm", "signals", "safe_distance"]
     assert not {f"/controller_manager/{name}" for name in names[1:]} & set(parameters("coglab_bringup", file, REAL))
 
 
@@ -54,8 +59,67 @@ def test_touch_sensors_are_read_where_their_driver_publishes():
     assert parameters("coglab_bringup", "coglab.launch")["/controller_manager/tactile"] is False
 
 
-def test_a_file_name_with_a_space_reaches_the_hand_emulator_whole():
-    config = load("coglab_bringup", "coglab.launch", "hand_trace:=/a folder/t.txt", "console:=false")
+def test_a_file_name_with_a_space_reaches_the_hand_emulator_whole(tmp_path):
+    (tmp_path / "a folder").mkdir()
+    trace = f"{tmp_path}/a folder/t.txt"
+    config = load("coglab_bringup", "coglab.launch", f"hand_trace:={trace}", "console:=false")
     (emulator,) = (node for node in config.nodes if node.name == "hand_emulator")
     words = shlex.split(emulator.args)
-    assert words[words.index("--trace") + 1] == "/a folder/t.txt"
+    assert words[words.index("--trace") + 1] == trace
+
+
+FILES = ["controllers", "feedback", "managers", "signals", "primitives", "objects", "machines", "tracker", "patterns"]
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_file_that_is_not_there_empty_a_folder_or_broken_is_refused_by_the_argument(tmp_path, name):
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "empty").touch()
+    (tmp_path / "broken").write_text("a: [1, 2\nb: {\n")
+    (tmp_path / "binary").write_bytes(bytes(range(128, 256)))
+    for file in ("absent", "empty", "folder", "broken", "binary"):
+        value = str(tmp_path / file)
+        with pytest.raises(ValueError, match=f"^{name}:={value}: ") as refusal:
+            check({name: value})
+        assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize("name", ["results", "contact_learnt_file", "log_file", "hand_trace"])
+def test_a_file_that_cannot_be_written_is_refused(tmp_path, name):
+    for value, named in ((tmp_path, "a folder"), (tmp_path / "no" / "file", "make it first")):
+        with pytest.raises(ValueError, match=named):
+            check({name: str(value)})
+    check({name: str(tmp_path / "file")})
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        ({"perception": "bridge", "tracker": ""}, "tracker:=FILE"),
+        ({"perception": "stand_in", "sim": "false"}, "bridge or none"),
+        ({"perception": "kinect"}, "stand_in, bridge, none"),
+        ({"feedback": "hand"}, "config/hand.yaml"),
+        ({"signals": "package://no_such_package/s.yaml"}, "no_such_package"),
+        ({"machines": "machines.yaml"}, "whole path"),
+        ({"arm": "steel"}, "fri, ideal, or a library"),
+        ({"arm": "libnot_there.so"}, "cannot be loaded"),
+        ({"arm": "libc.so.6"}, "COGLAB_ARM"),
+    ],
+)
+def test_arguments_that_name_nothing_are_refused(arguments, named):
+    with pytest.raises(ValueError, match=named):
+        check(arguments)
+
+
+def test_a_launch_with_a_file_that_is_not_there_starts_nothing():
+    with pytest.raises(RLException, match="coglab_files"):
+        load("coglab_bringup", "real.launch", "machines:=/nowhere/machines.yaml")
+
+
+def test_a_file_of_the_present_folder_reaches_the_nodes_by_its_whole_path(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "t.yaml").touch()
+    assert whole_path("tracker:=t.yaml") == f"tracker:={tmp_path}/t.yaml"
+    assert whole_path("results:=r.json") == f"results:={tmp_path}/r.json"
+    for word in ("feedback:=palm", "record:=none", "signals:=package://a/b.yaml", "object:=t.yaml", "--screen"):
+        assert whole_path(word) == word

@@ -6,7 +6,7 @@ import os
 import sys
 from pathlib import Path
 
-from coglab_bringup.launch_arguments import judge_launch, split_port
+from coglab_bringup.launch_arguments import judge_launch, split_port, whole_path
 from coglab_bringup.run_directory import free_port, lasting_home, port_is_free, record_run, run_environment
 from coglab_bringup.usage import Refused
 
@@ -32,7 +32,7 @@ def main(arguments: list[str]) -> int:
         flush=True,
     )
     print(f"[coglab]   export ROS_MASTER_URI={environment['ROS_MASTER_URI']}", flush=True)
-    command = ["roslaunch", "-p", str(port), "coglab_bringup", "coglab.launch", *words]
+    command = ["roslaunch", "-p", str(port), "coglab_bringup", "coglab.launch", *map(whole_path, words)]
     os.execvpe(command[0], command, environment)
     return 1
 

@@ -17,6 +17,9 @@ OBJECTS = "coglab_objects/objects"
 LIMITS = "lwr_description/config/joint_limits.yaml"
 CELL = "coglab_sim/include/coglab_sim/parameter_table.inc"
 CONVENTIONS = "lwr_fri_bridge/src/fri/krl_convention.cpp"
+READ = ("controllers", "feedback", "managers", "signals", "primitives", "dmp_library", "objects", "machines", "tracker",
+        "patterns", "recording")  # fmt: skip
+WRITTEN = ("results", "result_file", "contact_learnt_file", "record", "log_file", "hand_trace")
 HELP = """usage: ./coglab launch [-p PORT] [ARGUMENT:=VALUE ...] [OPTION of roslaunch ...]
 
 Starts coglab.launch on a free port of its own for the ROS master, or on PORT. Arguments, with what they are by default:
@@ -82,6 +85,12 @@ def _file(value: str) -> None:
     _must(Path(value).is_file(), f"there is no file {value or '(empty name)'}")
 
 
+def _controller_file(value: str) -> None:
+    """/robot knows shipped files by their names, and files of packages."""
+    if "/" in value and not value.startswith("package://"):
+        _file(value)
+
+
 def _folder(value: str) -> None:
     _must(Path(value).is_dir(), f"there is no folder {value or '(empty name)'}")
 
@@ -128,7 +137,8 @@ def _checks(sources: Path, objects: Path) -> dict[str, Check]:
         "object": _or_empty(_one_of(*sorted(path.stem for path in objects.glob("*.yaml")))),
         "objects": _folder,
         "perception": _one_of("stand_in", "bridge", "none"),
-        **dict.fromkeys(("feedback", "recording", "tracker"), _or_empty(_file)),
+        **dict.fromkeys(("recording", "tracker"), _or_empty(_file)),
+        **dict.fromkeys(("feedback", "managers", "signals"), _controller_file),
     }
 
 
@@ -141,6 +151,15 @@ def split_port(words: list[str]) -> tuple[int, list[str]]:
         return master_port((words[at + 1 : at + 2] or [""])[0]), words[:at] + words[at + 2 :]
     except Exception as error:
         raise Refused(f"-p: {error}") from error
+
+
+def whole_path(word: str) -> str:
+    """ARGUMENT:=VALUE with the whole path of a file that is named from this folder: nodes run in another one."""
+    name, _, value = word.partition(":=")
+    named = value and value != "none" and not value.startswith(("package://", "$("))
+    if named and (name in WRITTEN or (name in READ and Path(value).exists())):
+        return f"{name}:={Path(value).absolute()}"
+    return word
 
 
 def judge_launch(top: Path, words: list[str]) -> None:
