@@ -155,6 +155,9 @@ def faulty(name, tmp_path):
         return write(path, "t,x,y,z", [times, *places.T]), "102: time goes back by 0.49"
     if name == "unit":
         return write(path, "t,x,y,z", [times, *(10 * places).T]), "name the unit with --length"
+    if name == "late":
+        kept = times > REST + 0.3
+        return write(path, "t,x,y,z", [times[kept], *places[kept].T]), "the recording begins within it"
     if name == "half_named":
         return write(path, "t,x_mm,y,z", [times, 1000 * places[:, 0], *places[:, 1:].T]), "y, z none"
     if name == "step":
@@ -176,6 +179,7 @@ FAULTS = (
     "gap",
     "swap",
     "step",
+    "late",
     "backward",
     "unit",
     "half_named",

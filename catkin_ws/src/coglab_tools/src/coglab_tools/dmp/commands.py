@@ -123,7 +123,7 @@ def demonstrations(options: argparse.Namespace) -> list[Any]:
     source = Source(o.frame, o.topic, o.world, o.length, o.time, o.angle)
     found = []
     for path in progress(o.files, len(o.files), "reading"):
-        found += reaches(read(path, source), o.back)
+        found += reaches(read(path, source), o.back, "moving" in getattr(o, "allow", ()))
     return found
 
 

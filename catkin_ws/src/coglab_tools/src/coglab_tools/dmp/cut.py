@@ -22,6 +22,7 @@ LARGEST_STEP = 0.5  # share of a reach between two samples without a gap; above 
 LOW, LOW_SHARE = 0.02, 0.05  # m/s, and share of the peak speed: below the larger one the hand rests
 HIGH_SHARE = 0.25  # share of the largest speed that a motion must reach
 PAUSE_SHARE = 0.35  # slowest point between two motions, share of the smaller of their peaks
+MOVING_SHARE = 0.5  # of the mean speed: a reach that is faster at its first or last sample is not whole
 BACK_SHARE = 0.35  # a motion that ends this near to where the last one began, share of the way, is a way back
 
 
@@ -54,8 +55,9 @@ def smooth(raw: Demonstration) -> Demonstration:
     return replace(raw, times=grid, positions=positions, orientations=turns, closing=closing, noise=noise)
 
 
-def reaches(raw: Demonstration, back: bool = False) -> list[Demonstration]:
-    """The reaches of a recording, in order, smoothed and each from time 0; ways back too if `back`.
+def reaches(raw: Demonstration, back: bool = False, cut_off: bool = False) -> list[Demonstration]:
+    """The reaches of a recording, in order, smoothed and each from time 0; ways back too if `back`, and those during
+    which the recording begins or ends if `cut_off`.
 
     CheckFailed if there is none, or if a gap or a jump lies in one.
     """
@@ -63,6 +65,7 @@ def reaches(raw: Demonstration, back: bool = False) -> list[Demonstration]:
     found: list[Demonstration] = []
     farthest = 0.0
     origin: Array | None = None
+    lost = ""
     for begin, end in motions(whole.times, whole.speed):
         part = _part(whole, begin, end)
         farthest = max(farthest, part.way)
@@ -74,9 +77,17 @@ def reaches(raw: Demonstration, back: bool = False) -> list[Demonstration]:
             origin = None
             continue
         origin = part.positions[0]
+        speed, mean = part.speed, part.way / max(part.duration, 1e-9)
+        for at, edge, word in ((0, begin == 0, "begins"), (-1, end == len(whole.times) - 1, "ends")):
+            if edge and speed[at] > MOVING_SHARE * mean and not cut_off:
+                lost = f"the recording {word} within it, while the hand moves at {speed[at]:.2f} m/s"
+        if lost and (begin == 0 or end == len(whole.times) - 1):
+            continue
         _refuse_gap(raw, whole.times[begin], whole.times[end])
         _refuse_jump(raw, whole.times[begin], whole.times[end], way)
         found.append(part)
+    if not found and lost:
+        raise CheckFailed(f"{raw.name}: no whole reach in it: {lost}; record it again, or allow 'moving' in train")
     if not found:
         raise CheckFailed(
             f"{raw.name}: no reach in it: the longest motion goes {farthest:.3f} m, a reach at least {SHORTEST:g} m. "

@@ -7,6 +7,7 @@ both grips. z is up. The tracker repeats lost samples; they are left out.
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from coglab_tools.people.handover import Handover
 RATE = 120.0  # Hz
 GRIP = 1.0  # N above the hand's rest that count as a grip
 SOURCE = "KTH-RPL/handovers_dataset (Khanna et al. 2023, arXiv 2304.02154, MIT licence)"
+FARTHEST = 5.0  # m that a hand, a chest or the baton moves in a handover
 
 
 def is_kth(folder: Path) -> bool:
@@ -51,6 +53,11 @@ def _pose(folder: Path, name: str) -> Demonstration:
     kept = np.append(True, np.any(np.diff(rows[:, :3], axis=0) != 0.0, axis=1)) & finite
     if kept.sum() < 0.5 * len(rows):
         kept = finite  # it stands still
+    extent = float(np.linalg.norm(np.ptp(rows[finite, :3], axis=0))) if finite.any() else 0.0
+    if extent > FARTHEST:
+        raise CheckFailed(
+            f"{folder / name}_pose_saved.csv: it moves over {extent:.4g}; expected at most {FARTHEST:g} m: is it in mm?"
+        )
     lengths = np.linalg.norm(rows[:, 3:], axis=1)
     if np.any(np.abs(lengths[kept] - 1.0) > 0.05):
         raise CheckFailed(
@@ -70,9 +77,12 @@ def _table(path: Path, columns: int) -> Array:
     if not path.is_file():
         raise NotThere(f"{path}: no such file; a handover of the KTH dataset has 30 CSV files")
     try:
-        rows = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
+        with warnings.catch_warnings(category=UserWarning, action="ignore"):  # of an empty file, which is refused below
+            rows = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
     except ValueError as error:
         raise CheckFailed(f"{path}: expected a header and lines of {columns} numbers: {error}") from None
+    if not len(rows):
+        raise CheckFailed(f"{path}: no samples in it; expected a header and lines of {columns} numbers")
     if rows.shape[1] != columns:
         raise CheckFailed(f"{path}: expected {columns} columns, got {rows.shape[1]}")
     return np.asarray(rows, dtype=float)

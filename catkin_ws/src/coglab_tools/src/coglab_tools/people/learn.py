@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import coglab_controllers as cc
@@ -136,8 +137,11 @@ def learn_patterns(handovers: Sequence[Handover], path: Path) -> dict[str, int]:
     try:
         save_patterns(str(half), patterns, RecogniserSettings(), source)
         write_whole(path, json.dumps(json.loads(half.read_text(encoding="utf-8")), indent=1) + "\n")
+    except OSError as error:
+        raise CheckFailed(f"{path} cannot be written: {error.strerror}; what was there before is kept") from None
     finally:
-        half.unlink(missing_ok=True)
+        with suppress(OSError):
+            half.unlink(missing_ok=True)
     return {name: len(each) for name, each in demonstrations.items()}
 
 
