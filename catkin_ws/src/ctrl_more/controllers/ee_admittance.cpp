@@ -62,6 +62,13 @@ void bound(Offset offset, Velocity velocity, double limit) {
   if (outward > 0.0) velocity -= outward * direction;
 }
 
+/// Bound for a length that was `before`: where the limit has been set below it, it comes back to
+/// the limit with a time constant, and not at once.
+double eased(double limit, double before, double dt) noexcept {
+  constexpr double kReturn = 0.3;  // s
+  return limit + std::max(0.0, before - limit) * std::max(0.0, 1.0 - dt / kReturn);
+}
+
 void declareGains(Description& d) {
   d.gain("mass", 0).vector(3, 4.0).range(0.1, 100.0).in("kg").about("virtual mass, x y z");
   d.gain("damping", 0).vector(3, 60.0).range(0.0, 1e4).in("N s/m").about("virtual damper, x y z");
@@ -200,11 +207,12 @@ void EeAdmittance::update(const Cycle& cycle, const RobotStates& robot, const Co
     CTRL_MORE_LOG(log(), Warning, "a force of {} N holds it at max_offset, {} m", force.norm(),
                   max_offset);
   }
-  bound(offset_.head<3>(), velocity_.head<3>(), max_offset);
+  bound(offset_.head<3>(), velocity_.head<3>(), eased(max_offset, before.norm(), cycle.dt));
   if (rotates_) {
+    const double turned = offset_.tail<3>().norm();
     turn_.step(gain(inertia_), gain(rotary_damping_), gain(rotary_stiffness_), cycle.dt, torque,
                offset_.tail<3>(), velocity_.tail<3>());
-    bound(offset_.tail<3>(), velocity_.tail<3>(), scalar(max_angle_));
+    bound(offset_.tail<3>(), velocity_.tail<3>(), eased(scalar(max_angle_), turned, cycle.dt));
   }
   if (offset_.isZero(0.0) && velocity_.isZero(0.0)) return;  // the references keep every bit
   auto pose = modified[pose_];

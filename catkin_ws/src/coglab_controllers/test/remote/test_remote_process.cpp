@@ -2,6 +2,7 @@
 // virtual; time passes only between two cycles.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <csignal>
 #include <functional>
@@ -249,6 +250,38 @@ TEST_F(Feedback, TheCorrectionOfAStoppedOrDeadProcessFades) {
     for (int i = 0; i < 140; ++i) tick();  // max_age, fade_time, and the arm that follows
     EXPECT_LT(away(), 1e-3);
   }
+}
+
+TEST_F(Feedback, AStoppedArmStandsAndTheCorrectionComesBackAfterReset) {
+  const Process process("law", RemoteKind::Feedback,
+                        [](const RemoteQuestion&, RemoteAnswer& answer) {
+                          answer.kind = static_cast<std::int64_t>(RemoteAnswerKind::Correction);
+                          answer.values[2] = 0.03;
+                        });
+  ASSERT_TRUE(soon([this] { return tick(answers() > 0), away() > 0.029; }));
+  const auto block = [this](MotionBlock why) {
+    arm.sample.block = why;
+    ++arm.sample.motion_epoch;
+  };
+  block(MotionBlock::Held);
+  for (int i = 0; i < 4; ++i) tick();
+  const JointVector stopped = arm.sample.position;
+  for (int i = 0; i < 100; ++i) {
+    tick();
+    ASSERT_TRUE(arm.manager->report().standing);
+  }
+  EXPECT_EQ(arm.sample.position, stopped);
+  block(MotionBlock::None);
+  home = arm.hand().position;  // it holds where it stands
+  double fastest = 0.0;
+  ASSERT_TRUE(soon([&] {
+    const int count = answers();
+    arm.tick();
+    EXPECT_TRUE(soon([count] { return answers() != count; }));
+    fastest = std::max(fastest, arm.handVelocity().norm());
+    return away() > 0.029;
+  }));
+  EXPECT_LT(fastest, 0.4) << "its rate of 0.2 m/s, and the blending";
 }
 
 /// Well at first, then what no correction is: a wrong kind, NaN, and numbers beyond any reach.
