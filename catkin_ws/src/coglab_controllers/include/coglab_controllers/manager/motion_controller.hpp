@@ -30,7 +30,7 @@ struct CycleInput {
   /// The arm is to rest: no motion is allowed, or a cancel came and no motion since. There are no
   /// corrections of feedback controllers then.
   bool resting = false;
-  std::uint64_t cancels = 0;    ///< newest cancel of the active controller
+  std::uint64_t cancels = 0;  ///< newest cancel of the active controller
 };
 
 /// Why a request is void in the cycle that takes it over: a cancel came after it, or the robot

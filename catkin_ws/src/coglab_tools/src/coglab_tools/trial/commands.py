@@ -33,7 +33,7 @@ def add(verbs: argparse._SubParsersAction[Any]) -> None:
         given = parser.add_argument(
             "trial", nargs="?", default="", help='folder of a trial, or how its name begins; "" or "last": the newest'
         )
-        given.completer = _names  # type: ignore[attr-defined]  # of argcomplete
+        given.completer = _names  # of argcomplete
         if name in ("plot", "report", "video"):
             parser.add_argument("-o", "--out", type=Path, help="file to write; default: in the folder of the trial")
         if name == "report":
