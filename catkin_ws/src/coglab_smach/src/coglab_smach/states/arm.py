@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 from coglab_msgs.msg import ReasonCode
@@ -52,20 +53,20 @@ class ConfigureLwr(CoglabState):
     default_time_limit = 45.0
 
     def run(self, ud: Any) -> str:
-        before: list[str] = []
         while not self.ctx.arm.motion_allowed()[0]:
             try:
-                for command in before + list(self.ctx.config.get("lwr_commands")):
+                for command in list(self.ctx.config.get("lwr_commands")):
                     self.await_pending(self.ctx.arm.lwr_command(command), f"LWR command '{command}'")
                 break
             except TimeLimit:
                 raise
             except PortError:
-                # The robot controller may still be starting: try again within the time limit. Or somebody left it in
-                # command mode with another strategy, which can only be changed after a stop.
+                # The robot controller may still be starting: try again within the time limit.
                 if self.left() < 2.0:
                     raise
-                before = [] if before else ["stop"]
+                # Or somebody left it in command mode with another strategy, which can only be changed after a stop.
+                with suppress(PortError):
+                    self.await_pending(self.ctx.arm.lwr_command("stop"), "LWR command 'stop'")
                 self.pause(1.0)
         try:
             self.wait_for(lambda: self.ctx.arm.motion_allowed()[0], "command mode of the LWR", code=ARM)
