@@ -131,7 +131,8 @@ class Bridge(unittest.TestCase):
 
     def test_e_a_tracker_that_stops_is_seen_no_more(self):
         self.stop_playing()
-        self.assertTrue(wait_for(lambda: not self.services["locate_object"]("mug", 0.0).success, LIMIT))
+        for each in ("mug", "human_hand"):
+            self.assertTrue(wait_for(lambda e=each: not self.services["locate_object"](e, 0.0).success, LIMIT), each)
         answer = self.services["locate_object"]("human_hand", 0.0)
         self.assertEqual((answer.success, answer.reason_code), (False, ReasonCode.OBJECT_NOT_SEEN))
 
