@@ -94,7 +94,7 @@ def reports(quick: bool) -> Iterator[Row]:
         length = trial.results[-1].ended - trial.results[0].started
         trial.save(Path(place) / "long")
         spent = [command("trial", "report", Path(place) / "long") for _ in range(1 if quick else 5)]
-    yield median(f"report of a trial of {length:.0f} s", spent, "s", "<= 5")
+    yield median(f"report of {length:.0f} s with eight handovers", spent, "s", "<= 5")
 
 
 def workers(quick: bool) -> Iterator[Row]:
