@@ -123,7 +123,11 @@ def demonstrations(options: argparse.Namespace) -> list[Any]:
     source = Source(o.frame, o.topic, o.world, o.length, o.time, o.angle)
     found = []
     for path in progress(o.files, len(o.files), "reading"):
-        found += reaches(read(path, source), o.back, "moving" in getattr(o, "allow", ()))
+        recording = read(path, source)
+        try:
+            found += reaches(recording, o.back, "moving" in getattr(o, "allow", ()))
+        except CheckFailed as error:
+            raise CheckFailed(f"{path}: {str(error).removeprefix(f'{recording.name}: ')}") from None
     return found
 
 
@@ -235,7 +239,10 @@ def import_files(options: argparse.Namespace) -> Answer:
     paths = []
     for d in found:
         paths.append(options.out / f"{d.name}.csv")
-        d.save(paths[-1])
+        try:
+            d.save(paths[-1])
+        except CheckFailed as error:
+            raise CheckFailed(f"{error}; {len(paths) - 1} of {len(found)} demonstrations were written") from None
     text = [_of_files(options.files, found), *_table(found), f"wrote {len(paths)} demonstrations to {options.out}"]
     return Answer(
         "\n".join(text),
@@ -255,7 +262,10 @@ def train(options: argparse.Namespace) -> Answer:
     count = add_to_library(taught, options.library, options.replace)
     primitive, middle = taught.primitive, check.run(taught.primitive, check.region_middle())
     path = options.plot or options.library.with_name(f"{options.id}.png")
-    plot.draw(path, primitive, found, taught.rmse, taught.turn, taught.closing)
+    try:
+        plot.draw(path, primitive, found, taught.rmse, taught.turn, taught.closing)
+    except CheckFailed as error:
+        raise CheckFailed(f"{error}. The primitive is in {options.library}: ./coglab dmp inspect draws it") from None
     errors = 1000.0 * taught.rmse
     lines = [
         _of_files(options.files, found),

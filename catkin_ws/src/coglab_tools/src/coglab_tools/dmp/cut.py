@@ -17,6 +17,7 @@ from coglab_tools.dmp.demonstration import Array, Demonstration
 
 CUT_OFF = 6.0  # Hz; usual for motions of the arm (Winter, Biomechanics and Motor Control of Human Movement)
 SHORTEST = 0.1  # m, farthest point of a reach from its start
+NOTED_GAP = 0.05  # s without a sample that a note tells
 LONGEST_GAP = 0.2  # s without a sample within a reach
 LARGEST_STEP = 0.5  # share of a reach between two samples without a gap; above it the tracker took something else
 LOW, LOW_SHARE = 0.02, 0.05  # m/s, and share of the peak speed: below the larger one the hand rests
@@ -83,7 +84,9 @@ def reaches(raw: Demonstration, back: bool = False, cut_off: bool = False) -> li
                 lost = f"the recording {word} within it, while the hand moves at {speed[at]:.2f} m/s"
         if lost and (begin == 0 or end == len(whole.times) - 1):
             continue
-        _refuse_gap(raw, whole.times[begin], whole.times[end])
+        gap = _refuse_gap(raw, whole.times[begin], whole.times[end])
+        if gap > NOTED_GAP:
+            part = replace(part, notes=(*part.notes, f"a gap of {gap:.2f} s was bridged"))
         _refuse_jump(raw, whole.times[begin], whole.times[end], way)
         found.append(part)
     if not found and lost:
@@ -140,11 +143,12 @@ def _part(whole: Demonstration, begin: int, end: int) -> Demonstration:
     )
 
 
-def _refuse_gap(raw: Demonstration, begin: float, end: float) -> None:
+def _refuse_gap(raw: Demonstration, begin: float, end: float) -> float:
+    """The longest time between two samples within a reach, s. CheckFailed: it cannot be bridged."""
     t = raw.times
     inside = np.flatnonzero((t[1:] > begin) & (t[:-1] < end))
     if len(inside) == 0:
-        return
+        return 0.0
     gaps = np.diff(t)[inside]
     worst = int(np.argmax(gaps))
     if gaps[worst] > LONGEST_GAP:
@@ -152,6 +156,7 @@ def _refuse_gap(raw: Demonstration, begin: float, end: float) -> None:
             f"{raw.name}: a gap of {gaps[worst]:.2f} s at {t[inside[worst]]:.2f} s, within a reach; at most "
             f"{LONGEST_GAP:g} s can be bridged: record it again, or cut the file"
         )
+    return float(gaps[worst])
 
 
 def _refuse_jump(raw: Demonstration, begin: float, end: float, way: float) -> None:

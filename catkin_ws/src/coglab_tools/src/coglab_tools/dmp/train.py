@@ -18,7 +18,7 @@ import coglab_controllers as cc
 import numpy as np
 import yaml
 
-from coglab_tools.command import CheckFailed, UsageError
+from coglab_tools.command import CheckFailed, NotThere, UsageError
 from coglab_tools.dmp.demonstration import Array, Demonstration
 from coglab_tools.files import write_whole
 
@@ -203,8 +203,10 @@ def add_to_library(taught: Taught, library: Path, replace: bool = False) -> int:
 
 
 def load_library(path: Path) -> cc.Library:
-    """Read a library file. CheckFailed with file and line."""
+    """Read a library file. NotThere: there is none. CheckFailed with file and line."""
     library = cc.Library()
+    if not path.exists():
+        raise NotThere(f"{path}: no such file; expected a library of primitives (.xml)")
     try:
         library.load(str(path))
     except cc.LibraryError as error:

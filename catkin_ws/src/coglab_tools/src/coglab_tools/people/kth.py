@@ -44,6 +44,8 @@ def read_kth(folder: Path) -> Handover:
     touch = _touch(folder)
     if touch is not None:
         notes.append(f"both hold the baton from {touch:.2f} s on")
+    else:
+        notes.append("without the forces on the baton the touch is unknown: the longest reach is taken")
     return Handover(folder.name, hands, baton, toward / np.linalg.norm(toward), touch, SOURCE, tuple(notes))
 
 
