@@ -20,6 +20,7 @@ html_theme = "furo"
 html_title = f"CogLab {release}"
 html_show_sourcelink = False
 autodoc_member_order = "bysource"
+autodoc_mock_imports = ["gymnasium"]  # of PyPI; the pages need its names alone
 autodoc_typehints = "none"
 breathe_projects = {package: str(DOCS / "_build" / "doxygen" / package / "xml") for package in PACKAGES}
 breathe_default_project = PACKAGES[0]
@@ -27,14 +28,18 @@ breathe_default_project = PACKAGES[0]
 
 def plain(_app, _what, _name, _obj, _options, lines):
     """Escape the markup of docstrings: they are plain text with names in backticks, and examples after `::`."""
-    text, example = [], False
-    for line in lines:
+    text, example, bullet = [], False, False
+    for number, line in enumerate(lines):
         if example and (not line.strip() or line.startswith(" ")):
             text.append(line)
             continue
+        if example and not any(text[-1:]):  # an example up to the end, at the margin of the text
+            text += [f"    {rest}" for rest in lines[number:]]
+            break
         example = line.rstrip().endswith("::")
+        bullet = line.startswith("- ") or (bullet and line.startswith(" "))
         parts = re.split(r"(`+[^`]+`+)", line.strip())
-        text.append("".join(_name_or_text(part) for part in parts))
+        text.append(("  " if bullet and line.startswith(" ") else "") + "".join(_name_or_text(part) for part in parts))
     lines[:] = text
 
 

@@ -41,7 +41,7 @@ class FeedbackStage {
   /// Replaces the managers by those of a file; before the first cycle.
   /// @param file path
   /// @param folders searched for libraries of managers
-  /// @throws ctrl_more::ConfigError; the managers then stay as they are
+  /// @throws ctrl_more::ConfigError  the managers then stay as they are
   void loadCentral(const std::string& file, const std::vector<std::string>& folders);
   ctrl_more::FeedbackControllersManager& manager() { return central_->feedbackControllers(); }
   const ctrl_more::FeedbackControllersManager& manager() const {
