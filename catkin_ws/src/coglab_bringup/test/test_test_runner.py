@@ -1,8 +1,9 @@
 """The runner that counts all other tests must not lie: red, dead, hanging and empty programs are told apart."""
 
 import os
-import signal
+import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from coglab_bringup import arguments, process_tree, test_runner
@@ -52,16 +53,23 @@ def test_counts(tmp_path, script, counts, capsys):
     assert capsys.readouterr().out.splitlines()[-1] == "{} passed, {} failed, {} skipped".format(*counts)
 
 
+DEAF = """
+import sys
+from pathlib import Path
+from test_test_runner import GREEN, program, run
+item = program(Path("."), "import signal; assert signal.getsignal(signal.SIGINT) != signal.SIG_IGN;"
+               f"open(XML, 'w').write('''{GREEN}''')")
+run(item, Path("log"), limit=60.0)
+sys.exit(item.failed)
+"""
+
+
 def test_a_program_hears_ctrl_c_also_where_the_runner_ignores_it(tmp_path):
     """As it does where a script has started it in the background."""
-    heard = "import signal; assert signal.getsignal(signal.SIGINT) != signal.SIG_IGN"
-    item = program(tmp_path, f"{heard}; open(XML, 'w').write('''{GREEN}''')")
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        run(item, tmp_path / "log", limit=60.0)
-    finally:
-        signal.signal(signal.SIGINT, before)
-    assert (item.passed, item.failed) == (1, 0), item.failures
+    found = ":".join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")])
+    command = ["env", "--ignore-signal=INT", f"PYTHONPATH={found}", sys.executable, "-c", DEAF]
+    ended = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert ended.returncode == 0, ended.stdout + ended.stderr
 
 
 def test_a_gtest_that_was_not_built_is_a_failure(tmp_path):

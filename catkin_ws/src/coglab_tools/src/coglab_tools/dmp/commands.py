@@ -136,6 +136,7 @@ def record(options: argparse.Namespace) -> Answer:
     import re
     import signal
     import tempfile
+    import threading
 
     from coglab_tools.files import write_whole
 
@@ -155,8 +156,9 @@ def record(options: argparse.Namespace) -> Answer:
     terminal = recorder.Terminal()
     write_whole(path, "")  # a folder that cannot be written is found out before anything moves
     path.unlink()
-    for number in (signal.SIGHUP, signal.SIGTERM):  # as Ctrl-C: hand guiding has to end
-        signal.signal(number, signal.default_int_handler)
+    if threading.current_thread() is threading.main_thread():  # elsewhere Python sets no handlers
+        for number in (signal.SIGHUP, signal.SIGTERM):  # as Ctrl-C: hand guiding has to end
+            signal.signal(number, signal.default_int_handler)
     try:
         with coglab.connect(options.master or _running_master()) as robot:
             if not options.frame:
