@@ -1,13 +1,11 @@
 """After a stop: which one is acknowledged, the button that is held, and what begins a motion."""
 
 import asyncio
-import json
 from dataclasses import replace
 
 import pytest
 from coglab_console.desk.desk import Answer
 from coglab_console.desk.gates import HOLD_TIME, HeldButton, MotionGuard, Standstills
-from console_double import running
 from desk_double import RECEIVE, Clock, ask, hold_for, newest, shown
 
 
@@ -180,23 +178,6 @@ def test_the_real_robot_and_calibrations_that_open_the_hand_need_a_held_button()
     assert not plain.guarded("calibrate", {"mode": "fast"})
     assert plain.guarded("calibrate", {"mode": "fast", "force": True})
     assert plain.guarded("calibrate", {"mode": "complete"})
-
-
-def test_a_connection_that_dies_with_the_button_held_starts_nothing(tmp_path):
-    async def test():
-        async with running(tmp_path) as console, console.browser() as client:
-            ws = await console.socket_of(client)
-            await ws.send_str("{}")
-            console.desk.guard.stop("test")
-            console.desk.guard.acknowledge(console.desk.guard.stops)
-            for _ in range(6):
-                await ws.send_str(json.dumps({"t": "hold", "name": "start", "arguments": RECEIVE}))
-                await asyncio.sleep(0.1)
-            ws._response.connection.transport.abort()
-            await asyncio.sleep(1.2)
-            assert console.robot.calls == []
-
-    asyncio.run(test())
 
 
 def test_a_stop_that_was_lifted_in_a_terminal_is_said_to_be_over(desk):

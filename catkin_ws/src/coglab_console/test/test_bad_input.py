@@ -80,25 +80,6 @@ def test_of_two_operators_at_once_one_is_served_and_the_other_is_told_who_operat
     go(test, tmp_path)
 
 
-def test_whoever_has_taken_over_alone_operates(tmp_path, monkeypatch):
-    monkeypatch.setattr("coglab_console.desk.desk.NOTICE", 0.2)
-
-    async def test(console):
-        async with console.browser() as one, console.browser() as two:
-            async with console.socket_of(one) as first, console.socket_of(two) as second:
-                for ws in (first, second):
-                    await ws.send_str("{}")
-                    await ws.receive()
-                await console.post(two, "take_over")
-                await until(lambda: console.desk.roles.operator == "browser 2")
-                assert (await console.post(one, "home"))[0] == 409
-                assert (await console.post(two, "home"))[0] == 200
-                announced, changed = events_of(console, "control")[-2:]
-                assert "browser 2 takes over from browser 1" in announced and "browser 1 watches" in changed
-
-    go(test, tmp_path)
-
-
 def test_a_stop_during_a_request_still_asks_for_both_acts(tmp_path):
     """A STOP while the machine has not answered a start yet: the answer, which comes later, is not the first motion."""
 

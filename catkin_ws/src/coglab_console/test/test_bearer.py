@@ -105,15 +105,6 @@ def test_a_key_from_a_foreign_page_is_refused(tmp_path, origin):
     go(test, tmp_path)
 
 
-def test_a_key_under_a_foreign_host_is_refused(tmp_path):
-    async def test(console, client):
-        key = await key_for(console, client)
-        for address in ("/api/command", "/api/stop", "/api/session"):
-            assert (await posted(console, client, address, bearer(key, Host="evil.example"), NOTE))[0] == 403
-
-    go(test, tmp_path)
-
-
 def test_a_program_watches_until_it_takes_over_and_is_limited_like_a_browser(tmp_path):
     async def test(console, client):
         console.desk.connected("browser 9")

@@ -6,8 +6,7 @@ import time
 from dataclasses import replace
 
 import pytest
-from coglab_console.browser import Browser, press_and_hold
-from coglab_console.desk.desk import Answer
+from coglab_console.browser import Browser
 from coglab_console.desk.words import BUTTONS
 from page_check import PAGES, look
 from page_double import STATUS, Desk
@@ -161,37 +160,6 @@ def test_one_click_changes_no_threshold_and_opens_no_hand(desk, tab, label, comm
     page.js(f"{found}.dispatchEvent(new PointerEvent('pointerup', {{ bubbles: true }}))")
     assert desk.robot.calls[-1][0] == command
     page.tab("Live")
-
-
-def test_a_held_button_that_has_begun_something_is_not_refused_when_it_is_let_go(desk, monkeypatch):
-    """By then it is disabled, because of what it has begun."""
-    page = desk.browser
-
-    async def call(name, arguments):
-        calibrating = desk.robot.now.calibrating or name == "calibrate"
-        desk.robot.now = replace(desk.robot.now, calibrating=calibrating)
-        return Answer(True, "calibration complete started")
-
-    monkeypatch.setattr(desk.robot, "call", call)
-    page.tab("Health")
-    page.js("document.getElementById('told').hidden = true")
-    found = "[...document.querySelectorAll('#page button')].find((one) => one.innerText === 'Forced calibration')"
-    button = page.js(f"const one = {found}; one.scrollIntoView(); return one")
-    press_and_hold(page, button, lambda: page.js(f"return {found}.hasAttribute('aria-disabled')"), 15.0)
-    time.sleep(0.3)
-    words = page.js("return document.getElementById('page').innerText")
-    assert page.js("return document.getElementById('told').hidden") and "calibration complete started" in words
-    desk.robot.now = replace(desk.robot.now, calibrating=False)
-    page.tab("Live")
-
-
-def test_the_list_of_objects_stays_closed_for_who_watches(desk):
-    with Browser() as other:
-        other.open(desk.console.link())
-        other.until("return document.getElementById('why-side').innerText === 'browser 1 operates'", 60.0)
-        other.js("document.getElementById('object').click()")
-        assert other.js("return document.querySelector('ul.choice')") is None
-        other.until("return document.getElementById('told').innerText.includes('browser 1 operates')", 60.0)
 
 
 @pytest.mark.parametrize(

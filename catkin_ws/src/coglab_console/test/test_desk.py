@@ -131,17 +131,6 @@ def test_reasons(change, button, part):
     assert (found == "") == (part == "") and part in found
 
 
-def test_a_reason_is_short_enough_to_stand_below_its_button():
-    """Three lines; the whole of it is in the status column."""
-    told = "command mode was lost because the robot controller was not run for 259 ms (load); now: no datagrams"
-    for arm_reason in (told, "x" * 200):
-        standing = replace(Standing(**READY), motion_allowed=False, arm_reason=arm_reason)
-        found = reasons(standing, MotionGuard())["home"]
-        assert found.startswith("the arm may not move: ") and len(found) <= 50
-    standing = replace(Standing(**READY), motion_allowed=False, arm_reason=told)
-    assert reasons(standing, MotionGuard())["home"] == "the arm may not move: command mode was lost"
-
-
 def test_thresholds_do_not_change_under_way(desk):
     assert ask(desk, "a", "contact_arm", mode="off")["success"]
     desk.backend.now = replace(desk.backend.now, in_hub=False)

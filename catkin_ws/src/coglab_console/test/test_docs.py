@@ -6,7 +6,6 @@ import shutil
 from pathlib import Path
 
 import pytest
-from coglab_console.web import server
 from console_double import running
 
 PACKAGE = Path(__file__).resolve().parents[1]
@@ -27,8 +26,3 @@ def test_the_printed_program_notes_and_stops(tmp_path):
             assert console.robot.stops == ["program 1"] and console.robot.told == [("note", "by a program")]
 
     asyncio.run(test())
-
-
-def test_the_limits_are_those_that_are_served():
-    assert f"more than {server.MAX_MESSAGE // 1024} KiB" in PAGE and f"nothing for {server.SEND_LIMIT:.0f} s" in PAGE
-    assert f"after {server.MAX_BAD_FRAMES} of them" in PAGE and server.MAX_SOCKETS == 4

@@ -1,13 +1,12 @@
 """Machines on this master as the page is told of them: the last transition with its reason, and what is missing."""
 
 import threading
-import time
 from types import SimpleNamespace
 
 import pytest
 from coglab_console.ros import graph
 from coglab_console.ros.graph import Machine, SmachGraphs
-from coglab_console.scene.graph_layout import Container, Layout
+from coglab_console.scene.graph_layout import Container
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
 
 
@@ -54,21 +53,6 @@ def test_of_a_machine_that_tells_no_transitions_the_states_are_known(told):
     status(told, "B")
     status(told, "A")
     assert (last(told)["from"], last(told)["to"], last(told)["outcome"]) == ("B", "A", "")
-
-
-def test_without_graphviz_it_is_said_once_and_the_states_are_shown(told):
-    told.graphs._layout = Layout("no-such-program")
-    structure(told)
-    structure(told, "/N")
-    end = time.monotonic() + 60.0
-    while "graph:/coglab" not in told.documents and time.monotonic() < end:
-        time.sleep(0.05)
-    structure(told, "/O")
-    while len(told.documents["graph:/coglab"]["nodes"]) < 6 and time.monotonic() < end:
-        time.sleep(0.05)
-    assert len(told.documents["graph:/coglab"]["nodes"]) == 6
-    ((level, text),) = told.said
-    assert level == "warning" and "apt install graphviz" in text
 
 
 def test_containers_and_machines_are_bounded(told):

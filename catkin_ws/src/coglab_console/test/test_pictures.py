@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from coglab_console.desk.words import phase
 from coglab_console.ros import startup
 from coglab_console.ros.view import BadBytes, transforms
 from coglab_console.scene import path_ahead
@@ -46,11 +45,6 @@ def test_graphviz_lays_nested_machines_out():
     x, y, w, h = next(node["box"] for node in picture["nodes"] if node["path"] == "/M/SUB/X")
     assert inside[0] <= x and x + w <= inside[0] + inside[2] and inside[1] <= y and y + h <= inside[1] + inside[3]
     assert roots(MACHINE) == ["/M"]
-
-
-def test_the_same_structure_is_laid_out_once():
-    layout = Layout()
-    assert layout.of(MACHINE) is layout.of(dict(reversed(MACHINE.items())))
 
 
 @pytest.mark.parametrize("dot", ["no-such-program", "/bin/false", "/bin/echo"])
@@ -169,16 +163,6 @@ MUG = {
 }
 
 
-def test_what_the_brain_would_ask_for():
-    asked = path_ahead.aim("exchange_human_to_robot", MUG, "person")
-    assert (asked["primitive_id"], asked["dmp_ratio"], asked["goal_frame"]) == ("r", 1.0, "object_mug")
-    assert np.allclose(asked["goal_offset"], [0.0, -0.04 - 0.025, 0.05])
-    assert np.allclose(asked["target_orientation"], [0.5, 0.5, 0.5, 0.5])
-    asked = path_ahead.aim("exchange_robot_to_human", MUG, "person")
-    assert (asked["primitive_id"], asked["goal_frame"]) == ("g", "person")
-    assert np.allclose(asked["goal_offset"], [-0.1, -0.04, 0.0])
-
-
 @pytest.mark.parametrize("name", sorted(path.stem for path in OBJECTS.glob("*.yaml")))
 def test_it_is_what_the_brain_asks_for(name):
     """For every object of the database, and both roles: the goal that the state machines make."""
@@ -262,16 +246,6 @@ def test_bytes_that_are_none_are_refused():
                 pass
     with pytest.raises(BadBytes):
         list(transforms(struct.pack("<I", 4000000000)))
-
-
-def test_phases_in_words_depend_on_the_action():
-    """Giving opens the hand because the person has taken the object: nothing is waited for there."""
-    receive, give = "/m/exchange_human_to_robot", "/m/exchange_robot_to_human"
-    assert phase(f"{give}/approach/arm_motion/wait_stop") == "reaches and gives"
-    assert phase(f"{receive}/approach/arm_motion/wait_stop") == "reaches and receives"
-    assert phase(f"{give}/hand_open") == "lets the person have it" and phase("/m/put/hand_open") == "opens the hand"
-    assert phase(f"{give}/set_dmp_goal") == "waits for the person's hand"
-    assert phase("/m/some_state") == "some state"
 
 
 def test_versions_of_debian_packages_and_of_a_checkout(tmp_path):

@@ -146,28 +146,3 @@ def test_a_change_of_the_phase_is_read_out(desk):
     read_out = "return [...document.querySelectorAll('#live dd [aria-live=polite]')].map((one) => one.closest('dd'))"
     (cell,) = desk.browser.js(read_out)
     assert "phase" in cell.get_attribute("class").split()
-
-
-@pytest.mark.parametrize(
-    "kind, wanted, other", [("ahead", ["#56b4e9", 2, True], "#0072b2"), ("running", ["#0072b2", 5, False], "")]
-)
-def test_the_flat_picture_has_the_path_as_the_help_says(desk, kind, wanted, other):
-    """Thin and sky-blue where the next motion would go, thick and blue where it goes; dashes tell them apart, too."""
-    page = desk.browser
-    page.js(
-        "const of = CanvasRenderingContext2D.prototype; window.strokes = []; window.drawStroke ??= of.stroke;"
-        "of.stroke = function (...all) { strokes.push([this.strokeStyle, this.lineWidth,"
-        " this.getLineDash().length > 0]); return window.drawStroke.apply(this, all); };"
-    )
-    shown = {"kind": kind, "motion": "m", "stamp": 0.0, "goal": [0.9, 0, 0.3], "times": [0.0, 2.0],
-             "points": [[0.1, 0, 0.3], [0.9, 0, 0.3]]}  # fmt: skip
-    desk.put(path=None)
-    page.until("window.strokes = []; return coglab.docs().path === null", 60.0)
-    desk.put(path=shown)
-    page.until("return strokes.some((one) => JSON.stringify(one) === JSON.stringify(arguments[0]))", 60.0, wanted)
-    assert other not in page.js("return strokes.map(([colour]) => colour)")
-    page.tab("Help")
-    words = page.js("return document.getElementById('page').innerText")
-    assert "Thin sky-blue path, dashed in 2D: where the next motion would go; thick blue: the motion under way" in words
-    assert "whole: all of the machine, with letters as small as that takes; follow: letters that can be read" in words
-    page.tab("Live")

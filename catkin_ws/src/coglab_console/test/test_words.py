@@ -1,11 +1,7 @@
 """What an experimenter reads: no name of a state, an action, a command or a service; every phase has words."""
 
-import re
-
 import pytest
 from coglab_console.desk import words
-from coglab_console.desk.commands import COMMANDS
-from coglab_console.desk.gates import MotionGuard, Standing, reasons
 from coglab_objects.database import ObjectDatabase, objects_folder
 from coglab_py.packages import package_path
 from coglab_smach.context.config import Config
@@ -14,8 +10,6 @@ from coglab_trials.scripted import scripted_context
 from coglab_trials.virtual_clock import VirtualClock, using
 
 LIBRARY = str(package_path("coglab_controllers", "config", "primitives.xml"))
-HELD = {"object_id": "mug", "actions": ("exchange_robot_to_human", "put")}
-NAMES = re.compile(r"[a-z]+_[a-z_]+|/[a-z_]+|rosservice|coglab")
 
 
 def labels_of(machine, found):
@@ -42,33 +36,6 @@ def test_every_state_of_the_machine_has_words():
     assert sorted(label for label in labels if label not in words.PHASES) == []
 
 
-@pytest.mark.parametrize("name", sorted(COMMANDS))
-def test_every_command_is_told_in_words(name):
-    arguments = {"start": {"action": "exchange_human_to_robot"}, "calibrate": {"mode": "complete", "force": True}}
-    assert not NAMES.search(words.command(name, arguments.get(name, {})))
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {},
-        HELD,
-        {"master_alive": False, "arm_alive": False, "hand_alive": False, "manager_alive": False},
-        {"in_hub": False, "state": "/coglab_master/exchange_human_to_robot/approach/arm_motion/wait_stop"},
-        {"in_hub": False, "state": "/coglab_master/recover/coglab_home_robot"},
-        {"state": "/coglab_master/stopped", "actions": ("reset",)},
-        {"state": "/coglab_master/fault", "actions": ("initialise",)},
-        {"calibrated": True, "holding": True},
-    ],
-)
-def test_reasons_are_sentences(change):
-    standing = Standing(
-        **{"master_alive": True, "in_hub": True, "state": "/coglab_master/wait_without_object", **change}
-    )
-    for name, reason in reasons(standing, MotionGuard()).items():
-        assert not NAMES.search(reason), (name, reason)
-
-
 @pytest.mark.parametrize(
     "told, read",
     [
@@ -88,20 +55,3 @@ def test_reasons_are_sentences(change):
 )
 def test_a_sentence_of_the_brain_says_what_to_press(told, read):
     assert words.plain(told) == read
-
-
-def test_a_transition_is_a_sentence():
-    """Its reason stands first. What the phase that is shown beside it says already is left out."""
-    path = "/coglab_master/exchange_human_to_robot"
-    assert words.transition(path, "set_dmp_goal", "succeeded", "approach") == "now: reaches"
-    assert words.transition("/coglab_master", "wait_with_object", "put", "put") == (
-        "ready, holds an object: Put; now: puts on the board"
-    )
-    assert words.transition(path, "recover", "empty", "failed_empty") == "recovers: empty"
-    assert words.transition(path, "switch_to_dmp", "succeeded", "switch_to_dmp") == "prepares the reach: done"
-    assert words.transition(path, "monitor_dmp", "switched", "monitor_dmp", "pattern 'high'") == (
-        "pattern 'high' (watches where the person reaches: switched)"
-    )
-    assert words.transition(path, "approach", "failed", "recover", "the arm is blocked") == (
-        "the arm is blocked (reaches: failed; now: recovers)"
-    )
