@@ -16,7 +16,6 @@ import actionlib
 import numpy as np
 import rospy
 import rostest
-import yaml
 from coglab_msgs.msg import (
     Contact,
     ContactSignal,
@@ -27,7 +26,7 @@ from coglab_msgs.msg import (
     ReasonCode,
     Transition,
 )
-from coglab_msgs.srv import ArmContact, GetObject, Learn, LearnMotion, ListObjects, Reload, Start
+from coglab_msgs.srv import ArmContact, Learn, LearnMotion, Start
 from coglab_smach.kinematics.reachability import default_arm, home_posture, position_jacobian
 from sensor_msgs.msg import JointState
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
@@ -149,23 +148,6 @@ class BrainNodes(unittest.TestCase):
         ):
             answer = learn_motion(gather)
             self.assertEqual((answer.success, answer.reason_code), (success, code), answer.message)
-
-    def test_3_object_database(self):
-        self.assertEqual(
-            list(service("/object_database/list_objects", ListObjects)().object_ids),
-            ["ball", "bottle", "mug", "screwdriver", "tea_box"],
-        )
-        unknown = service("/object_database/get_object", GetObject)("elephant")
-        self.assertEqual((unknown.success, unknown.reason_code), (False, ReasonCode.OBJECT_UNKNOWN))
-        mug = service("/object_database/get_object", GetObject)("mug")
-        self.assertTrue(mug.success)
-        self.assertEqual(yaml.safe_load(mug.yaml)["mass"], 0.31)
-        missing = service("/object_database/get_object", GetObject)("elephant")
-        self.assertFalse(missing.success)
-        self.assertIn("ball, bottle, mug", missing.message)
-        read = service("/object_database/reload", Reload)()
-        self.assertEqual((read.success, read.reason_code), (True, ReasonCode.NONE))
-        self.assertEqual(rospy.get_param("/object_database/objects/mug/mass"), 0.31)
 
     def test_4_introspection_shows_the_whole_hierarchy(self):
         paths, states = set(), {}

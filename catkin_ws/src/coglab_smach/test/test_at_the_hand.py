@@ -12,7 +12,6 @@ from coglab_smach.ports.interfaces import HandState, Located
 from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states import hand as hands
 from coglab_smach.states import hand_tracking, regrasp
-from coglab_smach.states.hand import CalibrateHand, HandClose, HandTighten
 from coglab_smach.states.hand_tracking import (
     off_grasp,
     palm_at,
@@ -160,20 +159,6 @@ def test_fingers_at_their_ends_hold_nothing(positions, lost):
     assert carried.ctx.holding == ("" if lost else "mug") and carried.grip.shared is not lost
 
 
-def test_a_hand_says_itself_why_it_holds_nothing():
-    for state, words in (
-        (HandState(True, holding=False, message="slipped"), "slipped"),
-        (HandState(True, holding=False), "the fingers are open"),
-    ):
-        carried = Carried()
-        carried.state = state
-        with pytest.raises(PortError) as error:
-            carried.held.check()
-        assert error.value.causes == (words,)
-    carried.state = HandState(False, holding=False)
-    carried.held.check()  # who does not answer says nothing
-
-
 @pytest.mark.parametrize(("moved", "after", "stays"), [(0.039, 0.16, True), (0.041, 0.16, False), (0.0, 0.14, False)])
 def test_an_object_stays_that_a_later_sight_shows_as_far_from_the_palm_as_at_first(moved, after, stays):
     """A tenth of a second later, by the time at which the sight was taken."""
@@ -185,79 +170,6 @@ def test_an_object_stays_that_a_later_sight_shows_as_far_from_the_palm_as_at_fir
 
 
 # --- when fingers close -----------------------------------------------------------------------------------------------
-
-
-def tightened(monkeypatch, away, at_home=False, before=0.1, sure=True, **ud):
-    """(closed at which speed, s that it took) with the person's hand ``away(s)`` m from the palm."""
-    seen, closed, clock = (it := Seen()), [], it.trial.clock
-    monkeypatch.setattr(hands, "hand_from_palm", lambda state: away(clock.now()))
-    monkeypatch.setattr(hands, "from_palm", lambda state, track, *_: away(clock.now()))
-    seen.ctx.holding, seen.trial.grip.firm = "mug", 140
-    seen.trial.grip.hand.is_sure = sure
-    seen.ctx.hand.close = lambda speed: closed.append(speed) or Polled(lambda: False, lambda: None)
-    fields = {} if at_home else {"hand_distance": before, "hand_seen_away": True, **ud}
-    outcome, seconds = seen.run(HandTighten(seen.ctx, at_home), **fields)
-    assert outcome == "succeeded" and (seen.trial.grip.firm == 0) == bool(closed)
-    return closed, seconds
-
-
-@pytest.mark.parametrize(
-    ("away", "before", "closes", "took"),
-    [
-        (lambda t: 0.201, 0.1, True, 0.2 + 0.3),
-        (lambda t: 0.199, 0.1, False, 1.0),
-        (lambda t: 0.501, None, True, 0.5),
-        (lambda t: 0.499, None, False, 1.0),
-        (lambda t: None, 0.1, False, 1.0),
-        (lambda t: 0.3 if t > 0.75 else 0.1, 0.1, True, 0.76 + 0.2 + 0.3),
-        (lambda t: 0.3 if t > 0.9 else 0.1, 0.1, False, 1.0),
-    ],
-)
-def test_a_hand_has_gone_that_is_10_cm_farther_for_a_fifth_of_a_second_within_one(
-    monkeypatch, away, before, closes, took
-):
-    closed, seconds = tightened(monkeypatch, away, before=before)
-    assert closed == ([140] if closes else []) and seconds == pytest.approx(took, abs=0.05)
-
-
-def test_a_hand_that_was_not_seen_all_the_way_may_be_another_one(monkeypatch):
-    assert tightened(monkeypatch, lambda t: 0.9, sure=False) == ([], pytest.approx(1.0, abs=0.05))
-
-
-def test_who_was_not_seen_to_go_is_not_waited_for(monkeypatch):
-    assert tightened(monkeypatch, lambda t: 0.9, hand_seen_away=False) == ([], 0.0)
-
-
-@pytest.mark.parametrize(("away", "closes"), [(0.29, False), (0.31, True), (None, True)])
-def test_at_home_nobodys_hand_may_be_within_30_cm(monkeypatch, away, closes):
-    assert bool(tightened(monkeypatch, lambda t: away, at_home=True)[0]) == closes
-
-
-def test_a_hand_that_may_hold_something_is_given_two_seconds_before_it_is_calibrated():
-    seen, asked = Seen(), []
-    state = HandState(True, False, False, True)
-    seen.ctx.hand.calibrate = lambda mode: asked.append(mode) or Ready()
-    seen.ctx.hand.state = lambda: state
-    calibrate = CalibrateHand(seen.ctx)
-    assert (
-        seen.run(calibrate)[1] == pytest.approx(2.0, abs=0.11) and asked == [] and "would open it" in calibrate.reason
-    )
-    state = HandState(True, True, False, False)
-    assert seen.run(calibrate) == ("succeeded", 0.0) and calibrate.reason == "the hand is calibrated already"
-    seen.ctx.config.set("hand.calibrate_always", True)
-    assert seen.run(calibrate)[1] < 0.05 and asked == ["fast"]
-
-
-@pytest.mark.parametrize(("holds_after", "outcome"), [(0.25, "succeeded"), (0.36, "missed")])
-def test_a_hand_is_given_three_tenths_of_a_second_to_say_that_it_holds(monkeypatch, holds_after, outcome):
-    seen = Seen(human_hand=(np.array([0.1, 0.0, 0.0]), 0.0))
-    clock = seen.trial.clock
-    seen.ctx.hand.close_on_object = lambda: Ready()
-    seen.ctx.hand.state = lambda: HandState(True, True, False, clock.now() >= holds_after, "", (0, 100, 100, 100, 100))
-    ud = {"object_id": "mug", "grasp": {"hand": {"mode": "cylindrical", "firm": 140}}}
-    seen.ctx.journal.begin_action("x", "mug")
-    assert seen.run(HandClose(seen.ctx, True), **ud)[0] == outcome
-    assert (seen.ctx.holding, seen.trial.grip.shared) == (("mug", True) if outcome == "succeeded" else ("", False))
 
 
 # --- to the grasp -----------------------------------------------------------------------------------------------------

@@ -8,19 +8,15 @@ import pytest
 from coglab_controllers import load_joint_limits
 from coglab_py.packages import package_path
 from coglab_py.pose import Pose, about_z
-from coglab_smach.kinematics import board_room, reachability
-from coglab_smach.kinematics.board_room import BoardRoom
+from coglab_smach.kinematics import board_room
 from coglab_smach.kinematics.goals import (
     approach_of,
     cost,
-    delivery_goal,
-    grasp_goal,
     palm_at_grasp,
-    place_goal,
     ranked,
 )
 from coglab_smach.kinematics.motion_time import MotionLimits, hand_path, ptp_time, reach_time, read_limits
-from coglab_smach.kinematics.reachability import default_arm, home_posture, solve
+from coglab_smach.kinematics.reachability import default_arm
 
 GRASP = {
     "hand": {"mode": "cylindrical", "level": "low"},
@@ -41,21 +37,6 @@ def test_a_palm_is_drawn_back_against_the_approach_axis():
     assert palm_at_grasp(bare, 0.05).position == pytest.approx([0.1, -0.05, 0.0]), "no axis: the palm's x"
     assert approach_of(GRASP, 0.03) == pytest.approx([0.0, 0.03, 0.0])
     assert approach_of(bare, 0.03) == pytest.approx([0.0, 0.03, 0.0])
-
-
-def test_goals_name_primitive_and_pace():
-    goal = grasp_goal(ENTRY, GRASP, "object_x", "receive", 0.0)
-    assert (goal["frame"], goal["primitive"], goal["dmp_ratio"]) == ("object_x", "a", 1.0)
-    slow = {**ENTRY, "dmp": {**ENTRY["dmp"], "dmp_ratio": 3}}
-    assert grasp_goal(slow, GRASP, "object_x", "take")["dmp_ratio"] == 3.0
-    offered = {"pose": {"xyz": [1.0, 0.0, 0.0], "quaternion": about_z(math.pi / 2).tolist()}}
-    given = delivery_goal(ENTRY, GRASP, offered, "human_hand")
-    assert given["primitive"] == "b" and given["offset"] == pytest.approx([1.04, 0.0, 0.07])
-    placed = {"frame": "board", "xyz": [0.2, 0.0, 0.0], "quaternion": about_z(math.pi / 2).tolist()}
-    assert place_goal(ENTRY, GRASP, placed, "put")["offset"] == pytest.approx([0.24, 0.0, 0.07])
-    cleared = place_goal(ENTRY, GRASP, placed, "take", 0.01)
-    assert cleared["offset"] == pytest.approx([0.25, 0.0, 0.07]) and cleared["frame"] == "board"
-    assert cleared["orientation"] == pytest.approx(about_z(math.pi / 2))
 
 
 def test_a_grasp_costs_for_fingertips_the_persons_hand_and_a_palm_that_turns_away():
@@ -133,29 +114,6 @@ def test_limits_are_those_of_the_managers_parameters():
 # --- what the arm can reach -------------------------------------------------------------------------------------------
 
 
-def test_a_posture_is_within_3_mm_3_degrees_and_the_joints_ranges():
-    arm, home = default_arm(), home_posture()
-    here = Pose(*arm.fk(home))
-    assert solve(arm, here) == pytest.approx(home), "it begins at home"
-    for moved, turned, needed in ((0.0029, 0.0, False), (0.0031, 0.0, True), (0.0, 2.9, False), (0.0, 3.1, True)):
-        target = Pose(here.position + [0.0, moved, 0.0], here.orientation) * Pose(
-            np.zeros(3), about_z(math.radians(turned))
-        )
-        found = solve(arm, target)
-        assert (np.abs(found - home).max() > 0.0) == needed
-        distance, angle = Pose(*arm.fk(found)).distance(target)
-        assert distance < 0.003 and angle < math.radians(3.0)
-    start = home + [0.4, 0.0, -0.3, 0.2, 0.0, 0.0, 0.0]
-    there = Pose(*arm.fk(start))
-    assert solve(arm, there, start) == pytest.approx(start)
-    assert solve(arm, there, steps=1) is None and solve(arm, there) is not None
-    most = np.asarray(reachability.joint_limits().upper_position)
-    for target in (Pose([0.78, -0.3, 0.2], [0.5, 0.5, 0.5, 0.5]), Pose([0.3, 0.6, 0.6], here.orientation)):
-        found = solve(arm, target)
-        assert found is None or np.all(np.abs(found) <= 0.98 * most + 1e-9)
-    assert solve(arm, Pose([2.0, 0.0, 0.0], here.orientation)) is None
-
-
 # --- the board --------------------------------------------------------------------------------------------------------
 
 
@@ -177,23 +135,3 @@ def test_the_lowest_point_of_plain_shapes():
     ball = solid('<origin xyz="0.3 0 0.2"/><geometry><sphere radius="0.1"/></geometry>')
     assert ball.below(level, up) == pytest.approx(1.1) == ball.below(level, up)
     assert solid('<geometry><mesh filename="hand.stl"/></geometry>') is None
-
-
-def test_room_is_that_of_the_arm_from_the_elbow_on(monkeypatch):
-    """The shoulder stands beside the board and may be below its plane."""
-    urdf = package_path("lwr_description", "urdf", "lwr_ih2.urdf").read_text(encoding="utf-8")
-    room, palm = BoardRoom(urdf), Pose(*default_arm().fk(home_posture()))
-    board = Pose(np.array([0.0, 0.0, -1.0]))
-    height = room.over(board, palm)
-    assert 1.0 < height < 1.0 + palm.position[2]
-    assert room.over(Pose(np.array([9.0, 9.0, -0.5])), palm) == pytest.approx(height - 0.5), "a plane without end"
-    # With the hand up and the forearm down it is the forearm that counts.
-    names, up = default_arm().joint_names, np.array([0.0, 0.0, 1.0])
-    bent = np.array([0.0, 1.6, 0.0, 2.0, 0.0, 0.0, 0.0])
-    angles = dict(zip(names, bent, strict=True))
-    lowest = [room._lowest("lwr_base_link", Pose(), angles, set(names[k:]), False, up) for k in (2, 3, 4)]
-    monkeypatch.setattr(board_room, "solve", lambda *_: bent)
-    assert room.over(Pose(), palm) == pytest.approx(lowest[1]) and lowest[0] < lowest[1] < lowest[2]
-    monkeypatch.undo()
-    upside = Pose(board.position, np.array([1.0, 0.0, 0.0, 0.0]))
-    assert room.over(upside, palm) < -1.0, "its z axis is up"

@@ -3,6 +3,7 @@ also where the node falls silent in the middle. The clock goes on as the test sa
 
 from __future__ import annotations
 
+import time
 from types import SimpleNamespace
 
 import pytest
@@ -143,6 +144,20 @@ def test_late_end_of_an_older_goal_ends_that_goal_alone(node):
     second.cancel()
     first.cancel()
     assert (older.cancelled, newer.cancelled) == (0, 1)
+
+
+def test_an_action_that_is_cancelled_before_its_goal_was_sent_never_moves_the_hand(monkeypatch):
+    client = Client("hand_open", None)
+    client.there = False
+    monkeypatch.setattr(hand, "server_is_there", lambda client: client.there)
+    call = hand.ActionCall(client, "hand_open", "goal")
+    call.cancel()
+    client.there, end = True, time.monotonic() + 60.0
+    while not call.done():
+        assert time.monotonic() < end
+        time.sleep(0.005)
+    assert "cancelled before its goal was sent" in refused(call, ReasonCode.CANCELLED).sentence
+    assert client.goals == []
 
 
 def test_an_action_without_a_server_names_the_node(node):

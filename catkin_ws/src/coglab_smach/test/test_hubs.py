@@ -4,10 +4,8 @@ import json
 
 import numpy as np
 import pytest
-from coglab_msgs.msg import ReasonCode
 from coglab_py.pose import Pose
 from coglab_smach.context.holding import HoldingMemory
-from coglab_smach.ports.pending import PortError
 from conftest import Trial
 
 WORDS = "words of the perception node that are made up here 4714"
@@ -109,47 +107,6 @@ def test_a_hold_during_an_action_never_opens_the_hand():
     assert trial.result().outcome == "stopped" and "hold is latched" in trial.result().reason + str(
         trial.result().causes
     )
-
-
-def test_a_hold_while_the_person_gives_does_not_move_the_hand():
-    trial = Trial()
-
-    def script(t):
-        t.wait_hub("wait_without_object")
-        t.cell.calls.clear()
-        t.start("exchange_human_to_robot")
-        t.clock.sleep(0.8)
-        t.cell.arm.held = True
-        t.wait_hub("stopped", limit=10.0)
-        t.clock.sleep(3.0)
-        assert "open" not in t.cell.called() and "close" not in t.cell.called()
-        t.start("reset", "")
-        t.wait_hub("wait_without_object")
-
-    trial.run(script)
-
-
-def test_why_names_the_block_and_not_only_what_failed_before_it():
-    trial, asked = Trial(), []
-    locate = trial.ctx.perception.locate_object
-    trial.ctx.perception.locate_object = lambda name, limit: asked.append((name, limit)) or locate(name, limit)
-
-    def script(t):
-        t.wait_hub("wait_without_object")
-        # Not seen, so that the answer comes when the time that the brain gives is over; the words of it are any.
-        t.cell.faults.not_seen.add("mug")
-        t.cell.faults.refuse["locate mug"] = PortError(WORDS, code=ReasonCode.OBJECT_NOT_SEEN)
-        t.start("exchange_human_to_robot")
-        t.cell.arm.held = True
-        t.wait_hub("stopped", limit=15.0)
-
-    trial.run(script)
-    assert trial.ctx.journal.why() == (
-        "the arm is blocked: hold is latched; reset first; the hand keeps what it holds; when its cause is "
-        f"away, type: ./coglab start reset, because set_dmp_goal: {WORDS}"
-    )
-    assert asked == [("mug", 5.0)]
-    assert trial.result().reason.startswith("the arm is blocked: hold is latched")
 
 
 def test_a_robot_node_that_came_back_empty_ends_in_fault_with_that_reason():

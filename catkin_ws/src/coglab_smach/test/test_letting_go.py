@@ -37,16 +37,6 @@ def test_a_stop_ends_the_firm_closing_as_well(moment):
     assert firm and cancelled == firm
 
 
-def test_a_hand_that_is_seen_late_counts_from_where_it_is_seen_at_the_object(monkeypatch):
-    lifted = Lifted(monkeypatch, carried=True)
-    lifted.away = 0.1
-    for _ in range(3):
-        assert not lifted.state._has_let_go(), "it holds on, though it was hidden as the fingers closed"
-    assert lifted.state._farther == pytest.approx(0.14)
-    lifted.away = 0.141
-    assert lifted.state._has_let_go()
-
-
 def test_who_pulls_it_out_has_not_let_go(monkeypatch):
     lifted = Lifted(monkeypatch)
     lifted.state._farther, lifted.away, lifted.kept, lifted.held.moved = 0.14, 0.2, False, True
@@ -113,15 +103,6 @@ def test_a_hand_that_goes_and_is_hidden_now_and_then_is_one(speed, hidden):
         t = seen(track, lambda s, t=t: speed * (t + s), since=t)
         t += hidden
     assert track.is_one
-
-
-def test_a_person_whose_hand_the_tracker_took_another_for_keeps_what_they_hold(monkeypatch):
-    lifted = Lifted(monkeypatch, carried=True)
-    lifted.state._farther, lifted.away = 0.14, None
-    with using(lifted.trial.clock) as clock:
-        for _ in range(100):
-            assert not lifted.state._has_let_go()
-            clock.sleep(0.02)
 
 
 def test_what_the_brain_waits_for_is_told_all_the_while_and_no_look_beside_it():

@@ -198,24 +198,6 @@ def test_a_robot_controller_that_starts_late_is_asked_again():
     assert len(trial.cell.called("lwr start")) > 3
 
 
-def test_failure_while_holding_ends_with_the_object_in_the_hand():
-    trial = Trial()
-
-    def script(t):
-        t.wait_hub("wait_without_object")
-        t.start("exchange_human_to_robot")
-        t.wait_hub("wait_with_object")
-        t.cell.partner.take_after = None
-        t.cell.calls.clear()
-        t.start("exchange_robot_to_human")
-        t.wait_hub("wait_with_object")
-
-    trial.run(script)
-    assert trial.result().outcome == "failed_holding"
-    assert "the person's taking of the load" in trial.result().reason
-    assert "open" not in trial.cell.called() and trial.ctx.holding == "mug"
-
-
 @pytest.mark.parametrize("moment", [0.2, 0.9, 1.8, 2.5, 3.4, 4.5])
 def test_stop_holds_never_opens_the_hand_and_needs_a_reset(moment):
     trial = Trial()
@@ -238,40 +220,6 @@ def test_stop_holds_never_opens_the_hand_and_needs_a_reset(moment):
 
     trial.run(script)
     assert "STOP" in trial.ctx.journal.results[-1].reason
-
-
-def test_stop_in_a_hub_is_stopped_too():
-    trial = Trial()
-    moved = []  # what the machine asked of arm and hand while it was stopped
-
-    def script(t):
-        t.wait_hub("wait_without_object")
-        t.cell.calls.clear()
-        t.ctx.stop.press("the operator pressed STOP")
-        t.wait_hub("stopped")
-        moved.extend(t.cell.called("move") + t.cell.called("open") + t.cell.called("execute"))
-        t.start("reset", "")
-        t.wait_hub("wait_without_object")
-
-    trial.run(script)
-    assert not moved
-    assert not trial.ctx.stop.pressed()
-
-
-def test_trigger_in_the_wrong_hub_is_refused_with_a_sentence(trial):
-    def script(t):
-        t.wait_hub("wait_without_object")
-        ok, message, _ = t.ctx.requests.submit("exchange_robot_to_human", "mug")
-        assert not ok and message == (
-            "'exchange_robot_to_human' refused: wait_without_object takes "
-            "exchange_human_to_robot, take; type: ./coglab start exchange_human_to_robot or "
-            "./coglab start take"
-        )
-        t.start("exchange_human_to_robot")
-        ok, message, _ = t.ctx.requests.submit("take", "mug")
-        assert not ok and "not in a hub now" in message
-
-    trial.run(script)
 
 
 def test_another_object_named_in_wait_with_object_means_the_one_held(trial):
@@ -299,16 +247,3 @@ def test_no_free_place_keeps_the_object():
 
     trial.run(script)
     assert trial.result().outcome == "failed_holding" and "no free place" in trial.result().reason
-
-
-def test_a_belief_leaves_the_hub_where_configured():
-    trial = Trial(**{"recognition_trigger.enabled": True})
-
-    def script(t):
-        t.wait_hub("wait_without_object")
-        t.clock.sleep(0.2)
-        t.cell.partner.offer = 0.95
-        t.wait_hub("wait_with_object")
-
-    trial.run(script)
-    assert any("belief in an offer of 'mug' (0.95)" in t.reason for t in trial.ctx.journal.transitions)

@@ -142,29 +142,6 @@ def test_a_failure_is_told_until_the_next_success():
     assert codes == {ReasonCode.OBJECT_NOT_SEEN}
 
 
-def test_an_object_that_does_not_exist_is_refused_by_name():
-    trial = Watched()
-
-    def script(t):
-        t.wait_hub("wait_without_object")
-        refused = t.ask(RECEIVE, "elephant")
-        assert not refused.ok and refused.code == ReasonCode.OBJECT_UNKNOWN
-        assert refused.message == (
-            f"'{RECEIVE}' refused: object 'elephant' is not in the database; it has: ball, bottle, mug, screwdriver, "
-            f"tea_box; type: ./coglab start {RECEIVE} ball"
-        )
-        t.clock.sleep(1.0)
-        assert t.ctx.requests.hub() == "wait_without_object" and "execute_dmp" not in t.cell.called()
-        t.ctx.config.set("default_object", "gnu")
-        t.cell.arm.held = True  # the hub is opened again with the new default
-        t.wait_hub("stopped")
-        assert t.ask("reset").ok
-        t.wait_hub("wait_without_object")
-        assert "'gnu' is not in the database" in t.ask("take").message
-
-    trial.run(script)
-
-
 def no_hub(t):
     t.ctx.requests.close()
     return t.ask("take", "mug")

@@ -1,15 +1,12 @@
 """When something counts as offered, what is believed, and the goals that are made of it."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_smach.ports.interfaces import Ahead, Located
 from coglab_smach.ports.pending import PortError, Ready
-from coglab_smach.states import hub
 from coglab_smach.states.base import CoglabState
-from coglab_smach.states.hand_tracking import HandoverRegion, unless_withdrawn
+from coglab_smach.states.hand_tracking import HandoverRegion
 from coglab_smach.states.knowledge import (
     await_offer,
     believed,
@@ -66,12 +63,6 @@ def test_the_region_counts_to_its_walls_and_a_still_object_a_tenth_of_a_metre_be
         assert error.value.code == ReasonCode.OBJECT_NOT_SEEN
         where = ", ".join(f"{v:.2f}" for v in place)
         assert error.value.sentence.startswith(f"'mug' was not offered within 8 s: it stayed at ({where}) m")
-
-
-def test_an_offer_lasts_for_start_after_from_when_it_is_one():
-    offers = Offers(lambda t: INSIDE if 1.0 < t < 1.3 or t > 2.0 else (1.3, 0.0, 0.4), **{"handover.start_after": 0.5})
-    assert 2.5 <= offers.wait()[1] < 2.57
-    assert Offers().wait()[1] == 0.0
 
 
 def test_an_offer_without_a_posture_is_told_when_the_time_is_over():
@@ -159,26 +150,6 @@ def test_a_sight_for_a_goal_is_half_a_second_old_at_most(age, good):
 # --- limits of a reach ------------------------------------------------------------------------------------------------
 
 
-def test_a_goal_may_not_leave_the_region_nor_go_back_by_10_cm_nor_fall_by_8():
-    ctx = Offers().ctx
-    limits = unless_withdrawn(ctx, {**GOAL, "frame": "object_mug", "place": INSIDE})["limits"]
-    assert (limits["goal_region_low"], limits["goal_region_high"]) == (LOW, HIGH)
-    assert (limits["goal_retreat"], limits["goal_drop"]) == (0.10, 0.08)
-    hand = unless_withdrawn(ctx, {**GOAL, "frame": "human_hand", "place": INSIDE}, 0.1, may_fall=False)
-    assert hand["limits"]["goal_region_low"] == pytest.approx([0.35, -0.60, -0.05])
-    assert hand["limits"]["goal_region_high"] == pytest.approx([0.96, 0.60, 0.95])
-    assert hand["limits"]["goal_drop"] == 0.0 and "watch" in hand and hand["primitive"] == "p"
-
-
-def test_a_goal_that_is_predicted_has_to_lie_in_the_region_and_is_watched_further_by_the_state():
-    early = unless_withdrawn(Offers().ctx, {**GOAL, "frame": "object_mug_ahead", "place": INSIDE}, 0.1)
-    limits = early["limits"]
-    assert limits["goal_region_low"] == pytest.approx([0.35, -0.60, -0.05])
-    assert limits["goal_region_high"] == pytest.approx([0.96, 0.60, 0.95])
-    assert (limits["goal_retreat"], limits["goal_drop"]) == (0.0, 0.0)
-    assert early["watch"] == {"retreat": 0.10, "drop": 0.08, "margin": 0.1}
-
-
 def test_a_reach_has_the_pace_of_the_timing_and_arrives_slowly():
     ctx = Offers(timing="calm").ctx
     assert paced(ctx, GOAL)["dmp_ratio"] == pytest.approx(2.0 * 1.7) and paced(ctx, GOAL)["arrival_speed"] == 0.05
@@ -198,23 +169,3 @@ def test_the_first_goal_with_a_posture_is_taken_where_it_is_checked():
 
 
 # --- hubs -------------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("rest", "offer", "starts"), [(0.09, 0.9, True), (0.09, 0.89, False), (0.1, 0.95, False), (0.0, 1.0, True)]
-)
-def test_a_hub_is_left_on_a_belief_of_nine_tenths_that_was_below_a_tenth_before(rest, offer, starts):
-    trial = Trial(**{"recognition_trigger.enabled": True})
-    state = hub.Hub(trial.ctx, ["exchange_human_to_robot", "take"], False)
-    state._open(SimpleNamespace(object_id=""))
-    for probability in (rest, offer):
-        trial.ctx.perception.ahead = lambda p=probability: Ahead(p, 0.0, "ball")
-        state._watch_partner()
-    request = trial.ctx.requests.take()
-    assert (request is not None) == starts
-    if starts:
-        assert (request.action, request.object_id) == ("exchange_human_to_robot", "ball")
-        assert request.source == f"belief in an offer of 'ball' ({offer:.2f})"
-    trial.ctx.perception.ahead = lambda: Ahead(0.0, 0.95, "")
-    state._watch_partner()
-    assert trial.ctx.requests.take() is None, "this hub does not give"

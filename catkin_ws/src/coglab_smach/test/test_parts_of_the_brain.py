@@ -5,7 +5,6 @@ import json
 import os
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_smach.context.holding import HoldingMemory
@@ -13,7 +12,6 @@ from coglab_smach.context.requests import ask_for
 from coglab_smach.ports.interfaces import Verdict
 from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states.arm import ConfigureLwr, PtpMotion
-from coglab_smach.states.base import TimeLimit
 from coglab_trials.virtual_clock import using
 from conftest import Trial
 from test_master_node import script
@@ -101,27 +99,6 @@ def test_an_arm_that_was_left_in_another_mode_is_stopped_first():
 
     trial.ctx.arm.lwr_command = command
     assert ran(trial, ConfigureLwr(trial.ctx))[0] == "succeeded" and asked == ["position", "stop", "position", "start"]
-
-
-def test_a_robot_controller_that_refuses_is_asked_again_each_second_until_two_are_left():
-    trial, asked = Trial(), []
-    clock = trial.clock
-    trial.ctx.arm.motion_allowed = lambda: Verdict(False, "why", 9)
-    trial.ctx.arm.lwr_command = lambda event: asked.append((event, clock.now())) or Ready(error=PortError("no"))
-    with pytest.raises(PortError, match="no"):
-        ran(trial, ConfigureLwr(trial.ctx))
-    times = [t for event, t in asked if event == "position"]
-    assert np.diff(times) == pytest.approx(1.0, abs=0.011)
-    assert clock.now() == pytest.approx(43.0, abs=1.1) and 45.0 - clock.now() < 2.0
-    trial.ctx.arm.lwr_command = lambda event: asked.append((event, 0.0)) or Ready("done")
-    asked.clear()
-    with pytest.raises(TimeLimit) as error:
-        ran(trial, ConfigureLwr(trial.ctx))
-    assert [event for event, _ in asked] == ["position", "start"] and error.value.causes == ("why",)
-    assert error.value.code == 9
-    trial.ctx.arm.motion_allowed = lambda: Verdict(True)
-    asked.clear()
-    assert ran(trial, ConfigureLwr(trial.ctx)) == ("succeeded", 0.0) and asked == []
 
 
 @pytest.mark.parametrize(("holds", "code", "tries"), [(2, 405, 3), (9, 405, 4), (9, 403, 1)])

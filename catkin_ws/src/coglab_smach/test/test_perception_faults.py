@@ -134,14 +134,6 @@ def test_the_partner_among_two_is_served_and_served_only(seed):
     assert trial.world.robot.limit_violations == 0
 
 
-def test_the_other_hand_of_the_person_who_gives_is_nobody_elses():
-    """It hangs beside the body: the hand that gives is nearer, and is served."""
-    trial = two_people(1, 0.2, lambda t: np.array([1.35, 0.55, 0.1]))
-    results = trial.run(RECEIVE)
-    assert results[0].outcome == "succeeded", [results[0].reason, *results[0].causes]
-    assert trial.world.cell.truth()["held_by"] == "robot"
-
-
 def test_two_hands_of_one_person_that_come_together_are_not_told_apart():
     """The other one comes along 0.15 m beside the hand that gives: nobody can say which gives, and the action ends with
     the sentence, before the arm has closed on either."""
@@ -235,18 +227,6 @@ def test_a_second_hand_that_comes_beside_the_first_during_the_reach():
     states = [move.from_state for move in trial.ctx.journal.transitions if move.outcome == "succeeded"]
     assert result.marks["tightened"] > result.ended - 0.5 and "tighten_at_home" in states
     assert levels == {"low"} and not truth["dropped"] and trial.world.robot.limit_violations == 0
-
-
-def test_two_people_as_near_as_each_other_when_the_robot_gives():
-    """Nobody can tell who is to get the object: the robot keeps it, and says why."""
-    found = []
-    trial = two_people(1, 0.0, comes_along(found, lambda: found[0].begun[-1:] == [GIVE]))
-    found.append(trial)
-    results = trial.run(RECEIVE, GIVE)
-    assert [r.outcome for r in results] == ["succeeded", "failed_holding"], [r.reason for r in results]
-    assert SENTENCE in " ".join([results[1].reason, *results[1].causes])
-    assert results[1].code == ReasonCode.NOT_PERCEIVED
-    assert trial.world.cell.truth()["held_by"] == "robot" and trial.last_hub == "wait_with_object"
 
 
 @pytest.mark.parametrize("jump", [0.08, 0.30])

@@ -3,19 +3,17 @@ is asked of them, and how long they are waited for."""
 
 from __future__ import annotations
 
-import math
 import time
 from types import SimpleNamespace
 
 import pytest
 import rospy
 from coglab_msgs.msg import Contact, ContactSignal, HandoverBelief, ReasonCode
-from coglab_msgs.msg import Recognition as RecognitionMessage
 from coglab_py import publish
-from coglab_smach.ports.interfaces import Ahead, ContactEvent, Recognition
+from coglab_smach.ports.interfaces import Ahead, ContactEvent
 from coglab_smach.ports.pending import Permit, PortError, Ready, Threaded
 from coglab_smach.ros import calls, ports
-from geometry_msgs.msg import Point, Vector3, Vector3Stamped
+from geometry_msgs.msg import Point
 from test_arm_port import Topic, ended
 
 
@@ -51,18 +49,6 @@ def nodes(monkeypatch):
 
 
 # --- perception -------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("seconds", "known"), [(0.5, True), (0.51, False)])
-def test_what_is_recognised_counts_for_half_a_second(nodes, seconds, known):
-    assert nodes.perception.recognition() == Recognition()
-    message = RecognitionMessage(
-        pattern="high", confidence=0.9, decided=True, names=["a", "b"], probabilities=[0.1, 0.9]
-    )
-    nodes.say("perception/recognition", message, seconds)
-    assert nodes.perception.recognition() == (
-        Recognition("high", 0.9, True, {"a": 0.1, "b": 0.9}) if known else Recognition()
-    )
 
 
 @pytest.mark.parametrize(("seconds", "known"), [(0.3, True), (0.31, False)])
@@ -166,18 +152,6 @@ def test_the_share_that_is_gone_is_that_of_this_arming(nodes):
     assert nodes.contact.share_gone() is None
     nodes.contact.arm("contact", 6.0, {"load_share": 0.6})
     assert nodes.contact.share_gone() is None
-
-
-def test_forces_count_for_a_tenth_of_a_second_and_the_grip_for_three(nodes):
-    assert nodes.contact.force() is None and nodes.contact.grip() is None
-    for seconds, known in ((0.1, True), (0.11, False)):
-        nodes.say("contact_detector/force", Vector3Stamped(vector=Vector3(1.0, 2.0, 3.0)), seconds)
-        assert nodes.contact.force() == ((1.0, 2.0, 3.0) if known else None)
-    for seconds, known in ((0.3, True), (0.31, False)):
-        signal(nodes, seconds=seconds)
-        assert nodes.contact.grip() == (7.0 if known else None)
-    signal(nodes, grip=math.nan)
-    assert nodes.contact.grip() is None, "this hand does not feel"
 
 
 # --- calls ------------------------------------------------------------------------------------------------------------

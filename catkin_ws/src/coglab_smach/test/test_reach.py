@@ -11,8 +11,7 @@ from coglab_smach.ports.pending import PortError, Ready
 from coglab_smach.states import reach
 from coglab_smach.states.base import TimeLimit
 from coglab_smach.states.hand_tracking import SWAPPED
-from coglab_smach.states.monitor import MonitorDmp
-from coglab_smach.states.reach import PersonsGrip, ReachWatch, WaitContact, dmp_request, start, target_of
+from coglab_smach.states.reach import PersonsGrip, ReachWatch, WaitContact, dmp_request, target_of
 from coglab_trials.virtual_clock import using
 from conftest import Trial
 
@@ -63,14 +62,6 @@ class Watched:
         self.t += after
         self.place = place or self.place
         return self.reach.hopeful()
-
-
-@pytest.mark.parametrize(("belief", "hopeful"), [(0.1, True), (0.09, False)])
-@pytest.mark.parametrize("kind", ["offer", "request"])
-def test_a_weak_belief_is_enough_to_go_on_with_a_hidden_target(monkeypatch, belief, hopeful, kind):
-    early = Watched(monkeypatch)
-    early.ahead, early.place = Ahead(**{kind: belief}), None
-    assert early.look() == hopeful
 
 
 def test_doubt_takes_a_moment_and_is_forgiven(monkeypatch):
@@ -293,25 +284,6 @@ class Reaching:
 
 
 @pytest.mark.parametrize(
-    ("to_go", "off", "preshaped", "closes"),
-    [
-        (0.029, 0.039, True, True),
-        (0.031, 0.0, True, False),
-        (0.02, 0.041, True, False),
-        (0.02, None, True, False),
-        (0.02, 0.0, False, False),
-    ],
-)
-def test_the_fingers_close_on_the_way_on_what_is_seen_between_them(monkeypatch, to_go, off, preshaped, closes):
-    reaching = Reaching(monkeypatch, DmpProgress("running", "", "reach_human", 0.1, to_go), off)
-    reaching.grip.preshaped = preshaped
-    reaching.run(touched_after=0.5)
-    grip = reaching.grip
-    assert reaching.asked == (["close"] if closes else []) and grip.shared == (grip.closing is not None) == closes
-    assert grip.object_id == "mug"
-
-
-@pytest.mark.parametrize(
     ("off", "margin", "scale", "seconds"),
     [(0.031, 1.0, 1.0, 0.6), (0.031, 1.0, 0.5, 1.2), (0.029, 1.0, 1.0, 0.0), (0.05, 2.5, 1.0, 0.0)],
 )
@@ -341,42 +313,12 @@ def received(monkeypatch, off):
     return trial
 
 
-@pytest.mark.parametrize(("off", "again"), [(0.089, False), (0.091, True)])
-def test_a_touch_far_from_the_grasp_is_not_the_object(monkeypatch, off, again):
-    trial = received(monkeypatch, lambda looks: off if looks == 1 else 0.02)
-    assert ("bumped" in trial.result().marks) == again and trial.result().outcome == "succeeded"
-
-
 def test_the_arm_comes_again_twice_and_then_gives_up(monkeypatch):
     trial = received(monkeypatch, lambda looks: 0.2 if looks <= 2 else 0.02)
     assert trial.result().outcome == "succeeded" and trial.cell.called().count("execute_dmp") == 3
     trial = received(monkeypatch, lambda looks: 0.2)
     assert (trial.result().outcome, trial.result().code) == ("failed_empty", ReasonCode.NO_CONTACT)
     assert trial.cell.called().count("execute_dmp") == 3
-
-
-def test_the_palm_draws_back_against_its_outward_axis(monkeypatch):
-    ways, out, shift, axis = [], [], reach.shift, reach.palm_axis
-    monkeypatch.setattr(reach, "shift", lambda ctx, way, speed: ways.append(way) or shift(ctx, way, speed))
-    monkeypatch.setattr(reach, "palm_axis", lambda ctx: out.append(axis(ctx)) or out[-1])
-    received(monkeypatch, lambda looks: 0.2 if looks == 1 else 0.02)
-    assert len(ways) == 1 and ways[0] == pytest.approx(-reach.RETREAT * out[0])
-
-
-@pytest.mark.parametrize(("lost", "good"), [(0.9, True), (1.2, False)])
-def test_a_goal_that_is_lost_at_the_start_is_waited_for(monkeypatch, lost, good):
-    reaching = Reaching(monkeypatch, None)
-    clock, state = reaching.trial.clock, reaching.state
-    state._deadline = 1e9
-    stale = PortError("old", code=ReasonCode.GOAL_STALE)
-    state.ctx.arm.execute_dmp = lambda r: Ready(error=stale if clock.now() < lost else None)
-    with using(clock):
-        if good:
-            start(state, dmp_request(GOAL))
-        else:
-            with pytest.raises(PortError, match="old"):
-                start(state, dmp_request(GOAL))
-    assert clock.now() == pytest.approx(min(lost, 1.0), abs=0.06)
 
 
 @pytest.mark.parametrize("back_after", [2.9, 9.0])
@@ -409,52 +351,4 @@ def test_an_aborted_reach_says_why(monkeypatch, progress, predicted, code):
     assert error.code == code and (took > 2.9) == (progress.code == ReasonCode.GOAL_LEFT_REGION)
 
 
-@pytest.mark.parametrize(("touched_after", "goes_on"), [(0.25, False), (0.5, True)])
-def test_a_hand_that_feels_nothing_at_the_goal_goes_on(monkeypatch, touched_after, goes_on):
-    reaching = Reaching(monkeypatch, DmpProgress("reached", "", "reach_human"))
-    reaching.watch.goal_now = lambda: {**GOAL, "approach": [0.0, 0.0, -0.05]}
-    outcome, _ = reaching.run(touched_after)
-    assert outcome == "succeeded"
-    assert [r.goal_offset for r in reaching.asked] == ([pytest.approx([0.0, 0.0, 0.08])] if goes_on else [])
-
-
 # --- another pattern --------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("enabled", [True, False])
-def test_a_monitor_switches_primitives_where_it_is_enabled(enabled):
-    patterns = {"high": "reach_human_high", "mid": "reach_human"}
-    trial = Trial(**{"monitor.enabled": enabled, "monitor.primitives": patterns})
-    state, told = MonitorDmp(trial.ctx), []
-    trial.cell.partner.pattern, trial.cell.arm.motion_started = "high", 0.0
-    trial.ctx.arm.dmp_progress = lambda: DmpProgress("running")
-    trial.ctx.arm.switch_dmp = lambda request: told.append(request) or Ready()
-    with using(trial.clock) as clock:
-        clock.start_thread(lambda: (clock.sleep(2.0), state.request_preempt()), "end")
-        state._deadline = 1e9
-        if enabled:
-            assert state.run(SimpleNamespace(goal=GOAL)) == "preempted"
-        else:
-            with pytest.raises(Exception, match="preempted"):
-                state.run(SimpleNamespace(goal=GOAL))
-    assert [request.primitive_id for request in told] == (["reach_human_high"] if enabled else [])
-
-
-@pytest.mark.parametrize(
-    ("state", "confidence", "decided", "other"),
-    [
-        ("running", 0.9, True, True),
-        ("reached", 0.95, True, False),
-        ("running", 0.89, True, False),
-        ("running", 0.95, False, False),
-    ],
-)
-def test_a_pattern_counts_if_it_is_sure_and_the_motion_runs(state, confidence, decided, other):
-    trial = Trial()
-    monitor = MonitorDmp(trial.ctx)
-    trial.ctx.arm.dmp_progress = lambda: DmpProgress(state)
-    seen = SimpleNamespace(pattern="high", confidence=confidence, decided=decided)
-    trial.ctx.perception.recognition = lambda: seen
-    family = {"high": "reach_human_high", "mid": "reach_human"}
-    assert bool(monitor._other_pattern(family, "reach_human")) == other
-    assert not monitor._other_pattern(family, "reach_human_high")

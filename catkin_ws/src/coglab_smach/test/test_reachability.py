@@ -1,7 +1,5 @@
 """Goals from database entries, the arm's reach of them, and the tool that checks objects."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -42,15 +40,3 @@ def test_goals_are_the_palm_relative_to_the_goal_frame():
     assert held.position == pytest.approx(mug["deliveries"]["handle_first"]["pose"]["xyz"])
     put = place_goal(mug, grasp, {"frame": "board", "xyz": [0.1, 0.2, 0.0]}, "put")
     assert put["frame"] == "board" and put["offset"] == pytest.approx([0.1, 0.16, 0.07])
-
-
-def test_command_line(tmp_path):
-    tool = [sys.executable, str(SHARE / "scripts" / "object_tool.py"), "--folder", str(tmp_path)]
-    run = lambda *a: subprocess.run([*tool, *a], capture_output=True, text=True, timeout=60)  # noqa: E731
-    assert run("new", "spoon").returncode == 0
-    assert run("new", "spoon").returncode == 1
-    assert "spoon" in run("list").stdout
-    good = run("check", "spoon")
-    assert good.returncode == 0 and "places of the handover region reached" in good.stdout
-    (tmp_path / "bad.yaml").write_text("id: bad\n")
-    assert run("check").returncode == 1

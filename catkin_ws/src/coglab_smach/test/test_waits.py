@@ -78,16 +78,6 @@ def test_a_wait_for_a_motion_counts_in_its_pace_down_to_a_tenth(pace, took):
     assert seconds == pytest.approx(took, abs=0.15) and left[0] == pytest.approx(8.0, abs=0.1), "put off likewise"
 
 
-def test_what_looks_on_is_told_as_aside_and_its_failure_is_none_of_its_action():
-    told = []
-
-    def prepare(trial, state):
-        trial.ctx.journal.listen_waits(lambda: told.append(next(iter(trial.ctx.journal._waits.values()), None)))
-
-    trial, _, record, _ = walked(lambda s: s.wait_for(NEVER, "rain", 1.0), prepare, essential=False)
-    assert told[0].aside and record.outcome == "failed" and trial.ctx.journal.newest_failure().sentence == ""
-
-
 def test_a_pause_ends_with_the_states_limit():
     _, _, record, seconds = walked(lambda s: s.pause(30.0))
     assert seconds == pytest.approx(10.0, abs=0.02) and record.code == ReasonCode.TIME_LIMIT

@@ -271,13 +271,6 @@ def test_what_cannot_be_felt_is_not_taken_for_nobodys(monkeypatch, trouble):
         assert person_holds(lifted.state, {"mass": 0.31, "load_share": 0.5}) is (None if trouble else False)
 
 
-@pytest.mark.parametrize("carried", [True, False])
-def test_a_hand_that_goes_in_full_view_while_no_weight_has_come_may_have_left_another_one_there(monkeypatch, carried):
-    lifted = Lifted(monkeypatch, carried=carried)
-    lifted.state._farther, lifted.away = 0.14, 0.31
-    assert lifted.state._has_let_go() and lifted.state._seen_away == carried, "no finger closes firmly before home"
-
-
 @pytest.mark.parametrize("perception", ["seen", "silent"])
 def test_a_pull_while_the_fingers_close_waits_for_no_sight(perception):
     trial, took = Trial(), []
