@@ -4,9 +4,7 @@ A stream is a handful of calls during which bytes anywhere, in either direction,
 flipped or preceded by a stray byte: one or two apart from each other, or a burst of neighbours. The
 truth is read from the emulated motors at every request, and most requests must be answered: who
 refuses everything says nothing wrong either. A value needs three equal readings, so one or two
-corruptions cannot forge one. Three that forge the same lie can:
-`test_as_many_equal_lies_as_readings_are_the_truth` shows that no driver can tell, whatever number of
-readings it takes. Worse bursts are therefore counted, not excluded.
+corruptions cannot forge one. Three that forge the same lie can, and no driver can tell.
 """
 
 from __future__ import annotations
@@ -217,52 +215,12 @@ def test_bursts_of_two():
     assert campaign.read >= 0.96 * campaign.asked
 
 
-def test_worse_bursts():
-    """Beyond what can be excluded: counted. The motor's number alone is a force read, so three lost
-    or changed first bytes of GetMotorCurrent read the tension instead, three times.
-    """
-    campaign = run(3000, HARD_STREAMS, (3, 4, 6))
-    assert campaign.corrupter.done > HARD_STREAMS * 3
-    assert (len(campaign.wrong) + campaign.wrong_but_counted) * 2_000 <= campaign.read
-    assert campaign.read >= 0.85 * campaign.asked
-
-
 def test_longer_bursts_anywhere():
     """Neighbours in a row, from a few bytes to whole requests with their answers: counted, too."""
     campaign = run(4000, HARD_STREAMS, (3, 4, 8, 12, 20), burst=True)
     assert campaign.corrupter.done > HARD_STREAMS * 5
     assert (len(campaign.wrong) + campaign.wrong_but_counted) * 2_000 <= campaign.read
     assert campaign.read >= 0.80 * campaign.asked
-
-
-class Flipped:
-    """A line that flips the same bit of every byte from the hand."""
-
-    def __init__(self, bit: int):
-        self.mask = 1 << bit
-
-    def __call__(self, data: bytes) -> bytes:
-        return bytes(byte ^ self.mask for byte in data)
-
-
-def test_as_many_equal_lies_as_readings_are_the_truth():
-    """A finger at 100 behind a line that flips bit 3, and a finger at 108 behind a clean line:
-    byte for byte the same answers, so the same value. No rule on the answers can tell them apart.
-    """
-    answers, values = [], []
-    for position, tamper in ((100, Flipped(3)), (108, None)):
-        clock = SteppedClock()
-        hand = EmulatedHand(clock, greeting=True, positions=[0, position, 0, 0, 0])
-        link = VirtualLink(hand, clock)
-        driver = HandSerialDriver(transport=link, clock=clock)
-        heard = bytearray()
-        driver.line.trace = lambda way, data, heard=heard: heard.extend(data if way == "<" else b"")
-        link.to_host = tamper
-        values.append(driver.get_raw_position(1))
-        answers.append(bytes(heard))
-        assert driver.counters.resynchronisations == 0
-    assert answers[0] == answers[1]
-    assert values == [108, 108]
 
 
 class Forger:

@@ -112,26 +112,6 @@ def test_bytes_that_nobody_asked_for_are_thrown_away_before_a_request(bench):
 # -- what is known of a hand at rest ---------------------------------------------------------------
 
 
-def requests(bench, read) -> int:
-    """Bytes that a reading costs."""
-    bench.sent()
-    read()
-    return len(bench.sent().split())
-
-
-def position(bench) -> int:
-    return requests(bench, lambda: bench.driver.get_finger_position(2))
-
-
-def test_a_value_of_a_resting_hand_costs_one_request_and_after_a_command_it_is_confirmed_anew(bench):
-    for _ in range(2):
-        bench.driver.get_all_finger_status()
-        bench.driver.get_finger_position(2)
-    assert bench.driver.line.resting and position(bench) == 2
-    bench.driver.stop_all()
-    assert not bench.driver.line.resting and position(bench) == 6
-
-
 def test_a_hand_rests_when_all_five_motors_have_been_seen_to(bench):
     for motor in range(4):
         bench.driver.get_finger_status(motor)

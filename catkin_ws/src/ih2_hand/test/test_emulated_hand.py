@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pytest
-from ih2_hand import frames
 from ih2_hand.clock import SteppedClock
 from ih2_hand.emulator.faults import Faults
 from ih2_hand.emulator.hand import EmulatedHand
@@ -56,24 +55,6 @@ def raw() -> Raw:
 
 
 UNASSIGNED = (0x40, 0x4D, 0x72, 0x7F)
-
-
-@pytest.mark.parametrize(
-    ("length", "firsts"),
-    [
-        (1, (0x00, 0x3F, 0x41, 0x4C, 0x50, 0x57, 0x60, 0x69, 0x70, *UNASSIGNED)),
-        (2, (0x45, 0x49, 0x4B, 0x80, 0xFF)),
-        (3, (0x44, 0x4A)),
-        (4, (0x6F,)),
-        (6, (0x5C, 0x5E)),
-        (7, (0x48, 0x58, 0x5B, 0x6A, 0x6B)),
-        (10, (0x6C, 0x6E)),
-    ],
-)
-def test_frame_lengths(length, firsts):
-    for first in firsts:
-        assert frames.frame_length(bytes((first,))) == length, hex(first)
-        assert frames.is_known(first) == (first not in UNASSIGNED)
 
 
 def test_incomplete_frame_waits_for_ever(raw):
@@ -172,15 +153,6 @@ def test_uncalibrated_hand_ignores_positions_but_answers():
     assert raw.status(2) == "29"
 
 
-def test_spacing_of_postures():
-    raw = Raw(enforce_spacing=True)
-    raw.ask("48 00 00 00 00 00 48 44 02 80")
-    assert raw.hand.counters.too_fast == 1
-    raw.clock.sleep(0.0031)
-    raw.ask("44 02 80")
-    assert raw.hand.counters.too_fast == 1
-
-
 def test_stored_preshape_is_used(raw):
     raw.ask("58 0A 14 1E 28 32 58 61")
     raw.clock.sleep(0.15)
@@ -253,39 +225,11 @@ def test_no_fault_command_can_break_the_hand(raw, command):
 HELD = [255, 100, 100, 100, 100]
 
 
-@pytest.mark.parametrize(("code", "level"), [("60", 120), ("61", 240), ("62", 420)])
-def test_a_grasp_by_current_closes_with_its_level(hand, code, level):
-    hand.tell(code, then=1.3)
-    assert [motor.goal_effort for motor in hand.hand.motors] == [0.0] + [float(level)] * 4
-    assert hand.modes[1] == "current_position"
-
-
 @pytest.mark.parametrize("instead", ["41", "C9 40", "4A 02 64", "44 02 0A", "4C", "48 0A 0A 0A 0A 0A 48"])
 def test_another_command_before_the_preshape_is_reached_ends_the_grasp(hand, instead):
     hand.tell("61", then=0.05)
     hand.tell(instead, then=3.0)
     assert "current_position" not in hand.modes and hand.hand.motors[1].goal_effort == 0.0
-
-
-def test_a_calibration_ends_what_the_fingers_did(hand):
-    hand.tell("61", then=0.05)
-    hand.tell("46")
-    assert hand.modes == ["stop"] * 5 and hand.hand.calibrating
-    hand.clock.sleep(5.0)
-    hand.hand.advance()
-    assert not hand.hand.calibrating and hand.modes == ["stop"] * 5
-    assert [motor.position for motor in hand.hand.motors] == [0.0] * 5
-
-
-@pytest.mark.parametrize("motor", range(5))
-@pytest.mark.parametrize(("way", "direction"), [(0x80, -1), (0xC0, 1)])
-@pytest.mark.parametrize("speed", [1, 255, 256, 511])
-def test_each_motor_is_driven_both_ways(motor, way, direction, speed):
-    hand = Raw(positions=[100] * 5)
-    hand.tell(bytes((way + 4 * motor + (speed >> 8), speed & 0xFF)).hex())
-    driven = hand.hand.motors[motor]
-    assert hand.modes == ["speed" if other == motor else "stop" for other in range(5)]
-    assert (driven.direction, driven.speed) == (direction, speed)
 
 
 def test_long_silence_is_made_up_in_steps_short_enough_for_contact(hand):

@@ -47,12 +47,6 @@ def test_a_stored_value_is_read_back_and_is_the_motors_own(electronics, motor, s
     assert electronics.ask(read) == factory
 
 
-def test_the_status_is_that_of_the_motor(electronics):
-    assert electronics.ask("70") == "08"
-    electronics.motor.position = 100.0
-    assert electronics.ask("70") == "00"
-
-
 @pytest.mark.parametrize(("data", "speed", "direction"), [("02 64", 100, 1), ("00 64", 100, -1), ("03 FF", 511, 1)])
 def test_drive_has_nine_bits_of_speed_and_one_of_direction(electronics, data, speed, direction):
     electronics.motor.position = 100.0

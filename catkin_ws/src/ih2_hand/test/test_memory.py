@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 from ih2_hand.errors import HandCalibratingError, RefusedError
 from ih2_hand.memory import HandMemory
-from ih2_hand.progress import CloseTask, GraspTask, OpenTask, PreshapeTask, Verdict
+from ih2_hand.progress import GraspTask, Verdict
 from ih2_hand.reasons import Reason
 
 LEGACY = SimpleNamespace(dialect="legacy")
@@ -35,18 +35,6 @@ def finger(motor: int, **flags) -> SimpleNamespace:
 
 OPEN = [finger(motor, fully_open=True) for motor in range(5)]
 GRIPPING = [finger(motor, mode="tension", target_reached=True) for motor in range(5)]
-
-
-def test_each_action_has_its_task(memory):
-    opened, closed = ask(memory, "hand_open", speed=100), ask(memory, "hand_close", speed=200)
-    assert isinstance(opened, OpenTask) and opened.speed == 100
-    assert isinstance(closed, CloseTask) and closed.speed == 200
-    shaped = ask(memory, "hand_preshape", mode="tridigit", level="low")
-    assert isinstance(shaped, PreshapeTask)
-    assert (shaped.mode, shaped.level, shaped.is_current, shaped.limit) == ("tridigit", "low", True, 8.0)
-    memory.task_over(shaped, DONE)
-    grasp = ask(memory, "hand_preshape_close")
-    assert isinstance(grasp, GraspTask) and (grasp.closing, grasp.limit) == ((1, 2, 3), 8.0)
 
 
 def test_a_grasp_can_be_repeated_without_a_new_preshape(memory):

@@ -9,7 +9,6 @@ from ih2_hand.errors import RefusedError
 from ih2_hand.grasps import check_grasp
 from ih2_hand.progress import (
     BLOCKED_S,
-    LONGEST_S,
     STALL_S,
     START_GRACE_S,
     CloseTask,
@@ -162,11 +161,6 @@ def sent_preshape(is_sent: bool = True) -> tuple[PreshapeTask, list]:
     return task, told
 
 
-@pytest.mark.parametrize(("speed", "seconds"), [(511, 5.0), (146, 10.0), (20, 54.1), (10, LONGEST_S), (1, LONGEST_S)])
-def test_a_slower_movement_has_longer_but_no_more_than_a_minute(speed, seconds):
-    assert OpenTask(speed).limit == CloseTask(speed).limit == pytest.approx(seconds, abs=0.01)
-
-
 @pytest.mark.parametrize(("speed", "seconds"), [(511, STALL_S), (21, STALL_S), (16, 0.5), (4, 2.0)])
 def test_a_finger_that_stands_so_long_has_met_something(speed, seconds):
     task = CloseTask(speed)
@@ -212,14 +206,6 @@ def test_a_preshape_is_sent_once_by_the_driver_or_by_the_task(is_sent):
     assert task.limit == 7.0
 
 
-@pytest.mark.parametrize("beside", [-12, 12])
-def test_a_preshape_may_end_this_far_beside(beside):
-    task, _ = sent_preshape()
-    farther = beside + (1 if beside > 0 else -1)
-    assert not task.judge(poll("50 50 50 50 50", [110, 5, 160 + farther, 245, 245]), 1.0).done
-    assert task.judge(poll("50 50 50 50 50", [110, 5, 160 + beside, 245, 245]), 1.1).ok
-
-
 def test_a_preshape_is_blocked_by_a_finger_that_stands_for_a_second():
     task, _ = sent_preshape()
     raws, positions = "50 50 40 50 50", [110, 5, 100, 245, 245]
@@ -227,13 +213,6 @@ def test_a_preshape_is_blocked_by_a_finger_that_stands_for_a_second():
     assert task.judge(poll(raws, positions), BLOCKED_S - 0.01).text == "index moving"
     verdict = task.judge(poll(raws, positions), BLOCKED_S)
     assert verdict.done and verdict.stop and verdict.reason is Reason.HAND_STALLED
-
-
-def test_a_preshape_has_half_a_second_to_be_taken():
-    task, _ = sent_preshape()
-    assert not task.judge(poll("50 50 00 50 50", [110, 5, 100, 245, 245]), START_GRACE_S - 0.01).done
-    verdict = task.judge(poll("50 50 00 50 50", [110, 5, 100, 245, 245]), START_GRACE_S)
-    assert verdict.done and not verdict.ok and verdict.reason is Reason.HAND_NOT_CALIBRATED
 
 
 def grasp(closing=(1, 2)) -> GraspTask:
