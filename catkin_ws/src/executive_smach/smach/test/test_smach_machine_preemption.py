@@ -60,18 +60,6 @@ def test_before_the_start_the_first_state_sees_it():
     assert sm.execute() == "done" and state.seen == [True, False]
 
 
-def test_nested():
-    leaf = Serves(patience=10)
-    inner, after = machine(leaf), Says("done")
-    outer = machine(inner, after)
-    run = in_thread(outer.execute)
-    assert leaf.started.wait(60.0)
-    outer.request_preempt()
-    run.join(60.0)
-    assert run.result == "preempted" and after.runs == 0
-    assert not any(s.preempt_requested() for s in (leaf, inner, outer))
-
-
 def test_nested_and_ignored_is_carried_by_the_parent():
     leaf, after = Ignores("done"), Serves()
     inner = machine(leaf)
@@ -115,17 +103,6 @@ def test_an_ignored_request_does_not_poison_the_next_run_better():
     state.machine = None
     assert sm.execute() == "done"
     assert state.seen == [False, False] and not sm.preempt_requested()
-
-
-def test_an_ignored_request_in_a_nested_machine_does_not_poison_better():
-    leaf = Ignores("done")
-    inner = machine(leaf)
-    outer = machine(inner)
-    leaf.machine = outer
-    outer.execute()
-    leaf.machine = None
-    assert outer.execute() == "done" and inner.execute() == "done"
-    assert leaf.seen == [False] * 3
 
 
 def test_a_request_after_a_run_is_for_the_next_run():

@@ -69,25 +69,3 @@ def test_preempts_at_random_moments_none_lost_none_left_over():
             caller.join()
         assert not machine.preempt_requested()
     assert threading.active_count() == threads_before
-
-
-def test_after_preempted_runs_a_normal_run_is_normal():
-    states = [Hops() for _ in range(3)]
-    both = smach.Concurrence(
-        ["done", "preempted"], "preempted", outcome_map={"done": {str(i): "done" for i in range(3)}}
-    )
-    with both:
-        for i, state in enumerate(states):
-            smach.Concurrence.add(str(i), state)
-    outer = smach.StateMachine(["done", "preempted"])
-    with outer:
-        smach.StateMachine.add("BOTH", both)
-    seed = random.Random(7)
-    for _ in range(100):
-        timer = threading.Timer(seed.random() * 0.002, outer.request_preempt)
-        timer.start()
-        outer.execute()
-        timer.join()
-        if outer.preempt_requested() and not outer._preempt_spent:
-            outer.recall_preempt()  # asked after the end: withdrawn
-        assert outer.execute() == "done"

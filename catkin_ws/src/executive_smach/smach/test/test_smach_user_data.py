@@ -28,20 +28,6 @@ def test_missing_key_is_a_key_error_after_an_error_log(log):
     assert len(log.error) == 2
 
 
-def test_no_deletion_length_or_iteration():
-    ud = smach.UserData()
-    ud.x = 1
-    with pytest.raises(AttributeError):
-        del ud.x
-    with pytest.raises((AttributeError, TypeError)):
-        del ud["x"]
-    with pytest.raises(TypeError):
-        len(ud)
-    with pytest.raises(KeyError):
-        iter(ud).__next__()
-    assert ud._data == {"x": 1}
-
-
 def test_extract_and_merge_with_remapping():
     ud = smach.UserData()
     ud.a, ud.b = [1], 2

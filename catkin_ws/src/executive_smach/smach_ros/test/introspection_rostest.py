@@ -134,36 +134,6 @@ class TestIntrospection(unittest.TestCase):
         self.assertEqual(root.header.frame_id, "")
         self.assertLess(abs((rospy.Time.now() - root.header.stamp).to_sec()), LIMIT)
 
-    def test_what_a_viewer_needs(self):
-        self.start()
-        self.gate.open.set()
-        self.root.execute()
-        self.assertTrue(wait_for(lambda: "END end" in self.viewer.infos("/SM_ROOT")))
-        self.assertTrue(wait_for(lambda: len({m.path for m in self.viewer.structures}) == 4))
-        children = {message.path: message.children for message in self.viewer.structures}
-        for path in children:
-            parent, label = path.rsplit("/", 1)
-            self.assertTrue(parent == "" or label in children[parent], path)
-        for message in self.viewer.structures:
-            edges = (message.internal_outcomes, message.outcomes_from, message.outcomes_to)
-            self.assertEqual(len({len(part) for part in edges}), 1)
-        for status in self.viewer.statuses:
-            self.assertIn(status.path, children)
-            self.assertLessEqual(set(status.active_states) - {"None"}, set(children[status.path]))
-            self.assertIsInstance(pickle.loads(base64.b64decode(status.local_data)), dict)
-        header = status._connection_header
-        self.assertEqual(header["type"], "smach_msgs/SmachContainerStatus")
-        self.assertEqual(header["md5sum"], "5ba2bb79ac19e3842d562a191f2a675b")
-        self.assertEqual(header.get("latching", "0"), "0")
-
-    def test_a_new_viewer_gets_no_beat_until_its_window_exists(self):
-        smach_ros.introspection.WELCOME_DELAY = 1.5
-        before = time.monotonic()  # it connects after this
-        self.server.start()
-        self.assertTrue(wait_for(lambda: self.viewer.first_beat is not None))
-        self.assertGreaterEqual(self.viewer.first_beat - before, 1.5)
-        self.assertTrue(wait_for(lambda: len({m.path for m in self.viewer.structures}) == 4))
-
     def test_a_proxy_shows_one_container_alone(self):
         proxy = smach_ros.introspection.ContainerProxy(
             self.name, self.root, "/SM_ROOT", update_rate=rospy.Duration(0.5)

@@ -61,16 +61,6 @@ class TestSilentClock(unittest.TestCase):
         sub.unregister()
         self.assertGreaterEqual(len(got), 3)
 
-    def test_limits_count_ros_time_while_it_moves(self):
-        pub = self.clock()
-        limit = smach_ros.util.TimeLimit(rospy.Duration(100))
-        for second in range(1, 121):  # 120 s of ROS time in 1.2 s
-            pub.publish(rospy.Time(second))
-            time.sleep(0.01)
-            if limit.expired():
-                break
-        self.assertTrue(95 <= second <= 120, f"expired after {second} s")
-
 
 if __name__ == "__main__":
     import rostest
