@@ -208,29 +208,6 @@ class CellNode(unittest.TestCase):
         self.assertTrue(np.all(np.abs(measured) <= 2.97))
         os.unlink(path)
 
-    def test_8_parameters_out_of_range_are_refused_at_start(self) -> None:
-        binary = cell_binary()
-        for name, value, expected in (
-            ("fri_port", 70000, "= 70000 is outside its range 0..65535"),
-            ("fri_source_port", 70000, "= 70000 is outside its range 0..65535"),
-            ("speed", 1000.0, "= 1000 is outside its range 0.01..100"),
-            ("truth_rate", 0.1, "= 0.1 is outside its range 1..1000"),
-            ("rt_priority", 99, "= 99 is outside its range 0..98"),
-            ("krc/period", 0.5, "krc/period = 0.5 is outside its range 0.001..0.1"),
-            ("arm/unknown_load", -1.0, "arm/unknown_load = -1 is outside its range 0..10"),
-            ("krc/convention", "nobody", "known: coglab, centro_epiaggio, stanford"),
-            ("tactile", "perhaps", "/tactile: expected true or false"),
-            ("object/size", [0.1, "wide", 0.1], "/object/size: expected a list of numbers"),
-        ):
-            node = f"bad_{name.replace('/', '_')}"
-            rospy.set_param(f"/{node}/fri_port", 9)
-            rospy.set_param(f"/{node}/{name}", value)
-            run = subprocess.run(
-                [binary, f"__name:={node}"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=60
-            )
-            self.assertNotEqual(run.returncode, 0, name)
-            self.assertIn(expected, run.stdout)
-
     def test_91_a_simulation_that_diverges_ends_with_its_reason_and_status_1(self) -> None:
         """Braked or not, the arm's last joints do not stand against 1000 Nm."""
         push = rospy.Publisher("/torn/push", Wrench, queue_size=1, latch=True)

@@ -3,7 +3,7 @@ reads of them."""
 
 import numpy as np
 import pytest
-from fri_client import COMMAND, parse, set_point
+from fri_client import COMMAND, set_point
 from grasp_trial import G
 from test_object import EXACT
 
@@ -29,15 +29,6 @@ def test_losses_are_shares_of_each_way(session):
     for wrong in ((1.1, 0.0), (0.0, 1.1), (-0.1, 0.0), (0.0, -0.1)):
         with pytest.raises(ValueError, match="fault/packet_loss = .* is outside its range 0..1"):
             s.cell.set_loss(*wrong)
-
-
-def test_the_next_packets_are_lost_both_ways(session):
-    s = session()
-    s.monitor()
-    s.cell.lose_next(3)
-    missed = parse(s.measurement)["miss_counter"]
-    assert [s.tick() is None for _ in range(6)] == [True, True, True, False, False, False]
-    assert s.tick()["miss_counter"] == missed + 3
 
 
 def test_a_load_that_nobody_knows_of_pulls_at_the_palm(session):

@@ -30,19 +30,13 @@ def followed(s, field, values):
 
 JOINTS = [
     ("stiffness", {0: 5000.0, 6: 0.0}, True),
-    ("stiffness", {0: 5001.0}, "cmd.jntStiffness out of range"),
     ("stiffness", {6: 5001.0}, "cmd.jntStiffness out of range"),
-    ("stiffness", {3: -0.1}, "cmd.jntStiffness out of range"),
     ("stiffness", {3: NAN}, "cmd.jntStiffness out of range"),
     ("damping", {0: 1.0, 6: 0.0}, True),
-    ("damping", {0: 1.01}, "cmd.jntDamping out of range"),
     ("damping", {6: -0.01}, "cmd.jntDamping out of range"),
     ("torque", {0: 0.99, 6: -0.99}, True),
-    ("torque", {0: 1.01}, "cmd.addJntTrq not properly initialized"),
     ("torque", {6: -1.01}, "cmd.addJntTrq not properly initialized"),
     ("torque", {2: NAN}, "cmd.addJntTrq not properly initialized"),
-    ("torque", {2: INF}, "cmd.addJntTrq not properly initialized"),
-    ("cartesian stiffness", {0: -5.0}, True),  # not of this strategy
 ]
 
 
@@ -55,23 +49,15 @@ def test_joint_impedance(session, field, values, expected):
 
 TIP = [
     ("cartesian stiffness", {0: 10000.0, 2: 0.0, 3: 1000.0, 5: 0.0}, True),
-    ("cartesian stiffness", {0: 10001.0}, "cmd.cartStiffness out of range"),
     ("cartesian stiffness", {2: 10001.0}, "cmd.cartStiffness out of range"),
-    ("cartesian stiffness", {3: 1001.0}, "cmd.cartStiffness out of range"),
     ("cartesian stiffness", {5: 1001.0}, "cmd.cartStiffness out of range"),
-    ("cartesian stiffness", {1: -1.0}, "cmd.cartStiffness out of range"),
     ("cartesian stiffness", {4: -1.0}, "cmd.cartStiffness out of range"),
     ("cartesian damping", {0: 1.0, 5: 0.0}, True),
-    ("cartesian damping", {0: 1.01}, "cmd.cartDamping out of range"),
     ("cartesian damping", {5: -0.01}, "cmd.cartDamping out of range"),
     ("force", {0: 3.0, 5: -1.0}, True),
     ("force", {5: NAN}, "cmd.addTcpFT not properly initialized"),
-    ("force", {0: INF}, "cmd.addTcpFT not properly initialized"),
     ("frame", {3: NAN}, "cmd.cartPos not properly initialized"),
-    ("frame", {10: INF}, "cmd.cartPos not properly initialized"),
     ("frame", {0: 0.0, 1: 0.0, 2: 0.0}, "cmd.cartPos not properly initialized"),
-    ("stiffness", {0: -5.0}, True),
-    ("damping", {0: 5.0}, True),
 ]
 
 
@@ -172,18 +158,11 @@ def test_entry_with_a_frame_takes_what_is_within_a_millimetre_and_a_milliradian(
     [
         (10, 0x0001, True),
         (10, 0x0000, False),
-        (10, 0x0005, False),
         (10, 0x0003, False),
-        (10, 0x0101, False),
         (30, JOINT_IMPEDANCE, True),
-        (30, 0x0001, True),
         (30, 0x0034, False),
-        (30, 0x1035, False),
         (20, CARTESIAN_IMPEDANCE, True),
-        (20, 0x0100, True),
         (20, 0x3501, True),
-        (20, 0x3400, False),
-        (20, 0x3510, False),
         (20, 0x3701, False),
     ],
 )
@@ -297,22 +276,3 @@ def test_a_start_needs_the_entry_quality(session, every, entry_quality, starts):
     assert (fields["state"] == COMMAND) is starts and fields["quality"] == (2 if every == 25 else 1)
     told = [text for text in s.texts() if text.startswith("friStart: quality too low, answer rate 0.9")]
     assert bool(told) is not starts
-
-
-def test_too_many_losses_end_command_mode_by_their_number_or_by_the_quality(session):
-    s = session()
-    s.command()
-    for _ in range(5):
-        assert s.tick(answer=False)["state"] == COMMAND
-    s.tick()
-    for _ in range(5):
-        assert s.tick(answer=False)["state"] == COMMAND, "an answer in between begins the count anew"
-    s.tick(answer=False)
-    assert s.texts() == ["FRI timing: 6 successive answers missing"]
-    patient = session(krc__extrapolated_packets=100)
-    patient.command()
-    lost = 0
-    while patient.tick(answer=False)["state"] == COMMAND:
-        lost += 1
-    # The answer to the measurement of before counts in the period after it.
-    assert lost == 20 and patient.texts() == ["FRI quality unacceptable"]

@@ -279,27 +279,6 @@ def test_a_moving_frame_is_followed_without_lag(session):
 # -- messages, faults, restarts -----------------------------------------------------------------------------------
 
 
-def test_a_program_that_is_started_anew_pauses_and_opens_with_its_period(session):
-    s = session()
-    s.command()
-    for period, pause, words in (
-        (0.0009, 0.5, "krc/period = 0.0009"),
-        (0.11, 0.5, "krc/period"),
-        (0.01, -0.1, "pause"),
-    ):
-        with pytest.raises(ValueError, match=words):
-            s.cell.restart_program(period, pause)
-    assert s.tick()["state"] == COMMAND, "nothing was changed"
-    s.cell.restart_program(0.01)
-    begin = s.cell.time
-    assert s.cell.fri_state == 0 and s.cell.period == 0.01
-    while s.tick() is None:
-        assert s.cell.time < begin + 2.0
-    assert s.cell.time - begin == pytest.approx(0.5, abs=0.021)
-    fields = parse(s.measurement)
-    assert fields["quality"] == 0 and fields["state"] == MONITOR and fields["ints"][15] == 4010
-
-
 @pytest.mark.parametrize("joint", [0, 5])
 def test_full_torque_for_a_while_switches_off_and_names_the_joint(session, joint):
     ended = []

@@ -44,23 +44,6 @@ def test_coglab_changes_strategy_by_leaving_command_mode(session):
     assert MONITOR in states and states[-1] == COMMAND and fields["control"] == 3
 
 
-def test_stanford(session):
-    s = session(krc__convention="stanford")
-    s.monitor()
-    assert ints(s)[15] == 10 and ints(s)[14] == 30
-    s.client.ints[14], s.client.ints[15] = 10, 10
-    s.run(1.0)
-    assert ints(s)[15] == 20 and s.cell.fri_state == COMMAND
-    s.client.ints[15] = 20
-    s.run(0.5)
-    assert ints(s)[15] == 10 and s.cell.fri_state == MONITOR
-    s.client.ints[15] = 30  # equals TO_INT[15]: close and end
-    fields = s.run(0.5)
-    assert s.cell.fri_state == 0
-    assert fields["state"] == MONITOR and fields["ints"][15] == 30  # told after the close, and OFF never
-    assert s.run(1.5) is None
-
-
 def test_a_client_that_waits_for_each_datagram_hears_the_end(session):
     """A common client: receive, answer, look whether the program has closed. It hangs where no datagram comes."""
     s = session(krc__convention="stanford")
@@ -76,22 +59,6 @@ def test_a_client_that_waits_for_each_datagram_hears_the_end(session):
             s.client.ints[15], asked = fields["ints"][14], True
         measurement = s.cell.step(s.client.answer(measurement))
     assert fields["ints"][15] == 30
-
-
-def test_rtt_lwr(session):
-    s = session(krc__convention="rtt_lwr")
-    s.monitor()
-    assert ints(s)[0] == MONITOR
-    s.client.ints[0:3] = [1, 10, 7]
-    s.run(1.0)
-    assert ints(s)[0] == COMMAND and ints(s)[2] == 7 and s.cell.fri_state == COMMAND
-    assert parse(s.measurement)["reals"][:6] == (0.0,) * 6
-    s.client.ints[0] = 2
-    s.run(0.5)
-    assert ints(s)[0] == MONITOR
-    s.client.ints[0] = 3
-    s.run(0.5)
-    assert s.cell.fri_state == 0
 
 
 def test_kuka_sample(session):
@@ -175,26 +142,6 @@ def test_coglab_says_how_a_start_failed_and_waits_no_longer_than_it_says(session
     assert ints(s)[1] == -3
 
 
-def test_centro_epiaggio_a_level_has_to_rise(session):
-    s = session(krc__convention="centro_epiaggio")
-    s.client.ints[0:2] = [10, 1]
-    s.monitor()
-    s.run(1.0)
-    assert ints(s)[1] == 10 and s.cell.fri_state == MONITOR, "it was up from the beginning"
-    s.client.ints[1] = 0
-    s.run(0.1)
-    s.client.ints[0:2] = [25, 1]
-    until(s, lambda: ints(s)[1] == 1, 2.0)
-    assert s.cell.fri_state == COMMAND and parse(s.measurement)["control"] == 1, "25 is no strategy: it stays"
-    s.cell.leave_command_mode("fault injected")
-    until(s, lambda: ints(s)[1] == 0, 0.2)
-    s.client.ints[1] = 0
-    s.run(0.1)
-    s.client.ints[0:2] = [10, 1]
-    until(s, lambda: ints(s)[1] == 1, 3.0)
-    assert s.cell.fri_state == COMMAND
-
-
 def rcprg(session):
     s = session(krc__convention="rcprg_tum")
     s.client.flags = JOINT_IMPEDANCE
@@ -253,9 +200,6 @@ def test_openkc_a_command_is_served_once_until_its_flag_is_down(session):
     s.client.ints[15], s.client.bools = 0, 0
     s.run(0.1)
     assert command(s, 6)[2] == 104 and command(s, 7)[2] == 105 and command(s, 9)[2] == 107
-
-
-# -- KUKA's sample ------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -115,17 +115,3 @@ def test_commands_and_words_reach_the_person(monkeypatch):
         late.header.stamp = rospy.Time.from_sec(100.0 - age)
         one.ros.subscribed["/a/say"](late)
     assert [code for _, code in one.node.human._heard] == [Say.I_HAVE_IT, Say.READY_TO_RECEIVE]
-
-
-@pytest.mark.parametrize("name", ["perception_stand_in", "truth_markers", "virtual_human"])
-def test_a_node_that_was_ended_ends_with_0_and_one_that_cannot_begin_with_1(monkeypatch, name):
-    ros = Alone(monkeypatch)
-    ros.parameters = {"~frames": FRAMES, "~board": BOARD}
-    module, spun = script(name), []
-    monkeypatch.setattr(rospy, "init_node", lambda given: spun.append(given))
-    monkeypatch.setattr(rospy, "spin", lambda: spun.append("spin"))
-    monkeypatch.setattr(rospy, "is_shutdown", lambda: True)
-    assert module.main() == 0 and spun[0] == name.replace("_stand_in", "")
-    if name != "truth_markers":
-        ros.parameters = {"~frames": FRAMES, "~behaviour": "silly"}
-        assert module.main() == 1 and "silly" in ros.said[-1] or "board" in ros.said[-1]

@@ -58,17 +58,6 @@ def test_an_object_inside_the_arm_is_refused_wherever_it_is():
     assert accepted == []
 
 
-def test_a_person_who_would_stand_in_the_arm_is_not_there():
-    plant = _cell.Plant(URDF, HOME, BOX)
-    before, palm = plant.bytes(), plant.state()["palm"][0]
-    with pytest.raises(
-        ValueError, match=r"the person's hand would stand \d+(\.\d+)? mm inside \w+ where it comes from"
-    ):
-        plant.set_person(palm - [0.15, 0.0, 0.0])
-    assert plant.bytes() == before
-    plant.set_person([1.0, 0.2, 0.4])
-
-
 def test_bad_calls_are_refused_with_words():
     plant = _cell.Plant(URDF, HOME, BOX)
     with pytest.raises(ValueError, match="at most 0.001 s"):

@@ -127,13 +127,9 @@ def test_a_description_that_holds_no_robot_is_refused_with_its_name(tmp_path, te
     "old, new, words",
     [
         ("sliding: 0.8", "sliding: 5.001", "/contact/sliding: expected a number in 0..5, got 5.001"),
-        ("sliding: 0.8", "sliding: many", "/contact/sliding: expected a number in 0..5, got no number"),
         ("motor: 0, pivot", "motor: 5, pivot", r"/fingers/thumb\[0\]/motor: expected a number in 0..4"),
-        ("motor: 0, pivot", "motor: 1, pivot", r"/motors\[0\]/name: expected a motor that bends a phalanx"),
-        ("stall_current: 400.0", "stall_current: 0.9", "/drive/stall_current: expected a number in 1..1023"),
         ("tendon_stiffness: 50000.0", "", "/tendon_stiffness: expected a value, got nothing"),
         ("axis: [0.0, 0.0, -1.0]", "axis: [0.0, 0.0, -0.999]", "/axis: expected a vector of length 1"),
-        ("axis: [0.0, 0.0, -1.0]", "axis: [0.0, -1.0]", "/axis: expected a list of 3 numbers"),
         ("range: [0.0, 1.92]", "range: [0.5, 0.5]", "/range: expected low before high"),
         ("  index:\n", "  second:\n", "/fingers/index: expected a value, got nothing"),
         ("mass: 0.018", "mass: 0.9", "phalanges weigh .* more than the whole hand ih2_base_link"),

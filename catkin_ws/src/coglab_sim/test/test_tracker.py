@@ -5,8 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from coglab_perception.sights import Board
-from coglab_py.pose import Pose, about_z
+from coglab_py.pose import Pose
 from coglab_sim.tracker.tracker import PerceptionSettings, Tracker
 
 CALIBRATED = {"calibration_offset": 0.0, "calibration_turn_deg": 0.0, "swap_probability": 0.0}
@@ -136,12 +135,3 @@ def test_a_swap_shows_the_nearest_thing_within_reach():
     assert swaps((just,)) == pytest.approx(np.tile(just.position, (20, 1)))
     away = np.linalg.norm(swaps((beyond,)) - HERE.position, axis=1)
     assert away == pytest.approx([0.08] * 20), "else something at swap_jump from it"
-
-
-@pytest.mark.parametrize("away, free", [(0.099, False), (0.101, True)])
-def test_a_place_is_free_10_cm_from_every_object(away, free):
-    board = Board(Pose(np.array([0.5, -0.5, 0.05]), about_z(np.pi / 2)), {"A1": np.array([0.1, 0.0, 0.0])})
-    place = np.array([0.5, -0.4, 0.05])
-    assert (board.free([place + [0.0, 0.0, away]]) == ["A1"]) is free
-    assert board.free([place + [0.0, 0.0, 1.0], place + [away, 0.0, 0.0]]) == (["A1"] if free else [])
-    assert board.free([place + [0.06, 0.0, 0.0]], clearance=0.05) == ["A1"]

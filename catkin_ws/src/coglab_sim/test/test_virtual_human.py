@@ -95,30 +95,6 @@ def test_reach_time_and_reaction_are_human():
     assert 0.9 < np.median(reaches) < 1.5
 
 
-def handovers(profile, n=400):
-    """Object middles and turns (deg) at the handover points of n people."""
-    middles, turns = [], []
-    for seed in range(n):
-        human = VirtualHuman(Participant.draw(seed, profile=profile), Scene())
-        human._task = "give"
-        place, turn = human._handover_pose()
-        middles.append(place + turn.apply(human.scene.object_in_hand + human.scene.object_middle))
-        turns.append(np.degrees(turn.as_rotvec()))
-    return np.array(middles), np.array(turns)
-
-
-@pytest.mark.parametrize("profile", ["patient", "accustomed"])
-def test_patient_people_hold_upright_inside_the_box(profile):
-    middles, turns = handovers(profile)
-    assert not turns.any()
-    assert np.all(middles >= [0.72 - 1e-9, -0.12, 0.34 - 1e-9]) and np.all(
-        middles <= np.array([0.81, 0.16, 0.51]) + 1e-9
-    )
-    for seed in range(20):
-        p = Participant.draw(seed, profile=profile)
-        assert p.trust == 1.0 and not p.places_while_moving
-
-
 def test_grip_follows_mass_and_friction_and_is_limited():
     def grip(mass, friction, limit=40.0):
         scene = Scene(object_mass=mass, object_friction=friction)

@@ -131,20 +131,6 @@ def refused(call, *arguments):
     return str(refusal.value), refusal.value.code
 
 
-@pytest.mark.parametrize("age, fresh", [(0.49, True), (0.51, False)])
-def test_a_sight_is_fresh_for_half_a_second(age, fresh):
-    seen = Scene()
-    seen.see(objects={"object_mug": NEAR})
-    seen.now += age
-    if fresh:
-        name, _, told = seen.vision.locate("mug", 0.0)
-        assert name == "object_mug" and told == pytest.approx(age)
-    else:
-        text, code = refused(seen.vision.locate, "mug", 0.0)
-        assert code == ReasonCode.OBJECT_NOT_SEEN
-        assert text == ("'object_mug' was not seen within 0.0 s; in view: nothing; bring it into view of the tracker")
-
-
 def test_a_stamp_ahead_of_the_clock_is_no_negative_age():
     seen = Scene()
     seen.see(objects={"object_mug": NEAR})
