@@ -145,12 +145,6 @@ def test_reading_again_says_by_a_code_whether_all_files_fit(make, tmp_path):
     assert (read.success, read.reason_code) == (False, ReasonCode.BAD_FILE) and "mug.yaml" in read.message
 
 
-def test_an_object_that_is_unknown_is_a_code_and_a_sentence(make):
-    got = make().node.on_get(SimpleNamespace(object_id="elephant"))
-    assert (got.success, got.reason_code, got.yaml) == (False, ReasonCode.OBJECT_UNKNOWN, "")
-    assert got.message == "object 'elephant' is not in the database; it has: ball, mug"
-
-
 def test_a_file_that_is_written_is_read_at_the_next_tick_and_mirrored_once(make):
     started = make()
     assert started.master.values["~objects/mug"]["mass"] == 0.31 and started.master.calls == 2
@@ -160,14 +154,3 @@ def test_a_file_that_is_written_is_read_at_the_next_tick_and_mirrored_once(make)
         started.node.on_timer()
     assert started.master.values["~objects/mug"]["mass"] == 0.3333 and started.master.calls == 3
     assert started.warnings == []
-
-
-def test_a_problem_that_comes_back_is_told_again(make):
-    started = make()
-    path = started.folder / "mug.yaml"
-    good = path.read_text()
-    for text, told in (("id: mug\n", 1), (good, 1), ("id: mug\n", 2), ("id: mug\n# x\n", 2)):
-        path.write_text(text)
-        started.node.on_reload(None)
-        assert len(started.warnings) == told
-    assert started.warnings[0][0] == "object database: %s" and "mug.yaml" in started.warnings[0][1]
