@@ -61,13 +61,6 @@ def test_lists_of_points(server):
         assert sentence in str(error.value)
 
 
-@pytest.mark.parametrize("value", [1, 200, 1.0, 200.0, 7])
-def test_both_ends_of_a_range_belong_to_it(value):
-    assert checked("/n/x", value, float, 1, 200) == value
-    if isinstance(value, int):
-        assert checked("/n/x", value, int, 1, 200) == value
-
-
 def test_reading_a_parameter_with_range_default_and_choice(server):
     server.update({"/n/count": 3, "/n/low": -1e9, "/n/high": 1e9, "/n/word": "v17", "/n/map": {"a": 1}})
     assert parameters.read("/n/count", int) == 3

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from coglab_py.messages import pose_message, pose_of
-from coglab_py.pose import IDENTITY, Pose, about_z, mean_pose, rotation
+from coglab_py.pose import Pose, about_z, mean_pose, rotation
 from geometry_msgs.msg import Point, Quaternion
 from geometry_msgs.msg import Pose as PoseMessage
 
@@ -43,14 +43,6 @@ def test_poses_compose_as_matrices_do():
 def test_distance_is_that_of_position_and_of_the_smallest_turn():
     far, angle = Pose().distance(Pose(np.array([3.0, 4.0, 0.0]), -about_z(0.3)))
     assert (far, angle) == pytest.approx((5.0, 0.3))
-
-
-def test_a_pose_of_which_nothing_is_said_is_its_parent():
-    for pose in (Pose(), Pose.from_dict({})):
-        assert pose.position.tolist() == [0.0, 0.0, 0.0] and pose.orientation.tolist() == [0.0, 0.0, 0.0, 1.0]
-    assert IDENTITY == (0.0, 0.0, 0.0, 1.0)
-    with pytest.raises(AttributeError):
-        Pose().position = np.ones(3)
 
 
 def test_the_mean_of_two_poses_lies_half_way():
