@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from ih2_hand.clock import SteppedClock
-from ih2_hand.errors import HandConnectionLost, HandInconsistentError, HandTimeoutError
+from ih2_hand.errors import HandInconsistentError, HandTimeoutError
 from ih2_hand.line import ANALOGUE_SLACK, POSITION_SLACK, STATUS_SLACK, HandLine
 
 ASK = b"\x45\x02"
@@ -117,13 +117,6 @@ def test_nothing_follows_a_posture_before_it_is_executed(bench):
     bench.clock.sleep(2.0)
     bench.line.send(b"\x41")
     assert [moment for moment, _ in bench.script.sent] == [50.0, 50.5, 50.5, 50.5, 52.5]
-
-
-def test_a_closed_line_sends_nothing(bench):
-    bench.line.close()
-    with pytest.raises(HandConnectionLost, match="port scripted was closed"):
-        bench.line.request(ASK, 1)
-    assert bench.script.sent == [] and bench.script.closed
 
 
 @pytest.mark.parametrize(("answer", "is_good"), [("08", True), ("08 08", False), ("", False)])

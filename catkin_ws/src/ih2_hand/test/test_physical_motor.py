@@ -106,18 +106,3 @@ def test_speed_moves_end_at_the_end_sensors_and_stop_holds():
     bench.driver.move_motor(2, 511, False)
     bench.run(1.2)
     assert bench.driver.get_finger_status(2)["raw"] == 0x08
-
-
-@pytest.mark.parametrize(
-    "states, words",
-    [
-        ([], "states of 5 motors"),
-        ([MotorState(2.0, 0, 0, False, False)] * 5, "position of a motor must be 0..1"),
-        ([MotorState(0.0, float("nan"), 0, False, False)] * 5, "current of a motor"),
-    ],
-)
-def test_bad_states_are_refused_with_words(states, words):
-    with pytest.raises(ValueError, match=words):
-        EmulatedHand(SteppedClock(), physical=True).follow(states)
-    with pytest.raises(ValueError, match="turned by the physics are expected"):
-        EmulatedHand(SteppedClock()).follow([MotorState(0.0, 0.0, 0.0, False, False)] * 5)
