@@ -37,18 +37,6 @@ def test_any_iterable_but_no_lone_string():
         smach.State(outcomes=None)
 
 
-def test_preemption_flag():
-    state = smach.State(["a"])
-    assert state.preempt_requested() is False and state._preempt_requested is False
-    for clear in (state.service_preempt, state.recall_preempt):
-        state.request_preempt()
-        assert state.preempt_requested() and state._preempt_requested
-        clear()
-        assert not state.preempt_requested()
-    state._preempt_requested = True
-    assert state.preempt_requested()
-
-
 def test_cb_state():
     def cb(ud, *args, **kwargs):
         ud.seen = (args, kwargs)

@@ -1,21 +1,8 @@
 """Construction, user data and callbacks of all containers."""
 
-import threading
-
 import pytest
 import smach
 from machine_parts import Calls, Raises, Says, in_thread, machine
-
-
-def test_getitem_and_unknown_label():
-    state = Says("done")
-    sm = machine(state)
-    assert sm["S0"] is state
-    both = smach.Concurrence(["a"], "a")
-    each = smach.Iterator(["a"], [], [])
-    for container in (sm, both, each):
-        with pytest.raises(KeyError, match="nothing"):
-            container["nothing"]
 
 
 def test_keys_are_copied_in_and_out():
@@ -141,16 +128,6 @@ def test_another_thread_cannot_add_to_an_open_container_better():
         other = in_thread(lambda: smach.StateMachine.add("B", Says("done")))
         other.join(60.0)
     assert isinstance(other.error, smach.InvalidStateError) and list(sm.get_children()) == ["A"]
-
-
-def test_construction_in_many_threads():
-    results = []
-    threads = [
-        threading.Thread(target=lambda: results.append(machine(Says("done"), Says("done")).execute()))
-        for _ in range(20)
-    ]
-    [t.start() for t in threads], [t.join(60.0) for t in threads]
-    assert results == ["done"] * 20
 
 
 def test_what_is_no_state_is_refused_with_words():

@@ -113,11 +113,6 @@ def test_outcomes_that_nobody_has_are_found_better(contained, named):
         iterator(state, **contained).check_consistency()
 
 
-def test_shutdown_ends_the_iteration_better():
-    state = Calls(lambda ud: smach.set_shutdown_check(lambda: True))
-    assert iterator(state, range(5), loop_outcomes=["done"]).execute() is None
-
-
 def test_a_shutdown_inside_the_state_is_no_transition():
     ending, transitions = [], []
     smach.set_shutdown_check(lambda: bool(ending))

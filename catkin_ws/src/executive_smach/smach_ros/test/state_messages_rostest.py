@@ -79,16 +79,6 @@ class TestService(unittest.TestCase):
                 "aborted",
             )
 
-    def test_service_bad_construction(self):
-        for wrong in (
-            {"request_slots": ["x"]},
-            {"response_slots": ["x"]},
-            {"request_cb": 1},
-            {"response_cb": 1},
-        ):
-            with self.assertRaises(smach.InvalidStateError):
-                smach_ros.ServiceState("set", SetBool, **wrong)
-
     def test_preempted_before_and_while_waiting_for_the_service(self):
         state = smach_ros.ServiceState("nobody", Trigger)
         state.request_preempt()
@@ -145,13 +135,6 @@ class TestTopic(unittest.TestCase):
         self.assertEqual(run.result, "preempted")
         self.assertLess(time.monotonic() - asked, LIMIT)
         self.assertFalse(state.preempt_requested())
-
-    def test_monitor_in_a_concurrence_is_preempted(self):
-        both = smach.Concurrence(["done", "preempted"], "done", child_termination_cb=lambda o: True)
-        with both:
-            smach.Concurrence.add("M", smach_ros.MonitorState("silence", Empty, lambda ud, msg: True))
-            smach.Concurrence.add("S", smach.CBState(lambda ud: "ok", outcomes=["ok"]))
-        self.assertEqual([both.execute() for _ in range(5)], ["done"] * 5)
 
 
 class TestCondition(unittest.TestCase):

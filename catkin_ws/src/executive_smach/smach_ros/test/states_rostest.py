@@ -123,15 +123,6 @@ class TestActionState(unittest.TestCase):
             with self.assertRaises(smach.InvalidStateError):
                 smach_ros.SimpleActionState("reference", TestAction, **wrong)
 
-    def test_preempted_cancels_the_goal(self):
-        state = action_state(UNTIL_CANCELLED)
-        run = in_thread(state.execute, self.ud)
-        self.assertTrue(wait_for(lambda: self.server.goals == [UNTIL_CANCELLED]))
-        state.request_preempt()
-        run.join(LIMIT)
-        self.assertEqual(run.result, "preempted")
-        self.assertFalse(state.preempt_requested())
-
     def test_preempted_right_after_the_goal_was_sent(self):
         for delay in [0.0, 0.0005, 0.002, 0.005, 0.01] * 8:
             state = action_state(UNTIL_CANCELLED)

@@ -16,28 +16,15 @@ from smach_ros.plain_data import InvalidDataError, decode, encode, to_plain
 
 
 @pytest.mark.parametrize(
-    "name, md5, fields",
+    "name, md5",
     [
-        (
-            "SmachContainerStatus",
-            "5ba2bb79ac19e3842d562a191f2a675b",
-            "header path initial_states active_states local_data info",
-        ),
-        (
-            "SmachContainerStructure",
-            "3d3d1e0d0f99779ee9e58101a5dcf7ea",
-            "header path children internal_outcomes outcomes_from outcomes_to container_outcomes",
-        ),
-        (
-            "SmachContainerInitialStatusCmd",
-            "45f8cf31fc29b829db77f23001f788d6",
-            "path initial_states local_data",
-        ),
+        ("SmachContainerStatus", "5ba2bb79ac19e3842d562a191f2a675b"),
+        ("SmachContainerStructure", "3d3d1e0d0f99779ee9e58101a5dcf7ea"),
+        ("SmachContainerInitialStatusCmd", "45f8cf31fc29b829db77f23001f788d6"),
     ],
 )
-def test_messages(name, md5, fields):
-    message = getattr(smach_msgs.msg, name)
-    assert message._md5sum == md5 and message.__slots__ == fields.split()
+def test_messages_are_those_of_other_viewers(name, md5):
+    assert getattr(smach_msgs.msg, name)._md5sum == md5
 
 
 PLAIN = {
