@@ -124,35 +124,6 @@ def test_every_axis_has_its_limit_switch_for_commands_and_for_going_on(session, 
         assert s.texts() == [f"software limit switch {NAMES[joint]}"]
 
 
-@pytest.mark.parametrize("joint", range(7))
-def test_entry_takes_what_is_within_a_tenth_of_a_milliradian(session, joint):
-    s = session()
-    near = np.array(set_point(s.monitor()))
-    near[joint] += 0.8e-4
-    s.client.request(1, 10)
-    assert s.run(0.5, position=near)["state"] == COMMAND
-    s = session()
-    s.monitor()
-    far = near.copy()
-    far[joint] += 0.5e-4
-    s.client.request(1, 10)
-    assert s.run(0.5, position=far)["state"] == MONITOR
-    assert s.texts() == [f"FRI interpolation error {NAMES[joint]}"] and parse(s.measurement)["ints"][1] == -3
-
-
-@pytest.mark.parametrize("axis", range(3))
-def test_entry_with_a_frame_takes_what_is_within_a_millimetre_and_a_milliradian(session, axis):
-    for step, turn, ok in ((0.0009, 0.0, True), (0.0011, 0.0, False), (0.0, 0.0009, True), (0.0, 0.0011, False)):
-        s = session()
-        rotation, position = frame_of(s.monitor())
-        turned = Rotation.from_rotvec(turn * np.eye(3)[axis]).as_matrix() @ rotation
-        s.client.frame = list(wire(turned, position + step * np.eye(3)[axis]).values())
-        s.client.flags = CARTESIAN_IMPEDANCE
-        s.client.request(1, 20)
-        assert (s.run(0.3)["state"] == COMMAND) is ok, (step, turn)
-        assert s.texts() == ([] if ok else ["cmd.cartPos not properly initialized"])
-
-
 @pytest.mark.parametrize(
     "strategy, flags, ok",
     [
@@ -179,19 +150,6 @@ def test_flags_on_entry(session, strategy, flags, ok):
         assert s.texts() == ["cmdFlags changed during cmd mode"]
 
 
-def test_an_added_torque_is_judged_against_the_one_in_force(session):
-    s = session()
-    s.command(30)
-    for torque in (0.9, 1.8, 2.7, 1.8):
-        assert answered(s, "torque", {1: torque})["state"] == COMMAND
-    assert answered(s, "torque", {1: 0.7})["state"] == MONITOR
-    fresh = session()
-    fresh.monitor()
-    fresh.client.torque, fresh.client.flags = [0.9] + [0.0] * 6, JOINT_IMPEDANCE
-    fresh.client.request(1, 30)
-    assert fresh.run(0.3)["state"] == COMMAND, "on entry against none"
-
-
 def period(s, latency=None):
     """One period whose answer takes so long (s); None: no answer."""
     if latency is not None and s.measurement is not None:
@@ -216,50 +174,6 @@ def test_the_window_is_the_last_hundred_packets(session):
     assert fields["answer_rate"] == pytest.approx(0.90) and fields["latency"] == pytest.approx(0.004)
     fields = period(s, 0.004)
     assert fields["answer_rate"] == pytest.approx(0.91) and fields["miss_counter"] == before + 10
-
-
-@pytest.mark.parametrize("missing, quality", [(1, 3), (2, 2), (5, 2), (6, 1), (20, 1), (21, 0)])
-def test_qualities_by_the_share_that_is_answered(session, missing, quality):
-    s = session()
-    period(s)
-    for _ in range(100):
-        period(s, 0.0)
-    for _ in range(missing):
-        fields = period(s)
-    assert fields["quality"] == quality and s.cell.quality == quality
-
-
-def test_what_is_no_answer_is_counted_by_its_reason(session):
-    s = session()
-    for _ in range(3):
-        s.tick()
-    counted = {"wrong_size": 0, "wrong_header": 0, "stale": 0, "repeated": 0}
-    assert s.cell.rejections == counted
-
-    def refused(data, reason):
-        s.cell.receive(bytes(data))
-        counted[reason] += 1
-        assert s.cell.rejections == counted
-
-    good = bytearray(s.client.answer(s.measurement))
-    refused(good[:375], "wrong_size")
-    refused(good + b"\0", "wrong_size")
-    refused(good[:4] + bytes([0x77, 0x01]) + good[6:], "wrong_header")
-    refused(good[:6] + bytes([0x06]) + good[7:], "wrong_header")
-    refused(good[:2] + bytes([good[2] ^ 1]) + good[3:], "stale")
-    s.cell.receive(bytes(good))
-    assert s.cell.rejections == counted
-    refused(good, "repeated")
-    refused(s.client.answer(s.measurement), "repeated")
-    s.measurement = s.cell.step(None)
-    s.client.counter -= 1
-    again = bytearray(s.client.answer(s.measurement))
-    refused(good, "stale")
-    again[0:2] = (s.client.counter - 1).to_bytes(2, "little")
-    refused(again, "repeated")
-    early = session()
-    early.cell.receive(bytes(good))
-    assert early.cell.rejections["stale"] == 1, "nothing was asked yet"
 
 
 @pytest.mark.parametrize("every, entry_quality, starts", [(25, 2, True), (25, 3, False), (13, 2, False), (13, 1, True)])

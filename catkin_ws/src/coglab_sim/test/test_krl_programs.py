@@ -9,10 +9,6 @@ def ints(s):
     return parse(s.measurement)["ints"]
 
 
-def to_bool(s, index):
-    return bool(parse(s.measurement)["bools"] >> (index - 1) & 1)
-
-
 def test_coglab_numbers_requests_and_results(session):
     s = session()
     s.monitor()
@@ -59,22 +55,6 @@ def test_a_client_that_waits_for_each_datagram_hears_the_end(session):
             s.client.ints[15], asked = fields["ints"][14], True
         measurement = s.cell.step(s.client.answer(measurement))
     assert fields["ints"][15] == 30
-
-
-def test_kuka_sample(session):
-    s = session(krc__convention="kuka_sample")
-    s.client.ints[0] = 1
-    s.monitor()
-    first = parse(s.measurement)["reals"][1]
-    s.run(0.5)
-    assert parse(s.measurement)["reals"][1] > first
-    assert s.cell.fri_state == MONITOR
-    s.client.ints[0] = 10
-    s.run(1.0)
-    assert s.cell.fri_state == COMMAND
-    s.cell.leave_command_mode("end of the sample")
-    s.run(0.5)
-    assert ints(s)[0] == -1
 
 
 @pytest.mark.parametrize(
@@ -140,66 +120,6 @@ def test_coglab_says_how_a_start_failed_and_waits_no_longer_than_it_says(session
     s.client.ints[2] = 9
     until(s, lambda: ints(s)[0] == 9, position=wrong)
     assert ints(s)[1] == -3
-
-
-def rcprg(session):
-    s = session(krc__convention="rcprg_tum")
-    s.client.flags = JOINT_IMPEDANCE
-    s.monitor()
-    return s
-
-
-def test_rcprg_tum_a_request_is_served_once_until_its_flag_is_down(session):
-    s = rcprg(session)
-    s.client.ints[0], s.client.bools = 7, 1
-    s.run(0.5)
-    assert s.texts() == ["fri_start: unknown request 7"] and not to_bool(s, 1)
-    s.client.ints[0] = 1
-    s.run(0.5)
-    assert s.cell.fri_state == MONITOR, "the flag is still up"
-    s.client.bools = 0
-    s.run(0.1)
-    s.client.ints[0], s.client.bools = 1, 1
-    until(s, lambda: s.cell.fri_state == COMMAND, 1.0)
-
-
-def started_openkc(session, **parameters):
-    s = session(krc__convention="openkc", **parameters)
-    s.monitor()
-    return s
-
-
-def command(s, code, acknowledged=True):
-    """One command of OpenKC; the count, its echo and its result."""
-    s.client.ints[15], s.client.bools = code, 1
-    if acknowledged:
-        until(s, lambda: to_bool(s, 1), 2.0)
-    else:
-        s.run(0.3)
-    told = ints(s)[13:16]
-    s.client.ints[15], s.client.bools = 0, 0
-    until(s, lambda: not to_bool(s, 1), 0.3)
-    return told
-
-
-def test_openkc_a_command_is_served_once_until_its_flag_is_down(session):
-    s = started_openkc(session)
-    assert command(s, 1) == (1, 1, 100) and s.cell.fri_state == COMMAND
-    assert command(s, 1) == (2, 1, 100), "in command mode already"
-    s.client.ints[15], s.client.bools = 9, 1
-    s.run(0.3)
-    assert ints(s)[13] == 2 and s.texts() == ["$STIFFNESS.STRATEGY cannot change in command mode"]
-    s.client.bools = 0
-    s.run(0.1)
-    s.client.ints[15], s.client.bools = 2, 1
-    s.run(0.2)
-    assert ints(s)[13:16] == (3, 2, 101) and s.cell.fri_state == MONITOR
-    s.client.ints[15] = 9
-    s.run(0.2)
-    assert ints(s)[13:16] == (3, 2, 101), "the flag is still up"
-    s.client.ints[15], s.client.bools = 0, 0
-    s.run(0.1)
-    assert command(s, 6)[2] == 104 and command(s, 7)[2] == 105 and command(s, 9)[2] == 107
 
 
 @pytest.mark.parametrize(

@@ -9,23 +9,6 @@ from coglab_sim.person.senses import Senses
 DT = 0.01
 
 
-def perceive(person, view, seconds, seed=1):
-    """Percepts over time of view(t)."""
-    senses = Senses(person, np.random.default_rng(seed))
-    return [(k * DT, senses.step(k * DT, view(k * DT))) for k in range(int(seconds / DT))]
-
-
-def test_what_is_seen_is_noisy_and_the_noise_is_slow():
-    person = Participant.from_mapping({"seed": 2, "seen_noise": 0.004, "seen_turn": 2.0})
-    seen = [p for _, p in perceive(person, lambda t: WorldView(), 300.0)]
-    places = np.array([p.object.position for p in seen])
-    assert places.std(axis=0) == pytest.approx([0.004] * 3, rel=0.2)
-    x = places[:, 0] - places[:, 0].mean()
-    assert float(x[30:] @ x[:-30] / (x @ x)) == pytest.approx(np.exp(-1.0), abs=0.12)
-    turns = np.degrees([p.robot_hand.rotation.as_rotvec() for p in seen])
-    assert turns.std(axis=0) == pytest.approx([2.0] * 3, rel=0.2)
-
-
 STEP = 1 / 64
 BLIND = {"seen_noise": 0.0, "seen_turn": 0.0, "seen_speed": 0.0}
 
