@@ -16,8 +16,6 @@ WEIGHT = MASS * 9.81
 TURNED = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])
 """palm to base: the palm's y is up"""
 
-NOBODY = np.zeros((3, 3))
-
 
 def pinch(force, load):
     """Thumb against a finger, z of the palm, each with half of the load; and a palm that touches nothing."""

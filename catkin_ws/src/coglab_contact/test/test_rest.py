@@ -22,12 +22,6 @@ JACOBIAN = np.array(
 
 WATCHED = [1, 2, 4]
 
-BLEND = 1.0 - math.exp(-2.0 * math.pi * 20.0 * STEP)
-"""of one sample, low-pass of 20 Hz"""
-
-THRESHOLD = 6.0 * 0.02
-"""Nm, six of the smallest standard deviations that are believed"""
-
 
 class Rest:
     """A detector that is fed with what the test says, from rest on."""
