@@ -12,7 +12,7 @@ import pytest
 import yaml
 from coglab_perception._reach_bank import transition
 from coglab_perception.belief import Belief, BeliefFilter, BeliefSettings
-from coglab_perception.reach_bank import ReachBank, ReachSettings
+from coglab_perception.reach_bank import ReachSettings
 from coglab_perception.recogniser import PatternEnd
 from other_motions import KINDS, other_motion
 from synthetic_reaches import START, share
@@ -275,15 +275,6 @@ def test_a_recognised_pattern_comes_into_the_prediction_gradually():
     assert plain.beliefs[-1].pattern == "" and helped.beliefs[-1].pattern == "high"
     assert max(np.diff(shifts)) < 0.03
     assert np.trace(helped.beliefs[-1].covariance) < 0.7 * np.trace(plain.beliefs[-1].covariance)
-
-
-def test_the_work_per_sight_is_bounded():
-    rng = np.random.default_rng(12)
-    bank = ReachBank(0.0, START, ReachSettings())
-    for k in range(1, 150):
-        bank.step(k / 30, START + rng.normal(0.0, 0.02, 3))
-        assert len(bank) <= ReachSettings().hypotheses and np.isfinite(bank.position()).all()
-    assert 0.0 <= bank.handover <= 1.0
 
 
 def test_the_file_holds_the_defaults_and_faults_in_it_are_said():

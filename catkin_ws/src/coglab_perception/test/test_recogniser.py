@@ -1,4 +1,4 @@
-"""Recognition of reaching patterns: the filter against brute force and hmmlearn, earliness, unknown motions,
+"""Recognition of reaching patterns: the filter against brute force, earliness, unknown motions,
 hysteresis."""
 
 import itertools
@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from coglab_perception.hmm import VARIANCE_FLOOR, HmmFilter, LeftRightHmm
+from coglab_perception.hmm import LeftRightHmm
 from coglab_perception.recogniser import (
     UNKNOWN,
     Recogniser,
@@ -64,49 +64,6 @@ def test_training_raises_the_likelihood_and_finds_the_means():
     assert model.stay[:2] == pytest.approx([0.8, 0.8], abs=0.06)
 
 
-def hmmlearn_twin(model, dimensions):
-    """The same model in the oracle."""
-    hmm = pytest.importorskip("hmmlearn.hmm", reason="the oracle hmmlearn is not installed")
-    peer = hmm.GaussianHMM(
-        model.states, covariance_type="diag", init_params="", params="tmc", n_iter=1, tol=0.0, covars_prior=0.0
-    )
-    peer.n_features = dimensions
-    peer.startprob_ = np.eye(model.states)[0]
-    peer.transmat_ = model.transition()
-    peer.means_, peer.covars_ = model.mean, model.variance
-    return peer
-
-
-def test_the_filter_agrees_with_hmmlearn():
-    rng = np.random.default_rng(2)
-    model = small_model(rng, 4, 3)
-    peer = hmmlearn_twin(model, 3)
-    for _ in range(10):
-        x = rng.normal(size=(30, 3))
-        assert model.log_likelihood(x) == pytest.approx(peer.score(x), rel=1e-9)
-
-
-def test_a_step_of_training_agrees_with_hmmlearn():
-    rng = np.random.default_rng(4)
-    model = small_model(rng, 4, 3)
-    data = [rng.normal(size=(int(n), 3)) for n in rng.integers(20, 40, 8)]
-    peer = hmmlearn_twin(model, 3)
-    ours, score = model._reestimate(data)
-    assert score == pytest.approx(peer.score(np.concatenate(data), [len(x) for x in data]), rel=1e-9)
-    peer.fit(np.concatenate(data), [len(x) for x in data])
-    assert ours.mean == pytest.approx(peer.means_, rel=1e-6, abs=1e-9)
-    assert ours.variance - VARIANCE_FLOOR == pytest.approx(np.array([np.diag(c) for c in peer.covars_]), rel=1e-6)
-    assert ours.stay[:-1] == pytest.approx(np.diag(peer.transmat_)[:-1], rel=1e-6)
-
-
-def test_one_frame_costs_the_same_whatever_came_before():
-    rng = np.random.default_rng(3)
-    f = HmmFilter(small_model(rng))
-    for _ in range(5000):
-        f.update(rng.normal(size=2))
-    assert np.isfinite(f.log_likelihood) and f.frames == 5000 and 0.0 <= f.progress() <= 1.0
-
-
 def outcome_at(patterns, name, rng, share):
     recogniser = Recogniser(patterns)
     stamps, positions, onset, duration = reach(name, rng)
@@ -133,16 +90,6 @@ def test_right_after_forty_per_cent_of_the_reach_and_hardly_ever_wrong(patterns)
             total += 1
     assert right / total >= 0.95, f"{right} of {total} right after 40 %"
     assert wrong / total <= 0.01, f"{wrong} of {total} with a wrong decision"
-
-
-def test_more_of_the_reach_is_never_worse(patterns):
-    shares = []
-    for share in (0.2, 0.4, 0.7):
-        rng = np.random.default_rng(5)
-        shares.append(
-            np.mean([outcome_at(patterns, name, rng, share)[0].pattern == name for name in ENDS for _ in range(15)])
-        )
-    assert shares[0] <= shares[1] + 0.05 and shares[1] <= shares[2] + 0.05
 
 
 def test_a_motion_that_is_no_reach_is_unknown(patterns):
