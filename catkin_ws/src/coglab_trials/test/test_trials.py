@@ -229,21 +229,6 @@ def test_actions_succeed_within_the_limits_of_t1(tmp_path, actions, where):
     assert max(r.ended - r.started for r in results) > 40.0
 
 
-def test_a_reach_of_ten_times_its_duration_is_waited_for():
-    trial = VirtualTrial(world=World(3, CONSIDERATE, "world"))
-    get_object = trial.ctx.database.get_object
-
-    def slow(object_id):
-        answer = get_object(object_id)
-        answer.result()["dmp"]["dmp_ratio"] = 10.0
-        return answer
-
-    trial.ctx.database.get_object = slow
-    (result,) = succeed(trial, "take", limit=120.0)
-    # The demonstration of `take_board` took 1.8 s; what a reach was given before was 8 s.
-    assert result.ended - result.started > 15.0
-
-
 # --- recognition ------------------------------------------------------------------------------------------------------
 
 
@@ -268,24 +253,6 @@ def test_a_common_reach_keeps_the_primitive():
     trial = VirtualTrial(5, CONSIDERATE, recogniser=recogniser())
     succeed(trial, RECEIVE)
     assert not switched(trial)
-
-
-def test_each_sight_is_recognised_once_and_before_it_is_believed():
-    """As in the recogniser's node, which takes every new transform: none is left out, however they come."""
-    seen, told, asked, sights = recogniser(), [], [], []
-    update, pattern_end = seen.update, seen.pattern_end
-    seen.update = lambda stamp, position: told.append(stamp) or update(stamp, position)
-    seen.pattern_end = lambda: asked.append(told[-1]) or pattern_end()
-    trial = VirtualTrial(5, recogniser=seen)
-
-    def look(t):
-        stamp = t.world.sights["human_hand"].captured if "human_hand" in t.world.sights else None
-        if stamp is not None and sights[-1:] != [stamp]:
-            sights.append(stamp)
-
-    trial.beside = look
-    trial.run(script=lambda t: t.clock.sleep(3.0))
-    assert len(sights) > 30 and told == asked == sights
 
 
 def test_a_person_who_reaches_out_starts_the_exchange():

@@ -84,23 +84,6 @@ def test_a_goal_that_is_lost_half_way_or_for_the_rest_of_a_short_way(after, slow
     ended(trial, outcome, {ReasonCode.NONE if outcome == "succeeded" else ReasonCode.GOAL_LOST})
 
 
-def test_primitive_that_does_not_exist():
-    trial = trial_of()
-    database = trial.ctx.database.database
-    entry = database.get("mug")
-    database.get = lambda object_id: {**entry, "dmp": {**entry["dmp"], "receive": "reach_the_moon"}}
-    trial.run(RECEIVE)
-    assert "reach_the_moon" in ended(trial, "failed_empty", {ReasonCode.UNKNOWN_NAME}).reason
-
-
-def test_hand_dead_when_the_object_comes():
-    trial = trial_of()
-    once(trial, into_reach(0.0), lambda t: setattr(t.world.hand, "dead", True))
-    (result,) = trial.run(RECEIVE)
-    assert result.outcome == "failed_empty" and at_home(trial)
-    assert "preshape 'cylindrical'" in result.reason or "closing of the hand" in result.reason
-
-
 def test_command_mode_lost_in_mid_reach_and_reset():
     trial = trial_of()
     cut = once(trial, into_reach(0.4), lambda t: t.world.cell.leave_command_mode("cut by the test"))

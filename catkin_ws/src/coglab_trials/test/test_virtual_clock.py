@@ -5,7 +5,7 @@ import threading
 
 import pytest
 import smach
-from coglab_trials.virtual_clock import ClockStalled, VirtualClock, VirtualCondition, using
+from coglab_trials.virtual_clock import ClockStalled, VirtualClock, using
 
 
 class Waits(smach.State):
@@ -32,13 +32,6 @@ def both(clock, *seconds):
         for i, s in enumerate(seconds):
             smach.Concurrence.add(f"C{i}", Waits(clock, s))
     return result
-
-
-def test_an_hour_of_concurrent_machines_costs_nothing():
-    with using(VirtualClock()) as clock:
-        assert both(clock, 10.0, 3600.0, 0.0).execute() == "done"
-        assert clock.now() == pytest.approx(3600.0, abs=0.11)  # steps of 0.1 s, summed up
-    assert smach.concurrence.threading is threading
 
 
 def test_a_request_at_a_moment_of_virtual_time():
@@ -80,80 +73,6 @@ def test_events_wake_at_once_and_time_out():
         assert event.is_set() and event.wait() is True
         event.clear()
         assert not event.is_set()
-
-
-def test_a_condition_wakes_those_it_is_told_to_and_times_out():
-    with using(VirtualClock()) as clock:
-        condition, woken = VirtualCondition(clock), []
-
-        def wait(name):
-            with condition:
-                woken.append((name, condition.wait(30.0), clock.now()))
-
-        def notify():
-            clock.sleep(1.0)
-            with condition:
-                condition.notify()
-            clock.sleep(1.0)
-            with condition:
-                condition.notify_all()
-
-        for name in "abc":
-            clock.start_thread(lambda n=name: wait(n), name)
-        clock.start_thread(notify, "notify")
-        clock.sleep(5.0)
-        assert woken == [("a", True, 1.0), ("b", True, 2.0), ("c", True, 2.0)]
-        with condition:
-            assert condition.wait(4.0) is False and clock.now() == 9.0
-
-
-def test_polls_keep_the_order_of_sleeps():
-    def run(wait):
-        order = []
-        clock = VirtualClock()
-
-        def work(name, step):
-            def over():
-                order.append((name, round(clock.now(), 9)))
-                return sum(1 for who, _ in order if who == name) == 20
-
-            wait(clock, over, step)
-            order.append((name, "ends"))
-
-        with clock.attached():
-            threads = [clock.start_thread(lambda n=n: work(n, 0.1 * (n % 3 + 1)), f"w{n}") for n in range(5)]
-            for _ in range(40):
-                clock.sleep(0.2)
-                order.append(("all", "tick"))
-        [t.join(10) for t in threads]
-        return order
-
-    def by_sleeping(clock, over, step):
-        while not over():
-            clock.sleep(step)
-
-    assert run(lambda clock, over, step: clock.poll(over, step)) == run(by_sleeping)
-
-
-def test_what_is_polled_raises_where_it_is_waited_for():
-    with using(VirtualClock()) as clock:
-        seen = []
-
-        def watch(over, error):
-            with pytest.raises(error):
-                clock.poll(over, 0.25)
-            seen.append(clock.now())
-
-        def waits():
-            return clock.now() >= 2.0 and clock.event().wait()
-
-        threads = [
-            clock.start_thread(lambda: watch(lambda: clock.now() >= 1.0 and 1 / 0 > 0, ZeroDivisionError), "broken"),
-            clock.start_thread(lambda: watch(waits, RuntimeError), "waits itself"),
-        ]
-        clock.sleep(5.0)
-        assert seen == [1.0, 2.0] and clock.now() == 5.0
-        [thread.join(5) for thread in threads]
 
 
 def test_an_outside_thread_can_set_an_event():

@@ -11,10 +11,9 @@ from coglab_objects.database import ObjectError
 from coglab_py.pose import Pose
 from coglab_sim.person.in_cell import pose_of_truth
 from coglab_sim.person.scene import shipped
-from coglab_sim.tracker.tracker import PerceptionSettings
 from coglab_trials import Conditions, World
 from coglab_trials.conditions import CONSIDERATE, PATIENT
-from coglab_trials.world import BOARD, DT, Robot
+from coglab_trials.world import DT, Robot
 from ih2_hand.reasons import Reason
 
 
@@ -35,12 +34,6 @@ def test_conditions_reach_person_plant_and_tracker():
     assert world.scene.object_mass == pytest.approx(1.3 * shipped("bottle")["mass"])
     with pytest.raises(ObjectError):
         World(4, Conditions(object_id="elephant"))
-
-
-def test_an_object_on_the_board_lies_in_its_middle():
-    world = World(2, CONSIDERATE, "world")
-    assert not world.human.holds()
-    assert world.cell.truth()["object"]["position"] == pytest.approx([0.45, -0.55, 0.052], abs=1e-6)
 
 
 @pytest.mark.parametrize("module", ["coglab_sim._cell", "coglab_sim._virtual"])
@@ -76,19 +69,6 @@ def test_the_tracker_sees_the_hand_where_it_is():
         assert sight.frame.distance(true[sight.captured]) == pytest.approx((0.0, 0.0), abs=1e-9)
         apart.append(sight.frame.distance(wanted[sight.captured])[0])
     assert max(apart) > 0.002
-
-
-def test_the_board_is_off_as_much_as_everything_that_the_tracker_sees():
-    only_bias = PerceptionSettings(
-        position_noise=(0, 0, 0), orientation_noise=0.0, dropout_start=0.0, occlusion_distance=0.0, swap_probability=0.0
-    )
-    world = stepped(World(4, replace(CONSIDERATE, perception=only_bias), "world"), 0.3)
-    board, age = world.newest("board")
-    assert age == 0.0 and board.distance(BOARD)[0] > 0.001
-    assert np.degrees(board.distance(BOARD)[1]) == pytest.approx(1.0)
-    lies = BOARD.inverse() * pose_of_truth(world.truth["object"])
-    seen = board.inverse() * world.sights["object_mug"].frame
-    assert seen.distance(lies) == pytest.approx((0.0, 0.0), abs=1e-4)
 
 
 def test_what_is_seen_has_an_age_and_a_blind_tracker_sees_nothing():
