@@ -1,10 +1,8 @@
 """Cases of a whole handover from person to robot through the plain launch file: names, outcome, error, limits at every
 tick, bytes of the hand. session_rostest.py runs them."""
 
-import re
 import time
 import unittest
-import xmlrpc.client
 from pathlib import Path
 
 import numpy as np
@@ -54,17 +52,6 @@ class Handover(unittest.TestCase):
         nodes = {node for _, names in publishers + subscribers + services for node in names}
         problems = missing_names(dict(master.getTopicTypes()), {name for name, _ in services}, nodes)
         self.assertEqual(problems, [])
-
-    def test_the_named_threads_of_the_robot_are_those_of_the_page(self):
-        """What `ps -T` shows of the running process, against the table of docs/architecture.md."""
-        table = PAGE.read_text(encoding="utf-8").split("Threads of `/robot`")[1].split("\n\nWith `arm:=ideal`")[0]
-        columns = [line.split("|")[2] for line in table.splitlines() if line.startswith("| ")]
-        documented = {name for column in columns for name in re.findall(r"`(\w+)`", column)}
-        node = xmlrpc.client.ServerProxy(rosgraph.Master("/session_test").lookupNode("/robot"))
-        pid = node.getPid("/session_test")[2]
-        running = {path.read_text().strip() for path in Path(f"/proc/{pid}/task").glob("*/comm")}
-        self.assertIn("fri", documented)
-        self.assertEqual(running - {"robot_node"}, documented)
 
     def test_frames_of_arm_hand_person_and_goal(self):
         for frame in FRAMES:

@@ -97,11 +97,9 @@ def test_a_file_that_cannot_be_written_is_refused(tmp_path, name):
     [
         ({"perception": "bridge", "tracker": ""}, "tracker:=FILE"),
         ({"perception": "stand_in", "sim": "false"}, "bridge or none"),
-        ({"perception": "kinect"}, "stand_in, bridge, none"),
         ({"feedback": "hand"}, "config/hand.yaml"),
         ({"signals": "package://no_such_package/s.yaml"}, "no_such_package"),
         ({"machines": "machines.yaml"}, "whole path"),
-        ({"arm": "steel"}, "fri, ideal, or a library"),
         ({"arm": "libnot_there.so"}, "cannot be loaded"),
         ({"arm": "libc.so.6"}, "COGLAB_ARM"),
     ],

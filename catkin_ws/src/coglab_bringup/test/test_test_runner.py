@@ -1,14 +1,11 @@
 """The runner that counts all other tests must not lie: red, dead, hanging and empty programs are told apart."""
 
-import os
-import subprocess
 import sys
-from pathlib import Path
 
 import pytest
-from coglab_bringup import arguments, process_tree, test_runner
+from coglab_bringup import arguments
 from coglab_bringup.arguments import test_options as options_of_test
-from coglab_bringup.test_runner import Program, find_programs, longest_first, report, run, unfinished
+from coglab_bringup.test_runner import Program, find_programs, report, run, unfinished
 from coglab_bringup.usage import Refused
 
 GREEN = (
@@ -51,25 +48,6 @@ def test_counts(tmp_path, script, counts, capsys):
     status = report([item], tmp_path)
     assert status == (0 if counts[1] == 0 and counts[0] > 0 else 1)
     assert capsys.readouterr().out.splitlines()[-1] == "{} passed, {} failed, {} skipped".format(*counts)
-
-
-DEAF = """
-import sys
-from pathlib import Path
-from test_test_runner import GREEN, program, run
-item = program(Path("."), "import signal; assert signal.getsignal(signal.SIGINT) != signal.SIG_IGN;"
-               f"open(XML, 'w').write('''{GREEN}''')")
-run(item, Path("log"), limit=60.0)
-sys.exit(item.failed)
-"""
-
-
-def test_a_program_hears_ctrl_c_also_where_the_runner_ignores_it(tmp_path):
-    """As it does where a script has started it in the background."""
-    found = ":".join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")])
-    command = ["env", "--ignore-signal=INT", f"PYTHONPATH={found}", sys.executable, "-c", DEAF]
-    ended = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
-    assert ended.returncode == 0, ended.stdout + ended.stderr
 
 
 def test_a_gtest_that_was_not_built_is_a_failure(tmp_path):
@@ -133,29 +111,6 @@ def test_a_word_names_a_package_a_file_or_a_case(tmp_path):
         assert names in str(refusal.value)
 
 
-def test_gtests_of_a_room_are_one_binary(tmp_path):
-    package_with(
-        tmp_path,
-        ("core/test_one.cpp", "TEST(One, Adds) {}\nTEST_F(Two,\n       Subtracts) {}\n"),
-        ("core/test_two.cpp", "TEST_P(Three, Holds) {}\n"),
-        ("core/support.cpp", "int helper() { return 1; }\n"),
-        ("plugins/plugin.cpp", "int plugin() { return 1; }\n"),
-    )
-
-    def chosen(*words):
-        wanted = options_of_test(tmp_path, list(words)).tests
-        return {one.name: one.command[-1] for one in find_programs(tmp_path, tmp_path, sys.executable, wanted)}
-
-    for words in (["pkg"], ["pkg/core"], ["pkg/test_one.cpp", "pkg/core/test_two.cpp"], ["pkg/test_two.cpp", "pkg"]):
-        assert chosen(*words) == {"pkg_test_core": f"--gtest_output=xml:{tmp_path / 'pkg.pkg_test_core.xml'}"}
-    assert chosen("pkg/test_one.cpp") == {"pkg_test_core": "--gtest_filter=One.Adds:Two.Subtracts"}
-    assert chosen("pkg/core/test_two.cpp") == {"pkg_test_core": "--gtest_filter=*Three.Holds/*"}
-    assert chosen("pkg/test_one.cpp::Adds") == {"pkg_test_core": "--gtest_filter=*Adds*"}
-    with pytest.raises(Refused) as refusal:
-        options_of_test(tmp_path, ["pkg/plugins"])
-    assert "core, test_one.cpp, test_two.cpp" in str(refusal.value)
-
-
 def test_pytests_of_a_package_share_a_process_unless_they_are_a_node(tmp_path):
     cases = "def test_good(): pass\n\ndef test_bad():\n    assert not 'right'\n"
     dies = "import os\n\ndef test_dies():\n    os.abort()\n"
@@ -196,39 +151,3 @@ def test_a_named_test_builds_what_it_needs(tmp_path):
     assert arguments.test_targets(tmp_path, wanted) == ["needed/all", "pkg/CMakeFiles/pkg_test_b.dir/all", "pkg/all"]
     wanted = options_of_test(tmp_path, ["pkg/test_b.cpp::x"]).tests
     assert arguments.test_targets(tmp_path, wanted) == ["pkg/CMakeFiles/pkg_test_b.dir/all"]
-
-
-def test_what_is_not_the_same_in_each_run_is_listed(tmp_path, monkeypatch, capsys):
-    """With two busy processes beside it, that end with the run."""
-    package_with(tmp_path, ("a.test", "<launch/>"), ("b.test", "<launch/>"))
-    ends = iter((1, 0, 1, 1))  # cases passed by each program: b is red in the first run
-    seen: set[int] = set()
-
-    def pretend(program: Program, _log, _limit: float) -> None:
-        passed = next(ends)
-        program.passed, program.failed = passed, 1 - passed
-        program.cases = {"one": "passed" if passed else "failed"}
-        seen.update(process_tree.descendants(os.getpid()))
-
-    monkeypatch.setattr(test_runner, "AT_A_TIME", 1)
-    monkeypatch.setattr(test_runner, "run", pretend)
-    monkeypatch.setenv("COGLAB_TOP", str(tmp_path))
-    assert test_runner.main(["--out", str(tmp_path / "out"), "--repeat", "2", "--load"]) == 1
-    told = capsys.readouterr().out
-    assert "DIFFERS pkg b.test: one" in told and "failed in run 1\n" in told and "passed in run 2\n" in told
-    assert str(tmp_path / "out" / "run_1" / "logs" / "pkg.b.log") in told
-    assert "a.test: one" not in told
-    assert len(seen) == 2 and not seen & set(process_tree.descendants(os.getpid()))
-
-
-def test_one_package_alone_has_two_workers_and_begins_first(tmp_path):
-    package_with(tmp_path, ("test_a.py", ""), ("test_b.py", ""), ("c.test", "<launch/>"))
-    other = tmp_path / "catkin_ws" / "src" / "other"
-    (other / "test").mkdir(parents=True)
-    (other / "package.xml").write_text("<package><name>other</name></package>")
-    found = longest_first(find_programs(tmp_path, tmp_path, sys.executable, []))
-    assert [(one.kind, one.slots) for one in found] == [("pytest", 2), ("rostest", 1)]
-    for number in range(4):
-        (other / "test" / f"{number}.test").write_text("<launch/>")
-    found = longest_first(find_programs(tmp_path, tmp_path, sys.executable, []))
-    assert [(one.kind, one.slots) for one in found] == [("pytest", 1)] + 5 * [("rostest", 1)]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from coglab.plot import draw_trial, figure_of, rows_without_overlap
-from coglab.series import Series, state_intervals
+from coglab.series import Series
 from coglab_bringup.demo import keep, unfinished
 from coglab_bringup.handover import NotTaken
 from coglab_bringup.trial_recorder import summarise
@@ -47,29 +47,6 @@ def test_a_handover_that_did_not_end_has_a_code():
     assert unfinished("take", RuntimeError("roslaunch ended"))["reason_code"] == ReasonCode.NODE_SILENT
     refused = unfinished("take", NotTaken("take was not taken", ReasonCode.WRONG_STATE))
     assert refused == {"kind": "take", "outcome": "take was not taken", "reason_code": ReasonCode.WRONG_STATE}
-
-
-def test_state_intervals_end_where_states_end():
-    trial = Series()
-    trial.transitions = [
-        (1.0, "/m", "idle", "go", "work", ""),
-        (2.0, "/m/work", "first", "done", "second", ""),
-        (3.0, "/m/work", "second", "finished", "finished", ""),
-        (3.0, "/m", "work", "finished", "idle", ""),
-    ]
-    intervals = state_intervals(trial.transitions, 5.0)
-    assert intervals["/m/work"] == [(1.0, 2.0, "first"), (2.0, 3.0, "second")]
-    assert intervals["/m"] == [(1.0, 1.0, "idle"), (1.0, 3.0, "work"), (3.0, 5.0, "idle")]
-
-
-def test_a_child_of_a_concurrence_begins_with_it():
-    trial = Series()
-    trial.transitions = [
-        (1.0, "/m", "idle", "go", "both", ""),
-        (2.5, "/m/both/left", "first", "done", "done", ""),
-        (3.0, "/m", "both", "done", "idle", ""),
-    ]
-    assert state_intervals(trial.transitions, 5.0)["/m/both/left"] == [(1.0, 2.5, "first")]
 
 
 def test_children_of_a_concurrence_get_rows_of_their_own():
