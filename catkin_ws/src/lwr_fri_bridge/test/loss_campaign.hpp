@@ -196,35 +196,4 @@ class LossRun {
   int clean_ = 0;  ///< cycles without loss that are still to come
 };
 
-/// Time (s) of a motion of A2 at full speed from the middle of its range to 0.05 rad before its
-/// limit, coming to rest there within 1 mrad, on a connection that has lost nothing for 1200
-/// cycles.
-inline double motionTime(double period) {
-  Bridge bridge(defaultConfig());
-  SmallController robot(period);
-  robot.moveOwn(Vector7::Zero());
-  robot.setMeasured(Vector7::Zero());
-  for (int i = 0; i < 3; ++i) robot.cycle(bridge);
-  if (!runEvent(bridge, robot, "start").success()) return NAN;
-  for (int i = 0; i < 1200; ++i) robot.cycle(bridge);
-  const JointLimits& limits = bridge.config().limits;
-  const double target = limits.upper_position[1] - 0.05;
-  for (int i = 1; i * period < 30.0; ++i) {
-    RobotSample sample;
-    bridge.mailboxes().newestSample(sample);
-    const double way = target - sample.commanded_position[1];
-    Vector7 wanted = Vector7::Zero();
-    wanted[1] = std::copysign(
-        std::min(limits.velocity[1],
-                 brakingSpeed(std::abs(way), limits.acceleration[1], limits.jerk[1], 2.0 * period)),
-        way);
-    drive(bridge, robot, wanted);
-    robot.cycle(bridge);
-    if (std::abs(robot.setPoint()[1] - target) < 1e-3 &&
-        std::abs(bridge.snapshot().sample.commanded_velocity[1]) < 0.02)
-      return i * period;
-  }
-  return NAN;
-}
-
 }  // namespace lwr_fri_bridge::test

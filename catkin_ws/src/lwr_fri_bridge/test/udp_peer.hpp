@@ -6,7 +6,6 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
-#include <string>
 #include <thread>
 
 #include <arpa/inet.h>
@@ -49,13 +48,6 @@ class Peer {
       if (receive(c)) return true;
     }
     return false;
-  }
-  /// "address:port" of this end, as the bridge tells it.
-  std::string name() const {
-    sockaddr_in own{};
-    socklen_t length = sizeof own;
-    getsockname(fd_, reinterpret_cast<sockaddr*>(&own), &length);
-    return std::string(inet_ntoa(own.sin_addr)) + ":" + std::to_string(ntohs(own.sin_port));
   }
 
  private:

@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cmath>
-#include <limits>
 #include <string>
 
 #include "coglab_sim/cell.hpp"
@@ -15,8 +14,6 @@ namespace fri = lwr_fri_bridge::fri;
 using namespace coglab_sim;
 
 namespace {
-
-constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
 
 TEST(Pace, IsHalvedWhileTheComputerIsTooBusyAndComesBackCarefully) {
   ComputerLoad busy, calm;
@@ -46,23 +43,6 @@ TEST(Pace, IsHalvedWhileTheComputerIsTooBusyAndComesBackCarefully) {
 }
 
 }  // namespace
-
-TEST(Random, MomentsAndReproducibility) {
-  Random a(7), b(7), c(8);
-  double sum = 0.0, square = 0.0;
-  int equal = 0;
-  constexpr int kDraws = 200000;
-  for (int i = 0; i < kDraws; ++i) {
-    const double value = a.normal();
-    EXPECT_EQ(value, b.normal());
-    equal += value == c.normal() ? 1 : 0;
-    sum += value;
-    square += value * value;
-  }
-  EXPECT_EQ(equal, 0);
-  EXPECT_NEAR(sum / kDraws, 0.0, 0.01);
-  EXPECT_NEAR(square / kDraws, 1.0, 0.02);
-}
 
 /// The estimate stays aside by the hysteresis after a movement, on the side of the movement.
 TEST(TorqueSensor, TheEstimateKeepsTheSideOfTheLastMovement) {
@@ -164,35 +144,6 @@ TEST(TorqueSensor, NoiseGrowsWithTheFastestJointAndIsCorrelated) {
     EXPECT_NEAR(product / measured, std::exp(-0.5), 0.02);
     EXPECT_NEAR(apart / measured, 0.0, 0.02);
   }
-}
-
-TEST(TorqueSensor, TheOffsetOfTheEstimateDependsOnThePosture) {
-  TorqueNoise noise;
-  noise.sigma = noise.offset = noise.hysteresis = 0.0;
-  double largest = 0.0;
-  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
-    const TorqueSensor sensor(noise, seed);
-    for (int joint = 0; joint < 7; ++joint) {
-      Vector7 posture = Vector7::Zero();
-      double lowest = 1.0, highest = -1.0, from = kNoNumber, crossings = 0.0;
-      for (int i = 0; i <= 4000; ++i) {
-        posture[joint] = 0.02 * i;
-        const double bias = sensor.external(Vector7::Zero(), posture)[joint];
-        lowest = std::min(lowest, bias);
-        highest = std::max(highest, bias);
-        if (from * bias < 0.0) ++crossings;
-        from = bias;
-      }
-      EXPECT_NEAR(highest, 0.4, 1e-3);
-      EXPECT_NEAR(lowest, -0.4, 1e-3);
-      // A sine of 0.5 to 1.5 rad per rad.
-      EXPECT_GE(crossings, 80.0 * 0.5 / M_PI - 1.0);
-      EXPECT_LE(crossings, 80.0 * 1.5 / M_PI + 1.0);
-      largest = std::max(largest, crossings);
-    }
-    EXPECT_EQ(sensor.measured(Vector7::Zero()).norm(), 0.0);
-  }
-  EXPECT_GT(largest, 80.0 * 1.3 / M_PI);
 }
 
 TEST(TorqueSensor, OffsetsAreAddedToTheSensorAndTakenFromTheEstimate) {

@@ -3,8 +3,6 @@
 
 #include <cmath>
 
-#include <set>
-
 #include "coglab_sim/cell.hpp"
 #include "coglab_sim/krc/servos.hpp"
 #include "coglab_sim/plant/plant.hpp"
@@ -95,78 +93,6 @@ TEST(Servos, AWrongModelShowsInTheEstimateAndIsDrawnByTheSeed) {
   }
   EXPECT_EQ((estimates[0] - estimates[1]).norm(), 0.0);
   EXPECT_GT((estimates[0] - estimates[2]).norm(), 0.01);
-}
-
-// What the controller stand-in believes is wrong, each by its own share, drawn by the seed. Each of
-// the following tests looks at one error with the others off, at the shares as they are shipped.
-constexpr std::uint64_t kSeeds = 40;
-const Vector7 kRotors = plant::Drives{}.rotor_inertia;
-
-TEST(ModelErrors, InertiasOfTheLinksAreWrongByAtMostFivePercent) {
-  krc::ServoParameters parameters;
-  parameters.payload_error = 0.0;
-  ArmTerms exact, most;
-  ArmModel(URDF).evaluate(posture(), Vector7::Zero(), exact);
-  ModelErrors five;
-  five.inertia.fill(1.05);
-  ArmModel(URDF, five).evaluate(posture(), Vector7::Zero(), most);
-  const Vector7 span = (most.mass - exact.mass).diagonal();
-  double largest = 0.0;
-  std::set<double> different;
-  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
-    krc::Servos servos(URDF, parameters, kRotors, seed);
-    servos.observe(posture(), Vector7::Zero());
-    const Vector7 error = (servos.terms().mass - exact.mass).diagonal();
-    EXPECT_TRUE((error.cwiseAbs().array() <= span.array() + 1e-12).all()) << error.transpose();
-    EXPECT_EQ((servos.terms().gravity - exact.gravity).norm(), 0.0);
-    largest = std::max(largest, (error.array() / span.array()).abs().maxCoeff());
-    different.insert(error[6]);
-  }
-  EXPECT_GT(largest, 0.8);
-  EXPECT_EQ(different.size(), kSeeds);
-}
-
-TEST(ModelErrors, TheMassOfTheHandIsWrongByAtMostTenPercent) {
-  krc::ServoParameters parameters;
-  parameters.inertia_error = 0.0;
-  ArmTerms exact, most;
-  ArmModel(URDF).evaluate(posture(), Vector7::Zero(), exact);
-  ModelErrors ten;
-  ten.payload = 1.1;
-  ArmModel(URDF, ten).evaluate(posture(), Vector7::Zero(), most);
-  const Vector7 span = most.gravity - exact.gravity;
-  double largest = 0.0;
-  std::set<double> different;
-  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
-    krc::Servos servos(URDF, parameters, kRotors, seed);
-    servos.observe(posture(), Vector7::Zero());
-    const double share = (servos.terms().gravity - exact.gravity).dot(span) / span.squaredNorm();
-    EXPECT_LE(std::abs(share), 1.0 + 1e-9);
-    largest = std::max(largest, std::abs(share));
-    different.insert(share);
-  }
-  EXPECT_GT(largest, 0.8);
-  EXPECT_EQ(different.size(), kSeeds);
-}
-
-TEST(ModelErrors, FrictionIsDrawnByTheSeed) {
-  const plant::Drives drives;
-  double largest = 0.0;
-  std::set<double> different;
-  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-    CellConfig config;
-    config.urdf = URDF;
-    config.seed = seed;
-    const Cell cell(config);
-    const Vector7 share =
-        cell.plant().config().drives.coulomb_friction.cwiseQuotient(drives.coulomb_friction) -
-        Vector7::Ones();
-    EXPECT_LE(share.cwiseAbs().maxCoeff(), drives.friction_spread + 1e-12);
-    largest = std::max(largest, share.cwiseAbs().maxCoeff());
-    different.insert(share[0]);
-  }
-  EXPECT_GT(largest, 0.8 * drives.friction_spread);
-  EXPECT_EQ(different.size(), 10U);
 }
 
 TEST(Servos, ImpedanceYieldsAsItsStiffnessSays) {

@@ -48,15 +48,6 @@ TEST(HandMotors, WindAtTheirSpeedAndDrawMoreForIt) {
   EXPECT_NEAR(hand.state().position, 0.3, 1e-12);  // a step is no longer than the way
 }
 
-TEST(HandMotors, TensionAndEffortAreToldWhateverAMotorDoes) {
-  Motors hand;
-  hand.step(-45.0);
-  EXPECT_EQ(hand.state().tension, 45.0);
-  EXPECT_NEAR(hand.state().effort, 400.0 * 45.0 / 90.0, 1e-9);
-  EXPECT_NEAR(hand.motors.state(4).effort, 400.0 * 45.0 / 180.0, 1e-9);
-  EXPECT_EQ(hand.state().current, 0.0);
-}
-
 TEST(HandMotors, SlowDownOverTheLastFifthBeforeTheyStop) {
   // 240 counts are 200 above what a free motor draws: half of the stall's 400, 45 of 90 N.
   for (const auto& [tension, share] : {std::pair{0.0, 1.0},
@@ -84,15 +75,6 @@ TEST(HandMotors, SlowDownOverTheLastFifthBeforeTheyStop) {
   EXPECT_EQ(weak.state().position, 0.0);
 }
 
-TEST(HandMotors, AnOpeningMotorIsSlowedByNoTension) {
-  Motors hand;
-  hand.motors.set(2, 0.5);
-  hand.motors.command(2, {1.0, 0.0, 50.0});
-  hand.step(80.0, 100);
-  EXPECT_NEAR(hand.state().position, 0.4, 1e-12);
-  EXPECT_NEAR(hand.state().current, 100.0, 1e-9);
-}
-
 TEST(HandMotors, LockWhereTheyAreNearlyStoppedAndUnlockByAnotherCommand) {
   Motors hand;
   hand.motors.command(2, {1.0, 1.0, 240.0});
@@ -115,27 +97,6 @@ TEST(HandMotors, LockWhereTheyAreNearlyStoppedAndUnlockByAnotherCommand) {
   }
 }
 
-TEST(HandMotors, CommandsAndPlacesAreCutToWhatTheyCanBe) {
-  Motors hand;
-  hand.motors.command(2, {7.0, 1.7, -5.0});
-  hand.step(0.0, 100);
-  EXPECT_LT(hand.state().position, 0.1 + 1e-9);
-  hand.motors.command(2, {7.0, 1.7, 1000.0});
-  hand.step(0.0, 3000);
-  EXPECT_EQ(hand.state().position, 1.0);
-  hand.motors.command(2, {-1.0, 0.0, 1000.0});
-  hand.step(0.0, 100);
-  EXPECT_EQ(hand.state().position, 1.0);
-  hand.motors.command(2, {1.0, -3.0, 1000.0});
-  hand.step(0.0, 3000);
-  EXPECT_EQ(hand.state().position, 0.0);
-  for (const auto& [given, is] : {std::pair{-0.5, 0.0}, {0.25, 0.25}, {1.5, 1.0}}) {
-    hand.motors.set(2, given);
-    hand.step(0.0, 100);
-    EXPECT_EQ(hand.state().position, is);  // off: it stays
-  }
-}
-
 namespace {
 
 /// A body of 2 kg about the origin.
@@ -155,19 +116,6 @@ Pose at(const Vector3d& position, const Vector3d& turn = Vector3d::Zero()) {
 }
 
 }  // namespace
-
-TEST(HoldSpring, IsNothingUntilItIsEngagedOrWhereItHasFaded) {
-  HoldSpring hold;
-  EXPECT_FALSE(hold.engaged());
-  EXPECT_EQ(hold.evaluate(at({1, 0, 0}), {}, body(), kStrong, 1.0).stacked().norm(), 0.0);
-  hold.engageAt(Pose{});
-  EXPECT_TRUE(hold.engaged());
-  EXPECT_EQ(hold.evaluate(at({1, 0, 0}), {}, body(), kStrong, 0.0).stacked().norm(), 0.0);
-  EXPECT_GT(hold.evaluate(at({1, 0, 0}), {}, body(), kStrong, 0.1).stacked().norm(), 0.0);
-  hold.release();
-  EXPECT_FALSE(hold.engaged());
-  EXPECT_EQ(hold.evaluate(at({1, 0, 0}), {}, body(), kStrong, 1.0).stacked().norm(), 0.0);
-}
 
 TEST(HoldSpring, GainsFollowFromMassInertiaAndBandwidth) {
   HoldSpring hold;
@@ -224,20 +172,4 @@ TEST(HoldSpring, BeyondItsForceThePlaceFollows) {
   away.position = Vector3d(0.1, 0.0, 0.0);
   EXPECT_NEAR(turned.evaluate(away, {}, body(), weak, 0.5).force.x(), 5.0, 1e-9);
   EXPECT_NEAR(turned.evaluate(away, {}, body(), kStrong, 0.5).force.x(), 5.0, 1e-9);
-}
-
-TEST(HoldSpring, BeyondItsTorqueTheTurnFollows) {
-  HoldSpring hold;
-  hold.engage(Pose{}, Pose{});
-  const HoldLimits weak{10.0, 1e6, 0.5};
-  Wrench wrench = hold.evaluate(at({0, 0, 0}, {0, 0, 0.4}), {}, body(), weak, 1.0);  // 1.2 Nm
-  EXPECT_LT((wrench.torque - Vector3d(0.0, 0.0, 0.5)).norm(), 1e-9);
-  wrench = hold.evaluate(at({0, 0, 0}, {0, 0, 0.4}), {}, body(), kStrong, 1.0);
-  EXPECT_LT((wrench.torque - Vector3d(0.0, 0.0, 0.5)).norm(), 1e-9) << wrench.torque.transpose();
-  HoldSpring damped;
-  damped.engage(Pose{}, Pose{});
-  FreeBody fast = body();
-  fast.twist.angular = Vector3d(0.0, 9.0, 0.0);
-  EXPECT_NEAR(damped.evaluate(Pose{}, {}, fast, weak, 1.0).torque.y(), -0.5, 1e-9);
-  EXPECT_LT(damped.evaluate(Pose{}, {}, body(), kStrong, 1.0).torque.norm(), 1e-12);
 }

@@ -297,8 +297,8 @@ void BridgeRos::publishSample(const Snapshot& snapshot) {
   wrench_message_.wrench.torque.z = sample.tool_wrench[5];
   tool_wrench_.publish(wrench_message_);
 
-  if (sample.stamp_ns - latency_told_ns_ < kLatencyPeriodNs) return;
-  latency_told_ns_ = sample.stamp_ns;
+  if (sample.stamp_ns - latency_published_ns_ < kLatencyPeriodNs) return;
+  latency_published_ns_ = sample.stamp_ns;
   std_msgs::Float64 latency;
   latency.data = snapshot.latency;
   fri_latency_.publish(latency);
@@ -307,16 +307,16 @@ void BridgeRos::publishSample(const Snapshot& snapshot) {
 /// Publishes every change, and repeats the newest state every 0.25 s, so that subscribers can
 /// detect a silent node.
 void BridgeRos::publishStates() {
-  bool told = false;
-  for (StateView view; bridge_.nextStateChange(view); told = true) {
+  bool published = false;
+  for (StateView view; bridge_.nextStateChange(view); published = true) {
     newest_state_ = view;
     publishState(view);
   }
   const std::int64_t now = steadyNow();
-  if (told) {
-    state_told_ns_ = now;
-  } else if (state_told_ns_ != 0 && now - state_told_ns_ >= kStatePeriodNs) {
-    state_told_ns_ = now;
+  if (published) {
+    state_published_ns_ = now;
+  } else if (state_published_ns_ != 0 && now - state_published_ns_ >= kStatePeriodNs) {
+    state_published_ns_ = now;
     publishState(newest_state_);
   }
 }

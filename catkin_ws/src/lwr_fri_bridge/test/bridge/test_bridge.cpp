@@ -196,18 +196,6 @@ TEST(Bridge, KeepsTheLastValidCommandWhenOneIsNotFinite) {
   EXPECT_TRUE(cell.bridge.snapshot().sample.commanded_velocity.isZero());
 }
 
-TEST(Bridge, ScalesTheWholeVectorToTheSpeedLimit) {
-  Cell cell;
-  cell.start();
-  Vector7 velocity = Vector7::Constant(1.0);
-  velocity[2] = 4.0;
-  cell.runDriven(100, velocity);
-  const Vector7 v = cell.bridge.snapshot().sample.commanded_velocity;
-  const double limit = cell.bridge.config().limits.velocity[2];
-  EXPECT_NEAR(v[2], limit, 1e-9);
-  EXPECT_NEAR(v[5], limit / 4.0, 1e-9);
-}
-
 TEST(Bridge, ANewBridgeStartsNothing) {
   Cell cell;
   cell.start();

@@ -41,20 +41,6 @@ TEST(Requests, NothingBeginsWhileSomethingElseIsInProgress) {
   EXPECT_EQ(cell.bridge.snapshot().supervisor, SupervisorState::Monitor);
 }
 
-TEST(Requests, AHoldRefusesStartsAndModes) {
-  Cell cell;
-  cell.run(3);
-  ASSERT_EQ(codeOf(cell, "hold"), OutcomeCode::Done);
-  EXPECT_TRUE(cell.bridge.snapshot().hold_latched);
-  EXPECT_EQ(codeOf(cell, "start"), OutcomeCode::Held);
-  EXPECT_EQ(codeOf(cell, "joint_impedance"), OutcomeCode::Held);
-  EXPECT_EQ(cell.bridge.snapshot().mode.strategy, fri::ControlStrategy::Position);
-  ASSERT_EQ(codeOf(cell, "reset"), OutcomeCode::Done);
-  EXPECT_FALSE(cell.bridge.snapshot().hold_latched);
-  EXPECT_EQ(codeOf(cell, "joint_impedance"), OutcomeCode::Done);
-  EXPECT_EQ(cell.bridge.snapshot().mode.strategy, fri::ControlStrategy::JointImpedance);
-}
-
 TEST(Requests, TheFirstOfAFullQueueAreServed) {
   Bridge bridge(defaultConfig());
   for (int i = 0; i < 18; ++i) bridge.submit(i == 16 ? "stop" : "hold");

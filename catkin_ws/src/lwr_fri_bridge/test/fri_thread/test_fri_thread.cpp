@@ -47,21 +47,6 @@ TEST_F(FriThreadTest, AnswersToTheSourceOfTheDatagram) {
   EXPECT_NE(fri.statistics().peer.find("127.0.0.1:"), std::string::npos);
 }
 
-TEST(AnswerTimes, TheMeanForgetsOverAThousandAnswersAndTheLongestStaysUntilAsked) {
-  AnswerTimes times;
-  EXPECT_EQ(times.mean(), 0.0);
-  times.add(0.004F);
-  EXPECT_FLOAT_EQ(times.mean(), 0.004F);
-  for (int i = 0; i < 1000; ++i) times.add(0.001F);
-  EXPECT_NEAR(times.mean(), 0.001 + 0.003 * std::exp(-1.0), 2e-6);
-  for (int i = 0; i < 9000; ++i) times.add(0.001F);
-  EXPECT_NEAR(times.mean(), 0.001, 1e-6);
-  EXPECT_FLOAT_EQ(times.longest(false), 0.004F);
-  EXPECT_FLOAT_EQ(times.longest(true), 0.004F);
-  times.add(0.002F);
-  EXPECT_FLOAT_EQ(times.longest(false), 0.002F);
-}
-
 TEST_F(FriThreadTest, ASecondSenderIsIgnoredAndNamed) {
   Peer peer(fri.port()), other(fri.port());
   fri::CommandDatagram c{};

@@ -29,7 +29,7 @@ namespace lwr_fri_bridge {
 class BridgeDiagnostics;
 class TargetTopic;
 
-/// Reads the parameters of the bridge from the namespace of `nh` (README: table of parameters).
+/// Reads the parameters of the bridge from the namespace of `nh` (listed in config/lwr.yaml).
 /// @throws std::exception with parameter, value and range, or with file, line and field of the
 /// limits table.
 BridgeConfig readBridgeConfig(const ros::NodeHandle& nh);
@@ -98,9 +98,9 @@ class BridgeRos : public coglab_rt::ArmPort {
   std::unique_ptr<ros::AsyncSpinner> spinner_;
   std::unique_ptr<BridgeDiagnostics> diagnostics_;
   ros::Publisher joint_states_, external_torques_, tool_wrench_, state_, fri_latency_;
-  std::int64_t latency_told_ns_ = 0;  // stamp of the sample with the last published latency
+  std::int64_t latency_published_ns_ = 0;  // stamp of the sample with the last published latency
   StateView newest_state_;
-  std::int64_t state_told_ns_ = 0;  // time of its last publication
+  std::int64_t state_published_ns_ = 0;  // time of its last publication
   std::unique_ptr<TargetTopic> target_;
   ros::Subscriber events_;
   ros::ServiceServer command_;
