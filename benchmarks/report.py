@@ -24,13 +24,12 @@ GROUPS = {  # title: name of the plot, programs
 }
 HEAD = """# Benchmarks
 
-What was measured in simulation, beside a goal that a user feels or beside another program. `./coglab bench NAME`
-measures one group again, `./coglab bench --report` writes this page from `benchmarks/results.csv`. Nothing else depends
-on it.
+What was measured in simulation, beside a goal that a user feels or beside another program. No number says anything
+about real people or a real arm. "Drawn people" are simulated persons with delays, habits and senses drawn by a seed
+([people.md](people.md)). Values are medians unless the row says otherwise; intervals are 95 %.
 
-"Drawn people" are simulated persons with delays, habits and senses drawn by a seed ([people.md](people.md)). No number
-says anything about real people or a real arm. Values without another word are medians; intervals are 95 %. Each
-program of `benchmarks/` says in its first lines what it measures.
+`./coglab bench NAME` measures one group again, `./coglab bench --report` writes this page. Each program of
+`benchmarks/` says in its first lines what it measures.
 """
 COLOURS = {"met": "tab:green", "better": "tab:green", "missed": "tab:red", "worse": "tab:red", "": "tab:gray"}
 SIGNS = {"<=": "at most", ">=": "at least"}
@@ -88,14 +87,15 @@ def main() -> None:
         if not rows:
             continue
         plot(rows, PAGE.parent / "benchmarks" / f"{name}.svg")
-        text += [f"## {title}\n", f"![{title}: how many times better than goal or peer](benchmarks/{name}.svg)\n"]
-        text += ["| what | value | interval | goal or peer | | date |", "| --- | --- | --- | --- | --- | --- |"]
+        text += [f"## {title}\n", f"![Times better than goal or peer](benchmarks/{name}.svg)\n"]
+        text += ["| what | value | interval | goal or peer | |", "| --- | --- | --- | --- | --- |"]
         for row, line in zip(rows, mine, strict=True):
             value = f"{line['value']} {row.unit}".rstrip()
-            text.append(f"| {row.row} | {value} | {row.interval} | {words(row)} | {row.verdict()} | {line['date']} |")
+            text.append(f"| {row.row} | {value} | {row.interval} | {words(row)} | {row.verdict()} |")
         text.append("")
-    machines = sorted({line["machine"] for line in lines})
-    PAGE.write_text("\n".join([*text, f"Measured on: {'; '.join(machines)}."]) + "\n", encoding="utf-8")
+    machines, days = sorted({line["machine"] for line in lines}), sorted({line["date"] for line in lines})
+    measured = f"Measured from {days[0]} to {days[-1]} on: {'; '.join(machines)}."
+    PAGE.write_text("\n".join([*text, measured]) + "\n", encoding="utf-8")
     print(f"written: {PAGE.relative_to(TOP)} with {len(lines)} rows")
 
 
