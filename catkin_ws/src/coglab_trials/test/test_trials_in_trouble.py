@@ -1,14 +1,19 @@
 """Whole trials in which something breaks, or the person does what nobody wants: each ends in a hub with its reason, no
 limit is exceeded, nothing that is withdrawn is followed, and nothing is pressed firmly or dropped beside a hand."""
 
+import threading
+import time
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
+import smach
 from coglab_msgs.msg import ReasonCode, Say
 from coglab_smach.ports.pending import Polled
 from coglab_trials import GIVE, RECEIVE, VirtualTrial
 from coglab_trials.conditions import CONSIDERATE
+from coglab_trials.virtual_clock import ClockStalled, VirtualClock
 from hand_orders import HandOrders
 
 WITHDRAWN = {ReasonCode.GOAL_WITHDRAWN, ReasonCode.GOAL_LEFT_REGION, ReasonCode.GOAL_AHEAD_OUTSIDE}
@@ -390,3 +395,16 @@ def test_what_a_hand_has_let_go_of_beside_closed_fingers_is_not_dropped(after):
     (result,) = trial.run(RECEIVE)
     truth = trial.world.cell.truth()
     assert held and not truth["dropped"] and truth["held_by"] == "robot", (result, truth["held_by"])
+
+
+def test_a_trial_whose_clock_stalls_leaves_no_thread_behind(monkeypatch):
+    """A world that goes on for ever would keep its process alive."""
+    monkeypatch.setattr("coglab_trials.trial.VirtualClock", partial(VirtualClock, stall_limit=0.4))
+    before, trial = set(threading.enumerate()), trial_of()
+    once(trial, lambda t: t.hub != "", lambda t: time.sleep(2.0))
+    with pytest.raises(Exception, match="virtual time has stood still") as failed:
+        trial.run(RECEIVE)
+    assert failed.type in (ClockStalled, smach.InvalidUserCodeError)
+    for thread in set(threading.enumerate()) - before:
+        thread.join(20.0)
+        assert not thread.is_alive(), thread
