@@ -27,7 +27,7 @@ from typing import Any
 
 from coglab.envs.handover import GiveEnv, HandoverEnv, ReceiveEnv
 from coglab.envs.people import SPLITS, Split
-from coglab.envs.processes import search_workspace_first
+from coglab.workers import search_workspace_first
 
 IDS = {"coglab/Receive-v0": ReceiveEnv, "coglab/Give-v0": GiveEnv}
 
