@@ -194,12 +194,24 @@ def test_a_member_that_does_not_wait_through_the_clock_is_named():
     thread.join(5)
 
 
+STOPPED = """
+import time
+from coglab_trials.virtual_clock import VirtualClock
+
+def work():
+    print("stop", flush=True)
+    time.sleep(0.3)
+
+clock = VirtualClock(stall_limit=1.0)
+clock.start_thread(work, "works")
+clock.sleep(1.0)
+print("on")
+"""
+
+
 def test_a_process_that_was_stopped_goes_on():
     """Ctrl-Z and fg, or a virtual machine that stood still: no thread is to blame."""
-    words = "from coglab_trials.virtual_clock import VirtualClock; import os, signal, time; clock = VirtualClock(stall_limit=1.0)\n"
-    words += "def work():\n    print('stop', flush=True); time.sleep(0.3)\n"
-    words += "clock.start_thread(work, 'works'); clock.sleep(1.0); print('on')"
-    with subprocess.Popen([sys.executable, "-c", words], stdout=subprocess.PIPE, text=True) as child:
+    with subprocess.Popen([sys.executable, "-c", STOPPED], stdout=subprocess.PIPE, text=True) as child:
         assert child.stdout.readline() == "stop\n"
         child.send_signal(signal.SIGSTOP)
         time.sleep(1.5)

@@ -146,8 +146,8 @@ class Results:
 
 
 def play(jobs: Sequence[Job], results: Results, workers: int, say: Callable[[str], None]) -> int:
-    """Runs the episodes that ``results`` does not have yet, in processes of their own. One that raises, or whose process
-    dies or takes longer than WALL_LIMIT twice, is named and gets no result. Returns how many these are."""
+    """Runs the episodes that ``results`` does not have yet, in processes of their own. One that raises, or whose
+    process dies or takes longer than WALL_LIMIT twice, is named and gets no result. Returns how many these are."""
     done = {key: results.read(*key) for key in {job[:3] for job in jobs}}
     left = [job for job in jobs if job[3] not in done[job[:3]]]
     if left:
@@ -214,8 +214,8 @@ def _cells(r: dict[str, Any]) -> list[str]:
 def leaderboard(
     folder: Path, people: int, workers: int, tasks: Sequence[str], splits: Sequence[str], policies: Sequence[str]
 ) -> tuple[str, int]:
-    """Runs what is missing. Returns the table, which also lies in ``folder``/leaderboard.md, and how many episodes of it
-    have failed."""
+    """Runs what is missing. Returns the table, which also lies in ``folder``/leaderboard.md, and how many episodes of
+    it have failed."""
     results = Results(folder)
     jobs = [
         (task, split, policy, person)
