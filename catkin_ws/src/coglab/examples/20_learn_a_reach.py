@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from coglab.envs.leaderboard import row, run_policy
 from coglab.envs.policies import Reaching, StraightReach
-from coglab.envs.processes import processes
+from coglab.workers import run_each
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
@@ -41,10 +41,14 @@ def episode(job):
     return run_policy(StraightReach(task, Reaching(**parameters)), task, split, person)
 
 
-def judge(pool, candidates, task, split, people):
+def judge(workers, candidates, task, split, people):
     """Figures of each candidate with each of the people: a list of lists."""
     jobs = [(candidate, task, split, person) for candidate in candidates for person in people]
-    found = list(pool.map(episode, jobs))
+    results = dict(run_each(episode, jobs, workers, limit=600.0))
+    for result in results.values():
+        if isinstance(result, Exception):
+            raise result
+    found = [results[index] for index in range(len(jobs))]
     return [found[i : i + len(people)] for i in range(0, len(found), len(people))]
 
 
@@ -53,7 +57,7 @@ def mean_return(figures):
     return float(np.mean([max(-1.0, one["return"]) for one in figures]))
 
 
-def learn(pool, options, rng):
+def learn(options, rng):
     """Runs the generations. Returns the mean after each, and (mean return of all, of the best) of each."""
     start, names, low, high = asdict(Reaching()), list(SPREAD), *np.array(list(SPREAD.values())).T[1:]
     mean = np.array([start[name] for name in names])
@@ -65,7 +69,7 @@ def learn(pool, options, rng):
         # Other people in each generation, so that nobody is learnt by heart.
         people = range(generation * options.people, (generation + 1) * options.people)
         candidates = [{**start, **dict(zip(names, map(float, row_), strict=True))} for row_ in drawn]
-        returns = np.array([mean_return(f) for f in judge(pool, candidates, options.task, "train", people)])
+        returns = np.array([mean_return(f) for f in judge(options.workers, candidates, options.task, "train", people)])
         best = np.argsort(returns)[::-1][: max(1, options.population // 4)]
         mean = 0.3 * mean + 0.7 * drawn[best].mean(axis=0)
         spread = 0.3 * spread + 0.7 * np.maximum(drawn[best].std(axis=0), 0.1 * spread)
@@ -75,9 +79,9 @@ def learn(pool, options, rng):
     return means, history
 
 
-def choose(pool, means, options):
+def choose(means, options):
     """Returns the one of ``means`` with the largest mean return with people of validation."""
-    figures = judge(pool, means, options.task, "validation", range(options.validation))
+    figures = judge(options.workers, means, options.task, "validation", range(options.validation))
     returns = [mean_return(f) for f in figures]
     print("validation, return after each generation:", ", ".join(f"{one:.2f}" for one in returns), flush=True)
     return means[int(np.argmax(returns))]
@@ -120,11 +124,10 @@ def main():
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
 
-    with processes(options.workers) as pool:
-        means, history = learn(pool, options, np.random.default_rng(1))
-        learnt = choose(pool, means[-3:], options)
-        print({name: round(learnt[name], 3) for name in SPREAD})
-        before, after = judge(pool, [asdict(Reaching()), learnt], options.task, "test", range(options.test))
+    means, history = learn(options, np.random.default_rng(1))
+    learnt = choose(means[-3:], options)
+    print({name: round(learnt[name], 3) for name in SPREAD})
+    before, after = judge(options.workers, [asdict(Reaching()), learnt], options.task, "test", range(options.test))
     for name, figures in (("before", before), ("after", after)):
         r = row(figures)
         time = "-" if math.isnan(r["time"]) else f"{r['time']:.1f} s"

@@ -9,7 +9,8 @@ from coglab.control import ControlError, MotionSetup, Reference
     ("fields", "words"),
     [
         ({"joints": np.zeros(6)}, r"joints: shape \(7,\) is expected, shape \(6,\) came"),
-        ({"joints": [0.0] * 6 + [np.nan]}, "finite numbers"),
+        ({"joints": [0.0] * 6 + [np.nan]}, r"finite numbers are expected, joints\[6\] is nan"),
+        ({"joints": np.zeros(7) + 1j}, "7 numbers"),
         ({"joints": ["a"] * 7}, "7 numbers"),
         ({"joint_velocity": np.zeros(7)}, "without joints"),
         ({"joints": np.zeros(7), "twist": np.zeros(6)}, "both came"),

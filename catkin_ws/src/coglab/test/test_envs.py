@@ -128,7 +128,8 @@ def test_bad_actions_are_refused_in_words_and_change_nothing(make):
         ({"objects": ("sword",)}, "object 'sword' is none of mug"),
         ({"objects": ()}, "objects is empty"),
         ({"control": "torque"}, "control 'torque' is none of palm_twist"),
-        ({"time_limit": math.nan}, "time_limit is nan s"),
+        ({"time_limit": math.nan}, r"time_limit: a finite number \(s\) is expected, got nan"),
+        ({"time_limit": "long"}, "time_limit: a finite number"),
         ({"render_mode": "human"}, "render_mode 'human' is none of"),
     ],
 )

@@ -60,6 +60,27 @@ def test_a_python_motion_moves_the_palm_as_it_says(world):
     assert world.cell.robot.virtual.limits()["commanded"] == 0
 
 
+class Turn(Circle):
+    """The last joint turns at once by 0.5 rad."""
+
+    def reference(self, cycle):
+        super().reference(cycle)
+        joints = np.array(self.joints)
+        joints[6] += 0.5 if cycle.time > 0.5 else 0.0
+        return Reference(joints=joints)
+
+    def start(self, start):
+        super().start(start)
+        self.joints = start.set_point.joints
+
+
+def test_a_motion_ends_when_the_arm_is_there_too(world):
+    world.add_motion("turn", Turn())
+    before = world.robot.state.joints[6]
+    assert world.run_motion("turn", duration=1.0).ok
+    assert world.robot.state.joints[6] - before == pytest.approx(0.5, abs=0.005)
+
+
 class Wrong(Circle):
     """A circle that does something wrong after half a second."""
 

@@ -87,6 +87,7 @@ void PythonMotion::start(const MotionStart<>& start) {
 }
 
 void PythonMotion::computeReference(const MotionCycle& cycle, MotionReference& reference) {
+  if (state_ == MotionState::Reached) return holdEnd(reference);
   if (state_ != MotionState::Running) return reference.rest();
   try {
     const py::object answer =
@@ -94,13 +95,25 @@ void PythonMotion::computeReference(const MotionCycle& cycle, MotionReference& r
     readReference(answer, cycle.next - cycle.time, reference);
     if (!began_) checkBegin(reference);
     began_ = true;
-    if (steps_.attr("done")().cast<bool>()) state_ = MotionState::Reached;
+    if (steps_.attr("done")().cast<bool>()) {
+      state_ = MotionState::Reached;
+      end_ = reference;
+    }
   } catch (const py::error_already_set& error) {
     reference.rest();
     fail(inWords(error));
   } catch (const std::exception& error) {
     reference.rest();
     fail(error.what());
+  }
+}
+
+void PythonMotion::holdEnd(MotionReference& reference) const {
+  if (end_.space == MotionReference::Space::Joint) {
+    reference.joints(end_.joint_next, end_.joint_next);
+  } else if (end_.space == MotionReference::Space::Pose) {
+    const Pose at = end_.nextTool();
+    reference.pose(at, at);
   }
 }
 

@@ -40,6 +40,8 @@ class PythonMotion : public coglab_controllers::Motion<> {
 
  private:
   void fail(const std::string& what);
+  /// Stays at the end of the last reference, until the arm arrives there too.
+  void holdEnd(coglab_controllers::MotionReference& reference) const;
   void readReference(const pybind11::object& answer, double dt,
                      coglab_controllers::MotionReference& reference) const;
   void checkBegin(const coglab_controllers::MotionReference& reference) const;
@@ -49,7 +51,8 @@ class PythonMotion : public coglab_controllers::Motion<> {
   coglab_controllers::MotionState state_ = coglab_controllers::MotionState::Idle;
   coglab_controllers::Reason reason_;
   coglab_controllers::SetPoint from_;
-  bool began_ = false;  // the first reference has been checked
+  coglab_controllers::MotionReference end_;  // of the cycle in which done() was true
+  bool began_ = false;                       // the first reference has been checked
   std::string error_;
 };
 

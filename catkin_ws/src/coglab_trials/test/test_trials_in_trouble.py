@@ -1,14 +1,19 @@
 """Whole trials in which something breaks, or the person does what nobody wants: each ends in a hub with its reason, no
 limit is exceeded, nothing that is withdrawn is followed, and nothing is pressed firmly or dropped beside a hand."""
 
+import threading
+import time
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
+import smach
 from coglab_msgs.msg import ReasonCode, Say
 from coglab_smach.ports.pending import Polled
 from coglab_trials import GIVE, RECEIVE, VirtualTrial
 from coglab_trials.conditions import CONSIDERATE
+from coglab_trials.virtual_clock import ClockStalled, VirtualClock
 from hand_orders import HandOrders
 
 WITHDRAWN = {ReasonCode.GOAL_WITHDRAWN, ReasonCode.GOAL_LEFT_REGION, ReasonCode.GOAL_AHEAD_OUTSIDE}
@@ -373,3 +378,27 @@ def test_what_a_hand_has_let_go_of_beside_closed_fingers_is_not_dropped(after):
     (result,) = trial.run(RECEIVE)
     truth = trial.world.cell.truth()
     assert held and not truth["dropped"] and truth["held_by"] == "robot", (result, truth["held_by"])
+
+
+class Rests(smach.State):
+    """Waits for 100 s, whatever comes."""
+
+    def __init__(self, clock):
+        smach.State.__init__(self, ["done"])
+        self.clock = clock
+
+    def execute(self, ud=None):
+        self.clock.sleep(100.0)
+        return "done"
+
+
+def test_a_trial_whose_clock_stalls_leaves_no_thread_behind(monkeypatch):
+    """A world that goes on for ever would keep its process alive."""
+    monkeypatch.setattr("coglab_trials.trial.VirtualClock", partial(VirtualClock, stall_limit=0.4))
+    before, trial = set(threading.enumerate()), VirtualTrial(4, machine=lambda ctx: Rests(ctx.clock))
+    once(trial, lambda t: t.clock.now() > 0.1, lambda t: time.sleep(2.0))
+    with pytest.raises(ClockStalled, match="world is running"):
+        trial.run(script=lambda t: None)
+    for thread in set(threading.enumerate()) - before:
+        thread.join(20.0)
+        assert not thread.is_alive(), thread

@@ -1,7 +1,11 @@
 """The clock in which waiting costs no time, and machines that run by it."""
 
 import re
+import signal
+import subprocess
+import sys
 import threading
+import time
 
 import pytest
 import smach
@@ -107,6 +111,31 @@ def test_a_member_that_does_not_wait_through_the_clock_is_named():
         clock.sleep(1.0)
     stuck.set()
     thread.join(5)
+
+
+STOPPED = """
+import time
+from coglab_trials.virtual_clock import VirtualClock
+
+def work():
+    print("stop", flush=True)
+    time.sleep(0.3)
+
+clock = VirtualClock(stall_limit=1.0)
+clock.start_thread(work, "works")
+clock.sleep(1.0)
+print("on")
+"""
+
+
+def test_a_process_that_was_stopped_goes_on():
+    """Ctrl-Z and fg, or a virtual machine that stood still: no thread is to blame."""
+    with subprocess.Popen([sys.executable, "-c", STOPPED], stdout=subprocess.PIPE, text=True) as child:
+        assert child.stdout.readline() == "stop\n"
+        child.send_signal(signal.SIGSTOP)
+        time.sleep(1.5)
+        child.send_signal(signal.SIGCONT)
+        assert child.communicate(timeout=30)[0] == "on\n"
 
 
 def test_a_member_that_raises_gives_its_turn_away():

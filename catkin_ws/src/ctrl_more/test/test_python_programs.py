@@ -101,5 +101,7 @@ def test_command_runs_a_controller_of_a_python_file(tmp_path: Path) -> None:
     )
     code, said = call("-m", "ctrl_more", "run", file, "--cycles", "50")
     assert code == 0 and "ran in 50 of 50 cycles" in said and "0.1" in said, said
+    code, said = call("-m", "ctrl_more", "run", file, "--signal", "measuredData/wrench=0,5,0,0,0,0")
+    assert code == 1 and "measuredData/wrench: no controller uses it; they use: zmp/zmp" in said
     code, said = call("-m", "ctrl_more", "run", f"{file}:Falls")
     assert code == 1 and "its controllers: ['Rises']" in said

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import pickle
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Iterable
 from typing import Any, TypeVar, overload
 
 from coglab.trial import Trial
+from coglab.workers import run_each
 from coglab.world import World
 
 MOST_WORKERS = 256
@@ -62,7 +61,7 @@ def trials(
     ``world``: further arguments of World, such as ``person="accustomed"``. ``each``: a function of a module, called
     with each World instead of the actions; its values are returned instead of Trials.
 
-    Each worker is a new process (forkserver), so a script needs ``if __name__ == "__main__":`` around this call.
+    Each worker is a new process, so a script needs ``if __name__ == "__main__":`` around this call.
     A trial that does not succeed is a Trial like others. TrialFailed names the seed of one that raised an exception.
     Example::
 
@@ -76,25 +75,26 @@ def trials(
         raise ValueError("give actions, or a function 'each', not both")
     jobs = [(seed, actions or ("receive",), limit, world, each) for seed in chosen]
     if workers == 1 or (len(jobs) == 1 and World.opened() is None):
-        return [_one(job) for job in jobs]
-    try:
-        pickle.dumps((world, each))  # what multiprocessing does to send them; here the reason can be named
-    except Exception as error:
-        raise ValueError(
-            f"these arguments cannot be sent to another process ({error}): use functions of a module instead of lambda "
-            "or inner functions, or workers=1"
-        ) from None
-    context = multiprocessing.get_context("forkserver")
-    with ProcessPoolExecutor(min(workers, len(jobs)), mp_context=context) as pool:
-        return list(_in_order(pool, jobs))
-
-
-def _in_order(pool: ProcessPoolExecutor, jobs: list[Any]) -> Iterator[Any]:
-    try:
-        yield from pool.map(_one, jobs)
-    except BaseException:
-        pool.shutdown(cancel_futures=True)
-        raise
+        results: Iterable[tuple[int, Any]] = enumerate(map(_result, jobs))
+    else:
+        try:
+            pickle.dumps((world, each))  # what multiprocessing does to send them; here the reason can be named
+        except Exception as error:
+            raise ValueError(
+                f"these arguments cannot be sent to another process ({error}): use functions of a module instead of "
+                "lambda or inner functions, or workers=1"
+            ) from None
+        results = run_each(_one, jobs, workers)
+    found: dict[int, Any] = {}
+    for index, result in results:
+        if isinstance(result, (ValueError, TypeError)):
+            raise result  # of the arguments: the same for each seed
+        if isinstance(result, Exception):
+            seed = chosen[index]
+            words = f"the trial with seed {seed} failed: {type(result).__name__}: {result}"
+            raise TrialFailed(words, seed) from result
+        found[index] = result
+    return [found[index] for index in range(len(jobs))]
 
 
 def _seeds(n: int | None, seeds: Iterable[int] | None) -> list[int]:
@@ -109,10 +109,13 @@ def _seeds(n: int | None, seeds: Iterable[int] | None) -> list[int]:
 
 def _one(job: tuple[int, tuple[str, ...], float, dict[str, Any], Callable[[World], Any] | None]) -> Trial | Any:
     seed, actions, limit, arguments, each = job
+    with World(seed, **arguments) as world:
+        return each(world) if each is not None else world.trial(*actions, limit=limit)
+
+
+def _result(job: Any) -> Any:
+    """The result of a trial, or the exception that it raised."""
     try:
-        with World(seed, **arguments) as world:
-            return each(world) if each is not None else world.trial(*actions, limit=limit)
-    except (ValueError, TypeError):
-        raise  # of the arguments: the same for each seed
+        return _one(job)
     except Exception as error:
-        raise TrialFailed(f"the trial with seed {seed} failed: {type(error).__name__}: {error}", seed) from error
+        return error

@@ -14,6 +14,8 @@ from scipy.spatial.transform import Rotation
 def finite(value: Any, name: str, shape: tuple[int, ...]) -> np.ndarray:
     """Array of floats of this shape. ValueError: another shape, NaN, infinite, or no numbers."""
     try:
+        if np.iscomplexobj(value):
+            raise TypeError("complex numbers")
         array = np.array(value, dtype=float)
     except (TypeError, ValueError):
         raise ValueError(f"{name}: numbers of shape {shape} are expected, got {value!r}") from None
@@ -47,9 +49,9 @@ def number(value: Any, name: str, unit: str, above: float) -> float:
 
 
 def whole(value: Any, name: str) -> int:
-    """A whole number 0 or more, of Python or of numpy."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 0:
-        raise ValueError(f"{name}: a whole number 0 or more is expected, got {value!r}")
+    """A whole number of Python or of numpy, 0 or more, that a float64 holds exactly."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 0 <= value < 2**53:
+        raise ValueError(f"{name}: a whole number 0 or more and below 2**53 is expected, got {value!r}")
     return int(value)
 
 

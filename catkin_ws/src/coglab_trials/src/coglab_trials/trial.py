@@ -168,8 +168,10 @@ class VirtualTrial:
             self.clock.start_thread(self._run_world, "world")
             walk = script or (lambda trial: trial.ask_for(*actions, limit=limit))
             self.clock.start_thread(lambda: self._run_script(walk), "script")
-            self.master.execute()
-            self._over = True
+            try:
+                self.master.execute()
+            finally:  # also if the clock has stalled: the world must not go on for ever
+                self._over = True
         self._end_reach()  # a machine that was stopped leaves its reach open
         if self._failure is not None:
             raise self._failure

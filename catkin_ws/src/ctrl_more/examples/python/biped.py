@@ -104,7 +104,7 @@ def main() -> None:
     runs = {name: run(*case) for name, case in CASES.items()}
     for name, one in runs.items():
         if one["fallen"][-1]:
-            print(f"{name}: falls after {one['t'][one['fallen'] == 1.0][0]:.1f} s")
+            print(f"{name}: falls {one['t'][one['fallen'] == 1.0][0] - SHORT[0]:.1f} s after the push begins")
             continue
         at = round(LONG[1] / DT) - 2  # the end of the long push
         most, com, zmp = (1000 * x for x in (abs(one["com"]).max(), one["com"][at], one["zmp"][at]))

@@ -128,11 +128,12 @@ def read_signals(arguments: argparse.Namespace) -> dict[str, Numbers]:
 def write_signal(loaded: Loaded, name: str, values: Numbers, now_ns: int) -> None:
     group, _, key = name.partition("/")
     setters = {"measuredData": loaded.robot.set_measured_data, "estimatedData": loaded.robot.set_estimated_data}
+    used = [*loaded.manager.get_used_robot_states(), *loaded.manager.get_used_control_states()]
+    if name not in used:
+        raise Refused(f"--signal {name}: no controller uses it; they use: {', '.join(used)}")
     if group in setters:
         setters[group](key, values, now_ns)
         return
-    if key not in [signal.key for signal in loaded.control.signals(group)]:
-        raise Refused(f"no controller uses {name}; known: {loaded.manager.get_used_control_states()}")
     loaded.control.view(group, key)[:] = values
 
 

@@ -74,6 +74,8 @@ def _module(name: str, folder: Path, what: str) -> ModuleType:
     try:
         return _import(name, folder)
     except Exception as error:
+        if isinstance(error, ModuleNotFoundError) and f"{name}.".startswith(f"{error.name}."):
+            raise Refused(f"{what}: there is no module '{error.name}' in {folder}, nor on sys.path") from None
         last = traceback.extract_tb(error.__traceback__)[-1]
         place = f" ({Path(last.filename).name}:{last.lineno})" if last.lineno else ""
         raise Refused(f"{what}: the module was not imported: {type(error).__name__}: {error}{place}") from error

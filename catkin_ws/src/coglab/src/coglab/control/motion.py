@@ -123,13 +123,16 @@ class MotionSetup:
 
 def _numbers(name: str, value: npt.ArrayLike, size: int) -> Vector:
     try:
+        if np.iscomplexobj(value):
+            raise TypeError("complex numbers")
         array = np.array(value, dtype=np.float64)  # a copy, so that the caller may reuse the array
     except (TypeError, ValueError) as error:
         raise ControlError(f"{name}: {size} numbers are expected, {value!r} came") from error
     if array.shape != (size,):
         raise ControlError(f"{name}: shape ({size},) is expected, shape {array.shape} came")
-    if not np.isfinite(array).all():
-        raise ControlError(f"{name}: finite numbers are expected, {array} came")
+    wrong = np.flatnonzero(~np.isfinite(array))
+    if wrong.size:
+        raise ControlError(f"{name}: finite numbers are expected, {name}[{wrong[0]}] is {array[wrong[0]]}")
     return array
 
 

@@ -27,7 +27,8 @@ from typing import Any
 
 from coglab.envs.handover import GiveEnv, HandoverEnv, ReceiveEnv
 from coglab.envs.people import SPLITS, Split
-from coglab.envs.processes import search_workspace_first
+from coglab.values import whole
+from coglab.workers import search_workspace_first
 
 IDS = {"coglab/Receive-v0": ReceiveEnv, "coglab/Give-v0": GiveEnv}
 
@@ -50,7 +51,7 @@ def make_vec(identity: str, num_envs: int, **arguments: Any) -> gymnasium.vector
     """
     if identity not in IDS:
         raise ValueError(f"'{identity}' is none of {', '.join(IDS)}")
-    if num_envs < 1:
+    if whole(num_envs, "num_envs") < 1:
         raise ValueError(f"num_envs is {num_envs}; expected at least 1")
     search_workspace_first()
     made = [partial(_make, identity, arguments) for _ in range(num_envs)]

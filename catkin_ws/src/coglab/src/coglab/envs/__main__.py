@@ -36,8 +36,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from coglab.envs.leaderboard import POLICIES, leaderboard
 
     tasks, splits = given.environment or ("receive", "give"), given.split or ("test", "test_hard")
-    print(leaderboard(given.out, given.people, given.workers, tasks, splits, given.policy or POLICIES), end="")
-    return 0
+    text, failed = leaderboard(given.out, given.people, given.workers, tasks, splits, given.policy or POLICIES)
+    print(text, end="")
+    if failed:
+        print(f"{failed} episodes have no result; the same command runs them again", file=sys.stderr)
+    return 1 if failed else 0
 
 
 if __name__ == "__main__":

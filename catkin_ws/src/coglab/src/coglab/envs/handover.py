@@ -16,6 +16,7 @@ from gymnasium import spaces
 from coglab.envs.people import split_named
 from coglab.envs.referee import GIVE, RECEIVE, Referee
 from coglab.envs.stage import Stage
+from coglab.values import number
 
 RATE = 20.0  # Hz of actions
 PERIODS = round(1.0 / (RATE * DT))  # of the world in one step
@@ -87,8 +88,8 @@ class HandoverEnv(gymnasium.Env):
         self.split.conditions(self.split.seeds[0], self.objects)  # refuses unknown objects
         if control not in CONTROLS:
             raise ValueError(f"control '{control}' is none of {', '.join(CONTROLS)}")
-        if not 0.0 < time_limit <= 600.0:
-            raise ValueError(f"time_limit is {time_limit!r} s; expected more than 0 and at most 600")
+        if number(time_limit, "time_limit", "s", 0.0) > 600.0:
+            raise ValueError(f"time_limit: at most 600 s is expected, got {time_limit!r}")
         if render_mode not in (None, "rgb_array"):
             raise ValueError(f"render_mode '{render_mode}' is none of None, rgb_array")
         self.control, self.time_limit, self.weights, self.render_mode = control, time_limit, reward, render_mode

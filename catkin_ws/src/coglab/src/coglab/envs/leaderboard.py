@@ -9,7 +9,6 @@ import json
 import math
 import sys
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import as_completed
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,13 +23,14 @@ from coglab_trials.world import DT, World
 from coglab.envs.handover import GiveEnv, HandoverEnv, ReceiveEnv
 from coglab.envs.people import OBJECTS, split_named
 from coglab.envs.policies import Policy, RandomPolicy, StraightReach
-from coglab.envs.processes import processes
 from coglab.envs.referee import GIVE, KEPT, RECEIVE, Referee
+from coglab.workers import run_each
 
 ENVIRONMENTS: dict[str, type[HandoverEnv]] = {RECEIVE: ReceiveEnv, GIVE: GiveEnv}
 POLICIES = ("brain", "straight", "random")
 LIMIT = 20.0  # s, time limit of an episode
 LONGEST = 60.0  # s of virtual time, limit of each action of the shipped brain
+WALL_LIMIT = 600.0  # s of wall time, limit of an episode
 
 Job = tuple[str, str, str, int]
 """task, split, policy, index of the person"""
@@ -145,22 +145,24 @@ class Results:
             stream.write(("\n" if torn else "") + json.dumps(line) + "\n")
 
 
-def play(jobs: Sequence[Job], results: Results, workers: int, say: Callable[[str], None]) -> None:
-    """Runs the episodes that ``results`` does not have yet, in processes of their own."""
+def play(jobs: Sequence[Job], results: Results, workers: int, say: Callable[[str], None]) -> int:
+    """Runs the episodes that ``results`` does not have yet, in processes of their own. One that raises, or whose
+    process dies or takes longer than WALL_LIMIT twice, is named and gets no result. Returns how many these are."""
     done = {key: results.read(*key) for key in {job[:3] for job in jobs}}
     left = [job for job in jobs if job[3] not in done[job[:3]]]
-    if not left:
-        return
-    say(f"{len(left)} of {len(jobs)} episodes to run, {workers} at a time")
-    with processes(workers) as pool:
-        asked = {pool.submit(run, job): job for job in left}
-        try:
-            for count, future in enumerate(as_completed(asked), 1):
-                results.add(asked[future], future.result())
-                if count % 20 == 0 or count == len(left):
-                    say(f"{count} of {len(left)}")
-        finally:  # at Ctrl-C, those that have not begun never begin
-            pool.shutdown(cancel_futures=True)
+    if left:
+        say(f"{len(left)} of {len(jobs)} episodes to run, {workers} at a time")
+    failed = 0
+    for count, (index, line) in enumerate(run_each(run, left, workers, WALL_LIMIT), 1):
+        if isinstance(line, Exception):
+            failed += 1
+            task, split, policy, person = left[index]
+            say(f"no result of {task}, {split}, {policy}, person {person}: {type(line).__name__}: {line}")
+        else:
+            results.add(left[index], line)
+        if count % 20 == 0 or count == len(left):
+            say(f"{count} of {len(left)}")
+    return failed
 
 
 def row(episodes: Iterable[dict[str, Any]]) -> dict[str, Any]:
@@ -211,8 +213,9 @@ def _cells(r: dict[str, Any]) -> list[str]:
 
 def leaderboard(
     folder: Path, people: int, workers: int, tasks: Sequence[str], splits: Sequence[str], policies: Sequence[str]
-) -> str:
-    """Runs what is missing and returns the table; it also lies in ``folder``/leaderboard.md."""
+) -> tuple[str, int]:
+    """Runs what is missing. Returns the table, which also lies in ``folder``/leaderboard.md, and how many episodes of
+    it have failed."""
     results = Results(folder)
     jobs = [
         (task, split, policy, person)
@@ -221,7 +224,8 @@ def leaderboard(
         for split in splits
         for person in range(min(people, len(split_named(split).seeds)))
     ]
-    play(jobs, results, workers, lambda text: print(text, file=sys.stderr, flush=True))
+    failed = play(jobs, results, workers, lambda text: print(text, file=sys.stderr, flush=True))
     text = table(results, tasks, splits, policies, people)
+    folder.mkdir(parents=True, exist_ok=True)  # also where every episode has failed
     (folder / "leaderboard.md").write_text(text, encoding="utf-8")
-    return text
+    return text, failed

@@ -1,0 +1,64 @@
+"""Jobs in processes of their own: what becomes of one whose process dies, hangs or meets a stalled clock."""
+
+import os
+import signal
+import time
+
+import pytest
+from coglab.workers import WorkerLost, run_each
+from coglab_trials.virtual_clock import ClockStalled
+
+
+class Odd(Exception):
+    """Cannot be made again from its arguments, as pickle does."""
+
+    def __init__(self, one, two):
+        super().__init__(one)
+
+
+def job(what):
+    name, marker = what
+    first = marker is None or not marker.exists()
+    if marker is not None:
+        marker.touch()
+    if name == "killed" and first:
+        os.kill(os.getpid(), signal.SIGKILL)
+    if name == "stalled" and first:
+        try:
+            raise ClockStalled("for 60 s")
+        except ClockStalled as error:
+            raise RuntimeError("a state raised") from error
+    if name == "hangs":
+        time.sleep(60.0)
+    if name == "wrong":
+        raise ArithmeticError("1 + 1")
+    if name == "odd":
+        raise Odd(1, 2)
+    return f"{name} done"
+
+
+@pytest.mark.parametrize("workers", [1, 3])
+def test_each_job_has_a_result_whatever_becomes_of_its_process(tmp_path, workers):
+    once = ("killed", tmp_path / "killed"), ("stalled", tmp_path / "stalled")
+    jobs = [
+        ("plain", None),
+        *once,
+        ("killed", None),
+        ("stalled", None),
+        ("wrong", None),
+        ("odd", None),
+        ("plain", None),
+    ]
+    found = dict(run_each(job, jobs, workers))
+    assert sorted(found) == list(range(len(jobs)))
+    assert [found[i] for i in (0, 1, 2, 7)] == ["plain done", "killed done", "stalled done", "plain done"]
+    assert isinstance(found[3], WorkerLost) and "ended by signal 9" in str(found[3])
+    assert isinstance(found[4], ClockStalled) and isinstance(found[6], WorkerLost)
+    assert isinstance(found[5], ArithmeticError) and "test_workers.py" in found[5].__notes__[0]  # with its line
+
+
+def test_a_job_that_hangs_ends_at_its_limit():
+    begun = time.monotonic()
+    ((_, result),) = run_each(job, [("hangs", None)], 2, limit=1.0)
+    assert isinstance(result, WorkerLost) and "more than 1 s" in str(result)
+    assert time.monotonic() - begun < 50.0
