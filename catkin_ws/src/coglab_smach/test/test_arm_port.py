@@ -42,7 +42,7 @@ class Robot:
         self.port = arm.RosArm()
         self.topics = Topic.every
         self.say("lwr/state", motion_allowed=True, reason="", supervisor="running", reason_code=0, hold_latched=False)
-        self.say("lwr/joint_states", name=JOINTS[::-1], position=[float(k) for k in range(7)])
+        self.say_joints(JOINTS[::-1], [float(k) for k in range(7)])
         self.say("controller_manager/status", **self.status())
 
     @staticmethod
@@ -52,6 +52,10 @@ class Robot:
 
     def say(self, topic, seconds=0.0, **fields):
         self.topics[topic].message, self.topics[topic].seconds = SimpleNamespace(**fields), seconds
+
+    def say_joints(self, names, positions):
+        header = SimpleNamespace(stamp=SimpleNamespace(to_sec=lambda: 7.5))
+        self.say("lwr/joint_states", name=names, position=positions, header=header)
 
     def call(self, name, kind, wait=20.0, **fields):
         return Ready(self._answer(name, wait, fields))
@@ -108,12 +112,12 @@ def test_an_arm_that_moves_does_not_stand(robot):
 
 
 def test_joints_are_told_in_wire_order_for_half_a_second(robot):
-    assert robot.port.joint_positions() == (6.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.0)
+    assert robot.port.measured() == ((6.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.0), 7.5)
     robot.topics["lwr/joint_states"].seconds = 0.5
     assert robot.port.joint_positions() is not None
     robot.topics["lwr/joint_states"].seconds = 0.51
     assert robot.port.joint_positions() is None
-    robot.say("lwr/joint_states", name=JOINTS[1:], position=[0.0] * 6)
+    robot.say_joints(JOINTS[1:], [0.0] * 6)
     assert robot.port.joint_positions() is None, "one is missing"
     robot.topics["lwr/joint_states"].message = None
     assert robot.port.joint_positions() is None

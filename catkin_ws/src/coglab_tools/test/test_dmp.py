@@ -3,6 +3,8 @@
 import json
 import resource
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
+from types import SimpleNamespace
 
 import coglab
 import coglab_controllers as cc
@@ -127,6 +129,14 @@ def test_ways_back_and_pauses_are_cut(tmp_path):
     recording = read(path)
     assert [d.name for d in cut.reaches(recording)] == ["a_1", "a_2"]
     assert len(cut.reaches(recording, back=True)) == 3
+
+
+def test_an_arm_that_swings_back_when_it_is_let_go_makes_no_second_reach():
+    times, there = reach()
+    swing = there[-1] - np.outer(share((times - 0.1) / DURATION), 0.4 * WAY)
+    whole = Demonstration("a", np.arange(2 * len(times)) / 120.0, np.vstack([there, swing]))
+    (found,) = cut.reaches(whole)
+    assert np.linalg.norm(found.positions[-1] - START - WAY) < 0.003 and "the way back was left out" in found.notes
 
 
 def faulty(name, tmp_path):
@@ -303,6 +313,30 @@ def test_from_files_to_a_checked_library(tmp_path, capsys):
     out = tmp_path / "path.csv"
     assert answer(capsys, "dmp", "export", library, "--id", "mine", "-o", out)[0] == 0
     assert read(out).way == pytest.approx(data["demonstrations"][0]["way_m"], abs=0.05)
+
+
+class LateRobot:
+    """A led arm whose measurements, every 5 ms, arrive in bursts: 0.1 s without one, then all that were missed."""
+
+    state = SimpleNamespace(state="waits", holding="", actions=("receive",), fingers=())
+    arm = SimpleNamespace(guided=nullcontext)
+    time = 100.0
+
+    def pause(self, seconds):
+        self.time += seconds
+
+    def seen(self, name):
+        measured = 0.1 * np.floor(self.time / 0.1)
+        times, places = reach()
+        place = [np.interp(measured - 100.0, times, column) for column in places.T]
+        return SimpleNamespace(
+            position=np.array(place), orientation=np.array([0.0, 0.0, 0.0, 1.0])
+        ), self.time - measured
+
+
+def test_each_sample_of_a_led_arm_has_the_time_of_its_measurement():
+    recorded = record(LateRobot(), "a")
+    assert follows(recorded, *reach())
 
 
 class Leads:

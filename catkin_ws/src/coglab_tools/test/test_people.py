@@ -75,6 +75,14 @@ def test_a_handover_in_the_robots_world_plays(folder, tmp_path):
     assert open_recorded_hand({"file": str(file)}, "object_mug")[0].object_in_hand is not None
 
 
+def test_samples_that_the_tracker_lost_within_a_reach_are_bridged(folder):
+    path = folder / "giver_RHand_pose_saved.csv"
+    lines = path.read_text(encoding="utf-8").splitlines()
+    lines[200:210] = [lines[200]] * 10
+    path.write_text("\n".join(lines), encoding="utf-8")
+    assert read_kth(folder).reach("giver").way == pytest.approx(np.linalg.norm([0.4, 0.05, 0.25]), abs=0.01)
+
+
 def test_a_folder_that_cannot_be_used_is_refused_with_the_file(folder):
     (folder / "giver_RHand_pose_saved.csv").write_text("x,y,z,q0,q1,q2,q3\n1,2\n", encoding="utf-8")
     with pytest.raises(CheckFailed, match=r"giver_RHand_pose_saved\.csv: expected 7 columns, got 2"):

@@ -38,6 +38,7 @@ LIBRARY = str(package_path("coglab_controllers", "config", "primitives.xml"))
 OWN_FRAME = "coglab_goal"  # goal frame of a motion toward a pose, or along a function
 UNSET = (0.0, 0.0, 0.0, 0.0)
 GUIDE_MODE = "joint_impedance stiffness 0.01 damping 0.3"  # the smallest stiffness that the arm takes, Nm/rad
+SILENT = "the arm has sent no joint positions for 0.5 s: does it run? ./coglab status"
 GUIDE_ANSWER = 10.0  # s, time limit for a change of the arm's mode
 
 
@@ -114,7 +115,7 @@ class Arm:
         self._robot._check()
         position = self._cell.arm.joint_positions()
         if position is None:
-            raise RuntimeError("the arm has sent no joint positions for 0.5 s: does it run? ./coglab status")
+            raise RuntimeError(SILENT)
         return np.array(position)
 
     @property
@@ -609,9 +610,9 @@ class Robot:
     def seen(self, name: str) -> tuple[Pose, float]:
         """Like ``frame``, with the age of what is seen, s."""
         self._check()
-        if name == "palm":
-            return self.arm.palm, 0.0
         pose, age = self._cell.frame(str(name))
+        if pose is None and name == "palm":
+            raise Refused(SILENT, ReasonCode.NODE_SILENT)
         if pose is None:
             raise Refused(f"the frame '{name}' was never seen; is its name right?", ReasonCode.GOAL_MISSING)
         if age > 1.0:

@@ -29,6 +29,7 @@ from coglab_perception.tf_listener import TfListener
 from coglab_py.pose import Pose
 from coglab_smach.context.master_state import MasterState
 from coglab_smach.context.requests import Answer
+from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.pending import PortError
 from coglab_smach.ros.arm import RosArm
 from coglab_smach.ros.calls import PACE, Newest, call
@@ -300,6 +301,9 @@ class _RunningBackEnd:
             self.arm.hold(reason)  # the brain is silent: brake at least
 
     def frame(self, name: str) -> tuple[Pose | None, float]:
+        if name == "palm":
+            joints, measured = self.arm.measured()
+            return (None, 0.0) if joints is None else (Pose(*default_arm().fk(joints)), rospy.get_time() - measured)
         try:
             found = self._buffer.lookup_transform(BASE, name, rospy.Time(0))
         except tf2_ros.TransformException:

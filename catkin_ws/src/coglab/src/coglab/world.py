@@ -572,6 +572,8 @@ class _VirtualBackEnd:
         self._trial.ctx.arm.hold(reason)
 
     def frame(self, name: str) -> tuple[Pose | None, float]:
+        if name == "palm":
+            return self._world.robot.arm.palm, 0.0
         if name in self._frames:
             return self._frames[name], 0.0
         return self._world.cell.newest(name)

@@ -277,11 +277,16 @@ class RosArm:
         return None
 
     def joint_positions(self) -> tuple[float, ...] | None:
+        return self.measured()[0]
+
+    def measured(self) -> tuple[tuple[float, ...] | None, float]:
+        """Joint positions (rad), None if unknown or older than 0.5 s, and when they were measured (s, ROS time)."""
         message = self._joints.message
         if message is None or self._joints.age() > 0.5:
-            return None
+            return None, 0.0
         by_name = dict(zip(message.name, message.position, strict=False))
-        return tuple(by_name[name] for name in JOINTS) if all(name in by_name for name in JOINTS) else None
+        joints = tuple(by_name[name] for name in JOINTS) if all(name in by_name for name in JOINTS) else None
+        return joints, message.header.stamp.to_sec()
 
     def hold(self, reason: str) -> Pending:
         run = Threaded(lambda _: call_now(f"{self._lwr}/command", LwrCommand, Permit(), wait=1.0, event="hold"), "hold")

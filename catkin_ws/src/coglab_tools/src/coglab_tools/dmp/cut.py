@@ -24,7 +24,7 @@ LOW, LOW_SHARE = 0.02, 0.05  # m/s, and share of the peak speed: below the large
 HIGH_SHARE = 0.25  # share of the largest speed that a motion must reach
 PAUSE_SHARE = 0.35  # slowest point between two motions, share of the smaller of their peaks
 MOVING_SHARE = 0.5  # of the mean speed: a reach that is faster at its first or last sample is not whole
-BACK_SHARE = 0.35  # a motion that ends this near to where the last one began, share of the way, is a way back
+BACK, BACK_SHARE = -0.5, 1.2  # cosine to the last reach, and share of its way: a motion below both is a way back
 
 
 def smooth(raw: Demonstration) -> Demonstration:
@@ -65,19 +65,20 @@ def reaches(raw: Demonstration, back: bool = False, cut_off: bool = False) -> li
     whole = smooth(raw)
     found: list[Demonstration] = []
     farthest = 0.0
-    origin: Array | None = None
+    before: Array | None = None  # m, (3,): from start to end of the last reach
     lost = ""
     for begin, end in motions(whole.times, whole.speed):
         part = _part(whole, begin, end)
         farthest = max(farthest, part.way)
         if part.way < SHORTEST:
             continue
-        way = float(np.linalg.norm(part.positions[-1] - part.positions[0]))
-        returns = origin is not None and np.linalg.norm(part.positions[-1] - origin) < BACK_SHARE * way
-        if returns and not back:
-            origin = None
+        line = part.positions[-1] - part.positions[0]
+        way = float(np.linalg.norm(line))
+        if not back and before is not None and _goes_back(line, before):
+            found[-1:] = [replace(each, notes=(*each.notes, "the way back was left out")) for each in found[-1:]]
+            before = None
             continue
-        origin = part.positions[0]
+        before = line
         speed, mean = part.speed, part.way / max(part.duration, 1e-9)
         for at, edge, word in ((0, begin == 0, "begins"), (-1, end == len(whole.times) - 1, "ends")):
             if edge and speed[at] > MOVING_SHARE * mean and not cut_off:
@@ -129,6 +130,12 @@ def motions(times: Array, speed: Array) -> list[tuple[int, int]]:
     return found
 
 
+def _goes_back(line: Array, before: Array) -> bool:
+    """Whether a motion by `line` takes the way back, or a part of it, of a reach by `before`; (3,) m."""
+    a, b = float(np.linalg.norm(line)), float(np.linalg.norm(before))
+    return bool(line @ before < BACK * a * b and a < BACK_SHARE * b)
+
+
 def _part(whole: Demonstration, begin: int, end: int) -> Demonstration:
     part = slice(begin, end + 1)
     t = whole.times[part]
@@ -136,6 +143,7 @@ def _part(whole: Demonstration, begin: int, end: int) -> Demonstration:
     return replace(
         whole,
         times=t - t[0],
+        begin=float(t[0]),
         positions=whole.positions[part],
         orientations=None if whole.orientations is None else whole.orientations[part],
         closing=None if whole.closing is None else whole.closing[part],

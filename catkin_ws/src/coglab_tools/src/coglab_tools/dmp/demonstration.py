@@ -32,6 +32,8 @@ class Demonstration:
     """closing of the fingers, (n,), 0 open .. 1 closed; None: not recorded"""
     notes: tuple[str, ...] = ()
     """sentences on units, gaps, repeated samples and the cut"""
+    begin: float = 0.0
+    """s, of time 0 in the recording that it was cut from"""
     noise: float = 0.0
     """m, standard deviation per axis of what smoothing took away"""
 

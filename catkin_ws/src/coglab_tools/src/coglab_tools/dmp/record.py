@@ -18,8 +18,7 @@ from coglab_tools.command import CheckFailed, NotThere
 from coglab_tools.dmp.cut import LOW, SHORTEST
 from coglab_tools.dmp.demonstration import Demonstration
 
-PERIOD = 0.01  # s between two samples of the palm
-SEEN_PERIOD = 0.005  # s between two looks at a tracked hand
+PERIOD = 0.005  # s between two looks at the palm or at a tracked hand
 SAME_SIGHT = 0.002  # s; times that are nearer are the same sight, with the error of its age
 STILL = 0.5  # s at rest after a reach that end a demonstration
 WINDOW = 0.1  # s over which the speed is taken
@@ -124,25 +123,22 @@ def record(
 def _follow(
     robot: Any, frame: str, trace: Trace, limit: float, ends: Callable[[], bool], show: Callable[[str], None]
 ) -> None:
-    """Fill the trace until it is over."""
+    """Fill the trace until it is over. A sample's time is that of its measurement."""
     begun, shown, hub = robot.time, -np.inf, robot.state.state
     while robot.time - begun < limit and not ends() and not trace.over:
-        if frame:
-            pose, age = robot.seen(frame)
-            trace.add(robot.time - age, pose, ())
-        else:
-            trace.add(robot.time, robot.arm.palm, robot.state.fingers)
-            if trace.speed > FASTEST:
-                raise CheckFailed(
-                    f"the palm moves at {trace.speed:.1f} m/s and is not led any more (at most {FASTEST:g} m/s): "
-                    "the arm was stopped. Are the load data of the hand right?"
-                )
+        pose, age = robot.seen(frame or "palm")
+        trace.add(robot.time - age, pose, () if frame else robot.state.fingers)
+        if not frame and trace.speed > FASTEST:
+            raise CheckFailed(
+                f"the palm moves at {trace.speed:.1f} m/s and is not led any more (at most {FASTEST:g} m/s): "
+                "the arm was stopped. Are the load data of the hand right?"
+            )
         if robot.time - shown >= TRACE:
             shown = robot.time
             show(trace.line())
             if not frame and robot.state.state != hub:
                 raise CheckFailed(f"the brain left {hub}: somebody started an action; hand guiding was ended")
-        robot.pause(SEEN_PERIOD if frame else PERIOD)
+        robot.pause(PERIOD)
 
 
 def check_free(robot: Any) -> None:

@@ -62,7 +62,7 @@ class Handover:
     def span(self, role: str) -> tuple[float, float]:
         """Begin and end (s) of the reach to the handover: the one that ends nearest to the touch, else the longest."""
         found = reaches(self.whole(role), back=True)
-        spans = [_span(part) for part in found]
+        spans = [(part.begin, part.begin + part.duration) for part in found]
         if self.touch is None:
             return spans[int(np.argmax([part.way for part in found]))]
         touch = self.touch
@@ -107,12 +107,6 @@ class Handover:
                 raise UsageError(f"{self.name} has no object; leave --object out and use recorded_object:=in_hand")
             tracks[object_frame] = placed(smooth(self.object), False)
         return tracks
-
-
-def _span(part: Demonstration) -> tuple[float, float]:
-    """Begin and end of a reach in its recording, s, from its note."""
-    words = part.notes[-1].split()
-    return float(words[2]), float(words[5])
 
 
 def write_recording(path: Path, tracks: dict[str, Demonstration]) -> None:
