@@ -33,6 +33,14 @@ def test_the_interval_of_the_effect_covers_the_true_one():
     assert 89 <= inside <= 100
 
 
+@pytest.mark.parametrize("shift", [0.01, 1.0, 4.0, 50.0])
+def test_interval_of_the_effect_has_two_ends_in_both_directions(shift):
+    scatter = np.array([-1.2, 0.4, 0.9, -0.3, 0.1, 0.6])
+    up, down = compare(scatter * 0, scatter + shift), compare(scatter * 0, -scatter - shift)
+    assert (up.effect_low, up.effect_high) == pytest.approx((-down.effect_high, -down.effect_low), rel=1e-6)
+    assert up.effect_low < up.effect < up.effect_high
+
+
 def test_no_scatter_and_no_pairs_give_no_effect():
     assert np.isnan(compare([1.0, 1.0], [2.0, 2.0]).effect) and compare([], []).pairs == 0
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ CONTACT = COLOURS[3]
 JOINTS = ["A1", "A2", "E1", "A3", "A4", "A5", "A6"]
 FINGERS = ["thumb abduction", "thumb", "index", "middle", "ring+little"]
 MOST_ENTRIES = 12  # of the legend beside the phases
+MARGINS = (0.19, 0.05, 0.765, 0.975)  # left, bottom, right, top, share of the figure
 TEXT = 7  # pt, smallest text of the figure, which has the width of a page (7.2 inch)
 STYLE = {
     "font.size": 8,
@@ -96,15 +98,16 @@ def _label(axis: Axes, x: float, y: float, name: str, space: Bbox) -> bool:
     return False
 
 
-def _phases(axis: Axes, trial: Series, start: float, end: float) -> list[Any]:
+def _phases(axis: Axes, trial: Series, start: float, end: float, others: list[Any]) -> None:
     """One lane per active container, one bar per state. Parallel children share the height of the lane. A name is
-    written if it fits into its bar. Returns entries of a legend for the others."""
+    written if it fits into its bar; the legend has the names that do not, after the entries of `others`."""
     lanes = lanes_of(trial, start, end)
     colours = colours_of([name for _, rows in lanes for row in rows for _, _, name in row])
-    unnamed: dict[str, Any] = {}
+    unnamed = dict(colours)
     axis.set_xlim(0.0, end - start)
     axis.set_ylim(len(lanes) - 0.5, -0.5)
-    axis.figure.draw_without_rendering()  # to know the width of the bars
+    axis.set_yticks(range(len(lanes)), [_wrapped(name) for name, _ in lanes])
+    axis.tick_params(axis="y", length=0)
     renderer = axis.figure.canvas.get_renderer()
     for lane, (_, rows) in enumerate(lanes):
         height = 0.84 / len(rows)
@@ -122,13 +125,19 @@ def _phases(axis: Axes, trial: Series, start: float, end: float) -> list[Any]:
                     lw=0.4,
                 )
                 words, middle = name.replace("_", " "), (since + until) / 2 - start
-                if not _label(axis, middle, centre, words, bar.get_window_extent(renderer)):
-                    unnamed.setdefault(
-                        words, Patch(facecolor=colours[name], alpha=0.6, edgecolor=COLOURS[6], label=words)
-                    )
-    axis.set_yticks(range(len(lanes)), [name.replace("_", " ") for name, _ in lanes])
-    axis.tick_params(axis="y", length=0)
-    return list(unnamed.values())
+                if _label(axis, middle, centre, words, bar.get_window_extent(renderer)):
+                    unnamed.pop(name, None)
+    others += [
+        Patch(facecolor=colour, alpha=0.6, edgecolor=COLOURS[6], label=_wrapped(name))
+        for name, colour in unnamed.items()
+    ]
+    if others:
+        axis.legend(handles=others[:MOST_ENTRIES], loc="upper left", bbox_to_anchor=(1.0, 1.0))
+
+
+def _wrapped(name: str) -> str:
+    """A name for the margins, which have room for 24 letters."""
+    return textwrap.fill(name.replace("_", " "), 24)
 
 
 def _hands(path_axis: Axes, speed_axis: Axes, truth: list[tuple], start: float) -> None:
@@ -177,7 +186,8 @@ def _contact_lines(axes: list[Axes], contacts: list[tuple], start: float) -> lis
 def figure_of(trial: Series, title: str, start: float, end: float) -> Figure:
     """The figure of the trial between `start` and `end` (s). It belongs to no window."""
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.2, 9.0), layout="constrained")
+        figure = Figure(figsize=(7.2, 9.0))
+        figure.subplots_adjust(*MARGINS, hspace=0.13)  # a layout engine takes longer than all the rest
         FigureCanvasAgg(figure)
         axes = figure.subplots(6, 1, sharex=True, height_ratios=[2.2, 1.6, 0.9, 1.7, 1.0, 0.7])
         labels = (
@@ -208,9 +218,7 @@ def figure_of(trial: Series, title: str, start: float, end: float) -> Figure:
                 axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
         axes[-1].set_xlabel("time, s")
         entries = _contact_lines(list(axes), [row for row in trial.contacts if start <= row[0] <= end], start)
-        entries += _phases(axes[0], trial, start, end)
-        if entries:
-            axes[0].legend(handles=entries[:MOST_ENTRIES], loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        _phases(axes[0], trial, start, end, entries)
     return figure
 
 

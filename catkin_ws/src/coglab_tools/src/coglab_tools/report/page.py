@@ -21,7 +21,7 @@ from coglab_tools.trial.read import Measured
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MOST_ROWS = 3000  # of a series in a plot
+MOST_ROWS = 1500  # of a series in a plot
 PDF_LIMIT = 60.0  # s for chromium
 BLUE, ORANGE, DARK = "#0072B2", "#E69F00", "#1B1F24"
 
@@ -30,14 +30,15 @@ def figure_of_trial(trial: Measured) -> Figure:
     """Phases, paths, speeds, torques, fingers and force of a trial on one time axis."""
     from coglab.plot import figure_of
 
-    series = trial.series
-    thin = replace(
-        series,
-        truth=[row for row in series.truth[:: 1 + len(series.truth) // MOST_ROWS]],
-        external_torques=series.external_torques[:: 1 + len(series.external_torques) // MOST_ROWS],
-    )
     start, end = trial.start, max(trial.end, trial.start + 0.1)
-    return figure_of(thin, trial.record.id.replace("_", " "), start, end)
+
+    def thin(rows: list[Any]) -> list[Any]:
+        inside = [row for row in rows if start <= row[0] <= end]
+        return inside[:: 1 + len(inside) // MOST_ROWS]
+
+    series = trial.series
+    series = replace(series, truth=thin(series.truth), external_torques=thin(series.external_torques))
+    return figure_of(series, trial.record.id.replace("_", " "), start, end)
 
 
 def figure_of_activity(trial: Measured) -> Figure:
@@ -45,7 +46,8 @@ def figure_of_activity(trial: Measured) -> Figure:
     from matplotlib.figure import Figure
 
     person, robot = activities(trial)
-    figure = Figure(figsize=(7.2, 1.9), layout="constrained")
+    figure = Figure(figsize=(7.2, 1.9))
+    figure.subplots_adjust(0.09, 0.24, 0.97, 0.72)
     axis = figure.subplots()
     for lane, (intervals, colour, hatch) in enumerate(((person, ORANGE, "//"), (robot, BLUE, ""))):
         bars = [(start - trial.start, end - start) for start, end in intervals]
@@ -67,7 +69,7 @@ def figure_of_activity(trial: Measured) -> Figure:
 
 def _png(figure: Figure) -> str:
     stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=130)
+    figure.savefig(stream, format="png", dpi=130, pil_kwargs={"compress_level": 1})
     return base64.b64encode(stream.getvalue()).decode("ascii")
 
 

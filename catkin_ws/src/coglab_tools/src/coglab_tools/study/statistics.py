@@ -73,13 +73,15 @@ def _noncentral(statistic: float, df: int, level: float) -> tuple[float, float]:
     from scipy.optimize import brentq
     from scipy.stats import nct
 
+    width = 8.0 + 2.0 * abs(statistic)
+
+    def below(c: float) -> float:
+        with np.errstate(all="ignore"):
+            value = float(nct.cdf(statistic, df, c))
+        return value if math.isfinite(value) else float(c < statistic)  # scipy has NaN far out, where it is 1 or 0
+
     def at(share: float) -> float:
-        width = 8.0 + 2.0 * abs(statistic)
-        try:
-            with np.errstate(all="ignore"):
-                return float(brentq(lambda c: nct.cdf(statistic, df, c) - share, statistic - width, statistic + width))
-        except ValueError:  # beyond what the distribution can be computed for
-            return math.nan
+        return float(brentq(lambda c: below(c) - share, statistic - width, statistic + width))
 
     return at(0.5 + level / 2), at(0.5 - level / 2)
 
