@@ -53,7 +53,7 @@ def test_each_job_has_a_result_whatever_becomes_of_its_process(tmp_path, workers
     assert sorted(found) == list(range(len(jobs)))
     assert [found[i] for i in (0, 1, 2, 7)] == ["plain done", "killed done", "stalled done", "plain done"]
     assert isinstance(found[3], WorkerLost) and "ended by signal 9" in str(found[3])
-    assert isinstance(found[4], ClockStalled) and isinstance(found[6], WorkerLost)
+    assert isinstance(found[4], ClockStalled) and "cannot be read" in str(found[6])
     assert isinstance(found[5], ArithmeticError) and "test_workers.py" in found[5].__notes__[0]  # with its line
 
 
