@@ -51,10 +51,11 @@ def run_each(
                 busy[worker.pipe] = worker
             now = time.monotonic()
             first = min(worker.end for worker in busy.values())
-            ready = wait(list(busy), None if math.isinf(first) else max(0.0, first - now))
+            answered = wait(list(busy), None if math.isinf(first) else max(0.0, first - now))
+            ready = [pipe for pipe in busy if pipe in answered]
             late = [pipe for pipe, worker in busy.items() if worker.end <= now and pipe not in ready]
             for pipe in [*ready, *late]:
-                worker = busy.pop(pipe)  # type: ignore[arg-type, call-overload]
+                worker = busy.pop(pipe)
                 result = worker.result() if pipe in ready else WorkerLost(f"it took more than {limit:g} s")
                 if isinstance(result, Exception):
                     worker.kill()  # threads of a stalled clock may still run there
