@@ -110,10 +110,11 @@ def test_bad_actions_are_refused_in_words_and_change_nothing(make):
         env.step(np.zeros(7))
     env.reset(seed=1)
     for bad, words in (
-        (np.zeros(6), r"shape \(7,\) with control 'palm_twist', got \(6,\)"),
+        (np.zeros(6), r"action of control 'palm_twist': shape \(7,\) is expected, got \(6,\)"),
         (np.full(7, np.nan), "finite numbers"),
         ([np.inf] * 7, "finite numbers"),
-        ("up", "array of numbers"),
+        ("up", "numbers of shape"),
+        (np.zeros(7) + 1j, "numbers of shape"),
     ):
         with pytest.raises(ValueError, match=words):
             env.step(bad)
@@ -130,6 +131,7 @@ def test_bad_actions_are_refused_in_words_and_change_nothing(make):
         ({"control": "torque"}, "control 'torque' is none of palm_twist"),
         ({"time_limit": math.nan}, r"time_limit: a finite number \(s\) is expected, got nan"),
         ({"time_limit": "long"}, "time_limit: a finite number"),
+        ({"reward": 3}, "reward: a coglab.envs.handover.Reward"),
         ({"render_mode": "human"}, "render_mode 'human' is none of"),
     ],
 )

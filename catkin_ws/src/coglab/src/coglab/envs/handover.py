@@ -16,7 +16,7 @@ from gymnasium import spaces
 from coglab.envs.people import split_named
 from coglab.envs.referee import GIVE, RECEIVE, Referee
 from coglab.envs.stage import Stage
-from coglab.values import number
+from coglab.values import finite, number
 
 RATE = 20.0  # Hz of actions
 PERIODS = round(1.0 / (RATE * DT))  # of the world in one step
@@ -90,6 +90,8 @@ class HandoverEnv(gymnasium.Env):
             raise ValueError(f"control '{control}' is none of {', '.join(CONTROLS)}")
         if number(time_limit, "time_limit", "s", 0.0) > 600.0:
             raise ValueError(f"time_limit: at most 600 s is expected, got {time_limit!r}")
+        if not isinstance(reward, Reward):
+            raise ValueError(f"reward: a coglab.envs.handover.Reward is expected, got {reward!r}")
         if render_mode not in (None, "rgb_array"):
             raise ValueError(f"render_mode '{render_mode}' is none of None, rgb_array")
         self.control, self.time_limit, self.weights, self.render_mode = control, time_limit, reward, render_mode
@@ -97,7 +99,8 @@ class HandoverEnv(gymnasium.Env):
         self._camera: Any = None
         self._stage: Stage | None = None
         self._over = self._closed = False
-        self.action_space = spaces.Box(-1.0, 1.0, (7 if control == "palm_twist" else 8,), np.float32)
+        self._action_shape = (7 if control == "palm_twist" else 8,)
+        self.action_space = spaces.Box(-1.0, 1.0, self._action_shape, np.float32)
         self.observation_space = _observation_space()
         parts = self.observation_space.spaces
         boxes = {name: part for name, part in parts.items() if isinstance(part, spaces.Box)}
@@ -137,9 +140,9 @@ class HandoverEnv(gymnasium.Env):
         """Follows the action for 50 ms of virtual time. ValueError: an action of another shape or with a number that is
         not finite. RuntimeError: before reset(), or after the end of the episode."""
         self._check_open()
-        values = self._checked(action)
         if self._stage is None or self._over:
             raise RuntimeError("the episode has not begun or is over; call reset() first")
+        values = np.clip(finite(action, f"action of control '{self.control}'", self._action_shape), -1.0, 1.0)
         stage, referee = self._stage, self._referee
         rough = referee.rough
         self._follow(values[:-1])
@@ -188,18 +191,6 @@ class HandoverEnv(gymnasium.Env):
     def _check_open(self) -> None:
         if self._closed:
             raise RuntimeError("this environment is closed; make another one")
-
-    def _checked(self, action: Any) -> np.ndarray:
-        shape = self.action_space.shape
-        try:
-            values = np.asarray(action, dtype=float)
-        except (TypeError, ValueError):
-            raise ValueError(f"an action is an array of numbers with shape {shape}, got {action!r}") from None
-        if values.shape != shape:
-            raise ValueError(f"an action has shape {shape} with control '{self.control}', got {values.shape}")
-        if not np.all(np.isfinite(values)):
-            raise ValueError(f"an action has finite numbers in -1..1, got {values.tolist()}")
-        return np.clip(values, -1.0, 1.0)
 
     def _person(self, options: Mapping[str, Any]) -> int:
         unknown = sorted(set(options) - {"person"})

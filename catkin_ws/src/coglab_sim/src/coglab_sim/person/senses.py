@@ -25,6 +25,7 @@ FINGERTIP_WAY = 0.19
 """m, path of a fingertip from open to closed (middle finger of coglab_sim/config/hand_model.yaml). People see the
 closure by the fingertips."""
 FINGERS = 4  # number of fingertips that are seen independently; their mean is more exact than one
+OF_NOISE = np.array([*range(12), 13])  # which of the fresh random numbers of a step are for the visual error
 
 Value = TypeVar("Value")
 
@@ -48,13 +49,12 @@ class SlowNoise:
     """Correlated Gaussian noise with the given standard deviations."""
 
     def __init__(self, rng: np.random.Generator, sigma: np.ndarray) -> None:
-        self._rng, self._sigma = rng, sigma
+        self._sigma = sigma
         self._value = sigma * rng.normal(size=len(sigma))
 
-    def step(self, dt: float) -> np.ndarray:
-        """Returns the noise ``dt`` s later."""
+    def step(self, dt: float, fresh: np.ndarray) -> np.ndarray:
+        """Returns the noise ``dt`` s later. ``fresh``: standard normal numbers, one for each."""
         keep = math.exp(-dt / NOISE_TIME)
-        fresh = self._rng.normal(size=len(self._sigma))
         self._value = keep * self._value + math.sqrt(1.0 - keep**2) * self._sigma * fresh
         return self._value
 
@@ -94,10 +94,10 @@ class Senses:
     def __init__(self, person: Participant, rng: np.random.Generator) -> None:
         self.person, self._rng = person, rng
         turn = np.radians(person.seen_turn)
-        sigma = np.array([person.seen_noise] * 3 + [turn] * 3)
-        self._noises = SlowNoise(rng, sigma), SlowNoise(rng, sigma)
         self._of_tips = 1.0 / (FINGERTIP_WAY * math.sqrt(FINGERS))
-        self._bend_noise = SlowNoise(rng, np.array([person.seen_noise * self._of_tips]))
+        pose = [person.seen_noise] * 3 + [turn] * 3
+        # Of the robot's hand (6), of the object (6), of the closure of the robot's fingers (1).
+        self._noise = SlowNoise(rng, np.array([*pose, *pose, person.seen_noise * self._of_tips]))
         self._eyes: Delayed[tuple[WorldView, float, float]] = Delayed(person.seeing_delay)
         self._touch: Delayed[np.ndarray] = Delayed(person.feeling_delay)
         self._before: deque[tuple[float, np.ndarray, float]] = deque()
@@ -110,15 +110,16 @@ class Senses:
         dt = 0.0 if self._last is None else max(0.0, t - self._last)
         self._last = t
         seen, speed, closing = self._eyes.step(t, (view, *self._speeds(t, view)))
-        hand, thing = (noise.step(dt) for noise in self._noises)
+        fresh = self._rng.normal(size=15)  # at once: a step has little time
+        noise = self._noise.step(dt, fresh[OF_NOISE])
         return Percept(
             seen.robot_hand,
-            hand,
-            max(0.0, speed * self._misjudged + SLOWEST * float(self._rng.normal())),
-            seen.hand_closure + float(self._bend_noise.step(dt)[0]),
-            closing * self._misjudged + SLOWEST * self._of_tips * float(self._rng.normal()),
+            noise[:6],
+            max(0.0, speed * self._misjudged + SLOWEST * float(fresh[12])),
+            seen.hand_closure + float(noise[12]),
+            closing * self._misjudged + SLOWEST * self._of_tips * float(fresh[14]),
             seen.object,
-            thing,
+            noise[6:12],
             self._feel(self._touch.step(t, np.asarray(view.load, dtype=float))),
         )
 
