@@ -146,17 +146,18 @@ class BridgeNode:
         self._captured[source.frame] = captured
         sight = Sight(source.frame, captured, pose * source.offset)
         if sight.name == self.names.board:
-            self._see_board(sight)
-        else:
+            self._see_board(sight, not source.is_there)
+        elif not source.is_there:
             self.broadcaster.sendTransform(self.services.transform(sight))
         self.sights.add([sight])
 
-    def _see_board(self, sight: Sight) -> None:
+    def _see_board(self, sight: Sight, broadcast: bool) -> None:
         """The board stands still: it is broadcast when it is first seen, and when it has moved."""
         known = self.sights.board
         if known is None or max(known.frame.distance(sight.frame)) > BOARD_MOVED:
             self.sights.board = Board(sight.frame, self.mapping.slots)
-            self.static.sendTransform(self.services.transform(sight))
+            if broadcast:
+                self.static.sendTransform(self.services.transform(sight))
 
     def _warn(self, frame: str, text: str) -> None:
         now = time.monotonic()
