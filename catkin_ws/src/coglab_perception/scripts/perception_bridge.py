@@ -139,7 +139,14 @@ class BridgeNode:
             self._warn(source.frame, f"a pose is {captured - now:.2f} s from the future; use stamp: arrival")
             return
         if now - captured > source.largest_age:
-            self._warn(source.frame, f"the newest pose is {now - captured:.2f} s old, at most {source.largest_age:g} s")
+            age = (
+                "has no stamp"
+                if stamp.is_zero()
+                else f"is {now - captured:.2f} s old, at most {source.largest_age:g} s"
+            )
+            self._warn(
+                source.frame, f"the newest pose {age}; a tracker without this computer's clock needs stamp: arrival"
+            )
             return
         if captured <= self._captured.get(source.frame, 0.0):
             return
