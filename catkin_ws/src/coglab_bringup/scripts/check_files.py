@@ -2,8 +2,8 @@
 """check_files.py ARGUMENT:=VALUE ...: whether the files that a launch file names can be used.
 
 For launch files (<param command=...>): runs before any node is started, because a node that cannot read its file is
-started again and again, or runs without it. Prints "usable", or ends with 1 and one sentence. What the files mean is
-checked by the nodes that read them.
+started again and again, or runs without it. Prints "usable", or ends with 1 and one sentence. What controllers,
+signals, primitives, patterns and objects mean is checked by the nodes that read them.
 """
 
 from __future__ import annotations

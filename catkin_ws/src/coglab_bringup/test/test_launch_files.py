@@ -102,11 +102,33 @@ def test_a_file_that_cannot_be_written_is_refused(tmp_path, name):
         ({"machines": "machines.yaml"}, "whole path"),
         ({"arm": "libnot_there.so"}, "cannot be loaded"),
         ({"arm": "libc.so.6"}, "COGLAB_ARM"),
+        ({"arm": "ideal", "split": "true"}, "fri alone"),
     ],
 )
 def test_arguments_that_name_nothing_are_refused(arguments, named):
     with pytest.raises(ValueError, match=named):
         check(arguments)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "named"),
+    [
+        ("machines", "timimg: calm\n", "timimg"),
+        ("machines", "actions: {wipe: 'nowhere_at_all:build'}\n", "no module 'nowhere_at_all'"),
+        ("tracker", "frames: {human_hand: {tf: hand, offst: {}}}\n", "offst"),
+        ("tracker", "frames: {hand: {tf: human_hand}}\n", "perception contract"),
+    ],
+)
+def test_a_file_that_its_node_would_refuse_is_refused_before_the_start(tmp_path, name, content, named):
+    file = tmp_path / "file.yaml"
+    file.write_text(content)
+    with pytest.raises(ValueError, match=named):
+        check({name: str(file)})
+
+
+def test_an_arm_from_a_library_that_fails_ends_the_launch():
+    (robot,) = (node for node in load("coglab_controllers", "robot.launch", "arm:=libmy_arm.so", "respawn:=true").nodes)
+    assert (robot.respawn, robot.required) == (False, True)
 
 
 def test_a_launch_with_a_file_that_is_not_there_starts_nothing():

@@ -139,24 +139,32 @@ class BridgeNode:
             self._warn(source.frame, f"a pose is {captured - now:.2f} s from the future; use stamp: arrival")
             return
         if now - captured > source.largest_age:
-            self._warn(source.frame, f"the newest pose is {now - captured:.2f} s old, at most {source.largest_age:g} s")
+            age = (
+                "has no stamp"
+                if stamp.is_zero()
+                else f"is {now - captured:.2f} s old, at most {source.largest_age:g} s"
+            )
+            self._warn(
+                source.frame, f"the newest pose {age}; a tracker without this computer's clock needs stamp: arrival"
+            )
             return
         if captured <= self._captured.get(source.frame, 0.0):
             return
         self._captured[source.frame] = captured
         sight = Sight(source.frame, captured, pose * source.offset)
         if sight.name == self.names.board:
-            self._see_board(sight)
-        else:
+            self._see_board(sight, not source.is_there)
+        elif not source.is_there:
             self.broadcaster.sendTransform(self.services.transform(sight))
         self.sights.add([sight])
 
-    def _see_board(self, sight: Sight) -> None:
+    def _see_board(self, sight: Sight, broadcast: bool) -> None:
         """The board stands still: it is broadcast when it is first seen, and when it has moved."""
         known = self.sights.board
         if known is None or max(known.frame.distance(sight.frame)) > BOARD_MOVED:
             self.sights.board = Board(sight.frame, self.mapping.slots)
-            self.static.sendTransform(self.services.transform(sight))
+            if broadcast:
+                self.static.sendTransform(self.services.transform(sight))
 
     def _warn(self, frame: str, text: str) -> None:
         now = time.monotonic()

@@ -33,6 +33,11 @@ def test_an_offset_turns_in_degrees(tmp_path):
     assert np.allclose(seen.apply([1.0, 0.0, 0.0]), [1.0, 1.0, 1.0])
 
 
+def test_a_tracker_with_the_names_of_the_contract_is_served_as_it_is(tmp_path):
+    ours, other = load(tmp_path, "frames: {human_hand: {tf: human_hand}, board: {tf: b}}").sources
+    assert (ours.is_there, other.is_there) == (True, False)
+
+
 def test_stamps_of_another_clock_are_replaced_by_the_arrival(tmp_path):
     mapping = load(tmp_path, "stamp: arrival\nlatency: 0.03\nframes: {human_hand: {tf: h}}")
     assert mapping.captured(1e9, 10.0) == pytest.approx(9.97)
@@ -53,6 +58,9 @@ def test_stamps_of_another_clock_are_replaced_by_the_arrival(tmp_path):
         ("human_hand: {tf: h, offset: {position: [1, 2, .nan]}}", "number"),
         ("human_hand: {tf: h, largest_age: 0}", "largest_age"),
         ("human_hand: {tf: h, colour: red}", "colour"),
+        ("human_hand: {tf: human_hand, offset: {position: [0, 0, 1]}}", "this bridge broadcasts"),
+        ("human_hand: {tf: object_mug}", "this bridge broadcasts"),
+        ("board: {tf: board}\nstamp: arrival", "this bridge broadcasts"),
     ],
 )
 def test_a_wrong_source_is_refused_with_file_line_and_field(tmp_path, source, named):

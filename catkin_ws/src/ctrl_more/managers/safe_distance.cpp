@@ -35,7 +35,8 @@ namespace ctrl_more {
 /// A handover ends in touch, which separation would never allow. For the points of the person in
 /// `touch` the limit does not fall below `touch_speed` where the last line of the arm, wrist to
 /// palm, is the nearest one: power and force limiting there (5.5.5), separation everywhere else.
-/// The force of a touch is at most v_r sqrt(mu k), mu = 1 / (1/m_person + 1/m_robot).
+/// A free touch has the force v sqrt(mu k), mu = 1 / (1/m_person + 1/m_robot), v: speed of arm and
+/// person against each other. docs/equations.md has the source of each figure.
 ///
 /// Block in the central module's file, all optional: `person` (key or list of keys in estimatedData
 /// or measuredData: positions in the base frame, 3 numbers [m], or poses, 7; `person`), `touch`

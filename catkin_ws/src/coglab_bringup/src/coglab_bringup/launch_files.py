@@ -22,6 +22,8 @@ def check(arguments: Mapping[str, str]) -> None:
             _CHECKS[name](value)
         except ValueError as error:
             raise ValueError(f"{name}:={value}: {' '.join(str(error).split())}") from None
+    if arguments.get("split", "false").lower() == "true" and arguments.get("arm", "fri") != "fri":
+        raise ValueError(f"split:=true: the two nodes know arm:=fri alone; leave split out, or arm:={arguments['arm']}")
     source, simulated = arguments.get("perception", "none"), arguments.get("sim", "true").lower() == "true"
     if source not in PERCEPTION:
         raise ValueError(f"perception:={source}: expected one of {', '.join(PERCEPTION)}")
@@ -91,6 +93,27 @@ def _controller_file(value: str) -> None:
             "of a file of coglab_controllers/config"
         ) from None
     _mapping(str(path))
+
+
+def _machines(value: str) -> None:
+    """A configuration of the machines whose own actions, states and deliveries can be imported."""
+    from coglab_smach.context.config import Config, ConfigError
+    from coglab_smach.context.parts import Parts
+
+    _mapping(value)
+    try:
+        Parts.load(Config.load(value))
+    except ConfigError as error:
+        raise ValueError(str(error)) from None
+
+
+def _tracker(value: str) -> None:
+    """A mapping of the perception bridge."""
+    from coglab_perception.frames import FrameNames
+    from coglab_perception.tracker_mapping import TrackerMapping
+
+    _mapping(value)
+    TrackerMapping.load(value, FrameNames.load(str(package_path("coglab_perception", "config", "frames.yaml"))))
 
 
 def _primitives(value: str) -> None:
@@ -167,16 +190,16 @@ def _or_empty(judge: Callable[[str], None]) -> Callable[[str], None]:
 
 
 _CHECKS: dict[str, Callable[[str], object]] = {
-    **dict.fromkeys(("controllers", "machines"), _mapping),
+    "controllers": _mapping,
+    "machines": _machines,
     **dict.fromkeys(("feedback", "managers", "signals"), _or_empty(_controller_file)),
     **dict.fromkeys(("results", "log_file", "hand_trace"), _or_empty(_written)),
     "arm": _arm,
     "primitives": _primitives,
     "patterns": _patterns,
     "objects": _objects,
-    "tracker": _or_empty(_mapping),
+    "tracker": _or_empty(_tracker),
     "contact_learnt_file": _or_empty(_learnt),
     "record": _or_empty(_folder),
-    "perception": str,
-    "sim": str,
+    **dict.fromkeys(("perception", "sim", "split"), str),
 }

@@ -70,6 +70,11 @@ class Source:
     largest_age: float = 0.2
     """s; an older pose is not passed on"""
 
+    @property
+    def is_there(self) -> bool:
+        """True if the tracker broadcasts the contract's frame itself: it is served, and not broadcast again."""
+        return self.tf == self.frame
+
 
 @dataclass(frozen=True)
 class TrackerMapping:
@@ -87,11 +92,20 @@ class TrackerMapping:
         document = read(path)
         document.check(SCHEMA)
         value: Mapping[str, Any] = document.value
-        age = float(value.get("largest_age", 0.2))
+        age, by_arrival = float(value.get("largest_age", 0.2)), value.get("stamp", "capture") == "arrival"
+        sources = tuple(_source(document, names, frame, age) for frame in value["frames"])
+        for source in sources:
+            if source.tf and (names.is_tracked(source.tf) or source.tf == names.board):
+                if not source.is_there or by_arrival or "offset" in value["frames"][source.frame]:
+                    text = (
+                        f"'{source.tf}' is a name that this bridge broadcasts; give your tracker's frame another name, "
+                        f"or write {source.tf}: {{tf: {source.tf}}} without offset and without stamp: arrival"
+                    )
+                    raise YamlError(document.sentence(("frames", source.frame, "tf"), text))
         return TrackerMapping(
-            tuple(_source(document, names, frame, age) for frame in value["frames"]),
+            sources,
             slots_of(value.get("slots", {})),
-            value.get("stamp", "capture") == "arrival",
+            by_arrival,
             float(value.get("latency", 0.0)),
         )
 
