@@ -2,6 +2,8 @@
 limits of the arm as they are counted."""
 
 import importlib
+import os
+import subprocess
 import sys
 from dataclasses import replace
 
@@ -41,6 +43,24 @@ def test_an_object_on_the_board_lies_in_its_middle():
     world = World(2, CONSIDERATE, "world")
     assert not world.human.holds()
     assert world.cell.truth()["object"]["position"] == pytest.approx([0.45, -0.55, 0.052], abs=1e-6)
+
+
+def test_a_locale_with_decimal_commas_changes_no_number(tmp_path):
+    (tmp_path / "source").write_text(
+        'LC_NUMERIC\ndecimal_point "<U002C>"\nthousands_sep ""\ngrouping -1\nEND LC_NUMERIC\n'
+    )
+    (tmp_path / "letters").write_text("<escape_char> /\n<mb_cur_max> 1\nCHARMAP\n<U002C> /x2c COMMA\nEND CHARMAP\n")
+    made = ["localedef", "-c", "-i", tmp_path / "source", "-f", tmp_path / "letters", tmp_path / "xx_XX"]
+    subprocess.run(made, capture_output=True, check=False)  # warns of the categories that it has not
+    program = (
+        "import locale, lwr_fri_bridge\n"
+        "from coglab_py.packages import package_path\n"
+        "from coglab_trials import Conditions, World\n"
+        "locale.setlocale(locale.LC_NUMERIC, 'xx_XX'); assert locale.localeconv()['decimal_point'] == ','\n"
+        "limits = str(package_path('lwr_description', 'config', 'joint_limits.yaml'))\n"
+        "lwr_fri_bridge.Bridge(limits, control_mode='joint_impedance stiffness 500.5'); World(3, Conditions())\n"
+    )
+    subprocess.run([sys.executable, "-c", program], env={**os.environ, "LOCPATH": str(tmp_path)}, check=True)
 
 
 @pytest.mark.parametrize("module", ["coglab_sim._cell", "coglab_sim._virtual"])
