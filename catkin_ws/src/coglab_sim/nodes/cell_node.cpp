@@ -53,9 +53,9 @@ std::uint16_t publishedPort(const std::string& parameter) {
 
 /// Waits for the bridge's port. @throws std::runtime_error after `limit` s or at shutdown.
 std::uint16_t waitForPort(const std::string& parameter, double limit) {
-  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(limit);
+  const ros::SteadyTime end = ros::SteadyTime::now() + ros::WallDuration(limit);
   ROS_INFO("waiting up to %.0f s for the bridge's port in parameter %s", limit, parameter.c_str());
-  while (ros::ok() && ros::WallTime::now() < end) {
+  while (ros::ok() && ros::SteadyTime::now() < end) {
     if (const std::uint16_t port = publishedPort(parameter); port != 0) return port;
     ros::WallDuration(0.1).sleep();
   }
@@ -301,8 +301,8 @@ class CellNode {
     const auto share = [](std::uint64_t part, std::uint64_t of) {
       return of > 0 ? static_cast<double>(part) / static_cast<double>(of) : 0.0;
     };
-    const double seconds = (ros::WallTime::now() - measured_at_).toSec() * pace_.factor();
-    measured_at_ = ros::WallTime::now();
+    const double seconds = (ros::SteadyTime::now() - measured_at_).toSec() * pace_.factor();
+    measured_at_ = ros::SteadyTime::now();
     ComputerLoad load;
     load.latest = cell_->takeLatest();
     load.late_steps = share(now.late_ticks - measured_.late_ticks, now.tick - measured_.tick);
@@ -375,7 +375,7 @@ class CellNode {
   bool follow_port_ = false, failed_ = false;
   std::uint64_t answers_seen_ = 0;
   CellSnapshot measured_;  // at the last evaluation of the load
-  ros::WallTime measured_at_ = ros::WallTime::now();
+  ros::SteadyTime measured_at_ = ros::SteadyTime::now();
   double hand_messages_ = 0.0, hand_rate_ = 0.0;
   std::ofstream log_;
   ros::Publisher truth_, motor_states_, messages_, clock_, touch_, palm_imu_, palm_wrench_, factor_,

@@ -2,6 +2,8 @@
 limits of the arm as they are counted."""
 
 import importlib
+import os
+import subprocess
 import sys
 from dataclasses import replace
 
@@ -150,3 +152,21 @@ def test_a_new_goal_ends_the_one_that_runs():
     world.hand.end(second, "enough", Reason.CANCELLED)
     before = world.cell.truth()["hand_closure"]
     assert stepped(world, 0.3).cell.truth()["hand_closure"] == pytest.approx(before, abs=0.05), "the fingers stop"
+
+
+def test_a_locale_with_decimal_commas_changes_no_number(tmp_path):
+    (tmp_path / "source").write_text(
+        'LC_NUMERIC\ndecimal_point "<U002C>"\nthousands_sep ""\ngrouping -1\nEND LC_NUMERIC\n'
+    )
+    (tmp_path / "letters").write_text("<escape_char> /\n<mb_cur_max> 1\nCHARMAP\n<U002C> /x2c COMMA\nEND CHARMAP\n")
+    made = ["localedef", "-c", "-i", tmp_path / "source", "-f", tmp_path / "letters", tmp_path / "xx_XX"]
+    subprocess.run(made, capture_output=True, check=False)  # warns of the categories that it has not
+    program = (
+        "import locale, lwr_fri_bridge\n"
+        "from coglab_py.packages import package_path\n"
+        "from coglab_trials import Conditions, World\n"
+        "locale.setlocale(locale.LC_NUMERIC, 'xx_XX'); assert locale.localeconv()['decimal_point'] == ','\n"
+        "limits = str(package_path('lwr_description', 'config', 'joint_limits.yaml'))\n"
+        "lwr_fri_bridge.Bridge(limits, control_mode='joint_impedance stiffness 500.5'); World(3, Conditions())\n"
+    )
+    subprocess.run([sys.executable, "-c", program], env={**os.environ, "LOCPATH": str(tmp_path)}, check=True)

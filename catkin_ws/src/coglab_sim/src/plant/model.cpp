@@ -1,6 +1,7 @@
 #include "coglab_sim/plant/model.hpp"
 
 #include <algorithm>
+#include <clocale>
 #include <cstring>
 #include <stdexcept>
 
@@ -11,6 +12,22 @@ namespace {
   throw std::runtime_error(std::string("MuJoCo: ") + text);
 }
 void dropWarning(const char*) {}  // the plant reads warnings from mjData
+
+/// While it lives, this thread reads and writes numbers with a decimal point, as URDF and MJCF have
+/// them, in a program whose locale has decimal commas.
+class DecimalPoint {
+ public:
+  DecimalPoint() : made_(newlocale(LC_ALL_MASK, "C", nullptr)), before_(uselocale(made_)) {}
+  ~DecimalPoint() {
+    uselocale(before_);
+    freelocale(made_);
+  }
+  DecimalPoint(const DecimalPoint&) = delete;
+  DecimalPoint& operator=(const DecimalPoint&) = delete;
+
+ private:
+  locale_t made_, before_;
+};
 
 void checkLibrary() {
   // By default MuJoCo ends the process on an error and writes a file on a warning.
@@ -42,6 +59,7 @@ mjModel* compile(const std::string& text, const std::string& urdf) {
 
 Model::Model(const SceneDescription& scene) {
   checkLibrary();
+  const DecimalPoint numbers;
   model_.reset(compile(writeModel(scene), scene.urdf));
   data_.reset(mj_makeData(model_.get()));
   if (!data_) throw std::runtime_error("MuJoCo has no memory for the model's state");

@@ -1,5 +1,6 @@
 #include "lwr_fri_bridge/requests/events.hpp"
 
+#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <sstream>
@@ -64,15 +65,11 @@ void readParameters(const std::vector<std::string>& words, ControlMode& mode) {
       fail("'" + name + "': expected 'stiffness' or 'damping'");
     std::vector<double> values;
     for (; next < words.size() && words[next] != "stiffness" && words[next] != "damping"; ++next) {
-      std::size_t used = 0;
+      const std::string& word = words[next];
       double value = NAN;
-      try {
-        value = std::stod(words[next], &used);
-      } catch (const std::exception&) {
-        used = 0;
-      }
-      if (used == 0 || used != words[next].size())
-        fail("'" + words[next] + "' in " + name + " is not a number");
+      const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+      if (error != std::errc() || end != word.data() + word.size())
+        fail("'" + word + "' in " + name + " is not a number");
       values.push_back(value);
     }
     const bool stiffness = name == "stiffness";

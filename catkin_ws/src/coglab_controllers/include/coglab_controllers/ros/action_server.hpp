@@ -45,10 +45,11 @@ class ActionServer : public actionlib::ActionServerBase<Action> {
     goals_ = node_.template subscribe<ActionGoal>("goal", 50, &ActionServer::onGoal, this);
     cancels_ = node_.template subscribe<actionlib_msgs::GoalID>("cancel", 50,
                                                                 &ActionServer::onCancel, this);
-    timer_ = node_.createTimer(ros::Duration(kStatusPeriod), [this](const ros::TimerEvent&) {
-      forgetOldGoals();
-      publishStatus();
-    });
+    timer_ = node_.createSteadyTimer(ros::WallDuration(kStatusPeriod),
+                                     [this](const ros::SteadyTimerEvent&) {
+                                       forgetOldGoals();
+                                       publishStatus();
+                                     });
   }
 
   void onGoal(const boost::shared_ptr<const ActionGoal>& goal) {
@@ -106,7 +107,7 @@ class ActionServer : public actionlib::ActionServerBase<Action> {
   ros::NodeHandle node_;
   ros::Publisher results_, feedback_, status_;
   ros::Subscriber goals_, cancels_;
-  ros::Timer timer_;
+  ros::SteadyTimer timer_;
 };
 
 }  // namespace coglab_controllers
