@@ -55,7 +55,7 @@ def test_units_and_lost_samples_are_found_and_said(tmp_path):
     table[120, 1:4] += 800.0  # something else was taken for the hand
     demonstration = read(write(tmp_path / "a.csv", "t,x,y,z,roll,pitch,yaw,closing", table.T))
     said = "; ".join(demonstration.notes)
-    for words in ("time is in ms", "lengths are in mm", "turns are in degrees", "closing is in percent", "not finite"):
+    for words in ("time is in ms", "lengths are in mm", "turns are in degrees", "taken as percent", "not finite"):
         assert words in said
     assert "repeat the one before" in said and "jump faster" in said
     found = cut.reaches(demonstration)

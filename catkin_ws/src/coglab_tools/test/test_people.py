@@ -170,6 +170,14 @@ def test_what_is_learnt_says_from_what(folder, tmp_path, capsys):
     assert right >= 72, "of 80"
 
 
+def test_a_giver_alone_teaches_giving(dexycb, tmp_path, capsys):
+    assert run(["people", "learn", str(dexycb[1]), "--primitives", str(tmp_path / "p.xml")]) == 0
+    library = load_library(tmp_path / "p.xml")
+    assert "learnt from 1 recorded giver" in library["give_human"].description
+    assert "learnt" not in library["reach_human"].description and "reach_human_left" not in library.ids()
+    assert "reach_human_left, reach_human_right: not learnt" in capsys.readouterr().out
+
+
 @needs_sample
 def test_shipped_recorded_primitives_are_those_of_the_sample(tmp_path):
     """Their weights can be learnt again from the recording, which is not shipped."""

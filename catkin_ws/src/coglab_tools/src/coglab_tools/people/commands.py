@@ -88,7 +88,7 @@ def learn(options: argparse.Namespace) -> Answer:
     """`people learn`."""
     from coglab_tools.dmp.demonstration import for_shell
     from coglab_tools.files import write_whole
-    from coglab_tools.people.learn import PRIMITIVES, base_library, learn_patterns, learn_primitives
+    from coglab_tools.people.learn import PRIMITIVES, base_library, learn_patterns, learn_primitives, learnable
 
     if options.primitives is None and options.patterns is None:
         raise UsageError("nothing to write: name --primitives FILE.xml or --patterns FILE.json, or both")
@@ -102,9 +102,12 @@ def learn(options: argparse.Namespace) -> Answer:
         except ValueError as error:
             raise CheckFailed(str(error)) from None
         write_whole(options.primitives, library.format())
-        lines += [f"  {name}: {library[name].description}" for name in PRIMITIVES]
+        names = learnable(found)
+        lines += [f"  {name}: {library[name].description}" for name in names]
+        if left := [name for name in PRIMITIVES if name not in names]:
+            lines.append(f"  {', '.join(left)}: not learnt, nobody was recorded in this role; the shipped ones stay")
         lines.append(f"wrote {options.primitives}: {', '.join(library.ids())}")
-        data["primitives"] = {name: library[name].duration for name in PRIMITIVES}
+        data["primitives"] = {name: library[name].duration for name in names}
         follow.append(f"primitives:={for_shell(options.primitives)}")
     if options.patterns is not None:
         counts = learn_patterns(found, options.patterns)
