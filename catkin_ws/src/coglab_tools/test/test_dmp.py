@@ -55,7 +55,7 @@ def test_units_and_lost_samples_are_found_and_said(tmp_path):
     table[120, 1:4] += 800.0  # something else was taken for the hand
     demonstration = read(write(tmp_path / "a.csv", "t,x,y,z,roll,pitch,yaw,closing", table.T))
     said = "; ".join(demonstration.notes)
-    for words in ("time is in ms", "lengths are in mm", "turns are in degrees", "closing is in percent", "not finite"):
+    for words in ("time is in ms", "lengths are in mm", "turns are in degrees", "taken as percent", "not finite"):
         assert words in said
     assert "repeat the one before" in said and "jump faster" in said
     found = cut.reaches(demonstration)
@@ -87,9 +87,15 @@ def test_lengths_without_a_unit_are_judged(tmp_path, scale, said):
 
 def test_turns_without_a_unit_are_told(tmp_path):
     times, places = reach()
-    columns = [times, *places.T, 0 * times, 0 * times, 5.0 * share(times)]
+    columns = [times, *places.T, 0 * times, 0 * times, 0.3 * share(times)]
     found = read(write(tmp_path / "a.csv", "t,x,y,z,roll,pitch,yaw", columns))
     assert any("taken as rad" in note and "--angle deg" in note for note in found.notes)
+
+
+def test_units_behind_names_count_in_npz_files(tmp_path):
+    times, places = reach()
+    np.savez(tmp_path / "a.npz", t_ms=1000 * times, position_cm=100 * places)
+    assert follows(read(tmp_path / "a.npz"), times, places)
 
 
 def test_a_table_with_semicolons_and_decimal_commas_is_read(tmp_path):
@@ -173,6 +179,13 @@ def faulty(name, tmp_path):
     if name == "step":
         places[120:, 0] += 0.1
         return write(path, "t,x,y,z", [times, *places.T]), "jumps by 0.1"
+    if name == "turns":
+        columns = [times, *places.T, 0 * times, 0 * times, 5.0 * share(times)]
+        return write(path, "t,x,y,z,roll,pitch,yaw", columns), "rad or degrees? Name the unit with --angle"
+    if name == "closing":
+        return write(path, "t,x,y,z,closing", [times, *places.T, share(times) - 0.5]), "closing goes from -0.5 to 0.5"
+    if name == "double":
+        return write(path, "t,x,y,y", [times, *places.T]), ":1: two columns have the name 'y'"
     if name == "quaternion":
         q = [0 * times, 0 * times, 0 * times, 0 * times + 0.5]
         return write(path, "t,x,y,z,qx,qy,qz,qw", [times, *places.T, *q]), "quaternion of length 0.50"
@@ -194,6 +207,9 @@ FAULTS = (
     "unit",
     "half_named",
     "quaternion",
+    "turns",
+    "closing",
+    "double",
     "npz",
     "bag",
 )
@@ -220,6 +236,11 @@ def full_disk():
 def test_a_full_disk_leaves_no_half_of_a_file(tmp_path, full_disk, capsys, verb, option, file):
     assert run(["dmp", verb, "--id", "reach_human", option, str(tmp_path / file)]) == 1
     assert file in capsys.readouterr().err and list(tmp_path.iterdir()) == []
+
+
+def test_a_full_disk_is_found_before_the_arm_gives_way(tmp_path, full_disk, capsys):
+    assert run(["dmp", "record", "a", "--out", str(tmp_path), "--master", "http://127.0.0.1:9"]) == 1
+    assert "a.csv cannot be written" in capsys.readouterr().err and list(tmp_path.iterdir()) == []
 
 
 def test_a_goal_that_is_no_number_is_a_wrong_argument(capsys):

@@ -78,14 +78,23 @@ def test_a_handover_in_the_robots_world_plays(folder, tmp_path):
 def test_samples_that_the_tracker_lost_within_a_reach_are_bridged(folder):
     path = folder / "giver_RHand_pose_saved.csv"
     lines = path.read_text(encoding="utf-8").splitlines()
-    lines[200:210] = [lines[200]] * 10
+    lines[200:206] = [lines[200]] * 6
+    lines[206:210] = ["nan,nan,nan,0,0,0,1"] * 4
     path.write_text("\n".join(lines), encoding="utf-8")
-    assert read_kth(folder).reach("giver").way == pytest.approx(np.linalg.norm([0.4, 0.05, 0.25]), abs=0.01)
+    handover = read_kth(folder)
+    assert handover.reach("giver").way == pytest.approx(np.linalg.norm([0.4, 0.05, 0.25]), abs=0.01)
+    assert any("4 of 600 samples are not finite" in note for note in handover.notes)
+
+
+def test_without_forces_the_way_back_is_not_taken_for_the_reach(folder):
+    reach = read_kth(folder).span("giver")
+    (folder / "Wrench_taker_saved.csv").unlink()
+    assert read_kth(folder).span("giver") == reach
 
 
 def test_a_folder_that_cannot_be_used_is_refused_with_the_file(folder):
     (folder / "giver_RHand_pose_saved.csv").write_text("x,y,z,q0,q1,q2,q3\n1,2\n", encoding="utf-8")
-    with pytest.raises(CheckFailed, match=r"giver_RHand_pose_saved\.csv: expected 7 columns, got 2"):
+    with pytest.raises(CheckFailed, match=r"giver_RHand_pose_saved\.csv:2: expected 7 columns, got 2"):
         read_kth(folder)
     (folder / "giver_RHand_pose_saved.csv").unlink()
     with pytest.raises(NotThere, match=r"giver_RHand_pose_saved\.csv: no such file"):
@@ -159,6 +168,14 @@ def test_what_is_learnt_says_from_what(folder, tmp_path, capsys):
             }
             right += decided == {name}
     assert right >= 72, "of 80"
+
+
+def test_a_giver_alone_teaches_giving(dexycb, tmp_path, capsys):
+    assert run(["people", "learn", str(dexycb[1]), "--primitives", str(tmp_path / "p.xml")]) == 0
+    library = load_library(tmp_path / "p.xml")
+    assert "learnt from 1 recorded giver" in library["give_human"].description
+    assert "learnt" not in library["reach_human"].description and "reach_human_left" not in library.ids()
+    assert "reach_human_left, reach_human_right: not learnt" in capsys.readouterr().out
 
 
 @needs_sample

@@ -154,7 +154,7 @@ def record(options: argparse.Namespace) -> Answer:
     from coglab_tools.dmp.cut import reaches
 
     terminal = recorder.Terminal()
-    write_whole(path, "")  # a folder that cannot be written is found out before anything moves
+    write_whole(path, bytes(1_000_000))  # a folder or disk that cannot be written is found out before anything moves
     path.unlink()
     if threading.current_thread() is threading.main_thread():  # elsewhere Python sets no handlers
         for number in (signal.SIGHUP, signal.SIGTERM):  # as Ctrl-C: hand guiding has to end
@@ -238,14 +238,17 @@ def import_files(options: argparse.Namespace) -> Answer:
     double = [name for name, count in names.items() if count > 1]
     if double:
         raise UsageError(f"two files give demonstrations of the name {double[0]}; import them into two folders")
-    paths = []
+    paths: list[Path] = []
+    replaced = sum((options.out / f"{d.name}.csv").exists() for d in found)
     for d in found:
         paths.append(options.out / f"{d.name}.csv")
         try:
             d.save(paths[-1])
         except CheckFailed as error:
             raise CheckFailed(f"{error}; {len(paths) - 1} of {len(found)} demonstrations were written") from None
-    text = [_of_files(options.files, found), *_table(found), f"wrote {len(paths)} demonstrations to {options.out}"]
+    wrote = f"wrote {len(paths)} demonstrations to {options.out}"
+    wrote += f"; {replaced} took the place of earlier files" if replaced else ""
+    text = [_of_files(options.files, found), *_table(found), wrote]
     return Answer(
         "\n".join(text),
         {"demonstrations": [_facts(d, path) for d, path in zip(found, paths, strict=True)]},
@@ -393,11 +396,10 @@ def validate(options: argparse.Namespace) -> Answer:
         middle = check.run(library[name], check.region_middle())
         share = sum(c.reached for c in courses) / len(courses)
         slowed = sum(c.verdict == "slowed" for c in courses)
-        why = Counter(c.verdict.split(" ends")[0].split(" at ")[0] if c.stopped_by else "ends off"
-                      for c in courses if not c.reached)  # fmt: skip
+        why = Counter(c.stopped_by or "ends off the goal" for c in courses if not c.reached)
         good = share >= options.needed and middle.reached
         failed += [] if good else [name]
-        missed = ", ".join(f"{count} {word}" for word, count in why.most_common())
+        missed = ", ".join(f"{count}: {what}" for what, count in why.most_common())
         lines.append(
             f"{'ok ' if good else 'bad'} {name}: {100 * share:.0f} % of {len(courses)} goals reached, {slowed} slowed "
             f"by a joint's speed{f'; missed: {missed}' if missed else ''}; middle of the region: {middle.verdict}, "

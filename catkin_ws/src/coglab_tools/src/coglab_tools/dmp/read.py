@@ -91,7 +91,11 @@ def _read_csv(path: Path, source: Source) -> tuple[Table, dict[str, str], Place]
             raise CheckFailed(f"{path}: the file is empty; expected a header line t,x,y,z and samples")
         names, units = _named(header)
         if "t" not in names:
-            raise CheckFailed(f"{path}:1: expected a header with t,x,y,z or t and seven joints, got {','.join(header)}")
+            got = ascii(",".join(header))[:80]
+            raise CheckFailed(f"{path}:1: expected a header with t,x,y,z or t and seven joints, got {got}")
+        double = [name for name in names if name and names.count(name) > 1]
+        if double:
+            raise CheckFailed(f"{path}:1: two columns have the name '{double[0]}'")
         frame_column = names.index("frame") if "frame" in names else -1
         kept: list[list[str]] = []
         frames: set[str] = set()
@@ -113,8 +117,8 @@ def _read_csv(path: Path, source: Source) -> tuple[Table, dict[str, str], Place]
                 row = [word.replace(",", ".") for word in row]
             kept.append([*row, str(rows.line_num)])
     if not kept:
-        seen = f"; its frames are {', '.join(sorted(frames))}" if frames else ""
-        raise CheckFailed(f"{path}: no samples{f' of {wanted}' if wanted else ''} in it{seen}; choose with --frame")
+        seen = f" of {wanted} in it; choose one of {', '.join(sorted(frames))} with --frame" if frames else " in it"
+        raise CheckFailed(f"{path}: no samples{seen}")
     table = {}
     for i, name in enumerate(names):
         if name == "frame" or not name:
@@ -153,8 +157,8 @@ def _read_npz(path: Path, source: Source) -> tuple[Table, dict[str, str], Place]
     try:
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: np.asarray(file[name], dtype=float) for name in file.files}
-    except Exception as error:  # zip, header and value errors alike
-        raise CheckFailed(f"{path}: no npz file of plain numbers ({error})") from None
+    except Exception:  # zip, header and value errors alike
+        raise CheckFailed(f"{path}: no npz file of plain numbers; write it with numpy.savez") from None
     frames = sorted({name.rpartition(".")[0] for name in arrays if name.endswith(".t")})
     frame = source.frame or ("human_hand" if "human_hand" in frames else frames[0] if frames else "")
     if frame in frames:
@@ -162,19 +166,24 @@ def _read_npz(path: Path, source: Source) -> tuple[Table, dict[str, str], Place]
     elif source.frame:
         raise CheckFailed(f"{path}: no frame '{frame}' in it; its frames are {', '.join(frames) or 'not named'}")
     table: Table = {}
-    for name, value in arrays.items():
+    known, units = _named(list(arrays))
+    for name, value in zip(known, arrays.values(), strict=True):
         columns = {"position": ("x", "y", "z"), "orientation": ("qx", "qy", "qz", "qw"), "joints": JOINTS}.get(name)
         if columns is not None and value.ndim == 2 and value.shape[1] == len(columns):
             table.update(zip(columns, value.T, strict=True))
+            units.update(dict.fromkeys(columns, units[name]) if name in units else {})
         elif value.ndim == 1:
             table[name] = value
+    shapes = ", ".join(f"{name} {value.shape}" for name, value in sorted(arrays.items()))
     if "t" not in table:
-        raise CheckFailed(f"{path}: expected an array t and position (n, 3), got {', '.join(sorted(arrays)) or 'none'}")
+        raise CheckFailed(f"{path}: expected an array t and position (n, 3), got {shapes or 'none'}")
+    if "x" not in table and JOINTS[0] not in table:
+        raise CheckFailed(f"{path}: expected position (n, 3), or x, y and z, or joints (n, 7), got {shapes}")
     n = len(table["t"])
     wrong = [f"{name} has {len(value)}" for name, value in table.items() if len(value) != n]
     if wrong:
         raise CheckFailed(f"{path}: expected {n} values in each array as in t, but {', '.join(wrong)}")
-    return table, {}, lambda i: f"sample {i + 1}"
+    return table, units, lambda i: f"sample {i + 1}"
 
 
 def _read_bag(path: Path, source: Source) -> tuple[Table, dict[str, str], Place]:
@@ -191,9 +200,12 @@ def _read_bag(path: Path, source: Source) -> tuple[Table, dict[str, str], Place]
             if topic not in info:
                 there = ", ".join(sorted(info)) or "none"
                 raise CheckFailed(f"{path}: no topic {topic} in it; there are: {there}; choose with --topic")
-            rows = [
-                row for _, message, when in bag.read_messages(topics=[topic]) for row in _rows(message, when, source)
-            ]
+            rows: list[dict[str, float]] = []
+            frames: set[str] = set()
+            for _, message, when in bag.read_messages(topics=[topic]):
+                rows += _rows(message, when, source)
+                each = getattr(message, "transforms", ())
+                frames.update(f"'{i.header.frame_id}' -> '{i.child_frame_id}'" for i in each)
             fingers = _fingers(bag, info)
     except rosbag.ROSBagException as error:
         raise CheckFailed(f"{path}: no readable bag ({error}); if it was cut off: rosbag reindex {path}") from None
@@ -202,8 +214,9 @@ def _read_bag(path: Path, source: Source) -> tuple[Table, dict[str, str], Place]
     except Exception as error:  # of rosbag, genpy, struct or the file: a foreign or damaged bag
         raise CheckFailed(f"{path}: no readable bag ({' '.join(str(error).split())})") from None
     if not rows:
-        what = f"'{source.world}' -> '{source.frame or 'human_hand'}'" if "tf" in topic else "a pose or seven joints"
-        raise CheckFailed(f"{path}: {topic} has no {what}; choose with --frame, --world or --topic")
+        what = f"'{source.world}' -> '{source.frame or 'human_hand'}'" if "tf" in topic else "pose and no seven joints"
+        seen = f"; there are: {', '.join(sorted(frames))}" if frames else ""
+        raise CheckFailed(f"{path}: {topic} has no {what}; choose with --frame, --world or --topic{seen}")
     table = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     if len(fingers):
         order = np.argsort(fingers[:, 0])
@@ -300,7 +313,7 @@ def _judge(path: Path, table: Table, units: dict[str, str], place: Place, source
         raise CheckFailed(f"{path}: expected at least 10 different times, got {len(np.unique(table['t']))}")
     lonely = [name for name in ("roll", "pitch", "yaw", "qx", "qy", "qz", "qw") if name in table and name not in used]
     if lonely:
-        notes.append(f"{', '.join(lonely)} alone tell no turn and were left out: qx, qy, qz, qw or roll, pitch, yaw")
+        notes.append(f"{', '.join(lonely)} left out: a turn needs qx, qy, qz and qw, or roll, pitch and yaw")
 
     _convert_named(path, table, units, source, notes)
     times = table["t"] * _time_unit(table["t"], source.time or units.get("t", ""), notes)
@@ -309,7 +322,7 @@ def _judge(path: Path, table: Table, units: dict[str, str], place: Place, source
         where, by = place(int(index[at + 1])), times[at] - times[at + 1]
         raise CheckFailed(f"{path}: {where}: time goes back by {by:.4f} s; cut the file there")
     if joints:
-        table.update(_palm_of(np.column_stack([table[name] for name in JOINTS]), source, units, notes))
+        table.update(_palm_of(path, np.column_stack([table[name] for name in JOINTS]), source, units, notes))
     places = np.column_stack([table[name] for name in "xyz"])
     places = places * _length_unit(path, places, source.length or units.get("x", "m" if joints else ""), notes)
     turns = _turns(path, table, source.angle or units.get("roll", ""), notes, lambda i: place(int(index[i])))
@@ -319,7 +332,7 @@ def _judge(path: Path, table: Table, units: dict[str, str], place: Place, source
     if same.any():
         notes.append(f"{int(same.sum())} samples repeat the one before and were left out")
     kept = _without_jumps(path, times, places, ~same, notes)
-    closing = _closing(table, notes)
+    closing = _closing(path, table, notes)
     return Demonstration(
         path.stem,
         times[kept] - times[kept][0],
@@ -400,21 +413,24 @@ def _length_unit(path: Path, places: Array, given: str, notes: list[str]) -> flo
     return LENGTH[unit]
 
 
-def _angle_unit(angles: Array, largest: float, given: str, what: str, notes: list[str]) -> float:
+def _angle_unit(path: Path, angles: Array, given: str, what: str, notes: list[str]) -> float:
+    """Angles go up to half a turn in either unit. What is a whole turn in rad, and little in degrees, is refused."""
     most = float(np.abs(angles).max())
-    degrees = given == "deg" or (not given and most > largest)
+    if not given and 3.2 < most <= 2.0 * np.pi + 0.1:
+        raise CheckFailed(f"{path}: {what} go up to {most:.1f}: rad or degrees? Name the unit with --angle")
+    degrees = given == "deg" or (not given and most > 3.2)
     if degrees:
         notes.append(f"{what} are in degrees (up to {most:.0f}), converted to rad")
-    elif not given and what == "turns" and most > 0.5:
-        notes.append(f"turns are taken as rad (up to {most:.1f}); if they are degrees: --angle deg")
+    elif not given and what == "turns" and most > 0.0:
+        notes.append(f"turns are taken as rad (up to {most:.2g}); if they are degrees: --angle deg")
     return ANGLE["deg" if degrees else "rad"]
 
 
-def _palm_of(joints: Array, source: Source, units: dict[str, str], notes: list[str]) -> Table:
+def _palm_of(path: Path, joints: Array, source: Source, units: dict[str, str], notes: list[str]) -> Table:
     """Pose of the palm by forward kinematics from joint positions (n, 7)."""
     from coglab_smach.kinematics.reachability import default_arm
 
-    joints = joints * _angle_unit(joints, 3.2, source.angle or units.get(JOINTS[0], ""), "joint angles", notes)
+    joints = joints * _angle_unit(path, joints, source.angle or units.get(JOINTS[0], ""), "joint angles", notes)
     notes.append("the palm is computed from the joints of the arm")
     poses = [default_arm().fk(q) for q in joints]
     places, turns = np.array([p for p, _ in poses]), np.array([q for _, q in poses])
@@ -430,7 +446,7 @@ def _turns(path: Path, table: Table, given: str, notes: list[str], place: Place)
     if len(names) == 3:
         from scipy.spatial.transform import Rotation
 
-        radians = values * _angle_unit(values, 2 * np.pi + 0.1, given, "turns", notes)
+        radians = values * _angle_unit(path, values, given, "turns", notes)
         q = Rotation.from_euler("xyz", radians).as_quat()
     else:
         lengths = np.linalg.norm(values, axis=1)
@@ -443,15 +459,18 @@ def _turns(path: Path, table: Table, given: str, notes: list[str], place: Place)
     return q
 
 
-def _closing(table: Table, notes: list[str]) -> Array | None:
+def _closing(path: Path, table: Table, notes: list[str]) -> Array | None:
     values = table.get("closing")
     if values is None or not np.isfinite(values).any():
         return None
     values = np.interp(np.arange(len(values)), np.flatnonzero(np.isfinite(values)), values[np.isfinite(values)])
-    top = float(values.max())
+    low, top = float(values.min()), float(values.max())
     scale = 1.0 if top <= 1.2 else 100.0 if top <= 100.0 else MOTOR_CLOSED
+    if low < -0.2 * scale or top > 1.2 * scale:
+        raise CheckFailed(f"{path}: closing goes from {low:g} to {top:g}; expected 0..1, percent or 0..254")
     if scale > 1.0:
-        notes.append(f"closing is in {'percent' if scale == 100.0 else 'motor positions 0..254'}, converted to 0..1")
+        unit = "percent" if scale == 100.0 else "motor positions 0..254"
+        notes.append(f"closing is taken as {unit} (up to {top:g}), converted to 0..1")
     return np.asarray(np.clip(values / scale, 0.0, 1.0))
 
 

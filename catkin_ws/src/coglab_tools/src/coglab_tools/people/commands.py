@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from coglab_tools.command import Answer, CheckFailed, UsageError, progress
+from coglab_tools.command import Answer, CheckFailed, NotThere, UsageError, progress
 
 HELP = "recordings of people: made playable, and learnt from"
 KINDS = ("kth", "dexycb")
@@ -46,6 +46,9 @@ def handovers(paths: Sequence[Path], kind: str | None, rate: float | None) -> li
         raise UsageError(f"--rate: expected 1 to 10000 Hz, got {rate:g}")
     found = []
     for path in progress(paths, len(paths), "reading"):
+        if not path.is_dir() and path.suffix != ".npz":
+            what = "expected a folder of the KTH dataset or of DexYCB, or an npz file"
+            raise (UsageError if path.exists() else NotThere)(f"{path}: {what}")
         kth = kind == "kth" or (kind is None and (is_kth(path) or not (path / "pose.npz").exists() and path.is_dir()))
         found.append(read_kth(path) if kth else read_dexycb(path, rate))
     return found
@@ -67,11 +70,12 @@ def import_recordings(options: argparse.Namespace) -> Answer:
         if path in paths:
             raise UsageError(f"two recordings would become {path}; import them into two folders with --out")
         reach, tracks = h.reach(options.role), h.recording(options.role, frame, options.turn)
+        replaced = "; an earlier file was there and was replaced" if path.exists() else ""
         write_recording(path, tracks)
         paths.append(path)
         lines.append(
             f"{path}: {tracks['human_hand'].duration:.1f} s; the reach takes {reach.duration:.2f} s over "
-            f"{reach.way:.3f} m, at {float(reach.speed.max()):.2f} m/s at most; {'; '.join(h.notes)}"
+            f"{reach.way:.3f} m, at {float(reach.speed.max()):.2f} m/s at most; {'; '.join(h.notes)}{replaced}"
         )
         rows.append({"file": str(path), "frames": list(tracks), "reach_s": reach.duration, "reach_m": reach.way,
                      "peak_speed_m_s": float(reach.speed.max()), "touch_s": h.touch, "source": h.source,
@@ -84,7 +88,7 @@ def learn(options: argparse.Namespace) -> Answer:
     """`people learn`."""
     from coglab_tools.dmp.demonstration import for_shell
     from coglab_tools.files import write_whole
-    from coglab_tools.people.learn import PRIMITIVES, base_library, learn_patterns, learn_primitives
+    from coglab_tools.people.learn import PRIMITIVES, base_library, learn_patterns, learn_primitives, learnable
 
     if options.primitives is None and options.patterns is None:
         raise UsageError("nothing to write: name --primitives FILE.xml or --patterns FILE.json, or both")
@@ -98,9 +102,12 @@ def learn(options: argparse.Namespace) -> Answer:
         except ValueError as error:
             raise CheckFailed(str(error)) from None
         write_whole(options.primitives, library.format())
-        lines += [f"  {name}: {library[name].description}" for name in PRIMITIVES]
+        names = learnable(found)
+        lines += [f"  {name}: {library[name].description}" for name in names]
+        if left := [name for name in PRIMITIVES if name not in names]:
+            lines.append(f"  {', '.join(left)}: not learnt, nobody was recorded in this role; the shipped ones stay")
         lines.append(f"wrote {options.primitives}: {', '.join(library.ids())}")
-        data["primitives"] = {name: library[name].duration for name in PRIMITIVES}
+        data["primitives"] = {name: library[name].duration for name in names}
         follow.append(f"primitives:={for_shell(options.primitives)}")
     if options.patterns is not None:
         counts = learn_patterns(found, options.patterns)

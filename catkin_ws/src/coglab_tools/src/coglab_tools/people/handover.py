@@ -60,8 +60,9 @@ class Handover:
         )
 
     def span(self, role: str) -> tuple[float, float]:
-        """Begin and end (s) of the reach to the handover: the one that ends nearest to the touch, else the longest."""
-        found = reaches(self.whole(role), back=True)
+        """Begin and end (s) of the reach to the handover: the one that ends nearest to the touch, else the longest
+        that is no way back."""
+        found = reaches(self.whole(role), back=self.touch is not None)
         spans = [(part.begin, part.begin + part.duration) for part in found]
         if self.touch is None:
             return spans[int(np.argmax([part.way for part in found]))]

@@ -7,7 +7,6 @@ both grips. z is up. The tracker repeats lost samples; they are left out.
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 
 import numpy as np
@@ -37,7 +36,8 @@ def read_kth(folder: Path) -> Handover:
         far = {side: float(np.linalg.norm(np.ptp(track.positions, axis=0))) for side, track in sides.items()}
         side = max(far, key=lambda s: far[s])
         hands[role] = sides[side]
-        notes.append(f"the {role} uses the {'right' if side == 'R' else 'left'} hand")
+        hand = f"the {role} uses the {'right' if side == 'R' else 'left'} hand"
+        notes.append(f"{hand} ({'; '.join(sides[side].notes)})" if sides[side].notes else hand)
     baton = _pose(folder, "baton")
     toward = _pose(folder, "giver_chest").positions.mean(axis=0) - _pose(folder, "taker_chest").positions.mean(axis=0)
     toward[2] = 0.0
@@ -45,7 +45,7 @@ def read_kth(folder: Path) -> Handover:
     if touch is not None:
         notes.append(f"both hold the baton from {touch:.2f} s on")
     else:
-        notes.append("without the forces on the baton the touch is unknown: the longest reach is taken")
+        notes.append("without the forces on the baton the touch is unknown: the longest way there is taken")
     return Handover(folder.name, hands, baton, toward / np.linalg.norm(toward), touch, SOURCE, tuple(notes))
 
 
@@ -70,24 +70,29 @@ def _pose(folder: Path, name: str) -> Demonstration:
     q = rows[:, 3:] / lengths[:, None]
     q = q[kept]
     q[1:] *= np.cumprod(np.where(np.sum(q[1:] * q[:-1], axis=1) < 0.0, -1.0, 1.0))[:, None]
-    left = len(rows) - int(kept.sum())
-    note = (f"{left} of {len(rows)} samples repeat the one before and were left out",) if left else ()
-    return Demonstration(name, np.arange(len(rows))[kept] / RATE, rows[kept, :3], q, notes=note)
+    wrong = len(rows) - int(finite.sum())
+    notes = tuple(
+        f"{count} of {len(rows)} samples {what} and were left out"
+        for count, what in ((wrong, "are not finite"), (len(rows) - wrong - len(q), "repeat the one before"))
+        if count
+    )
+    return Demonstration(name, np.arange(len(rows))[kept] / RATE, rows[kept, :3], q, notes=notes)
 
 
 def _table(path: Path, columns: int) -> Array:
     if not path.is_file():
         raise NotThere(f"{path}: no such file; a handover of the KTH dataset has 30 CSV files")
-    try:
-        with warnings.catch_warnings(category=UserWarning, action="ignore"):  # of an empty file, which is refused below
-            rows = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
-    except ValueError as error:
-        raise CheckFailed(f"{path}: expected a header and lines of {columns} numbers: {error}") from None
-    if not len(rows):
+    rows = []
+    for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines()[1:], 2):
+        try:
+            rows.append([float(word) for word in line.split(",")])
+        except ValueError:
+            raise CheckFailed(f"{path}:{number}: expected {columns} numbers, got {ascii(line)[:80]}") from None
+        if len(rows[-1]) != columns:
+            raise CheckFailed(f"{path}:{number}: expected {columns} columns, got {len(rows[-1])}")
+    if not rows:
         raise CheckFailed(f"{path}: no samples in it; expected a header and lines of {columns} numbers")
-    if rows.shape[1] != columns:
-        raise CheckFailed(f"{path}: expected {columns} columns, got {rows.shape[1]}")
-    return np.asarray(rows, dtype=float)
+    return np.array(rows)
 
 
 def _touch(folder: Path) -> float | None:

@@ -47,21 +47,25 @@ PRIMITIVES = {
 
 
 def learn_primitives(handovers: Sequence[Handover], others: cc.Library | None = None, basis: int = 20) -> cc.Library:
-    """A library with the primitives above, and those of `others` that have other names."""
+    """A library with those primitives above whose role was recorded, and those of `others` that have other names."""
     library = cc.Library()
     if others is not None:
         for name in others.ids():
             library.add(others[name])
-    for name, (role, mapping, mirrored, words) in PRIMITIVES.items():
+    for name in learnable(handovers):
+        role, mapping, mirrored, words = PRIMITIVES[name]
         reaches = [h.reach(role) for h in handovers if role in h.hands]
-        if not reaches:
-            raise CheckFailed(f"no recording has a {role}; '{name}' cannot be learnt")
         reaches = [_mirrored(r) if mirrored else r for r in reaches]
         source = f"{words}; learnt from {len(reaches)} recorded {role}{'s' if len(reaches) > 1 else ''}"
         where = sorted({h.source for h in handovers})
         description = f"{source}{', left and right exchanged' if mirrored else ''}: {'; '.join(where)}"
         library.add(train(name, reaches, basis, mapping, description[:500]).primitive)
     return library
+
+
+def learnable(handovers: Sequence[Handover]) -> list[str]:
+    """Names of the primitives above whose role was recorded."""
+    return [name for name, (role, *_) in PRIMITIVES.items() if any(role in h.hands for h in handovers)]
 
 
 def _mirrored(reach: Demonstration) -> Demonstration:
