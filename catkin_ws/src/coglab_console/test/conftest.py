@@ -2,6 +2,7 @@
 
 import pytest
 from desk_double import desk_in
+from page_double import Desk
 
 
 @pytest.fixture
@@ -11,3 +12,11 @@ def desk(tmp_path):
     made.connected("a")
     made.connected("b")
     return made
+
+
+@pytest.fixture(scope="module")
+def live(tmp_path_factory):
+    """The page in a real browser, with a double in place of the robot."""
+    found = Desk(tmp_path_factory.mktemp("console"))
+    yield found
+    found.close()

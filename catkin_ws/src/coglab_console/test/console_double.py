@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import inspect
 import socket
 import time
 from collections.abc import Iterable
@@ -167,3 +168,32 @@ async def running(folder: Path, robot: RobotDouble | None = None, **files: objec
     finally:
         task.cancel()
         await runner.cleanup()
+
+
+def served(robot: type[RobotDouble] = RobotDouble, program: bool = False, **files: object):
+    """Makes a coroutine a test. `console`: serves for 30 s; `client`: of a browser, or of a program without cookies."""
+
+    def of(test):
+        asked = inspect.signature(test).parameters
+
+        async def inside(folder, given):
+            async with running(folder, robot(), **files) as console:
+                given["console"] = console
+                if "client" not in asked:
+                    return await asyncio.wait_for(test(**given), 30)
+                new = aiohttp.ClientSession(cookie_jar=aiohttp.DummyCookieJar()) if program else console.browser()
+                async with new as given["client"]:
+                    await asyncio.wait_for(test(**given), 30)
+
+        def run(tmp_path, **given):
+            if "tmp_path" in asked:
+                given["tmp_path"] = tmp_path
+            asyncio.run(inside(tmp_path, given))
+
+        names = ["tmp_path", *(name for name in asked if name not in ("console", "client", "tmp_path"))]
+        kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
+        run.__signature__ = inspect.Signature([inspect.Parameter(name, kind) for name in names])
+        run.__name__, run.__doc__ = test.__name__, test.__doc__
+        return run
+
+    return of

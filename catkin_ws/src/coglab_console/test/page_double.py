@@ -1,11 +1,17 @@
 """The page in a real browser with a double in place of the robot, for tests of the page."""
 
 import asyncio
+import shutil
 import threading
 import time
 
+import pytest
 from coglab_console.browser import Browser
 from console_double import PAGE_DOCUMENTS, RobotDouble, page_state, running
+
+needs_browser = pytest.mark.skipif(
+    shutil.which("chromedriver") is None, reason="chromium-driver is missing: ./coglab install browser"
+)
 
 # Puts the page's connections in a test's hand: deaf ones say nothing and stay open, as behind a cable that was pulled;
 # `slow` is what each message costs, as on a computer that is busy.

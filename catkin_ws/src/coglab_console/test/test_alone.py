@@ -10,6 +10,7 @@ import pytest
 import rosgraph
 from coglab_console.ros import startup
 from coglab_console.ros.startup import PLACE, StartError, announce, look_for_another
+from coglab_py import alone
 
 
 @contextlib.contextmanager
@@ -53,7 +54,7 @@ def node(pid):
 @pytest.fixture(autouse=True)
 def quickly(monkeypatch):
     monkeypatch.setattr(startup, "PATIENCE", 0.3)
-    monkeypatch.setattr(startup, "ANSWER_LIMIT", 0.3)
+    monkeypatch.setattr(alone, "ANSWER_LIMIT", 0.3)
 
 
 def test_the_first_console_begins_and_the_second_is_told_where_the_first_is(master):

@@ -9,25 +9,17 @@ if shutil.which("chromedriver") is None:
     pytest.skip("chromium-driver is missing: ./coglab install browser", allow_module_level=True)
 from coglab_console.browser import Browser
 from page_check import PAGES, look
-from page_double import Desk
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
 
-@pytest.fixture(scope="module")
-def desk(tmp_path_factory):
-    found = Desk(tmp_path_factory.mktemp("console"))
-    yield found
-    found.close()
-
-
-def test_a_choice_that_was_refused_says_why_and_is_taken_back(desk):
+def test_a_choice_that_was_refused_says_why_and_is_taken_back(live):
     """An observer's: the list of objects and the speed show what is, not what was wished."""
     objects = {"rows": [{"id": "ball", "name": "ball", "mass": 0.1, "text": ""}], "asked": True, "problems": []}
-    desk.loop.call_soon_threadsafe(desk.console.documents.put, "objects", objects)
+    live.loop.call_soon_threadsafe(live.console.documents.put, "objects", objects)
     with Browser() as page:
-        page.open(desk.console.link())
+        page.open(live.console.link())
         page.until("return document.getElementById('object').textContent.includes('(default)')", 60.0)
         for field, wish, shown in (("object", "ball", ""), ("speed", "40", "100")):
             page.js("document.getElementById('told').hidden = true")
@@ -41,25 +33,25 @@ def test_a_choice_that_was_refused_says_why_and_is_taken_back(desk):
                 "const t = document.getElementById('told'); return !t.hidden && /watches/.test(t.textContent)", 10.0
             )
             assert page.js("return document.getElementById(arguments[0]).value", field) == shown
-    assert desk.console.desk.object_id == "" and ("speed_scale", {"value": 0.4}) not in desk.robot.calls
+    assert live.console.desk.object_id == "" and ("speed_scale", {"value": 0.4}) not in live.robot.calls
 
 
-def test_space_is_stop_also_while_a_list_is_open_and_enter_chooses(desk):
+def test_space_is_stop_also_while_a_list_is_open_and_enter_chooses(live):
     rows = [{"id": name, "name": name, "mass": 0.1, "text": ""} for name in ("ball", "mug", "tea_box")]
     objects = {"rows": rows, "asked": True, "problems": []}
-    desk.loop.call_soon_threadsafe(desk.console.documents.put, "objects", objects)
-    page = desk.browser
+    live.loop.call_soon_threadsafe(live.console.documents.put, "objects", objects)
+    page = live.browser
     page.tab("Live")
     page.until("return document.getElementById('object').textContent.includes('(default)')", 60.0)
     time.sleep(0.5)  # what other tests have pressed is answered
     page.driver.find_element(By.ID, "object").click()
     page.until("return document.getElementById('object').ariaExpanded === 'true'", 60.0)
-    stops = len(desk.robot.stops)
+    stops = len(live.robot.stops)
     ActionChains(page.driver).send_keys(Keys.SPACE).perform()
     end = time.monotonic() + 60.0
-    while len(desk.robot.stops) == stops and time.monotonic() < end:
+    while len(live.robot.stops) == stops and time.monotonic() < end:
         time.sleep(0.02)
-    assert len(desk.robot.stops) > stops and desk.console.desk.object_id == ""
+    assert len(live.robot.stops) > stops and live.console.desk.object_id == ""
     # STOP is not covered by the list.
     assert look(page)[0] == []
     ActionChains(page.driver).send_keys(Keys.ARROW_DOWN, Keys.ARROW_DOWN, Keys.ENTER).perform()
@@ -73,11 +65,11 @@ def test_space_is_stop_also_while_a_list_is_open_and_enter_chooses(desk):
     page.driver.find_element(By.ID, "object").click()
     ActionChains(page.driver).send_keys(Keys.ARROW_DOWN, Keys.ESCAPE).perform()
     page.until("return document.getElementById('object').ariaExpanded === 'false'", 60.0)
-    assert desk.console.desk.object_id == "ball"
+    assert live.console.desk.object_id == "ball"
     assert page.js("return document.querySelectorAll('select').length") == 0
 
 
-def test_space_is_stop_wherever_the_focus_is_and_presses_nothing_else(desk):
+def test_space_is_stop_wherever_the_focus_is_and_presses_nothing_else(live):
     """In a text field with Ctrl."""
 
     def plain(keys):
@@ -86,9 +78,9 @@ def test_space_is_stop_wherever_the_focus_is_and_presses_nothing_else(desk):
     def with_ctrl(keys):
         keys.key_down(Keys.CONTROL).send_keys(Keys.SPACE).key_up(Keys.CONTROL).perform()
 
-    page = desk.browser
+    page = live.browser
     some = "[...document.querySelectorAll(arguments[0])].filter((one) => one.checkVisibility())"
-    before, seen = len(desk.robot.calls), 0
+    before, seen = len(live.robot.calls), 0
     for name in PAGES:
         page.tab(name)
         for selector, press in (
@@ -97,15 +89,15 @@ def test_space_is_stop_wherever_the_focus_is_and_presses_nothing_else(desk):
         ):
             for i in range(page.js(f"return {some}.length", selector)):
                 page.js(f"{some}[arguments[1]].focus()", selector, i)
-                stops = len(desk.robot.stops)
+                stops = len(live.robot.stops)
                 press(ActionChains(page.driver))
                 # The page sends each press twice, so that none of the next one's is taken for this one's.
                 end = time.monotonic() + 60.0
-                while len(desk.robot.stops) < stops + 2 and time.monotonic() < end:
+                while len(live.robot.stops) < stops + 2 and time.monotonic() < end:
                     time.sleep(0.01)
-                assert len(desk.robot.stops) == stops + 2, (name, selector, i)
+                assert len(live.robot.stops) == stops + 2, (name, selector, i)
                 time.sleep(0.05)  # more than 50 a second of one browser are taken together
                 seen += 1
     assert seen > 100
-    assert [name for name, _ in desk.robot.calls[before:] if name != "parameters"] == []
+    assert [name for name, _ in live.robot.calls[before:] if name != "parameters"] == []
     page.tab("Live")

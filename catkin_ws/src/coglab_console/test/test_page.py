@@ -1,6 +1,5 @@
 """The page in a real browser, a double in place of the robot: a dead connection, a slow computer, reasons, touch."""
 
-import shutil
 import time
 
 import pytest
@@ -9,42 +8,33 @@ from coglab_console.desk.gates import Standing
 from coglab_console.scene.graph_layout import Container, Layout
 from console_double import PAGE_DOCUMENTS, READY
 from page_check import PAGES, focus_order, look
-from page_double import IN_HAND, Desk
+from page_double import IN_HAND, Desk, needs_browser
 
-pytestmark = pytest.mark.skipif(
-    shutil.which("chromedriver") is None, reason="chromium-driver is missing: ./coglab install browser"
-)
+pytestmark = needs_browser
 
 
-@pytest.fixture(scope="module")
-def desk(tmp_path_factory):
-    found = Desk(tmp_path_factory.mktemp("console"))
-    yield found
-    found.close()
-
-
-def test_a_connection_that_is_dead_but_open_is_given_up_and_no_event_is_lost(desk):
-    page = desk.browser
-    desk.event("before")
+def test_a_connection_that_is_dead_but_open_is_given_up_and_no_event_is_lost(live):
+    page = live.browser
+    live.event("before")
     page.until("return coglab.events().some((e) => e.text === 'before')", 60.0)
     page.js("window.connections.at(-1).deaf = true")
-    desk.event("meanwhile")
+    live.event("meanwhile")
     page.until("return document.body.classList.contains('lost')", 60.0)
     page.until("return !document.body.classList.contains('lost')", 60.0)
-    desk.event("after")
+    live.event("after")
     page.until("return coglab.events().some((e) => e.text === 'after')", 60.0)
     seen = page.js("return coglab.events().map((e) => e.seq)")
     assert seen == list(range(1, len(seen) + 1))
     assert page.js("return window.connections.length") <= 3
 
 
-def test_a_slow_page_shows_the_newest_state_and_every_event(desk):
-    page = desk.browser
+def test_a_slow_page_shows_the_newest_state_and_every_event(live):
+    page = live.browser
     page.js("window.slow = 100")
     for number in range(40):
-        desk.event(f"slow {number}")
+        live.event(f"slow {number}")
         time.sleep(0.1)
-    ages = [desk.age() for _ in range(5)]
+    ages = [live.age() for _ in range(5)]
     page.js("window.slow = 0")
     page.until("return coglab.events().some((e) => e.text === 'slow 39')", 60.0)
     texts = page.js("return coglab.events().map((e) => e.text).filter((text) => text.startsWith('slow'))")
@@ -52,8 +42,8 @@ def test_a_slow_page_shows_the_newest_state_and_every_event(desk):
     assert sorted(ages)[2] < 1.0, ages
 
 
-def test_a_page_that_is_behind_says_by_how_much(desk):
-    page = desk.browser
+def test_a_page_that_is_behind_says_by_how_much(live):
+    page = live.browser
     page.js("window.slow = 300")
     page.until("return /s behind/.test(document.getElementById('lost').textContent)", 60.0)
     page.js("window.slow = 0")
@@ -71,29 +61,29 @@ def test_a_page_that_is_behind_says_by_how_much(desk):
         ),
     ],
 )  # fmt: skip
-def test_the_path_ahead_in_words(desk, shown, words):
-    page = desk.browser
+def test_the_path_ahead_in_words(live, shown, words):
+    page = live.browser
     robot = {"root": "world", "joints": [], "shapes": {}}
-    desk.loop.call_soon_threadsafe(desk.console.documents.put, "model", {**PAGE_DOCUMENTS["model"], "robot": robot})
-    desk.loop.call_soon_threadsafe(desk.console.documents.put, "path", shown)
+    live.loop.call_soon_threadsafe(live.console.documents.put, "model", {**PAGE_DOCUMENTS["model"], "robot": robot})
+    live.loop.call_soon_threadsafe(live.console.documents.put, "path", shown)
     page.until("return document.getElementById('view-words').textContent.includes(arguments[0])", 60.0, words)
 
 
-def test_a_click_on_a_disabled_button_says_why(desk):
-    page = desk.browser
+def test_a_click_on_a_disabled_button_says_why(live):
+    page = live.browser
     button = "[data-action=exchange_robot_to_human]"
     page.until(f"return document.querySelector('{button}').hasAttribute('aria-disabled')", 60.0)
     page.js(f"document.querySelector('{button}').click()")
     words = page.js("const told = document.getElementById('told'); return told.checkVisibility() && told.textContent")
     assert "Give" in words and "the hand is empty" in words
-    assert not desk.robot.calls
+    assert not live.robot.calls
 
 
-def test_a_button_is_held_by_touch(desk):
+def test_a_button_is_held_by_touch(live):
     """As on a tablet: nothing comes of a short touch, something of a long one, nothing of one that slides away."""
-    page = desk.browser
-    desk.loop.call_soon_threadsafe(desk.console.desk.guard.stop, "a test")
-    desk.loop.call_soon_threadsafe(lambda: desk.console.desk.guard.acknowledge(desk.console.desk.guard.stops))
+    page = live.browser
+    live.loop.call_soon_threadsafe(live.console.desk.guard.stop, "a test")
+    live.loop.call_soon_threadsafe(lambda: live.console.desk.guard.acknowledge(live.console.desk.guard.stops))
     page.until("return document.getElementById('why-home').textContent.includes('hold')", 60.0)
     box = page.js(
         "const b = document.querySelector('[data-action=home]').getBoundingClientRect();"
@@ -112,59 +102,59 @@ def test_a_button_is_held_by_touch(desk):
     touch("touchMove", [box[0], box[1] - 200])
     time.sleep(1.2)
     touch("touchEnd")
-    assert not desk.robot.calls
+    assert not live.robot.calls
     touch("touchStart", box)
     end = time.monotonic() + 60.0
-    while not desk.robot.calls and time.monotonic() < end:
+    while not live.robot.calls and time.monotonic() < end:
         time.sleep(0.05)
     touch("touchEnd")
-    assert desk.robot.calls == [("home", {})]
-    assert desk.robot.now == Standing(**READY)
+    assert live.robot.calls == [("home", {})]
+    assert live.robot.now == Standing(**READY)
 
 
-def test_a_tablet_has_stop_and_every_page_within_reach_of_a_finger(desk):
+def test_a_tablet_has_stop_and_every_page_within_reach_of_a_finger(live):
     with Browser(size=(1024, 768), touch=True) as tablet:
-        tablet.open(desk.console.link())
+        tablet.open(live.console.link())
         assert tablet.js("return navigator.maxTouchPoints") > 0
         for name in PAGES:
             tablet.touch(f"#tab-{name}")
             tablet.until("return document.getElementById('tab-' + arguments[0]).ariaSelected === 'true'", 60.0, name)
             assert look(tablet)[0] == [], name
-        before = len(desk.robot.stops)
+        before = len(live.robot.stops)
         tablet.touch("#stop")
         end = time.monotonic() + 60.0
-        while len(desk.robot.stops) == before and time.monotonic() < end:
+        while len(live.robot.stops) == before and time.monotonic() < end:
             time.sleep(0.02)
-        assert len(desk.robot.stops) > before
+        assert len(live.robot.stops) > before
 
 
-def test_a_computer_that_is_too_busy_is_said_on_every_page(desk):
-    page = desk.browser
-    desk.put(busy="This computer is too busy", real_time_factor=0.5)
+def test_a_computer_that_is_too_busy_is_said_on_every_page(live):
+    page = live.browser
+    live.put(busy="This computer is too busy", real_time_factor=0.5)
     page.until("return document.getElementById('busy').innerText.includes('too busy')", 60.0)
     assert "0.5" in page.js("return document.getElementById('world').innerText")
     assert look(page)[0] == []
-    desk.put(busy="", real_time_factor=1.0)
+    live.put(busy="", real_time_factor=1.0)
     page.until("return document.getElementById('busy').hidden", 60.0)
 
 
-def test_the_keyboard_reaches_everything_in_order_on_every_page(desk):
+def test_the_keyboard_reaches_everything_in_order_on_every_page(live):
     for name in PAGES:
-        desk.browser.tab(name)
-        names, problems = focus_order(desk.browser)
+        live.browser.tab(name)
+        names, problems = focus_order(live.browser)
         assert problems == [] and f"tab-{name}" in names, (name, problems)
-    desk.browser.tab("Live")
+    live.browser.tab("Live")
 
 
-def test_diagnostics_are_a_tree_by_node_whose_branches_show_their_worst(desk):
+def test_diagnostics_are_a_tree_by_node_whose_branches_show_their_worst(live):
     def row(name, level):
         return {"name": name, "level": level, "message": "words", "values": [["key", "value"]]}
 
     rows = [row("robot: FRI connection", 0), row("robot: arm", 1), row("ih2_hand: hand", 0), row("camera", 2)]
-    page = desk.browser
+    page = live.browser
     page.tab("Health")
     health = {"rows": rows, "versions": {}, "browsers": []}
-    desk.loop.call_soon_threadsafe(desk.console.documents.put, "health", health)
+    live.loop.call_soon_threadsafe(live.console.documents.put, "health", health)
     tree = (
         "const words = (one, what) => [...one.querySelectorAll(what)].map((summary) => summary.textContent);"
         "return [...document.querySelectorAll('#diagnostics > details')].map((branch) =>"
@@ -181,7 +171,7 @@ def test_diagnostics_are_a_tree_by_node_whose_branches_show_their_worst(desk):
     page.js("const d = document.querySelectorAll('#diagnostics details'); d[0].open = false; d[3].open = true;")
     page.js("document.querySelectorAll('#diagnostics summary')[3].focus()")
     time.sleep(0.2)
-    desk.loop.call_soon_threadsafe(desk.console.documents.put, "health", {**health, "rows": rows[:3]})
+    live.loop.call_soon_threadsafe(live.console.documents.put, "health", {**health, "rows": rows[:3]})
     page.until("return document.querySelectorAll('#diagnostics > details').length === 2", 60.0)
     kept = "return [...document.querySelectorAll('#diagnostics details')].map((one) => one.open)"
     assert page.js(kept) == [False, False, False, True, False]
@@ -189,8 +179,8 @@ def test_diagnostics_are_a_tree_by_node_whose_branches_show_their_worst(desk):
     page.tab("Live")
 
 
-def test_a_note_that_was_not_taken_stays_in_its_field_and_says_why(desk):
-    page = desk.browser
+def test_a_note_that_was_not_taken_stays_in_its_field_and_says_why(live):
+    page = live.browser
     page.tab("Experiment")
     write = (
         "const n = document.getElementById('note'); n.value = arguments[0];"
@@ -208,58 +198,58 @@ def test_a_note_that_was_not_taken_stays_in_its_field_and_says_why(desk):
     page.tab("Live")
 
 
-def test_without_graphviz_the_page_has_the_states_and_says_what_is_missing(desk):
+def test_without_graphviz_the_page_has_the_states_and_says_what_is_missing(live):
     containers = {"/M": Container("/M", ("A", "B", "C"), (("ok", "A", "B"),))}
     picture = {**Layout("no-such-program").of(containers), "roots": ["/M"]}
-    desk.loop.call_soon_threadsafe(desk.console.documents.put, "graph:/coglab", picture)
-    desk.browser.until("return document.querySelectorAll('#graph .node').length >= 3", 60.0)
-    words = desk.browser.js("return document.getElementById('graph').innerText")
+    live.loop.call_soon_threadsafe(live.console.documents.put, "graph:/coglab", picture)
+    live.browser.until("return document.querySelectorAll('#graph .node').length >= 3", 60.0)
+    words = live.browser.js("return document.getElementById('graph').innerText")
     assert "apt install graphviz" in words
 
 
-def test_the_way_to_the_active_state_ends_with_it_in_full(desk):
+def test_the_way_to_the_active_state_ends_with_it_in_full(live):
     """Where there is no room for all containers the outer ones give way."""
     leaf = "/M/exchange_human_to_robot/approach/arm_motion/wait_stop"
     picture = {**Layout("no-such-program").of({"/M": Container("/M", ("A",), ())}), "problem": "", "roots": ["/M"]}
-    desk.loop.call_soon_threadsafe(desk.console.documents.put, "graph:/coglab", picture)
-    desk.loop.call_soon_threadsafe(desk.console.documents.put, "active", {"/coglab": {"active": [leaf], "last": {}}})
-    desk.browser.tab("Machine")
-    desk.browser.until("return document.querySelector('.crumbs').textContent.endsWith('wait_stop')", 60.0)
+    live.loop.call_soon_threadsafe(live.console.documents.put, "graph:/coglab", picture)
+    live.loop.call_soon_threadsafe(live.console.documents.put, "active", {"/coglab": {"active": [leaf], "last": {}}})
+    live.browser.tab("Machine")
+    live.browser.until("return document.querySelector('.crumbs').textContent.endsWith('wait_stop')", 60.0)
     cut = "const c = document.querySelector('.crumbs'); return c.scrollHeight - c.clientHeight"
-    assert desk.browser.js(cut) <= 1
-    desk.browser.tab("Live")
+    assert live.browser.js(cut) <= 1
+    live.browser.tab("Live")
 
 
 @pytest.mark.parametrize("promised", [False, True])
 def test_without_libjs_there_are_two_dimensions_and_a_sentence(tmp_path, promised):
     """Also where a library was there when the console began, and half of it is not served."""
-    desk = Desk(tmp_path, {"three": promised, "charts": promised}, libraries=tmp_path)
+    live = Desk(tmp_path, {"three": promised, "charts": promised}, libraries=tmp_path)
     try:
-        page = desk.browser
+        page = live.browser
         assert page.js("return coglab.view()") == "2D"
         page.until("return /Strip charts/.test(document.getElementById('charts').innerText)", 60.0)
         assert look(page)[0] == []
         page.js("document.getElementById('stop').click()")
         end = time.monotonic() + 60.0
-        while not desk.robot.stops and time.monotonic() < end:
+        while not live.robot.stops and time.monotonic() < end:
             time.sleep(0.02)
-        assert desk.robot.stops == ["browser 1"] or len(desk.robot.stops) == 2  # by both ways
+        assert live.robot.stops == ["browser 1"] or len(live.robot.stops) == 2  # by both ways
     finally:
-        desk.close()
+        live.close()
 
 
-def test_a_page_that_is_let_in_no_more_says_what_to_do_and_that_its_stop_went_nowhere(desk):
+def test_a_page_that_is_let_in_no_more_says_what_to_do_and_that_its_stop_went_nowhere(live):
     """As after the console was killed and started anew, which knows no session of before."""
     with Browser() as page:
         page.driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": IN_HAND})
-        page.open(desk.console.link())
+        page.open(live.console.link())
         mine = page.js("return document.getElementById('role').innerText.match(/browser [0-9]+/)[0]")
-        sessions = desk.console.access._sessions
+        sessions = live.console.access._sessions
         (key,) = [key for key, one in sessions.items() if one.name == mine]
         del sessions[key]
         page.js("window.connections.at(-1).close()")
         page.until("return document.getElementById('lost').textContent.includes('console.url')", 60.0)
-        stops = len(desk.robot.stops)
+        stops = len(live.robot.stops)
         page.js("document.getElementById('stop').click()")
         page.until("return document.getElementById('told').textContent.includes('red button')", 60.0)
-        assert len(desk.robot.stops) == stops
+        assert len(live.robot.stops) == stops

@@ -1,7 +1,6 @@
 """Whoever looks can read all of it: the last event with its reason, what is waited for, why the robot stands still.
 What has no room is shown in full by focus and by the mouse. In a real browser with a double in place of the robot."""
 
-import shutil
 import time
 
 import pytest
@@ -9,14 +8,12 @@ from coglab_console.browser import Browser
 from coglab_console.desk import words
 from coglab_console.scene.graph_layout import Container, Layout
 from page_check import focus_order, look
-from page_double import STATUS, Desk
+from page_double import STATUS, needs_browser
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
-pytestmark = pytest.mark.skipif(
-    shutil.which("chromedriver") is None, reason="chromium-driver is missing: ./coglab install browser"
-)
+pytestmark = needs_browser
 ROOT = "/coglab_master/exchange_human_to_robot/approach"
 SWITCHED = (
     "pattern 'high' recognised with confidence 1.00: primitive 'reach_human_middle' replaced by 'reach_human_high'"
@@ -42,49 +39,42 @@ def shown_of(last, reason):
     }
 
 
-def in_the_middle_of_a_reach(desk):
-    desk.state = {
+def in_the_middle_of_a_reach(live):
+    live.state = {
         "words": "reaches and receives",
         "waits": "contact of an object with the hand, or the end of the reach",
         "left": 7.5,
         "dmp": ["running", 0.4, 0.23, 0.9],
         "ages": {"hand": 0.047, "object": 0.051},
     }
-    desk.put(**shown_of(("monitor_dmp", "switched", "monitor_dmp"), SWITCHED))
-    desk.put(status={**STATUS, "manager": {**STATUS["manager"], "state": "running"}})
+    live.put(**shown_of(("monitor_dmp", "switched", "monitor_dmp"), SWITCHED))
+    live.put(status={**STATUS, "manager": {**STATUS["manager"], "state": "running"}})
     for before, how, after, reason in (
         ("execute_dmp", "succeeded", "wait_stop", ""),
         ("monitor_dmp", "switched", "monitor_dmp", SWITCHED),
     ):
-        desk.event(words.transition(ROOT, before, how, after, reason))
+        live.event(words.transition(ROOT, before, how, after, reason))
     return SWITCHED
 
 
-def stopped(desk):
-    desk.state = {"words": "stopped", "phase": "/coglab_master/stopped"}
+def stopped(live):
+    live.state = {"words": "stopped", "phase": "/coglab_master/stopped"}
     machine = {**STATUS["machine"], "state": "/coglab_master/stopped", "words": "stopped", "why": FELL, "object": "mug"}
     arm = {**STATUS["arm"], "supervisor": "stopped", "words": "stopped", "quality": "UNACCEPTABLE", "reason": FELL,
            "held": True, "power": False, "allowed": False}  # fmt: skip
     manager = {**STATUS["manager"], "state": "fault", "reason": FELL}
     hand = {**STATUS["hand"], "connected": False, "message": f"no answer of the hand for 0.5 s: {FELL}"}
-    desk.put(status={**STATUS, "machine": machine, "arm": arm, "manager": manager, "hand": hand})
-    desk.put(**shown_of(("arm_motion", "failed", "failed"), FELL))
-    desk.event(words.transition(ROOT, "arm_motion", "failed", "failed", FELL))
+    live.put(status={**STATUS, "machine": machine, "arm": arm, "manager": manager, "hand": hand})
+    live.put(**shown_of(("arm_motion", "failed", "failed"), FELL))
+    live.event(words.transition(ROOT, "arm_motion", "failed", "failed", FELL))
     return FELL
 
 
-@pytest.fixture(scope="module")
-def desk(tmp_path_factory):
-    found = Desk(tmp_path_factory.mktemp("console"))
-    yield found
-    found.close()
-
-
 @pytest.mark.parametrize("moment", [in_the_middle_of_a_reach, stopped])
-def test_nothing_is_cut_off_that_cannot_be_read_in_full(desk, moment):
+def test_nothing_is_cut_off_that_cannot_be_read_in_full(live, moment):
     """Least of all the reason of the last event: its first words stand in the column, without a press of any key."""
-    page = desk.browser
-    reason = moment(desk)
+    page = live.browser
+    reason = moment(live)
     page.until("return document.getElementById('log').textContent.includes(arguments[0])", 60.0, reason)
     page.until("return document.getElementById('status').textContent.includes(arguments[0])", 60.0, reason)
     page.until("return document.querySelector('#graph p.last').textContent.includes(arguments[0])", 60.0, reason)
@@ -101,10 +91,10 @@ def test_nothing_is_cut_off_that_cannot_be_read_in_full(desk, moment):
     assert page.js("return document.querySelector('#graph p.last').innerText").startswith(reason[:40])
 
 
-def test_a_tablet_shows_the_whole_column(desk):
-    stopped(desk)
+def test_a_tablet_shows_the_whole_column(live):
+    stopped(live)
     with Browser(size=(1024, 768), touch=True) as tablet:
-        tablet.open(desk.console.link())
+        tablet.open(live.console.link())
         tablet.until("return document.getElementById('now').innerText.includes('stopped')", 60.0)
         end = time.monotonic() + 20.0  # a busy computer lays the column out later than it fills it
         while look(tablet)[0] and time.monotonic() < end:
@@ -112,9 +102,9 @@ def test_a_tablet_shows_the_whole_column(desk):
         assert look(tablet)[0] == []
 
 
-def test_what_is_cut_off_unfolds_under_the_mouse_and_covers_nothing_that_is_pressed(desk):
-    page = desk.browser
-    stopped(desk)
+def test_what_is_cut_off_unfolds_under_the_mouse_and_covers_nothing_that_is_pressed(live):
+    page = live.browser
+    stopped(live)
     height = "return document.getElementById('log').getBoundingClientRect().height"
     page.until("return document.getElementById('log-place').tabIndex === 0", 60.0)
     folded = page.js(height)
@@ -130,19 +120,19 @@ def test_what_is_cut_off_unfolds_under_the_mouse_and_covers_nothing_that_is_pres
     page.until(f"{height} === arguments[0]", 60.0, folded)
 
 
-def test_an_event_that_comes_while_one_reads_takes_the_focus_nowhere(desk):
-    page = desk.browser
-    stopped(desk)
+def test_an_event_that_comes_while_one_reads_takes_the_focus_nowhere(live):
+    page = live.browser
+    stopped(live)
     page.until("return document.getElementById('log-place').tabIndex === 0", 60.0)
     page.js("document.getElementById('log-place').focus()")
-    desk.event("one more")
+    live.event("one more")
     page.until("return document.getElementById('log').textContent.includes('one more')", 60.0)
     assert page.js("return document.activeElement.id") == "log-place"
     ActionChains(page.driver).send_keys(Keys.TAB).perform()
     assert page.js("return document.activeElement.id") != "log-place"
 
 
-def test_a_change_of_the_phase_is_read_out(desk):
+def test_a_change_of_the_phase_is_read_out(live):
     read_out = "return [...document.querySelectorAll('#live dd [aria-live=polite]')].map((one) => one.closest('dd'))"
-    (cell,) = desk.browser.js(read_out)
+    (cell,) = live.browser.js(read_out)
     assert "phase" in cell.get_attribute("class").split()

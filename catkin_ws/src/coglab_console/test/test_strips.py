@@ -1,17 +1,14 @@
 """What the strip charts show is what was sent: values, planned speed, limit, order of the fingers, phases, one axis;
 and no two series of a strip look alike but for their colour. In a real browser with a double in place of the robot."""
 
-import shutil
 import time
 from pathlib import Path
 
 import pytest
-from page_double import Desk
+from page_double import Desk, needs_browser
 
 pytestmark = [
-    pytest.mark.skipif(
-        shutil.which("chromedriver") is None, reason="chromium-driver is missing: ./coglab install browser"
-    ),
+    needs_browser,
     pytest.mark.skipif(
         not Path("/usr/share/javascript/dygraphs").is_dir(), reason="libjs-dygraphs is missing: ./coglab install run"
     ),

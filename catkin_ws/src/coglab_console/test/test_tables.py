@@ -49,15 +49,6 @@ def test_who_changed_what_by_how_much_in_execution_order(shown):
     }
 
 
-def test_attribution_is_bounded(shown):
-    """A message of somebody else must not fill the page."""
-    table, documents = shown
-    many = FeedbackControllerState(controller="x", names=["n"] * 500, values=[0.0] * 500, units=["1"] * 500)
-    table._on_feedback_state(FeedbackState(states=[many] * 500, corrections=[FeedbackCorrection()] * 500))
-    found = documents["attribution"]
-    assert (len(found["rows"]), len(found["inside"]), len(found["inside"][0]["values"])) == (64, 32, 20)
-
-
 def test_controllers_with_their_pauses_and_recognition_with_its_confidences(shown):
     table, documents = shown
     limit = FeedbackControllerStatus(name="limit", stage="joint", paused=True, pause_reasons=["user"], faults=2)

@@ -1,16 +1,13 @@
 """What the pages Feedback, Primitives, Objects and Contact show is what was sent, in words and numbers; in a real
 browser with a double in place of the robot."""
 
-import shutil
 import time
 
 import pytest
 from coglab_console.browser import press_and_hold
-from page_double import STATUS, Desk
+from page_double import STATUS, needs_browser
 
-pytestmark = pytest.mark.skipif(
-    shutil.which("chromedriver") is None, reason="chromium-driver is missing: ./coglab install browser"
-)
+pytestmark = needs_browser
 TABLE = (
     "return [...[...document.querySelectorAll('#page table')][arguments[0]].querySelectorAll('tbody tr')]"
     ".map((row) => [...row.children].map((cell) => cell.innerText))"
@@ -24,21 +21,14 @@ BARS = (
 )
 
 
-@pytest.fixture(scope="module")
-def desk(tmp_path_factory):
-    found = Desk(tmp_path_factory.mktemp("console"))
-    yield found
-    found.close()
-
-
 def controller(name, **more):
     row = {"name": name, "type": "t", "stage": "task", "enabled": True, "paused": False, "safety": False, "waiting": "",
            "activity": "active", "reasons": [], "fault": "", "faults": 0, "overruns": 0}  # fmt: skip
     return {**row, **more}
 
 
-def test_feedback_controllers_by_order_with_activity_pauses_and_who_changed_what(desk):
-    page = desk.browser
+def test_feedback_controllers_by_order_with_activity_pauses_and_who_changed_what(live):
+    page = live.browser
     page.tab("Feedback")
     yields = controller("yield", activity="waits", waiting="for the wrench", faults=2, overruns=7)
     reasons = ["the hand closes", "the arm stands still"]
@@ -48,7 +38,7 @@ def test_feedback_controllers_by_order_with_activity_pauses_and_who_changed_what
         {"controller": "limit", "signal": "stiffness", "size": 12.5, "angle": 0.0},
     ]
     inside = [{"controller": "yield", "values": [["force", 3.25, "N"], ["offset", 0.004, "m"]]}]
-    desk.put(feedback={"profile": "approach", "rows": [yields, limit]}, attribution={"rows": rows, "inside": inside})
+    live.put(feedback={"profile": "approach", "rows": [yields, limit]}, attribution={"rows": rows, "inside": inside})
     page.until("return document.querySelectorAll('#page table').length === 2", 60.0)
     shown = page.js(TABLE, 0)
     assert [row[:6] for row in shown] == [
@@ -60,32 +50,32 @@ def test_feedback_controllers_by_order_with_activity_pauses_and_who_changed_what
     assert page.js(TABLE, 1) == [["yield", "velocity", "0.0125", "0.034"], ["limit", "stiffness", "12.5", "0"]]
     assert "yield: force 3.25 N, offset 0.004 m" in page.js("return document.getElementById('page').innerText")
     # Another order is another table, and nobody's correction is said to be nobody's.
-    desk.put(feedback={"profile": "", "rows": [limit, yields]}, attribution={"rows": [], "inside": []})
+    live.put(feedback={"profile": "", "rows": [limit, yields]}, attribution={"rows": [], "inside": []})
     page.until("return document.getElementById('page').innerText.includes('Nobody changed a reference.')", 60.0)
     assert [row[:2] for row in page.js(TABLE, 0)] == [["1", "limit"], ["2", "yield"]]
     assert page.js("return document.getElementById('feedback-profile').innerText") == "Profile: none"
     page.tab("Live")
 
 
-def test_recognition_with_the_confidence_of_each_pattern(desk):
-    page = desk.browser
+def test_recognition_with_the_confidence_of_each_pattern(live):
+    page = live.browser
     page.tab("Primitives")
     rows = [["low", 0.07], ["high", 0.9], ["middle", 0.03]]
     seen = {"pattern": "high", "decided": True, "progress": 0.4, "stamp": time.monotonic() - 7.0, "rows": rows}
-    desk.put(recognition=seen)
+    live.put(recognition=seen)
     page.until("return document.querySelectorAll('#page .bar').length === 3", 60.0)
     bars = page.js(BARS)
     assert [[name, value] for name, _, _, value in bars] == [["low", "0.07"], ["high", "0.90"], ["middle", "0.03"]]
     assert [width for _, width, _, _ in bars] == pytest.approx([0.07, 0.9, 0.03], abs=0.01)
     words = page.js("return document.getElementById('page').innerText")
     assert "Decided: high, 40 % of the reach seen, 7 s ago" in words
-    desk.put(recognition={**seen, "decided": False})
+    live.put(recognition={**seen, "decided": False})
     page.until("return document.getElementById('page').innerText.includes('Not decided: high')", 60.0)
     page.tab("Live")
 
 
-def test_objects_with_what_the_database_has_against_a_file(desk):
-    page = desk.browser
+def test_objects_with_what_the_database_has_against_a_file(live):
+    page = live.browser
     page.tab("Objects")
     sizes = {"mug": {"type": "cylinder", "radius": 0.04, "height": 0.1}, "box": {"type": "box"}}
     rows = [
@@ -100,7 +90,7 @@ def test_objects_with_what_the_database_has_against_a_file(desk):
         for name, mass in (("box", 0.5), ("mug", 0.25))
     ]
     problem = "ball.yaml: mass: -1 is less than the minimum of 0"
-    desk.put(objects={"rows": rows, "asked": True, "problems": [problem]})
+    live.put(objects={"rows": rows, "asked": True, "problems": [problem]})
     page.until("return document.getElementById('object-problems').innerText.includes('ball.yaml')", 60.0)
     assert page.js("return document.getElementById('object-problems').innerText") == f"▲{problem}"
     assert [row[:4] for row in page.js(TABLE, 0)] == [
@@ -110,24 +100,24 @@ def test_objects_with_what_the_database_has_against_a_file(desk):
     assert page.js("return document.querySelector('#page pre').innerText").strip() == "id: box"
     page.js("document.querySelector('#page [aria-label=\"Show mug\"]').click()")
     assert page.js("return document.querySelector('#page pre').innerText").strip() == "id: mug"
-    desk.put(objects={"rows": rows, "asked": True, "problems": []})
+    live.put(objects={"rows": rows, "asked": True, "problems": []})
     page.until(
         "return document.getElementById('object-problems').innerText.includes('2 objects, every file fits')", 10.0
     )
-    desk.put(objects={"rows": [], "asked": False, "problems": []})
+    live.put(objects={"rows": [], "asked": False, "problems": []})
     page.until("return document.getElementById('object-problems').innerText.includes('has not been asked')", 60.0)
     page.tab("Live")
 
 
-def test_contact_by_joint_against_its_threshold_and_learning(desk):
-    page = desk.browser
+def test_contact_by_joint_against_its_threshold_and_learning(live):
+    page = live.browser
     page.tab("Contact")
     rate = [0.3, -0.15, 0.0, 0.9, 0.01, 0.0, 0.02]
     threshold = [0.6, 0.3, 0.24, 0.6, 0.01, 0.36, 0.18]
     watched = [True, True, False, True, False, False, False]
     contact = {**STATUS["contact"], "k": 6.0, "samples": 321, "window": 0.04, "mode": "contact", "state": "watching"}
-    desk.state = {"rate": rate, "threshold": threshold, "watched": watched, "margin": 1.5}
-    desk.put(status={**STATUS, "contact": contact})
+    live.state = {"rate": rate, "threshold": threshold, "watched": watched, "margin": 1.5}
+    live.put(status={**STATUS, "contact": contact})
     words = "return document.getElementById('page').innerText"
     page.until(f"{words}.includes('321 samples')", 60.0)
     page.until("return [...document.querySelectorAll('#page .bar')][3].innerText.includes('0.900')", 60.0)
@@ -145,41 +135,41 @@ def test_contact_by_joint_against_its_threshold_and_learning(desk):
     assert "Change of the external torques within 40 ms, Nm" in shown and "Watching for contact: margin 1.50" in shown
     assert "standard deviations A1 0.100, A2 0.050, E1 0.040" in shown and "k 6" in shown
     assert "Learnt: 321 samples" in shown
-    desk.state = {**desk.state, "margin": None}
-    desk.put(status={**STATUS, "contact": {**contact, "learnt": False, "state": "waiting", "samples": 12}})
+    live.state = {**live.state, "margin": None}
+    live.put(status={**STATUS, "contact": {**contact, "learnt": False, "state": "waiting", "samples": 12}})
     page.until(f"{words}.includes('Learning; leave the arm alone: 12 samples')", 60.0)
     page.until(f"{words}.includes('Armed for contact; waits until the arm stands still')", 60.0)
     button = page.js(
         "return [...document.querySelectorAll('#page button')].find((b) => b.innerText === 'Learn anew at rest')"
     )
-    press_and_hold(page, button, lambda: desk.robot.calls == [("contact_learn", {})])
-    desk.state = {}
+    press_and_hold(page, button, lambda: live.robot.calls == [("contact_learn", {})])
+    live.state = {}
     page.tab("Live")
 
 
-def test_a_questionnaire_is_filled_in_recordings_are_listed_and_a_primitive_is_previewed(desk):
-    page = desk.browser
+def test_a_questionnaire_is_filled_in_recordings_are_listed_and_a_primitive_is_previewed(live):
+    page = live.browser
     page.tab("Experiment")
     asked = {"name": "tlx", "title": "Workload", "low": 0, "high": 100, "step": 5, "ends": ["low", "high"],
              "items": [["effort", "How hard?"], ["pace", "How hurried?"]]}  # fmt: skip
     row = {"name": "x", "started": "2026-11-28T13:41:48.795+00:00", "action": "take", "object": "mug",
            "participant": "P03", "condition": "calm", "outcome": "succeeded", "duration_s": 9.4,
            "notes": "looked away"}  # fmt: skip
-    desk.put(
+    live.put(
         study={"study": "s", "participant": "P03", "condition": "calm", "problem": "", "questionnaires": [asked]},
         recordings={"folder": "/x", "recording": True, "rows": [row]},
     )
     field = "document.querySelector('#page input[aria-label=\"How hard?\"]')"
     page.until(f"return {field} !== null && document.body.innerText.includes('looked away')", 60.0)
     page.js(f"{field}.value = '55'")
-    desk.put(recordings={"folder": "/y", "recording": True, "rows": [row]})
+    live.put(recordings={"folder": "/y", "recording": True, "rows": [row]})
     page.until("return document.body.innerText.includes('/y')", 60.0)
     assert page.js(f"return {field}.value") == "55"  # what is being filled in stays
     page.js(
         "[...document.querySelectorAll('#page button')].find((one) => one.innerText === 'Write the answers').click()"
     )
     page.until("return document.querySelector('#page p[aria-live]').innerText.includes('done')", 60.0)
-    assert desk.robot.calls[-1] == ("answer", {"questionnaire": "tlx", "answers": {"effort": 55}})
+    assert live.robot.calls[-1] == ("answer", {"questionnaire": "tlx", "answers": {"effort": 55}})
     page.tab("Primitives")
     shown = {
         "name": "reach_me",
@@ -189,9 +179,9 @@ def test_a_questionnaire_is_filled_in_recordings_are_listed_and_a_primitive_is_p
         "basis": 3,
         "plot": [[0, 0, 0, 0, 0]],
     }
-    desk.put(primitives={"file": "f", "problem": "", "rows": [shown]})
+    live.put(primitives={"file": "f", "problem": "", "rows": [shown]})
     button = "[...document.querySelectorAll('#page button')].find((one) => one.innerText === 'Preview')"
     page.until(f"return {button} !== undefined", 60.0)
     page.js(f"{button}.click()")
     page.until("return document.querySelector('#page p[aria-live]').innerText.includes('done')", 60.0)
-    assert desk.robot.calls[-1] == ("preview", {"primitive": "reach_me"})
+    assert live.robot.calls[-1] == ("preview", {"primitive": "reach_me"})

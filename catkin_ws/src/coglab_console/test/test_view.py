@@ -118,15 +118,6 @@ def test_nothing_of_an_arm_that_is_silent_is_shown_as_news(seen, monkeypatch):
     assert not view.standing().arm_alive
 
 
-def test_phase_and_what_it_waits_for_are_of_one_moment(seen):
-    view, _, _ = seen
-    state = "/coglab_master/exchange_human_to_robot/set_dmp_goal"
-    view._on_machine(MasterState(state=state, waits_for="the offer of mug", deadline=Time(103)))
-    frame = view.frame()
-    assert (frame["words"], frame["waits"], frame["left"]) == ("waits until it is offered", "the offer of mug", 3.0)
-    assert view.phase() == frame["words"]
-
-
 def test_a_transition_belongs_to_the_phase_that_has_ended(seen):
     view, _, events = seen
     path = "/coglab_master/exchange_human_to_robot"

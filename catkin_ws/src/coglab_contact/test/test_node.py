@@ -136,9 +136,6 @@ def test_arming(node):
     assert node.on_arm(wrong).reason_code == ReasonCode.INVALID_ARGUMENT
 
 
-BEGIN, END = LearnMotionRequest(gather=True), LearnMotionRequest(gather=False)
-
-
 def answered(node, request):
     """(success, code, sentence)"""
     answer = node.on_learn_motion(request)
@@ -152,13 +149,6 @@ def test_what_is_learnt_is_written_and_used(node):
     assert Thresholds.load(Path(node.learnt_file)).limit == Thresholds.load(SHIPPED).limit
     assert node.moving.use.called and node.recorder is None
     assert answered(node, END)[1] == ReasonCode.NOTHING_RUNS
-
-
-def test_without_a_file_nothing_is_gathered(node):
-    node.learnt_file = ""
-    success, code, sentence = answered(node, BEGIN)
-    assert (success, code, node.recorder) == (False, ReasonCode.BAD_FILE, None)
-    assert "~learnt_file" in sentence and "contact_learnt_file:=" in sentence
 
 
 @pytest.mark.parametrize("place, words", [("", "is a folder"), ("none/learnt.yaml", "is not there")])

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from coglab_perception._reach_bank import transition
 from coglab_perception.belief import Belief, BeliefFilter, BeliefSettings
 from coglab_perception.reach_bank import ReachSettings
 from coglab_perception.recogniser import PatternEnd
@@ -84,15 +83,6 @@ def steps(beliefs: list[Belief]) -> list[float]:
 
 def carried(hand: Path3) -> Path3:
     return lambda t: hand(t) + IN_HAND
-
-
-def test_the_feedback_form_is_minimum_jerk():
-    state, t = np.array([0.0, 0.0, 0.0, 0.5]), 0.0
-    for step in np.random.default_rng(1).uniform(0.005, 0.06, 80):
-        state[:3] = transition(1.2 - t, step) @ state
-        t += step
-        assert state[0] == pytest.approx(0.5 * share(t / 1.2), abs=1e-9)
-    assert state == pytest.approx([0.5, 0.0, 0.0, 0.5])
 
 
 @pytest.mark.parametrize("holds", [False, True])

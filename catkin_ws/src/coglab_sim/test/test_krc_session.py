@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from fri_client import CARTESIAN_IMPEDANCE, COMMAND, JOINT_IMPEDANCE, JOINT_POSITION, MONITOR, parse, set_point
+from fri_client import CARTESIAN_IMPEDANCE, COMMAND, JOINT_IMPEDANCE, MONITOR, parse, set_point
 from test_object import EXACT
 
 
@@ -175,20 +175,6 @@ QUIET = {**EXACT, "arm__coulomb_friction": [0.0] * 7}
 """no friction: an arm that is pushed goes to where its springs hold it"""
 
 
-def openkc(session, **parameters):
-    s = session(krc__convention="openkc", **QUIET, **parameters)
-    s.monitor()
-    return s
-
-
-def command(s, code):
-    """One command of OpenKC."""
-    s.client.ints[15], s.client.bools = code, 1
-    s.run(0.3)
-    s.client.ints[15], s.client.bools = 0, 0
-    s.run(0.15)
-
-
 def pushed(s, force, torque=(0.0, 0.0, 0.0), seconds=4.0):
     """Position and frame of the arm before a push and after it."""
     before = s.tick()
@@ -200,42 +186,6 @@ def yields(before, after):
     """Joint torque of the push over the way that each joint gives, Nm/rad."""
     jacobian = np.array(before["jacobian"]).reshape(6, 7)
     return jacobian, np.array(after["position"]) - np.array(before["position"])
-
-
-def test_joint_stiffness_of_the_controller_counts_where_the_pc_gives_none(session):
-    s = openkc(session)
-    stiffness = [700, 800, 900, 1000, 1100, 1200, 1300]
-    s.client.ints[8:15], s.client.reals[9:16] = stiffness, [1.0] * 7
-    command(s, 5)
-    command(s, 7)
-    s.client.flags = JOINT_POSITION
-    command(s, 1)
-    assert s.cell.fri_state == COMMAND and parse(s.measurement)["control"] == 3
-    force = np.array([6.0, 8.0, -5.0])
-    before, after = pushed(s, force, [1.0, 0.5, -0.8])
-    jacobian, way = yields(before, after)
-    torque = jacobian.T @ [*force, -0.8, 0.5, 1.0]  # the wire's rotation rows are z y x
-    assert way * stiffness == pytest.approx(torque, abs=0.06)
-    assert np.abs(torque).min() > 0.2, "every joint was asked"
-
-
-def test_cartesian_stiffness_of_the_controller_in_the_order_of_krl(session):
-    """INT[10..15]: x y z, then A B C, which turn about z y x."""
-    s = openkc(session)
-    s.client.ints[9:15], s.client.reals[10:16] = [900, 1200, 1500, 90, 120, 150], [1.0] * 6
-    command(s, 4)
-    assert parse(s.measurement)["ints"][15] == 102
-    command(s, 6)
-    s.client.flags = 0x0100
-    command(s, 1)
-    assert s.cell.fri_state == COMMAND and parse(s.measurement)["control"] == 2
-    before, after = pushed(s, [6.0, 8.0, -5.0], [1.0, 0.8, -0.9], 6.0)
-    rotation, moved = (np.array(f["frame"]).reshape(3, 4) for f in (before, after))
-    way = moved[:, 3] - rotation[:, 3]
-    turned = moved[:, :3] @ rotation[:, :3].T
-    turn = np.array([turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]]) / 2
-    assert way * [900, 1200, 1500] == pytest.approx([6.0, 8.0, -5.0], abs=0.1)
-    assert turn * [150, 120, 90] == pytest.approx([1.0, 0.8, -0.9], abs=0.02)
 
 
 def test_values_of_the_pc_count_while_it_gives_them(session):

@@ -16,8 +16,3 @@ def test_one_number_is_enough(wrong, where):
     position, orientation, numbers = np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]), [0.0]
     {"position": position, "orientation": orientation, "number": numbers}[where][0] = wrong
     assert not plausible([Pose(), Pose(position, orientation)], numbers)
-
-
-@pytest.mark.parametrize("size", [0.0, 1e-9])
-def test_an_orientation_has_a_direction(size):
-    assert not plausible([Pose(np.zeros(3), np.array([0.0, size, 0.0, 0.0]))])

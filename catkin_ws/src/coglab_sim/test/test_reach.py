@@ -1,16 +1,8 @@
-"""The shape of a human reach: minimum jerk in closed form, decoupled, conic."""
+"""The shape of a human reach: decoupled, bowed, corrected."""
 
 import numpy as np
 import pytest
-from coglab_py.rotation import Rotation
-from coglab_sim.person.reach import CorrectedReach, Reach, Turn, min_jerk
-
-
-def test_min_jerk_closed_form():
-    x = np.linspace(0, 1, 201)
-    s = np.array([min_jerk(v)[0] for v in x])
-    assert s[0] == 0 and s[-1] == 1 and np.all(np.diff(s) >= 0)
-    assert max(min_jerk(v)[1] for v in x) == pytest.approx(1.875)
+from coglab_sim.person.reach import CorrectedReach, Reach, min_jerk
 
 
 @pytest.mark.parametrize("bow", [0.0, 0.05])
@@ -27,21 +19,6 @@ def test_the_vertical_part_is_quicker_and_both_arrive():
     position, _ = reach.at(0.8)
     assert position[2] / 0.3 > position[0] / 0.4
     assert reach.at(1.0)[0] == pytest.approx([0.4, 0, 0.3]) and reach.over(1.0)
-
-
-def test_a_conic_reach_bows_but_ends_where_it_should():
-    reach = Reach(np.zeros(3), np.array([0.4, 0.0, 0.0]), 0.0, 1.0, bow=0.05)
-    assert max(reach.at(t)[0][2] for t in np.linspace(0, 1, 101)) == pytest.approx(0.05, abs=1e-3)
-    assert reach.at(1.0)[0] == pytest.approx([0.4, 0, 0], abs=1e-12)
-
-
-def test_a_turn_goes_about_one_axis_with_minimum_jerk():
-    turn = Turn(Rotation.from_rotvec([0, 0, 0.2]), Rotation.from_rotvec([0, 0, 1.2]), 1.0, 2.0)
-    for t in (0.5, 1.5, 2.0, 2.7, 3.5):
-        share, rate = min_jerk((t - 1.0) / 2.0)
-        rotation, spin = turn.at(t)
-        assert rotation.as_rotvec() == pytest.approx([0.0, 0.0, 0.2 + share])
-        assert spin == pytest.approx([0.0, 0.0, rate / 2.0])
 
 
 def test_a_reach_that_is_corrected_on_the_way():

@@ -82,19 +82,6 @@ def test_the_same_seed_gives_the_same_hand():
     assert any(not np.array_equal(x.frame.position, y.frame.position) for x, y in pairs)
 
 
-def test_reach_time_and_reaction_are_human():
-    reactions, reaches = [], []
-    for seed in range(40):
-        stage = Stage(Participant.draw(seed), robot_comes=False)
-        stage.human.command("give mug")
-        stage.run(4.0)
-        phases = [s.phase for s in stage.samples]
-        reactions.append(phases.count("reacting") * DT)
-        reaches.append(phases.count("reaching") * DT)
-    assert 0.25 < np.median(reactions) < 0.5
-    assert 0.9 < np.median(reaches) < 1.5
-
-
 def test_grip_follows_mass_and_friction_and_is_limited():
     def grip(mass, friction, limit=40.0):
         scene = Scene(object_mass=mass, object_friction=friction)

@@ -76,6 +76,16 @@ class Trial:
         assert ok, message
         self.clock.sleep(0.1)
 
+    def begin(self, action="exchange_human_to_robot", object_id="mug"):
+        """Trigger an action as soon as the hub of the empty hand is open."""
+        self.wait_hub("wait_without_object")
+        self.start(action, object_id)
+
+    def receive(self):
+        """Have the mug received."""
+        self.begin()
+        self.wait_hub("wait_with_object")
+
     def labels(self, path_end):
         """Labels of the states that ended in the container whose path ends so, in order."""
         return [t.from_state for t in self.ctx.journal.transitions if t.path.endswith(path_end)]

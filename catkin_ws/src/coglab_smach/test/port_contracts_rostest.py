@@ -14,7 +14,6 @@ import rosgraph
 import rospy
 import rostest
 from coglab_msgs.msg import HandoverBelief, ReasonCode, Recognition
-from coglab_msgs.srv import SetSpeedScale
 from coglab_py.packages import package_path
 from coglab_smach.ports.interfaces import Ahead, DmpRequest
 from coglab_smach.ports.interfaces import Recognition as Recognised
@@ -182,17 +181,6 @@ class Motions(WithArm):
         until(lambda: self.arm.profile_settled("dmp_compliant").ok, 3.0, "the profile")
         refused(self.arm.apply_profile("nobody"), ReasonCode.UNKNOWN_NAME)
         assert not self.arm.profile_settled("dmp").ok
-
-    def test_limits_and_speed_scale_are_those_of_the_manager(self):
-        limits = self.arm.motion_limits()
-        assert len(limits.velocity) == len(limits.ptp_acceleration) == 7 and min(limits.velocity) > 1.0
-        assert self.arm.speed_scale() == 1.0
-        scale = rospy.ServiceProxy("/controller_manager/speed_scale", SetSpeedScale)
-        try:
-            scale(0.25)
-            until(lambda: self.arm.speed_scale() == 0.25, 2.0, "the speed scale")
-        finally:
-            scale(1.0)
 
     def test_what_is_given_up_while_the_node_is_frozen_never_acts(self):
         before = np.array(self.arm.joint_positions())

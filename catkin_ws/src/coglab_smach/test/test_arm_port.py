@@ -8,7 +8,6 @@ from types import SimpleNamespace
 
 import pytest
 from coglab_msgs.msg import FinishedPtp, ReasonCode, UnfinishedPtp
-from coglab_msgs.srv import ExecuteDmpRequest, SwitchDmpRequest
 from coglab_smach.ports.interfaces import DmpProgress, DmpRequest, Verdict
 from coglab_smach.ports.pending import Permit, PortError, Ready
 from coglab_smach.ros import arm
@@ -104,13 +103,6 @@ def test_a_robot_that_was_never_heard_or_not_for_a_second_is_silent(robot, ask):
     assert "has never been published" in verdict().why and verdict().code == ReasonCode.NODE_SILENT
 
 
-def test_an_arm_that_moves_does_not_stand(robot):
-    robot.say("controller_manager/status", **robot.status(standing=False, state="moving"))
-    assert robot.port.standing() == Verdict(False, "the arm is moving") and robot.port.speed_scale() == 0.5
-    robot.topics["controller_manager/status"].message = None
-    assert robot.port.speed_scale() == 1.0
-
-
 def test_joints_are_told_in_wire_order_for_half_a_second(robot):
     assert robot.port.measured() == ((6.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.0), 7.5)
     robot.topics["lwr/joint_states"].seconds = 0.5
@@ -139,28 +131,7 @@ def test_news_of_a_motion_that_is_older_than_its_start_is_none(robot):
     assert robot.port.dmp_progress() == DmpProgress("running"), "it has begun when it was accepted"
 
 
-def test_a_profile_is_settled_when_the_others_are_off(robot):
-    assert robot.port.profile_settled("dmp").code == ReasonCode.NODE_SILENT
-    part = lambda name, enabled, activity: SimpleNamespace(name=name, enabled=enabled, activity=activity)  # noqa: E731
-    status = "controller_manager/feedback/status"
-    robot.say(status, profile="dmp", controllers=[part("a", True, "active"), part("b", False, "off")])
-    assert robot.port.profile_settled("dmp") == Verdict(True)
-    assert robot.port.profile_settled("ptp") == Verdict(False, "profile 'dmp' is in force")
-    robot.say(status, profile="dmp", controllers=[part("a", False, "stopping"), part("b", False, "off")])
-    assert robot.port.profile_settled("dmp") == Verdict(False, "a is stopping")
-
-
 # --- what is asked of it ----------------------------------------------------------------------------------------------
-
-
-def test_a_request_has_the_fields_of_its_service():
-    request = DmpRequest("p", "f", (1.0, 2.0, 3.0), 1.5, True, (0.0, 0.0, 0.0, 1.0), (0.0, 0.05, 0.0), 0.05)
-    fields = arm._fields(request, ExecuteDmpRequest)
-    assert (fields["goal_offset"].x, fields["goal_offset"].z, fields["target_orientation"].w) == (1.0, 3.0, 1.0)
-    assert (fields["goal_approach"].y, fields["arrival_speed"], fields["goal_frame"]) == (0.05, 0.05, "f")
-    switch = arm._fields(request, SwitchDmpRequest)
-    assert (switch["primitive_id"], switch["dmp_ratio"], "goal_frame" in switch) == ("p", 1.5, False)
-    assert set(fields) == set(ExecuteDmpRequest.__slots__) and set(switch) == set(SwitchDmpRequest.__slots__)
 
 
 # --- the end of a motion ----------------------------------------------------------------------------------------------
@@ -203,30 +174,6 @@ def test_cancelling_is_over_when_the_arm_stands_or_at_once_when_it_fails(robot):
         ended(robot.port.cancel_motion("why")).result()
 
 
-@pytest.mark.parametrize(
-    ("code", "active", "fails"),
-    [
-        (ReasonCode.NOTHING_RUNS, "ptp", False),
-        (ReasonCode.NOT_ACTIVE, "ptp", False),
-        (ReasonCode.NODE_SILENT, "ptp", True),
-        (ReasonCode.NODE_SILENT, "", False),
-        (ReasonCode.HELD, "", True),
-    ],
-)
-def test_what_has_nothing_to_cancel_is_cancelled(robot, code, active, fails):
-    robot.say("controller_manager/status", **robot.status(active_controller=active))
-    robot.answers["controller_manager/ptp/cancel"] = PortError("no", code=code)
-    if fails:
-        with pytest.raises(PortError):
-            robot.port._cancel("ptp", "why")
-    else:
-        robot.port._cancel("ptp", "why")
-    robot.topics["controller_manager/status"].message = None
-    if code == ReasonCode.NODE_SILENT:
-        with pytest.raises(PortError):
-            robot.port._cancel("ptp", "why")
-
-
 def finished(robot, ptp_id=3):
     robot.topics["controller_manager/ptp/finished_ptp"].heard(FinishedPtp(ptp_id=ptp_id))
 
@@ -247,18 +194,14 @@ def test_a_motion_is_over_when_its_own_end_is_told(robot):
     assert (error.value.causes, error.value.code) == (("cancelled",), ReasonCode.CANCELLED)
 
 
-@pytest.mark.parametrize("how", ["fault", "not allowed", "refused"])
+@pytest.mark.parametrize("how", ["fault", "not allowed"])
 def test_a_motion_may_end_without_a_word_of_its_own(robot, how):
     motion = robot.port.move_ptp((0.0,) * 7, [])
     assert not motion.done()
     if how == "fault":
         robot.say("controller_manager/status", **robot.status(state="fault", reason="why", reason_code=9))
-    elif how == "not allowed":
-        robot.say("lwr/state", motion_allowed=False, reason="why", supervisor="", reason_code=9, hold_latched=False)
     else:
-        refused = SimpleNamespace(result=lambda: (_ for _ in ()).throw(PortError("no", ("why",), 9)))
-        assert robot.port._end_of_ptp(refused)[0].code == 9
-        return
+        robot.say("lwr/state", motion_allowed=False, reason="why", supervisor="", reason_code=9, hold_latched=False)
     assert motion.done()
     with pytest.raises(PortError) as error:
         motion.result()

@@ -29,8 +29,7 @@ def take_with(aside):
     arm.joint_positions = positions
 
     def script(t):
-        t.wait_hub("wait_without_object")
-        t.start("take")
+        t.begin("take")
         t.wait_hub("wait_with_object" if abs(aside(10.0)) < 0.03 else "wait_without_object")
 
     trial.run(script)

@@ -2,11 +2,8 @@
 
 The words of the nodes themselves are tested beside the nodes."""
 
-import shutil
-
 import pytest
 from coglab_msgs.msg import ReasonCode
-from coglab_objects.database import ObjectDatabase, objects_folder
 from coglab_smach.ports.pending import PortError
 from conftest import Trial
 
@@ -68,8 +65,7 @@ def test_hand_node_dies_during_the_exchange(moment, hub, sentence, code):
     trial = Trial()
 
     def script(t):
-        t.wait_hub("wait_without_object")
-        t.start(EXCHANGE)
+        t.begin()
         t.clock.sleep(moment)
         t.cell.faults.dead.add("hand")
         t.wait_hub(hub)
@@ -111,8 +107,7 @@ def test_a_goal_that_is_lost_for_a_moment_at_the_start_is_waited_for():
     trial.cell.faults.refuse["execute_dmp"] = stale("object_mug", 0.45)
 
     def script(t):
-        t.wait_hub("wait_without_object")
-        t.start(EXCHANGE)
+        t.begin()
         while not t.cell.called("execute_dmp"):
             t.clock.sleep(0.02)
         t.clock.sleep(0.4)
@@ -125,27 +120,3 @@ def test_a_goal_that_is_lost_for_a_moment_at_the_start_is_waited_for():
     trial.run(script)
     assert [r.outcome for r in trial.ctx.journal.results[1:]] == ["succeeded", "failed_holding"]
     assert "age 3.10" in trial.ctx.journal.why()
-
-
-def test_a_database_file_that_breaks_during_a_trial_keeps_the_old_entry(tmp_path):
-    shutil.copytree(objects_folder(), tmp_path / "objects")
-    trial = Trial()
-    problems = []
-
-    def script(t):
-        t.database = t.ctx.database.database = ObjectDatabase(str(tmp_path / "objects"))
-        assert t.database.reload() == []
-        t.wait_hub("wait_without_object")
-        t.start(EXCHANGE)
-        file = tmp_path / "objects" / "mug.yaml"
-        file.write_text(file.read_text().replace("mass: 0.31", "mass: heavy"))
-        problems.extend(t.database.reload())
-        t.wait_hub("wait_with_object")
-        assert t.result().outcome == "succeeded"
-        t.start("exchange_robot_to_human")
-        t.wait_hub("wait_without_object")
-
-    trial.run(script)
-    assert trial.result().outcome == "succeeded"
-    assert len(problems) == 1 and "mug.yaml" in problems[0] and "mass" in problems[0], problems
-    assert trial.database.get("mug")["mass"] == 0.31

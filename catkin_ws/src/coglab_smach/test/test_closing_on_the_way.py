@@ -32,13 +32,7 @@ def receive(monkeypatch, away, touch_after=1.5, **settings):
     monkeypatch.setattr(reach, "off_grasp", off_grasp)
     trial.cell.partner.touch_after = touch_after
 
-    def script(t):
-        t.wait_hub("wait_without_object")
-        t.start(RECEIVE)
-        t.clock.sleep(1.0)
-        t.wait_hub("wait_with_object")
-
-    trial.run(script)
+    trial.run(Trial.receive)
     assert trial.result().outcome == "succeeded"
     return trial, [name for _, name in trial.cell.calls]
 
@@ -91,13 +85,7 @@ def test_a_goal_that_is_hidden_for_a_moment_is_waited_for(monkeypatch):
     monkeypatch.setattr(reach, "off_grasp", off_grasp)
     trial.ctx.arm.execute_dmp = hidden
 
-    def script(t):
-        t.wait_hub("wait_without_object")
-        t.start(RECEIVE)
-        t.clock.sleep(1.0)
-        t.wait_hub("wait_with_object")
-
-    trial.run(script)
+    trial.run(Trial.receive)
     assert trial.result().outcome == "succeeded" and len(refused) > 5, trial.ctx.journal.why()
 
 
@@ -118,10 +106,8 @@ def test_with_fingers_that_do_not_open_again_the_arm_stays_with_what_the_person_
     trial.cell.partner.touch_after = None
 
     def script(t):
-        t.wait_hub("wait_without_object")
-        t.start(RECEIVE)
-        while not t.ctx.journal.marked("closing_on_the_way"):
-            t.clock.sleep(0.01)
+        t.begin()
+        t.until(lambda: t.ctx.journal.marked("closing_on_the_way"))
         moved = t.cell.called("move_ptp")
         t.cell.faults.refuse["open"] = PortError("motors 2, 3 are stuck", code=ReasonCode.HAND_STALLED)
         if why == "goal lost":
@@ -148,10 +134,8 @@ def test_what_fingers_have_caught_on_the_way_is_not_dropped_where_the_person_has
     trial.cell.partner.take_after = 1.0 if person == "at it" else None
 
     def script(t):
-        t.wait_hub("wait_without_object")
-        t.start(RECEIVE)
-        while not t.ctx.journal.marked("closing_on_the_way"):
-            t.clock.sleep(0.01)
+        t.begin()
+        t.until(lambda: t.ctx.journal.marked("closing_on_the_way"))
         t.cell.at_palm = ("mug", Pose([-0.05, 0.0, 0.0]))
         if person == "at it":
             at_the_palm(t)
@@ -182,8 +166,7 @@ def test_fingers_that_have_opened_to_come_again_hold_nothing_of_the_persons(monk
     trial.cell.partner.touch_after = 0.3
 
     def script(t):
-        t.wait_hub("wait_without_object")
-        t.start(RECEIVE)
+        t.begin()
         while t.cell.called().count("execute_dmp") < 2:
             t.clock.sleep(0.01)
         t.cell.faults.refuse["open"] = PortError("motors 2, 3 are stuck", code=ReasonCode.HAND_STALLED)
@@ -208,10 +191,8 @@ def test_fingers_that_have_begun_to_close_open_before_a_reach_that_paused_goes_o
     )
 
     def script(t):
-        t.wait_hub("wait_without_object")
-        t.start(RECEIVE)
-        while t.ctx.requests.hub() == "":
-            t.clock.sleep(0.05)
+        t.begin()
+        t.until(t.ctx.requests.hub)
 
     trial.run(script)
     calls = trial.cell.called()
@@ -229,8 +210,7 @@ def test_a_stop_ends_fingers_that_have_begun_to_close_at_once(monkeypatch):
     )
 
     def script(t):
-        t.wait_hub("wait_without_object")
-        t.start(RECEIVE)
+        t.begin()
         t.until(lambda: t.ctx.journal.marked("closing_on_the_way"))
         pressed.append(t.clock.now())
         t.ctx.stop.press("a finger is in it")

@@ -7,8 +7,7 @@ ACTIONS = {"contact": "exchange_human_to_robot", "release": "exchange_robot_to_h
 
 
 def handover(t):
-    t.wait_hub("wait_without_object")
-    t.start(ACTIONS["contact"])
+    t.begin(ACTIONS["contact"])
     t.wait_hub("wait_with_object")
     t.start(ACTIONS["release"])
     t.wait_hub("wait_without_object")
@@ -53,8 +52,7 @@ def test_a_profile_that_cannot_be_left_ends_the_reach(fault):
         trial.cell.fade_time = 1e9
 
     def script(t):
-        t.wait_hub("wait_without_object")
-        t.start(ACTIONS["contact"])
+        t.begin(ACTIONS["contact"])
         t.clock.sleep(30.0)
 
     trial.run(script)

@@ -57,14 +57,9 @@ def test_values_beyond_a_range_are_refused(load, row):
         ("hubs: {}", ":1: hubs: .*'hub'"),
         ("nonsense_of_mine: 1", "nonsense_of_mine: there is no such parameter$"),
         ("hand: {calibration: slow}", "hand.calibration: 'slow' is not one of"),
-        ("ptp_tolerance: little", "ptp_tolerance: 'little' is not of type 'number'"),
         ("reach_timeout: .nan", "reach_timeout: a finite number expected"),
-        ("hand: {open_speed: 1.5}", "hand.open_speed: 1.5 is not of type 'integer'"),
         ("postures: {home: [0, 0, 0, 0, 0, 0]}", "postures.home: .* is too short"),
-        ("take: {preshape: after}", "take.preshape: 'after' is not one of"),
         ("time_limits: {wait_stop: -1}", "time_limits.wait_stop: -1"),
-        ("auto_trigger: no way", "auto_trigger: 'no way' is not of type 'boolean'"),
-        ("handover: {region_low: [450, -500, 50]}", "region_low"),
         ("handover: {region_low: [0.9, -0.5, 0.05], region_high: [0.8, 0.5, 0.8]}", "region_low"),
         ("timing: hasty\ntimings: {calm: {}}", "no timing 'hasty'; timings: calm"),
         ("timings: {calm: {handover.hand_margin: 0.3}}", "'handover.hand_margin' was unexpected"),
@@ -91,12 +86,6 @@ def test_a_timing_wins_over_the_file_and_a_parameter_of_the_node_over_the_timing
     assert Config.load(str(SHIPPED), {"timing": "calm", "hand.lift_after": 2.0}).get("hand.lift_after") == 2.0
     calm.set("timing", "natural")
     assert calm.get("handover.belief") == natural.get("handover.belief")
-
-
-@pytest.mark.parametrize("row", [row for row in TABLE if row.timed], ids=lambda row: row.name)
-def test_a_timing_may_set_every_delay(load, row):
-    text = f"timings: {{calm: {{{row.name}: {row.high}}}, natural: {{}}}}"
-    assert load(text, timing="calm").get(row.name) == row.high != load(text, timing="natural").get(row.name)
 
 
 def test_a_file_that_became_bad_keeps_the_values_read_before(tmp_path):

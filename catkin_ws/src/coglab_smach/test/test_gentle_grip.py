@@ -22,13 +22,7 @@ def receive(trial):
     trial.ctx.hand.preshape = lambda mode, level: asked.append(level) or preshape(mode, level)
     trial.ctx.hand.close = lambda speed: asked.append(speed) or close(speed)
 
-    def script(t):
-        t.wait_hub("wait_without_object")
-        t.start(RECEIVE)
-        t.clock.sleep(1.0)
-        t.wait_hub("wait_with_object")
-
-    trial.run(script)
+    trial.run(Trial.receive)
     return asked
 
 
@@ -55,13 +49,7 @@ def test_a_hand_that_refuses_keeps_what_it_holds():
     refusal = Ready(error=PortError("hand_close refused", ("the port is gone",)))
     trial.ctx.hand.close = lambda speed: refusal
 
-    def script(t):
-        t.wait_hub("wait_without_object")
-        t.start(RECEIVE)
-        t.clock.sleep(1.0)
-        t.wait_hub("wait_with_object")
-
-    trial.run(script)
+    trial.run(Trial.receive)
     assert trial.result().outcome == "failed_holding" and "hand_tighten" in trial.result().reason
     assert trial.ctx.holding == "mug"
 

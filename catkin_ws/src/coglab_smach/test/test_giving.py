@@ -24,13 +24,10 @@ def giving(script, **overrides):
     trial.cell.partner.take_after = None
 
     def walk(t):
-        t.wait_hub("wait_without_object")
-        t.start(RECEIVE)
-        t.wait_hub("wait_with_object")
+        t.receive()
         t.cell.calls.clear()
         t.start(GIVE)
-        while "arm release" not in t.cell.called():
-            t.clock.sleep(0.05)
+        t.until(lambda: "arm release" in t.cell.called())
         t.clock.sleep(1.0)
         script(t)
 
@@ -251,9 +248,7 @@ def test_what_a_delivery_asks_for_is_what_is_waited_for():
     )
 
     def script(t):
-        t.wait_hub("wait_without_object")
-        t.start(RECEIVE)
-        t.wait_hub("wait_with_object")
+        t.receive()
         t.start(GIVE)
         t.wait_hub("wait_with_object")
 

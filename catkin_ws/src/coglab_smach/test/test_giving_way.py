@@ -28,21 +28,17 @@ def receiving(script, let_go_after=0.2, **overrides):
     trial.cell.partner.let_go_after = let_go_after
 
     def walk(t):
-        t.wait_hub("wait_without_object")
-        t.start(RECEIVE)
-        while not t.ctx.journal.marked("closing"):
-            t.clock.sleep(0.01)
+        t.begin()
+        t.until(lambda: t.ctx.journal.marked("closing"))
         t.cell.calls.clear()
         script(t)
-        while t.ctx.requests.hub() == "":
-            t.clock.sleep(0.05)
+        t.until(t.ctx.requests.hub)
 
     return trial.run(walk)
 
 
 def until_weight(t):
-    while "arm lift" not in t.cell.called():
-        t.clock.sleep(0.01)
+    t.until(lambda: "arm lift" in t.cell.called())
     t.clock.sleep(0.15)
 
 

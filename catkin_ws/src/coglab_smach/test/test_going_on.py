@@ -21,8 +21,7 @@ def receive(touch_after, refuse="", **settings):
     trial.ctx.arm.execute_dmp = kept
 
     def script(t):
-        t.wait_hub("wait_without_object")
-        t.start("exchange_human_to_robot")
+        t.begin()
         t.clock.sleep(1.0)
         t.wait_hub("wait_with_object" if touch_after is not None else "wait_without_object")
 

@@ -117,13 +117,11 @@ def test_while_one_runs_another_one_is_rejected_and_the_first_is_not_disturbed()
 @pytest.mark.parametrize(
     ("fields", "code", "said"),
     [
-        ({"action": "give"}, ReasonCode.WRONG_STATE, "wait_without_object takes"),
         ({"action": "give", "wait": 3.0}, ReasonCode.WRONG_STATE, "wait_without_object takes"),
         ({"action": "juggle", "wait": 9.0}, ReasonCode.UNKNOWN_NAME, "there are: receive, give"),
         ({"action": ""}, ReasonCode.INVALID_ARGUMENT, "action: a name is expected"),
         ({"action": "take", "object_id": "elephant", "wait": 9.0}, ReasonCode.OBJECT_UNKNOWN, "not in the database"),
         ({"action": "take", "wait": float("nan")}, ReasonCode.OUT_OF_RANGE, "wait: 0 .. 3600 s is expected, got nan"),
-        ({"action": "take", "time_limit": -1.0}, ReasonCode.OUT_OF_RANGE, "time_limit: 0 .. 3600 s"),
         ({"action": "take", "condition": "x" * 65}, ReasonCode.OUT_OF_RANGE, "condition: at most 64"),
         ({"action": "take", "delivery": "rim_first"}, ReasonCode.INVALID_ARGUMENT, "the hand is empty"),
     ],

@@ -11,18 +11,12 @@ from conftest import Trial
 WORDS = "words of the perception node that are made up here 4714"
 
 
-def receive(t):
-    t.wait_hub("wait_without_object")
-    t.start("exchange_human_to_robot")
-    t.wait_hub("wait_with_object")
-
-
 @pytest.mark.parametrize("with_object", [False, True])
 def test_a_hold_in_a_hub_is_shown_and_needs_a_reset(with_object):
     trial = Trial()
 
     def script(t):
-        receive(t) if with_object else t.wait_hub("wait_without_object")
+        t.receive() if with_object else t.wait_hub("wait_without_object")
         hub = t.ctx.requests.hub()
         before = len(t.cell.called())
         t.cell.arm.held = True  # somebody sent 'hold' to the robot without asking this machine
@@ -92,7 +86,7 @@ def test_a_hold_during_an_action_never_opens_the_hand():
     trial = Trial()
 
     def script(t):
-        receive(t)
+        t.receive()
         t.cell.calls.clear()
         t.start("exchange_robot_to_human")
         t.clock.sleep(0.8)
@@ -193,7 +187,7 @@ def test_an_object_that_was_taken_away_ends_in_the_hub_without():
     trial = Trial()
 
     def script(t):
-        receive(t)
+        t.receive()
         t.cell.hand_positions = (200, 254, 254, 254, 254)
         t.cell.faults.empty_grasp = True
         t.ctx.stop.press("the operator pressed STOP")

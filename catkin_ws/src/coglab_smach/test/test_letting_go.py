@@ -10,7 +10,7 @@ from coglab_smach.states.base import TimeLimit
 from coglab_smach.states.hand_tracking import HandTrack
 from coglab_trials.virtual_clock import using
 from conftest import Trial
-from test_weight_and_recovery import RECEIVE, Lifted
+from test_weight_and_recovery import Lifted
 
 
 @pytest.mark.parametrize("moment", ["released", "tightened"])
@@ -27,8 +27,7 @@ def test_a_stop_ends_the_firm_closing_as_well(moment):
     trial.ctx.hand.close = watched
 
     def script(t):
-        t.wait_hub("wait_without_object")
-        t.start(RECEIVE)
+        t.begin()
         t.until(lambda: firm and t.ctx.journal.marked(moment))
         t.ctx.stop.press("a finger is in it")
         t.wait_hub("stopped")
@@ -110,10 +109,8 @@ def test_what_the_brain_waits_for_is_told_all_the_while_and_no_look_beside_it():
     trial.cell.partner.let_go_after = None
 
     def script(t):
-        t.wait_hub("wait_without_object")
-        t.start(RECEIVE)
-        while "arm lift" not in t.cell.called():
-            t.clock.sleep(0.01)
+        t.begin()
+        t.until(lambda: "arm lift" in t.cell.called())
         t.clock.sleep(0.3)
         for _ in range(100):
             told.append(t.ctx.journal.wait().what)

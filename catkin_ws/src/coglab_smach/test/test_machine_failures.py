@@ -4,7 +4,6 @@ never by opening the hand."""
 import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_py.pose import Pose
-from coglab_smach.ports.pending import PortError
 from coglab_smach.states import weight
 from conftest import Trial
 
@@ -63,13 +62,6 @@ def test_a_failure_ends_at_home_with_an_empty_hand_and_its_reason(prepare, code,
         assert "execute_dmp" not in trial.cell.called(), "the arm has not moved"
 
 
-def test_dead_hand_arm_still_goes_home():
-    trial = failed_exchange(lambda t: t.cell.faults.dead.add("hand"))
-    result = trial.result()
-    assert result.outcome == "failed_empty" and "preshape 'cylindrical'" in result.reason
-    assert list(trial.cell.joints) == trial.ctx.config.get("postures.home")
-
-
 def test_who_goes_back_while_the_robot_lets_time_pass_is_not_gone_after():
     """The offer has to last for ``start_after``; who goes back before, and offers again, is met then."""
     trial = Trial(**{"handover.start_after": 1.0})
@@ -78,8 +70,7 @@ def test_who_goes_back_while_the_robot_lets_time_pass_is_not_gone_after():
         t.wait_hub("wait_without_object")
         offered = t.cell.objects["mug"]
         t.start("exchange_human_to_robot")
-        while not t.ctx.journal.marked("offered"):
-            t.clock.sleep(0.01)
+        t.until(lambda: t.ctx.journal.marked("offered"))
         t.clock.sleep(0.5)
         t.cell.objects["mug"] = Pose([1.2, 0.2, 0.1])
         t.clock.sleep(3.0)
@@ -91,22 +82,6 @@ def test_who_goes_back_while_the_robot_lets_time_pass_is_not_gone_after():
 
     trial.run(script)
     assert trial.result().outcome == "succeeded"
-
-
-def test_primitive_that_does_not_exist():
-    asked = []
-
-    def prepare(t):
-        execute = t.ctx.arm.execute_dmp
-        t.ctx.arm.execute_dmp = lambda request: asked.append(request.primitive_id) or execute(request)
-        t.cell.faults.refuse["execute_dmp"] = PortError(WORDS, (CAUSE,), ReasonCode.UNKNOWN_NAME)
-
-    trial = failed_exchange(prepare)
-    assert_recovered_empty(trial, WORDS)
-    assert asked == ["reach_human"], "the primitive of the object's entry, and once"
-    result = trial.result()
-    assert (result.reason, result.causes) == (f"execute_dmp: {WORDS}", (CAUSE,))
-    assert result.code == ReasonCode.UNKNOWN_NAME
 
 
 def test_a_person_who_does_not_let_go_gets_the_object_back(monkeypatch):
@@ -158,8 +133,7 @@ def test_dead_arm_node_ends_in_fault_and_can_be_initialised_again():
     trial = Trial()
 
     def script(t):
-        t.wait_hub("wait_without_object")
-        t.start("exchange_human_to_robot")
+        t.begin()
         t.clock.sleep(1.0)
         t.cell.faults.dead.add("arm")
         t.wait_hub("fault")
@@ -224,9 +198,7 @@ def test_stop_holds_never_opens_the_hand_and_needs_a_reset(moment):
 
 def test_another_object_named_in_wait_with_object_means_the_one_held(trial):
     def script(t):
-        t.wait_hub("wait_without_object")
-        t.start("exchange_human_to_robot")
-        t.wait_hub("wait_with_object")
+        t.receive()
         t.start("put", "bottle")
         t.wait_hub("wait_without_object")
 
@@ -238,9 +210,7 @@ def test_no_free_place_keeps_the_object():
     trial = Trial()
 
     def script(t):
-        t.wait_hub("wait_without_object")
-        t.start("exchange_human_to_robot")
-        t.wait_hub("wait_with_object")
+        t.receive()
         t.ctx.perception.places = []
         t.start("put")
         t.wait_hub("wait_with_object")

@@ -54,8 +54,7 @@ def test_a_motion_beyond_its_time_limit_is_ended_before_recovery_begins(monkeypa
 @pytest.mark.parametrize("action, moment", [("take", 0.3), ("take", 1.2), (RECEIVE, 0.3), (RECEIVE, 0.7)])
 def test_a_shut_down_leaves_no_motion_behind(action, moment):
     def script(t):
-        t.wait_hub("wait_without_object")
-        t.start(action)
+        t.begin(action)
         t.clock.sleep(moment)
         assert not t.cell.arm.standing().ok
         t.master.request_preempt()
@@ -223,13 +222,10 @@ def test_a_person_who_holds_on_and_a_hand_that_does_not_open(hub_after, monkeypa
 
 def test_a_person_who_has_taken_the_load_and_a_hand_that_does_not_open():
     def script(t):
-        t.wait_hub("wait_without_object")
-        t.start(RECEIVE)
-        t.wait_hub("wait_with_object")
+        t.receive()
         t.cell.faults.refuse |= {"open": "motors 2, 3 are stuck", "preshape cylindrical": "motors 2, 3 are stuck"}
         t.start(GIVE)
-        while not t.ctx.journal.marked("opening"):
-            t.clock.sleep(0.02)
+        t.until(lambda: t.ctx.journal.marked("opening"))
         place = t.cell.joints
         t.wait_hub("stopped")
         t.clock.sleep(3.0)
@@ -249,12 +245,7 @@ def test_a_failed_monitor_is_no_reason_of_a_success():
 
     trial.ctx.perception.recognition = broken
 
-    def script(t):
-        t.wait_hub("wait_without_object")
-        t.start(RECEIVE)
-        t.wait_hub("wait_with_object")
-
-    trial.run(script)
+    trial.run(Trial.receive)
     result = trial.result()
     assert (result.outcome, result.reason, result.code) == ("succeeded", "", 0)
     assert any(

@@ -25,10 +25,6 @@ def plain_value(ctx):
     return 3
 
 
-def returns_nothing(ctx):
-    pass
-
-
 def raises(ctx):
     return ctx.no_such_port
 
@@ -106,17 +102,13 @@ def test_a_state_of_a_user_takes_the_place_of_a_shipped_one():
     [
         ({"actions": {"wipe": "my_labb.machines:build"}}, "actions.wipe: no module 'my_labb.machines'; put its file"),
         ({"actions": {"wipe": "my_lab.machines:biuld"}}, "has no function 'biuld'; it has: .*build_wipe"),
-        ({"actions": {"wipe": "my_lab.machines:__doc__"}}, "has a value of type str, no function, '__doc__'"),
         ({"actions": {"wipe": f"{__name__}:plain_value"}}, "has to return a CoglabState .* a value of type int"),
-        ({"actions": {"wipe": f"{__name__}:returns_nothing"}}, "it returned nothing"),
         ({"actions": {"wipe": f"{__name__}:raises"}}, r"raised AttributeError: .*no_such_port.* \(test_own_parts.py:"),
         ({"actions": {"wipe": f"{__name__}:OtherOutcomes"}}, "outcomes have to be failed, preempted, succeeded; "),
         ({"actions": {"take": "my_lab.machines:build_wipe"}}, "actions.take: this name is in use"),
-        ({"actions": {"Wipe now": "my_lab.machines:build_wipe"}}, "'Wipe now' does not match"),
         ({"actions": {"wipe": "my_lab.machines"}}, "'module:function' is expected, .* got 'my_lab.machines'"),
         ({"actions": {"wipe": {"build": "my_lab.machines:build_wipe", "hand": "left"}}}, "actions.wipe"),
         ({"states": {"take/hand_closes": "my_lab.states:Announce"}}, "no such state; there are: take/approach_board, "),
-        ({"states": {"take/hand_close": f"{__name__}:OtherOutcomes"}}, "states.take/hand_close: its outcomes have to"),
         ({"deliveries": {"low": "my_lab.deliveries:lower"}}, "deliveries.low: .* no function 'lower'; it has: low"),
     ],
 )

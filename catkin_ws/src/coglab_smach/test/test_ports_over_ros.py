@@ -12,7 +12,7 @@ from coglab_msgs.msg import Contact, ContactSignal, HandoverBelief, ReasonCode
 from coglab_py import publish
 from coglab_smach.ports.interfaces import Ahead, ContactEvent
 from coglab_smach.ports.pending import Permit, PortError, Ready, Threaded
-from coglab_smach.ros import calls, ports
+from coglab_smach.ros import ports
 from geometry_msgs.msg import Point
 from test_arm_port import Topic, ended
 
@@ -66,9 +66,6 @@ def test_what_is_believed_counts_for_three_tenths_of_a_second(nodes, seconds, kn
         assert nodes.perception.ahead() == Ahead(0.9, 0.1, "mug"), "no place is predicted"
         message.place_covariance = [0.0] * 9
         assert nodes.perception.ahead().deviation == 0.0 and nodes.perception.ahead().frame
-
-
-# --- database ---------------------------------------------------------------------------------------------------------
 
 
 # --- contact ----------------------------------------------------------------------------------------------------------
@@ -152,27 +149,6 @@ def test_the_share_that_is_gone_is_that_of_this_arming(nodes):
     assert nodes.contact.share_gone() is None
     nodes.contact.arm("contact", 6.0, {"load_share": 0.6})
     assert nodes.contact.share_gone() is None
-
-
-# --- calls ------------------------------------------------------------------------------------------------------------
-
-
-def test_a_node_that_shuts_down_calls_nobody(monkeypatch):
-    monkeypatch.setattr(calls, "service_answers", lambda name: False)
-    monkeypatch.setattr(calls.rospy, "is_shutdown", lambda: True)
-    with pytest.raises(PortError) as error:
-        calls._await_service("/s", 20.0, Permit())
-    assert error.value.code == ReasonCode.PREEMPTED
-
-
-def test_stamps_that_a_message_can_carry():
-    good = [rospy.Time(0), rospy.Time(2**32 - 1)]
-    assert all(publish.can_be_sent(stamp) for stamp in good)
-    late = rospy.Time()
-    late.secs = 2**32
-    assert not publish.can_be_sent(late)
-    late.secs = -1
-    assert not publish.can_be_sent(late)
 
 
 @pytest.mark.parametrize("over", [True, False])

@@ -304,8 +304,7 @@ def received(monkeypatch, off):
     trial.cell.partner.touch_after = 0.3
 
     def script(t):
-        t.wait_hub("wait_without_object")
-        t.start("exchange_human_to_robot")
+        t.begin()
         t.clock.sleep(1.0)
         t.until(t.ctx.requests.hub)
 

@@ -30,14 +30,11 @@ def receiving(script, **overrides):
     let_go, trial.cell.let_go = trial.cell.let_go, lambda: None
 
     def walk(t):
-        t.wait_hub("wait_without_object")
-        t.start(RECEIVE)
-        while "arm lift" not in t.cell.called():
-            t.clock.sleep(0.01)
+        t.begin()
+        t.until(lambda: "arm lift" in t.cell.called())
         script(t)
         let_go()
-        while t.ctx.requests.hub() == "":
-            t.clock.sleep(0.05)
+        t.until(t.ctx.requests.hub)
 
     return trial.run(walk)
 
@@ -89,10 +86,8 @@ def test_without_a_sight_of_the_person_the_rise_is_whole():
     trial.cell.faults.not_seen.add("human_hand")
 
     def walk(t):
-        t.wait_hub("wait_without_object")
-        t.start(RECEIVE)
-        while "arm lift" not in t.cell.called():
-            t.clock.sleep(0.01)
+        t.begin()
+        t.until(lambda: "arm lift" in t.cell.called())
         script(t)
 
     trial.cell.partner.let_go_after = None
@@ -135,11 +130,9 @@ def edged(times, person_gone=False):
     trial.ctx.hand.state = seen
 
     def script(t):
-        t.wait_hub("wait_without_object")
-        t.start(RECEIVE)
+        t.begin()
         t.clock.sleep(0.5)
-        while t.ctx.requests.hub() == "":
-            t.clock.sleep(0.05)
+        t.until(t.ctx.requests.hub)
 
     return trial.run(script)
 
@@ -170,17 +163,14 @@ def test_an_object_that_falls_in_the_last_moment_of_the_way_is_no_success():
     trial = Trial()
 
     def script(t):
-        t.wait_hub("wait_without_object")
-        t.start(RECEIVE)
-        while not t.ctx.journal.marked("tightened"):
-            t.clock.sleep(0.01)
+        t.begin()
+        t.until(lambda: t.ctx.journal.marked("tightened"))
         home, here = np.asarray(t.ctx.config.get("postures.home")), lambda: np.asarray(t.ctx.arm.joint_positions())
         while np.max(np.abs(here() - home)) > 0.05:
             t.clock.sleep(0.01)
         t.cell.at_palm = None
         t.cell.objects["mug"] = Pose(np.array([0.4, -0.4, -0.5]))
-        while t.ctx.requests.hub() == "":
-            t.clock.sleep(0.05)
+        t.until(t.ctx.requests.hub)
 
     trial.run(script)
     assert trial.result().outcome == "failed_empty" and trial.result().code == ReasonCode.OBJECT_NOT_SEEN
@@ -196,11 +186,9 @@ def test_fingers_that_close_past_it_on_the_way_hold_nothing():
     )
 
     def script(t):
-        t.wait_hub("wait_without_object")
-        t.start(RECEIVE)
+        t.begin()
         t.clock.sleep(0.5)
-        while t.ctx.requests.hub() == "":
-            t.clock.sleep(0.05)
+        t.until(t.ctx.requests.hub)
 
     trial.run(script)
     assert trial.result().outcome == "failed_empty" and trial.result().code == ReasonCode.OBJECT_NOT_SEEN
@@ -215,11 +203,9 @@ def test_an_object_whose_giver_was_hidden_while_the_fingers_closed_and_is_gone_i
         t.wait_hub("wait_without_object")
         t.cell.partner.let_go_after = t.cell.partner.take_after = None
         t.start("exchange_human_to_robot")
-        while not t.ctx.journal.marked("contact"):
-            t.clock.sleep(0.01)
+        t.until(lambda: t.ctx.journal.marked("contact"))
         t.cell.faults.not_seen.add("human_hand")
-        while "arm lift" not in t.cell.called():
-            t.clock.sleep(0.01)
+        t.until(lambda: "arm lift" in t.cell.called())
         t.clock.sleep(1.0)
         t.cell.objects["human_hand"] = Pose([2.0, 0.0, 0.4])
         t.cell.faults.not_seen.discard("human_hand")

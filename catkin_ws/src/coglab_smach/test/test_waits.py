@@ -78,12 +78,6 @@ def test_a_wait_for_a_motion_counts_in_its_pace_down_to_a_tenth(pace, took):
     assert seconds == pytest.approx(took, abs=0.15) and left[0] == pytest.approx(8.0, abs=0.1), "put off likewise"
 
 
-def test_a_pause_ends_with_the_states_limit():
-    _, _, record, seconds = walked(lambda s: s.pause(30.0))
-    assert seconds == pytest.approx(10.0, abs=0.02) and record.code == ReasonCode.TIME_LIMIT
-    assert record.reason == "Probe: Probe had to end within 10.0 s, it did not"
-
-
 def test_a_call_that_is_given_up_is_cancelled_and_one_that_is_answered_is_not():
     never, good = Never(), Ready(5)
     good.cancel = lambda: pytest.fail("it was answered")

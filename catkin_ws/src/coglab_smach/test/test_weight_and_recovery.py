@@ -57,8 +57,7 @@ def test_every_end_ends_the_closing_of_fingers_that_follow(stop):
     trial.cell.partner.let_go_after = None
 
     def script(t):
-        t.wait_hub("wait_without_object")
-        t.start(RECEIVE)
+        t.begin()
         t.until(lambda: "arm lift" in t.cell.called())
         t.clock.sleep(0.5)
         if stop:
@@ -119,8 +118,7 @@ def test_an_abort_of_a_falling_goal_is_a_withdrawal_where_the_hand_is_still_at_i
         trial = Trial()
 
         def script(t, above=above):
-            t.wait_hub("wait_without_object")
-            t.start(RECEIVE)
+            t.begin()
             t.until(lambda: t.ctx.journal.marked("motion_started"))
             t.clock.sleep(0.3)
             mug = t.cell.objects["mug"].position

@@ -78,13 +78,11 @@ def spring(before, stiffness):
 @pytest.mark.parametrize(
     ("mass", "before", "stiffness"),
     [
-        *[(mass, 0.0, stiffness) for mass in (0.06, 0.31, 0.53, 1.0) for stiffness in (35, 100)],
-        *[(0.06, before, 100) for before in (0.59, -0.5, -2.0)],
-        *[(0.31, before, 100) for before in (1.0, -2.0)],
+        *[(mass, 0.0, 35) for mass in (0.06, 0.31, 0.53, 1.0)],
+        *[(0.06, before, 100) for before in (0.59, -2.0)],
         (0.31, 3.04, 40),
-        *[(0.53, before, 80) for before in (1.0, 2.0, 5.2)],
-        (0.53, -1.0, 100),
-        *[(1.0, before, stiffness) for before, stiffness in ((4.4, 100), (9.8, 100), (9.8, 150))],
+        (0.53, 5.2, 80),
+        (1.0, 9.8, 150),
     ],
 )
 def test_a_hand_holds_it_whatever_it_lifts_or_presses_before(monkeypatch, mass, before, stiffness, over_ros):
@@ -99,7 +97,7 @@ def test_nobody_holds_what_weighs_the_same_lower_down(monkeypatch, mass, noise):
     assert scale.ask(person_holds) is False
 
 
-@pytest.mark.parametrize("pull", [1.5, 3.0, 6.0])
+@pytest.mark.parametrize("pull", [1.5, 6.0])
 def test_a_pull_that_ends_before_the_arm_sinks_may_be_a_hand_that_follows(monkeypatch, pull):
     """The weight that it takes along is gone from the palm: nothing is opened for that, nor taken away."""
     scale = Scale(monkeypatch, 0.31, spring(0.0, 0.0), pull)
@@ -107,9 +105,9 @@ def test_a_pull_that_ends_before_the_arm_sinks_may_be_a_hand_that_follows(monkey
 
 
 @pytest.mark.parametrize("over_ros", [False, True])
-@pytest.mark.parametrize("late", [0.05, 0.2, 0.5, 1.0, 1.3, 1.6])
-@pytest.mark.parametrize("mass", [0.06, 0.31, 0.53])
-@pytest.mark.parametrize("goes", [0.0, 0.3, 0.6])
+@pytest.mark.parametrize("late", [0.05, 0.5, 1.6])
+@pytest.mark.parametrize("mass", [0.06, 0.53])
+@pytest.mark.parametrize("goes", [0.0, 0.6])
 def test_who_ends_a_pull_while_the_arm_sinks_has_left_it_to_the_robot(monkeypatch, goes, mass, late, over_ros):
     """With a hand that stays there, or goes at so many m/s."""
     scale = Scale(monkeypatch, mass, lambda sunk, since: 0.0, 3.0, over_ros)

@@ -27,16 +27,6 @@ def test_time_goes_by_periods_and_a_frozen_process_answers_nothing():
     assert robot.cell.quality == 3 and robot.report()["cycles"] > before
 
 
-@pytest.mark.parametrize("period, periods", [(0.001, 5), (0.002, 3), (0.01, 1)])
-def test_a_control_cycle_takes_whole_periods(period, periods):
-    """5 ms of cycle time, rounded up."""
-    robot = Robot(3, krc__period=period).virtual
-    robot.advance(0.6)
-    before, begin = robot.report()["cycles"], robot.now
-    robot.advance(0.6)
-    assert robot.report()["cycles"] - before == pytest.approx((robot.now - begin) / (period * periods), abs=1.1)
-
-
 # --- refusals ---------------------------------------------------------------------------------------------------------
 
 REACH = DmpRequest("take_board", "board", [0.0, -0.25, 0.45], dmp_ratio=2.0)

@@ -232,12 +232,6 @@ def test_another_command_before_the_preshape_is_reached_ends_the_grasp(hand, ins
     assert "current_position" not in hand.modes and hand.hand.motors[1].goal_effort == 0.0
 
 
-def test_long_silence_is_made_up_in_steps_short_enough_for_contact(hand):
-    hand.hand.set_contacts(HELD, [20] * 5)
-    hand.tell("C8 80", then=60.0)
-    assert hand.hand.motors[2].position == pytest.approx(100.0 + 1000.0 * 128 / 511 / 20.0)
-
-
 # -- faults of the line --------------------------------------------------------------------------
 
 

@@ -13,10 +13,9 @@ import numpy as np
 import rospy
 from coglab.series import Series
 from coglab_msgs.msg import CellTruth, Contact, DmpFeedback, HandStatus, Transition
-from coglab_py.pose import Pose
+from coglab_py.messages import pose_of
 from coglab_py.steady import Stamps
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import Pose as PoseMessage
 from sensor_msgs.msg import JointState
 
 from coglab_bringup.reach_errors import GIVES, reach_errors
@@ -70,7 +69,7 @@ class TrialRecorder:
         robot, human, thing, force = ([p.x, p.y, p.z] for p in points)
         stamp = self._time(message.header.stamp)
         self.trial.truth.append((stamp, robot, human, thing, float(np.linalg.norm(force))))
-        self.trial.poses.append((stamp, *map(_pose, (message.robot_hand, message.human_hand, message.object))))
+        self.trial.poses.append((stamp, *map(pose_of, (message.robot_hand, message.human_hand, message.object))))
 
     def _on_hand(self, message: HandStatus) -> None:
         if len(message.motors) == 5:
@@ -94,11 +93,6 @@ class TrialRecorder:
         counts = [int(value.value) for status in message.status for value in status.values if value.key in LOST_KEYS]
         if counts:
             self.trial.fri_lost.append((self._time(message.header.stamp), sum(counts)))
-
-
-def _pose(message: PoseMessage) -> Pose:
-    place, turn = message.position, message.orientation
-    return Pose(np.array([place.x, place.y, place.z]), np.array([turn.x, turn.y, turn.z, turn.w]))
 
 
 def summarise(

@@ -25,7 +25,7 @@ class _Brief(Transport):
         return connection
 
 
-def _answer(uri: str, method: str, *words: object) -> Any:
+def answer(uri: str, method: str, *words: object) -> Any:
     """Value of an XML-RPC call; None if there is no server or it refuses. TimeoutError if it does not answer."""
     try:
         code, _, value = getattr(ServerProxy(uri, transport=_Brief()), method)("/coglab_alone", *words)
@@ -47,11 +47,11 @@ def _command(process: int) -> str:
 
 def living(master: str, name: str) -> str:
     """The running node with this name at a master, as text: address, process and command. Empty if there is none."""
-    uri = _answer(master, "lookupNode", name)
+    uri = answer(master, "lookupNode", name)
     if not uri:
         return ""
     try:
-        process = _answer(uri, "getPid")
+        process = answer(uri, "getPid")
     except TimeoutError:
         return f"{name} at {uri}, which does not answer"
     if process is None:

@@ -51,13 +51,7 @@ class SmachGraphs:
             for machine in self._machines.values():
                 if path in machine.containers:
                     machine.tells = True
-                    machine.last = {
-                        "path": path,
-                        "from": from_state,
-                        "outcome": outcome,
-                        "to": to_state,
-                        "reason": reason,
-                    }
+                    machine.last = _step(path, from_state, outcome, to_state, reason)
         self._show()
 
     def _look(self) -> None:
@@ -115,13 +109,7 @@ class SmachGraphs:
                 return
             machine.active[message.path] = active
             if before and active and not machine.tells:
-                machine.last = {
-                    "path": message.path,
-                    "from": ", ".join(before),
-                    "outcome": "",
-                    "to": ", ".join(active),
-                    "reason": "",
-                }
+                machine.last = _step(message.path, ", ".join(before), "", ", ".join(active), "")
         self._show()
 
     def _show(self) -> None:
@@ -144,6 +132,11 @@ class SmachGraphs:
                 self._put(f"graph:{machine.name}", {**picture, "roots": roots(containers)})
             if waiting:
                 self._show()
+
+
+def _step(*values: str) -> dict[str, str]:
+    """A transition for the page."""
+    return dict(zip(("path", "from", "outcome", "to", "reason"), values, strict=True))
 
 
 def _active_paths(machine: Machine) -> list[str]:

@@ -89,7 +89,7 @@ class ConsoleNode:
             secrets.token_hex(8),
             self.write_link,
         )
-        self.events.listen(lambda _event: self.soon(self._wake))
+        self.events.listen(lambda _event: self.soon(self.server.wake))
         self.view.listen()
         self._put_static(model, missing, files)
 
@@ -101,9 +101,6 @@ class ConsoleNode:
             self.loop.call_soon_threadsafe(callback, *arguments)
         except RuntimeError:  # the loop has ended
             pass
-
-    def _wake(self) -> None:
-        self.server.wake()
 
     def say(self, source: str, text: str, level: str = "info", phase: str | None = None) -> None:
         """Adds an event, from any thread."""

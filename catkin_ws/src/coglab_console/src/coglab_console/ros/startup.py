@@ -14,18 +14,17 @@ import platform
 import socket
 import subprocess
 import time
-from http.client import HTTPConnection, HTTPException
+from http.client import HTTPException
 from pathlib import Path
-from typing import Any
 from urllib.parse import urlsplit
-from xmlrpc.client import Error, ServerProxy, Transport
+from xmlrpc.client import Error
 
 import rosgraph
 import rospkg
+from coglab_py.alone import answer
 
 PLACE = "/coglab_console_place"
 PATIENCE = 2.0  # s to wait for another console to end, for example while it is respawned
-ANSWER_LIMIT = 2.0  # s to wait for the process number of another console
 PACKAGES = (
     "python3-rospy", "python3-aiohttp", "python3-numpy", "python3-scipy", "libjs-three", "libjs-dygraphs", "graphviz",
 )  # fmt: skip
@@ -34,15 +33,6 @@ DPKG_LIMIT = 5.0  # s
 
 class StartError(Exception):
     """The console cannot start. The message says what to do."""
-
-
-class _Brief(Transport):
-    """An XML-RPC transport with the timeout ANSWER_LIMIT."""
-
-    def make_connection(self, host: Any) -> HTTPConnection:
-        connection = super().make_connection(host)
-        connection.timeout = ANSWER_LIMIT
-        return connection
 
 
 def only_one(home: Path) -> int:
@@ -81,11 +71,11 @@ def _another(master: rosgraph.Master) -> str:
         uri, process = master.getParam(PLACE)
         if not isinstance(uri, str):
             return ""
-        answer: Any = ServerProxy(uri, transport=_Brief()).getPid("/coglab_console")
-        return f" at {uri}, process {process}" if answer[2] == process else ""
+        found = answer(uri, "getPid")
+        return f" at {uri}, process {process}" if found is not None and found == process else ""
     except TimeoutError:
         return f" at {uri} but does not answer"
-    except (rosgraph.MasterException, Error, HTTPException, OSError, TypeError, ValueError, IndexError):
+    except (rosgraph.MasterException, Error, HTTPException, OSError, TypeError, ValueError):
         return ""
 
 

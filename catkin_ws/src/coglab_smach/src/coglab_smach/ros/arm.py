@@ -96,9 +96,7 @@ class RosArm:
     def motion_allowed(self) -> Verdict:
         state = self._lwr_state.message
         if state is None:
-            return Verdict(
-                False, f"{self._lwr}/state has never been published; is the robot node running?", ReasonCode.NODE_SILENT
-            )
+            return _unheard(f"{self._lwr}/state")
         if self._joints.age() > 1.0:
             return self._silent()
         if state.motion_allowed:
@@ -119,11 +117,7 @@ class RosArm:
     def standing(self) -> Verdict:
         status = self._status.message
         if status is None:
-            return Verdict(
-                False,
-                f"{self._manager}/status has never been published; is the robot node running?",
-                ReasonCode.NODE_SILENT,
-            )
+            return _unheard(f"{self._manager}/status")
         if self._joints.age() > 1.0:
             return self._silent()
         return Verdict(status.standing, "" if status.standing else f"the arm is {status.state}")
@@ -188,11 +182,7 @@ class RosArm:
     def profile_settled(self, profile: str) -> Verdict:
         message = self._cascade.message
         if message is None:
-            return Verdict(
-                False,
-                f"{self._manager}/feedback/status has never been published; is the robot node running?",
-                ReasonCode.NODE_SILENT,
-            )
+            return _unheard(f"{self._manager}/feedback/status")
         if message.profile != profile:
             return Verdict(False, f"profile '{message.profile}' is in force")
         busy = [f"{c.name} is {c.activity}" for c in message.controllers if not c.enabled and c.activity != "off"]
@@ -291,6 +281,10 @@ class RosArm:
     def hold(self, reason: str) -> Pending:
         run = Threaded(lambda _: call_now(f"{self._lwr}/command", LwrCommand, Permit(), wait=1.0, event="hold"), "hold")
         return mapped(run, lambda r: r.message)
+
+
+def _unheard(topic: str) -> Verdict:
+    return Verdict(False, f"{topic} has never been published; is the robot node running?", ReasonCode.NODE_SILENT)
 
 
 def _fields(request: DmpRequest, kind: type[ExecuteDmpRequest | SwitchDmpRequest]) -> dict[str, Any]:

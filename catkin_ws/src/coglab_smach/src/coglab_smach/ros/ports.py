@@ -21,6 +21,7 @@ from coglab_smach.ports.interfaces import OLDEST_BELIEF, OLDEST_RECOGNITION, Ahe
 from coglab_smach.ports.pending import Pending, Permit, PortError, Threaded
 from coglab_smach.ros.calls import SERVICE_WAIT, Newest, call, call_now, mapped
 
+ARM = "contact_detector/arm"
 OLDEST_SIGNAL = 0.3  # s, oldest ContactSignal that is used
 OLDEST_FORCE = 0.1  # s, oldest force that is used
 DEFAULT_SHARE = 0.5  # share of the load, if the request does not set one
@@ -29,22 +30,21 @@ DEFAULT_SHARE = 0.5  # share of the load, if the request does not set one
 class RosPerception:
     """PerceptionPort on the perception services and the recogniser's topics."""
 
-    def __init__(self, namespace: str = "perception") -> None:
-        self._ns = namespace
-        self._recognition = Newest(f"{namespace}/recognition", RecognitionMsg)
-        self._belief = Newest(f"{namespace}/belief", HandoverBelief)
+    def __init__(self) -> None:
+        self._recognition = Newest("perception/recognition", RecognitionMsg)
+        self._belief = Newest("perception/belief", HandoverBelief)
 
     def init_vision(self, time_limit: float) -> Pending:
         # Report a missing service before the caller's time limit ends.
         wait = max(0.5, min(SERVICE_WAIT, time_limit - 1.0))
-        return mapped(call(f"{self._ns}/init_vision", InitVision, wait, timeout=time_limit), lambda r: r.message)
+        return mapped(call("perception/init_vision", InitVision, wait, timeout=time_limit), lambda r: r.message)
 
     def locate_object(self, object_id: str, time_limit: float) -> Pending:
-        pending = call(f"{self._ns}/locate_object", LocateObject, wait=2.0, object_id=object_id, timeout=time_limit)
+        pending = call("perception/locate_object", LocateObject, wait=2.0, object_id=object_id, timeout=time_limit)
         return mapped(pending, lambda r: _located(r.frame_id, r.pose.header.frame_id, r.pose.pose, r.age))
 
     def free_places(self, object_id: str, time_limit: float) -> Pending:
-        pending = call(f"{self._ns}/free_places", FreePlaces, wait=2.0, object_id=object_id, timeout=time_limit)
+        pending = call("perception/free_places", FreePlaces, wait=2.0, object_id=object_id, timeout=time_limit)
         return mapped(pending, lambda r: [_located("", p.header.frame_id, p.pose, 0.0) for p in r.places])
 
     def recognition(self) -> Recognition:
@@ -86,37 +86,27 @@ def _entry(object_id: str, text: str) -> dict[str, Any]:
 class RosDatabase:
     """DatabasePort on object_database."""
 
-    def __init__(self, namespace: str = "object_database") -> None:
-        self._ns = namespace
-
     def get_object(self, object_id: str) -> Pending:
-        pending = call(f"{self._ns}/get_object", GetObject, wait=5.0, object_id=object_id)
+        pending = call("object_database/get_object", GetObject, wait=5.0, object_id=object_id)
         return mapped(pending, lambda r: _entry(object_id, r.yaml))
 
     def list_objects(self) -> Pending:
-        return mapped(call(f"{self._ns}/list_objects", ListObjects, wait=1.0), lambda r: list(r.object_ids))
+        return mapped(call("object_database/list_objects", ListObjects, wait=1.0), lambda r: list(r.object_ids))
 
 
 class RosContact:
     """ContactPort on the topic coglab/contact, the arming service of its publisher, and the detector's signal."""
 
-    def __init__(
-        self,
-        topic: str = "coglab/contact",
-        service: str = "contact_detector/arm",
-        signal: str = "contact_detector/signal",
-        force: str = "contact_detector/force",
-    ) -> None:
-        self._service = service
-        self._force = Newest(force, Vector3Stamped)
-        self._signal = Newest(signal, ContactSignal)
+    def __init__(self) -> None:
+        self._force = Newest("contact_detector/force", Vector3Stamped)
+        self._signal = Newest("contact_detector/signal", ContactSignal)
         self._needed: float | None = None  # share of the load in mode 'release'; None in other modes
         self._armed_at = 0.0
         self._event: ContactEvent | None = None
         self._wanted: bool | None = None
         self._before = threading.Event()
         self._before.set()
-        self._newest = Newest(topic, Contact, self._on_contact)
+        self._newest = Newest("coglab/contact", Contact, self._on_contact)
 
     def _on_contact(self, message: Contact) -> None:
         if self._wanted is not None and self._event is None and message.contact == self._wanted:
@@ -164,14 +154,14 @@ class RosContact:
                     permit.check()
                     if time.monotonic() > end:
                         raise PortError(
-                            f"{self._service} has not answered the request before this one for {SERVICE_WAIT:.0f} s",
+                            f"{ARM} has not answered the request before this one for {SERVICE_WAIT:.0f} s",
                             code=ReasonCode.NODE_SILENT,
                         )
-                return call_now(self._service, ArmContact, permit, wait, **fields)
+                return call_now(ARM, ArmContact, permit, wait, **fields)
             finally:
                 over.set()
 
-        return Threaded(run, f"service {self._service}")
+        return Threaded(run, f"service {ARM}")
 
     def disarm(self) -> None:
         if self._wanted is not None:
