@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import coglab_controllers as cc
 import numpy as np
 import pytest
-from arms import DT, HOME, SHIPPED, URDF, Arm, ArmAsMeasured, feed, fused, jacobian, ramp
+from arms import DT, SHIPPED, URDF, Arm, ArmAsMeasured, feed, fused, jacobian, ramp
 from coglab_contact.detector import ContactDetector, DetectorSettings
 from coglab_contact.evidence import (
     MOMENTUM,
@@ -23,31 +23,6 @@ from coglab_contact.motion_thresholds import (
 )
 from coglab_contact.moving_contact import MotionRecorder, MovingContact
 from coglab_msgs.msg import ReasonCode
-
-
-def test_terms_of_the_arm_obey_their_definitions():
-    dynamics, rng = cc.ArmDynamics(URDF), np.random.default_rng(5)
-    for _ in range(20):
-        q, v = rng.uniform(-1.5, 1.5, (2, 7))
-        terms = dynamics.evaluate(q, v)
-        assert np.allclose(terms.momentum, terms.mass @ v, atol=1e-12)
-        energy = [[0.5 * v @ dynamics.evaluate(q + h * axis, v).mass @ v for h in (-1e-5, 1e-5)] for axis in np.eye(7)]
-        # C^T q' with Christoffel's symbols is the gradient of the kinetic energy.
-        assert np.allclose(terms.transposed, [(b - a) / 2e-5 for a, b in energy], atol=1e-6)
-        assert v @ terms.coriolis == pytest.approx(v @ terms.transposed, abs=1e-6)
-
-
-def test_a_payload_is_what_its_weight_says():
-    bare, loaded = cc.ArmDynamics(URDF), cc.ArmDynamics(URDF)
-    loaded.set_payload(0.5, [0.0, 0.0, 0.0])
-    q = HOME
-    added = loaded.evaluate(q, np.zeros(7)).gravity - bare.evaluate(q, np.zeros(7)).gravity
-    assert np.allclose(added, jacobian(q).T @ [0.0, 0.0, 0.5 * 9.81], atol=1e-9)
-    j = jacobian(q)
-    assert np.allclose(loaded.evaluate(q, np.zeros(7)).mass - bare.evaluate(q, np.zeros(7)).mass, 0.5 * j.T @ j)
-    for mass in (-0.1, np.nan):
-        with pytest.raises(ValueError, match="mass"):
-            bare.set_payload(mass, [0.0, 0.0, 0.0])
 
 
 def test_a_known_torque_is_recovered_with_a_first_order_lag():
