@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import coglab_controllers as cc
 import numpy as np
 import pytest
-from arms import DT, HOME, SHIPPED, URDF, Arm, ArmAsMeasured, feed, fused, jacobian, ramp
+from arms import DT, SHIPPED, URDF, Arm, ArmAsMeasured, feed, fused, jacobian, ramp
 from coglab_contact.detector import ContactDetector, DetectorSettings
 from coglab_contact.evidence import (
     MOMENTUM,
@@ -21,19 +21,6 @@ from coglab_contact.motion_thresholds import (
 )
 from coglab_contact.moving_contact import MotionRecorder, MovingContact
 from coglab_msgs.msg import ReasonCode
-
-
-def test_a_payload_is_what_its_weight_says():
-    bare, loaded = cc.ArmDynamics(URDF), cc.ArmDynamics(URDF)
-    loaded.set_payload(0.5, [0.0, 0.0, 0.0])
-    q = HOME
-    added = loaded.evaluate(q, np.zeros(7)).gravity - bare.evaluate(q, np.zeros(7)).gravity
-    assert np.allclose(added, jacobian(q).T @ [0.0, 0.0, 0.5 * 9.81], atol=1e-9)
-    j = jacobian(q)
-    assert np.allclose(loaded.evaluate(q, np.zeros(7)).mass - bare.evaluate(q, np.zeros(7)).mass, 0.5 * j.T @ j)
-    for mass in (-0.1, np.nan):
-        with pytest.raises(ValueError, match="mass"):
-            bare.set_payload(mass, [0.0, 0.0, 0.0])
 
 
 def test_a_known_torque_is_recovered_with_a_first_order_lag():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import coglab_controllers as cc
@@ -13,8 +12,6 @@ SYSTEM = '<system duration="1.2" alpha="4.6" stiffness="150" damping="24.5"/>'
 WEIGHT, SHAPE = '<goal_weight kind="linear"/>', '<shape mapping="none"/>'
 ENDS = '<start position="0 0 0" velocity="0 0 0"/><goal position="0.5 0 0"/>'
 BASIS = '<basis centre="1" width="10" weight="0.1 0 0"/>'
-SAMPLES = [f'<sample t="{0.2 * i}" position="{0.1 * i} {0.01 * i * i} 0"/>' for i in range(6)]
-TRAJECTORY = f"<trajectory>{''.join(SAMPLES)}</trajectory>"
 
 
 def library(*primitives: str, version: str = ' version="1"') -> str:
@@ -29,22 +26,10 @@ def weighted(basis: int = 2, name: str = 'id="p"') -> str:
     return primitive(SYSTEM, WEIGHT, SHAPE, ENDS, BASIS * basis, name=name)
 
 
-def learnt(*parts: str, learn: str = '<learn basis="3"/>') -> str:
-    return primitive(learn, *parts)
-
-
 def parsed(*primitives: str, **options: str) -> cc.Library:
     made = cc.Library()
     assert made.parse(library(*primitives, **options), "file.xml") == len(primitives)
     return made
-
-
-def refusal(text: str) -> str:
-    made = cc.Library()
-    with pytest.raises(cc.LibraryError) as error:
-        made.parse(text, "file.xml")
-    assert len(made) == 0
-    return str(error.value)
 
 
 def test_what_cannot_be_written_leaves_nothing_behind(tmp_path: Path) -> None:
@@ -61,55 +46,9 @@ def test_what_cannot_be_written_leaves_nothing_behind(tmp_path: Path) -> None:
     assert (tmp_path / "a.xml").read_text() == made.format()
 
 
-GOOD = library(weighted())
-SIGMOID = 'kind="sigmoid"'
-
-
 def line(count: int = 9, step: float = 0.1, way: float = 0.5) -> tuple[np.ndarray, np.ndarray]:
     times = step * np.arange(count)
     return times, np.outer(np.linspace(0.0, way, count), [1.0, 0.0, 0.0])
-
-
-def test_demonstrations_are_taken_within_their_limits() -> None:
-    for count, step in ((5, 0.1), (9, 0.05 / 8), (9, 600.0 / 8)):
-        cc.learn("a", [line(count, step, 0.02)], 3, allow=["short", "brief"])
-    for count, step, words in (
-        (4, 0.1, "demonstration 1: trajectory: expected at least 5 samples, got 4"),
-        (9, 0.0499 / 8, "trajectory duration: expected a number from 0.05 to 600"),
-        (9, 600.1 / 8, "trajectory duration: expected a number from 0.05 to 600"),
-    ):
-        with pytest.raises(ValueError, match=words):
-            cc.learn("a", [line(count, step)], 3)
-    times, path = line()
-    for shift, fine in ((1e10 - 0.9, True), (-1e10, True), (1.1e10, False), (-1.1e10, False)):
-        if fine:
-            cc.learn("a", [(times + shift, path)], 3)
-            continue
-        with pytest.raises(ValueError, match=r"demonstration 2: sample 0 t: expected a number from -1e\+10 to 1e\+10"):
-            cc.learn("a", [(times, path), (times + shift, path)], 3)
-    for axis in range(3):
-        for way in (100.5, -100.5):
-            bad = path.copy()
-            bad[4, axis] = way
-            with pytest.raises(
-                ValueError, match=f"sample 4 position.{'xyz'[axis]}: expected a number from -100 to 100"
-            ):
-                cc.learn("a", [(times, bad)], 3)
-    with pytest.raises(ValueError, match=r"one position per time \(9\), got 8"):
-        cc.learn("a", [(times, path[:8])], 3)
-    cc.learn("a", [line(way=1.01e-4)], 3, allow=["short"])
-    with pytest.raises(ValueError, match="expected a path of at least 0.1 mm, got one of 0.000099 m"):
-        cc.learn("a", [line(way=0.99e-4)], 3)
-    for count in (2, 64):
-        assert cc.learn("a", [line()], count).weights.shape == (count, 3)
-    for count in (1, 65):
-        with pytest.raises(ValueError, match=f"basis_count: expected 2 to 64, got {count}"):
-            cc.learn("a", [line()], count)
-    for fine in (0.0, 1.0):
-        cc.learn("a", [line()], 3, regularisation=fine)
-    for bad_ridge in (-1e-9, 1.0 + 1e-9, math.nan):
-        with pytest.raises(ValueError, match="regularisation: expected 0 to 1"):
-            cc.learn("a", [line()], 3, regularisation=bad_ridge)
 
 
 def test_a_demonstration_that_is_slow_at_its_start_begins_at_rest() -> None:

@@ -105,25 +105,6 @@ TEST_F(CycleLimits, SilenceIsToldAfterATenthAndEndsAMotionAfterHalfASecond) {
   EXPECT_EQ(report().motion, MotionState::Aborted);
 }
 
-TEST_F(CycleLimits, ARobotThatStopsOrLeavesCommandModeForAMomentEndsTheMotion) {
-  begin();
-  move();
-  robot->sample.block = MotionBlock::Held;
-  robot->tick();
-  EXPECT_EQ(report().motion, MotionState::Aborted);
-  EXPECT_EQ(report().reason.code(), ReasonCode::Held);
-  EXPECT_EQ(report().reason.str().find("the robot stopped the motion: hold is latched; send reset"),
-            0u);
-  robot->sample.block = MotionBlock::None;
-  robot->tick();
-  move();
-  ++robot->sample.motion_epoch;
-  robot->tick();
-  EXPECT_EQ(report().motion, MotionState::Aborted);
-  EXPECT_EQ(report().reason.code(), ReasonCode::NotInCommandMode);
-  EXPECT_NE(report().reason.str().find("for a moment"), std::string::npos);
-}
-
 TEST_F(CycleLimits, AMotionThatWasReachedAndFollowsItsGoalEndsWhenTheRobotLeftCommandMode) {
   begin();
   robot->switchTo("dmp");

@@ -105,18 +105,6 @@ TEST(Learning, DemonstrationsOfDifferentSizeAndDirectionAgreeWhenMapped) {
   EXPECT_NEAR(both.duration, 1.05, 1e-12);
 }
 
-TEST(Learning, IsInvariantUnderAffineMaps) {
-  Random random(4);
-  for (int k = 0; k < 50; ++k) {
-    const Trajectory path = randomPath(random, true);
-    const Matrix3 rotation = 1.7 * random.rotation().toRotationMatrix();
-    Trajectory mapped = path;
-    mapped.positions = (rotation * path.positions).colwise() + Vector3(0.3, -0.2, 0.5);
-    const Primitive one = learn("one", {path}, kAny), two = learn("two", {mapped}, kAny);
-    EXPECT_LT((rotation * one.weights - two.weights).norm(), 1e-5 * (1.0 + one.weights.norm()));
-  }
-}
-
 TEST(Learning, WorksWithEverySupportedSizeAndWeight) {
   const Trajectory path = minimumJerkReach(Vector3::Zero(), Vector3(0.5, 0.1, 0), 1.2);
   for (int count : {2, 5, 10, 33, kMaxBasis}) {

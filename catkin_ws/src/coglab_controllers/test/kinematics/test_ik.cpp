@@ -29,27 +29,6 @@ CartesianReference randomReference(Random& random, const ChainState& state, doub
 
 }  // namespace
 
-TEST(SmallSvd, EqualsEigen) {
-  Random random(1);
-  for (int k = 0; k < 20000; ++k) {
-    Eigen::Matrix<double, 3, 7> a = Eigen::Matrix<double, 3, 7>::Random();
-    a.row(2) =
-        a.row(2) * std::pow(10.0, random.uniform(-10, 2)) + (k % 3 == 0 ? 1.0 : 0.0) * a.row(0);
-    const RowSvd<3> svd(a);
-    Eigen::JacobiSVD<Eigen::Matrix<double, 3, 7>> reference(a);
-    Eigen::Vector3d sigma = svd.sigma;
-    std::sort(sigma.data(), sigma.data() + 3, std::greater<double>());
-    ASSERT_LT((sigma - reference.singularValues()).norm(), 1e-13 * (1.0 + sigma[0]));
-    const Eigen::Matrix<double, 7, 3> inverse = svd.pseudoInverse([](double s) { return 1.0 / s; });
-    if (sigma[2] > 1e-6) {
-      ASSERT_LT((a * inverse - Matrix3::Identity()).norm(), 1e-9);
-    }
-  }
-  const RowSvd<3> zero(Eigen::Matrix<double, 3, 7>::Zero());
-  EXPECT_TRUE(zero.sigma.isZero(0.0));
-  EXPECT_TRUE(zero.pseudoInverse([](double s) { return 1.0 / s; }).isZero(0.0));
-}
-
 TEST(TwoTaskIk, EqualsTheEquationsWithASingularValueDecomposition) {
   Random random(2);
   const IkParameters parameters = unlimited();

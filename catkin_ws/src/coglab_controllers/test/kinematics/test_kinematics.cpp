@@ -176,15 +176,3 @@ TEST(Rotation, TheShortestTurnTurnsOneDirectionIntoTheOther) {
     EXPECT_LT((shortestTurn(axis, -axis) * axis + axis).norm(), 1e-12);
   }
 }
-
-TEST(Rotation, DifferenceEqualsKdl) {
-  Random random(6);
-  for (int k = 0; k < 20000; ++k) {
-    const Quaternion a = random.rotation(), b = random.rotation();
-    const KDL::Vector expected = KDL::diff(KDL::Rotation::Quaternion(a.x(), a.y(), a.z(), a.w()),
-                                           KDL::Rotation::Quaternion(b.x(), b.y(), b.z(), b.w()));
-    const Vector3 got = rotationBetween(a, b);
-    if (got.norm() > M_PI - 1e-3) continue;  // the axis of half a turn has no sign
-    ASSERT_LT((got - Vector3(expected.x(), expected.y(), expected.z())).norm(), 1e-6);
-  }
-}

@@ -267,27 +267,6 @@ TEST(ControlCycle, ABorderThatAllowsLessAndLessSpeedEndsAMotion) {
   EXPECT_NEAR(stands, 0.5, 0.1);
 }
 
-TEST(ControlCycle, TheClockIsSlowedByTheLimitsOfAMotionUnderWayAlone) {
-  PushedRobot robot;
-  const auto expect = [&robot](std::initializer_list<double> scales) {
-    for (const double scale : scales) {
-      robot.tick();
-      EXPECT_NEAR(robot.manager->report().time_scale, scale, 1e-12);
-    }
-  };
-  EXPECT_EQ(robot.manager->report().time_scale, 1.0);
-  robot.push->limit = 0.5;
-  expect({1.0, 0.5, 0.25});
-  robot.push->limit = 3.0;  // no more than nothing is limited
-  expect({0.125, 0.135});
-  robot.push->limit = 0.5;
-  robot.push->doing = MotionState::Idle;
-  expect({0.145, 0.155});
-  robot.push->limit = -1.0;
-  robot.push->doing = MotionState::Running;
-  expect({0.165, 0.0});
-}
-
 TEST(ControlCycle, AMotionIsAllowedWithAJointStateOfAnArmThatFollowsAndElseOnlyAdopted) {
   PushedRobot robot;
   robot.push->doing = MotionState::Idle;

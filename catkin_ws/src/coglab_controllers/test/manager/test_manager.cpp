@@ -50,17 +50,6 @@ TEST(Manager, LibraryThatIsCutShortIsRefused) {
   EXPECT_TRUE(refused(robot.manager->load("a", "test/Cut"), {"cut short"}));
 }
 
-TEST(Manager, TypesGoWithTheirLibraryAndComeBackWithIt) {
-  MotionTypes& types = MotionTypes::instance();
-  for (int i = 0; i < 2; ++i) {
-    const auto library =
-        ctrl_more::PluginLibrary::open(PLUGIN_DIR "/libcoglab_test_own_exception.so", types);
-    EXPECT_EQ(library->types(), std::vector<std::string>{"test/Throwing"});
-    EXPECT_NE(types.find("test/Throwing").controller, nullptr);
-  }
-  EXPECT_EQ(types.find("test/Throwing").controller, nullptr);
-}
-
 TEST(Manager, BadPluginsAndSwitchesLeaveARunningMotionAsItIs) {
   VirtualRobot robot("{" + kTypes + "}"), twin("{" + kTypes + "}");
   for (VirtualRobot* one : {&robot, &twin}) {
@@ -88,30 +77,6 @@ TEST(Manager, BadPluginsAndSwitchesLeaveARunningMotionAsItIs) {
     ASSERT_EQ(robot.command.velocity, twin.command.velocity);
   }
   EXPECT_EQ(robot.state(), MotionState::Running);
-}
-
-/// With the parameters as shipped.
-TEST(Manager, AnArmThatFallsSilentIsKnownWithinASecond) {
-  VirtualRobot robot;
-  robot.loadBoth();
-  robot.see("human_hand", kGoal);
-  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
-  for (int i = 0; i < 50; ++i) {
-    robot.see("human_hand", kGoal);
-    robot.tick();
-  }
-  ASSERT_EQ(robot.state(), MotionState::Running) << robot.reason();
-  double silent = 0.0, zero = 0.0;
-  while (robot.state() != MotionState::Aborted && silent < 5.0) {
-    silent += 0.005;
-    robot.manager->cycle().idle(robot.now_ns + std::llround(1e9 * silent));
-    if (zero == 0.0 && robot.manager->report().velocity.isZero()) zero = silent;
-  }
-  EXPECT_LE(silent, 1.0);
-  EXPECT_GT(silent, 0.1);  // a few lost cycles end nothing
-  EXPECT_LE(zero, 0.1);
-  EXPECT_EQ(robot.manager->report().reason.code(), ReasonCode::StaleJointState);
-  EXPECT_FALSE(robot.manager->report().standing);
 }
 
 TEST(Manager, SwitchInMotionBrakesWithoutAJumpAndReportsUnfinished) {
@@ -306,40 +271,6 @@ TEST(Manager, MotionAndItsFeedbackProfileBeginInTheSameCycle) {
   EXPECT_GT(with.load(), 100);
   EXPECT_GT(without.load(), 100);
   EXPECT_EQ(apart.load(), 0);
-}
-
-TEST(Manager, ARefusedSwitchLeavesTheFeedbackProfile) {
-  VirtualRobot robot;
-  robot.loadBoth("ptp");
-  bool ran = false;
-  ctrl_more::FeedbackControllersManager& feedback = robot.manager->feedback();
-  ASSERT_TRUE(feedback.addController(std::make_unique<Probe>(ran), "probe").ok());
-  ASSERT_TRUE(feedback.setProfile("dmp", {"probe"}).ok());
-  std::string type;
-  EXPECT_TRUE(refused(robot.manager->switchTo("nobody", type), {"nobody"}));
-  EXPECT_FALSE(feedback.isEnabled("probe"));
-  ASSERT_TRUE(VirtualRobot::ok(robot.manager->switchTo("dmp", type)));
-  EXPECT_TRUE(feedback.isEnabled("probe"));
-}
-
-TEST(Manager, EmptyFeedbackListChangesNoBit) {
-  VirtualRobot plain, staged;
-  plain.loadBoth();
-  staged.loadBoth();
-  // One controller, loaded and disabled, against none at all.
-  ASSERT_TRUE(VirtualRobot::ok(staged.manager->load("limits", "JointLimits")));
-  ASSERT_TRUE(staged.manager->feedback().disable("limits", true).ok());
-  for (VirtualRobot* robot : {&plain, &staged}) {
-    robot->see("human_hand", kGoal);
-    ASSERT_TRUE(VirtualRobot::ok(robot->dmp().execute(robot->reach())));
-  }
-  for (int i = 0; i < 600; ++i) {
-    plain.see("human_hand", kGoal);
-    staged.see("human_hand", kGoal);
-    plain.tick();
-    staged.tick();
-    ASSERT_EQ(plain.command.velocity, staged.command.velocity);
-  }
 }
 
 }  // namespace

@@ -224,12 +224,6 @@ TEST_F(Following, APointAtTheStartIsWhereTheArmIs) {
   EXPECT_LE(steepest, 10.0 + 1e-6);
 }
 
-TEST_F(Following, OffersTheGainsThatItHas) {
-  std::vector<std::string> names;
-  for (const Tunable& gain : controller->tunables()->all()) names.push_back(gain.name);
-  EXPECT_EQ(names, std::vector<std::string>{"Kp"});
-}
-
 TEST_F(Following, WhatCannotBeFollowedIsRefusedBeforeAnythingMoves) {
   using Error = TrajectoryError;
   const double nan = std::nan("");

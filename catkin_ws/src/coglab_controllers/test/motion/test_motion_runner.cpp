@@ -57,32 +57,6 @@ class Turn : public Motion<> {
   double time_ = 0.0;
 };
 
-/// Moves the hand along x with a constant speed for a second.
-class Slide : public Motion<> {
- public:
-  void configure(MotionConfiguration&) override {}
-  void start(const MotionStart<>& start) override {
-    from_ = start.from.pose;
-    time_ = 0.0;
-  }
-  void computeReference(const MotionCycle& cycle, MotionReference& reference) override {
-    time_ = cycle.next;
-    reference.pose(at(cycle.time), at(cycle.next));
-  }
-  MotionState state() const override {
-    return time_ >= 1.0 ? MotionState::Reached : MotionState::Running;
-  }
-
- private:
-  Pose at(double time) const {
-    Pose pose = from_;
-    pose.position.x() += 0.05 * std::min(time, 1.0);
-    return pose;
-  }
-  Pose from_;
-  double time_ = 0.0;
-};
-
 struct Runner : ::testing::Test {
   VirtualArm arm{DESCRIPTION_DIR, "turn: {max_queue: 2, settle_time: 0.5}"};
   CustomMotionController& turn = arm.load("turn", "test/Turn");
@@ -158,17 +132,6 @@ TEST_F(Runner, AnAbortEndsWhatRunsAndWaitsAndTheArmStands) {
   EXPECT_EQ(ask(0.1, 1.0, true).status, MotionAnswer::kStarted);  // and on it goes
 }
 
-TEST_F(Runner, AnArmThatDoesNotArriveAborts) {
-  ask(0.2, 1.0, false);
-  arm.run(0.9);
-  for (int i = 0; i < 300; ++i) {
-    arm.tick();
-    arm.sample.position[0] -= arm.period * arm.command.velocity[0];  // somebody holds it
-  }
-  EXPECT_EQ(arm.state(), MotionState::Aborted);
-  EXPECT_EQ(arm.manager->report().reason.code(), ReasonCode::TargetNotReached);
-}
-
 TEST_F(Runner, AMotionThatIsReplacedBeforeItBeganIsToldToo) {
   EXPECT_EQ(ask(0.2, 1.0, false).id, 0);
   EXPECT_EQ(ask(0.2, 1.0, true).status, MotionAnswer::kQueued);
@@ -191,51 +154,6 @@ TEST_F(Runner, ASwitchAwayLeavesWhatWasReachedBehind) {
   MotionProgress progress;
   ASSERT_TRUE(turn.readProgress(progress));
   EXPECT_EQ(progress.state, MotionState::Idle);
-  EXPECT_EQ(MotionProgress().id, -1);
-  EXPECT_EQ(EndedMotion().id, -1);
-  EXPECT_FALSE(EndedMotion().executed);
-  EXPECT_EQ(MotionAnswer().status, MotionAnswer::kRejected);
-}
-
-/// Knows nothing of limits and borders; notes what it is told of the robot.
-class Plain : public MotionController {
- public:
-  static inline bool allowed = false;
-  static inline int adopted = 0;
-
-  void configure(const MotionSetup&) override {}
-  void adopt(const CycleInput& input) override {
-    allowed = input.motion_allowed;
-    ++adopted;
-  }
-  void start(const CycleInput&) override {}
-  void stop() override {}
-  void abort(const Reason&) override {}
-  void computeReference(const CycleInput&, References&) override {}
-  void resolve(const CycleInput&, References&) override {}
-  MotionState state() const override { return MotionState::Idle; }
-  const Reason& reason() const override { return reason_; }
-
- private:
-  Reason reason_;
-};
-
-MotionController* makePlain() { return new Plain(); }
-
-TEST_F(Runner, AControllerIsToldWhetherItMayMoveInEveryCycleAndNotWithoutAJointState) {
-  MotionTypes::instance().insert("test/Plain", {makePlain, nullptr});
-  ASSERT_TRUE(arm.manager->load("plain", "test/Plain").success);
-  std::string type;
-  ASSERT_TRUE(arm.manager->switchTo("plain", type).success);
-  arm.tick();
-  EXPECT_TRUE(Plain::allowed);
-  const int before = Plain::adopted;
-  arm.manager->cycle().idle(arm.now_ns + 1'000'000);
-  EXPECT_FALSE(Plain::allowed);
-  EXPECT_EQ(Plain::adopted, before + 1);
-  arm.sample.block = MotionBlock::Held;
-  arm.tick();
-  EXPECT_FALSE(Plain::allowed);
 }
 
 TEST_F(Runner, FaultsOfAMotionEndInStandStillWithTheReason) {
@@ -256,27 +174,7 @@ TEST_F(Runner, FaultsOfAMotionEndInStandStillWithTheReason) {
   }
 }
 
-TEST_F(Runner, AMotionThatWasToReplaceAnotherAndIsReplacedItselfIsToldOnce) {
-  for (int i = 0; i < 3; ++i) {
-    EXPECT_EQ(ask(0.2, 2.0, false).id, i);
-    if (i == 0) arm.run(0.2);
-  }
-  const std::vector<EndedMotion> all = ends();
-  ASSERT_EQ(all.size(), 2u);
-  for (int i = 0; i < 2; ++i) EXPECT_EQ(all[i].id, i);
-}
-
 }  // namespace
 }  // namespace coglab_controllers
 
 COGLAB_REGISTER_MOTION("test/Turn", coglab_controllers::Turn)
-
-namespace {
-using coglab_controllers::CustomMotionController;
-using coglab_controllers::MotionRegistration;
-const MotionRegistration slide("test/Slide", {[] {
-                                                return CustomMotionController::make(
-                                                    std::make_unique<coglab_controllers::Slide>());
-                                              },
-                                              nullptr});
-}  // namespace

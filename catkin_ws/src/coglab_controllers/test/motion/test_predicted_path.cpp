@@ -129,7 +129,6 @@ DmpPlan reachPlan(double ratio = 1.0) {
 }
 
 const Pose kStart{Vector3(0.4, 0.1, 0.3), Quaternion::Identity()};
-const Pose kThere{kGoal, Quaternion::Identity()};
 
 TEST(CartesianMotion, TurnsOnAsFastAsItDidWhenItBeginsAndWhenItIsSwitched) {
   const Vector3 turning(0.2, -0.3, 0.4);
@@ -144,37 +143,6 @@ TEST(CartesianMotion, TurnsOnAsFastAsItDidWhenItBeginsAndWhenItIsSwitched) {
     motion.switchTo(reachPlan(1.5), goal);
     EXPECT_LT((motion.step(0.005, goal, rate).angular_velocity - before).norm(),
               0.02 * before.norm());
-  }
-}
-
-TEST(CartesianMotion, AsksForNothingWhereNoTimePassesAndWhereItIsNotUnderWay) {
-  CartesianMotion motion;
-  for (int i = 0; i < 5; ++i) {
-    EXPECT_TRUE(motion.step(0.005, kThere).velocity.isZero(0.0));
-    EXPECT_TRUE(motion.reference().pose.position.isZero(0.0));
-    EXPECT_EQ(motion.phase(), CartesianMotion::Phase::Idle);
-  }
-  const Quaternion turned(Eigen::AngleAxisd(0.5, Vector3::UnitX()));
-  motion.start(reachPlan(), kStart, Vector3::Zero(), Vector3::Zero(), {kGoal, turned});
-  for (int i = 0; i < 100; ++i) motion.step(0.005, {kGoal, turned});
-  const CartesianReference before = motion.reference();
-  const Vector3 place = motion.dmp().state().position;
-  EXPECT_NEAR(motion.remainingDistance(), (kGoal - place).norm(), 1e-12);
-  for (const double no_time : {0.0, -0.005}) {
-    const CartesianReference& same = motion.step(no_time, kThere);
-    EXPECT_EQ(same.velocity, before.velocity) << no_time;
-    EXPECT_EQ(same.angular_velocity, before.angular_velocity) << no_time;
-    EXPECT_EQ(motion.dmp().state().position, place) << no_time;
-  }
-  ASSERT_GT(before.velocity.norm(), 0.1);
-  ASSERT_GT(before.angular_velocity.norm(), 0.1);
-  motion.stop();
-  for (int i = 0; i < 2; ++i) {
-    EXPECT_EQ(motion.reference().pose.position, place) << "where the next cycle would have been";
-    EXPECT_TRUE(motion.reference().velocity.isZero(0.0));
-    EXPECT_TRUE(motion.reference().angular_velocity.isZero(0.0));
-    EXPECT_EQ(motion.remainingTime(), 0.0);
-    motion.step(0.005, kThere);
   }
 }
 

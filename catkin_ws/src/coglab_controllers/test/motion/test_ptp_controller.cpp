@@ -49,44 +49,6 @@ TEST(PtpController, EndsExactlyWithinItsLimitsAndReportsOnce) {
   EXPECT_EQ(executed(robot.ptp()), std::vector<int>{answer.id});
 }
 
-TEST(PtpController, RejectsBadRequestsSayingWhy) {
-  VirtualRobot robot;
-  robot.loadBoth("ptp");
-  const auto why = [&](const PtpRequest& request, const std::string& word) {
-    const MotionAnswer answer = robot.ptp().add(request);
-    EXPECT_EQ(answer.status, MotionAnswer::kRejected);
-    EXPECT_EQ(answer.id, -1);
-    EXPECT_NE(answer.message.find(word), std::string::npos) << answer.message;
-  };
-  std::vector<double> far = kThere, nan = kThere;
-  far[1] = 2.1;
-  nan[4] = std::nan("");
-  why({{1, 2, 3}, {}, {}}, "3 numbers");
-  why({{}, {}, {}}, "0 numbers");
-  why({far, {}, {}}, "lwr_a2");
-  why({nan, {}, {}}, "lwr_a4");
-  why({kThere, {0.1, 0.1}, {}}, "max_vel");
-  why({kThere, std::vector<double>(7, 0.0), {}}, "max_vel");
-  why({kThere, std::vector<double>(7, 99.0), {}}, "max_vel");
-  why({kThere, {}, std::vector<double>(7, -1.0)}, "max_acc");
-  EXPECT_TRUE(executed(robot.ptp()).empty());
-}
-
-TEST(PtpController, SpeedScaleStretchesTheProfile) {
-  const auto cycles = [](double scale) {
-    VirtualRobot robot;
-    robot.loadBoth("ptp");
-    EXPECT_TRUE(robot.manager->setSpeedScale(scale).success);
-    for (int i = 0; i < 200; ++i) robot.tick();
-    EXPECT_EQ(robot.ptp().add({kThere, {}, {}}).status, MotionAnswer::kStarted);
-    int count = 0;
-    for (; count < 5000 && robot.state() != MotionState::Reached; ++count) robot.tick();
-    return count;
-  };
-  const int full = cycles(1.0);
-  EXPECT_NEAR(cycles(0.25), 4 * full, 0.02 * full + 8);
-}
-
 TEST(PtpController, StandsStillAtScaleZeroAndGoesOn) {
   VirtualRobot robot;
   robot.loadBoth("ptp");

@@ -81,27 +81,6 @@ TEST(DmpController, OffsetIsAppliedOnceAndTurnsWithTheGoalFrame) {
   EXPECT_LT(robot.hand().orientation.angularDistance(turned * wanted), 0.01);
 }
 
-TEST(DmpController, TopicAndTfGiveTheSameMotion) {
-  VirtualRobot a, b;
-  a.loadBoth();
-  b.loadBoth();
-  Vector3 goal = kGoal;
-  a.see("human_hand", goal);
-  ASSERT_TRUE(VirtualRobot::ok(b.dmp().setGoal("lwr_base_link", goal, 0)));
-  ASSERT_TRUE(VirtualRobot::ok(a.dmp().execute(a.reach())));
-  DmpRequest request = b.reach();
-  request.goal_frame.clear();
-  ASSERT_TRUE(VirtualRobot::ok(b.dmp().execute(request)));
-  for (int i = 0; i < 500; ++i) {
-    a.tick();
-    b.tick();
-    goal.y() += 0.0002;
-    a.see("human_hand", goal);
-    ASSERT_TRUE(VirtualRobot::ok(b.dmp().setGoal("lwr_base_link", goal, b.now_ns)));
-    ASSERT_EQ(a.command.velocity, b.command.velocity) << "cycle " << i;
-  }
-}
-
 TEST(DmpController, SwitchKeepsPhasePositionAndVelocityOfTheSetPointExactly) {
   // The clock of the motion is stopped for the switch, so that the state behind the references can
   // be compared before and after without a step of the integration between.
@@ -215,34 +194,6 @@ TEST(DmpController, RobotThatStopsAbortsTheMotionAndRefusesNewOnes) {
   EXPECT_EQ(robot.state(), MotionState::Aborted);  // nothing goes on by itself
   robot.see("human_hand", kGoal);
   EXPECT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
-}
-
-TEST(DmpController, GivenStateBeginsThereWithItsVelocity) {
-  for (const bool given : {true, false}) {
-    VirtualRobot robot("dmp: {enable_ik_debug: true}");
-    robot.loadBoth();
-    robot.see("human_hand", kGoal);
-    const Vector3 hand = robot.hand().position;
-    DmpRequest request = robot.reach();
-    request.initial_state = given ? DmpRequest::kGiven : DmpRequest::kCurrent;
-    request.initial_position = hand + Vector3(0.0, 0.03, 0.0);
-    request.initial_velocity = Vector3(0.1, 0.0, 0.0);
-    ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(request)));
-    robot.tick();
-    IkDebugRecord record;
-    ASSERT_TRUE(robot.dmp().readIkDebug(record));
-    const Vector3 begin = given ? request.initial_position : hand;
-    const Vector3 velocity = given ? request.initial_velocity : Vector3(Vector3::Zero());
-    EXPECT_LT((record.set_point.position - begin).norm(), 1e-9);
-    EXPECT_LT((record.velocity - velocity).norm(), 0.01);
-    // The arm follows its velocity from the first cycle on; the way to the place is blended in.
-    EXPECT_LT((robot.handVelocity() - velocity).norm(), 0.03);
-    for (int i = 0; i < 1000; ++i) {
-      robot.see("human_hand", kGoal);
-      robot.tick();
-    }
-    EXPECT_EQ(robot.state(), MotionState::Reached) << robot.reason();
-  }
 }
 
 TEST(DmpController, AfterTheEndTheRemainingDistanceIsThatToTheGoalThatWasLatched) {

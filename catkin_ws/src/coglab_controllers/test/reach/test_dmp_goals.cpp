@@ -122,24 +122,6 @@ TEST(DmpController, AGoalOutsideItsRegionFromTheBeginningIsWaitedFor) {
   EXPECT_EQ(reachAfter(far, [](double) { return Vector3::Zero(); }).first, ReasonCode::None);
 }
 
-TEST(DmpController, OldGoalIsHeldAndALostOneAborts) {
-  VirtualRobot robot;
-  robot.loadBoth();
-  robot.see("human_hand", kGoal);
-  DmpRequest request = robot.reach();
-  request.dmp_ratio = 4.0;
-  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(request)));
-  for (int i = 0; i < 60; ++i) robot.tick();  // 0.3 s without a frame
-  EXPECT_EQ(robot.state(), MotionState::Holding);
-  EXPECT_NE(robot.reason().find("old"), std::string::npos) << robot.reason();
-  robot.see("human_hand", kGoal);
-  robot.tick();
-  EXPECT_EQ(robot.state(), MotionState::Running);
-  for (int i = 0; i < 210; ++i) robot.tick();
-  EXPECT_EQ(robot.state(), MotionState::Aborted);
-  EXPECT_NE(robot.reason().find("lost"), std::string::npos) << robot.reason();
-}
-
 TEST(DmpController, LostGoalNearTheEndIsFinished) {
   VirtualRobot robot;
   robot.loadBoth();
@@ -149,30 +131,6 @@ TEST(DmpController, LostGoalNearTheEndIsFinished) {
   for (int i = 0; i < 1000; ++i) robot.tick();
   EXPECT_EQ(robot.state(), MotionState::Reached) << robot.reason();
   EXPECT_LT((robot.hand().position - near).norm(), 2e-3);
-}
-
-TEST(DmpController, JumpIsBelievedAfterThreeFrames) {
-  VirtualRobot robot;
-  robot.loadBoth();
-  robot.see("human_hand", kGoal);
-  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
-  robot.tick();
-  const Vector3 far = kGoal + Vector3(0.0, -0.2, 0.0);
-  for (int frame = 0; frame < 2; ++frame) {
-    robot.see("human_hand", far);
-    robot.tick();
-    EXPECT_EQ(robot.state(), MotionState::Holding);
-    EXPECT_EQ(robot.reason(),
-              "the goal jumped by 0.200 m: the last one is held until frames agree");
-  }
-  robot.see("human_hand", far);
-  robot.tick();
-  EXPECT_EQ(robot.state(), MotionState::Running);
-  robot.see("human_hand", kGoal);  // one wild frame, then the old place again
-  robot.tick();
-  robot.see("human_hand", far);
-  robot.tick();
-  EXPECT_EQ(robot.state(), MotionState::Running);
 }
 
 TEST(DmpController, TopicGoalMayBeReplacedByAFarOne) {
@@ -204,26 +162,6 @@ TEST(DmpController, GoalThatLeavesTheWorkspaceIsProjected) {
     }
   }
   EXPECT_GT(robot.hand().position.x(), 0.74);
-}
-
-TEST(DmpController, FollowsATurningObject) {
-  VirtualRobot robot;
-  robot.loadBoth();
-  const Quaternion start = robot.hand().orientation;
-  robot.see("human_hand", kGoal);
-  DmpRequest request = robot.reach();
-  request.orientation_control = true;
-  request.target_orientation = start.coeffs();
-  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(request)));
-  Quaternion object = Quaternion::Identity();
-  for (int i = 0; i < 1000; ++i) {
-    const double angle = std::min(0.3, 0.3 * i * robot.period / 0.8);  // turns for 0.8 s
-    object = Quaternion(Eigen::AngleAxisd(angle, Vector3::UnitZ()));
-    robot.see("human_hand", kGoal, object);
-    robot.tick();
-  }
-  EXPECT_EQ(robot.state(), MotionState::Reached) << robot.reason();
-  EXPECT_LT(robot.hand().orientation.angularDistance(object * start), 0.02);
 }
 
 /// A reach of an arm that stands, as its clock does, toward a goal that was seen when it began, and

@@ -286,54 +286,6 @@ TEST(Settling, TheLoopIsOpenedSlowlyWhereTheHandDoesNotComeToRest) {
   EXPECT_LT(late, 0.3 * early);
 }
 
-/// A motion that follows dmp_goal; the clock of the stamps is `ahead` of that of the samples.
-struct TopicGoal : ::testing::Test {
-  VirtualRobot robot;
-  std::int64_t ahead = 1000 * kSecond;
-  Vector3 goal = kGoal;
-
-  void SetUp() override {
-    robot.loadBoth();
-    ASSERT_TRUE(VirtualRobot::ok(tell()));
-    DmpRequest request = robot.reach();
-    request.goal_frame.clear();
-    ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(request)));
-    run(50);
-  }
-
-  Answer tell() {
-    return robot.dmp().setGoal("lwr_base_link", goal, robot.now_ns, robot.now_ns + ahead);
-  }
-  void run(int cycles) {
-    for (int i = 0; i < cycles; ++i) {
-      robot.tick();
-      if (i % 6 == 0) {
-        EXPECT_TRUE(VirtualRobot::ok(tell()));
-      }
-    }
-  }
-};
-
-TEST_F(TopicGoal, AStepBackOfTheClockStartsAnew) {
-  for (const double step : {0.2, 10.0, 500.0}) {
-    ahead -= std::llround(step * 1e9);
-    goal.y() += 0.05;
-    run(400);
-    EXPECT_LT((robot.dmp().motion().goal() - goal).norm(), 2e-3) << step << " s back";
-    EXPECT_EQ(robot.manager->report().reason.code(), ReasonCode::None) << robot.reason();
-  }
-}
-
-TEST_F(TopicGoal, WithoutAStepOldAndRepeatedGoalsAreRefused) {
-  EXPECT_TRUE(VirtualRobot::ok(tell()));
-  EXPECT_EQ(tell().code, ReasonCode::TooLate);
-  const Answer late = robot.dmp().setGoal("lwr_base_link", (kGoal + Vector3(0.0, -0.5, 0.0)),
-                                          robot.now_ns - kSecond, robot.now_ns - kSecond + ahead);
-  EXPECT_EQ(late.code, ReasonCode::TooLate) << late.message;
-  run(50);
-  EXPECT_LT((robot.dmp().motion().goal() - goal).norm(), 1e-2);
-}
-
 TEST(FrameGoal, AStepBackOfTheClockStartsAnew) {
   VirtualRobot robot;
   robot.loadBoth();
@@ -372,32 +324,6 @@ TEST(FrameGoal, ASightThatIsNoPoseIsNotFollowed) {
     ASSERT_EQ(robot.state(), i < 200 ? MotionState::Running : robot.state()) << robot.reason();
     ASSERT_LT((robot.dmp().motion().goal() - kGoal - request.goal_offset).norm(), 1e-9) << i;
   }
-}
-
-TEST(FrameGoal, ASightStampedAheadOfTheClockIsNotFollowed) {
-  VirtualRobot robot;
-  robot.loadBoth();
-  robot.see("human_hand", kGoal);
-  ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
-  const auto tick = [&](double ahead, const Vector3& place) {
-    robot.see("human_hand", place);
-    GoalObservation& seen = robot.frames.frames["human_hand"];
-    seen.stamp_ns += std::llround(1e9 * ahead);
-    seen.frame_ns += std::llround(1e9 * ahead);
-    robot.tick();
-  };
-  const Vector3 aside = kGoal + Vector3(0.0, 0.05, 0.0);
-  for (int i = 0; i < 60; ++i) tick(0.0, kGoal);
-  for (int i = 0; i < 60; ++i) {
-    tick(0.2, aside);
-    ASSERT_LT((robot.dmp().motion().goal() - kGoal).norm(), 1e-9) << i;
-  }
-  EXPECT_EQ(robot.state(), MotionState::Holding);
-  EXPECT_NE(robot.reason().find("ahead of the clock"), std::string::npos) << robot.reason();
-  // What clocks that are synchronised differ by is let pass.
-  for (int i = 0; i < 100; ++i) tick(0.04, aside);
-  EXPECT_EQ(robot.state(), MotionState::Running) << robot.reason();
-  EXPECT_GT((robot.dmp().motion().goal() - kGoal).norm(), 0.04);
 }
 
 }  // namespace

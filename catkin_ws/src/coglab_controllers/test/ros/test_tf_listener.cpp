@@ -83,17 +83,6 @@ TEST_F(Listener, AStaticTransformHasNoStampAndJoinsNoHistory) {
   EXPECT_NE(goal.frame_ns, 0);
 }
 
-TEST_F(Listener, FramesThatWereRefusedAreRememberedUpToTwoHundredAndFiftySix) {
-  for (int i = 0; i < 257; ++i) receive(seen("f" + std::to_string(i), 100 * kMs));
-  EXPECT_NEAR(listener.ahead("f255"), 0.1, 1e-9);
-  EXPECT_EQ(listener.ahead("f256"), 0.0);
-  receive(seen("f7", 200 * kMs));
-  EXPECT_NEAR(listener.ahead("f7"), 0.2, 1e-9) << "one that is known is told anew";
-  receive(seen("f7", 0));
-  receive(seen("f256", 100 * kMs));
-  EXPECT_NEAR(listener.ahead("f256"), 0.1, 1e-9) << "there is room again";
-}
-
 TEST_F(Listener, AClockThatGoesBackByMoreThanClocksDifferForgetsAll) {
   receive(seen("cup", 0));
   set(now_ns - 50 * kMs);

@@ -54,13 +54,6 @@ class Edges : public ::testing::Test {
   const std::string path_ = "/tmp/coglab_rt_edges_" + std::to_string(getpid()) + ".yaml";
 };
 
-TEST(JointLimits, TheArmsTableHasItsProfiles) {
-  const JointLimits full = loadJointLimits(LIMITS_FILE), t1 = loadJointLimits(LIMITS_FILE, "t1");
-  EXPECT_DOUBLE_EQ(t1.velocity[0], 0.24 / 1.04);  // what is commanded leaves the servos room
-  EXPECT_GT(full.velocity.minCoeff(), 1.0);
-  EXPECT_EQ(t1.upper_position, full.upper_position);
-}
-
 TEST_F(Edges, AFaultIsNamedWithFileLineAndField) {
   const char* const faults[][3] = {
       {"torque: [31, ", "torque: [", ":9: default.torque: expected a list of 7 numbers"},

@@ -84,40 +84,6 @@ TEST(Random, IsThePublishedGenerator) {
   EXPECT_EQ(plain.next(), same.next());
 }
 
-TEST(Geometry, PosesAndTwists) {
-  const Pose turned{Vector3d(1, 2, 3), Quaterniond(Eigen::AngleAxisd(M_PI / 2, Vector3d::UnitZ()))};
-  EXPECT_LT((turned * Vector3d(1, 0, 0) - Vector3d(1, 3, 3)).norm(), 1e-12);
-  const Pose both = turned * Pose{Vector3d(0, 1, 0), turned.rotation};
-  EXPECT_LT((both.position - Vector3d(0, 2, 3)).norm(), 1e-12);
-  EXPECT_NEAR(std::abs(both.rotation.z()), 1.0, 1e-12);
-  const Pose back = turned.inverse() * turned;
-  EXPECT_LT(back.position.norm(), 1e-12);
-  EXPECT_NEAR(std::abs(back.rotation.w()), 1.0, 1e-12);
-  EXPECT_LT((turned.inverse() * Vector3d(1, 3, 3) - Vector3d(1, 0, 0)).norm(), 1e-12);
-  const Twist twist{Vector3d(1, 0, 0), Vector3d(0, 0, 2)};
-  EXPECT_EQ(twist.at(Vector3d(0, 3, 0)), Vector3d(-5, 0, 0));
-  Wrench wrench;
-  wrench.add(Vector3d(0, 1, 0), Vector3d(2, 0, 0));
-  wrench.add(Vector3d(0, 1, 0), Vector3d(2, 0, 0));
-  EXPECT_EQ(wrench.stacked(), (Vector6() << 0, 2, 0, 0, 0, 4).finished());
-}
-
-TEST(Geometry, TheShortWayFromOneRotationToAnother) {
-  const Quaterniond none = Quaterniond::Identity();
-  for (const double angle : {-3.1, -1.0, 0.0, 1e-7, 0.3, 3.1}) {
-    const Vector3d axis = Vector3d(1, 2, -2) / 3.0;
-    const Quaterniond turn(Eigen::AngleAxisd(angle, axis));
-    EXPECT_LT((rotationBetween(none, turn) - angle * axis).norm(), 1e-9) << angle;
-    Quaterniond same;
-    same.coeffs() = -turn.coeffs();
-    EXPECT_LT((rotationBetween(none, same) - angle * axis).norm(), 1e-9) << angle;
-    EXPECT_LT((rotationBetween(turn, none) + angle * axis).norm(), 1e-9) << angle;
-  }
-  const Quaterniond long_way(Eigen::AngleAxisd(4.0, Vector3d::UnitX()));
-  EXPECT_NEAR(rotationBetween(none, long_way).x(), 4.0 - 2.0 * M_PI, 1e-12);
-  EXPECT_EQ(rotationBetween(none, none).norm(), 0.0);
-}
-
 TEST(TorqueSensor, NoiseGrowsWithTheFastestJointAndIsCorrelated) {
   TorqueNoise noise;
   noise.bias = noise.offset = noise.hysteresis = 0.0;

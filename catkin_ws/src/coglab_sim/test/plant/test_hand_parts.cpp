@@ -117,26 +117,6 @@ Pose at(const Vector3d& position, const Vector3d& turn = Vector3d::Zero()) {
 
 }  // namespace
 
-TEST(HoldSpring, GainsFollowFromMassInertiaAndBandwidth) {
-  HoldSpring hold;
-  hold.engageAt(Pose{});
-  FreeBody held = body();
-  held.twist = {Vector3d(0.1, 0.2, 0.3), Vector3d(0.4, 0.5, 0.6)};
-  const Twist hand{Vector3d(0.3, 0.3, 0.3), Vector3d(1.0, 1.0, 1.0)};
-  const Wrench all =
-      hold.evaluate(at({0.01, -0.02, 0.03}, {0.0, 0.0, 0.2}), hand, held, kStrong, 1.0);
-  const Vector3d force = 2.0 * 100.0 * Vector3d(0.01, -0.02, 0.03) +
-                         2.0 * 10.0 * 2.0 * Vector3d(0.2, 0.1, 0.0) +
-                         Vector3d(0.0, 0.0, 2.0 * 9.81);
-  EXPECT_LT((all.force - force).norm(), 1e-9) << all.force.transpose();
-  const Vector3d torque(20.0 * 0.01 * 0.6, 20.0 * 0.02 * 0.5,
-                        100.0 * 0.03 * 0.2 + 20.0 * 0.03 * 0.4);
-  EXPECT_LT((all.torque - torque).norm(), 1e-9) << all.torque.transpose();
-  const Wrench half =
-      hold.evaluate(at({0.01, -0.02, 0.03}, {0.0, 0.0, 0.2}), hand, held, kStrong, 0.5);
-  EXPECT_LT((half.stacked() - 0.5 * all.stacked()).norm(), 1e-9);
-}
-
 TEST(HoldSpring, WhatAnotherHoldsIsTakenWithoutItsWeight) {
   HoldSpring hold;
   hold.engageAt(Pose{});

@@ -49,18 +49,6 @@ TEST_F(AttitudeTest, ProportionalAndDampingFollowTheClosedForm) {
   EXPECT_NEAR(plant.angle, d / (1 + kp), 1e-4);
 }
 
-TEST_F(AttitudeTest, IntegralActionLeavesNoError) {
-  ASSERT_TRUE(rig.load("attitude", "kp: 0.5\nkd: 0\nki: 4\nmax_angle: 1\n"));
-  Plant plant{0.05, 0.1};
-  for (int i = 0; i < 2000; ++i) {
-    setImu(expOf({0, plant.angle, 0}), {0, plant.rate, 0});
-    rig.setReferences();
-    rig.cycleOnce();
-    plant.step(correction().y(), 0.005);
-  }
-  EXPECT_NEAR(plant.angle, 0.0, 1e-9);
-}
-
 TEST_F(AttitudeTest, OneStepDelayConvergesBelowOneAndDivergesAbove) {
   for (const double kp : {0.95, 1.05}) {
     ControllerRig fresh;

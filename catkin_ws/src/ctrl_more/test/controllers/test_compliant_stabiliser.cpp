@@ -7,19 +7,6 @@
 namespace ctrl_more {
 namespace {
 
-TEST(SecondOrderTest, CriticalDampingIsExactAtTheSamples) {
-  const double m = 2.0, k = 50.0, f = 3.0, wn = std::sqrt(k / m), dt = 0.005;
-  SecondOrder axis;
-  axis.prepare(m, 2 * std::sqrt(k * m), k, dt);
-  double x = 0, v = 0;
-  for (int i = 1; i <= 2000; ++i) {
-    axis.step(f, x, v);
-    const double t = i * dt;
-    ASSERT_NEAR(x, f / k * (1 - (1 + wn * t) * std::exp(-wn * t)), 1e-13);
-    ASSERT_NEAR(v, f / m * t * std::exp(-wn * t), 1e-12);
-  }
-}
-
 TEST(SecondOrderTest, AllDampingsAgreeWithSmallSteps) {
   std::mt19937 random(11);
   std::uniform_real_distribution<double> u(0.0, 1.0);
@@ -41,13 +28,6 @@ TEST(SecondOrderTest, AllDampingsAgreeWithSmallSteps) {
 
 struct CompliantTest : ::testing::Test {
   ControllerRig rig;
-  void push(double zmp_x, int cycles) {
-    for (int i = 0; i < cycles; ++i) {
-      rig.robot.setEstimatedData("zmp", vectorOf({zmp_x, 0, 0}), rig.cycle.now_ns);
-      rig.setReferences();
-      rig.cycleOnce();
-    }
-  }
 };
 
 struct ClosedLoop : ::testing::Test {
@@ -140,29 +120,6 @@ TEST_F(CompliantTest, PoseAndVelocityFollowTheClosedForm) {
     const std::vector<double> shown = rig.manager->lastCycle().states.at(0).values;
     ASSERT_EQ(shown, (std::vector<double>{rig.control.getCoM().x(), 0.0, f, 0.0}));
   }
-}
-
-// Position and velocity after one step from rest at 1 with speed `v`, in long double.
-std::pair<double, double> exactStep(long double m, long double d, long double k, long double dt,
-                                    long double f, long double v) {
-  // Taylor series of the motion in steps so short that it converges at once.
-  const int parts = 64;
-  const long double h = dt / parts;
-  long double x = 1.0L;
-  for (int i = 0; i < parts; ++i) {
-    long double dx = x, dv = v, power = 1.0L, next_x = x, next_v = v;
-    for (int n = 1; n < 40; ++n) {
-      const long double a = ((n == 1 ? f : 0.0L) - d * dv - k * dx) / m;
-      dx = dv;
-      dv = a;
-      power *= h / n;
-      next_x += dx * power;
-      next_v += dv * power;
-    }
-    x = next_x;
-    v = next_v;
-  }
-  return {static_cast<double>(x), static_cast<double>(v)};
 }
 
 }  // namespace

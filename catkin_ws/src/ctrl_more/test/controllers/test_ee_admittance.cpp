@@ -184,18 +184,6 @@ TEST_F(AdmittanceTest, AtItsBoundNothingMovesOutward) {
   EXPECT_LT(rig.twist()[0], 0.0) << "back at once";
 }
 
-TEST_F(AdmittanceTest, BoundsOfZeroKeepTheReference) {
-  ASSERT_TRUE(rig.load("ee_admittance",
-                       "axes: all\nmax_offset: 0\nmax_angle: 0\nmax_velocity: 0\n"
-                       "force_dead_band: 0\ntorque_dead_band: 0\n"));
-  for (const double f : {0.0, 50.0, 0.0}) {
-    push(vectorOf({f, 0, 0, 0.1 * f, 0, 0}), 20);
-    EXPECT_NEAR(rig.pose()[0], 0.0, 1e-12) << f;
-    EXPECT_NEAR(rig.pose()[6], 1.0, 1e-12) << f;
-    EXPECT_EQ(rig.manager->status("c").faults, 0u) << f;
-  }
-}
-
 TEST_F(AdmittanceTest, TranslationAloneLeavesTheTurnAlone) {
   ASSERT_TRUE(rig.load("ee_admittance", ""));
   push(vectorOf({20, 10, -5, 8, 9, 10}), 50);

@@ -86,15 +86,6 @@ TEST_F(WithGain, TheControllerIsToldBeforeEachUpdateWhoseGainsDiffer) {
   EXPECT_EQ(changed, 40) << "refused";
 }
 
-TEST_F(WithGain, GainsByNameAndThroughTheInstance) {
-  ASSERT_TRUE(rig.manager->setGains("c", {{"kp", {2.0}}}));
-  rig.step(40);
-  EXPECT_EQ(rig.twist()[0], 2.0);
-  ASSERT_TRUE(c->setGains({{"kp", {4.0}}}));
-  rig.step(40);
-  EXPECT_EQ(rig.twist()[0], 4.0);
-}
-
 TEST_F(WithGain, TheInstanceAsksAndTellsItsManager) {
   ASSERT_TRUE(c->setGains({{"kp", {4.0}}}));
   EXPECT_EQ(rig.manager->getGains("c").all().at("kp"), std::vector<double>{4.0});

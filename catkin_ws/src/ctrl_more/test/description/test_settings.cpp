@@ -52,22 +52,6 @@ TEST(Settings, NumbersHaveTheirCountAndRange) {
   EXPECT_FALSE(values.set("ends", Numbers{}));
 }
 
-TEST(GainValues, BlendingEndsExactlyAtTheNewValue) {
-  Description d;
-  d.gain("far", 1e17).in("1").about("x");
-  d.gain("near", 0.0).in("1").about("x");
-  const GainValues from(d.gains);
-  GainValues to = from, gains = from;
-  to.set("far", {0.1});
-  to.set("near", {8.0});
-  gains.blend(from, to, 0.25);
-  EXPECT_EQ(gains.all().at("near"), std::vector<double>{2.0});
-  EXPECT_FALSE(gains.sameAs(to));
-  gains.blend(from, to, 1.0);
-  EXPECT_EQ(gains.all().at("far"), std::vector<double>{0.1});
-  EXPECT_TRUE(gains.sameAs(to));
-}
-
 TEST(ControllerFiles, GiveWhatTheyName) {
   const ControllerConfig config = readControllerConfig(
       declared(), ConfigNode::fromText("type: X\nkp: [0, 2]\nmode: slow\nends: [1, 2]\n", "f"));

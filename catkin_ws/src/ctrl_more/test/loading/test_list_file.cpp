@@ -74,35 +74,5 @@ TEST_F(ListFiles, PartsOfAProfileAreNotUnloaded) {
   EXPECT_TRUE(rig.manager->unload("Good"));
 }
 
-TEST_F(ListFiles, ReadingAnExclusiveSignalIsAllowed) {
-  auto alone = adder("pose", "ee", 0.1);
-  alone->description.control_signals[0].alone();
-  rig.add(std::move(alone), "alone");
-  auto reader = adder("com", "com", 0.1);
-  reader->description.reads(ControlContainer::TaskSpaceReferencePose, "ee").in("m").frameOf("w");
-  rig.add(std::move(reader), "reader");
-  EXPECT_FALSE(rig.manager->addController(adder("pose", "ee", 0.1), "other", [] {
-    ControllerEntry entry;
-    entry.enabled = true;
-    return entry;
-  }()));
-}
-
-// A controller that tells when it is gone.
-struct Watched : TestController {
-  bool* gone;
-  explicit Watched(bool* flag) : gone(flag) {}
-  ~Watched() override { *gone = true; }
-};
-
-TEST_F(ListFiles, UnloadedControllersAreGoneAtOnceIfNoCycleEverSawThem) {
-  bool gone = false;
-  rig.add(std::make_unique<Watched>(&gone), "watched", false);
-  rig.add(adder("pose", "ee", 0.1), "other");
-  ASSERT_TRUE(rig.manager->pause("other"));
-  ASSERT_TRUE(rig.manager->unload("watched"));
-  EXPECT_TRUE(gone) << "plans that nobody took are freed when the next one is offered";
-}
-
 }  // namespace
 }  // namespace ctrl_more

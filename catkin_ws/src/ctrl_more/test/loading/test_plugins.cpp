@@ -58,14 +58,6 @@ TEST_F(Plugins, PapersOwnMakerAndNames) {
   EXPECT_EQ(used, (std::vector<std::string>{"centreOfMass/com", "zmp/zmp"}));
 }
 
-TEST_F(Plugins, AddedRobotStateWithoutSizeMustExist) {
-  // "imu" has no declared size: the host has to declare it, or the load is refused in words.
-  const LoadReport report =
-      load("loadControllers: [MyController]\nMyController: {libPath: libpaper_maker.so}\n");
-  EXPECT_FALSE(report.ok());
-  EXPECT_TRUE(contains(report.text(), "declare it before loading")) << report.text();
-}
-
 TEST_F(Plugins, PapersExampleFileIsRefusedWithLineAndSuggestion) {
   const std::string paper =
       "loadControllers: [Attitude , ZmpIP]\n"
@@ -86,15 +78,6 @@ TEST_F(Plugins, PapersExampleFileIsRefusedWithLineAndSuggestion) {
   EXPECT_TRUE(contains(report.errors[1], "zmpip.yaml")) << report.errors[1];
   rig.step();
   EXPECT_EQ(rig.control.getZMP()[0], 1.0) << "what was loaded keeps running";
-}
-
-TEST_F(Plugins, PapersKeysWorkAsPrintedWithRealFiles) {
-  const std::string yaml = "loadControllers: [Attitude]\nAttitude:\n  libPath: " + kController +
-                           "/libctrl_more_attitude.so\n  configFile: " CTRL_MORE_SOURCE_DIR
-                           "/config/attitude.yaml\n";
-  const LoadReport report = load(yaml);
-  EXPECT_TRUE(report.ok()) << report.text();
-  EXPECT_EQ(report.loaded, std::vector<std::string>{"Attitude"});
 }
 
 TEST_F(Plugins, BadLibrariesAreRefusedInWords) {
@@ -170,26 +153,6 @@ TEST_F(Plugins, KnownTypeNameIsRefusedAndTheFirstOneStays) {
   EXPECT_NE(prototypes().find("Good"), nullptr);
 }
 
-TEST_F(Plugins, TwoInstancesOfOneLibrary) {
-  ASSERT_TRUE(load("loadControllers: [left, right]\nleft: {libPath: libgood.so, enabled: true}\n"
-                   "right: {libPath: libgood.so, enabled: true}\n")
-                  .ok());
-  rig.step();
-  EXPECT_EQ(rig.control.getZMP()[0], 2.0);
-}
-
-TEST_F(Plugins, AllOrNothingUnlessTheRestIsAskedFor) {
-  const std::string yaml =
-      "loadControllers: [Bad, Good]\nBad: {libPath: libnone.so}\nGood: {libPath: libgood.so}\n";
-  const LoadReport strict = load(yaml);
-  EXPECT_FALSE(strict.ok());
-  EXPECT_TRUE(strict.loaded.empty());
-  EXPECT_TRUE(rig.manager->getControllersNames().empty());
-  const LoadReport lenient = load(yaml, false);
-  EXPECT_EQ(lenient.loaded, std::vector<std::string>{"Good"});
-  EXPECT_EQ(lenient.errors.size(), 1u);
-}
-
 TEST_F(Plugins, RefusedListIsNeverSeenByARunningCycle) {
   rig.step();  // frozen
   const LoadReport report = load(
@@ -204,12 +167,6 @@ TEST_F(Plugins, RefusedListIsNeverSeenByARunningCycle) {
   ASSERT_TRUE(load("loadControllers: [Good]\nGood: {libPath: libgood.so, enabled: true}\n").ok());
   rig.step();
   EXPECT_EQ(rig.control.getZMP()[0], 1.0);
-}
-
-TEST_F(Plugins, RefusedListLeavesNoKeyBehind) {
-  load("loadControllers: [Limits, Bad]\nLimits: {type: JointLimits, libPath: " + kController +
-       "/libctrl_more_joint_limits.so}\nBad: {libPath: libnone.so}\n");
-  EXPECT_FALSE(rig.robot.find(RobotSource::Measured, "joint_position").valid());
 }
 
 TEST_F(Plugins, WrongFilesAreRefusedWithTheirLine) {

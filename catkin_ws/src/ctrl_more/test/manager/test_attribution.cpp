@@ -50,45 +50,5 @@ TEST(AttributionTest, AttributionIsOfTheLastCycleHoweverOftenItIsAsked) {
   EXPECT_EQ(meanwhile[0].cycle, rig.cycle.number);
 }
 
-TEST(AttributionTest, WhatDidNotRunInTheLastCycleIsLeftOut) {
-  Rig rig;
-  EXPECT_EQ(rig.manager->lastCycle().cycle, 0u);
-  rig.add(adder("pose", "ee", 1.0), "task");
-  rig.add(adder("joint", "Velocity", 1.0), "joint");
-  rig.step();
-  EXPECT_EQ(rig.manager->attribution().size(), 2u);
-  for (int i = 0; i < 4; ++i) {
-    ++rig.cycle.number;
-    rig.setReferences();
-    rig.manager->beginCycle(rig.cycle);
-    rig.manager->updateStage(Stage::Task, rig.robot, rig.control);
-    rig.manager->endCycle();
-    const CycleRecord record = rig.manager->lastCycle();
-    EXPECT_EQ(record.cycle, rig.cycle.number);
-    ASSERT_EQ(record.changes.size(), 1u) << "the joint stage did not run";
-    EXPECT_EQ(record.changes[0].controller, "task");
-    EXPECT_EQ(record.changes[0].angle, 0.0);
-  }
-}
-
-TEST(AttributionTest, ACycleWithoutAStageLeavesTheRecordOfTheOneBefore) {
-  Rig rig;
-  rig.manager->beginCycle({0, 0.005, 7});
-  rig.manager->endCycle();
-  EXPECT_EQ(rig.manager->lastCycle().cycle, 0u) << "nothing ran yet";
-  rig.add(adder("pose", "ee", 1.0), "a");
-  for (int i = 1; i <= 4; ++i) {
-    rig.step();
-    const std::uint64_t ran = rig.cycle.number;
-    for (int empty = 0; empty < i; ++empty) {
-      rig.manager->beginCycle({0, 0.005, ++rig.cycle.number});
-      rig.manager->endCycle();
-    }
-    const CycleRecord record = rig.manager->lastCycle();
-    EXPECT_EQ(record.cycle, ran);
-    EXPECT_EQ(record.changes.size(), 1u);
-  }
-}
-
 }  // namespace
 }  // namespace ctrl_more

@@ -160,37 +160,5 @@ TEST(CorrectionTest, DifferenceAndApplyAreInverse) {
   }
 }
 
-TEST(BlendingTest, AfterTheBlendTheReferenceIsExactlyWhatWasWritten) {
-  Rig rig(kBlend);
-  auto c = adder("com", "com", 0.0);
-  c->on_write = [](TestController& self, ModifiedControlStates& m) { m[self.out][0] = 0.1; };
-  rig.add(std::move(c), "c");
-  rig.step(25);
-  rig.control.setCoM({1e10, 0, 0});  // 0.1 is no difference of it and another number
-  ++rig.cycle.number;
-  rig.manager->update(rig.cycle, rig.robot, rig.control);
-  EXPECT_EQ(rig.control.getCoM().x(), 0.1);
-}
-
-// The order as it is: nobody moves, and nobody is blended.
-TEST(BlendingTest, AnOrderThatIsTheOldOneChangesNothing) {
-  Rig rig(kBlend);
-  double ramp = 0.0;
-  auto c = adder("pose", "ee", 0.0);
-  c->on_write = [&](TestController& self, ModifiedControlStates& m) { m[self.out][0] += ramp; };
-  rig.add(std::move(c), "ramp");
-  rig.add(adder("vel", "ee", 1.0), "other");
-  rig.add(adder("vel", "ee", 1.0), "third");
-  rig.step(25);
-  for (int i = 1; i <= 10; ++i) {
-    ASSERT_TRUE(rig.manager->setExecutionOrder(
-        i % 2 == 0 ? std::vector<std::string>{"ramp", "other", "third"}
-                   : std::vector<std::string>{"ramp", "third", "other"}));
-    ramp += 0.25;
-    rig.step();
-    EXPECT_EQ(rig.pose()[0], ramp) << "it keeps its place, whatever the others do";
-  }
-}
-
 }  // namespace
 }  // namespace ctrl_more

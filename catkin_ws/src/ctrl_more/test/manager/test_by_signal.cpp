@@ -38,14 +38,6 @@ TEST_F(BySignal, PauseAndResumeByRobotState) {
   EXPECT_FALSE(rig.manager->isPaused("limits"));
 }
 
-TEST_F(BySignal, PauseByEveryWrittenControlState) {
-  rig.manager->pauseAllUsingControlState("taskSpaceReferencePose/ee");
-  EXPECT_TRUE(rig.manager->isPaused("force"));
-  EXPECT_TRUE(rig.manager->isPaused("vision"));
-  rig.manager->resumeAllUsingControlState("taskSpaceReferencePose/ee");
-  EXPECT_FALSE(rig.manager->isPaused("vision"));
-}
-
 TEST_F(BySignal, ReasonsDoNotCancelEachOther) {
   rig.manager->pause("force");
   rig.manager->pauseAllUsingRobotState("wrench");
@@ -102,17 +94,6 @@ TEST_F(BySignal, MotionSwitchResetsWhoWantsIt) {
   rig.step();
   EXPECT_EQ(force->resets, before + 1);
   EXPECT_EQ(limits->resets, held + 1) << "Reset is the default";
-}
-
-TEST_F(BySignal, RefusalsAndPausesHaveACauseBesideTheSentence) {
-  EXPECT_EQ(rig.manager->pauseAllUsingRobotState("nothing").cause(), Cause::UnknownName);
-  EXPECT_EQ(rig.manager->enable("nobody").cause(), Cause::UnknownName);
-  EXPECT_EQ(rig.manager->setExecutionOrder({"force", "force"}).cause(), Cause::InvalidArgument);
-  EXPECT_EQ(rig.manager->unload("force").cause(), Cause::Busy) << "it is enabled";
-  ASSERT_TRUE(rig.manager->pause("force"));
-  EXPECT_EQ(rig.manager->status("force").causes, std::vector<PauseCause>{PauseCause::User});
-  ASSERT_TRUE(rig.manager->resume("force"));
-  EXPECT_EQ(rig.manager->resume("force").cause(), Cause::None);
 }
 
 TEST_F(BySignal, KeyAndFullNameAreTheSameReason) {

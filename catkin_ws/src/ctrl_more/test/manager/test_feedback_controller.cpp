@@ -283,22 +283,5 @@ TEST(Handles, EmptyOnesAreFaults) {
   }
 }
 
-TEST(FeedbackControllerTest, AddedStatesAreModifiedOrReadWhereTheirNameSays) {
-  TestController c;
-  c.addUsedControlState("zmp");
-  c.addUsedControlState("otherReference/horizon");
-  c.addUsedRobotState("estimatedData/zmp");
-  c.addUsedRobotState("imu");
-  const auto control = c.getUsedControlStates();
-  EXPECT_TRUE(control[0].use.modifies);
-  EXPECT_EQ(control[1].name(), "otherReference/horizon");
-  EXPECT_EQ(control[1].key, "horizon");
-  const auto robot = c.getUsedRobotStates();
-  EXPECT_EQ(robot[0].name(), "estimatedData/zmp");
-  EXPECT_EQ(robot[0].key, "zmp");
-  EXPECT_EQ(robot[1].name(), "measuredData/imu");
-  EXPECT_FALSE(c.addUsedControlState("noContainer/key"));
-}
-
 }  // namespace
 }  // namespace ctrl_more

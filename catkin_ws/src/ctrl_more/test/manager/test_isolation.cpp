@@ -128,15 +128,6 @@ TEST_F(Isolation, AngleTooLarge) {
   expectFault(FaultKind::CorrectionSize, "larger");
 }
 
-TEST_F(Isolation, TurningTooFast) {
-  build(
-      [](TestController& self, ModifiedControlStates& m) {
-        m[self.out].tail<4>() = Eigen::Vector4d(std::sin(0.01), 0, 0, std::cos(0.01));
-      },
-      {}, {kUnlimited, kUnlimited, kUnlimited, 3.0});  // 0.015 rad per cycle, and this is 0.02
-  expectFault(FaultKind::CorrectionRate, "faster");
-}
-
 TEST(IsolationTest, TheRateOfATurnIsThatOfItsChange) {
   // A turn of 0.5 rad that grows by 0.014 rad per cycle is within 3 rad/s, however large it is.
   Rig rig;

@@ -215,17 +215,5 @@ TEST_F(Waiting, PausedMeanwhileItEndsOff) {
   EXPECT_EQ(rig.pose()[0], 0.0);
 }
 
-TEST(LettingGoTest, ASwitchOfMotionDoesNotProlongAFade) {
-  Rig rig(0.1);
-  rig.add(adder("vel", "ee", 1.0), "c");
-  rig.step(40);
-  rig.manager->pause("c");
-  for (int i = 1; i <= 20; ++i) {
-    rig.manager->apply(Change().motionSwitched());
-    rig.step();
-    EXPECT_NEAR(rig.twist()[0], 1.0 - i / 20.0, 1e-12);
-  }
-}
-
 }  // namespace
 }  // namespace ctrl_more

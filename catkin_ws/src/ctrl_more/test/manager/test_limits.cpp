@@ -45,24 +45,6 @@ TEST_F(TwoSignals, TheBoundItselfIsAllowed) {
   EXPECT_EQ(rig.pose()[0], 0.0) << "all signals of the controller are undone";
 }
 
-TEST_F(TwoSignals, TheRateIsThatOfTheSecondSignal) {
-  build({kUnlimited, 10.0, kUnlimited, kUnlimited});  // 0.05 per cycle
-  shift = 1.0;
-  EXPECT_EQ(faultAfter(3.0, 6), FaultKind::None) << "the first correction follows no other";
-  for (int i = 1; i <= 20; ++i) {
-    ASSERT_EQ(faultAfter(3.0 + 0.049 * i), FaultKind::None) << i;
-    ASSERT_DOUBLE_EQ(rig.twist()[1], 3.0 + 0.049 * i);
-    const std::vector<Attribution> changes = rig.manager->attribution();
-    ASSERT_EQ(changes.size(), 2u);
-    EXPECT_EQ(changes[0].before[0], 0.0);
-    EXPECT_EQ(changes[0].size, 1.0);
-    EXPECT_EQ(changes[1].before[1], 0.0);
-    EXPECT_DOUBLE_EQ(changes[1].size, 3.0 + 0.049 * i);
-  }
-  EXPECT_EQ(faultAfter(3.0 + 0.049 * 20 + 0.051), FaultKind::CorrectionRate);
-  EXPECT_EQ(rig.twist()[1], 0.0);
-}
-
 TEST_F(TwoSignals, AfterAPauseTheRateIsNotJudgedOnce) {
   build({kUnlimited, 10.0, kUnlimited, kUnlimited});
   ASSERT_EQ(faultAfter(1.0, 3), FaultKind::None);

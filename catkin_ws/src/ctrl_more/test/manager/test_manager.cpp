@@ -27,12 +27,6 @@ struct Three : ::testing::Test {
   }
 };
 
-TEST_F(Three, RunsInLoadOrderByDefault) {
-  EXPECT_EQ(runOnce(), (Names{"a", "b", "c"}));
-  EXPECT_EQ(rig.manager->getControllersNames(), (Names{"a", "b", "c"}));
-  EXPECT_EQ(rig.manager->getExecutionOrder(), (Names{"a", "b", "c"}));
-}
-
 TEST_F(Three, OrderChangesBetweenCycles) {
   ASSERT_TRUE(rig.manager->setExecutionOrder({"c", "a", "b"}));
   EXPECT_EQ(runOnce(), (Names{"c", "a", "b"}));
@@ -105,13 +99,6 @@ TEST_F(Three, SeveralChangesAreOneCycleBoundaryAndAllOrNothing) {
   EXPECT_TRUE(rig.manager->waitAdopted(status.generation(), 0.0));
 }
 
-TEST_F(Three, PlanIsAcknowledgedOnlyByACycle) {
-  const Status status = rig.manager->disable("a");
-  EXPECT_FALSE(rig.manager->waitAdopted(status.generation(), 0.01));
-  rig.step();
-  EXPECT_TRUE(rig.manager->waitAdopted(status.generation(), 0.0));
-}
-
 TEST_F(Three, PlanThatWasNotAdoptedCanBeWithdrawn) {
   rig.step();
   const Status first = rig.manager->disable("a");
@@ -148,15 +135,6 @@ TEST_F(Three, PreparedPlanWaitsForItsPlaceInTheCycle) {
   EXPECT_EQ(runOnce(), (Names{"a", "b", "c"}));
   rig.manager->adoptPrepared();
   EXPECT_EQ(runOnce(), (Names{"a", "b", "c"}));
-}
-
-TEST_F(Three, AnOlderOrdinaryPlanDoesNotOvertakeAPreparedOne) {
-  rig.step();
-  ASSERT_TRUE(rig.manager->disable("a"));
-  const Status prepared = rig.manager->prepare(Change().disable("b"));
-  rig.manager->adoptPrepared();
-  EXPECT_TRUE(rig.manager->waitAdopted(prepared.generation(), 0.0));
-  EXPECT_EQ(runOnce(), (Names{"c"}));
 }
 
 TEST_F(Three, UnloadOnlyWhenDisabledAndFaded) {

@@ -27,22 +27,6 @@ TEST_F(RobotStatesTest, KeepsDataAndStampOfBothMaps) {
   EXPECT_EQ(robot.newestStamp(), 43);
 }
 
-TEST_F(RobotStatesTest, HasNoKeyOfItsOwn) {
-  EXPECT_TRUE(robot.signals(RobotSource::Measured).empty());
-  EXPECT_TRUE(robot.signals(RobotSource::Estimated).empty());
-  EXPECT_EQ(robot.newestStamp(), kNeverWritten);
-}
-
-TEST_F(RobotStatesTest, AnnouncesEachNewKeyOnce) {
-  robot.setMeasuredData("imu", vectorOf({1}), 0);
-  robot.setMeasuredData("imu", vectorOf({2}), 1);
-  robot.setMeasuredData("imu", vectorOf({3}), 2);
-  logger.drain();
-  int announced = 0;
-  for (const std::string& line : sink->lines) announced += contains(line, "new key") ? 1 : 0;
-  EXPECT_EQ(announced, 1);
-}
-
 TEST_F(RobotStatesTest, WrongSizeIsRefusedAndNamesKeyExpectedGotAndWho) {
   robot.setMeasuredData("imu", vectorOf({1, 2, 3, 4, 5, 6, 7, 8, 9}), 0);
   const Status status = robot.setMeasuredData("imu", vectorOf({1, 2, 3}), 1, "driver");

@@ -242,35 +242,6 @@ TEST(Bridge, TheVelocitySourceIsSwitched) {
   EXPECT_TRUE(cell.bridge.snapshot().sample.commanded_velocity.isZero());
 }
 
-TEST(Bridge, NoPositionLimitIsCrossedWhateverIsAsked) {
-  for (const double period : {0.001, 0.005, 0.020}) {
-    Cell cell(period);
-    cell.start();
-    const double way = period < 0.01 ? 1.5 : 3.0;  // s; 20 cycles may be lost, which takes its time
-    std::mt19937 random(3);
-    std::uniform_real_distribution<double> speed(-3.0, 3.0);
-    Vector7 velocity = Vector7::Zero();
-    Vector7 reached = Vector7::Zero();
-    for (int i = 0; i < static_cast<int>(20.0 * way / period); ++i) {
-      if (i % static_cast<int>(way / period) == 0) {
-        for (int j = 0; j < 7; ++j) velocity[j] = speed(random);
-      }
-      drive(cell.bridge, cell.robot, velocity);
-      cell.robot.cycle(cell.bridge);
-      const Vector7 q = cell.robot.setPoint();
-      reached = reached.cwiseMax(q.cwiseAbs());
-      for (int j = 0; j < 7; ++j) {
-        ASSERT_LE(q[j], cell.bridge.config().limits.upper_position[j]);
-        ASSERT_GE(q[j], cell.bridge.config().limits.lower_position[j]);
-      }
-    }
-    for (int j = 0; j < 7; ++j) {  // the range is not given away either
-      EXPECT_GT(reached[j], cell.bridge.config().limits.upper_position[j] - 0.03) << j;
-    }
-    EXPECT_GT(cell.bridge.snapshot().counters.position_bounds, 0U);
-  }
-}
-
 /// friOpen with another period: the counters go on, no velocity spike, and every bound holds at the
 /// new period.
 TEST(Bridge, FollowsAnotherPeriodAfterFriWasOpenedAgain) {
@@ -312,35 +283,6 @@ TEST(Bridge, FollowsAnotherPeriodAfterFriWasOpenedAgain) {
     EXPECT_EQ(cell.bridge.snapshot().session.new_periods, changes);
     EXPECT_EQ(cell.bridge.snapshot().session.restarts, 0U);
     EXPECT_TRUE(runEvent(cell.bridge, cell.robot, "stop").success());
-  }
-}
-
-/// What a person sees on the wire: float32 positions, speed and acceleration by differences.
-TEST(Bridge, TheWireKeepsTheLimitsAtEveryPeriod) {
-  for (const double period : {0.001, 0.005, 0.020, 0.100}) {
-    Cell cell(period);
-    cell.start();
-    const JointLimits& limits = cell.bridge.config().limits;
-    std::mt19937 random(21);
-    std::uniform_real_distribution<double> part(-1.5, 1.5);
-    Vector7 velocity = Vector7::Zero(), last = cell.robot.setPoint(), last_v = Vector7::Zero();
-    for (int i = 0; i < 6000; ++i) {
-      if (i % 13 == 0) {
-        for (int j = 0; j < 7; ++j) velocity[j] = part(random) * limits.velocity[j];
-      }
-      drive(cell.bridge, cell.robot, velocity);
-      cell.robot.cycle(cell.bridge);
-      const Vector7 sent = fri::jointsFromWire(cell.robot.answer.joint_position);
-      const Vector7 v = (sent - last) / period;
-      if (i > 1) {
-        ASSERT_LE((v.cwiseAbs() - limits.velocity).maxCoeff(), 5e-4) << period << " " << i;
-        ASSERT_LE(((v - last_v).cwiseAbs() / period - limits.acceleration).maxCoeff(), 1.0)
-            << period << " " << i;
-      }
-      last = sent;
-      last_v = v;
-    }
-    EXPECT_EQ(cell.bridge.snapshot().supervisor, SupervisorState::Command);
   }
 }
 

@@ -162,27 +162,6 @@ TEST(BridgeLosses, SeveralPacketsLostShortlyBeforeAreTheCause) {
   }
 }
 
-/// The controller's own command moves while it is not commanded: every answer is its set-point.
-TEST(BridgeLosses, TheSetPointOfAControllerThatIsNotCommandedIsMirrored) {
-  for (const bool monitor : {true, false}) {
-    Cell cell;
-    if (!monitor) {
-      cell.robot.state = fri::FriState::Command;
-      cell.robot.power = 0x7E;
-    }
-    cell.run(3);
-    for (int i = 0; i < 20; ++i) {
-      cell.robot.moveOwn(cell.robot.own() + Vector7::Constant(0.002));
-      const Vector7 set_point = cell.robot.setPoint();
-      cell.run(1);
-      for (int j = 0; j < 7; ++j) {
-        ASSERT_FLOAT_EQ(cell.robot.answer.joint_position[j], static_cast<float>(set_point[j]))
-            << monitor << " " << i;
-      }
-    }
-  }
-}
-
 /// Command mode begins at the frame that is reported, not at the one that the joints would have.
 TEST(BridgeLosses, TheFirstCartesianAnswersAreTheReportedFrame) {
   Cell cell;

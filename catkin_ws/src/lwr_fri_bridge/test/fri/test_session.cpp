@@ -199,40 +199,5 @@ TEST(Session, AMillionBadDatagramsMakeNoLeap) {
   EXPECT_GT(s.session.implausible, 0U);
 }
 
-/// Reordered: a datagram that was overtaken is not answered, and the command goes on without a
-/// leap.
-TEST(Session, ReorderedDatagramsMakeNoLeap) {
-  const double period = 0.005;
-  Bridge bridge(test::defaultConfig());
-  SmallController robot(period);
-  for (int i = 0; i < 5; ++i) robot.cycle(bridge);
-  ASSERT_TRUE(test::runEvent(bridge, robot, "start").success());
-  Bytes late;
-  Vector7 last = robot.setPoint();
-  fri::CommandDatagram answer{};
-  const bool campaign = std::getenv("COGLAB_LONG") != nullptr;
-  const int cycles = campaign ? 1'000'000 : 100'000;
-  for (int i = 0; i < cycles; ++i) {
-    test::drive(bridge, robot, Vector7::Constant(0.4 * std::sin(0.01 * i)));
-    const Bytes bytes = bytesOf(robot.measure());
-    if (i % 10 == 3) {
-      late = bytes;
-      robot.take(nullptr);
-    } else {
-      ASSERT_TRUE(bridge.answer(bytes.data(), bytes.size(), robot.now(), answer));
-      robot.take(&answer);
-      if (!late.empty()) {
-        EXPECT_FALSE(bridge.answer(late.data(), late.size(), robot.now(), answer));
-        late.clear();
-      }
-    }
-    const Vector7 step = robot.setPoint() - last;
-    last = robot.setPoint();
-    ASSERT_LE(step.cwiseAbs().maxCoeff(), 0.4 * period * 1.05 + 1e-6);
-  }
-  EXPECT_EQ(bridge.snapshot().session.out_of_order, static_cast<std::uint64_t>(cycles / 10));
-  EXPECT_EQ(bridge.snapshot().supervisor, SupervisorState::Command);
-}
-
 }  // namespace
 }  // namespace lwr_fri_bridge

@@ -50,26 +50,6 @@ SetPointHistory moved(int joint, double step) {
   return history;
 }
 
-TEST(SetPointHistory, ASetPointLiesBetweenWhereItWasAndWhereTheLastStepHasTakenIt) {
-  for (const int joint : {0, 6}) {
-    for (const double step : {0.01, -0.01}) {
-      const SetPointHistory history = moved(joint, step);
-      const double sign = step > 0.0 ? 1.0 : -1.0;
-      for (const int missed : {0, 1, 5}) {
-        const auto explained = [&](double beyond_low, double beyond_high) {
-          const double at = beyond_high > -1.0 ? 0.1 + missed * step + sign * beyond_high
-                                               : 0.1 - step - sign * beyond_low;
-          return history.explains(reported(unit(joint, at), missed));
-        };
-        EXPECT_TRUE(explained(0.0, 9e-5)) << missed;
-        EXPECT_FALSE(explained(0.0, 1.1e-4)) << missed;
-        EXPECT_TRUE(explained(9e-5, -2.0)) << missed;
-        EXPECT_FALSE(explained(1.1e-4, -2.0)) << missed;
-      }
-    }
-  }
-}
-
 TEST(SetPointHistory, WhatIsNotCommandedIsNotJudged) {
   const SetPointHistory history = moved(0, 0.01);
   const MeasurementDatagram off = reported(unit(0, 1.0));
@@ -98,39 +78,6 @@ TEST(SetPointHistory, AnAnswerThatWasNeverSentExplainsNothing) {
   }
   history.forget();
   EXPECT_TRUE(history.explains(reported(unit(0, 1.0))));  // nothing is known
-}
-
-/// More than half the way that the last step would have gone: the controller went on.
-TEST(SetPointHistory, AControllerThatWentOnHasTheSpeedOfTheAnswer) {
-  for (const double step : {0.01, -0.01}) {
-    const SetPointHistory history = moved(2, step);
-    for (const auto& [steps, went_on] : {std::pair{4.0, true}, std::pair{2.1, true},
-                                         std::pair{1.9, false}, std::pair{0.0, false}}) {
-      const Vector7 at = unit(2, 0.1 + steps * step);
-      const SetPointState state = history.afterGap(reported(at, 4), false);
-      EXPECT_NEAR(state.position[2], at[2], 1e-7);
-      EXPECT_EQ(state.velocity, Vector7::Constant(went_on ? 0.5 : 0.0)) << steps;
-      EXPECT_EQ(state.acceleration, Vector7::Constant(went_on ? -2.0 : 0.0)) << steps;
-      EXPECT_NEAR(state.step[2], went_on ? step : 0.0, 1e-12) << steps;
-      EXPECT_NEAR(state.step[3], 0.0, 1e-12);
-    }
-  }
-}
-
-/// In Cartesian impedance mode the frame tells, for the joint set-point is the arm's.
-TEST(SetPointHistory, InCartesianImpedanceTheFrameTells) {
-  const SetPointHistory history = moved(2, 0.01);
-  for (int value = 0; value < 12; ++value) {
-    for (const float off : {0.9e-5F, -0.9e-5F, 1.3e-5F, -1.3e-5F}) {
-      MeasurementDatagram m = reported(unit(2, 0.7), 4);
-      m.control = static_cast<std::uint16_t>(ControlStrategy::CartesianImpedance);
-      m.commanded_frame[value] += off;
-      const bool went_on = std::abs(off) > 1e-5F;
-      const SetPointState state = history.afterGap(m, false);
-      EXPECT_NEAR(state.position[2], went_on ? 0.14 : 0.1, 1e-12) << value << " " << off;
-      EXPECT_EQ(state.velocity[0], went_on ? 0.5 : 0.0) << value << " " << off;
-    }
-  }
 }
 
 }  // namespace

@@ -169,31 +169,6 @@ TEST(LeashEdges, OnlyMotionAwayFromTheArmTrips) {
   }
 }
 
-/// Joints that are ahead by more than a tenth of their leash go back to the arm, the others stand.
-TEST(LeashEdges, WhatIsNoticeablyAheadReturns) {
-  Tied tied;
-  Vector7 arm, wanted = Vector7::Constant(0.3);
-  arm << -0.06, -0.0049, -0.0051, 0.0049, 0.0051, 0.04, 0.0;
-  ASSERT_TRUE(tied.tick(arm, wanted));
-  EXPECT_EQ(tied.leash.joint(), 0);
-  const double signs[7] = {-1, 0, -1, 0, 1, 1, 0};
-  for (int i = 0; i < 7; ++i) {
-    EXPECT_EQ(tied.target[i] == 0.0, signs[i] == 0.0) << i;
-    EXPECT_GE(tied.target[i] * signs[i], 0.0) << i;
-    EXPECT_LE(std::abs(tied.target[i]), 0.3) << i;
-  }
-  EXPECT_DOUBLE_EQ(tied.target[2],
-                   -brakingSpeed(0.0051, tied.limits.acceleration[2], tied.limits.jerk[2], 0.05));
-  // Far ahead it returns at 0.3 rad/s, and never faster than the joint may.
-  Tied far;
-  ASSERT_TRUE(far.tick(unit(0, -0.8), unit(0, 0.3)));
-  EXPECT_DOUBLE_EQ(far.target[0], -0.3);
-  Tied slow;
-  slow.limits.velocity[0] = 0.1;
-  ASSERT_TRUE(slow.tick(unit(0, 0.8), unit(0, -0.3)));
-  EXPECT_DOUBLE_EQ(slow.target[0], 0.1);
-}
-
 /// Home is where the arm was at the trip, however it is pushed afterwards; it lets go within 1 mrad
 /// of it when the outward motion is not asked for any more.
 TEST(LeashEdges, LetsGoAtHomeWithoutTheOldRequest) {

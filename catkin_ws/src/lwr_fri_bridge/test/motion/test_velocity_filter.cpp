@@ -30,29 +30,6 @@ TEST(VelocityFilter, DelayIsAsStated) {
   }
 }
 
-TEST(VelocityFilter, NoiseGainIsAsStated) {
-  std::mt19937 random(1);
-  std::normal_distribution<double> noise(0.0, 1e-5);
-  for (const double T : {0.0, 0.008, 0.02}) {
-    for (const double dt : {0.001, 0.005}) {
-      VelocityFilter filter(T);
-      double sum = 0.0;
-      int n = 0;
-      for (int i = 0; i < 60000; ++i) {
-        Vector7 p;
-        for (int j = 0; j < 7; ++j) p[j] = noise(random);
-        filter.update(p, 1, dt);
-        if (i < 200) continue;
-        sum += filter.velocity().squaredNorm();
-        n += 7;
-      }
-      const double gain = std::sqrt(sum / n) / 1e-5;
-      const double k = weight(T, dt);
-      EXPECT_NEAR(gain / (k / dt * std::sqrt(2.0 / (2.0 - k))), 1.0, 0.02) << T << " " << dt;
-    }
-  }
-}
-
 TEST(VelocityFilter, LostSamplesMakeNoSpikeAndKeepTheTimeConstant) {
   const double dt = 0.001;
   VelocityFilter all(0.008), some(0.008);

@@ -94,26 +94,5 @@ TEST(TargetCommand, NamesSortIntoWireOrder) {
   for (int i = 0; i < 7; ++i) EXPECT_NEAR(verdict.command.velocity[i], 0.7 - 0.1 * i, 1e-12);
 }
 
-/// Whatever comes, what passes was made within the permission, is not too old, and is never newer
-/// than now.
-TEST(TargetCommand, NothingOldPassesWhateverTheStamp) {
-  std::mt19937_64 random(11);
-  int passed = 0;
-  for (int i = 0; i < 100'000; ++i) {
-    Message m;
-    m.age_ns = static_cast<std::int64_t>(random() >> (random() % 50 + 1)) * (random() % 2 ? 1 : -1);
-    if (random() % 3 != 0) m.epoch = std::to_string(random() % 3 + 6);
-    const std::int64_t since = kNow - static_cast<std::int64_t>(random() % (200 * kMs));
-    const TargetVerdict verdict = m.judge(7, since);
-    if (verdict.fault != TargetFault::None) continue;
-    ++passed;
-    ASSERT_LE(verdict.command.stamp_ns, kNow);
-    ASSERT_LE(kNow - verdict.command.stamp_ns, kLongest);
-    ASSERT_TRUE(m.epoch == "7" || (m.epoch.empty() && verdict.command.stamp_ns >= since));
-    ASSERT_EQ(verdict.command.motion_epoch, 7U);
-  }
-  EXPECT_GT(passed, 1000);
-}
-
 }  // namespace
 }  // namespace lwr_fri_bridge
