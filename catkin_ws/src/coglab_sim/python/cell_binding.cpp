@@ -28,6 +28,9 @@ PYBIND11_MODULE(_cell, m) {
           "the "
           "robot's hand, closure of its fingers, position and rotation of the object, force on the "
           "person's hand, position and rotation of the person's hand).")
+      .def("handover", &PyCell::handover,
+           "The part of truth() that decides about a handover: (held_by, dropped, touch_force as a "
+           "number, N).")
       .def_property_readonly("period", [](const PyCell& c) { return c.cell().period(); })
       .def_property_readonly("time", [](const PyCell& c) { return c.cell().controller().time(); })
       .def_property_readonly("set_point",

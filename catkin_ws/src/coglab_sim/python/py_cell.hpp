@@ -127,6 +127,12 @@ class PyCell {
                           t.human_hand.position, rotation(t.human_hand));
   }
 
+  /// What decides about a handover, without a dictionary.
+  py::tuple handover() const {
+    const CellTruth t = cell_.truth();
+    return py::make_tuple(t.held_by, t.dropped, t.touch_force.norm());
+  }
+
   Cell& cell() { return cell_; }
   const Cell& cell() const { return cell_; }
 

@@ -33,13 +33,12 @@ class Referee:
 
     def look(self) -> None:
         """Looks at the world after one period."""
-        t, truth = self._world.t, self._world.cell.truth()
-        held_by = truth["held_by"]
-        x, y, z = truth["touch_force"].tolist()
-        self.now = math.sqrt(x * x + y * y + z * z) if held_by in ("human", "both") else 0.0
+        t = self._world.t
+        held_by, dropped, force = self._world.cell.handover()
+        self.now = force if held_by in ("human", "both") else 0.0
         self.force = max(self.force, self.now)
         self.rough += DT * max(0.0, self.now - GENTLE)
-        self.dropped = self.dropped or bool(truth["dropped"])
+        self.dropped = self.dropped or dropped
         if self.success:
             return
         if held_by != self._keeper or self.dropped:
