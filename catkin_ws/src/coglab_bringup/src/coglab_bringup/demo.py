@@ -225,8 +225,8 @@ def run(top: Path, options: argparse.Namespace) -> int:
         text = json.dumps(result, indent=1) + "\n"
         keep(problems, out, "result.json", lambda path: path.write_text(text))
         system.stop()
-    page = report_on(sorted(set(trials.glob("*/trial.yaml")) - earlier), problems)
     status = summarise(out, result["handovers"], "" if problems else f"{out}/result.json and trial.png, ")
+    page = report_on(sorted(set(trials.glob("*/trial.yaml")) - earlier), problems)
     if page:
         print(f"[coglab] report of the last handover: {page}", flush=True)
     for problem in problems:
