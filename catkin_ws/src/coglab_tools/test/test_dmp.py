@@ -3,7 +3,7 @@
 import json
 import resource
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
 from types import SimpleNamespace
 
 import coglab
@@ -223,23 +223,27 @@ def test_a_file_that_cannot_be_used_is_refused_with_its_name_and_place(tmp_path,
     assert words in str(refused.value) and name in str(refused.value)
 
 
-@pytest.fixture
+@contextmanager
 def full_disk():
     """No file can grow beyond 100 bytes."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))
-    yield
-    resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 @pytest.mark.parametrize(("verb", "option", "file"), [("export", "-o", "a.npz"), ("inspect", "--plot", "a.png")])
-def test_a_full_disk_leaves_no_half_of_a_file(tmp_path, full_disk, capsys, verb, option, file):
-    assert run(["dmp", verb, "--id", "reach_human", option, str(tmp_path / file)]) == 1
+def test_a_full_disk_leaves_no_half_of_a_file(tmp_path, capsys, verb, option, file):
+    with full_disk():
+        assert run(["dmp", verb, "--id", "reach_human", option, str(tmp_path / file)]) == 1
     assert file in capsys.readouterr().err and list(tmp_path.iterdir()) == []
 
 
-def test_a_full_disk_is_found_before_the_arm_gives_way(tmp_path, full_disk, capsys):
-    assert run(["dmp", "record", "a", "--out", str(tmp_path), "--master", "http://127.0.0.1:9"]) == 1
+def test_a_full_disk_is_found_before_the_arm_gives_way(tmp_path, capsys):
+    with full_disk():
+        assert run(["dmp", "record", "a", "--out", str(tmp_path), "--master", "http://127.0.0.1:9"]) == 1
     assert "a.csv cannot be written" in capsys.readouterr().err and list(tmp_path.iterdir()) == []
 
 
