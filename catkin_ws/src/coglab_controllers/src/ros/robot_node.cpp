@@ -30,9 +30,7 @@ volatile std::sig_atomic_t asked_to_end = 0;
 void onSignal(int) { asked_to_end = 1; }
 
 /// The back ends by name, or that of a library. @throws std::exception naming a parameter
-std::unique_ptr<coglab_rt::ArmPort> makeArm(const ros::NodeHandle& lwr) {
-  const auto name =
-      coglab_rt::readParameter<std::string>(lwr, "arm", "fri", "fri, ideal or a library");
+std::unique_ptr<coglab_rt::ArmPort> makeArm(const ros::NodeHandle& lwr, const std::string& name) {
   if (name == "fri") return std::make_unique<lwr_fri_bridge::BridgeRos>(lwr, true);
   if (name == "ideal") return std::make_unique<coglab_controllers::IdealArmRos>(lwr);
   if (name.find(".so") != std::string::npos) return coglab_rt::loadArm(name);
@@ -53,10 +51,16 @@ int main(int argc, char** argv) {
     coglab_rt::LoggerServices logger_services;
     ros::NodeHandle lwr("lwr");
     std::atomic<coglab_controllers::ControlThread*> control{nullptr};
-    const std::unique_ptr<coglab_rt::ArmPort> arm = makeArm(lwr);
-    arm->start([&control](bool measured) {
-      if (auto* thread = control.load(std::memory_order_acquire)) thread->wake(measured);
-    });
+    const auto name =
+        coglab_rt::readParameter<std::string>(lwr, "arm", "fri", "fri, ideal or a library");
+    const std::unique_ptr<coglab_rt::ArmPort> arm = makeArm(lwr, name);
+    try {
+      arm->start([&control](bool measured) {
+        if (auto* thread = control.load(std::memory_order_acquire)) thread->wake(measured);
+      });
+    } catch (const std::exception& error) {
+      throw std::runtime_error("the arm " + name + " cannot be started: " + error.what());
+    }
 
     coglab_controllers::ManagerRos::Options options;
     options.target = lwr.advertise<sensor_msgs::JointState>("target_joint_states", 10);

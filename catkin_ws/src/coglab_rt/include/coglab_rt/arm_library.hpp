@@ -44,41 +44,44 @@ inline std::unique_ptr<ArmPort> loadArm(const std::string& library) {
   const auto refuse = [&library](const std::string& why) {
     throw std::runtime_error("the arm's library " + library + ": " + why);
   };
+  // Runs code of the library: it may throw anything.
+  const auto guarded = [&refuse](const auto& run) -> decltype(run()) {
+    std::string why = "something that is no std::exception was thrown";
+    try {
+      return run();
+    } catch (const std::exception& error) {
+      why = error.what();
+    } catch (...) {
+    }
+    refuse("its arm could not be made: " + why +
+           "; mend that, or the constructor of the arm, and start again");
+    return nullptr;
+  };
   // Through a pointer: constructors of static objects can throw, which the declaration of dlopen()
   // excludes.
   void* (*const volatile open)(const char*, int) = dlopen;
-  try {
-    void* const handle = open(library.c_str(), RTLD_NOW | RTLD_LOCAL);
-    if (handle == nullptr) {
-      const char* const why = dlerror();
-      refuse(std::string("cannot be opened: ") + (why != nullptr ? why : "no reason was given"));
-    }
-    const auto* const entry = static_cast<const ArmEntry*>(dlsym(handle, "coglab_arm"));
-    if (entry == nullptr)
-      refuse("has no arm; write COGLAB_ARM(YourArm) once, outside of any namespace");
-    constexpr ArmEntry mine = kThisProgram;
-    if (entry->interface != mine.interface) {
-      refuse("was made for interface " + std::to_string(entry->interface) +
-             " of an arm, expected " + std::to_string(mine.interface) +
-             "; compile it again with coglab_rt/arm_library.hpp");
-    }
-    if (entry->mailboxes_size != mine.mailboxes_size || entry->sample_size != mine.sample_size ||
-        entry->command_size != mine.command_size) {
-      refuse(
-          "was compiled with other headers or options than this program; compile it again in the "
-          "same workspace");
-    }
-    std::unique_ptr<ArmPort> arm(entry->make());
-    if (arm == nullptr) refuse("made no arm");
-    return arm;
-  } catch (const std::runtime_error&) {
-    throw;
-  } catch (const std::exception& error) {
-    refuse(std::string("its arm could not be made: ") + error.what());
-  } catch (...) {
-    refuse("its arm could not be made: it threw something that is no std::exception");
+  void* const handle = guarded([&] { return open(library.c_str(), RTLD_NOW | RTLD_LOCAL); });
+  if (handle == nullptr) {
+    const char* const why = dlerror();
+    refuse(std::string("cannot be opened: ") + (why != nullptr ? why : "no reason was given"));
   }
-  return nullptr;
+  const auto* const entry = static_cast<const ArmEntry*>(dlsym(handle, "coglab_arm"));
+  if (entry == nullptr)
+    refuse("has no arm; write COGLAB_ARM(YourArm) once, outside of any namespace");
+  constexpr ArmEntry mine = kThisProgram;
+  if (entry->interface != mine.interface) {
+    refuse("was made for interface " + std::to_string(entry->interface) + " of an arm, expected " +
+           std::to_string(mine.interface) + "; compile it again with coglab_rt/arm_library.hpp");
+  }
+  if (entry->mailboxes_size != mine.mailboxes_size || entry->sample_size != mine.sample_size ||
+      entry->command_size != mine.command_size) {
+    refuse(
+        "was compiled with other headers or options than this program; compile it again in the "
+        "same workspace");
+  }
+  std::unique_ptr<ArmPort> arm(guarded([entry] { return entry->make(); }));
+  if (arm == nullptr) refuse("made no arm");
+  return arm;
 }
 
 }  // namespace coglab_rt

@@ -8,7 +8,7 @@
 COGLAB_ARM(ShortestArm);
 #elif defined(ARM_throwing)
 struct ThrowingArm : ShortestArm {
-  ThrowingArm() { throw std::logic_error("no cable is plugged in"); }
+  ThrowingArm() { throw std::runtime_error("no cable is plugged in"); }
 };
 COGLAB_ARM(ThrowingArm);
 #elif defined(ARM_other_version)
