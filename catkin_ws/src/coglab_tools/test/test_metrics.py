@@ -38,6 +38,14 @@ def test_the_person_alone_with_the_object_gives_no_force_of_both():
     assert found["impulse_ns"] == pytest.approx(12.0, rel=0.01)
 
 
+def test_a_late_stamp_makes_no_fast_palm():
+    trial = measured()
+    late = int(np.searchsorted([row[0] for row in trial.series.truth], 4.0))
+    when = trial.series.truth[late + 1][0] - 0.0003
+    trial.series.truth[late] = (when, *trial.series.truth[late][1:])
+    assert metrics_of(trial)["peak_palm_speed"] == pytest.approx(1.875 * 0.3, rel=0.05)
+
+
 @pytest.mark.parametrize("rate", [60.0, 200.0])
 def test_sparc_does_not_depend_on_the_rate(rate):
     s = np.arange(0.0, 1.0, 1.0 / (2.0 * rate))

@@ -92,7 +92,7 @@ def test_a_note_is_of_the_handover_that_runs_or_of_the_last_one(tmp_path):
     cell.run(2000.0, 2001.0)
     cell.move(2020.0, "wait_without_object", ACTION, ACTION)
     cell.run(2020.0, 2021.0)
-    cell.send(2021.0, "/coglab/note", String("looked\naway"))
+    cell.send(2021.0, "/coglab/note", String("looked\naway"), latching="1")  # as `rostopic pub` does
     cell.result(2020.0, 2024.0)
     cell.run(2021.0, 2026.0)
     cell.send(2030.0, "/coglab/note", String("let go early"))

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import coglab
@@ -15,6 +16,7 @@ from coglab_py.packages import package_path
 from coglab_tools.__main__ import run
 from coglab_tools.command import CheckFailed, UsageError
 from coglab_tools.study import settings, simulate
+from coglab_tools.study.cluster import local_cluster
 from coglab_tools.study.live import session
 from coglab_tools.study.plan import load
 from coglab_tools.study.report import write_report
@@ -98,6 +100,25 @@ def test_a_crashed_study_goes_on_with_the_same_rows(undisturbed, tmp_path):
     assert (folder / "trials.csv").read_bytes() == (undisturbed / "trials.csv").read_bytes()
 
 
+def test_a_local_cluster_listens_on_loopback_alone(tmp_path):
+    distributed = pytest.importorskip("distributed")
+    with local_cluster(distributed, 1, str(tmp_path)):
+        found = subprocess.run(["ps", "-o", "pid=", "--ppid", str(os.getpid())], capture_output=True, text=True)
+        sockets = set()
+        for pid in (os.getpid(), *map(int, found.stdout.split())):
+            for each in Path(f"/proc/{pid}/fd").glob("*"):
+                with suppress(OSError):
+                    sockets.add(os.readlink(each))
+        listening = [
+            (line.split()[1], f"socket:[{line.split()[9]}]")
+            for table in ("tcp", "tcp6")
+            for line in Path(f"/proc/net/{table}").read_text().splitlines()[1:]
+            if line.split()[3] == "0A"
+        ]
+        places = {address.partition(":")[0] for address, socket in listening if socket in sockets}
+    assert places == {"0100007F"}, "127.0.0.1, in hexadecimal digits"
+
+
 def test_a_lost_worker_and_a_lost_scheduler_change_nothing(undisturbed, tmp_path):
     pytest.importorskip("distributed")
     folder = make(tmp_path / "kill")
@@ -135,7 +156,7 @@ def test_a_lost_worker_and_a_lost_scheduler_change_nothing(undisturbed, tmp_path
         wait_for_rows(folder, 2, study)
         kill(scheduler)
         said, _ = study.communicate(timeout=LIMIT)
-        assert study.returncode == 3 and "study resume" in said, said
+        assert study.returncode == 3 and "study resume" in said and "Traceback" not in said, said
     finally:
         for process in (*workers, scheduler):
             kill(process)

@@ -232,14 +232,13 @@ def _exchange(row: dict[str, Any]) -> Exchange:
 
 
 def speed_of(times: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Speed (m/s) along a path, times [n] s and points [n, 3] m, smoothed over 60 ms. Shape (n,)."""
+    """Mean speed (m/s) over the 60 ms around each time of a path, times [n] s and points [n, 3] m. Shape (n,). Late
+    stamps of single points change it by little."""
     if len(times) < 3:
         return np.zeros(len(times))
-    speed = np.linalg.norm(np.gradient(points, times, axis=0), axis=1)
-    width = min(len(times), max(1, round(0.06 / float(np.median(np.diff(times))))))
-    return np.convolve(np.pad(speed, width // 2, mode="edge"), np.ones(width) / width, mode="same")[
-        width // 2 : width // 2 + len(times)
-    ]
+    first, last = np.maximum(times - 0.03, times[0]), np.minimum(times + 0.03, times[-1])
+    move = [np.interp(last, times, axis) - np.interp(first, times, axis) for axis in points.T]
+    return np.linalg.norm(move, axis=0) / (last - first)
 
 
 class Recording:

@@ -80,6 +80,7 @@ def page_of(trial: Measured) -> str:
 
     record = trial.record
     parts = trial.parts()
+    titles = [f"{k}. {part.record.action}".replace("_", " ") for k, part in enumerate(parts, 1)]
     names = Environment(
         loader=FileSystemLoader(str(package_path("coglab_tools", "templates"))),
         autoescape=True, undefined=StrictUndefined, trim_blocks=True,
@@ -97,16 +98,16 @@ def page_of(trial: Measured) -> str:
         record=record,
         verdicts=[(part.record.outcome.success, headline(part)) for part in parts],
         metrics=METRICS,
-        columns=[(part.record.action.replace("_", " "), metrics_of(part)) for part in parts],
+        columns=[(name, metrics_of(part)) for name, part in zip(titles, parts, strict=True)],
         sources=trial.sources or {"hands": "unknown", "force": "unknown"},
         parts=[
             {
-                "name": part.record.action.replace("_", " "),
+                "name": name,
                 "lines": explain(part)[1:],
                 "activity": _png(figure_of_activity(part)),
                 "plot": _png(figure_of_trial(part)),
             }
-            for part in parts
+            for name, part in zip(titles, parts, strict=True)
         ],
         facts=[(name, value) for name, value in facts if value not in ("", None)],
         configuration=[(name, value) for name, value in record.configuration.items() if name != "hash"],

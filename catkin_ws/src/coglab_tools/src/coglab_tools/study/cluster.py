@@ -24,6 +24,7 @@ PATIENCE = 30.0  # s without any worker, before the study is interrupted
 LOOK = 2.0  # s between two looks at the workers, while no trial ends
 AHEAD = 3  # trials that wait at each thread of a worker
 MOST_WORKERS = 1024
+LOCAL = "127.0.0.1:0"  # of Dask's web servers, which are on every network otherwise
 
 
 def cores() -> int:
@@ -49,16 +50,17 @@ def results(jobs: Sequence[simulate.Job], workers: int = 0, scheduler: str = "")
     import dask
     import distributed
 
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what it would say is said here in a sentence
+    for name in ("distributed", "distributed.client"):  # each has a level of its own
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # what it would say is said here in a sentence
     dask.config.set({"distributed.comm.timeouts.connect": "10s", "distributed.scheduler.allowed-failures": 3})
     if scheduler:
         yield from _with_scheduler(jobs, distributed, scheduler)
         return
-    with tempfile.TemporaryDirectory() as place, _local(distributed, count, place) as cluster:
+    with tempfile.TemporaryDirectory() as place, local_cluster(distributed, count, place) as cluster:
         yield from _with_scheduler(jobs, distributed, cluster)
 
 
-def _local(distributed: Any, count: int, place: str) -> Any:
+def local_cluster(distributed: Any, count: int, place: str) -> Any:
     """A cluster on this computer's loopback. Ctrl-C is for this process alone: it ends the workers itself."""
     main = threading.current_thread() is threading.main_thread()
     before = signal.signal(signal.SIGINT, signal.SIG_IGN) if main else None  # children inherit it
@@ -69,6 +71,8 @@ def _local(distributed: Any, count: int, place: str) -> Any:
             processes=True,
             host="127.0.0.1",
             dashboard_address=None,
+            scheduler_kwargs={"dashboard_address": LOCAL},
+            worker_dashboard_address=LOCAL,
             memory_limit=0,
             local_directory=place,
             silence_logs=logging.CRITICAL,

@@ -31,7 +31,8 @@ def run_simulated(study: Study, workers: int = 0, scheduler: str = "") -> dict[s
         except CommandError as error:
             kind = type(error)
             state = f"{len(rows.trials)} of {len(study.trials())} trials are done and kept"
-            raise kind(f"{error}. {state}; to go on: ./coglab study resume {study.folder}") from error
+            verb = "resume" if rows.trials else "run"
+            raise kind(f"{error}. {state}; to go on: ./coglab study {verb} {study.folder}") from error
         everything = rows.table()
         table = write_table(study, everything)
         return {

@@ -167,7 +167,7 @@ def report(options: argparse.Namespace) -> Answer:
     if options.pdf:
         data["pdf"] = str(write_pdf(file, file.with_suffix(".pdf")))
         text += f"\n{data['pdf']}"
-    return Answer(text, data, f"./coglab trial replay {place}")
+    return Answer(text, data, f"./coglab trial video {place}")
 
 
 def video(options: argparse.Namespace) -> Answer:

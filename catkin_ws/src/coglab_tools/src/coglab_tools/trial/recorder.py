@@ -143,7 +143,7 @@ class Recorder:
         while self._waiting:
             raw = self._waiting.popleft()
             name = raw.topic.lstrip("/")
-            if raw.header.get("latching") == "1":
+            if raw.header.get("latching") == "1" and not name.endswith(NOTE):
                 self._latched[raw.topic, raw.header.get("callerid", "")] = raw
             if name.endswith(TRANSITIONS):
                 self._transition(raw)
@@ -152,7 +152,7 @@ class Recorder:
             self._ring.append(raw)
             if name.endswith(RESULTS) and self._trial is not None:
                 self._result(raw)
-            if name.endswith(NOTE) and raw.header.get("latching") != "1":
+            if name.endswith(NOTE):
                 self._note(raw)
 
     def _transition(self, raw: Raw) -> None:
