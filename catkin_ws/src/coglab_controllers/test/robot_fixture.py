@@ -66,11 +66,14 @@ def wait_until(condition: Callable[[], bool], what: str) -> None:
 
 
 def robot_processes() -> list[int]:
-    """Process ids of the nodes that the arm hangs on: one, or two with split:=true."""
+    """Process ids of the nodes that the arm hangs on: one, or two with split:=true; none while one has ended."""
     master = rospy.get_master()
     nodes = {node for _, who in master.getSystemState()[2][2] for node in who}
     own = sorted(nodes & {"/robot", "/lwr", "/controller_manager"})
-    return [ServerProxy(master.lookupNode(node)[2]).getPid(rospy.get_name())[2] for node in own]
+    try:
+        return [ServerProxy(master.lookupNode(node)[2]).getPid(rospy.get_name())[2] for node in own]
+    except OSError:  # the master still knows a process that has ended
+        return []
 
 
 def runs(pid: int) -> bool:

@@ -10,12 +10,25 @@ namespace {
 
 std::int64_t nanoseconds(double seconds) { return static_cast<std::int64_t>(1e9 * seconds); }
 
+/// True for fields that end with a quaternion x y z w.
+bool hasQuaternion(const SignalField& field) {
+  return field.name == "orientation" || field.name == "pose";
+}
+
 /// Copies the numbers of one pick to the end of `values`. Returns what the message lacks.
 std::string gather(const SignalPick& pick, const SignalField& field, const SignalMessage& message,
                    std::vector<double>& values) {
   const SignalMessage::Field& given = message.fields[pick.field];
   if (given.size == 0) return "the message has no " + field.name;
   if (pick.parts.empty() && pick.joints.empty()) {
+    if (hasQuaternion(field)) {
+      const double* const q = given.numbers + given.size - 4;
+      const double length = std::hypot(std::hypot(q[0], q[1]), std::hypot(q[2], q[3]));
+      if (!(std::abs(length - 1.0) <= 0.01)) {
+        return "expected a unit quaternion in " + field.name + ", got one of length " +
+               std::to_string(length);
+      }
+    }
     values.insert(values.end(), given.numbers, given.numbers + given.size);
     return "";
   }

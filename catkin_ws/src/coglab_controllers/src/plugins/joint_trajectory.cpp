@@ -362,7 +362,11 @@ class Reader {
       const auto share = values.array().abs() / most.array();
       if (share.maxCoeff(&joint) <= slack) return;
       outOfRange("joint ", name(joint), " has ", what, " ", values[joint], " ", unit, " at ",
-                 point.time, " s; allowed: ", most[joint], " ", unit, "; make it slower");
+                 point.time, " s; allowed: ", most[joint], " ", unit,
+                 point.time < request_.points.front().time
+                     ? ", on the way from the arm to the first point; give that point more time, "
+                       "or let it be at 0 s"
+                     : "; make it slower");
     };
     slow("velocity", point.velocity, limits.velocity, kRounding, "rad/s");
     slow("acceleration", point.acceleration, limits.acceleration, kAccelerationSlack, "rad/s^2");

@@ -218,6 +218,31 @@ TEST(SignalInputs, MessagesThatCannotBeUsedAreRefused) {
   EXPECT_EQ(robot.stamp(imu), ctrl_more::kNeverWritten) << "absent after its largest age";
 }
 
+// Many trackers publish a quaternion of zeros for an orientation that they do not know.
+TEST(SignalInputs, OrientationsThatAreNoUnitQuaternionsAreRefused) {
+  constexpr std::int64_t kNow = 10'000'000'000;
+  ctrl_more::RobotStates robot;
+  SignalInputs inputs;
+  const std::string row = "topic: p, type: geometry_msgs/PoseStamped, max_age: 1, ";
+  ASSERT_TRUE(inputs
+                  .add(read("in:\n- {" + row + "key: a, field: pose}\n- {" + row +
+                            "key: b, field: position}\n")
+                           .in,
+                       robot)
+                  .ok());
+  const auto post = [&](std::size_t index, double w) {
+    const std::vector<double> pose = {0.1, 0.2, 0.3, 0.0, 0.0, 0.0, w};
+    SignalMessage message;
+    message.stamp_ns = kNow;
+    message.fields = {{pose.data(), 3}, {pose.data() + 3, 4}, {pose.data(), 7}};
+    return inputs.post(index, message, kNow);
+  };
+  EXPECT_EQ(post(0, 0.0).text, "expected a unit quaternion in pose, got one of length 0.000000");
+  EXPECT_EQ(post(0, 2.0).refusal, SignalRefusal::Missing);
+  EXPECT_EQ(post(1, 0.0).refusal, SignalRefusal::None) << "its position is known";
+  EXPECT_EQ(post(0, 1.0).refusal, SignalRefusal::None);
+}
+
 /// A controller that needs the signal `imu`, and notes its age in each cycle.
 class Probe : public ctrl_more::FeedbackController {
  public:

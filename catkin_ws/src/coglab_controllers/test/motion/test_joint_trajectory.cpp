@@ -258,6 +258,11 @@ TEST_F(Following, WhatCannotBeFollowedIsRefusedBeforeAnythingMoves) {
                 Error::InvalidGoal, "joint lwr_a5 has position");
   expectRefused(goal([](Request r) { r.points[1].time = 0.1; }), Error::InvalidGoal,
                 "make it slower");
+  expectRefused(goal([](Request r) {
+                  r.points[0].time = 0.005;
+                  r.points[0].positions[0] += 0.01;
+                }),
+                Error::InvalidGoal, "on the way from the arm to the first point");
   // Between the states that are 5 ms apart.
   expectRefused(goal([](Request r) {
                   r.points[1].positions = r.points[0].positions;
