@@ -156,7 +156,7 @@ def test_a_topic_that_is_closed_while_the_node_ends_is_no_error(monkeypatch, ove
     def closed(message):
         raise rospy.ROSException("publish() to a closed topic")
 
-    monkeypatch.setattr(publish.rospy, "is_shutdown", lambda: over)
+    monkeypatch.setattr(publish.rospy.core, "is_shutdown_requested", lambda: over)
     if over:
         publish.publish(SimpleNamespace(publish=closed), "m")
     else:

@@ -6,13 +6,15 @@ from typing import Any
 
 import rospy
 
+from coglab_py.steady import ending
+
 
 def publish(publisher: rospy.Publisher, message: Any) -> None:
     """Publish, unless the node is shutting down. At shutdown the topics close before the threads end."""
     try:
         publisher.publish(message)
     except rospy.ROSException:
-        if not rospy.is_shutdown():
+        if not ending():
             raise
 
 
