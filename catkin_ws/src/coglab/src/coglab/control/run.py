@@ -150,7 +150,7 @@ def connect(options: argparse.Namespace, kind: int, services: SlotServices) -> w
 def run(words: list[str]) -> int:
     """Run the command. Return its exit status."""
     options = parser().parse_intermixed_args(words)  # so that options may come before NAME=VALUE
-    ended, over = Flag(), threading.Event()
+    ended, refused, over = Flag(), Flag(), threading.Event()
 
     def end(_signal: int, _frame: FrameType | None) -> None:
         ended.set()
@@ -174,7 +174,7 @@ def run(words: list[str]) -> int:
                     f"not name it, or the robot measures nothing. Enable it: {how}"
                 )
             if options.start or (kind == wire.FEEDBACK and not options.wait):
-                threading.Thread(target=_act, args=(act, address.slot, ended), daemon=True).start()
+                threading.Thread(target=_act, args=(act, address.slot, ended, refused), daemon=True).start()
             else:
                 print(f"start it: {how}", flush=True)
             if sys.stdin is not None and sys.stdin.isatty():
@@ -186,14 +186,15 @@ def run(words: list[str]) -> int:
     finally:
         over.set()
     print("let go", flush=True)
-    return 0
+    return int(refused.is_set())
 
 
-def _act(act: Callable[[str], None], slot: str, ended: Flag) -> None:
+def _act(act: Callable[[str], None], slot: str, ended: Flag, refused: Flag) -> None:
     try:
         act(slot)
     except wire.SlotError as error:
         print(f"error: {error}", file=sys.stderr, flush=True)
+        refused.set()
         ended.set()
 
 
