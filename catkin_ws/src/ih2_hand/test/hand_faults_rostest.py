@@ -22,6 +22,7 @@ class HandFaults(unittest.TestCase):
     def setUpClass(cls) -> None:
         cls.hand = HandClient()
         cls.hand.wait_ready()
+        cls.hand.calibrate_and_wait("fast force")
 
     def setUp(self) -> None:
         self.hand.fault("clear")

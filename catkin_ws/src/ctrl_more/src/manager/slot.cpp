@@ -75,7 +75,7 @@ void Slot::configure(const GainValues& gains, const SettingValues& settings, Rob
   for (const WrittenSignal& w : guard_.written()) {
     correction::setIdentity(w.kind, w.size, from_.data() + w.local);
   }
-  now_ = from_;
+  now_ = left_ = from_;
   state_.assign(description.states.size(), 0.0);
   // Before and after are equal and unit, so the correction before the first run is the identity.
   for (Record& record : records_) {
@@ -141,6 +141,7 @@ void Slot::lastCorrection(double* correction) noexcept {
 void Slot::captureCorrection() noexcept {
   lastCorrection(from_.data());
   blend_ = 0.0;
+  blend_begins_ = true;
 }
 
 void Slot::start() noexcept {
@@ -309,14 +310,22 @@ void Slot::runStopped(StageRun& run) noexcept {
   if (run.timed) run.boundary_ns = coglab_rt::steadyNow();
 }
 
+// The step from the last correction to the controller's first one fades. What the controller adds
+// later counts at once: pose and velocity stay consistent, and it keeps its own limits.
 void Slot::blendIn(double* data) noexcept {
   for (const WrittenSignal& w : guard_.written()) {
     double* const c = now_.data() + w.local;
+    double* const step = from_.data() + w.local;
+    double* const left = left_.data() + w.local;
     const double* const found = guard_.found() + w.local;
     correction::difference(w.kind, w.size, found, data + w.offset, c);
-    correction::between(w.kind, w.size, from_.data() + w.local, c, blend_, c);
+    if (blend_begins_) correction::difference(w.kind, w.size, c, step, step);
+    correction::setIdentity(w.kind, w.size, left);
+    correction::between(w.kind, w.size, step, left, blend_, left);
+    correction::apply(w.kind, w.size, c, left, c);
     correction::apply(w.kind, w.size, found, c, data + w.offset);
   }
+  blend_begins_ = false;
 }
 
 StopPolicy Slot::policyOf(const WrittenSignal& written) const {

@@ -128,12 +128,13 @@ class Slot {
 
   Guard guard_;
   std::vector<Needed> needed_;
-  std::array<Record, 3> records_;  // one for each buffer of the cycle
-  unsigned last_ = 0;              // index of the newest record
-  std::vector<double> state_;      // newest numbers of state()
-  std::vector<double> from_;       // correction at the start of the blend
-  std::vector<double> now_;        // buffer for one correction
+  std::array<Record, 3> records_;   // one for each buffer of the cycle
+  unsigned last_ = 0;               // index of the newest record
+  std::vector<double> state_;       // newest numbers of state()
+  std::vector<double> from_;        // correction before the blend; while it runs, the step to it
+  std::vector<double> now_, left_;  // buffers for one correction each
   double blend_ = 1.0;
+  bool blend_begins_ = false;  // the next run of the controller is the first one of the blend
   GainValues gains_from_, gains_to_;
   double gain_weight_ = 1.0;
 
