@@ -1,7 +1,10 @@
 """`./coglab trial` on whole, damaged and foreign trials, without ROS."""
 
 import json
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -28,6 +31,23 @@ def answer(capsys, *words):
     status = run(["trial", *map(str, words), "--json"])
     out, error = capsys.readouterr()
     return status, json.loads(out), error
+
+
+AFTER_THE_FIRST_DEMO = """
+import sys
+for name in ("coglab_sim._cell", "coglab_sim._virtual", "coglab_sim._plant", "coglab_sim._camera", "ctrl_more._core"):
+    sys.modules[name] = None
+from coglab_tools.report.page import page_of
+from coglab_tools.trial.read import read_trial
+from trials import measured
+page_of(measured())
+"""
+
+
+def test_a_report_needs_only_what_the_demo_builds():
+    command, place = [sys.executable, "-c", AFTER_THE_FIRST_DEMO], Path(__file__).parent
+    ended = subprocess.run(command, cwd=place, capture_output=True, text=True, timeout=120)
+    assert ended.returncode == 0, ended.stderr
 
 
 def test_the_list_names_whole_unreadable_and_unfinished_trials(tmp_path, capsys):

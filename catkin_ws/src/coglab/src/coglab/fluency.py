@@ -19,6 +19,9 @@ import numpy as np
 
 Interval = tuple[float, float]
 GAP, BLIP = 0.15, 0.10  # s: a shorter pause does not interrupt an activity; a shorter activity is none
+PERSON_SPEED, PALM_SPEED = 0.05, 0.05  # m/s, from which a hand counts as active
+TOUCH = 0.05  # N, from which the person touches the object
+FINGER_SPEED = 20.0  # counts of 254 per s, from which the robot's fingers count as active
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,16 @@ class Fluency:
     overlap more than they wait"""
     turns: int
     """changes from one agent to the other"""
+
+
+def speed_of(times: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Mean speed (m/s) over the 60 ms around each time of a path, times [n] s and points [n, 3] m. Shape (n,). Late
+    stamps of single points change it by little."""
+    if len(times) < 3:
+        return np.zeros(len(times))
+    first, last = np.maximum(times - 0.03, times[0]), np.minimum(times + 0.03, times[-1])
+    move = [np.interp(last, times, axis) - np.interp(first, times, axis) for axis in points.T]
+    return np.linalg.norm(move, axis=0) / (last - first)
 
 
 def active_intervals(times: np.ndarray, active: np.ndarray) -> list[Interval]:

@@ -16,7 +16,16 @@ from coglab_smach.context.journal import TransitionRecord
 from coglab_trials import Conditions, VirtualTrial
 from coglab_trials.world import DT
 
-from coglab.fluency import Fluency, active_intervals, fluency_of
+from coglab.fluency import (
+    FINGER_SPEED,
+    PALM_SPEED,
+    PERSON_SPEED,
+    TOUCH,
+    Fluency,
+    active_intervals,
+    fluency_of,
+    speed_of,
+)
 from coglab.results import Exchange
 from coglab.series import Series, state_intervals
 
@@ -27,9 +36,6 @@ HOLDERS = ("nobody", "human", "robot", "board")
 """values of ``Trial.held_by``"""
 VERSION = 1  # of the files that save() writes
 SAMPLE = 2  # periods between two samples: 10 ms
-PERSON_SPEED, PALM_SPEED = 0.05, 0.05  # m/s, from which a hand counts as active
-TOUCH = 0.05  # N, from which the person touches the object
-FINGER_SPEED = 20.0  # counts of 254 per s, from which the robot's fingers count as active
 
 ARRAYS = {
     "time": (),
@@ -229,16 +235,6 @@ class Trial:
 def _exchange(row: dict[str, Any]) -> Exchange:
     values: dict[str, Any] = {**row, "causes": tuple(row["causes"])}
     return Exchange(**values)
-
-
-def speed_of(times: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Mean speed (m/s) over the 60 ms around each time of a path, times [n] s and points [n, 3] m. Shape (n,). Late
-    stamps of single points change it by little."""
-    if len(times) < 3:
-        return np.zeros(len(times))
-    first, last = np.maximum(times - 0.03, times[0]), np.minimum(times + 0.03, times[-1])
-    move = [np.interp(last, times, axis) - np.interp(first, times, axis) for axis in points.T]
-    return np.linalg.norm(move, axis=0) / (last - first)
 
 
 class Recording:

@@ -9,8 +9,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from coglab.fluency import Interval, active_intervals, fluency_of
-from coglab.trial import FINGER_SPEED, PALM_SPEED, PERSON_SPEED, TOUCH, speed_of
+from coglab.fluency import (
+    FINGER_SPEED,
+    PALM_SPEED,
+    PERSON_SPEED,
+    TOUCH,
+    Interval,
+    active_intervals,
+    fluency_of,
+    speed_of,
+)
 
 from coglab_tools.trial.read import Measured
 
