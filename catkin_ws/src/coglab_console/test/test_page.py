@@ -115,7 +115,7 @@ def test_a_button_is_held_by_touch(live):
 def test_a_tablet_has_stop_and_every_page_within_reach_of_a_finger(live):
     with Browser(size=(1024, 768), touch=True) as tablet:
         tablet.open(live.console.link())
-        assert tablet.js("return navigator.maxTouchPoints") > 0
+        tablet.until("return navigator.maxTouchPoints > 0", 60.0)
         for name in PAGES:
             tablet.touch(f"#tab-{name}")
             tablet.until("return document.getElementById('tab-' + arguments[0]).ariaSelected === 'true'", 60.0, name)

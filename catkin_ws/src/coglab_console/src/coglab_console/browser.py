@@ -49,8 +49,7 @@ class Browser:
         )
         # With Tab past its last control the page would lose the focus to the browser itself, and look otherwise.
         self.driver.execute_cdp_cmd("Emulation.setFocusEmulationEnabled", {"enabled": True})
-        if touch:
-            self.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": True, "maxTouchPoints": 5})
+        self._touch = touch
 
     def __enter__(self) -> Browser:
         return self
@@ -64,6 +63,8 @@ class Browser:
     def open(self, link: str, limit: float = 30.0) -> None:
         """Opens the console at this one-time link. Returns when the page is live and shows the robot."""
         self.driver.get(link)
+        if self._touch:  # now, as a page in a new process of Chromium may have lost it
+            self.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": True, "maxTouchPoints": 5})
         self.until(
             "return coglab.state() !== null && coglab.docs().desk !== undefined && coglab.view() !== 'none'", limit
         )
