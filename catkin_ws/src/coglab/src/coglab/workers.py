@@ -68,8 +68,8 @@ def run_each(
 
 
 def _call(function: Callable[[Any], Any], job: Any) -> bytes:
-    """Runs one job in its process. Returns its result or its exception, pickled here: so what cannot be sent is the
-    job's own error."""
+    """Runs one job in its process. Returns its result or its exception, pickled as multiprocessing does it. Here, so
+    that what cannot be sent is the job's own error, and does not end the pool."""
     try:
         result = function(job)
     except Exception as error:
@@ -95,7 +95,7 @@ def _answer(future: Future[bytes], limit: float | None) -> Any:
         how = f"was ended by signal {-code}" if code < 0 else f"ended with status {code}"
         return WorkerLost(f"its process {how} before it answered")
     try:
-        return pickle.loads(answer)
+        return pickle.loads(answer)  # from a process that run_each() itself has started
     except Exception as error:
         return RuntimeError(f"its result cannot be read: {error}")
 
