@@ -177,6 +177,8 @@ export function showStatus(parent, now) {
     }
     if (changed) fit(parent, list);
   }, 100);
+  // The column gets smaller without a new word in it, too: a reason below a button, another window.
+  new ResizeObserver(() => fit(parent, list)).observe(parent);
   on('state', update);
   on('events', update);
   onDocs(['status', 'desk', 'recognition'], update);

@@ -42,14 +42,10 @@ class Browser:
         service = webdriver.chrome.service.Service("/usr/bin/chromedriver")
         self.driver = webdriver.Chrome(service=service, options=options)
         self.driver.set_script_timeout(20)
-        # the page itself gets this size, whatever the window's frame takes
-        self.driver.execute_cdp_cmd(
-            "Emulation.setDeviceMetricsOverride",
-            {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": touch},
-        )
         # With Tab past its last control the page would lose the focus to the browser itself, and look otherwise.
         self.driver.execute_cdp_cmd("Emulation.setFocusEmulationEnabled", {"enabled": True})
         self._touch = touch
+        self.resize(size)
 
     def __enter__(self) -> Browser:
         return self
@@ -59,6 +55,13 @@ class Browser:
             self.driver.quit()
         finally:
             shutil.rmtree(self._profile, ignore_errors=True)
+
+    def resize(self, size: tuple[int, int]) -> None:
+        """Gives the page itself this width and height in pixels, whatever the window's frame takes."""
+        self.driver.execute_cdp_cmd(
+            "Emulation.setDeviceMetricsOverride",
+            {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": self._touch},
+        )
 
     def open(self, link: str, limit: float = 30.0) -> None:
         """Opens the console at this one-time link. Returns when the page is live and shows the robot."""
