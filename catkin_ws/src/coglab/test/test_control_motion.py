@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from coglab.control import ControlError, MotionSetup, Reference
+from coglab.control import ControlError, Motion, MotionSetup, Reference
+from coglab.control.simulation import simulate
 
 
 @pytest.mark.parametrize(
@@ -39,3 +40,18 @@ def test_arguments_take_defaults_and_refuse_what_is_outside():
             setup.values({"radius": wrong})
     with pytest.raises(ControlError, match="no argument 'size'; it has: radius"):
         setup.values({"size": 1.0})
+
+
+def test_text_from_done_is_no_end():
+    class Talks(Motion):
+        def start(self, start):
+            self.at = start.set_point.joints
+
+        def reference(self, cycle):
+            return Reference(joints=self.at)
+
+        def done(self):
+            return "not yet"
+
+    with pytest.raises(ControlError, match="'not yet'; True or False is expected"):
+        simulate(Talks())

@@ -143,7 +143,11 @@ def test_bad_arguments_are_refused_in_words(arguments, words):
 def test_a_person_can_be_chosen_and_an_unknown_one_is_refused(make):
     env = make(split="test")
     assert env.reset(options={"person": 7})[1]["person"] == SPLITS["test"].seeds[7]
-    for options, words in (({"person": 300}, "people 0 to 299"), ({"people": 1}, "the only option is person")):
+    for options, words in (
+        ({"person": 300}, "people 0 to 299"),
+        ({"people": 1}, "the only option is person"),
+        (3, "dict"),
+    ):
         with pytest.raises(ValueError, match=words):
             env.reset(options=options)
 

@@ -18,7 +18,16 @@ import numpy.typing as npt
 from ctrl_more import FeedbackController
 
 from coglab.control import slot as wire
-from coglab.control.motion import ControlError, Motion, MotionCycle, MotionSetup, MotionStart, Reference, SetPoint
+from coglab.control.motion import (
+    ControlError,
+    Motion,
+    MotionCycle,
+    MotionSetup,
+    MotionStart,
+    Reference,
+    SetPoint,
+    is_done,
+)
 
 POLL = 0.0005  # s between two looks for a question; a wake-up would cost the robot's cycle a system call
 ALIVE = 0.5  # s between two looks whether the robot is still there
@@ -127,7 +136,7 @@ class MotionHost:
             if not isinstance(reference, Reference):
                 raise ControlError(f"reference() returned {reference!r}; a coglab.control.Reference is expected")
             fill(answer, reference)
-            answer["done"] = int(bool(self.motion.done()))
+            answer["done"] = int(is_done(self.motion))
         except Exception:
             traceback.print_exc()
             print("the motion is given up; correct the file and run it again", file=sys.stderr, flush=True)

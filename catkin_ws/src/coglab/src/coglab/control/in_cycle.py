@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from coglab.control.motion import Motion, MotionCycle, MotionSetup, MotionStart, Reference, SetPoint, Vector
+from coglab.control.motion import Motion, MotionCycle, MotionSetup, MotionStart, Reference, SetPoint, Vector, is_done
 
 
 class InCycle:
@@ -46,4 +46,4 @@ class InCycle:
 
     def done(self) -> bool:
         """Returns whether the reference has ended."""
-        return bool(self.motion.done())
+        return is_done(self.motion)

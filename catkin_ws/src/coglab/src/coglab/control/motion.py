@@ -200,3 +200,11 @@ class Motion:
     def done(self) -> bool:
         """Return true when the reference has ended. Called after each `reference()`."""
         raise NotImplementedError(f"{type(self).__name__} has no done()")
+
+
+def is_done(motion: Any) -> bool:
+    """Whether a motion has ended. Raises ControlError if its done() returns no truth value."""
+    value = motion.done()
+    if not isinstance(value, (bool, np.bool_)):
+        raise ControlError(f"done() returned {value!r}; True or False is expected")
+    return bool(value)

@@ -183,6 +183,9 @@ def run(words: list[str]) -> int:
     except (ControlError, wire.SlotError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
+    except KeyboardInterrupt:
+        print("interrupted before the controller was connected", file=sys.stderr)
+        return 130
     finally:
         over.set()
     print("let go", flush=True)

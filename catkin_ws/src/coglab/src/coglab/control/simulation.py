@@ -8,7 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from coglab.control.motion import ControlError, MotionCycle, MotionSetup, MotionStart, Reference, SetPoint, Vector
+from coglab.control.motion import (
+    ControlError,
+    MotionCycle,
+    MotionSetup,
+    MotionStart,
+    Reference,
+    SetPoint,
+    Vector,
+    is_done,
+)
 
 HOME = (-1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782)  # rad, start posture of the robots
 
@@ -61,7 +70,7 @@ def simulate(
     rows: list[Reference] = []
     times: list[float] = []
     joints = start.joints
-    while not (rows and motion.done()):
+    while not (rows and is_done(motion)):
         time = len(rows) * cycle_time
         if time > longest:
             raise ControlError(f"the motion is not done after {longest} s; does done() become true?")

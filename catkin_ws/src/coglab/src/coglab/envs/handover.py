@@ -119,7 +119,7 @@ class HandoverEnv(gymnasium.Env):
         self._check_open()
         super().reset(seed=seed)
         self._stage = self._camera = None  # frees the last world before the next one is made
-        person = self._person(options or {})
+        person = self._person({} if options is None else options)
         conditions = self.split.conditions(person, self.objects)
         self._stage = stage = Stage(person, conditions, self.task, CONTROLS[self.control])
         self._speeds = (
@@ -193,6 +193,8 @@ class HandoverEnv(gymnasium.Env):
             raise RuntimeError("this environment is closed; make another one")
 
     def _person(self, options: Mapping[str, Any]) -> int:
+        if not isinstance(options, Mapping):
+            raise ValueError(f"options is {options!r}; a dictionary such as {{'person': 7}} is expected")
         unknown = sorted(set(options) - {"person"})
         if unknown:
             raise ValueError(f"options has {', '.join(map(str, unknown))}; the only option is person")
