@@ -8,17 +8,28 @@ signals, primitives, patterns and objects mean is checked by the nodes that read
 
 from __future__ import annotations
 
+import signal
 import sys
+from types import FrameType
 
 from coglab_bringup.launch_files import check
 from coglab_py.alone import refuse
 
+LIMIT = 60  # s. It imports modules of the user, and one that waits for ever would hold up the launch.
+
+
+def late(_signal: int, _frame: FrameType | None) -> None:
+    """Ends an import that takes too long. Raises TimeoutError there."""
+    raise TimeoutError(f"checking the files took over {LIMIT} s; does a module wait for something while it is imported?")
+
 
 def main(words: list[str]) -> int:
     """Exit status: 0 usable, 1 not."""
+    signal.signal(signal.SIGALRM, late)
+    signal.alarm(LIMIT)
     try:
         check(dict(word.split(":=", 1) for word in words))
-    except ValueError as error:
+    except (ValueError, TimeoutError) as error:
         refuse(str(error))
     sys.stdout.write("usable")
     return 0
