@@ -20,7 +20,7 @@ LIMIT = 60  # s. It imports modules of the user, and one that waits for ever wou
 
 def late(_signal: int, _frame: FrameType | None) -> None:
     """Ends an import that takes too long. Raises TimeoutError there."""
-    raise TimeoutError(f"checking the files took over {LIMIT} s; does a module wait for something while it is imported?")
+    raise TimeoutError(f"checking the files took over {LIMIT} s; does a module wait while it is imported?")
 
 
 def main(words: list[str]) -> int:
