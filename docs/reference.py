@@ -102,6 +102,16 @@ def cell_parameters(_top: Path) -> str:
     )
 
 
+def contact_parameters(top: Path) -> str:
+    """Parameters of the contact detector, from the fields of its settings and their docstrings."""
+    text = (top / "catkin_ws/src/coglab_contact/src/coglab_contact/detector.py").read_text(encoding="utf-8")
+    rows = re.findall(r'^    (\w+): .+? = (.+)\n    """(.+)"""$', text, re.MULTILINE)
+    about = "Private parameters of the node `/contact_detector`, besides the files and topics on the page *Reference*."
+    return f"# Parameters of the contact detector\n\n{about}\n\n" + table(
+        ("name", "default", "meaning"), ((code(name), code(default), meaning) for name, default, meaning in rows)
+    )
+
+
 def machine_parameters(_top: Path) -> str:
     """Parameters of the state machines, from their table."""
     from coglab_smach import parameters
@@ -132,6 +142,7 @@ CONFIGURATION = (
     ("lwr_fri_bridge/config/lwr.yaml", "arm's interface, below `/lwr`"),
     ("lwr_description/config/joint_limits.yaml", "the one table of joint limits"),
     ("ctrl_more/config/feedback.yaml", "list of feedback controllers"),
+    ("coglab_objects/config/object_schema.json", "fields of an object file"),
     ("coglab_perception/config/frames.yaml", "frame names"),
     ("coglab_perception/config/belief.yaml", "belief in an offer or a request"),
     ("coglab_sim/config/perception.yaml", "simulated tracker"),
@@ -190,6 +201,7 @@ PAGES = {
     "configuration": configuration,
     "cell_parameters": cell_parameters,
     "machine_parameters": machine_parameters,
+    "contact_parameters": contact_parameters,
     "wire_choices": wire_choices,
     "console_commands": console_commands,
 }
