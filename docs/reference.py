@@ -169,19 +169,40 @@ def configuration(top: Path) -> str:
     return "\n".join(page)
 
 
-def launch_arguments(top: Path) -> str:
-    """Arguments of every launch file."""
-    page = ["# Launch arguments", "", "`./coglab launch NAME:=VALUE` takes those of `coglab.launch`."]
+def _nodes(element: ET.Element, when: tuple[str, ...] = ()) -> Iterable[tuple[str, str, str]]:
+    """Name, program and condition of each node of a launch file, without those of included files."""
+    for child in element:
+        conditions = (*when, *(f"{key} {child.get(key)}" for key in ("if", "unless") if child.get(key)))
+        if child.tag == "node":
+            yield code(child.get("name")), code(f"{child.get('pkg')} {child.get('type')}"), code(", ".join(conditions))
+        elif child.tag == "group":
+            yield from _nodes(child, conditions)
+
+
+def launch_files(top: Path) -> str:
+    """Arguments and nodes of every launch file."""
+    about = "`./coglab launch NAME:=VALUE` takes the arguments of `coglab.launch`, which includes other files."
+    page = ["# Launch files", "", about]
     files = sorted((top / "catkin_ws" / "src").glob("*/launch/*.launch"), key=lambda f: (f.stem != "coglab", f.stem))
     for file in files:
+        root = ET.parse(file).getroot()
         rows = [
             (code(arg.get("name")), code(arg.get("default", "(needed)")), arg.get("doc", ""))
-            for arg in ET.parse(file).getroot().findall("arg")
+            for arg in root.findall("arg")
             if arg.get("value") is None
         ]
+        nodes = list(_nodes(root))
         page += ["", f"## {file.name}", "", f"`roslaunch {file.parts[-3]} {file.name}`", ""]
         page += [table(("argument", "default", "meaning"), rows) if rows else "No arguments."]
+        page += ["", table(("node", "package and program", "condition"), nodes)] if nodes else []
     return "\n".join(page)
+
+
+def packages(top: Path) -> str:
+    """The packages, with the description of each package.xml."""
+    roots = [ET.parse(file).getroot() for file in (top / "catkin_ws" / "src").glob("**/package.xml")]
+    rows = sorted((code(root.findtext("name")), " ".join(root.findtext("description", "").split())) for root in roots)
+    return "# Packages\n\n" + table(("package", "what it is"), rows)
 
 
 def commands(top: Path) -> str:
@@ -194,8 +215,9 @@ def commands(top: Path) -> str:
 
 
 PAGES = {
+    "packages": packages,
     "commands": commands,
-    "launch_arguments": launch_arguments,
+    "launch_files": launch_files,
     "messages": messages,
     "reason_codes": reason_codes,
     "configuration": configuration,
