@@ -201,8 +201,8 @@ def launch_files(top: Path) -> str:
 def packages(top: Path) -> str:
     """The packages, with the description of each package.xml."""
     roots = [ET.parse(file).getroot() for file in (top / "catkin_ws" / "src").glob("**/package.xml")]
-    rows = sorted((code(root.findtext("name")), " ".join(root.findtext("description", "").split())) for root in roots)
-    return "# Packages\n\n" + table(("package", "what it is"), rows)
+    rows = sorted((root.findtext("name", ""), " ".join(root.findtext("description", "").split())) for root in roots)
+    return "# Packages\n\n" + table(("package", "what it is"), ((code(name), about) for name, about in rows))
 
 
 def commands(top: Path) -> str:
