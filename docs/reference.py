@@ -102,6 +102,16 @@ def cell_parameters(_top: Path) -> str:
     )
 
 
+def contact_parameters(top: Path) -> str:
+    """Parameters of the contact detector, from the fields of its settings and their docstrings."""
+    text = (top / "catkin_ws/src/coglab_contact/src/coglab_contact/detector.py").read_text(encoding="utf-8")
+    rows = re.findall(r'^    (\w+): .+? = (.+)\n    """(.+)"""$', text, re.MULTILINE)
+    about = "Private parameters of the node `/contact_detector`, besides the files and topics on the page *Reference*."
+    return f"# Parameters of the contact detector\n\n{about}\n\n" + table(
+        ("name", "default", "meaning"), ((code(name), code(default), meaning) for name, default, meaning in rows)
+    )
+
+
 def machine_parameters(_top: Path) -> str:
     """Parameters of the state machines, from their table."""
     from coglab_smach import parameters
@@ -132,6 +142,7 @@ CONFIGURATION = (
     ("lwr_fri_bridge/config/lwr.yaml", "arm's interface, below `/lwr`"),
     ("lwr_description/config/joint_limits.yaml", "the one table of joint limits"),
     ("ctrl_more/config/feedback.yaml", "list of feedback controllers"),
+    ("coglab_objects/config/object_schema.json", "fields of an object file"),
     ("coglab_perception/config/frames.yaml", "frame names"),
     ("coglab_perception/config/belief.yaml", "belief in an offer or a request"),
     ("coglab_sim/config/perception.yaml", "simulated tracker"),
@@ -158,19 +169,40 @@ def configuration(top: Path) -> str:
     return "\n".join(page)
 
 
-def launch_arguments(top: Path) -> str:
-    """Arguments of every launch file."""
-    page = ["# Launch arguments", "", "`./coglab launch NAME:=VALUE` takes those of `coglab.launch`."]
+def _nodes(element: ET.Element, when: tuple[str, ...] = ()) -> Iterable[tuple[str, str, str]]:
+    """Name, program and condition of each node of a launch file, without those of included files."""
+    for child in element:
+        conditions = (*when, *(f"{key} {child.get(key)}" for key in ("if", "unless") if child.get(key)))
+        if child.tag == "node":
+            yield code(child.get("name")), code(f"{child.get('pkg')} {child.get('type')}"), code(", ".join(conditions))
+        elif child.tag == "group":
+            yield from _nodes(child, conditions)
+
+
+def launch_files(top: Path) -> str:
+    """Arguments and nodes of every launch file."""
+    about = "`./coglab launch NAME:=VALUE` takes the arguments of `coglab.launch`, which includes other files."
+    page = ["# Launch files", "", about]
     files = sorted((top / "catkin_ws" / "src").glob("*/launch/*.launch"), key=lambda f: (f.stem != "coglab", f.stem))
     for file in files:
+        root = ET.parse(file).getroot()
         rows = [
             (code(arg.get("name")), code(arg.get("default", "(needed)")), arg.get("doc", ""))
-            for arg in ET.parse(file).getroot().findall("arg")
+            for arg in root.findall("arg")
             if arg.get("value") is None
         ]
+        nodes = list(_nodes(root))
         page += ["", f"## {file.name}", "", f"`roslaunch {file.parts[-3]} {file.name}`", ""]
         page += [table(("argument", "default", "meaning"), rows) if rows else "No arguments."]
+        page += ["", table(("node", "package and program", "condition"), nodes)] if nodes else []
     return "\n".join(page)
+
+
+def packages(top: Path) -> str:
+    """The packages, with the description of each package.xml."""
+    roots = [ET.parse(file).getroot() for file in (top / "catkin_ws" / "src").glob("**/package.xml")]
+    rows = sorted((root.findtext("name", ""), " ".join(root.findtext("description", "").split())) for root in roots)
+    return "# Packages\n\n" + table(("package", "what it is"), ((code(name), about) for name, about in rows))
 
 
 def commands(top: Path) -> str:
@@ -183,13 +215,15 @@ def commands(top: Path) -> str:
 
 
 PAGES = {
+    "packages": packages,
     "commands": commands,
-    "launch_arguments": launch_arguments,
+    "launch_files": launch_files,
     "messages": messages,
     "reason_codes": reason_codes,
     "configuration": configuration,
     "cell_parameters": cell_parameters,
     "machine_parameters": machine_parameters,
+    "contact_parameters": contact_parameters,
     "wire_choices": wire_choices,
     "console_commands": console_commands,
 }

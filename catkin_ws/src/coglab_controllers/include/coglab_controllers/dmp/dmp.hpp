@@ -57,7 +57,7 @@ class Dmp {
   /// Time until the duration is over, s, at rate 1.
   double remainingTime() const noexcept;
 
-  /// @name The primitive, eq. (1), (2), (4) and (5). Notation: docs/architecture.md
+  /// @name The primitive, eq. (1), (2), (4) and (5). Notation: docs/equations.md
   /// @{
   double duration() const noexcept { return shape_.duration; }    ///< s
   double stiffness() const noexcept { return shape_.stiffness; }  ///< K
