@@ -261,7 +261,7 @@ def test_one_that_hand_status_says_nothing_about(node):
     node.say(3.0)
     assert not calibration.done()
     node.say(0.01)
-    assert refused(calibration, ReasonCode.NODE_SILENT).causes == ("hand_status says nothing about it",)
+    assert refused(calibration, ReasonCode.NODE_SILENT).causes == ("hand_status does not report it",)
 
 
 def test_a_node_that_dies_while_it_calibrates(node):

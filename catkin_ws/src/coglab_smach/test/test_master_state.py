@@ -189,7 +189,7 @@ def held_by_the_hub(t):
         (no_hub, ReasonCode.WRONG_STATE, "is not in a hub now"),
         (lambda t: t.ask(GIVE), ReasonCode.WRONG_STATE, "wait_without_object takes"),
         (no_name, ReasonCode.OBJECT_UNKNOWN, "not known after a restart"),
-        (asked_twice, ReasonCode.BUSY, "'take' was asked for a moment ago"),
+        (asked_twice, ReasonCode.BUSY, "'take' was requested a moment ago"),
         (silent_database, ReasonCode.NODE_SILENT, "database has not answered within 2 s"),
         (broken_database, ReasonCode.NODE_SILENT, "list_objects is not there"),
         (lambda t: t.ask("take", "elephant"), ReasonCode.OBJECT_UNKNOWN, "'elephant' is not in the database"),
