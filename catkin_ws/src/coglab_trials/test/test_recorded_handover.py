@@ -37,8 +37,8 @@ def write_csv(path, rows, frames=FRAMES):
 
 
 def play(file, person, timing="natural", **more):
-    """Returns the outcome of a handover with the recorded hand, the trial, and the largest distance (m) of its hand from
-    the recorded one while only that hand holds the object."""
+    """Returns the outcome of a handover with the recorded hand, the trial, and the largest distance (m) of the hand
+    from the recorded one while only that hand holds the object."""
     recording = {"file": file, "person": person, **more}
     trial, off = VirtualTrial(world=World(8, CONSIDERATE, recording=recording), settings={"timing": timing}), [0.0]
 

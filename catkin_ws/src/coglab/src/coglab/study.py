@@ -78,7 +78,7 @@ def trials(
         results: Iterable[tuple[int, Any]] = enumerate(map(_result, jobs))
     else:
         try:
-            pickle.dumps((world, each))  # what multiprocessing does to send them; here the reason can be named
+            pickle.dumps((world, each))  # multiprocessing does this too; here the reason is reported
         except Exception as error:
             raise ValueError(
                 f"these arguments cannot be sent to another process ({error}): use functions of a module instead of "
