@@ -19,11 +19,7 @@ def parser(description: str | None) -> argparse.ArgumentParser:
     """A parser with --out, the folder of the plot. An example adds its own arguments."""
     arguments = argparse.ArgumentParser(description=description)
     arguments.add_argument(
-        "--out",
-        type=Path,
-        default=Path("out/examples"),
-        metavar="FOLDER",
-        help="folder of the plot (default out/examples)",
+        "--out", type=Path, default=Path("out/examples"), metavar="FOLDER", help="of the plot (default out/examples)"
     )
     return arguments
 

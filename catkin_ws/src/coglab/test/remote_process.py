@@ -136,9 +136,7 @@ class Slots:
 
         try:
             soon(started, "the start of the motion")
-            soon(
-                lambda: process.count.value, "the first answer"
-            )  # no cycles meanwhile: otherwise the process would be silent too long
+            soon(lambda: process.count.value, "the first answer")  # without cycles, which would make it late
             yield process
         finally:
             process.end()

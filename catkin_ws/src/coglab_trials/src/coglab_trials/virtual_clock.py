@@ -295,9 +295,7 @@ class VirtualClock(Clock):
         """Wait for the event or the time; with `poll`, until that has a result. Returns True if the event came."""
         me = threading.current_thread()
         if self._poller is me:
-            raise RuntimeError(
-                "a condition polled on a virtual clock must not wait; wait for it in a loop with sleep()"
-            )
+            raise RuntimeError("a condition polled on a virtual clock must not wait; use a loop with sleep()")
         parked = _Parked(me, poll)
         with self._lock:
             if event is not None:

@@ -143,9 +143,7 @@ class WaitStop(CoglabState):
         """Wait until ``near()``. The time limit is computed from the first feedback of the motion."""
         arm = self.ctx.arm
         try:
-            self.wait_for(
-                lambda: self.arrived() or arm.dmp_progress().primitive_id != "", "the first progress of the reach", 2.0
-            )
+            self.wait_for(lambda: self.arrived() or arm.dmp_progress().primitive_id != "", "the reach's start", 2.0)
             begun = arm.dmp_progress()
             asked = begun.remaining_time + reach_time(arm.motion_limits(), begun.remaining_distance)
             limit = self.ctx.config.number("reach_timeout") + asked

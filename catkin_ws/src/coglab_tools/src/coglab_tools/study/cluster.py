@@ -50,8 +50,8 @@ def results(jobs: Sequence[simulate.Job], workers: int = 0, scheduler: str = "")
     import dask
     import distributed
 
-    for name in ("distributed", "distributed.client"):  # each has a level of its own
-        logging.getLogger(name).setLevel(logging.CRITICAL)  # what it would say is said here in a sentence
+    for name in ("distributed", "distributed.client"):  # each has its own level
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # errors are reported here in one sentence
     dask.config.set({"distributed.comm.timeouts.connect": "10s", "distributed.scheduler.allowed-failures": 3})
     if scheduler:
         yield from _with_scheduler(jobs, distributed, scheduler)

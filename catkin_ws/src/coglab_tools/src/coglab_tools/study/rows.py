@@ -48,7 +48,7 @@ class Rows:
         return bool((self.header or {}).get("simulated", True))
 
     def begin(self, identity: Mapping[str, Any], simulated: bool) -> None:
-        """Write the head of a new file, or check that these results may be added to it: CheckFailed in words."""
+        """Write the head of a new file, or check that these results may be added to it: CheckFailed with a reason."""
         kind = {True: "simulated", False: "live"}
         if self.header is None:
             self.header = {
@@ -80,7 +80,7 @@ class Rows:
         return [row for number in sorted(self.trials) for row in self.trials[number]]
 
     def _write(self, line: Mapping[str, Any]) -> None:
-        assert self._stream is not None  # opened for reading alone
+        assert self._stream is not None  # opened only for reading
         try:
             content = json.dumps(line).encode() + b"\n"
             if self._stream.write(content) < len(content):
@@ -147,7 +147,7 @@ def _read(study: Study, content: bytes, stream: IO[bytes] | None) -> Rows:
                     f"{path}: trial {number} has the condition '{strange['condition']}', which {study.folder / FILE} "
                     "does not have; remove its line, and it runs again"
                 )
-    else:  # no trial has ended: the plan may still change
+    else:  # no finished trial: the plan may still change
         rows.header, rows.dropped = None, len(content)
     return rows
 
