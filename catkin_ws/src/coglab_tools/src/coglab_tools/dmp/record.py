@@ -93,8 +93,8 @@ def record(
     """Record one demonstration with the robot of `coglab.connect()` or `World.robot`.
 
     `frame`: tf frame of the tracked hand; empty: the hand-guided arm. It ends when `ends()` is true, when the
-    hand rests for 0.5 s after a reach, or after `limit` s. `show` gets a line ten times a second. CheckFailed if the arm
-    is too fast, the brain starts an action, or nothing was recorded.
+    hand rests for 0.5 s after a reach, or after `limit` s. `show` gets ten lines per second. CheckFailed if the arm is
+    too fast, the brain starts an action, or nothing was recorded.
     """
     if not frame:
         check_free(robot)
