@@ -52,7 +52,7 @@ with coglab.World(seed=3, managers=files(options.out)) as world:
         rows.append((world.time - start, from_arm(world, person), float(np.linalg.norm(hand - before)) / 0.005))
         before = hand
 
-    world.cell.blind.add("human_hand")  # the simulated tracker sees the visitor alone
+    world.cell.blind.add("human_hand")  # the simulated tracker sees only the visitor
     world.after_period.append(visit)
     home = np.asarray(world.robot.arm.home)
     other = home + [0.5, 0.3, 0.0, -0.4, 0.0, 0.0, 0.0]

@@ -38,7 +38,7 @@ class BrainDouble:
             return StartResponse(success=accepted, message=f"'{request.action}' {words}")
 
         def on_command(request):
-            self.say("/coglab_master/stopped", ["reset"], "hold was asked for")
+            self.say("/coglab_master/stopped", ["reset"], "hold was requested")
             return LwrCommandResponse(success=True, message=f"{request.event} done")
 
         rospy.Service("/coglab/start", Start, on_start)
@@ -107,7 +107,7 @@ def test_hold_status_and_reset(brain):
     status, output = ask("hold")
     assert status == 0 and "hold done; on again: ./coglab start reset" in output
     status, output = ask("status")
-    assert "hold was asked for" in output and "next:   ./coglab start reset" in output
+    assert "hold was requested" in output and "next:   ./coglab start reset" in output
     status, output = ask("start")
     assert status == 1 and "stopped takes reset; name one" in output and "hold was" in output
     status, output = ask("start", "reset")

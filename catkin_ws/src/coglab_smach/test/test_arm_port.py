@@ -77,7 +77,7 @@ def robot(monkeypatch):
 
 
 def ended(pending):
-    """Waits for a call that has a thread of its own."""
+    """Waits for a call in its own thread."""
     end = time.monotonic() + 60.0
     while not pending.done():
         assert time.monotonic() < end

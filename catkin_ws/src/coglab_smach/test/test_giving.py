@@ -144,7 +144,7 @@ def test_a_hand_that_does_not_open_ends_at_its_time_limit():
 
 @pytest.mark.parametrize(("pressed", "sinks"), [(0.5, 0), (1.5, 1)])
 def test_the_arm_sinks_with_a_hand_that_presses_the_object_down(monkeypatch, pressed, sinks):
-    """The object is too high for the hand that holds it. A torque error is no hand."""
+    """The object is too high for the hand at it. A torque error must not count as a hand."""
     monkeypatch.setattr(give, "way_to_hand", lambda *_: None)  # it is not brought anywhere
 
     def script(t):

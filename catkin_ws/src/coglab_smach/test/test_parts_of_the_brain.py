@@ -74,7 +74,7 @@ def test_an_object_from_the_board_keeps_its_grasp_and_may_be_named_again(trial):
 
     trial.run(walk)
     reasons = [t.reason for t in trial.ctx.journal.transitions if t.from_state == "wait_with_object"]
-    assert reasons[0] == "operator asked for put of 'mug'"
+    assert reasons[0] == "operator requested put of 'mug'"
 
 
 # --- states -----------------------------------------------------------------------------------------------------------

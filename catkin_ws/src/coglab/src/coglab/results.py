@@ -26,7 +26,7 @@ def reason_name(code: int) -> str:
 
 
 class Refused(RuntimeError):
-    """A request was refused before anything moved. The sentence says what to do.
+    """A request was refused before anything moved. The sentence has the next step.
 
     ``code``: its coglab_msgs/ReasonCode. ``name``: the name of the code.
     """

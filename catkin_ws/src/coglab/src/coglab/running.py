@@ -48,7 +48,7 @@ LATCHED = 0.2  # s in which a latched message comes after its topic is connected
 
 
 class NoRobot(ConnectionError):
-    """There is no robot to connect to. The sentence says what to do."""
+    """There is no robot to connect to. The sentence has the next step."""
 
 
 def connect(master: str = "", *, namespace: str = "", limit: float = 10.0) -> Robot:
@@ -57,7 +57,7 @@ def connect(master: str = "", *, namespace: str = "", limit: float = 10.0) -> Ro
     ``master``: address of the ROS master, such as "http://127.0.0.1:11311", or its port; by default ROS_MASTER_URI.
     ``namespace``: of the robot, if it was launched in one. ``limit``: s, longest wait for messages of the arm.
 
-    The process becomes a node of its own, "coglab_python_..."; a process that is a node already stays that node.
+    The process becomes a new node, "coglab_python_..."; a process that is already a node stays that node.
     Several connections in a process are possible, to one master. NoRobot: no master, no robot, or a robot of another
     version.
     Example::

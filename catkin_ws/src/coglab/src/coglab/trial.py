@@ -153,7 +153,7 @@ class Trial:
         return float(np.linalg.norm(self.hand_force[shared], axis=1).max(initial=0.0))
 
     def series(self) -> Series:
-        """The record as the rows that plots and reports of running systems use, too."""
+        """The record as rows, as in plots and reports of running systems."""
         rows = range(len(self.time))
         forces = np.linalg.norm(self.hand_force, axis=1)
         truth: list[tuple[Any, ...]] = [

@@ -101,7 +101,7 @@ def _answer(future: Future[bytes], limit: float | None) -> Any:
 
 
 def _stalled(error: BaseException | None) -> ClockStalled | None:
-    """ClockStalled among the causes of an error: state machines raise errors of their own from it."""
+    """ClockStalled among the causes of an error: state machines raise their own errors from it."""
     while error is not None and not isinstance(error, ClockStalled):
         error = error.__cause__ or error.__context__
     return error

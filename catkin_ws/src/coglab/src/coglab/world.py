@@ -363,7 +363,7 @@ class World:
         self.cell.cell.set_loss(*shares)
 
     def leave_command_mode(self, reason: str = "the robot controller left command mode") -> None:
-        """The robot controller falls back to monitor mode, as after a fault of its own."""
+        """The robot controller falls back to monitor mode, as after an own fault."""
         self._check()
         self.cell.cell.leave_command_mode(reason)
 

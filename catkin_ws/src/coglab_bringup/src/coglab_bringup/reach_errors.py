@@ -80,7 +80,7 @@ def reach_errors(trial: Series, kind: str, entry: Mapping[str, Any] | None, star
     nobody = {
         "the goal of this action is no grasp of a person's object": kind not in (TAKES, GIVES),
         "no reach began": not rows,
-        "the object database did not return the object's grasps": entry is None,
+        "the object database did not return the object": entry is None,
         "no truth is published on /coglab_sim/truth/cell, as with a real robot": not trial.poses,
         "truth or chosen grasp are unknown at the end of the reach": last["error_mm"] is None,
     }

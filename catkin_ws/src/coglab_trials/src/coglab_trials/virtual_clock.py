@@ -368,7 +368,7 @@ class VirtualClock(Clock):
         return not again
 
     def _await_turn(self, parked: _Parked) -> None:
-        # Two halves without progress: a process that was stopped and goes on misses one of them at most.
+        # Two halves without progress: a stopped and continued process misses at most one of them.
         seen = -1.0
         while not parked.gate.acquire(timeout=self._stall_limit / 2.0):
             with self._lock:
@@ -431,7 +431,7 @@ def _count_users(change: int) -> None:
 @contextmanager
 def using(clock: VirtualClock) -> Iterator[VirtualClock]:
     """Inside the block, the calling thread belongs to `clock`. So do the children of each Concurrence that is
-    created and executed there. Each thread of a process may use a clock of its own. Example::
+    created and executed there. Each thread of a process may use its own clock. Example::
 
         with using(VirtualClock()) as clock:
             machine = build()

@@ -76,7 +76,7 @@ class Parts:
 
 def imported(name: str, spec: str, arguments: tuple[str, ...]) -> Callable[..., Any]:
     """Returns the function ``module:function`` that the field ``name`` of machines.yaml gives, and that takes
-    ``arguments``. ConfigError in words."""
+    ``arguments``. ConfigError with a reason."""
     module, _, function = spec.partition(":")
     if not function.isidentifier() or not all(word.isidentifier() for word in module.split(".")):
         raise ConfigError(f"{name}: 'module:function' is expected, such as my_lab.machines:build_polish, got '{spec}'")

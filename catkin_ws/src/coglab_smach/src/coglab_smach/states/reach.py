@@ -253,7 +253,7 @@ class Phase(Enum):
     REACH = "the hand goes to the object"
     NEAR_GOAL = "contact is watched for, the fingers may start to close, and a hand without contact moves on"
     TOUCHED = "the hand slides on to the grasp, if it has brushed the object on its way past"
-    BUMPED = "something else was touched: draw back, and come again"
+    BUMPED = "something else was touched: retreat and reach again"
     HELD = "the object is between the fingers"
 
 

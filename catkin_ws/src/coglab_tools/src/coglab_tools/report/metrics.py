@@ -66,7 +66,7 @@ METRICS = {
     "detection_delay_s": Metric(
         "detection delay",
         "s",
-        f"From the first true force above {FIRST_TOUCH} N on the hand to the detector's sample. Simulation alone.",
+        f"From the first true force above {FIRST_TOUCH} N on the hand to the detector's sample. Only in simulation.",
     ),
     "peak_palm_speed": Metric("peak speed of the palm", "m/s", "Largest speed of the palm, smoothed over 60 ms."),
     "nearest_m": Metric("least distance of the hands", "m", "Least distance of the palm from the person's hand."),

@@ -61,7 +61,7 @@ def results(jobs: Sequence[simulate.Job], workers: int = 0, scheduler: str = "")
 
 
 def local_cluster(distributed: Any, count: int, place: str) -> Any:
-    """A cluster on this computer's loopback. Ctrl-C is for this process alone: it ends the workers itself."""
+    """A cluster on this computer's loopback. Ctrl-C reaches only this process, which ends the workers itself."""
     main = threading.current_thread() is threading.main_thread()
     before = signal.signal(signal.SIGINT, signal.SIG_IGN) if main else None  # children inherit it
     try:

@@ -53,5 +53,5 @@ def joined(study: Study, table: Sequence[Mapping[str, Any]]) -> tuple[list[dict[
 
 
 def _seconds(utc: str) -> float:
-    """Time (s) of a UTC stamp in ISO 8601. ValueError: it is none."""
+    """Time (s) of a UTC stamp in ISO 8601. ValueError: it is invalid."""
     return datetime.fromisoformat(utc.replace("Z", "+00:00")).timestamp()

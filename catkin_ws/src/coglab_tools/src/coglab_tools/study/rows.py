@@ -153,7 +153,7 @@ def _read(study: Study, content: bytes, stream: IO[bytes] | None) -> Rows:
 
 
 def _row(value: Mapping[str, Any]) -> dict[str, Any]:
-    """One row of a handover. KeyError, TypeError or ValueError: it is none."""
+    """One row of a handover. KeyError, TypeError or ValueError: it is invalid."""
     row = dict(value)
     for name in ("participant", "condition", "action", "outcome", "reason_code"):
         row[name] = str(row[name])
@@ -179,13 +179,13 @@ def _check_plan(study: Study, header: Mapping[str, Any]) -> None:
 
 
 def _line(path: Path, name: str) -> str:
-    """File and line of a key of study.yaml; of the file alone where the key is gone."""
+    """File and line of a key of study.yaml; only the file if the key is missing."""
     line = read(path).lines.get((name,))
     return f"{path}:{line}" if line else str(path)
 
 
 def difference(a: Mapping[str, Any], b: Mapping[str, Any]) -> str:
-    """The first difference of two identities in words; empty if they are the same."""
+    """The first difference of two identities as text; empty if they are the same."""
     for name in sorted(a.keys() | b.keys()):
         if a.get(name) != b.get(name):
             return f"{name} {a.get(name)}, and here it is {b.get(name)}"

@@ -84,7 +84,7 @@ def apply(world: World, settings: Mapping[str, Any]) -> None:
     """Apply the settings to a new World, except `machines_settings`, which are arguments of the World."""
     inside = world.virtual_trial
     entry = inside.ctx.database.get_object(world.conditions.object_id).result()
-    entry.update(object_with(entry, settings))  # the entry belongs to this World alone
+    entry.update(object_with(entry, settings))  # the entry belongs only to this World
     if "speed" in settings:
         world.cell.robot.virtual.speed_scale(float(settings["speed"]))
         world.cell.speed_scale = float(settings["speed"])

@@ -28,7 +28,7 @@ MARKS = {
     "tightened": "the grip was tightened",
     "switch_dmp": "the primitive was changed",
 }
-"""marks in words; others are named as they are"""
+"""text of marks; others are shown by their names"""
 LESS = ("preshaped", "paused", "closing", "closing_on_the_way", "tightened")  # marks that are left out first
 
 

@@ -79,7 +79,7 @@ class Measured:
 
 
 def read_trial(folder: str | Path) -> Measured:
-    """Read the trial in a folder. UsageError: it is none. CheckFailed: a file of it is unusable."""
+    """Read the trial in a folder. UsageError: there is none. CheckFailed: a file of it is unusable."""
     place = Path(folder)
     record = TrialRecord.load(place)
     if (place / BAG).is_file():
