@@ -40,7 +40,7 @@ def test_touch_counts_from_half_a_newton_or_six_deviations(newton, deviation, ma
     second = touch.feed(1.01, forces, deviation)
     assert second.margin == pytest.approx(margin) and second.until == pytest.approx(1.06)
     assert second.message == f"{newton:.1f} N on the hand's touch sensors"
-    assert touch.feed(1.02, [[0.1, 0.0, 0.0]]).margin == pytest.approx(0.2), "the smaller one of two in a row"
+    assert touch.feed(1.02, [[0.1, 0.0, 0.0]]).margin == pytest.approx(0.2), "the smaller of two consecutive samples"
     touch.reset()
     assert touch.feed(1.03, forces).margin == 0.0
     for nothing in ([], [[math.nan, 0.0, 0.0]], [[math.inf, 0.0, 0.0]]):
@@ -92,7 +92,7 @@ def test_a_finger_that_stops_before_its_target_is_a_contact():
     stopped = fingers.feed(0.1, [Motor(position=90, over_current=True)])
     assert stopped.margin == pytest.approx(1.2)
     assert stopped.message == "motor 0 of the hand stopped before its target"
-    assert fingers.feed(0.2, [Motor(position=90, over_current=True)]).margin == 0.0, "said once"
+    assert fingers.feed(0.2, [Motor(position=90, over_current=True)]).margin == 0.0, "reported once"
     for end in ({"target_reached": True, "over_current": True}, {"over_current": False}):
         fingers = Fingers()
         fingers.feed(0.0, [Motor(moving=True)])
@@ -106,7 +106,7 @@ def test_a_share_must_be_gone_for_50_ms_and_a_restarted_estimate_resets_it():
     load = LeavingLoad(1.0, 0.5, 100.0, 9.81)
     for k in range(4):
         assert not load.feed(0.01 * k, 4.9, False, False)
-    assert not load.feed(0.04, None, False, False), "nothing tells"
+    assert not load.feed(0.04, None, False, False), "no data"
     assert not any(load.feed(0.05 + 0.01 * k, 4.9, False, False) for k in range(5))
     assert load.feed(0.101, 4.9, False, False)
     load.feed(0.2, None, False, True)

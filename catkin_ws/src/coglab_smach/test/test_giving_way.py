@@ -73,8 +73,8 @@ def test_the_palm_follows_a_pull_during_the_lift_and_motions_do_not_overlap():
         t.cell.let_go()
 
     trial = receiving(script, let_go_after=None)
-    assert 0.03 < gone[0] < 0.055, "as far as pull.way lets it"
-    assert height[0] > 0.015, "the rise goes on when the pull is over"
+    assert 0.03 < gone[0] < 0.055, "as far as pull.way allows"
+    assert height[0] > 0.015, "the rise continues after the pull"
     assert trial.result().outcome == "succeeded" and "gave_way" in trial.result().marks
     order = motions(trial)
     assert order[:3] == ["move_ptp", "cancel", "move_ptp"], order

@@ -51,7 +51,7 @@ class Thread:
     """Runs its target at once."""
 
     def __init__(self, target, args, name, daemon):
-        assert daemon, "it must not keep a process that ends"
+        assert daemon, "it must not block the end of the process"
         self.start = lambda: target(*args)
 
 

@@ -108,7 +108,7 @@ def test_a_predicted_place_counts_from_the_probability_of_the_timing(seen, perso
         assert found == {**LOCATED, "frame": seen.frame, "xyz": list(seen.place)}
     offers.ctx.config.set("handover.belief", 0.0)
     offers.ctx.config.set("handover.belief_request", 0.0)
-    assert believed(offers.ctx, "mug", LOCATED, person, region) is None, "the timing starts on no belief"
+    assert believed(offers.ctx, "mug", LOCATED, person, region) is None, "this timing ignores beliefs"
 
 
 def test_a_reach_begins_on_a_belief_before_the_object_is_there():

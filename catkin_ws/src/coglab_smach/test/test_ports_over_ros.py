@@ -113,7 +113,7 @@ def test_the_first_event_of_the_armed_kind_is_kept(nodes, mode, contact):
     topic = "coglab/contact"
     nodes.say(topic, Contact(contact=True))
     nodes.say(topic, Contact(contact=False))
-    assert nodes.contact.event() is None, "nobody watches"
+    assert nodes.contact.event() is None, "the detector is not armed"
     nodes.contact.arm(mode, 6.0, {})
     nodes.say(topic, Contact(contact=not contact))
     assert nodes.contact.event() is None

@@ -145,7 +145,7 @@ def test_a_preemption_is_served_during_a_wait_and_at_the_end():
     for work in (lambda s: s.request_preempt() or s.pause(1.0), lambda s: s.request_preempt() or "other"):
         _, state, record, seconds = walked(work)
         assert (record.outcome, record.code, seconds) == ("preempted", ReasonCode.PREEMPTED, 0.0)
-        assert record.reason == "Probe was preempted" and not state.preempt_requested(), "served"
+        assert record.reason == "Probe was preempted" and not state.preempt_requested(), "the request is served"
     _, state, record, _ = walked(lambda s: s.request_preempt() or "failed")
     assert record.outcome == "failed" and state.preempt_requested(), "the container passes it on"
 

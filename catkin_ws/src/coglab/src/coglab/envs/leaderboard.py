@@ -51,7 +51,7 @@ def run_policy(policy: Policy, task: str, split: str, person: int, objects: Sequ
 
 def run_brain(task: str, split: str, person: int, objects: Sequence[str] = OBJECTS) -> dict[str, Any]:
     """The same with the shipped state machines, for the same person and conditions. Before giving, an accustomed person
-    hands over the object. Only a failure of that counts."""
+    hands over the object; if that fails, the episode has failed."""
     people = split_named(split)
     seed = people.seeds[person]
     conditions = people.conditions(seed, objects)

@@ -144,9 +144,7 @@ class Hub(CoglabState):
         if ud.object_id == UNKNOWN:
             self.ctx.holding = ud.object_id = request.object_id
         elif request.object_id and request.object_id != ud.object_id:
-            self.reason = (
-                f"'{request.object_id}' was requested, but the hand holds '{ud.object_id}': this one is used. "
-            )
+            self.reason = f"requested '{request.object_id}', but the hand holds '{ud.object_id}': this one is used. "
         if ud.object_entry:
             return ""
         try:
