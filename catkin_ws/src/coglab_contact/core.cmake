@@ -16,7 +16,7 @@ set_target_properties(coglab_contact PROPERTIES POSITION_INDEPENDENT_CODE ON)
 target_include_directories(coglab_contact PUBLIC ${CMAKE_CURRENT_SOURCE_DIR}/include)
 target_link_libraries(coglab_contact PUBLIC Eigen3::Eigen)
 
-# The module knows the chain and the dynamics of coglab_controllers: a target in one workspace build, a file otherwise.
+# The module uses the chain and the dynamics of coglab_controllers: a target in one workspace build, a file otherwise.
 if(TARGET coglab_controllers_core)
   set(COGLAB_CONTACT_controllers coglab_controllers_core)
 else()

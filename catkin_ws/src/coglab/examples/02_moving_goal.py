@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""A goal that steps aside, then drifts, then trembles: what the estimator makes of it."""
+"""A goal that steps aside, then drifts, then trembles, and the estimate of it."""
 
 import coglab_controllers as cc
 import numpy as np

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Follow a Cartesian motion with the arm: translation first, orientation in what freedom is left."""
+"""Follow a Cartesian motion with the arm: translation first, orientation with the remaining freedom."""
 
 import coglab_controllers as cc
 import numpy as np

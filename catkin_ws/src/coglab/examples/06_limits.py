@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Drive the arm against its limits: the guard slows the whole vector and names the reason."""
+"""Drive the arm against its limits: the guard scales the whole vector down and reports the reason."""
 
 import coglab_controllers as cc
 import numpy as np
@@ -27,6 +27,6 @@ for reason in dict.fromkeys(reasons):
     chosen = np.array([r == reason for r in reasons])
     axes.plot(time[chosen], np.array(scales)[chosen], ".", markersize=3, label=reason)
 axes.set_xlabel("time [s]")
-axes.set_ylabel("share of the request that passes")
+axes.set_ylabel("passed share of the request")
 axes.legend()
 save(figure, __file__, options.out)

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""People of one's own: how long giving takes with a person who trusts the robot's hand sooner or later."""
+"""Own people: duration of giving with a person who trusts the robot's hand sooner or later."""
 
 import coglab
 from coglab_trials import Conditions
@@ -9,7 +9,7 @@ arguments = parser(__doc__)
 arguments.add_argument("--seeds", type=int, default=2, help="people of each kind")
 options = arguments.parse_args()
 
-TRUST = (0.1, 0.5, 2.0)  # s that the person wants to see the hand at rest
+TRUST = (0.1, 0.5, 2.0)  # s, for which the person must see the hand at rest
 figure = new_figure()
 axes = figure.subplots()
 for behaviour in ("normal", "hesitant"):

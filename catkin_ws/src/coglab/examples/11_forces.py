@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Forces of a handover: on both hands, and what the joints feel. Somebody pushes the arm."""
+"""Forces of a handover on both hands, and external torques of the joints. Somebody pushes the arm."""
 
 import coglab
 import numpy as np

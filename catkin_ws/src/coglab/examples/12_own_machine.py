@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Parts of one's own in the brain: an action, and a state that replaces a shipped one.
+"""Own parts of the brain: an action, and a state that replaces a shipped one.
 
 Both are named as in machines.yaml: ``actions: {nod: my_lab.machines:build_nod}``. The same names serve the running
 robot."""
@@ -14,7 +14,7 @@ from example import parser, save
 
 
 class Announce(QueryDatabase):
-    """The shipped state; before it, say what comes, and leave the person a second to understand it."""
+    """Announces the object and waits 1 s, so that the person can understand it; then the shipped state."""
 
     def run(self, ud) -> str:
         self.ctx.say(Say.NOTHING, f"I will take the {ud.object_id}.")

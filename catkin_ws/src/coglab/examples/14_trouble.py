@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""What can go wrong, and what the robot says of it: hidden hands, lost datagrams, a robot controller that stops."""
+"""Faults and their reported reasons: hidden hands, lost datagrams, a robot controller that stops."""
 
 from collections.abc import Callable
 

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Attitude by an IMU in the palm, in a handover, beside the same handover without it. The joint sensors of the
-simulated arm are exact, so the IMU can only add its own error. On an arm that bends it can help."""
+"""A handover with the attitude from an IMU in the palm, compared with the same handover without it. The joint sensors
+of the simulated arm are exact, so the IMU can only add its error. On a flexible arm it can help."""
 
 import coglab
 import numpy as np

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Speed and separation (ISO/TS 15066): somebody walks up to the moving arm, which slows down and stands."""
+"""Speed and separation (ISO/TS 15066): a visitor walks up to the moving arm, which slows down and stops."""
 
 from pathlib import Path
 
@@ -13,8 +13,8 @@ options = parser(__doc__).parse_args()
 
 
 def files(folder: Path) -> str:
-    """Copies the shipped files into the folder, with two changes: a visitor is handed nothing, so nobody may touch the
-    palm, and nobody in sight is no reason to be slow."""
+    """Copy the shipped files into the folder, with two changes: a visitor receives no object, so nobody may touch the
+    palm; and the arm is not slow when nobody is in sight."""
     folder.mkdir(parents=True, exist_ok=True)
     config = package_path("coglab_controllers", "config")
     central = yaml.safe_load((config / "safe_distance.yaml").read_text())
@@ -30,7 +30,7 @@ def distance_at(time: float) -> float:
 
 
 def from_arm(world: coglab.World, person: np.ndarray) -> float:
-    """Distance (m) of the person from the lines elbow - wrist - palm, as the robot knows them."""
+    """Distance (m) of the person from the lines elbow - wrist - palm, as measured by the robot."""
     points = world.cell.robot.virtual.robot_signal("arm_points").reshape(3, 3)
     share = np.linspace(0.0, 1.0, 101)[:, None]
     lines = np.concatenate([a + share * (b - a) for a, b in zip(points, points[1:], strict=False)])
@@ -52,7 +52,7 @@ with coglab.World(seed=3, managers=files(options.out)) as world:
         rows.append((world.time - start, from_arm(world, person), float(np.linalg.norm(hand - before)) / 0.005))
         before = hand
 
-    world.cell.blind.add("human_hand")  # the simulated tracker sees the visitor alone
+    world.cell.blind.add("human_hand")  # the simulated tracker sees only the visitor
     world.after_period.append(visit)
     home = np.asarray(world.robot.arm.home)
     other = home + [0.5, 0.3, 0.0, -0.4, 0.0, 0.0, 0.0]

@@ -14,7 +14,7 @@ class Eight(Motion):
     """Draws a lying eight in the plane y, z of the base, from rest to rest."""
 
     def configure(self, setup: MotionSetup) -> None:
-        """Declare what a request may give."""
+        """Declare the arguments of a request."""
         self.width = setup.argument("width", "m", 0.12, 0.0, 0.3)
         self.duration = setup.argument("duration", "s", 5.0, 2.0, 60.0)
 
@@ -38,7 +38,7 @@ class Eight(Motion):
         return Reference(position=now, orientation=self.orientation, twist=[*velocity, 0.0, 0.0, 0.0])
 
     def done(self) -> bool:
-        """Whether the eight is drawn."""
+        """True when the eight is complete."""
         return self.time >= self.all
 
 

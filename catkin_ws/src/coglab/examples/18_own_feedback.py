@@ -14,7 +14,7 @@ class Spring(ctrl_more.FeedbackController):
     """Shifts the hand's reference by x, where mass x'' + damping x' + stiffness x = force."""
 
     def describe(self) -> ctrl_more.Description:
-        """Declare what it reads and corrects, and its gains."""
+        """Declare inputs, correction and gains."""
         d = ctrl_more.Description("Lets the hand yield to a push.")
         d.measured("wrench", size=6, unit="N, Nm", frame="base", max_age=0.1)
         d.modifies(
@@ -26,7 +26,7 @@ class Spring(ctrl_more.FeedbackController):
         return d
 
     def initialize(self, setup: ctrl_more.Setup) -> None:
-        """Fetch a handle for everything."""
+        """Get the handles of inputs, correction and gains."""
         self.wrench, self.ee = setup.read("wrench"), setup.modify("ee")
         self.mass, self.damping, self.stiffness = (setup.gain(name) for name in ("mass", "damping", "stiffness"))
         self.reset()
@@ -52,7 +52,7 @@ class Spring(ctrl_more.FeedbackController):
 
 
 def main() -> None:
-    """Push the hand with three stiffnesses and draw where it goes."""
+    """Push the hand with three stiffnesses and plot its path."""
     options = parser(__doc__).parse_args()
     figure = new_figure(7, 4)
     axes = figure.subplots()

@@ -1,12 +1,12 @@
 #!/usr/bin/python3
-"""A policy that learns: the cross-entropy method tunes the straight-line reach, on the processor alone, in less than 20
-minutes of it. It needs the extras:
+"""A learning policy: the cross-entropy method tunes the straight-line reach in less than 20 minutes of processor time.
+It needs the extras:
 
     ./coglab extras python3 catkin_ws/src/coglab/examples/20_learn_a_reach.py
 
 Each generation draws parameters around a mean, lets each meet the same people of the split "train", and moves mean and
-spread to the best. People of "validation" choose among the means of the generations. Those of "test" judge once, at the
-end: the chosen one against the start.
+spread to the best. The people of "validation" select the best generation. Those of "test" are
+used once, at the end: they compare the selected mean with the start.
 """
 
 import argparse
@@ -66,7 +66,7 @@ def learn(options, rng):
     for generation in range(options.generations):
         drawn = np.clip(mean + spread * rng.standard_normal((options.population, len(names))), low, high)
         drawn[0] = mean
-        # Other people in each generation, so that nobody is learnt by heart.
+        # Other people in each generation, against overfitting.
         people = range(generation * options.people, (generation + 1) * options.people)
         candidates = [{**start, **dict(zip(names, map(float, row_), strict=True))} for row_ in drawn]
         returns = np.array([mean_return(f) for f in judge(options.workers, candidates, options.task, "train", people)])
@@ -80,7 +80,7 @@ def learn(options, rng):
 
 
 def choose(means, options):
-    """Returns the one of ``means`` with the largest mean return with people of validation."""
+    """Returns the mean with the largest mean return on the people of validation."""
     figures = judge(options.workers, means, options.task, "validation", range(options.validation))
     returns = [mean_return(f) for f in figures]
     print("validation, return after each generation:", ", ".join(f"{one:.2f}" for one in returns), flush=True)
@@ -120,7 +120,7 @@ def main():
     parser.add_argument("--validation", type=int, default=40, help="people who choose a generation (default 40)")
     parser.add_argument("--test", type=int, default=200, help="people before and after (default 200, at most 300)")
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--out", type=Path, default=Path("out/examples"), metavar="FOLDER", help="gets the plot")
+    parser.add_argument("--out", type=Path, default=Path("out/examples"), metavar="FOLDER", help="folder of the plot")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
 

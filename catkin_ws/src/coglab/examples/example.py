@@ -1,4 +1,4 @@
-"""What the numbered examples share: their arguments, files of the robot, and where a plot goes."""
+"""Common parts of the numbered examples: arguments, files of the robot, folder of the plot."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def parser(description: str | None) -> argparse.ArgumentParser:
     """A parser with --out, the folder of the plot. An example adds its own arguments."""
     arguments = argparse.ArgumentParser(description=description)
     arguments.add_argument(
-        "--out", type=Path, default=Path("out/examples"), metavar="FOLDER", help="gets the plot (default out/examples)"
+        "--out", type=Path, default=Path("out/examples"), metavar="FOLDER", help="of the plot (default out/examples)"
     )
     return arguments
 
@@ -40,6 +40,6 @@ def save(figure: Figure, script: str, out: Path) -> None:
 
 
 def minimum_jerk(u: np.ndarray) -> np.ndarray:
-    """Share of the way at share u of the time."""
+    """Returns the share of the path at the share u of the time."""
     u = np.clip(u, 0.0, 1.0)
     return u**3 * (10.0 - 15.0 * u + 6.0 * u**2)

@@ -8,7 +8,7 @@ class Sway(Motion):
     """Sways the sixth joint by `size` and comes back."""
 
     def configure(self, setup: MotionSetup) -> None:
-        """Declare how far, and how long."""
+        """Declare size and duration."""
         self.size = setup.argument("size", "rad", 0.3, 0.0, 0.5)
         self.duration = setup.argument("duration", "s", 2.0, 0.5, 10.0)
 
@@ -19,7 +19,7 @@ class Sway(Motion):
         self.time = 0.0
 
     def reference(self, cycle: MotionCycle) -> Reference:
-        """Return the joints on a smooth way out and back."""
+        """Return the joints on a smooth path out and back."""
         self.time = min(cycle.time, self.all)
         turned = 2.0 * np.pi * self.time / self.all
         joints, velocity = self.joints.copy(), np.zeros(7)

@@ -11,7 +11,7 @@ class Sway(_Sway):
     """Sways for 10 s."""
 
     def configure(self, setup):
-        """As its base, but longer."""
+        """Like the base, but longer."""
         super().configure(setup)
         self.duration = setup.argument("longer", "s", 10.0, 0.5, 20.0)
 
@@ -20,7 +20,7 @@ class Shift(ctrl_more.FeedbackController):
     """Shifts the hand by `height` along z."""
 
     def describe(self):
-        """Declare what it needs."""
+        """Declare the correction and its gain."""
         d = ctrl_more.Description("shifts the hand")
         d.modifies("taskSpaceReferencePose", "ee", unit="m", frame="base")
         d.gain("height", 0.03, low=0.0, high=0.1, unit="m")
@@ -38,11 +38,11 @@ class Shift(ctrl_more.FeedbackController):
         self.then(modified)
 
     def then(self, modified):
-        """Do what a derived class does wrong."""
+        """Hook for the fault of a derived class."""
 
 
 class Jump(Shift):
-    """Asks for more than a slot allows, up and down."""
+    """Requests a larger correction than a slot allows, up and down."""
 
     def then(self, modified):
         """Jump."""
@@ -53,7 +53,7 @@ class Late(Shift):
     """Holds Python's lock for 0.3 s in its 40th cycle."""
 
     def then(self, modified):
-        """Compute, without giving the lock to another thread."""
+        """Compute without releasing the lock."""
         end = time.monotonic() + 0.3
         while self.cycles == 40 and time.monotonic() < end:
             sum(range(1000))

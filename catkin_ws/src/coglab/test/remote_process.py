@@ -1,6 +1,6 @@
 """A robot in virtual time with slots, and real Python processes that hold them: for tests and benchmarks.
 
-Time passes only in `Slots.step`, which may wait for the process's answer. So outcomes do not depend on the machine.
+Time passes only in `Slots.step`, which may wait for the process's answer. So the computer has no influence on results.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from coglab.control import slot as wire
 from coglab.control.host import MotionHost, find_class, load_module, serve
 
 HERE = Path(__file__).resolve().parent
-LIMIT = 60.0  # s, for all that is waited for
+LIMIT = 60.0  # s, limit of each wait
 PERIOD = 0.005  # s, a cycle
 MOTION, FEEDBACK = "python_motion", "python_feedback"
 # Gains of RemoteFeedback as it describes them.
@@ -30,18 +30,18 @@ BRAKING = 400  # cycles within which the arm must stand
 
 
 class Counted(wire.Slot):
-    """A slot that counts its answers where the robot's process sees it."""
+    """A slot that counts its answers in memory shared with the robot's process."""
 
     count: Any
 
     def answer(self, answer: npt.NDArray[np.void]) -> None:
-        """As its base."""
+        """Publish an answer and count it."""
         super().answer(answer)
         self.count.value += 1
 
 
 def answer_questions(robot: int, slot: str, file: str, name: str, count: Any) -> None:
-    """Do as `./coglab controller run FILE --class NAME`, in a process of its own."""
+    """Do the same as `./coglab controller run FILE --class NAME`, in its own process."""
     from coglab.control.feedback_host import FeedbackHost
 
     controller, kind = find_class(load_module(Path(file)), name)
@@ -52,7 +52,7 @@ def answer_questions(robot: int, slot: str, file: str, name: str, count: Any) ->
 
 
 def soon(condition: Callable[[], object], what: str) -> None:
-    """Wait until a condition holds; fail with what was waited for."""
+    """Wait until ``condition()``; fail with the text ``what``."""
     end = time.monotonic() + LIMIT
     while not condition():
         assert time.monotonic() < end, f"not within {LIMIT} s: {what}"
@@ -79,7 +79,7 @@ class Process:
         os.kill(self.process.pid, what)
 
     def end(self) -> None:
-        """Kill it, if it lives."""
+        """Kill the process if it still runs."""
         self.process.kill()
         self.process.join(LIMIT)
 
@@ -96,7 +96,7 @@ class Slots:
         self.correction = np.zeros(6)  # m and rad, applied to the hand's reference
 
     def step(self, process: Process | None = None) -> None:
-        """One cycle. With a process, its answer is waited for."""
+        """Run one cycle. With a process, wait for its answer."""
         before = process.count.value if process else 0
         cycles = self.robot.report()["cycles"]
         self.world.step(PERIOD)
@@ -113,7 +113,7 @@ class Slots:
 
     @contextmanager
     def feedback(self, name: str) -> Iterator[Process]:
-        """A process with a feedback controller, which is enabled and has corrected at least 5 mm."""
+        """Yields a process with an enabled feedback controller that has corrected at least 5 mm."""
         process = Process(FEEDBACK, name)
         try:
             self.world.feedback.enable(FEEDBACK)
@@ -125,7 +125,7 @@ class Slots:
 
     @contextmanager
     def motion(self, name: str) -> Iterator[Process]:
-        """A process with a motion, which runs."""
+        """Yields a process with a running motion."""
         process = Process(MOTION, name)
 
         def started() -> bool:
@@ -136,7 +136,7 @@ class Slots:
 
         try:
             soon(started, "the start of the motion")
-            soon(lambda: process.count.value, "the first answer")  # time stands still, or it would be silent too long
+            soon(lambda: process.count.value, "the first answer")  # without cycles, which would make it late
             yield process
         finally:
             process.end()
@@ -156,7 +156,7 @@ class Slots:
         raise AssertionError(f"the arm moves: {self.robot.motion_progress(MOTION)}")
 
     def disturb(self, kind: str, draw: random.Random) -> None:
-        """Stop or kill a process of that kind (MOTION or FEEDBACK) at a random moment, and check what becomes of it."""
+        """Stop or kill a process of that kind (MOTION or FEEDBACK) at a random moment, and check the result."""
         with self.motion("Sway") if kind == MOTION else self.feedback("Jump") as process:
             for _ in range(draw.randrange(1, 60)):
                 self.step(process)

@@ -1,4 +1,4 @@
-"""What coglab.control accepts from the author of a motion, and how it refuses the rest."""
+"""Valid and invalid values of a user's motion in coglab.control."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ from coglab.control.simulation import simulate
         ({"position": np.zeros(3), "orientation": [0, 0, 0, 2]}, "length is 2"),
     ],
 )
-def test_wrong_reference_is_refused_in_words(fields, words):
+def test_an_invalid_reference_is_refused_with_a_reason(fields, words):
     with pytest.raises(ControlError, match=words):
         Reference(**fields)
 
@@ -31,7 +31,7 @@ def test_reference_keeps_a_copy():
     assert reference.joints is not None and reference.joints[0] == 0.0
 
 
-def test_arguments_take_defaults_and_refuse_what_is_outside():
+def test_arguments_have_defaults_and_ranges():
     setup = MotionSetup()
     name = setup.argument("radius", "m", 0.05, 0.0, 0.15)
     assert setup.values({}) == {name: 0.05}
@@ -42,7 +42,7 @@ def test_arguments_take_defaults_and_refuse_what_is_outside():
         setup.values({"size": 1.0})
 
 
-def test_text_from_done_is_no_end():
+def test_done_must_return_a_truth_value():
     class Talks(Motion):
         def start(self, start):
             self.at = start.set_point.joints

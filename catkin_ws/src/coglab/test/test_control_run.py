@@ -1,4 +1,4 @@
-"""`./coglab controller run` with a real robot node (its ideal arm), and what it says about files that are no good."""
+"""`./coglab controller run` with a real robot node (ideal arm), and its messages for unusable files."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SOURCES = HERE.parents[1]
 sys.path.insert(0, str(SOURCES / "coglab_controllers" / "test"))
 from own_master import node_path, own_master  # noqa: E402
 
-LIMIT = 60.0  # s, for all that is waited for
+LIMIT = 60.0  # s, limit of each wait
 
 
 @pytest.mark.parametrize(
@@ -34,7 +34,7 @@ LIMIT = 60.0  # s, for all that is waited for
         ("class A:\n    start = reference = done = len\nclass B(A): pass\n", "2 controllers: A, B"),
     ],
 )
-def test_bad_file_is_refused_in_words(tmp_path, text, words):
+def test_a_bad_file_is_refused_with_a_reason(tmp_path, text, words):
     file = tmp_path / "bad.py"
     file.write_text(text)
     with pytest.raises(ControlError, match=words):
@@ -64,7 +64,7 @@ def running_robot() -> Iterator[subprocess.Popen]:
 
 
 def wait(condition, what: str) -> None:
-    """Wait until a condition holds; fail with what was waited for."""
+    """Wait until ``condition()``; fail with the text ``what``."""
     end = time.monotonic() + LIMIT
     while not condition():
         assert time.monotonic() < end, f"not within {LIMIT} s: {what}"

@@ -96,7 +96,7 @@ def test_no_action_breaks_a_limit_of_the_arm(make, control):
     assert env.stage.world.robot.limit_violations == 0 and not info["stopped"]
 
 
-def test_observations_hold_nothing_of_the_truth(make):
+def test_observations_contain_no_true_values(make):
     env = make(GIVE)
     seen, info = env.reset(seed=1)
     assert {"force", "dropped", "success"} <= set(info) and not {"force", "dropped", "success"} & set(seen)
@@ -104,7 +104,7 @@ def test_observations_hold_nothing_of_the_truth(make):
     assert np.abs(seen["human_hand"][:3] - truth).max() > 1e-4  # the tracker's errors
 
 
-def test_bad_actions_are_refused_in_words_and_change_nothing(make):
+def test_invalid_actions_are_refused_and_change_nothing(make):
     env = make()
     with pytest.raises(RuntimeError, match="call reset"):
         env.step(np.zeros(7))
@@ -118,7 +118,7 @@ def test_bad_actions_are_refused_in_words_and_change_nothing(make):
     ):
         with pytest.raises(ValueError, match=words):
             env.step(bad)
-    seen, *_ = env.step([9.0] * 7)  # counts as 1
+    seen, *_ = env.step([9.0] * 7)  # the same as 1
     assert seen["time"][0] == pytest.approx(0.05)
 
 
@@ -135,7 +135,7 @@ def test_bad_actions_are_refused_in_words_and_change_nothing(make):
         ({"render_mode": "human"}, "render_mode 'human' is none of"),
     ],
 )
-def test_bad_arguments_are_refused_in_words(arguments, words):
+def test_invalid_arguments_are_refused_with_a_reason(arguments, words):
     with pytest.raises(ValueError, match=words):
         coglab.envs.ReceiveEnv(**arguments)
 
@@ -152,7 +152,7 @@ def test_a_person_can_be_chosen_and_an_unknown_one_is_refused(make):
             env.reset(options=options)
 
 
-def test_a_closed_environment_is_refused_in_words(make):
+def test_a_closed_environment_is_refused_with_a_reason(make):
     env = make()
     env.reset(seed=1)
     env.close()
@@ -214,7 +214,7 @@ def test_memory_stays_over_many_resets(make):
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 25_000  # kB; a world has several MB
 
 
-def test_environments_in_processes_of_their_own():
+def test_environments_in_their_own_processes():
     vector = coglab.envs.make_vec(GIVE, 2, split="validation")
     try:
         seen, info = vector.reset(seed=3)
@@ -233,7 +233,7 @@ def test_wilsons_interval():
     assert wilson(0, 10)[0] == 0.0 and wilson(10, 10)[1] == 1.0
 
 
-def test_results_go_on_after_a_torn_line(tmp_path):
+def test_results_continue_after_an_incomplete_line(tmp_path):
     results, job = Results(tmp_path), ("receive", "test", "random", 0)
     line = {"person": 0, "success": True, "time": 5.0, "force": 8.0, "dropped": False}
     results.add(job, line)

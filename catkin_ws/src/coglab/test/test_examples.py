@@ -1,5 +1,5 @@
-"""Each example below 20 runs with small arguments and draws its picture into the folder that is given. Those from 20
-on need more time or other packages: they have tests of their own."""
+"""Each example below 20 runs with small arguments and draws its picture into the given folder. Those from 20 on need
+more time or other packages: they have their own tests."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ def palm_path(world):
     return path
 
 
-def test_a_python_motion_moves_the_palm_as_it_says(world):
+def test_the_palm_follows_a_python_motion(world):
     world.add_motion("circle", Circle())
     path = palm_path(world)
     assert world.run_motion("circle", radius=0.06, duration=4.0).ok
@@ -74,7 +74,7 @@ class Turn(Circle):
         self.joints = start.set_point.joints
 
 
-def test_a_motion_ends_when_the_arm_is_there_too(world):
+def test_a_motion_ends_when_the_arm_has_arrived_too(world):
     world.add_motion("turn", Turn())
     before = world.robot.state.joints[6]
     assert world.run_motion("turn", duration=1.0).ok
@@ -92,7 +92,7 @@ class Wrong(Circle):
 
 
 class Far(Circle):
-    """Begins somewhere else."""
+    """Starts away from the set-point."""
 
     def place(self, time):
         return super().place(time) + [0.1, 0.0, 0.0]
@@ -114,7 +114,7 @@ def raises():
     ],
     ids=["exception", "shape", "nan", "quaternion", "type", "begin"],
 )
-def test_a_motion_that_does_wrong_is_aborted_and_the_arm_brakes(world, motion, named):
+def test_a_faulty_motion_is_aborted_and_the_arm_brakes(world, motion, named):
     world.add_motion("mine", motion)
     end = world.run_motion("mine")
     assert not end.ok and end.reason == "CONTROLLER_FAULT" and named in end.causes[0] and "\n" not in end.causes[0]
@@ -123,7 +123,7 @@ def test_a_motion_that_does_wrong_is_aborted_and_the_arm_brakes(world, motion, n
     assert robot.report()["standing"] and robot.limits()["commanded"] == 0
 
 
-def test_limits_hold_for_a_motion_that_asks_for_too_much(world):
+def test_limits_hold_for_a_motion_that_is_too_fast(world):
     world.add_motion("circle", Circle())
     world.run_motion("circle", radius=0.15, duration=1.0)
     assert world.cell.robot.virtual.limits()["commanded"] == 0
@@ -136,7 +136,7 @@ def test_a_motion_that_does_not_end_is_stopped_at_its_limit(world):
     assert world.robot.state.standing
 
 
-def test_requests_that_are_wrong_are_refused_in_words(world):
+def test_invalid_requests_are_refused_with_a_reason(world):
     world.add_motion("circle", Circle())
     with pytest.raises(coglab.Refused, match="in use"):
         world.add_motion("circle", Circle())

@@ -1,4 +1,4 @@
-"""Feedback controllers by the sensors in the palm, in a handover in virtual time."""
+"""Feedback controllers with the sensors in the palm, in a handover in virtual time."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ def test_palm_sensors_drive_feedback_controllers_in_a_handover() -> None:
     assert np.median(forces, axis=0)[2] == pytest.approx(-9.81 * mass, abs=0.5)
 
 
-def test_after_a_stop_of_a_corrected_reach_the_robot_hands_over_again() -> None:
+def test_the_robot_hands_over_again_after_a_stop_in_a_corrected_reach() -> None:
     with coglab.World(seed=7, feedback="palm") as world:
         robot, virtual = world.robot, world.cell.robot.virtual
         with pytest.raises(TimeoutError, match="monitor_dmp"):
-            robot.receive(limit=2.0)  # then it is stopped, in the middle of the reach
+            robot.receive(limit=2.0)  # the limit stops it in the middle of the reach
         assert virtual.report()["active"] == "dmp"
         assert virtual.report()["standing"]
         assert virtual.feedback.status("attitude").waiting_for == "a motion"
@@ -41,14 +41,14 @@ def test_after_a_stop_of_a_corrected_reach_the_robot_hands_over_again() -> None:
         assert robot.receive()
 
 
-def test_a_file_that_is_wrong_is_refused_with_its_line(tmp_path) -> None:
+def test_an_invalid_file_is_refused_with_its_line(tmp_path) -> None:
     file = tmp_path / "signals.yaml"
     file.write_text("in:\n- {topic: a, type: sensor_msgs/Imuu, field: orientation, key: a, max_age: 1}\n")
     with pytest.raises(ValueError, match=r"signals.yaml:2: unknown type .* did you mean 'sensor_msgs/Imu'"):
         coglab.World(signals=str(file))
 
 
-def test_signals_of_ones_own_are_posted_in_virtual_time(tmp_path) -> None:
+def test_own_signals_are_posted_in_virtual_time(tmp_path) -> None:
     file = tmp_path / "signals.yaml"
     file.write_text(
         "in:\n- {topic: person, type: geometry_msgs/PoseStamped, field: position, key: person, source: estimated, "

@@ -1,4 +1,4 @@
-"""Speed and separation by the distance of the simulated person, in virtual time."""
+"""Speed and separation with the distance of the simulated person, in virtual time."""
 
 from __future__ import annotations
 

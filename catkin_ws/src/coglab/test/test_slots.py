@@ -1,4 +1,4 @@
-"""Python processes in the slots of a robot in virtual time: what they correct acts, and what goes wrong fades."""
+"""Python processes in the slots of a robot in virtual time: corrections act, and fade after a fault."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_correction_fades_when_the_controller_goes_wrong(slots: Slots, wrong: st
         slots.fades()
 
 
-def test_controller_that_holds_pythons_lock_is_late_and_comes_back(slots: Slots) -> None:
+def test_controller_that_holds_pythons_lock_is_late_and_recovers(slots: Slots) -> None:
     with slots.feedback("Late") as process:
         while process.count.value < 39:
             slots.step(process)
@@ -62,14 +62,14 @@ def test_controller_that_holds_pythons_lock_is_late_and_comes_back(slots: Slots)
         assert slots.correction[2] == pytest.approx(0.03)
 
 
-def test_motion_that_is_late_for_a_moment_goes_on_within_limits(slots: Slots) -> None:
+def test_briefly_late_motion_continues_within_limits(slots: Slots) -> None:
     with slots.motion("Sway") as process:
         for _ in range(100):
             slots.step(process)
         process.send(signal.SIGSTOP)
         for _ in range(40):  # 0.2 s, shorter than silent_time
             slots.step()
-        assert np.abs(slots.robot.report()["velocity"]).max() < 1e-3, "it did not brake"
+        assert np.abs(slots.robot.report()["velocity"]).max() < 1e-3, "it must brake"
         process.send(signal.SIGCONT)
         for _ in range(60):
             slots.step(process)
@@ -78,7 +78,7 @@ def test_motion_that_is_late_for_a_moment_goes_on_within_limits(slots: Slots) ->
 
 
 class Needy(Shift):
-    """Declares what a slot does not carry."""
+    """Declares more than a slot carries."""
 
     def __init__(self, more: Any) -> None:
         super().__init__()

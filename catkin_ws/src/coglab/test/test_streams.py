@@ -51,12 +51,12 @@ def test_the_palm_follows_and_stands_after_a_tenth_of_a_second_of_silence(arm):
     report = arm.run(0.6)
     assert report["standing"] and report["state"] == "holding" and "no command newer" in report["reason"]
     there = arm.height()
-    arm.up(0.3)  # it is still open
+    arm.up(0.3)  # the stream is still open
     assert arm.height() > there + 0.03
     assert arm.robot.limit_violations == 0
 
 
-def test_it_gives_way_to_another_motion_and_takes_over_again(arm):
+def test_a_stream_yields_to_another_motion_and_takes_over_again(arm):
     assert arm.virtual.load_controller("ptp", "coglab/PtpController")[0]
     assert arm.virtual.open_stream("twist_stream")[0]
     arm.up(0.3)
@@ -75,7 +75,7 @@ def test_it_gives_way_to_another_motion_and_takes_over_again(arm):
     assert arm.robot.limit_violations == 0
 
 
-def test_what_is_no_command_is_refused_in_words(arm):
+def test_invalid_commands_are_refused_with_a_reason(arm):
     with pytest.raises(ValueError, match="no stream of velocities is loaded under the id 'twist_stream'"):
         arm.virtual.stream_twist(UP)
     assert "'wave' is no stream" in arm.virtual.open_stream("wave")[1]
@@ -85,6 +85,6 @@ def test_what_is_no_command_is_refused_in_words(arm):
         assert not good and words in why
 
 
-def test_an_arm_that_may_not_move_opens_no_stream():
+def test_a_blocked_arm_opens_no_stream():
     good, why = Arm().virtual.open_stream("twist_stream")
     assert not good and "start" in why

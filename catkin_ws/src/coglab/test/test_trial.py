@@ -1,4 +1,4 @@
-"""Records of trials: what they hold, files, plots, fluency, and many trials."""
+"""Records of trials: contents, files, plots, fluency, and many trials."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_a_trial_holds_results_phases_and_traces(trial):
     assert any(abs(when - closed) < 0.1 for when, *_ in trial.contacts)
 
 
-def test_a_trial_is_drawn_and_comes_back_from_its_files(trial, tmp_path):
+def test_a_trial_is_plotted_saved_and_loaded(trial, tmp_path):
     trial.plot("a title").savefig(tmp_path / "trial.png")
     assert (tmp_path / "trial.png").stat().st_size > 20_000
     folder = trial.save(tmp_path / "deep" / "first")
@@ -59,7 +59,7 @@ def test_a_trial_is_drawn_and_comes_back_from_its_files(trial, tmp_path):
     assert sorted(os.listdir(folder.parent)) == ["first"]  # nothing half written
 
 
-def test_files_that_are_no_trial_are_named(trial, tmp_path):
+def test_files_without_a_valid_trial_are_named(trial, tmp_path):
     with pytest.raises(FileNotFoundError, match=r"trial.yaml"):
         coglab.Trial.load(tmp_path / "nothing")
     folder = trial.save(tmp_path / "it")
@@ -106,7 +106,7 @@ def test_a_failed_action_ends_the_trial():
     assert trial.fluency().human_idle > 0.9
 
 
-def test_wrong_actions_are_refused_in_words():
+def test_wrong_actions_are_refused_with_a_reason():
     with coglab.World(seed=1, **EASY) as world:
         with pytest.raises(ValueError, match="receive, give, take, put"):
             world.trial()
@@ -136,7 +136,7 @@ def durations(world: coglab.World) -> float:
     return world.robot.receive().duration
 
 
-def test_many_trials_on_two_processors_are_those_of_one():
+def test_many_trials_are_the_same_on_one_and_two_processors():
     two = coglab.trials(2, **EASY)
     one = coglab.trials(seeds=[1, 2], workers=1, **EASY)
     assert [t.seed for t in two] == [1, 2]
@@ -144,7 +144,7 @@ def test_many_trials_on_two_processors_are_those_of_one():
         assert a.results == b.results and np.array_equal(a.palm_position, b.palm_position)
 
 
-def test_many_trials_name_what_is_wrong():
+def test_errors_in_many_trials_name_their_cause():
     with pytest.raises(TrialFailed, match="seed 99.*this seed is odd") as failed:
         coglab.trials(seeds=[99], each=durations, **EASY)
     assert failed.value.seed == 99
@@ -165,7 +165,7 @@ def test_import_needs_neither_ros_nor_the_simulation():
     subprocess.run([sys.executable, "-c", words], check=True, timeout=120)
 
 
-def test_what_cannot_be_connected_to_is_named():
+def test_a_failed_connection_is_reported():
     words = "import coglab\ntry: coglab.connect('http://127.0.0.1:9')\nexcept ConnectionError as e: print(e)\n"
     words += "try: coglab.connect('ftp://nowhere')\nexcept ValueError as e: print(e)"
     done = subprocess.run([sys.executable, "-c", words], check=True, timeout=60, capture_output=True, text=True)

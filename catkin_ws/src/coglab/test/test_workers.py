@@ -1,4 +1,4 @@
-"""Jobs in processes of their own: what becomes of one whose process dies, hangs or meets a stalled clock."""
+"""Jobs in their own processes: results for a process that dies, hangs or has a stalled clock."""
 
 import os
 import signal
@@ -10,7 +10,7 @@ from coglab_trials.virtual_clock import ClockStalled
 
 
 class Odd(Exception):
-    """Cannot be made again from its arguments, as pickle does."""
+    """pickle cannot load it: the arguments do not fit."""
 
     def __init__(self, one, two):
         super().__init__(one)
@@ -38,7 +38,7 @@ def job(what):
 
 
 @pytest.mark.parametrize("workers", [1, 3])
-def test_each_job_has_a_result_whatever_becomes_of_its_process(tmp_path, workers):
+def test_each_job_has_a_result_even_if_its_process_dies(tmp_path, workers):
     once = ("killed", tmp_path / "killed"), ("stalled", tmp_path / "stalled")
     jobs = [
         ("plain", None),

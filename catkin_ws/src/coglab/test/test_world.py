@@ -1,4 +1,4 @@
-"""The robot in virtual time: motions, exchanges, stops, faults, and what is refused."""
+"""The robot in virtual time: motions, exchanges, stops, faults, refusals."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ def world():
 
 @pytest.fixture
 def alone():
-    """This test opens worlds of its own."""
+    """Closes the shared world: this test opens its own worlds."""
     close_shared()
 
 
-def test_arm_comes_to_joints_and_in_the_time_that_is_asked_for(world):
+def test_arm_reaches_joints_in_the_requested_time(world):
     arm, target = world.robot.arm, world.robot.arm.home + 0.2
     result = arm.move_joints(target, duration=3.0)
     assert result.ok and result.duration == pytest.approx(3.0, abs=0.3)
@@ -53,7 +53,7 @@ def test_arm_comes_to_joints_and_in_the_time_that_is_asked_for(world):
         arm.move_joints(arm.home, duration=0.01)
 
 
-def test_palm_comes_to_poses_and_frames(world):
+def test_palm_reaches_poses_and_frames(world):
     arm = world.robot.arm
     here = arm.palm
     there = coglab.Pose(here.position + [0.05, 0.1, -0.05], here.orientation)
@@ -77,7 +77,7 @@ def test_palm_follows_a_function_of_time(world):
     assert world.robot.state.standing
 
 
-def test_time_passes_only_inside_calls_and_thinking_is_no_stall(world):
+def test_time_passes_only_inside_calls(world):
     before = world.time
     time.sleep(0.3)
     assert world.time == before
@@ -160,12 +160,12 @@ def test_hand_makes_preshapes_closes_and_opens(world):
 @pytest.mark.parametrize(
     "joints", [[0.0] * 6, [[0.0] * 7], [float("nan")] * 7, [9.0] + [0.0] * 6, "home", None, [1j] * 7]
 )
-def test_wrong_joints_are_refused_in_words(world, joints):
+def test_wrong_joints_are_refused_with_a_reason(world, joints):
     with pytest.raises(ValueError, match="joints"):
         world.robot.arm.move_joints(joints)
 
 
-def test_wrong_poses_and_names_are_refused_in_words(world):
+def test_wrong_poses_and_names_are_refused_with_a_reason(world):
     arm, place = world.robot.arm, [0.6, 0.0, 0.5]
     for wrong in ([0.6], (place, [0, 0, 0, 0]), (place, [0, 0, 1]), (place[:2], [0, 0, 0, 1]), 2.0 * np.eye(4)):
         with pytest.raises(ValueError, match="target"):
@@ -184,7 +184,7 @@ def test_wrong_poses_and_names_are_refused_in_words(world):
     assert world.robot.state.standing and world.robot.state.can_move
 
 
-def test_a_world_is_of_one_thread_and_alone_in_it(world):
+def test_a_thread_has_one_world_and_uses_only_its_own(world):
     with pytest.raises(RuntimeError, match="seed 3.*close"):
         coglab.World(seed=1)
     said = []
@@ -259,7 +259,7 @@ def test_a_world_that_fails_leaves_its_thread_free(alone):
     assert coglab.World.opened() is None
 
 
-def test_an_action_without_an_object_takes_that_of_the_world(alone):
+def test_an_action_without_an_object_uses_that_of_the_world(alone):
     with coglab.World(seed=3, person="accustomed", object="ball", perfect_perception=True) as world:
         with pytest.raises(coglab.Refused, match="'dance' is no action.*receive"):
             world.robot.do("dance")
@@ -275,7 +275,7 @@ def test_hidden_things_and_losses_are_named(world):
         world.push([1e4, 0.0, 0.0], 1.0)
 
 
-def test_a_push_is_felt_and_ends(world):
+def test_a_push_acts_and_ends(world):
     before = world.robot.arm.joints
     world.push([0.0, 60.0, 0.0], 0.2)
     world.step(0.1)
@@ -332,7 +332,7 @@ def test_same_calls_give_the_same_world(alone):
     assert ends[0] == ends[1]
 
 
-def test_an_error_in_an_own_machine_comes_to_the_caller(alone):
+def test_an_error_in_an_own_machine_is_raised_in_the_caller(alone):
 
     def machine(ctx):
         master = build_master(ctx)

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""check_alone.py: whether a system of ours runs already on the ROS master that a launch file is for.
+"""check_alone.py: checks that no CogLab system runs yet on the ROS master of a launch file.
 
 For launch files (<param command=...>): runs before any node is started. Prints "alone", or ends with 1 and a sentence.
 """
@@ -12,7 +12,7 @@ from pathlib import Path
 
 from coglab_py.alone import living, refuse
 
-NODES = ("robot", "lwr", "controller_manager", "coglab")  # of which every system has at least one
+NODES = ("robot", "lwr", "controller_manager", "coglab")  # every system has at least one of them
 LOOKS_ONLY = {"--dump-params", "--nodes", "--files", "--args", "--find-node", "--ros-args"}  # roslaunch starts nothing
 
 
@@ -25,7 +25,7 @@ def main() -> int:
         try:
             there = living(master, f"/{space}/{name}" if space else f"/{name}")
         except TimeoutError:
-            refuse(f"the ROS master {master} does not answer; end what runs there")
+            refuse(f"the ROS master {master} does not answer; end the program there")
         if there:
             refuse(
                 f"a system runs already on the ROS master {master}: {there}. End it first, or give this one a master "

@@ -1,9 +1,9 @@
 #!/usr/bin/python3
-"""check_files.py ARGUMENT:=VALUE ...: whether the files that a launch file names can be used.
+"""check_files.py ARGUMENT:=VALUE ...: checks that the files in the arguments of a launch file are usable.
 
-For launch files (<param command=...>): runs before any node is started, because a node that cannot read its file is
-started again and again, or runs without it. Prints "usable", or ends with 1 and one sentence. What controllers,
-signals, primitives, patterns and objects mean is checked by the nodes that read them.
+For launch files (<param command=...>): runs before any node is started, because a node with an unreadable file
+restarts again and again, or runs without it. Prints "usable", or ends with 1 and one sentence. The nodes themselves
+check the contents of controllers, signals, primitives, patterns and objects.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from types import FrameType
 from coglab_bringup.launch_files import check
 from coglab_py.alone import refuse
 
-LIMIT = 60  # s. It imports modules of the user, and one that waits for ever would hold up the launch.
+LIMIT = 60  # s. It imports modules of the user; one that waits for ever would block the launch.
 
 
 def late(_signal: int, _frame: FrameType | None) -> None:

@@ -1,11 +1,11 @@
 #!/usr/bin/python3
-"""The node /scene_markers: what rviz needs besides robot and person to show what is going on.
+"""The node /scene_markers: markers for rviz, besides robot and person.
 
 Publishes coglab/scene (visualization_msgs/MarkerArray, latched, 5 Hz): pedestal, board (frame `board`), during a motion
-its goal (frame `dmp_goal`) and the path of the primitive from where it began to that goal, and a line of text from
+its goal (frame `dmp_goal`) and the path of the primitive from its start to that goal, and a line of text from
 coglab/state. Subscribes controller_manager/dmp/feedback and coglab/state. Nothing in control reads any of it.
 Parameters: coglab/dmp_library (XML file of the primitives), ~board_size (m along x, y of the frame `board`).
-Where a primitive was loaded from another file later, its path is not drawn.
+The path of a primitive that was loaded later from another file is not drawn.
 """
 
 import sys
@@ -25,7 +25,7 @@ from visualization_msgs.msg import MarkerArray
 
 PERIOD = 0.2  # s
 SHOWN = ("running", "holding", "reached")  # states of a motion whose goal and path are drawn
-SILENCE = 1.0  # s without feedback after which the controller is taken to be idle
+SILENCE = 1.0  # s without feedback after which the controller counts as idle
 
 
 class SceneMarkers:
@@ -38,8 +38,8 @@ class SceneMarkers:
         self.board_size = (length, width)
         self.lock = threading.Lock()
         self.words = ""
-        self.primitive = ""  # of the motion that runs
-        self.start: np.ndarray | None = None  # where it began, m in the base, (3,)
+        self.primitive = ""  # of the running motion
+        self.start: np.ndarray | None = None  # its start, m in the base, (3,)
         self.heard = 0.0
         self.frames = tf2_ros.Buffer()
         self.listener = TfListener(self.frames, "world")
@@ -52,7 +52,7 @@ class SceneMarkers:
         self.words = scene.words_of(message.state, message.object_id, message.why)
 
     def on_feedback(self, message: DmpFeedback) -> None:
-        """Where a motion begins, from its first feedback."""
+        """Store the start of a motion, from its first feedback."""
         with self.lock:
             self.heard = time.monotonic()
             if message.state not in SHOWN:
@@ -69,7 +69,7 @@ class SceneMarkers:
         return np.array([t.x, t.y, t.z])
 
     def motion(self) -> list:
-        """Goal and path of the motion under way, or their removal."""
+        """Goal and path of the running motion, or their removal."""
         with self.lock:
             fresh = time.monotonic() - self.heard < SILENCE
             primitive, start = (self.primitive, self.start) if fresh else ("", None)

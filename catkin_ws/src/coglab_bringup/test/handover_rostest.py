@@ -19,7 +19,7 @@ from tf2_msgs.msg import TFMessage
 
 PAGE = Path(__file__).resolve().parents[4] / "docs" / "architecture.md"
 CMD = 2  # FRI state in which the arm follows our commands
-FLOAT32 = 5e-4  # rad/s, what rounding to float32 on the wire adds to a velocity (at 10 ms)
+FLOAT32 = 5e-4  # rad/s, error of a velocity from rounding to float32 on the wire (at 10 ms)
 
 
 class Handover(unittest.TestCase):
@@ -39,7 +39,7 @@ class Handover(unittest.TestCase):
         recorder = TrialRecorder()
         cls.row, cls.start, cls.end = run_handover("exchange_human_to_robot", "mug", recorder)
         cls.trial = recorder.stop()
-        cls.stamps_later = rospy.get_time() - time.monotonic()  # s, of ROS time than the steady clock
+        cls.stamps_later = rospy.get_time() - time.monotonic()  # s, ROS time minus steady clock
 
     @classmethod
     def on_tf(cls, message):
@@ -55,7 +55,7 @@ class Handover(unittest.TestCase):
 
     def test_frames_of_arm_hand_person_and_goal(self):
         for frame in FRAMES:
-            self.frames.lookup_transform("world", frame, rospy.Time(0), rospy.Duration(60.0))  # raises if there is none
+            self.frames.lookup_transform("world", frame, rospy.Time(0), rospy.Duration(60.0))  # raises without it
         self.assertEqual(self.goal_owners, {"/robot"})
 
     def test_outcome(self):
@@ -70,7 +70,7 @@ class Handover(unittest.TestCase):
         self.assertEqual([text for text in errors if not text.startswith("incoming connection failed")], [])
 
     def test_every_reach_ends_and_has_its_error(self):
-        """How large it may be is judged in virtual time."""
+        """Its limit is tested in virtual time."""
         self.assertEqual(self.row["final_error_by"], "truth of the simulated cell")
         self.assertTrue(self.row["reaches"])
         for reach in self.row["reaches"]:

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Controllers on the ideal arm: point-to-point, DMP, feedback, hold and reset, an orderly end."""
+"""Controllers on the ideal arm: point-to-point, DMP, feedback, hold and reset, shutdown."""
 
 from __future__ import annotations
 
@@ -53,8 +53,8 @@ class IdealArm(unittest.TestCase):
         self.assertIn("/robot", nodes)
         self.assertFalse(nodes & {"/lwr", "/cell", "/coglab_sim", "/ih2_hand", "/coglab", "/perception"}, nodes)
 
-    def test_1b_state_and_status_are_told_again_without_a_change(self) -> None:
-        """Who looks on knows a silent node from that."""
+    def test_1b_state_and_status_are_published_again_without_a_change(self) -> None:
+        """Thus observers can detect a silent node."""
         told: list[ControllerStatus] = []
         rospy.Subscriber("controller_manager/status", ControllerStatus, told.append)
         count = len(self.states)
@@ -85,10 +85,10 @@ class IdealArm(unittest.TestCase):
         self.assertEqual(robot.arm(), held)
         self.assertTrue(self.command("reset").success)
         wait_until(lambda: robot.state.motion_allowed, "motion allowed")
-        self.assertEqual(robot.arm(), held)  # what ran before the hold is over
+        self.assertEqual(robot.arm(), held)  # the motion before the hold has ended
         robot.go(HOME)
 
-    def test_4_reaches_a_goal_of_tf_and_takes_feedback(self) -> None:
+    def test_4_reaches_a_tf_goal_with_feedback_controllers(self) -> None:
         robot = self.robot
         path = rospkg.RosPack().get_path("coglab_controllers") + "/config/primitives.xml"
         self.assertTrue(robot.dmp("load_dmps", path).success)
@@ -122,7 +122,7 @@ class IdealArm(unittest.TestCase):
         epochs = [state.motion_epoch for state in self.states]
         self.assertEqual(epochs, sorted(epochs))
 
-    def test_7_ends_at_once_and_comes_again(self) -> None:
+    def test_7_ends_at_once_and_is_restarted(self) -> None:
         first = robot_processes()
         self.assertEqual(len(first), 1)
         end_all(first)

@@ -1,4 +1,4 @@
-"""The names that a running system shows: what `rostopic list`, `rosservice list`, `rosnode list` and tf2 must hold."""
+"""Names in a running system: required entries of `rostopic list`, `rosservice list`, `rosnode list` and tf2."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ FRAMES = ["world", "lwr_base_link", "lwr_flange", "ih2_palm", "human_hand", "obj
 
 
 def missing_names(topics: dict[str, str], services: set[str], nodes: set[str]) -> list[str]:
-    """What is missing, or has another type, in a graph: `topics` with types, `services` and `nodes`, by full name."""
+    """Returns missing names and wrong types in a graph: `topics` with types, `services` and `nodes`, by full name."""
     problems = [
         f"topic {name}: expected {kind}, found {topics.get(name, 'nothing')}"
         for name, kind in TOPICS.items()

@@ -1,4 +1,4 @@
-"""Messages that no node expects, for every topic that a running system listens to and every service that it offers."""
+"""Unexpected messages for every subscribed topic and every service of a running system."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ import rospy
 import rosservice
 
 FOREIGN = ("/rosout", "/joint_state_publisher", "/robot_state_publisher", "/rviz")
-LEFT_OUT = ("/coglab/stop",)  # would refuse every motion from then on
+LEFT_OUT = ("/coglab/stop",)  # would block every later motion
 FLOATS = (math.nan, math.inf, -math.inf, 3e38, -3e38)
 TEXTS = (" ", "\0", "a\0b", "../../etc/passwd", "%s%n%x", "☃" * 50, "{[}:", "//x", "-1", "nan", "\x1b[2J", "x" * 5000)
 KNOWN = ("mug", "human_hand", "object_mug", "world", "dmp", "ptp", "reach_human", "lwr_a1")
@@ -28,7 +28,7 @@ INTEGER = re.compile(r"(u?)int(8|16|32|64)$")
 
 
 def fill(message: Any, draw: random.Random, fine: bool) -> Any:
-    """Every float is not finite or huge, every text odd. `fine`: these are harmless, and all times are odd."""
+    """Fill with floats that are not finite or huge, and odd texts. `fine`: harmless ones, but odd times."""
     for name, of in zip(message.__slots__, message._slot_types, strict=True):
         array = ARRAY.match(of)
         if not array:
@@ -42,7 +42,7 @@ def fill(message: Any, draw: random.Random, fine: bool) -> Any:
 
 
 def has_time(kind: Any) -> bool:
-    """Whether a message has a stamp or a duration, in itself or in a part."""
+    """True if a message type contains a time or a duration, at any depth."""
     for of in kind._slot_types:
         name = (ARRAY.match(of) or [of, of])[1]
         if name in ("time", "duration", "Header", "std_msgs/Header"):
@@ -53,7 +53,7 @@ def has_time(kind: Any) -> bool:
 
 
 def odd_messages(kind: Any, count: int, draw: random.Random) -> Iterator[Any]:
-    """So many; of those with a time every third one is odd in that alone."""
+    """Yields ``count`` messages. Of types with a time, every third message has only an odd time."""
     timed = has_time(kind)
     for number in range(count):
         yield fill(kind(), draw, timed and number % 3 == 0)
@@ -80,7 +80,7 @@ def value_of(of: str, draw: random.Random, fine: bool) -> Any:
 
 
 class OddMessages:
-    """Sends them. `ended`: nodes that did not survive; `unanswered`: services that gave no answer within `limit` s."""
+    """Sends odd messages. `ended`: nodes that died. `unanswered`: services without a response within `limit` s."""
 
     def __init__(self) -> None:
         self.master = rosgraph.Master(rospy.get_name())
@@ -99,11 +99,11 @@ class OddMessages:
     def _process(self, node: str) -> int:
         try:
             return int(ServerProxy(self.master.lookupNode(node)).getPid(rospy.get_name())[2])
-        except Exception:  # of whatever kind: no answer
+        except Exception:  # any error: no answer
             return 0
 
     def send(self, to_topics: int, to_services: int, limit: float = 60.0) -> None:
-        """So many to each topic, and to each service."""
+        """Send these numbers of messages to each topic and to each service."""
         threads = {
             name: threading.Thread(target=self._call, args=(name, kind, to_services), daemon=True)
             for name, kind in self.services.items()
@@ -130,5 +130,5 @@ class OddMessages:
         for request in odd_messages(kind._request_class, each, random.Random(name)):
             try:
                 proxy(request)
-            except Exception:  # an error that the service answers with, or a request that cannot be serialised
+            except Exception:  # an error response, or a request that cannot be serialised
                 continue

@@ -59,7 +59,7 @@ class PythonRobot(unittest.TestCase):
         self.assertTrue(self.robot.state.standing)
         self.assertGreater(np.abs(arm.joints - arm.home + 0.3).max(), 0.05)
 
-    def test_2_comes_to_a_pose_and_follows_a_function(self) -> None:
+    def test_2_reaches_a_pose_and_follows_a_function(self) -> None:
         arm = self.robot.arm
         self.assertTrue(arm.move_joints(arm.home).ok)
         palm = arm.palm
@@ -96,7 +96,7 @@ class PythonRobot(unittest.TestCase):
         self.assertTrue(received.started <= received.marks["closed"] <= received.ended <= rospy.get_time())
         with self.assertRaises(coglab.Refused):
             robot.hand.open()
-        # A client written from actionlib and the messages alone gives it back.
+        # A client that uses only actionlib and the messages gives it back.
         client = str(package_path("coglab_smach", "examples", "handover_client.py"))
         given = subprocess.run([sys.executable, client, "give", "mug"], capture_output=True, text=True, timeout=LIMIT)
         self.assertEqual(given.returncode, 0, given.stdout + given.stderr)

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
-"""A session of the whole system: from the person, with all cases of a handover, onto the board, from the board, to the
-person. Then odd messages come on every topic and service, and the robot's node is killed while the machine waits: it
-says so, and can go on."""
+"""A session of the whole system: from the person with all cases of a handover, onto the board, from the board, to the
+person. Then every topic and service receives odd messages, and the robot's node is killed while the machine waits: the
+reason is published, and the machine can continue."""
 
 import os
 import re
@@ -32,7 +32,7 @@ WORKSPACE = Path(rospkg.RosPack().get_path("coglab_bringup")).parents[1]
 
 
 def built_for_the_first_demo() -> set[str]:
-    """Names of the programs and libraries that the target coglab_system builds, with all that these depend on."""
+    """Names of the programs and libraries of the target coglab_system and of its dependencies."""
     needs: dict[str, set[str]] = {}
     for target, needed in re.findall(
         r"^(\S+\.dir)/all: (\S+\.dir)/all$", (WORKSPACE / "build/CMakeFiles/Makefile2").read_text(), re.MULTILINE
@@ -48,14 +48,14 @@ def built_for_the_first_demo() -> set[str]:
 
 
 def loaded_by_this_session() -> set[str]:
-    """Names of the programs and libraries of this workspace that its running processes have in memory, and of those
-    that programs of the launch file load before there are any."""
+    """Names of the programs and libraries of this workspace in the memory of its running processes, and of those that
+    programs of the launch file load before them."""
     ours = f"ROS_MASTER_URI={os.environ['ROS_MASTER_URI']}\0".encode()
     text = ""
     for process in Path("/proc").glob("[0-9]*"):
         try:
             text += (process / "maps").read_text() if ours in (process / "environ").read_bytes() else ""
-        except OSError:  # it has ended, or is somebody else's
+        except OSError:  # it has ended, or belongs to another user
             continue
     with tempfile.TemporaryDirectory() as out:
         told = {"LD_DEBUG": "files", "LD_DEBUG_OUTPUT": f"{out}/loaded"}
@@ -68,7 +68,7 @@ def loaded_by_this_session() -> set[str]:
 
 
 class Session(Handover):
-    """The actions run once, in setUpClass; the cases of Handover, too, look at what has happened then."""
+    """The actions run once, in setUpClass; all cases, also those of Handover, check their results."""
 
     @classmethod
     def setUpClass(cls):
@@ -103,8 +103,8 @@ class Session(Handover):
         self.assertEqual(drawn, {"pedestal", "board", "goal", "path", "state"})
         self.assertTrue(any(m.points for array in self.scenes for m in array.markers if m.ns == "path"))
 
-    def test_6_all_that_runs_is_what_the_first_demo_builds(self):
-        """Whoever types ./coglab demo first has nothing else of this workspace."""
+    def test_6_only_programs_that_the_first_demo_builds_run(self):
+        """After a first ./coglab demo, nothing else of this workspace is built."""
         loaded = loaded_by_this_session()
         self.assertLessEqual(
             {"robot_node", "cell_node", "libcoglab_sim_plant"}, {name.split(".")[0] for name in loaded}

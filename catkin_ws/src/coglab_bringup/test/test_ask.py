@@ -1,4 +1,4 @@
-"""./coglab start, status and hold against a brain that publishes its latched state, on a master of its own."""
+"""./coglab start, status and hold with a simulated brain that publishes its latched state, on its own master."""
 
 import os
 import subprocess
@@ -17,7 +17,7 @@ TAKES = ["exchange_human_to_robot", "take"]
 
 
 class BrainDouble:
-    """Serves /coglab/start as the brain does: what the hub takes while it is in a hub, else nothing."""
+    """Serves /coglab/start like the brain: in a hub it accepts the hub's actions, otherwise nothing."""
 
     def __init__(self) -> None:
         import rospy
@@ -38,7 +38,7 @@ class BrainDouble:
             return StartResponse(success=accepted, message=f"'{request.action}' {words}")
 
         def on_command(request):
-            self.say("/coglab_master/stopped", ["reset"], "hold was asked for")
+            self.say("/coglab_master/stopped", ["reset"], "hold was requested")
             return LwrCommandResponse(success=True, message=f"{request.event} done")
 
         rospy.Service("/coglab/start", Start, on_start)
@@ -47,7 +47,7 @@ class BrainDouble:
         self.say("/coglab_master/initialise/home", [])
 
     def say(self, state: str, actions: list, why: str = "", object_id: str = "") -> None:
-        """Publishes the state; a hub is where actions are taken."""
+        """Publish the state; with actions it is a hub."""
         self.now = self._state(state=state, actions=actions, in_hub=bool(actions), why=why, object_id=object_id)
         self._publisher.publish(self.now)
 
@@ -70,11 +70,11 @@ def brain():
 
 
 def begin(*words: str) -> subprocess.Popen:
-    """./coglab WORDS with the master of this test named, output and errors as one text."""
+    """Start ./coglab WORDS with the master of this test, output and errors as one text."""
     port = os.environ["ROS_MASTER_URI"].rsplit(":", 1)[1]
     environment = {**os.environ, "COGLAB_TOP": str(TOP)}
     return subprocess.Popen(
-        [sys.executable, "-I", "-S", ask_module.__file__, *words, "-p", port],  # as ./coglab does: without ROS
+        [sys.executable, "-I", "-S", ask_module.__file__, *words, "-p", port],  # like ./coglab: without ROS
         env=environment,
         text=True,
         stdout=subprocess.PIPE,
@@ -89,7 +89,7 @@ def ask(*words: str) -> tuple[int, str]:
     return process.returncode, output
 
 
-def test_start_waits_for_the_hub_and_takes_what_the_person_offers(brain):
+def test_start_waits_for_the_hub_and_takes_the_offered_object(brain):
     process = begin("start")
     line = process.stdout.readline()
     assert "waiting for the hub" in line and "now: home" in line
@@ -100,14 +100,14 @@ def test_start_waits_for_the_hub_and_takes_what_the_person_offers(brain):
     brain.started.clear()
 
 
-def test_hold_status_and_the_way_back(brain):
+def test_hold_status_and_reset(brain):
     brain.say("/coglab_master/wait_with_object", ["exchange_robot_to_human", "put"], object_id="mug")
     status, output = ask("status")
     assert status == 0 and "wait_with_object (takes exchange_robot_to_human, put)" in output and "object: mug" in output
     status, output = ask("hold")
     assert status == 0 and "hold done; on again: ./coglab start reset" in output
     status, output = ask("status")
-    assert "hold was asked for" in output and "next:   ./coglab start reset" in output
+    assert "hold was requested" in output and "next:   ./coglab start reset" in output
     status, output = ask("start")
     assert status == 1 and "stopped takes reset; name one" in output and "hold was" in output
     status, output = ask("start", "reset")
@@ -131,14 +131,14 @@ def test_a_short_name_and_a_delivery_reach_the_brain(brain):
     brain.started.clear()
 
 
-def test_what_the_hub_does_not_take_ends_with_what_to_type(brain):
+def test_a_refused_action_ends_with_a_command(brain):
     brain.say(HUB, TAKES)
     status, output = ask("start", "put", "--wait", "0.5")
     assert status == 1 and "wait_without_object does not take 'put'" in output
     assert output.endswith("type: ./coglab start exchange_human_to_robot or ./coglab start take\n"), output
 
 
-def test_the_master_never_hears_of_who_asks(brain):
+def test_the_command_does_not_register_at_the_master(brain):
     import rosgraph
 
     brain.say(HUB, TAKES)
@@ -162,7 +162,7 @@ def test_no_system_and_several(tmp_path, monkeypatch):
     with pytest.raises(Refused, match=r"-p 4001 \(launch\), -p 4002 \(demo\)"):
         find_master(tmp_path, 0, "")
     assert find_master(tmp_path, 0, "http://127.0.0.1:4002") == "http://127.0.0.1:4002"
-    # one that has ended is forgotten, also where another program has its process id now
+    # an ended system is forgotten, even if another program has its process id now
     runs = tmp_path / ".coglab" / "runs"
     (runs / "4002.json").write_text(f'{{"command": "demo", "pid": {os.getpid()}, "start_time": "1"}}')
     assert running_systems(tmp_path) == {4001: "launch"} and not (runs / "4002.json").exists()

@@ -1,5 +1,5 @@
-"""Which smach ./coglab builds with, and what it does when that changes; the functions of the script itself, with other
-places to look in."""
+"""The smach that ./coglab builds with, and changes of it. The tests run the functions of the script itself, with other
+search paths."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def with_smach(prefix: Path, *packages: str) -> Path:
 
 
 class Script:
-    """The functions in a folder of their own, which look below `places` and nowhere else."""
+    """The functions in their own folder; they search only below `places`."""
 
     def __init__(self, folder: Path) -> None:
         self.workspace = folder / "catkin_ws"
@@ -43,7 +43,7 @@ class Script:
         (self.workspace / "build" / "CMakeCache.txt").write_text(f"CATKIN_BLACKLIST_PACKAGES:STRING={packages}\n")
 
     def run(self, command: str, ask: str = "") -> subprocess.CompletedProcess:
-        """What `./coglab COMMAND` chooses; `ask` as the branch of build does before it."""
+        """Choose smach like `./coglab COMMAND`. `ask`: commands before it, as in the branch of build."""
         places = "for prefix in /usr /opt/ros/*; do"
         find = function("find_upstream_smach")
         assert places in find
@@ -71,23 +71,23 @@ ASK = "upstream_smach=$(find_upstream_smach)"
 ALL = ";".join(PACKAGES)
 
 
-def test_asked_for_it_leaves_ours_out_and_finds_the_prefix_that_holds_all_three(script):
+def test_upstream_smach_omits_ours_and_needs_all_three_packages_in_one_prefix(script):
     with_smach(script.places / "a", "smach", "smach_ros")
     whole = with_smach(script.places / "b", *PACKAGES)
     assert script.run("build", ASK).stdout == f"left out: {ALL}; before: ; path: {whole}\n"
 
 
-def test_asked_for_where_it_is_not_installed_it_says_so_and_ends(script):
+def test_missing_upstream_smach_is_an_error(script):
     with_smach(script.places / "a", "smach", "smach_msgs")
     ended = script.run("build", ASK)
     assert ended.returncode == 1 and "needs smach, smach_msgs and smach_ros" in ended.stderr
 
 
-def test_later_commands_use_what_was_built_last_and_a_plain_build_goes_back_to_ours(script):
+def test_later_commands_use_the_last_build_and_a_plain_build_returns_to_ours(script):
     whole = with_smach(script.places / "noetic", *PACKAGES)
     script.built_without(ALL)
     assert script.run("demo").stdout == f"left out: {ALL}; before: {ALL}; path: {whole}\n"
-    # The names differ: build() then removes what was built with the other one.
+    # The names differ: build() then removes the build with the other one.
     assert script.run("build").stdout == OURS.format(ALL)
     assert '[ "$was_left_out" = "$left_out" ] || rm -rf "$workspace/build" "$workspace/devel"' in function("build")
 

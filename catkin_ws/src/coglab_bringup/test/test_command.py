@@ -1,4 +1,4 @@
-"""./coglab where something is wrong: one clear sentence, what to do, and nothing left half-done."""
+"""./coglab with faults: one clear sentence, the next step, and nothing incomplete."""
 
 import os
 import shutil
@@ -30,7 +30,7 @@ def run(*command: object, **environment: str) -> subprocess.CompletedProcess:
 
 
 def needs(*command: str) -> pytest.MarkDecorator:
-    """Skips where this command, which prepares the fault, does not run (no root, or a container that forbids it)."""
+    """Skip if the command that prepares the fault does not run (no root, or a restricted container)."""
     works = shutil.which(command[0]) and subprocess.run(command, capture_output=True, check=False).returncode == 0
     return pytest.mark.skipif(
         not works, reason=f"`{' '.join(command)}` does not run here: not root, or a restricted container"
@@ -45,14 +45,14 @@ def checkout():
     shutil.copy(TOP / "coglab", folder)
     (folder / "debian-packages.txt").write_text(f"run: {ABSENT}\nbuild: {ABSENT}\n")
     for path in folder.iterdir():
-        path.chmod(0o755)  # whatever umask this checkout was made with
+        path.chmod(0o755)  # independent of the umask of this checkout
     yield folder
     shutil.rmtree(folder)
 
 
 @pytest.fixture
 def workspace(checkout):
-    """A checkout of which every package is installed, with coglab_bringup alone in its workspace."""
+    """A checkout whose packages are all installed, with only coglab_bringup in its workspace."""
     (checkout / "debian-packages.txt").write_text("run: bash\nbuild: bash\n")
     sources = checkout / "catkin_ws" / "src"
     sources.mkdir(parents=True)
@@ -113,7 +113,7 @@ esac
 @needs("unshare", "--mount", "true")
 @pytest.mark.parametrize("suite, advice", [("sid", "/etc/apt also names sid"), ("", "to go on by hand: apt-get")])
 def test_packages_that_cannot_be_installed(checkout, suite, advice):
-    """An upgrade of Debian that is half done is named; umask 077 of the caller does not reach Debian's packages."""
+    """An incomplete upgrade of Debian is named; the caller's umask 077 does not affect Debian's packages."""
     tool = checkout / "apt-get"
     tool.write_text(APT_GET)
     tool.chmod(0o755)
@@ -145,7 +145,7 @@ def test_full_disk(workspace, tmp_path):
     assert ".coglab" not in ended.stdout and ended.stdout.splitlines()[-1] == "src"
 
 
-def test_doctor_names_a_missing_package_and_the_way_to_it(checkout):
+def test_doctor_names_a_missing_package_and_its_command(checkout):
     doctor = TOP / "catkin_ws/src/coglab_bringup/src/coglab_bringup/doctor.py"
     ended = run("/usr/bin/python3", "-I", doctor, checkout)
     assert ended.returncode == 1
@@ -153,7 +153,7 @@ def test_doctor_names_a_missing_package_and_the_way_to_it(checkout):
     assert "not built yet; do it: ./coglab build" in ended.stdout
 
 
-def test_a_foreign_ros_is_named_and_left_aside():
+def test_a_foreign_ros_is_named_and_not_used():
     ended = run(TOP / "coglab", "help", ROS_PACKAGE_PATH="/opt/ros/noetic/share")
     assert ended.returncode == 0 and "a ROS from /opt/ros is in your environment" in ended.stdout
     ended = run(TOP / "coglab", "doctor", ROS_PACKAGE_PATH="/opt/ros/noetic/share")
@@ -178,7 +178,7 @@ def test_occupied_port():
 def test_a_build_that_fails_without_the_word_error(workspace):
     folder = workspace / "catkin_ws" / "build"
     folder.mkdir()
-    (folder / ".built_by").write_text("catkin build")  # catkin_make refuses it, in words of its own
+    (folder / ".built_by").write_text("catkin build")  # catkin_make refuses it with its own message
     ended = run(workspace / "coglab", "build")
     assert ended.returncode == 1
     assert "previously built by 'catkin build'" in ended.stdout
@@ -211,7 +211,7 @@ def test_a_newer_source_is_built_and_data_is_not(workspace):
         change()
         assert "building" in run(coglab, "shell", "true").stdout
         assert "building" not in run(coglab, "shell", "true").stdout
-    assert "building" in run(coglab, "build").stdout  # who asks for it by name gets it
+    assert "building" in run(coglab, "build").stdout  # an explicit build always builds
 
 
 def test_the_template_of_a_controller_is_named_as_the_runner_expects(tmp_path):
@@ -229,7 +229,7 @@ def test_the_template_of_a_controller_is_named_as_the_runner_expects(tmp_path):
     assert f"set(test_target {program.name})" in cmake and "test/test_controller.cpp" in cmake
 
 
-def test_a_run_finds_its_home_again_and_shares_it_with_nobody(tmp_path):
+def test_a_run_reuses_its_home_and_never_shares_it(tmp_path):
     from coglab_bringup.run_directory import lasting_home
 
     first, lock = lasting_home(tmp_path)
@@ -237,6 +237,6 @@ def test_a_run_finds_its_home_again_and_shares_it_with_nobody(tmp_path):
     assert first != second
     os.close(lock)
     again, lock = lasting_home(tmp_path)
-    assert again == first  # with what the hand holds, and without waiting for the other run
+    assert again == first  # with the held object, and without waiting for the other run
     os.close(lock)
     os.close(other)

@@ -1,4 +1,4 @@
-"""docker/run and docker/test, with an engine that only writes down what it is asked for."""
+"""docker/run and docker/test, with an engine that only records its calls."""
 
 import os
 import shutil
@@ -21,7 +21,7 @@ IN_CONTAINER = ["run", "--rm", "--network", "none", "--hostname", "localhost"]
 
 
 class Checkout:
-    """The docker folder in a checkout of its own, and an engine of that name."""
+    """The docker folder in its own checkout, and an engine of that name."""
 
     def __init__(self, folder: Path) -> None:
         self.top, self.log = folder / "checkout", folder / "asked"
@@ -43,7 +43,7 @@ class Checkout:
         )
 
     def asked(self) -> list[list[str]]:
-        """What the engine was asked for, but for questions."""
+        """Calls of the engine, without queries."""
         calls = [call.split("\n")[:-1] for call in self.log.read_text().split("= end\n") if call]
         return [call for call in calls if call[0] in ("build", "run")]
 
@@ -63,8 +63,8 @@ def expected_build(top: Path, suite: str = "bookworm") -> list[str]:
     "words, command",
     [([], ["./coglab", "demo", "--headless"]), (["./coglab", "test", "a b"], ["./coglab", "test", "a b"])],
 )
-def test_run_builds_what_is_there_now_and_runs_the_command_in_it(checkout, words, command):
-    """The image is never an old one; the demo's results are seen outside, and nothing else is."""
+def test_run_builds_the_present_sources_and_runs_the_command(checkout, words, command):
+    """The image is never an old one. Only the demo's results are visible outside."""
     for _ in range(2):
         checkout.log.unlink(missing_ok=True)
         ended = checkout.run("run", *words)
@@ -88,15 +88,15 @@ def test_unknown_suite_is_named(checkout, script, words):
     assert not checkout.log.exists()
 
 
-def test_how_they_end_says_what_happened(checkout):
+def test_exit_status_and_message_show_the_failure(checkout):
     assert checkout.run("run", ENGINE_RUN="3").returncode == 3
     checkout.log.unlink()
     ended = checkout.run("test", ENGINE_BUILD="1")
     assert ended.returncode == 71 and "the image did not build" in ended.stderr
-    assert [call[0] for call in checkout.asked()] == ["build"], "nothing runs in an image that is not there"
+    assert [call[0] for call in checkout.asked()] == ["build"], "nothing runs without an image"
 
 
-def test_without_an_engine_they_say_how_to_get_one(checkout):
+def test_a_missing_engine_is_reported_with_a_remedy(checkout):
     tools = checkout.tools
     (tools / "docker").unlink()
     for name in ("bash", "env", "dirname", "readlink", "mkdir", "timeout"):

@@ -19,7 +19,7 @@ def text_of(page: Path) -> str:
 
 
 def anchors(page: Path) -> set[str]:
-    """The anchors of a page's headings, as the usual renderers of Markdown make them."""
+    """The anchors of a page's headings, as in the usual renderers of Markdown."""
     text = re.sub(r"```.*?```", "", text_of(page), flags=re.S)
     titles = re.findall(r"^#+ +(.+?) *$", text, re.M)
     return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
@@ -50,9 +50,9 @@ def test_links_exist(page: Path):
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(TOP)))
 def test_named_files_exist(page: Path):
-    """Files that are named with their path from the top of the checkout; NAME and <...> stand for any."""
+    """Files named with their path from the top of the checkout; NAME and <...> are placeholders."""
     named = re.findall(r"`((?:catkin_ws/src|docs|docker|benchmarks)/[\w./-]+\.\w+)`", text_of(page))
-    made = ("side_sway", "wrist_damper", "_build", "/cup.yaml", "NAME")  # by the commands on the page
+    made = ("side_sway", "wrist_damper", "_build", "/cup.yaml", "NAME")  # created by the commands on the page
     missing = [name for name in named if not (TOP / name).exists() and not any(part in name for part in made)]
     assert not missing
 

@@ -1,4 +1,4 @@
-"""Arguments of the launch files reach the nodes that they are for."""
+"""Arguments of the launch files reach their nodes."""
 
 import pytest
 from coglab_bringup.launch_arguments import whole_path
@@ -13,7 +13,7 @@ OTHERS = ("signals:=signals", "managers:=safe_distance")  # shipped files, by na
 
 
 def load(package, file, *arguments):
-    """The launch file as roslaunch reads it; nothing starts."""
+    """Load the launch file with roslaunch, without a start."""
     path = str(package_path(package, "launch", file))
     return load_config_default([(path, list(arguments))], None, verbose=False, assign_machines=False)
 
@@ -36,7 +36,7 @@ def test_arm_and_controller_manager_read_the_same_limits(package, file, profile)
 
 @pytest.mark.parametrize("file", ["coglab.launch", "real.launch"])
 def test_learnt_contact_thresholds_reach_the_detector(file, tmp_path):
-    learnt = str(tmp_path / "learnt.yaml")  # is not there before the first learning
+    learnt = str(tmp_path / "learnt.yaml")  # does not exist before the first learning
     found = parameters("coglab_bringup", file, f"contact_learnt_file:={learnt}", REAL)
     assert found["/contact_detector/learnt_file"] == learnt
 
@@ -72,7 +72,7 @@ FILES = ["controllers", "feedback", "managers", "signals", "primitives", "object
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_a_file_that_is_not_there_empty_a_folder_or_broken_is_refused_by_the_argument(tmp_path, name):
+def test_a_missing_empty_or_broken_file_or_a_folder_is_refused_by_the_argument(tmp_path, name):
     (tmp_path / "folder").mkdir()
     (tmp_path / "empty").touch()
     (tmp_path / "broken").write_text("a: [1, 2\nb: {\n")
@@ -102,10 +102,10 @@ def test_a_file_that_cannot_be_written_is_refused(tmp_path, name):
         ({"machines": "machines.yaml"}, "whole path"),
         ({"arm": "libnot_there.so"}, "cannot be loaded"),
         ({"arm": "libc.so.6"}, "COGLAB_ARM"),
-        ({"arm": "ideal", "split": "true"}, "fri alone"),
+        ({"arm": "ideal", "split": "true"}, "needs arm:=fri"),
     ],
 )
-def test_arguments_that_name_nothing_are_refused(arguments, named):
+def test_arguments_with_unknown_values_are_refused(arguments, named):
     with pytest.raises(ValueError, match=named):
         check(arguments)
 
@@ -119,7 +119,7 @@ def test_arguments_that_name_nothing_are_refused(arguments, named):
         ("tracker", "frames: {hand: {tf: human_hand}}\n", "perception contract"),
     ],
 )
-def test_a_file_that_its_node_would_refuse_is_refused_before_the_start(tmp_path, name, content, named):
+def test_an_invalid_file_is_refused_before_the_start(tmp_path, name, content, named):
     file = tmp_path / "file.yaml"
     file.write_text(content)
     with pytest.raises(ValueError, match=named):
@@ -131,12 +131,12 @@ def test_an_arm_from_a_library_that_fails_ends_the_launch():
     assert (robot.respawn, robot.required) == (False, True)
 
 
-def test_a_launch_with_a_file_that_is_not_there_starts_nothing():
+def test_a_launch_with_a_missing_file_starts_nothing():
     with pytest.raises(RLException, match="coglab_files"):
         load("coglab_bringup", "real.launch", "machines:=/nowhere/machines.yaml")
 
 
-def test_a_file_of_the_present_folder_reaches_the_nodes_by_its_whole_path(tmp_path, monkeypatch):
+def test_a_file_of_the_present_folder_reaches_the_nodes_with_its_absolute_path(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "t.yaml").touch()
     assert whole_path("tracker:=t.yaml") == f"tracker:={tmp_path}/t.yaml"

@@ -1,4 +1,4 @@
-"""Nothing of a command outlives it: not what forks twice, has a session of its own and ignores every polite signal."""
+"""No process of a command outlives it, not even one that forks twice, opens its own session and ignores signals."""
 
 import os
 import signal
@@ -11,9 +11,9 @@ from tree_of_processes import Marked, wait_until
 
 TOP = Path(__file__).resolve().parents[4]
 TREE = Path(__file__).resolve().parents[1] / "src" / "coglab_bringup" / "process_tree.py"
-GONE_LIMIT = 20.0  # s; how fast it goes on an idle machine is for the campaign (test_process_campaign.py)
+GONE_LIMIT = 20.0  # s; the campaign measures the time on an idle machine (test_process_campaign.py)
 
-# A node of roslaunch as bad as one can be: daemon by double fork, own session, deaf to all but SIGKILL.
+# The worst possible node of roslaunch: daemon by double fork, own session, only SIGKILL ends it.
 STUBBORN = """
 import os, signal, sys, time
 for sign in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
@@ -36,12 +36,12 @@ ENTRY_POINTS = {
 }
 
 
-# Whoever runs the tests in the background or under nohup hands on that some signals are ignored.
+# Tests in the background or under nohup inherit ignored signals.
 HEARS = ["env", "--default-signal=INT,HUP"]
 
 
 def start(script: str, entry: str = "module") -> tuple[Marked, subprocess.Popen]:
-    """Starts the script and waits until its tree stands."""
+    """Start the script and wait until its tree is complete."""
     marked = Marked()
     process = subprocess.Popen(
         [*HEARS, *ENTRY_POINTS[entry], script],
@@ -59,8 +59,8 @@ def keeper_of(front: int) -> int:
     return int(Path(f"/proc/{front}/task/{front}/children").read_text().split()[0])
 
 
-def test_signals_to_the_command_and_sigkill_of_each_of_the_two_above_it():
-    bystander = subprocess.Popen(["sleep", "300"])  # of the same parent and the same process group
+def test_signals_to_the_command_and_sigkill_of_front_and_keeper():
+    bystander = subprocess.Popen(["sleep", "300"])  # with the same parent and process group
     runs = {}
     for how in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGKILL, "keeper"):
         marked, process = runs[how] = start(STAYS)
@@ -90,7 +90,7 @@ def test_a_command_that_leaves_a_daemon_and_ends():
     assert not marked.alive()
 
 
-def test_a_polite_command_says_its_last_word_and_keeps_its_status():
+def test_a_command_may_print_and_exit_with_its_own_status_on_ctrl_c():
     script = "import signal, sys, time\ntry:\n    print('ready', flush=True); time.sleep(300)\n"
     script += "except KeyboardInterrupt:\n    print('bye', flush=True); sys.exit(9)\n"
     marked, process = start(script)

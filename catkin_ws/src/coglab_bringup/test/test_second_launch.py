@@ -1,4 +1,4 @@
-"""Two systems on one ROS master: the second one is refused before anything of the first has ended."""
+"""Two systems on one ROS master: the second one is refused before a node of the first has ended."""
 
 import os
 import subprocess
@@ -15,7 +15,7 @@ NODE = "import rospy; rospy.init_node('x'); print('ready', flush=True); rospy.sp
 
 @pytest.fixture(scope="module")
 def first():
-    """A ROS master and a living node /robot on it; the environment to reach them, and the node's process."""
+    """A ROS master with a running node /robot. Yields the environment to reach them, and the node's process."""
     port = free_port()
     environment = {**os.environ, "ROS_MASTER_URI": f"http://127.0.0.1:{port}", "ROS_IP": "127.0.0.1"}
     master = subprocess.Popen(["rosmaster", "--core", "-p", str(port)], stdout=subprocess.DEVNULL, env=environment)
@@ -33,7 +33,7 @@ def first():
 
 
 def refusal(environment: dict, *command: object) -> str:
-    """What a program says that has to end with status 1."""
+    """Returns the output of a program that must end with status 1."""
     ended = subprocess.run(
         [str(word) for word in command],
         env=environment,
@@ -54,9 +54,9 @@ def test_a_second_launch_is_refused_by_name_and_process(first):
 
 
 @pytest.mark.parametrize("program", ["coglab_objects/object_database_node.py", "coglab_controllers/robot_node"])
-def test_a_node_does_not_take_the_place_of_a_living_one(first, program):
+def test_a_node_does_not_replace_a_running_one(first, program):
     environment, node = first
     workspace = package_path("coglab_bringup").parents[1]
     words = refusal(environment, workspace / "devel" / "lib" / program, "__name:=robot")
     assert f"process {node.pid}" in words
-    assert node.poll() is None, "the first one lives on"
+    assert node.poll() is None, "the first node still runs"

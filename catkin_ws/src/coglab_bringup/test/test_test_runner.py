@@ -1,4 +1,4 @@
-"""The runner that counts all other tests must not lie: red, dead, hanging and empty programs are told apart."""
+"""The test runner must count correctly: failed, dead, hanging and empty programs are distinguished."""
 
 import sys
 
@@ -29,11 +29,11 @@ def program(tmp_path, script: str) -> Program:
         (f"open(XML, 'w').write('''{GREEN}''')", (1, 0, 1)),
         (f"open(XML, 'w').write('''{RED}'''); raise SystemExit(1)", (0, 1, 0)),
         (f"open(XML, 'w').write('''{GREEN}'''); raise SystemExit(1)", (1, 1, 1)),  # died after green cases
-        ("raise SystemExit(0)", (0, 1, 0)),  # says it is fine and leaves no report
+        ("raise SystemExit(0)", (0, 1, 0)),  # succeeds without a report
         ("import os; os.abort()", (0, 1, 0)),
         ("open(XML, 'w').write('<testsuite><testcase')", (0, 1, 0)),
         ("import time; time.sleep(60)", (0, 1, 0)),  # ended at the limit
-        ("open(XML, 'w').write('<testsuites></testsuites>')", (0, 1, 0)),  # runs, and holds no case
+        ("open(XML, 'w').write('<testsuites></testsuites>')", (0, 1, 0)),  # runs without a case
         ("open(XML, 'w').write('<testsuite/>'); raise SystemExit(5)", (0, 1, 0)),  # a pytest file without a case
         (
             f"open(XML, 'w').write('{SKIPPED}'); raise SystemExit(5)",
@@ -128,13 +128,13 @@ def test_pytests_of_a_package_share_a_process_unless_they_are_a_node(tmp_path):
     assert "test_c.test_dies: " in told and "crashed" in told
 
 
-def test_what_hangs_is_named(tmp_path):
+def test_a_hanging_test_is_named(tmp_path):
     log = tmp_path / "log"
     log.write_text("header\ntest_a.py::test_x \n[gw0] [ 50%] PASSED test_a.py::test_x \ntest_a.py::test_y \n")
     assert unfinished(log) == ["test_a.py::test_y"]
 
 
-def test_a_named_test_builds_what_it_needs(tmp_path):
+def test_a_named_test_builds_its_targets(tmp_path):
     package_with(tmp_path, ("test_a.py", "import needed"), ("test_b.cpp", ""))
     for name in ("needed", "other"):
         (tmp_path / "catkin_ws" / "src" / name).mkdir()

@@ -1,4 +1,4 @@
-"""Figures and intervals of a trial against trials small enough to know the answer."""
+"""Figures and intervals of trials with known values."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def test_summary_of_a_known_trial():
     trial.feedback = [(4.0, "running", 0.2), (5.0, "reached", 0.004), (5.5, "reached", 0.003), (9.0, "reached", 0.5)]
     trial.truth = [(5.9, [0, 0, 0], [0, 0, 0], [0, 0, 0], 0.1), (6.0, [0, 0, 0], [0, 0, 0], [0, 0, 0], 2.0)]
     trial.contacts = [(6.04, True, 3.0)]
-    trial.fri_lost = [(0.5, 3), (1.5, 3), (7.5, 5), (9.5, 9)]  # two of them meanwhile
+    trial.fri_lost = [(0.5, 3), (1.5, 3), (7.5, 5), (9.5, 9)]  # two of them during the handover
     row = summarise(trial, "exchange_human_to_robot", "success", 1.0, 8.0, LIMITS)
     assert row["fri_lost"] == 2
     assert row["duration_s"] == 7.0
@@ -27,15 +27,15 @@ def test_summary_of_a_known_trial():
     assert row["peak_velocity_share"] == pytest.approx(0.4)
 
 
-def test_no_contact_is_waited_for_where_the_robot_gives():
-    """The object touches the hand that holds it all the while; what touches on the way there is no object felt."""
+def test_giving_has_no_contact_delay():
+    """The held object touches the hand all the time, so a touch means nothing."""
     trial = Series()
     trial.truth = [(t, [0, 0, 0], [0, 0, 0], [0, 0, 0], 3.0) for t in (1.0, 2.0, 3.0)]
     trial.contacts = [(3.1, True, 2.0)]
     assert summarise(trial, "exchange_robot_to_human", "success", 0.9, 8.0, LIMITS)["contact_delay_ms"] is None
 
 
-def test_summary_without_measurements_says_none():
+def test_summary_without_measurements_has_none():
     row = summarise(Series(), "take", "no end", 0.0, 1.0, LIMITS)
     assert row["final_error_mm"] is None and row["contact_delay_ms"] is None and row["peak_velocity_share"] is None
     assert row["fri_lost"] is None and row["believed_error_mm"] is None
@@ -49,7 +49,7 @@ def test_a_handover_that_did_not_end_has_a_code():
     assert refused == {"kind": "take", "outcome": "take was not taken", "reason_code": ReasonCode.WRONG_STATE}
 
 
-def test_children_of_a_concurrence_get_rows_of_their_own():
+def test_children_of_a_concurrence_have_their_own_rows():
     rows = rows_without_overlap([(0.0, 2.0, "a"), (0.0, 1.0, "b"), (1.0, 3.0, "c")])
     assert sorted(name for row in rows for _, _, name in row) == ["a", "b", "c"]
     for row in rows:

@@ -1,4 +1,4 @@
-"""An argument that cannot be used: one sentence with what there is, before anything is installed or built."""
+"""An invalid argument: one sentence with the valid values, before anything is installed or built."""
 
 import os
 import shutil
@@ -39,7 +39,7 @@ REFUSED = {
 
 @pytest.fixture(scope="module")
 def bare(tmp_path_factory):
-    """The sources with a package list of which nothing is installed: to install or to build would be seen."""
+    """The sources with a list of packages that are not installed: any installing or building would be noticed."""
     top = tmp_path_factory.mktemp("bare")
     shutil.copy(TOP / "coglab", top)
     (top / "debian-packages.txt").write_text(
@@ -65,7 +65,7 @@ def run(top: Path, words: str) -> subprocess.CompletedProcess:
 
 
 @pytest.mark.parametrize("words", REFUSED)
-def test_refused_by_name_with_what_there_is(words):
+def test_invalid_arguments_are_refused_with_the_valid_values(words):
     command, *rest = words.split()
     with pytest.raises(Refused) as refusal:
         ask_parser(command).parse_args(rest) if command in COMMANDS else judge(TOP, command, rest)
@@ -91,7 +91,7 @@ def test_results_need_space(tmp_path, monkeypatch):
 
 
 def test_an_unknown_group_is_refused_where_python_is_missing_too(tmp_path):
-    """Arguments are judged by a program of Python's; a bare machine has none yet."""
+    """The check of arguments is a Python program, and a bare machine has no Python yet."""
     for name in ("coglab", "debian-packages.txt"):
         shutil.copy(TOP / name, tmp_path)
     ended = subprocess.run(
@@ -108,8 +108,8 @@ def test_help_does_nothing_else(bare, words, part):
     assert not (bare / ".coglab").exists()
 
 
-def test_every_value_that_the_launch_files_offer_is_taken():
-    """The lists that arguments are judged by are read from the places that define them."""
+def test_every_value_of_the_launch_files_is_accepted():
+    """The lists of valid values are read from their definitions."""
     sources = TOP / "catkin_ws" / "src"
     defaults = launch_arguments(sources)
     judge_launch(TOP, [f"{name}:={value}" for name, (value, _) in defaults.items()])

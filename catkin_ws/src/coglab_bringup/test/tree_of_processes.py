@@ -35,7 +35,7 @@ class Marked:
 
 
 def wait_until(condition: Callable[[], bool], limit: float) -> bool:
-    """Whether the condition held within `limit` seconds."""
+    """True if the condition became true within `limit` seconds."""
     end = time.monotonic() + limit
     while not condition():
         if time.monotonic() > end:

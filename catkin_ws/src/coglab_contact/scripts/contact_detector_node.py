@@ -139,7 +139,7 @@ class ContactDetectorNode:
         """Returns whether the stamp of a message is invalid for other messages; logs a warning."""
         if can_be_sent(message.header.stamp):
             return False
-        rospy.logwarn_throttle(5.0, f"contact detector: {message._type} refused: no message can carry its stamp")
+        rospy.logwarn_throttle(5.0, f"contact detector: {message._type} refused: its stamp is out of range")
         return True
 
     def on_state(self, message: LwrState) -> None:
@@ -307,12 +307,12 @@ class ContactDetectorNode:
                     return LearnMotionResponse(False, ReasonCode.BAD_FILE, why)
                 self.recorder = MotionRecorder(self.moving)
                 return LearnMotionResponse(
-                    True, ReasonCode.NONE, "gathering: let the arm reach, with and without objects in the hand"
+                    True, ReasonCode.NONE, "recording: let the arm reach, with and without objects in the hand"
                 )
             recorder, self.recorder = self.recorder, None
             if recorder is None:
                 return LearnMotionResponse(
-                    False, ReasonCode.NOTHING_RUNS, "nothing was gathered: call with gather true first"
+                    False, ReasonCode.NOTHING_RUNS, "nothing was recorded: call with gather true first"
                 )
             reaches = len(recorder.reaches)
         # Learning from minutes of samples takes seconds: the lock is free meanwhile, so the detector continues.
@@ -326,7 +326,7 @@ class ContactDetectorNode:
                 # A disk error can be repaired; the motions would have to be repeated.
                 self.recorder = self.recorder or recorder
             return LearnMotionResponse(
-                False, ReasonCode.BAD_FILE, f"{error}; what was gathered is kept: call again with gather false"
+                False, ReasonCode.BAD_FILE, f"{error}; the recording is kept: call again with gather false"
             )
         with self.lock:
             self.moving.use(thresholds)
@@ -337,7 +337,7 @@ class ContactDetectorNode:
     def no_file(self) -> str:
         """Returns the reason why the result could not be written, else ''. Checked first: recording takes minutes."""
         if not self.learnt_file:
-            return "parameter ~learnt_file says where to write, and is not set: start with contact_learnt_file:=FILE"
+            return "parameter ~learnt_file, the file to write, is not set: start with contact_learnt_file:=FILE"
         return unwritable(self.learnt_file)
 
     def on_learn(self, _request):

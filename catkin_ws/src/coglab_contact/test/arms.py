@@ -1,4 +1,4 @@
-"""For tests: an arm by formulas as a robot measures it, synthetic torques of an arm at rest, detectors on both."""
+"""For tests: an arm with analytic motion and measurements, synthetic torques of an arm at rest, detectors."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -27,7 +27,7 @@ SWING = np.array([0.30, 0.25, -0.30, 0.35, 0.20, -0.20, 0.15])
 
 
 class Arm:
-    """Samples of an arm that swings about home from ``begin`` s on, with what acts on it; exact torques and noise."""
+    """Samples of an arm that swings about home from ``begin`` s on, with forces on it; exact torques plus noise."""
 
     def __init__(self, rate=2.5, begin=0.6, sigma=0.0, seed=1, mass=0.0):
         self.rate, self.begin, self.sigma = rate, begin, sigma
@@ -56,18 +56,18 @@ class Arm:
 
 
 def jacobian(q):
-    """3 x 7, of the palm."""
+    """Jacobian of the palm, 3 x 7."""
     return ARM.jacobian(np.asarray(q))[:3]
 
 
 def fused():
-    """As the node makes it, with the shipped thresholds."""
+    """The detector as in the node, with the shipped thresholds."""
     moving = MovingContact(Thresholds.load(SHIPPED), cc.ArmDynamics(URDF), jacobian)
     return FusedDetector(ContactDetector(DetectorSettings(), jacobian), moving)
 
 
 def feed(detector, arm, begin, end, force=lambda t: (0.0, 0.0, 0.0), shift=0.0):
-    """Both inputs of the robot from ``begin`` to ``end`` s, stamps shifted; (event, its time) or (None, end)."""
+    """Feed both inputs of the robot from ``begin`` to ``end`` s, stamps shifted: (event, its time) or (None, end)."""
     for k in range(round(begin / DT), round(end / DT)):
         t = k * DT
         outside = np.asarray(force(t))
@@ -80,12 +80,12 @@ def feed(detector, arm, begin, end, force=lambda t: (0.0, 0.0, 0.0), shift=0.0):
 
 
 def ramp(direction, begin, newton=3.0):
-    """3 N within 60 ms from ``begin`` s on."""
+    """A force that rises to ``newton`` within 60 ms from ``begin`` s on."""
     return lambda t: np.asarray(direction) * newton * min(1.0, max(0.0, (t - begin) / 0.06))
 
 
 class ArmAsMeasured(Arm):
-    """Torques as the cell's sensors tell them: noise that lasts 10 ms and grows with the fastest joint, and a lag."""
+    """Torques like those of the cell's sensors: noise that lasts 10 ms and grows with the fastest joint, and a lag."""
 
     def __init__(self, lag=0.0, sigma=0.05, **rest):
         super().__init__(**rest)
@@ -184,8 +184,8 @@ def found_within(
     sigma: float = 0.05,
     trials: int = 60,
 ) -> tuple[float, float]:
-    """(share of pushes found within ``limit`` s, median delay in s); what is not found within 0.2 s, or alarmed before
-    it was pushed, is infinitely late."""
+    """(share of pushes detected within ``limit`` s, median delay in s). A push that is not detected within 0.2 s, or
+    detected too early, has an infinite delay."""
     found, delays = 0, [math.inf] * trials
     for seed in range(trials):
         trial = ContactTrial(posture, seed, sigma)

@@ -1,4 +1,4 @@
-"""Evidence of contact, grip and load: each source at its edges, and when all of it together decides."""
+"""Evidence of contact, grip and load: each source at its limits, and their combination."""
 
 import math
 from dataclasses import dataclass
@@ -36,11 +36,11 @@ class Motor:
 )
 def test_touch_counts_from_half_a_newton_or_six_deviations(newton, deviation, margin):
     touch, forces = Touch(), [[0.0, 0.0, 0.0], [0.6 * newton, 0.0, -0.8 * newton]]
-    assert touch.feed(1.0, forces, deviation).margin == 0.0, "one sample is none"
+    assert touch.feed(1.0, forces, deviation).margin == 0.0, "one sample is no evidence"
     second = touch.feed(1.01, forces, deviation)
     assert second.margin == pytest.approx(margin) and second.until == pytest.approx(1.06)
     assert second.message == f"{newton:.1f} N on the hand's touch sensors"
-    assert touch.feed(1.02, [[0.1, 0.0, 0.0]]).margin == pytest.approx(0.2), "the smaller one of two in a row"
+    assert touch.feed(1.02, [[0.1, 0.0, 0.0]]).margin == pytest.approx(0.2), "the smaller of two consecutive samples"
     touch.reset()
     assert touch.feed(1.03, forces).margin == 0.0
     for nothing in ([], [[math.nan, 0.0, 0.0]], [[math.inf, 0.0, 0.0]]):
@@ -62,7 +62,7 @@ def test_an_object_is_seen_in_the_palm(distance, degrees, speed, seen):
     found = [palm.feed(0.03 * k, distance, math.radians(degrees), speed) for k in range(6)]
     assert [each.margin for each in found] == [0.0] * 4 + [1.0 if seen else 0.0] * 2, "for 0.12 s"
     assert found[5].until == pytest.approx(0.15 + 0.12)
-    assert palm.feed(0.05, distance, 0.0, 0.0).margin == 0.0, "a clock that was set begins anew"
+    assert palm.feed(0.05, distance, 0.0, 0.0).margin == 0.0, "a set clock restarts the confirmation"
     for bad in range(4):
         assert palm.feed(*[math.nan if k == bad else 1.0 for k in range(4)]) is None
 
@@ -75,8 +75,8 @@ def test_an_object_is_seen_in_the_palm(distance, degrees, speed, seen):
         ({"current": 59}, 0.0, ""),
     ],
 )
-def test_what_a_standing_motor_shows(change, margin, word):
-    """8 counts of way, 20 of tension; of a current nothing with the first status."""
+def test_evidence_of_a_standing_motor(change, margin, word):
+    """Limits: 8 counts of motion, 20 of tension. A current does not count in its first status."""
     fingers = Fingers()
     first = fingers.feed(2.0, [Motor(), Motor()])
     assert first.margin == 0.0 and first.until == pytest.approx(2.4)
@@ -86,38 +86,38 @@ def test_what_a_standing_motor_shows(change, margin, word):
     assert fingers.feed(2.2, []) is None
 
 
-def test_a_finger_that_stops_before_its_target_is_a_contact_and_stands_for_itself_then():
+def test_a_finger_that_stops_before_its_target_is_a_contact():
     fingers = Fingers()
     fingers.feed(0.0, [Motor(moving=True)])
     stopped = fingers.feed(0.1, [Motor(position=90, over_current=True)])
     assert stopped.margin == pytest.approx(1.2)
     assert stopped.message == "motor 0 of the hand stopped before its target"
-    assert fingers.feed(0.2, [Motor(position=90, over_current=True)]).margin == 0.0, "said once"
+    assert fingers.feed(0.2, [Motor(position=90, over_current=True)]).margin == 0.0, "reported once"
     for end in ({"target_reached": True, "over_current": True}, {"over_current": False}):
         fingers = Fingers()
         fingers.feed(0.0, [Motor(moving=True)])
         assert fingers.feed(0.1, [Motor(position=90, **end)]).margin == 0.0
 
 
-def test_a_share_has_to_be_gone_for_50_ms_and_a_fresh_estimate_begins_anew():
+def test_a_share_must_be_gone_for_50_ms_and_a_restarted_estimate_resets_it():
     load = LeavingLoad(1.0, 0.5, 100.0, 9.81)
     said = [load.feed(0.01 * k, 4.9, False, False) for k in range(12)]
     assert said.index(True) == 5 and sum(said) == 1
     load = LeavingLoad(1.0, 0.5, 100.0, 9.81)
     for k in range(4):
         assert not load.feed(0.01 * k, 4.9, False, False)
-    assert not load.feed(0.04, None, False, False), "nothing tells"
+    assert not load.feed(0.04, None, False, False), "no data"
     assert not any(load.feed(0.05 + 0.01 * k, 4.9, False, False) for k in range(5))
     assert load.feed(0.101, 4.9, False, False)
     load.feed(0.2, None, False, True)
-    assert load.share is None, "nothing is known of the gap"
+    assert load.share is None, "the gap has no data"
     for k in range(25):
         load.feed(0.21 + 0.005 * k, 3.0, True, False)
-    assert load.share == pytest.approx((9.81 - 3.0) / 9.81), "what somebody carried before it is theirs"
+    assert load.share == pytest.approx((9.81 - 3.0) / 9.81), "a load carried before the gap counts as gone"
 
 
 class Moving:
-    """In the place of the moving arm's model: tells what the test says."""
+    """Replaces the model of the moving arm; the test sets its values."""
 
     def __init__(self):
         self.load, self.hangs, self.fresh, self.change = 0.0, 0.0, False, object()
@@ -150,7 +150,7 @@ def fused():
 
 
 def measured(detector, begin, end, step=0.01):
-    """Fed so long; (event, its time)."""
+    """Feed from ``begin`` to ``end``. Returns (event, its time)."""
     for k in range(round((end - begin) / step)):
         event = detector.feed_measured(begin + step * k, np.zeros(7), np.zeros(7))
         if event is not None:
@@ -159,7 +159,7 @@ def measured(detector, begin, end, step=0.01):
 
 
 @pytest.mark.parametrize("mode", [LIFT, IN_MOTION, RELEASE])
-def test_an_arming_ends_with_its_time(mode):
+def test_an_arming_ends_at_its_time_limit(mode):
     detector, moving = fused()
     moving.before = np.zeros(7) if mode != RELEASE else 0.0
     detector.arm(mode, 0.0, 1.0, mass=0.5)
@@ -173,7 +173,7 @@ def test_an_arming_ends_with_its_time(mode):
 
 
 @pytest.mark.parametrize("jump", [-100.0, 1.5])
-def test_a_clock_that_was_set_leaves_an_arming_its_time(jump):
+def test_an_arming_keeps_its_remaining_time_if_the_clock_is_set(jump):
     detector, moving = fused()
     detector.arm(IN_MOTION, 0.0, 1.0)
     moving.told = Evidence(MOMENTUM, 0.0, 1e6, 0.5)

@@ -1,4 +1,4 @@
-"""Grip and load by touch: what the forces say, and how they count beside the torques of the arm."""
+"""Grip and load by touch, and their combination with the torques of the arm."""
 
 from types import SimpleNamespace
 
@@ -18,7 +18,7 @@ TURNED = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])
 
 
 def pinch(force, load):
-    """Thumb against a finger, z of the palm, each with half of the load; and a palm that touches nothing."""
+    """Forces of thumb and finger along z of the palm, each with half of the load; the palm touches nothing."""
     return [[0.0, -load / 2, force], [0.0, -load / 2, -force], [0.0, 0.0, 0.0]]
 
 
@@ -31,7 +31,7 @@ def fed(*forces, deviation=0.0, seconds=1.0):
     return held, t
 
 
-def test_what_fingers_press_is_grip_and_what_hangs_on_them_is_load():
+def test_internal_forces_are_grip_and_vertical_ones_are_load():
     held, t = fed(pinch(12.0, 3.0))
     assert held.load(t) == pytest.approx(3.0) and held.grip(t) == pytest.approx(12.0)
     lying, t = fed([[0.0, -3.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
@@ -45,7 +45,7 @@ def test_noise_is_no_grip():
     assert held.grip(1.995) == 0.0 and abs(held.load(1.995)) < 0.25
 
 
-def test_old_or_broken_touch_tells_nothing():
+def test_old_or_invalid_touch_data_is_ignored():
     assert GripAndLoad(lambda q: TURNED).grip(0.0) is None
     held, t = fed(pinch(12.0, 3.0))
     held.feed(t + 0.01, [[np.nan, 0, 0]] * 3, 0.0, np.zeros(7))
@@ -53,9 +53,9 @@ def test_old_or_broken_touch_tells_nothing():
     assert held.grip(t + OLDEST + 0.02) is None and held.load(t + OLDEST + 0.02) is None
 
 
-def test_the_share_is_counted_from_what_has_hung_there():
+def test_the_share_is_counted_from_the_load_before():
     held, t = fed(pinch(12.0, 0.9 * WEIGHT))
-    assert held.share_gone(t, WEIGHT) is None, "nobody has asked to count"
+    assert held.share_gone(t, WEIGHT) is None, "no reference load is set"
     held.count_from_now()
     for _ in range(100):
         t += 0.005
@@ -66,13 +66,13 @@ def test_the_share_is_counted_from_what_has_hung_there():
     assert held.share_gone(t, WEIGHT) is None
 
 
-def test_sensors_that_do_not_feel_the_weight_do_not_count_it():
+def test_sensors_that_miss_the_weight_give_no_share():
     held, t = fed(pinch(12.0, (1.0 - 1.2 * COVERED) * WEIGHT))
     held.count_from_now()
     assert held.share_gone(t, WEIGHT) is None and held.grip(t) == pytest.approx(12.0)
 
 
-def test_torques_and_touch_count_by_their_variance_and_the_lower_one_where_they_differ():
+def test_torques_and_touch_are_weighted_and_the_lower_share_counts_if_they_differ():
     assert together(None, 0.2, None) is None
     assert together(0.4, 0.2, None) == 0.4 and together(None, 0.2, Felt(0.3, 0.05)) == 0.3
     assert together(0.4, 0.2, Felt(0.3, 0.05)) == pytest.approx((0.4 / 0.04 + 0.3 / 0.0025) / (1 / 0.04 + 1 / 0.0025))
@@ -80,7 +80,7 @@ def test_torques_and_touch_count_by_their_variance_and_the_lower_one_where_they_
 
 
 class Moving:
-    """A model of an arm: what hangs on the palm is told; fast or not."""
+    """A model of an arm. The test sets the load on the palm, and whether the arm is fast."""
 
     def before_motion(self):
         return None
@@ -136,7 +136,7 @@ class Detector:
         return [event for event in events if event is not None]
 
 
-def test_touch_tells_the_load_while_the_arm_is_too_fast_for_its_torques():
+def test_touch_measures_the_load_of_a_fast_arm():
     for touch, events in ((True, 1), (False, 0)):
         run = Detector(touch)
         run.run(0.5)
@@ -149,7 +149,7 @@ def test_touch_tells_the_load_while_the_arm_is_too_fast_for_its_torques():
     assert run.detector.grip(run.t) is None
 
 
-def test_the_torques_alone_are_as_they_were():
+def test_without_touch_only_the_torques_count():
     run = Detector(False)
     run.run(0.5)
     run.moving.hangs = 0.3 * WEIGHT
@@ -165,7 +165,7 @@ def test_a_contact_that_slips_off_the_sensors_releases_nothing():
     assert run.detector.grip(run.t) == pytest.approx(20.0, abs=0.1)
 
 
-def test_who_touches_what_is_still_on_its_way_does_not_change_what_is_counted_from():
+def test_an_early_touch_does_not_change_the_reference_load():
     run = Detector()
     run.detector.arm(IN_MOTION, run.t, 5.0)
     run.felt = run.moving.hangs = 0.5 * WEIGHT

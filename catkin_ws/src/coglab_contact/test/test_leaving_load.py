@@ -1,4 +1,4 @@
-"""The load that a person takes from the hand: how much of it is sure, in which posture, and when it counts."""
+"""The load that a person takes from the hand: its certain part in each posture, and when it counts."""
 
 import math
 
@@ -10,13 +10,13 @@ WEIGHT = 0.31 * 9.81
 
 
 def settled(carried=None, weight=WEIGHT, mass=0.31):
-    """Fed at 200 Hz with what hangs on the palm of an arm at rest."""
+    """A LeavingLoad after samples at 200 Hz of the load on a resting palm."""
     load = LeavingLoad(mass, 0.6, 100.0, carried)
     assert not any(load.feed(0.005 * k, weight, True, False) for k in range(40))
     return load
 
 
-def test_who_lifts_before_the_arm_stands_is_felt():
+def test_a_lift_before_the_arm_stands_is_detected():
     load = LeavingLoad(0.31, 0.6, 100.0, WEIGHT)
     assert any(load.feed(0.005 * k, 0.2 * WEIGHT, k > 60, False) for k in range(100))
     assert load.share == pytest.approx(0.8) and 0.8 * WEIGHT > SAME
@@ -24,12 +24,12 @@ def test_who_lifts_before_the_arm_stands_is_felt():
         LeavingLoad(0.0, 0.6, 1.0)
 
 
-def test_what_the_posture_may_explain_loosens_no_grip_and_opens_no_hand():
+def test_a_load_change_within_posture_error_does_not_loosen_or_open_the_hand():
     light = LeavingLoad(0.12, 0.5, 100.0, 0.12 * 9.81)
     gone = lambda newton, start: [  # noqa: E731
         light.feed(start + 0.005 * k, 0.12 * 9.81 - newton, True, False) for k in range(60)
     ]
-    assert not any(gone(0.55, 0.0)), "seen so, of an arm that stands elsewhere and an object that nobody has touched"
+    assert not any(gone(0.55, 0.0)), "an untouched object in another posture may look like this"
     assert light.share == pytest.approx(0.55 / (0.12 * 9.81)) and 0.0 <= light.sure < 0.1
     assert not any(gone(0.6, 0.3)) and light.needed == pytest.approx(0.25 + SAME / (0.12 * 9.81))
     assert any(gone(1.1, 0.6)) and light.margin == pytest.approx(light.share / light.needed)
@@ -39,7 +39,7 @@ def test_what_the_posture_may_explain_loosens_no_grip_and_opens_no_hand():
     assert light.sure == pytest.approx(-(2.0 - SAME) / (0.12 * 9.81))
 
 
-def test_a_load_counted_from_where_the_arm_stands_is_all_sure():
+def test_a_load_counted_in_the_present_posture_is_certain():
     load = settled(carried=WEIGHT + 0.4)
     load.feed(0.3, 0.7 * WEIGHT, True, False)
     assert load.sure == pytest.approx(load.share) == pytest.approx(0.3) and load.needed == pytest.approx(0.6)
@@ -48,24 +48,24 @@ def test_a_load_counted_from_where_the_arm_stands_is_all_sure():
 HERE, THERE = np.zeros(7), np.array([0.0, 0.25, 0.0, -0.1, 0.0, 0.0, 0.0])
 
 
-def test_an_arm_that_brings_the_object_elsewhere_is_not_sure_of_its_load_until_it_has_asked_again():
+def test_a_load_is_uncertain_after_a_motion_until_it_is_averaged_again():
     light = LeavingLoad(0.12, 0.5, 100.0)
     weight = 0.12 * 9.81
     for k in range(40):
         light.feed(0.005 * k, weight, True, False, posture=HERE)
     assert light.sure == pytest.approx(0.0) and light.needed == 0.5
-    for k in range(20):  # on the way the model errs by 0.45 N, which nobody has taken
+    for k in range(20):  # during the motion the model errs by 0.45 N, without a person
         assert not light.feed(0.2 + 0.005 * k, weight - 0.45, False, False, posture=THERE)
     assert light.share > 0.3 and light.sure == 0.0 and light.needed > 0.6
     light.feed(0.3, weight - 0.45, False, False, posture=0.4 * THERE)
-    assert 0.0 < light.sure < 0.2, "half as far away it may err by half as much"
+    assert 0.0 < light.sure < 0.2, "half the rotation may cause half the error"
     for k in range(40):
         light.feed(0.4 + 0.005 * k, weight - 0.35, True, False, posture=THERE)
-    assert light.share == pytest.approx(0.0) and light.needed == 0.5, "it is counted from there now"
+    assert light.share == pytest.approx(0.0) and light.needed == 0.5, "the reference load is the new one"
     assert any(light.feed(0.6 + 0.005 * k, 0.0, True, False, posture=THERE) for k in range(20))
 
 
-def test_a_clock_that_is_set_asks_anew_and_keeps_the_time_limit():
+def test_a_set_clock_restarts_the_confirmation_and_keeps_the_time_limit():
     load = settled()
     load.feed(0.3, 0.0, True, False)
     load.clock_was_set(-60.0)

@@ -1,4 +1,4 @@
-"""Contact of a moving arm: momentum observer, learnt thresholds, and what is found on motions by formulas."""
+"""Contact of a moving arm: momentum observer, learnt thresholds, and detection in analytic motions."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -39,7 +39,7 @@ def test_a_known_torque_is_recovered_with_a_first_order_lag():
     assert np.allclose(residual.torque, step, atol=0.02)
 
 
-def test_what_is_no_number_and_short_gaps_leave_the_estimate_alone():
+def test_invalid_samples_and_short_gaps_do_not_change_the_estimate():
     arm = Arm(begin=0.0)
     whole, holed = (MomentumObserver(cc.ArmDynamics(URDF)) for _ in range(2))
     for k in range(120):
@@ -54,8 +54,8 @@ def test_what_is_no_number_and_short_gaps_leave_the_estimate_alone():
     assert np.allclose(other.torque, 1.0, atol=0.05)
 
 
-def test_a_stamp_that_could_be_of_either_period_is_no_push():
-    """As a computer under load stamps: some samples half a period late. Without a word of it they are 27 Nm."""
+def test_samples_half_a_period_late_are_no_push():
+    """A computer under load stamps some samples half a period late. Uncorrected, this gives 27 Nm."""
     arm, rng = Arm(begin=0.0), np.random.default_rng(5)
     observer, worst = MomentumObserver(cc.ArmDynamics(URDF), period=DT), 0.0
     for k in range(400):
@@ -67,7 +67,7 @@ def test_a_stamp_that_could_be_of_either_period_is_no_push():
 
 
 @pytest.mark.parametrize(("direction", "newton"), [((0, 1, 0), 4.0), ((0, -0.7, 0.7), 6.0), ((0, 0, -1), 6.0)])
-def test_a_push_on_the_moving_arm_is_found_within_eighty_milliseconds(direction, newton):
+def test_a_push_on_the_moving_arm_is_detected_within_eighty_milliseconds(direction, newton):
     arm, detector = Arm(sigma=0.1), fused()
     assert feed(detector, arm, 0.0, 0.7)[0] is None
     detector.arm(IN_MOTION, 0.7, 5.0)
@@ -84,7 +84,7 @@ def test_no_alarm_without_contact():
     assert feed(detector, arm, 0.7, 2.5)[0] is None
 
 
-def test_a_clock_that_is_set_and_a_long_gap_are_no_contact():
+def test_a_set_clock_and_a_long_gap_are_no_contact():
     arm, detector = Arm(sigma=0.1), fused()
     feed(detector, arm, 0.0, 0.7)
     detector.arm(IN_MOTION, 0.7, 2.0)
@@ -97,7 +97,7 @@ def test_a_clock_that_is_set_and_a_long_gap_are_no_contact():
     assert event is not None
 
 
-def test_a_mass_that_was_told_is_no_contact_and_an_untold_one_is():
+def test_a_set_payload_is_no_contact_and_an_unknown_one_is():
     for told in (True, False):
         before, after, detector = Arm(begin=99.0), Arm(begin=99.0, mass=0.5), fused()
         feed(detector, before, 0.0, 0.7)
@@ -113,7 +113,7 @@ def test_a_mass_that_was_told_is_no_contact_and_an_untold_one_is():
         assert (event is None) == told
 
 
-def test_an_object_that_was_there_before_anybody_watched_is_contact():
+def test_an_object_touching_before_arming_is_contact():
     arm, detector = Arm(rate=1.2), fused()
     force = lambda t: (0.0, 8.0, 0.0) if t > 0.9 else (0.0, 0.0, 0.0)  # noqa: E731
     feed(detector, arm, 0.0, 1.6, force)
@@ -122,7 +122,7 @@ def test_an_object_that_was_there_before_anybody_watched_is_contact():
     assert event is not None and event.code == ReasonCode.CONTACT_CAME_EARLY and when < 1.62
 
 
-def test_learning_from_motions_and_the_file_of_it(tmp_path):
+def test_learning_from_motions_and_its_file(tmp_path):
     moving, runs = MovingContact(Thresholds.load(SHIPPED), cc.ArmDynamics(URDF), jacobian), []
     arm, recorder = Arm(rate=3.0, sigma=0.1), MotionRecorder(moving)
     for k in range(600):
@@ -145,15 +145,15 @@ def test_learning_from_motions_and_the_file_of_it(tmp_path):
         Thresholds.load(file)
 
 
-def test_without_a_model_in_motion_is_refused():
+def test_in_motion_without_a_model_is_refused():
     detector = FusedDetector(ContactDetector(DetectorSettings(), jacobian), None)
     with pytest.raises(ValueError, match="model"):
         detector.arm(IN_MOTION, 0.0, 1.0)
     assert detector.feed_measured(0.0, np.zeros(7), np.zeros(7)) is None
 
 
-def test_the_weight_comes_to_an_arm_that_lifts():
-    """Counted from arming on, whatever was carried then; the arm moves meanwhile."""
+def test_the_weight_arrives_at_a_lifting_arm():
+    """Counted from the load on arming, while the arm moves."""
     arm, detector = Arm(rate=0.3, sigma=0.05), fused()
     share = lambda t: 0.2 if t < 1.5 else min(1.0, 0.2 + (t - 1.5) / 0.3)  # noqa: E731
     weight = lambda t: (0.0, 0.0, -0.31 * 9.81 * share(t))  # noqa: E731
@@ -166,7 +166,7 @@ def test_the_weight_comes_to_an_arm_that_lifts():
     assert detector.moving.load == pytest.approx(0.31) and detector.state() == "off"
 
 
-def test_a_lift_without_a_weight_ends_with_its_time_and_asks_for_a_mass():
+def test_a_lift_without_weight_ends_at_its_limit_and_needs_a_mass():
     arm, detector = Arm(rate=0.3, sigma=0.05), fused()
     feed(detector, arm, 0.0, 1.0)
     for mass, timeout in ((0.0, 1.0), (0.3, 0.0), (np.nan, 1.0)):
@@ -178,7 +178,7 @@ def test_a_lift_without_a_weight_ends_with_its_time_and_asks_for_a_mass():
 
 
 def delays(pushes, newton, **arm):
-    """s from the begin of pushes aside, at many moments of the swing, to their events; inf: none, or before it."""
+    """Delays (s) from sideways pushes, at many moments of the swing, to their events; inf: none, or too early."""
     found = []
     for seed in range(pushes):
         moving, detector, begin = ArmAsMeasured(rate=2.0, seed=seed, **arm), fused(), 1.0 + 0.02 * seed
@@ -190,13 +190,13 @@ def delays(pushes, newton, **arm):
     return np.array(found)
 
 
-def test_three_newtons_across_are_found_in_time_at_the_speeds_of_a_reach():
-    """A ramp has 1 N after 20 ms and is found within 80 ms of that; joints at up to 1.4 rad/s."""
+def test_lateral_three_newtons_are_detected_in_time_at_reaching_speed():
+    """A ramp has 1 N after 20 ms and is detected within 80 ms of that; joints move at up to 1.4 rad/s."""
     found = delays(40, 3.0, lag=Thresholds.load(SHIPPED).lag)
     assert np.mean(found <= 0.1001) >= 0.9, np.sort(found)
 
 
-def test_torques_that_lag_behind_positions_are_no_push_once_that_is_learnt():
+def test_a_learnt_lag_of_the_torques_is_no_push():
     lag = 0.002
     moving = MovingContact(Thresholds.load(SHIPPED), cc.ArmDynamics(URDF), jacobian)
     recorder, arm = MotionRecorder(moving), ArmAsMeasured(lag=lag, rate=4.0)
@@ -223,7 +223,7 @@ def test_torques_that_lag_behind_positions_are_no_push_once_that_is_learnt():
 
 
 @pytest.mark.parametrize("share", [0.7, 1.3])
-def test_an_object_that_is_not_as_heavy_as_its_file_says_is_no_contact(share):
+def test_an_object_with_a_wrong_mass_in_its_file_is_no_contact(share):
     for seed in range(6):
         arm, detector = ArmAsMeasured(rate=3.2, seed=seed, mass=0.53 * share), fused()
         detector.set_payload(0.53)
@@ -233,8 +233,8 @@ def test_an_object_that_is_not_as_heavy_as_its_file_says_is_no_contact(share):
         assert event is None, (seed, when, event.message)
 
 
-def test_what_an_arm_carries_is_no_early_contact_where_it_comes_to_rest():
-    """The controller's estimate does not know of the load, and feels it elsewhere after the motion."""
+def test_a_carried_object_is_no_early_contact_after_a_motion():
+    """The controller's estimate ignores the payload, and shows it on other joints after the motion."""
     detector, mass = fused(), 2.0
     detector.set_payload(mass)
     arm, weight, stops = Arm(rate=1.0, begin=1.2, mass=mass), np.array([0.0, 0.0, -9.81 * mass]), 1.2 + np.pi / 2.0
@@ -256,7 +256,7 @@ def test_what_an_arm_carries_is_no_early_contact_where_it_comes_to_rest():
 STEP = 1.0 / 128.0
 
 PALM = np.hstack([np.eye(3), np.zeros((3, 4))])
-"""m/rad: the first three joints feel one axis each"""
+"""m/rad: each of the first three joints measures one axis"""
 
 
 class Plain:
@@ -278,8 +278,8 @@ def seven(value):
     return np.full(7, float(value))
 
 
-def test_late_stamps_are_no_push_where_the_robots_own_time_is_known():
-    """A fast motion that nothing touches; one sample in twenty is received up to 0.4 s late, as on a busy computer."""
+def test_late_stamps_are_no_push_if_the_robots_time_is_known():
+    """A fast motion without contact; one sample in twenty is received up to 0.4 s late, as on a busy computer."""
     rng, observer = np.random.default_rng(5), MomentumObserver(Plain(2.0), period=STEP)
     time = STEP * np.arange(600)
     position, velocity = 0.3 * np.sin(4.0 * time), 1.2 * np.cos(4.0 * time)
@@ -305,7 +305,7 @@ BAD = {
 
 
 @pytest.mark.parametrize(("good", "bad"), [(good, bad) for good, every in BAD.items() for bad in every])
-def test_thresholds_that_cannot_be_are_refused(tmp_path, good, bad):
+def test_impossible_thresholds_are_refused(tmp_path, good, bad):
     file, text = tmp_path / "thresholds.yaml", SHIPPED.read_text()
     assert text.count(good) == 1 or good.startswith("limit")
     file.write_text(text.replace("\n" + good, "\n" + bad))
@@ -316,14 +316,14 @@ def test_thresholds_that_cannot_be_are_refused(tmp_path, good, bad):
 
 
 class Moved:
-    """A MovingContact on an arm without inertia, fed with positions (rad) and what acts on its first joints (N)."""
+    """A MovingContact on an arm without inertia, fed with positions (rad) and forces on its first joints (N)."""
 
     def __init__(self, period=STEP):
         self.arm, self.k, self.period = Plain(), 0, period
         self.contact = MovingContact(thresholds(lag=0.002), self.arm, lambda q: PALM)
 
     def feed(self, force=(0.0, 0.0, 0.0), samples=1, by=0.0):
-        """``by``: rad that each sample is farther than the one before."""
+        """``by``: step (rad) from sample to sample."""
         for _ in range(samples):
             self.k += 1
             self.q = getattr(self, "q", 0.0) + by
@@ -332,7 +332,7 @@ class Moved:
 
 
 @pytest.mark.parametrize("period", [0.002, 0.005, 0.010])
-def test_a_push_at_rest_is_forgotten_as_fast_at_every_period(period):
+def test_a_push_at_rest_decays_equally_fast_at_every_period(period):
     contact = (moved := Moved(period)).feed((0.0, 0.0, 0.0), int(1.0 / period))
     moved.feed((0.0, 0.0, -8.0), int(1.0 / period))
     moved.feed((0.0, 0.0, 0.0), int(0.5 / period))

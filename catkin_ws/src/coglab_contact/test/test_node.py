@@ -1,4 +1,4 @@
-"""The contact detector node without a ROS master: what it makes of messages, publishes, answers and learns."""
+"""The contact detector node without a ROS master: messages, publications, services and learning."""
 
 import importlib.util
 import math
@@ -32,7 +32,7 @@ def script():
 
 
 class Detector:
-    """In the place of the FusedDetector: keeps what it is fed with."""
+    """Replaces the FusedDetector and stores its inputs."""
 
     def __init__(self):
         self.fed, self.holds, self.payload, self.armed = [], False, None, None
@@ -59,7 +59,7 @@ class Detector:
 
 @pytest.fixture
 def node(monkeypatch, tmp_path):
-    """The node without ROS; ``sent``: what it publishes, by publisher; what it learns are the shipped thresholds."""
+    """The node without ROS. ``sent``: its messages by publisher. Learning returns the shipped thresholds."""
     module = script()
     made = module.ContactDetectorNode.__new__(module.ContactDetectorNode)
     made.pace, made.last_stamp = Pace(), rospy.Time()
@@ -118,7 +118,7 @@ def test_arming(node):
     refused = node.on_arm(request())
     assert (refused.success, refused.reason_code) == (False, ReasonCode.NODE_SILENT)
     node.last_sample = 9.5
-    for age, silent in ((1.1, True), (0.0, False)):  # by the steady clock: that of the stamps may be set
+    for age, silent in ((1.1, True), (0.0, False)):  # on the steady clock: the clock of the stamps may be set
         node.heard = time.monotonic() - age
         assert node.silent() == silent, age
         assert node.on_arm(request()).success is not silent
@@ -142,7 +142,7 @@ def answered(node, request):
     return answer.success, answer.reason_code, answer.message
 
 
-def test_what_is_learnt_is_written_and_used(node):
+def test_learnt_thresholds_are_written_and_used(node):
     assert answered(node, BEGIN)[:2] == (True, ReasonCode.NONE)
     success, code, sentence = answered(node, END)
     assert (success, code) == (True, ReasonCode.NONE) and node.learnt_file in sentence
@@ -151,16 +151,16 @@ def test_what_is_learnt_is_written_and_used(node):
     assert answered(node, END)[1] == ReasonCode.NOTHING_RUNS
 
 
-@pytest.mark.parametrize("place, words", [("", "is a folder"), ("none/learnt.yaml", "is not there")])
-def test_a_file_that_cannot_be_is_refused_before_anything_is_gathered(node, tmp_path, place, words):
+@pytest.mark.parametrize("place, words", [("", "is a folder"), ("none/learnt.yaml", "does not exist")])
+def test_an_unwritable_file_is_refused_before_recording(node, tmp_path, place, words):
     node.learnt_file = str(tmp_path / place)
     success, code, sentence = answered(node, BEGIN)
     assert (success, code, node.recorder) == (False, ReasonCode.BAD_FILE, None)
     assert words in sentence and str(tmp_path) in sentence and "\n" not in sentence
 
 
-def test_what_was_gathered_outlives_a_file_that_was_not_written(node, tmp_path):
-    """The folder is gone meanwhile: it can be made again, the motions cannot."""
+def test_the_recording_is_kept_if_the_file_cannot_be_written(node, tmp_path):
+    """The folder was deleted: it can be created again, but the motions cannot be repeated easily."""
     node.learnt_file = str(tmp_path / "gone" / "learnt.yaml")
     (tmp_path / "gone").mkdir()
     answered(node, BEGIN)
@@ -174,7 +174,7 @@ def test_what_was_gathered_outlives_a_file_that_was_not_written(node, tmp_path):
 
 
 def stamped(message, secs, nsecs=0):
-    """Such a message."""
+    """Returns the message with this stamp."""
     message.header.stamp = rospy.Time()
     message.header.stamp.secs, message.header.stamp.nsecs = secs, nsecs
     return message

@@ -1,4 +1,4 @@
-"""The detector of an arm at rest: what it learns, its thresholds and times, and what it finds in synthetic torques."""
+"""The detector of an arm at rest: learning, thresholds, times, and detection in synthetic torques."""
 
 import dataclasses
 import math
@@ -18,13 +18,13 @@ JACOBIAN = np.array(
         [0.0, 0.5, 0.0, -0.3, 0.0, 0.0, 0.0],
     ]
 )
-"""m/rad: joints 1, 2 and 4 feel what is across the x axis"""
+"""m/rad: joints 1, 2 and 4 measure forces across the x axis"""
 
 WATCHED = [1, 2, 4]
 
 
 class Rest:
-    """A detector that is fed with what the test says, from rest on."""
+    """A detector fed with samples of the test, starting at rest."""
 
     def __init__(self, jacobian=JACOBIAN, **settings):
         self.detector, self.n = ContactDetector(DetectorSettings(**settings), lambda q: jacobian), 0
@@ -34,7 +34,7 @@ class Rest:
         return self.n * STEP
 
     def feed(self, torque=0.0, samples=1, speed=0.0):
-        """So many samples of one torque (Nm, all joints or each); (event, how many it took) or (None, samples)."""
+        """Feed samples of one torque (Nm, all joints or each). Returns (event, needed samples) or (None, samples)."""
         for k in range(samples):
             self.n += 1
             event = self.detector.feed(self.t, np.zeros(7) + torque, np.zeros(7), np.full(7, speed))
@@ -43,7 +43,7 @@ class Rest:
         return None, samples
 
     def armed(self, mode="contact", timeout=100.0, **request):
-        """Armed, and it watches."""
+        """Arm and wait until the detector watches."""
         self.feed(samples=150)
         self.detector.arm(mode, self.t, timeout, **request)
         assert self.feed() == (None, 1) and self.detector.state() == "watching"
@@ -51,7 +51,7 @@ class Rest:
 
 
 def joint(number, torque):
-    """Nm on one joint, as 1..7."""
+    """Torque (Nm) on one joint, number 1..7."""
     return torque * (np.arange(1, 8) == number)
 
 
@@ -70,7 +70,7 @@ def test_a_request_may_name_joints_and_sensitivity():
             rest.detector.arm("contact", 0.0, timeout)
 
 
-def test_who_carries_something_has_no_early_contact():
+def test_a_carried_object_is_no_early_contact():
     rest = Rest()
     rest.feed(samples=150)
     rest.feed(samples=20, speed=0.3)
@@ -79,8 +79,8 @@ def test_who_carries_something_has_no_early_contact():
 
 
 @pytest.mark.parametrize("aside", [-0.5, 0.0, 1.2, 40.0])
-def test_one_sample_that_does_not_follow_is_ignored(aside):
-    """Alone it says nothing: neither a torque nor a clock that was set."""
+def test_a_single_outlier_is_ignored(aside):
+    """It is neither a torque nor a set clock."""
     rest = Rest().armed()
     assert rest.detector.feed(rest.t + aside, np.full(7, 50.0), np.zeros(7), np.zeros(7)) is None
     assert rest.detector.state() == "watching"
@@ -93,7 +93,7 @@ def posture():
     return q, jacobian(q)
 
 
-def test_lateral_three_newton_found_within_sixty_milliseconds(posture):
+def test_lateral_three_newtons_are_detected_within_sixty_milliseconds(posture):
     share, median = found_within(posture, (0, 1, 0), 3.0)
     assert share >= 0.95, f"{share:.0%} within 60 ms, median {median * 1000:.0f} ms"
 
@@ -117,7 +117,7 @@ def test_never_watches_while_the_arm_moves(posture):
             assert event is None and run.detector.state() != "watching"
 
 
-def test_arming_ends_by_itself(posture):
+def test_arming_ends_at_its_time_limit(posture):
     run = ContactTrial(posture, 4)
     run.feed(1.0)
     run.detector.arm("contact", run.t, 0.5)
@@ -126,7 +126,7 @@ def test_arming_ends_by_itself(posture):
     assert run.feed(0.3, push((0, 1, 0), 10.0))[0] is None
 
 
-def test_a_person_who_was_early_is_found_by_the_offset(posture):
+def test_an_early_touch_is_detected_by_its_offset(posture):
     run = ContactTrial(posture, 5)
     run.feed(1.5)
     moving = np.full(7, 0.3)
@@ -139,8 +139,8 @@ def test_a_person_who_was_early_is_found_by_the_offset(posture):
     assert event.code == ReasonCode.CONTACT_CAME_EARLY and event.confidence > 0.5
 
 
-def test_who_pushed_the_arm_at_rest_and_let_go_has_left_no_offset(posture):
-    """The jolts of both are no motion, before which the arm would have rested with that force on it."""
+def test_a_released_push_at_rest_leaves_no_offset(posture):
+    """The jolts of push and release are no motions, so the rest with the force is no reference."""
     run = ContactTrial(posture, 5)
     run.feed(1.5)
     jolt = lambda t: np.full(7, 0.05)  # noqa: E731
@@ -152,11 +152,11 @@ def test_who_pushed_the_arm_at_rest_and_let_go_has_left_no_offset(posture):
     run.detector.arm("contact", run.t, 10.0)
     assert run.feed(1.0)[0] is None
     run.feed(0.4, velocity=lambda t: np.full(7, 0.3))
-    assert run.feed(1.0)[0] is None, "nor after a motion from there"
+    assert run.feed(1.0)[0] is None, "also after a motion from there"
 
 
-def test_a_touch_that_jolts_the_arm_is_found_as_a_touch(posture):
-    """Nothing was there on arming, and a motion went before."""
+def test_a_touch_that_jolts_the_arm_is_detected_as_a_touch(posture):
+    """There was no contact on arming, after a motion."""
     run = ContactTrial(posture, 7)
     run.feed(1.5)
     run.feed(1.0, velocity=lambda t: np.full(7, 0.3))
@@ -177,14 +177,14 @@ def test_only_one_event_per_arming(posture):
 
 
 @pytest.mark.parametrize("mass", [0.2, 0.31, 0.8])
-def test_release_is_found_when_the_load_leaves(posture, mass):
+def test_release_is_detected_when_the_load_leaves(posture, mass):
     weight = mass * 9.81
     held = lambda t: (0, 0, -weight)  # noqa: E731
     for seed in range(20):
         run = ContactTrial(posture, seed)
         run.feed(1.5, held)
         run.detector.arm("release", run.t, 10.0, mass=mass, load_share=0.6)
-        assert run.feed(1.0, held)[0] is None, "released while the robot carried it all"
+        assert run.feed(1.0, held)[0] is None, "no release while the robot carries all of it"
         event, delay = run.feed(1.5, lambda t: (0, 0, -weight * max(0.0, 1 - t / 0.5)))
         assert event is not None and not event.contact
         assert 0.2 <= delay <= 0.6
@@ -199,7 +199,7 @@ def test_load_is_counted_from_before_the_contact(posture):
         assert event is not None
         trial.detector.arm("load", trial.t, 5.0, mass=0.31)
         pressing = lambda t: (0, -3.0, 0)  # noqa: E731
-        assert trial.feed(1.0, pressing)[0] is None, "a person who only presses does not carry less"
+        assert trial.feed(1.0, pressing)[0] is None, "a pressing person takes no load"
         event, delay = trial.feed(1.0, lambda t: (0, 0, -weight * min(1.0, t / 0.3)))
         assert event is not None and event.contact and delay < 0.5
 
@@ -207,7 +207,7 @@ def test_load_is_counted_from_before_the_contact(posture):
 @pytest.mark.parametrize("which", ["torque", "position", "velocity"])
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e308, -1e308, "six", "eight"])
 @pytest.mark.parametrize("armed", [False, True])
-def test_a_sample_that_no_arm_can_give_is_ignored_and_the_push_after_it_found(posture, which, value, armed):
+def test_an_impossible_sample_is_ignored_and_a_later_push_is_detected(posture, which, value, armed):
     trial = ContactTrial(posture, 3)
     sample = {"torque": np.zeros(7), "position": trial.q, "velocity": np.zeros(7)}
     sample[which] = (
@@ -230,8 +230,8 @@ def test_a_sample_that_no_arm_can_give_is_ignored_and_the_push_after_it_found(po
 
 
 @pytest.mark.parametrize("step", [-3600.0, -0.4, 30.0])
-def test_hears_again_after_the_clock_was_set(posture, step):
-    """Armed, then the clock steps: the arming keeps the time that it had left, and a touch is still found in time."""
+def test_detection_continues_after_the_clock_was_set(posture, step):
+    """The clock steps after arming: the arming keeps its remaining time, and a touch is still detected in time."""
     run = ContactTrial(posture, 21)
     assert run.rest_and_arm() is None
     run.t += step
@@ -241,7 +241,7 @@ def test_hears_again_after_the_clock_was_set(posture, step):
     assert event is not None and delay < 0.06
 
 
-def test_the_noise_is_learnt_anew_at_rest_alone(posture):
+def test_the_noise_is_learnt_again_only_at_rest(posture):
     run = ContactTrial(posture, 4)
     with pytest.raises(ValueError, match="at rest"):
         run.detector.learn()
@@ -251,7 +251,7 @@ def test_the_noise_is_learnt_anew_at_rest_alone(posture):
     with pytest.raises(ValueError, match="armed for contact"):
         run.detector.learn()
     run.feed(0.2)
-    assert run.detector.state() == "waiting"  # until enough was seen
+    assert run.detector.state() == "waiting"  # until there are enough samples
     run.feed(1.0)
     assert run.detector.state() == "watching" and all(
         mine == (j in run.detector.watched) for j, mine in enumerate(run.detector.look().watched)
@@ -263,7 +263,7 @@ def test_the_noise_is_learnt_anew_at_rest_alone(posture):
         moving.detector.learn()
 
 
-def test_settings_that_jump_while_the_arm_moves_are_no_contact():
+def test_changed_settings_during_a_motion_are_no_contact():
     for name, (low, high, _) in TUNABLE.items():
         trial = Rest()
         trial.feed(samples=150)
@@ -278,4 +278,4 @@ def test_settings_that_jump_while_the_arm_moves_are_no_contact():
         trial.detector.use(DetectorSettings())
         assert trial.feed(samples=300)[0] is None, name
         event, samples = trial.feed(joint(2, 1.0), samples=20)
-        assert event is not None and event.contact, f"{name}: a push is found afterwards"
+        assert event is not None and event.contact, f"{name}: a push is detected afterwards"

@@ -1,4 +1,4 @@
-"""A node goes on when its log cannot be written, as on a full disk."""
+"""A node continues if its log cannot be written, as on a full disk."""
 
 from __future__ import annotations
 

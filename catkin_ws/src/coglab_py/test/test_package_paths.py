@@ -1,4 +1,4 @@
-"""Where files of packages are looked for, in which order, and what is said where they are in none of these places."""
+"""Search order for files of packages, and the error for missing ones."""
 
 import pytest
 import rospkg
@@ -8,7 +8,7 @@ from coglab_py.packages import package_path
 
 @pytest.fixture
 def rospack(monkeypatch):
-    """What rospack knows, by package; nothing at first."""
+    """Paths known to rospack, by package; empty at first."""
     known = {}
 
     class RosPack:
@@ -39,16 +39,16 @@ def test_in_the_share_folder_of_an_install_space(rospack, monkeypatch, tmp_path)
     assert package_path("ours") == tmp_path / "share" / "ours"
 
 
-def test_through_rospack_where_it_is_nowhere_near(rospack, tmp_path):
+def test_through_rospack_if_it_is_in_no_other_place(rospack, tmp_path):
     file = placed(tmp_path / "elsewhere")
     rospack["far_away"] = str(tmp_path / "elsewhere")
     assert package_path("far_away", "config", "f.yaml") == file
 
 
-def test_a_file_or_package_that_is_nowhere_is_named_with_what_to_do(rospack, tmp_path):
+def test_a_missing_file_or_package_is_named_with_a_remedy(rospack, tmp_path):
     placed(tmp_path / "elsewhere")
     rospack["far_away"] = str(tmp_path / "elsewhere")
-    todo = "is not there: build the workspace, or install the package"
+    todo = "does not exist: build the workspace, or install the package"
     with pytest.raises(FileNotFoundError) as error:
         package_path("far_away", "config", "g.yaml")
     assert str(error.value) == f"{tmp_path}/elsewhere/config/g.yaml {todo} far_away again"

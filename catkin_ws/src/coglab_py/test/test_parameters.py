@@ -1,4 +1,4 @@
-"""Parameters: types and ranges, and the sentence where one does not fit."""
+"""Parameters: types, ranges, and the messages for invalid ones."""
 
 import pytest
 from coglab_py import parameters
@@ -9,7 +9,7 @@ from coglab_py.parameters import ParameterError, checked, checked_numbers
     "value, kind, expected",
     [(True, bool, True), (3, int, 3), (3, float, 3.0), (2.5, float, 2.5), ("a", str, "a"), ({"a": 1}, dict, {"a": 1})],
 )
-def test_a_value_of_its_type_is_taken(value, kind, expected):
+def test_a_value_of_the_right_type_is_accepted(value, kind, expected):
     taken = checked("/n/x", value, kind)
     assert taken == expected and type(taken) is type(expected)
 
@@ -37,7 +37,7 @@ def test_another_value_is_refused_with_a_sentence(value, kind, more, sentence):
 
 @pytest.fixture
 def server(monkeypatch):
-    """What the parameter server holds, by whole names; nothing at first."""
+    """Contents of the parameter server by full names; empty at first."""
     given = {}
     monkeypatch.setattr(parameters.rospy, "get_param", lambda name, default=None: given.get(name, default))
     monkeypatch.setattr(parameters.rospy, "resolve_name", lambda name: name)

@@ -18,7 +18,7 @@ def random_pose() -> Pose:
 
 
 def matrix(pose: Pose) -> np.ndarray:
-    """Homogeneous, from the quaternion's own formula."""
+    """Homogeneous matrix, from the formula of the quaternion."""
     x, y, z, w = pose.orientation
     turn = np.array(
         [
@@ -40,7 +40,7 @@ def test_poses_compose_as_matrices_do():
         assert np.array([a.axis(i) for i in range(3)]).T == pytest.approx(matrix(a)[:3, :3], abs=1e-12)
 
 
-def test_distance_is_that_of_position_and_of_the_smallest_turn():
+def test_distance_has_position_and_smallest_rotation():
     far, angle = Pose().distance(Pose(np.array([3.0, 4.0, 0.0]), -about_z(0.3)))
     assert (far, angle) == pytest.approx((5.0, 0.3))
 
@@ -56,7 +56,7 @@ def test_reading():
     assert Pose.from_dict({"xyz": [1, 2, 3], "quaternion": [0, 0, 2, 0]}).orientation == pytest.approx([0, 0, 1, 0])
     assert Pose.from_dict({"xyz": [1, 2, 3]}).orientation == pytest.approx([0, 0, 0, 1])
     assert Pose.from_dict({"xyz": [0, 0, 0], "rpy_deg": [0, 0, 90]}).axis(0) == pytest.approx([0, 1, 0], abs=1e-12)
-    # Fixed axes: the roll comes first, so a yaw after it carries the rolled y axis.
+    # Fixed axes: the roll comes first, then the yaw rotates the rolled y axis.
     assert Pose.from_dict({"rpy_deg": [90, 0, 90]}).axis(1) == pytest.approx([0, 0, 1], abs=1e-12)
     pose = random_pose()
     assert matrix(Pose.from_dict(pose.to_dict())) == pytest.approx(matrix(pose))
@@ -82,7 +82,7 @@ def test_malformed_poses_are_refused(data, sentence):
         Pose.from_dict(data)
 
 
-def test_the_mean_of_noisy_poses_is_near_the_truth_whatever_the_signs_of_their_quaternions():
+def test_the_mean_of_noisy_poses_does_not_depend_on_quaternion_signs():
     truth = random_pose()
     noisy = [
         truth * Pose(0.01 * RNG.normal(size=3), rotation([*(0.01 * RNG.normal(size=3)), 1.0]).as_quat())

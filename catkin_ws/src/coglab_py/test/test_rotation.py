@@ -1,4 +1,4 @@
-"""Our Rotation gives the numbers of scipy's."""
+"""Our Rotation agrees with that of scipy."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from coglab_py.rotation import Rotation
 
 
 def pairs(count=200):
-    """Random rotations, ours and scipy's: any size, tiny ones, and about half a turn."""
+    """Random rotations, ours and scipy's: any size, tiny ones, and near half a turn."""
     rng = np.random.default_rng(1)
     for size in (1.0, 1e-3, 1e-5, 3.1):
         for _ in range(count):
@@ -17,7 +17,7 @@ def pairs(count=200):
             yield Rotation.from_rotvec(vector), theirs.from_rotvec(vector), rng.normal(size=(2, 3))
 
 
-def test_every_method_gives_the_numbers_of_scipy():
+def test_every_method_agrees_with_scipy():
     exact = {"rel": 1e-14, "abs": 1e-15}
     before, before_theirs = Rotation.identity(), scipy.spatial.transform.Rotation.identity()
     for ours, theirs, points in pairs():
@@ -33,7 +33,7 @@ def test_every_method_gives_the_numbers_of_scipy():
         before, before_theirs = ours, theirs
 
 
-def test_a_quaternion_has_any_length_but_zero():
+def test_a_quaternion_may_have_any_length_except_zero():
     assert Rotation.from_quat([0, 0, 3, 0]).as_quat().tolist() == [0.0, 0.0, 1.0, 0.0]
     with pytest.raises(ValueError, match="no direction"):
         Rotation.from_quat(np.zeros(4))

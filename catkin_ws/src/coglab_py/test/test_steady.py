@@ -1,4 +1,4 @@
-"""Timers, stamps and waits by the steady clock; time slowed down with the simulated cell."""
+"""Timers, stamps and waits on the steady clock; time slowed down with the simulated cell."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from coglab_py.pace import Slowed
 
 @pytest.fixture(autouse=True)
 def ros(monkeypatch):
-    """rospy without a master; what was logged and why the node ended."""
+    """rospy without a master; collects log messages and the reason for the node's end."""
     said = []
     rospy.rostime.set_rostime_initialized(True)
     rospy.rostime.switch_to_wallclock()
@@ -35,11 +35,11 @@ def set_ros(seconds):
 def wait(condition):
     end = time.monotonic() + 60.0
     while not condition():
-        assert time.monotonic() < end, "it waits for ever"
+        assert time.monotonic() < end, "it waits too long"
         time.sleep(0.005)
 
 
-def test_a_timer_goes_on_while_the_clock_stands_and_goes_back():
+def test_a_timer_continues_while_the_clock_stands_or_goes_back():
     calls = []
     set_ros(100.0)
     timer = steady.SteadyTimer(0.01, lambda: calls.append(rospy.get_time()), "timer")
@@ -52,7 +52,7 @@ def test_a_timer_goes_on_while_the_clock_stands_and_goes_back():
     assert len(calls) == count and calls.count(100.0) > 2
 
 
-def test_a_failing_call_costs_no_timer_but_failing_for_good_ends_the_node(ros, monkeypatch):
+def test_single_failures_do_not_end_a_timer_but_lasting_ones_end_the_node(ros, monkeypatch):
     calls = []
 
     def fail_at_first():
@@ -71,13 +71,13 @@ def test_a_failing_call_costs_no_timer_but_failing_for_good_ends_the_node(ros, m
     assert steady.spin() == 1
 
 
-def test_stamps_are_told_on_the_steady_clock_across_a_step(monkeypatch):
+def test_stamps_are_converted_across_a_step_of_the_clock(monkeypatch):
     now = [50.0, 1000.0]
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
     monkeypatch.setattr(time, "time", lambda: now[1])
     stamps = steady.Stamps()
     assert stamps.steady(rospy.Time.from_sec(999.8)) == pytest.approx(49.8)
-    for late in (0.03, -0.03):  # as /clock is, which comes now and then
+    for late in (0.03, -0.03):  # like /clock, which is published only now and then
         now[1] += late
         assert stamps.steady(rospy.Time.from_sec(999.8)) == pytest.approx(49.8, abs=0.001)
     now[1] -= 30.0
@@ -85,7 +85,7 @@ def test_stamps_are_told_on_the_steady_clock_across_a_step(monkeypatch):
     assert stamps.stamp(49.9).to_sec() == pytest.approx(969.9, abs=0.001)
 
 
-def test_a_service_is_given_up_by_the_steady_clock(monkeypatch):
+def test_waiting_for_a_service_ends_on_the_steady_clock(monkeypatch):
     monkeypatch.setattr(time, "time", lambda: 1000.0)  # rospy's own wait would never end
     begun = time.monotonic()
     with pytest.raises(rospy.ROSException):
@@ -93,7 +93,7 @@ def test_a_service_is_given_up_by_the_steady_clock(monkeypatch):
     assert time.monotonic() - begun < 10.0
 
 
-def test_a_silent_clock_is_a_fault_and_a_set_one_is_told(ros, monkeypatch):
+def test_a_silent_clock_is_a_fault_and_a_set_one_is_logged(ros, monkeypatch):
     now = [50.0]
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
     set_ros(0.0)
@@ -116,7 +116,7 @@ def test_a_silent_clock_is_a_fault_and_a_set_one_is_told(ros, monkeypatch):
     assert len(ros) == count + 1 and "forward by 60.0 s" in ros[-1]
 
 
-def test_time_passes_by_the_factor_and_never_leaps():
+def test_slowed_time_passes_by_the_factor_and_never_jumps():
     time = Slowed()
     assert time.at(7.0) == 7.0
     time.change(10.0, 0.5)

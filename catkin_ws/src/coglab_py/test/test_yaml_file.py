@@ -29,7 +29,7 @@ def test_a_field_is_named_with_its_line():
         ("a: !!python/object:x.Y {}", "not YAML"),
     ],
 )
-def test_what_is_refused(text, sentence):
+def test_invalid_files_are_refused(text, sentence):
     with pytest.raises(YamlError, match=sentence):
         parse(text, "f.yaml")
 
@@ -42,7 +42,7 @@ def test_what_is_refused(text, sentence):
         ('a: "\\x07"', "control characters"),
     ],
 )
-def test_what_ros_cannot_carry_is_refused(text, sentence):
+def test_values_that_ros_cannot_carry_are_refused(text, sentence):
     with pytest.raises(YamlError, match=f"f.yaml:1: a: .*{sentence}"):
         parse(text, "f.yaml").check({})
 
@@ -57,7 +57,7 @@ def test_files(tmp_path):
         read(tmp_path / "f.yaml", "f.yaml")
 
 
-def test_a_field_that_is_not_there_has_the_line_of_the_nearest_one_above_it():
+def test_a_missing_field_has_the_line_of_its_nearest_parent():
     document = parse("# x\n\na:\n  b:\n    c: 7\n", "f.yaml")
     assert document.lines == {(): 3, ("a",): 3, ("a", "b"): 4, ("a", "b", "c"): 5}
     assert document.sentence(("a", "b", "x", "y"), "is missing") == "f.yaml:4: a.b.x.y: is missing"

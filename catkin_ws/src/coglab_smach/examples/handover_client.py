@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""A handover by a plain actionlib client, with nothing of CogLab but its messages: handover_client.py ACTION OBJECT"""
+"""Request a handover with actionlib and the messages of CogLab. Usage: handover_client.py ACTION OBJECT"""
 
 import sys
 

@@ -63,9 +63,7 @@ def main() -> int:
     """Entry point."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--folder", type=Path, default=None, help="folder of the object files")
-    parser.add_argument(
-        "--dialect", choices=("legacy", "v17"), default="legacy", help="of the hand: decides which grasps there are"
-    )
+    parser.add_argument("--dialect", choices=("legacy", "v17"), default="legacy", help="firmware dialect of the hand")
     verbs = parser.add_subparsers(dest="verb", required=True)
     verbs.add_parser("list")
     check = verbs.add_parser("check")

@@ -71,7 +71,7 @@ class Torques(threading.Thread):
 
 
 class BrainNodes(unittest.TestCase):
-    """See the module."""
+    """Tests in the order of their numbers."""
 
     def test_1_arming_without_torques_is_refused(self):
         answer = service("/contact_detector/arm", ArmContact)(mode="contact", timeout=1.0)
@@ -120,14 +120,14 @@ class BrainNodes(unittest.TestCase):
             torques.over = True
 
     def until(self, ready, what):
-        """Waits for it."""
+        """Wait until ``ready()``."""
         end = time.monotonic() + LIMIT
         while not ready():
             self.assertLess(time.monotonic(), end, what)
             time.sleep(0.02)
 
     def learns(self, learn, seen):
-        """The noise at rest anew, as the signal tells it: thresholds are k standard deviations of what was learnt."""
+        """Learn the noise at rest again: thresholds are k standard deviations of the learnt noise."""
         self.until(lambda: seen and seen[-1].learnt, "learnt at the start")
         self.assertTrue(all(value > 0.0 for value in seen[-1].threshold) and all(seen[-1].watched))
         self.assertEqual((seen[-1].state, seen[-1].mode, seen[-1].margin), ("off", "", 0.0))
@@ -139,11 +139,11 @@ class BrainNodes(unittest.TestCase):
         self.until(lambda: seen[-1].learnt, "learnt anew")
 
     def learns_no_motion(self):
-        """What is missing for thresholds of the moving arm is told by a code each."""
+        """Learning in motion is refused with a code for each missing condition."""
         learn_motion = service("/contact_detector/learn_motion", LearnMotion)
         for gather, success, code in (
             (False, False, ReasonCode.NOTHING_RUNS),
-            (True, False, ReasonCode.BAD_FILE),  # nothing says where to write
+            (True, False, ReasonCode.BAD_FILE),  # no file is set
             (False, False, ReasonCode.NOTHING_RUNS),
         ):
             answer = learn_motion(gather)
@@ -169,7 +169,7 @@ class BrainNodes(unittest.TestCase):
             time.sleep(0.1)
         self.assertIn("object_id", pickle.loads(base64.b64decode(states["/coglab_master"].local_data)))
 
-    def test_5_without_a_robot_the_master_says_so_and_waits_in_fault(self):
+    def test_5_without_a_robot_the_master_waits_in_fault_with_the_reason(self):
         transitions = []
         rospy.Subscriber("/coglab/transitions", Transition, transitions.append)
         start = service("/coglab/start", Start)
@@ -206,7 +206,7 @@ class BrainNodes(unittest.TestCase):
         self.assertTrue(
             any("is its node running?" in t.reason and t.reason_code == ReasonCode.NODE_SILENT for t in transitions)
         )
-        # What it waited for, and until when, was told while it waited.
+        # The wait and its deadline were published during the wait.
         limited = [m for m in waits if m.waits_for]
         ahead = [(m.deadline - m.header.stamp).to_sec() for m in limited]
         self.assertTrue(all(0.0 < seconds < 120.0 for seconds in ahead), ahead)
@@ -220,7 +220,7 @@ class BrainNodes(unittest.TestCase):
         self.handover_by_a_standard_client(shown["kind"], written["reason"])
 
     def handover_by_a_standard_client(self, kind, reason):
-        """The action in the same fault: refused in words, and why an initialisation fails is its result."""
+        """The action in the same fault: a refusal has a reason; a failed initialisation has it as its result."""
         last = rospy.wait_for_message("/coglab/handover_results", HandoverResult, LIMIT)
         self.assertEqual((last.action, last.reason, last.success), (kind, reason, False))
         self.assertLess(abs(last.ended.to_sec() - time.time()), 2 * LIMIT, "times are of the wall clock")
@@ -235,7 +235,7 @@ class BrainNodes(unittest.TestCase):
         self.assertEqual((state, result.reason_code), (actionlib.GoalStatus.ABORTED, ReasonCode.NODE_SILENT))
         self.assertIn("is its node running?", result.reason)
 
-    def test_6_a_second_one_in_its_own_namespace_ends_without_a_traceback(self):
+    def test_6_a_second_master_in_its_own_namespace_ends_without_a_traceback(self):
         config = rospy.get_param("/coglab/config_file")
         node = subprocess.Popen(
             [

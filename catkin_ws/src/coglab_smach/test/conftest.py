@@ -1,4 +1,4 @@
-"""Fixtures of the machine tests: the master in virtual time on simulated ports, walked by a script."""
+"""Fixtures of the machine tests: a script operates the master in virtual time on simulated ports."""
 
 from pathlib import Path
 
@@ -31,11 +31,11 @@ class Trial:
 
     @property
     def grip(self):
-        """What the states of a handover leave for each other."""
+        """The grip record that the states of a handover share."""
         return self.master.userdata.grip
 
     def run(self, script, limit=600.0):
-        """Walk the machine until the script ends; whatever the script raises is raised here."""
+        """Run the machine until the script ends. Raises the script's exception."""
         with using(self.clock):
 
             def scripted():
@@ -64,7 +64,7 @@ class Trial:
             self.clock.sleep(0.05)
 
     def until(self, condition, limit=60.0):
-        """Wait until it is so, which has to be within ``limit`` s."""
+        """Wait until ``condition()``; fails after ``limit`` s."""
         end = self.clock.now() + limit
         while not condition():
             assert self.clock.now() < end, f"not within {limit} s; why: {self.ctx.journal.why()}"
@@ -82,12 +82,12 @@ class Trial:
         self.start(action, object_id)
 
     def receive(self):
-        """Have the mug received."""
+        """Run the action that receives the mug."""
         self.begin()
         self.wait_hub("wait_with_object")
 
     def labels(self, path_end):
-        """Labels of the states that ended in the container whose path ends so, in order."""
+        """Labels of the states that ended in the container whose path ends with ``path_end``, in order."""
         return [t.from_state for t in self.ctx.journal.transitions if t.path.endswith(path_end)]
 
     def result(self):

@@ -1,30 +1,29 @@
-"""Nothing moves after a failure: what tests and bench mean by it.
+"""Checks that nothing moves after a failure, for tests and benches.
 
-From the moment at which the next state begins after a state that has ended failed or preempted (or at which the machine
-has ended), until a motion that somebody asks for is accepted or the trial is over, the true speed of every joint stays
-below STILL.
+A state ends with failed or preempted. From the start of the next state (or the end of the machine), until a new motion
+is accepted or the trial is over, the true speed of every joint must stay below STILL.
 """
 
 import numpy as np
 from coglab_smach.ports.pending import PortError
 
 STILL = 0.02
-"""rad/s: what the contact detector calls standing still"""
+"""rad/s, the contact detector's limit for an arm at rest"""
 
 
 class MotionWatch:
-    """Looks at the arm's true velocity. ``velocity()`` gives it (rad/s, seven joints); ``look()`` is called in every
-    step of the world, by the clock's own time."""
+    """Checks the arm's true velocity. ``velocity()`` returns it (rad/s, seven joints); ``look()`` is called in every
+    step of the world, in the clock's time."""
 
     def __init__(self, ctx, velocity):
         self._velocity = velocity
         self._failed = self._watching = False
         self._asked_for = []
-        """requests for motions since the failure whose answer is not known yet"""
+        """motion requests since the failure that are neither accepted nor refused yet"""
         self.failures = 0
         """states that have ended failed or preempted"""
         self.moved = []
-        """(state that had begun, rad/s) where the arm moved all the same"""
+        """(running state, rad/s) of each forbidden motion"""
         self._journal = ctx.journal
         ctx.journal.listen(self._on_transition)
         ctx.journal.listen_changes(self._on_change)
@@ -50,14 +49,14 @@ class MotionWatch:
             self._asked_for.clear()
 
     def _on_change(self):
-        # A state has begun, and nothing beside it is left of what failed.
+        # A new state has begun, and no parallel state of the failed group is left.
         if self._failed and len(self._journal.active()) == 1:
             self._watching = True
             self.look()
 
     def _accepted(self, pending, moves):
-        """Whether a motion was taken over; None: not known yet. A handle of one says so only at its end, but then the
-        arm has moved."""
+        """True if a motion was accepted; None: not known yet. The handle of a motion reports it only at its end, but
+        then the arm has moved."""
         if not pending.done():
             return True if moves else None
         try:
@@ -67,7 +66,7 @@ class MotionWatch:
         return True
 
     def look(self):
-        """Note it if the arm moves although it must not."""
+        """Record a motion of the arm while it must stand."""
         if not self._failed:
             return
         speed = float(np.max(np.abs(self._velocity())))

@@ -1,6 +1,6 @@
-"""A handover, both directions, on another engine than ours. A program: ``other_engine.py FOLDER [FILE]``.
+"""Runs a handover in both directions on another smach. A program: ``other_engine.py FOLDER [FILE]``.
 
-FOLDER holds a package ``smach``. Prints one JSON object. With FILE: runs the tests of that file instead.
+FOLDER contains a package ``smach``. Prints one JSON object. With FILE, runs the tests of that file instead.
 """
 
 import json
@@ -19,7 +19,7 @@ def use_engine(folder):
 
 
 def watch_user_data(container, seen):
-    """Note what a viewer is sent at each transition: the introspection of other engines pickles it."""
+    """Collect the user data that a viewer receives at each transition. Other engines pickle it."""
     container.register_transition_cb(lambda *_: seen.append(pickle.dumps(container.userdata._data, 2)))
     for child in container.get_children().values():
         if hasattr(child, "get_children"):

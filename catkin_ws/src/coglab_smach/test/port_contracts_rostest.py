@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The ports over ROS on the nodes behind them: what they take, refuse and report, and what a frozen node looks like."""
+"""The ROS ports with real nodes: requests, refusals, reports, and frozen nodes."""
 
 import os
 import signal
@@ -23,7 +23,7 @@ from coglab_smach.ros.hand import RosHand
 from coglab_smach.ros.ports import RosContact, RosDatabase, RosPerception
 from geometry_msgs.msg import Vector3, Wrench
 
-PATIENCE = 20.0  # how many times as long everything may take: the computer may be busy
+PATIENCE = 20.0  # factor on all time limits, for a busy computer
 LIBRARY = str(package_path("coglab_controllers", "config", "primitives.xml"))
 REACH = DmpRequest("take_board", "board", [0.0, -0.25, 0.45], dmp_ratio=4.0)
 
@@ -43,13 +43,13 @@ def stays(condition, duration):
 
 
 def settle(pending, limit=5.0):
-    """The value of a call, which has to come in time."""
+    """The value of a call; fails after ``limit`` s."""
     until(pending.done, limit, "the answer")
     return pending.result()
 
 
 def refused(pending, code):
-    """The error of a call that must not succeed, with this code."""
+    """The error of a call that must fail with this code."""
     try:
         value = settle(pending)
     except PortError as error:
@@ -60,7 +60,7 @@ def refused(pending, code):
 
 @contextmanager
 def frozen(node):
-    """Within the block this node's process is stopped."""
+    """Inside the block, the process of this node is stopped."""
     api = rosgraph.Master("/port_contracts").lookupNode(node)
     pid = xmlrpc.client.ServerProxy(api).getPid("/port_contracts")[2]
     os.kill(pid, signal.SIGSTOP)
@@ -71,7 +71,7 @@ def frozen(node):
 
 
 class WithArm(unittest.TestCase):
-    """A RosArm that may move, with its controllers loaded. Nothing but push() touches the hand."""
+    """A RosArm that may move, with its controllers loaded. Only push() touches the hand."""
 
     arm = None
 
@@ -118,7 +118,7 @@ class Motions(WithArm):
         until(lambda: self.arm.standing().ok, 2.0, "rest")
         time.sleep(0.1)
         place = np.array(self.arm.joint_positions())
-        assert np.max(np.abs(place - target)) > 0.02, "it went to its target all the same"
+        assert np.max(np.abs(place - target)) > 0.02, "it went to its target"
         time.sleep(0.3)
         assert np.max(np.abs(place - self.arm.joint_positions())) < 0.01, "it moved on"
 
@@ -135,9 +135,9 @@ class Motions(WithArm):
         assert self.arm.standing().ok, "cancel is answered when the arm stands"
         refused(queued, ReasonCode.CANCELLED)
         self.stands_before(target)
-        settle(self.arm.cancel_motion("the test"), 2.5)  # nothing to end is a success, too
+        settle(self.arm.cancel_motion("the test"), 2.5)  # succeeds without a motion too
 
-    def test_the_handle_and_a_switch_end_a_motion(self):
+    def test_cancel_of_the_handle_and_a_switch_end_a_motion(self):
         motion, target = self.start_ptp()
         motion.cancel()
         refused(motion, ReasonCode.CANCELLED)
@@ -158,7 +158,7 @@ class Motions(WithArm):
         until(lambda: self.arm.motion_allowed().ok, 2.0, "the end of the hold")
         stays(lambda: self.arm.standing().ok, 0.2)
 
-    def test_a_reach_reports_takes_another_primitive_and_is_cancelled(self):
+    def test_a_reach_reports_progress_changes_its_primitive_and_is_cancelled(self):
         self.ready("dmp")
         refused(self.arm.execute_dmp(DmpRequest("to_the_moon", "board", REACH.goal_offset)), ReasonCode.UNKNOWN_NAME)
         refused(self.arm.switch_dmp(REACH), ReasonCode.NOTHING_RUNS)
@@ -174,7 +174,7 @@ class Motions(WithArm):
         until(lambda: progress().state == "aborted", 1.0, "news of the end")
         assert progress().code == ReasonCode.CANCELLED
 
-    def test_profiles_of_feedback_are_applied_and_come_with_a_controller(self):
+    def test_feedback_profiles_are_applied_and_a_controller_brings_its_own(self):
         self.ready("dmp")
         until(lambda: self.arm.profile_settled("dmp").ok, 3.0, "the controller's own profile")
         settle(self.arm.apply_profile("dmp_compliant"))
@@ -182,7 +182,7 @@ class Motions(WithArm):
         refused(self.arm.apply_profile("nobody"), ReasonCode.UNKNOWN_NAME)
         assert not self.arm.profile_settled("dmp").ok
 
-    def test_what_is_given_up_while_the_node_is_frozen_never_acts(self):
+    def test_requests_cancelled_while_the_node_is_frozen_never_act(self):
         before = np.array(self.arm.joint_positions())
         with frozen("/robot"):
             motion = self.arm.move_ptp([*before[:6], 0.0], [])
@@ -196,7 +196,7 @@ class Motions(WithArm):
 
 
 class Contact(WithArm):
-    """RosContact, before the arm has gone anywhere."""
+    """RosContact, before the first motion of the arm."""
 
     @classmethod
     def setUpClass(cls):
@@ -206,10 +206,10 @@ class Contact(WithArm):
     def tearDown(self):
         self.push(0.0)
         self.contact.disarm()
-        time.sleep(1.0)  # what the arm feels while nobody touches it
+        time.sleep(1.0)  # s at rest for the detector, while nobody touches the arm
 
     def watch(self, mode, **settings):
-        """Armed, and the detector has seen enough of the arm at rest."""
+        """Arm the detector and wait until it has enough samples of the arm at rest."""
         settle(self.contact.arm(mode, 20.0, settings))
         time.sleep(3.0)
         assert self.contact.event() is None, self.contact.event()
@@ -220,7 +220,7 @@ class Contact(WithArm):
         assert (event.contact, event.code) == (contact, code), event
         assert event.margin >= 1.0 and 0.5 <= event.confidence <= 1.0 and event.source, event
 
-    def test_a_touch_a_weight_and_a_release_are_found_once_each(self):
+    def test_touch_weight_and_release_are_each_detected_once(self):
         refused(self.contact.arm("juggle", 1.0, {}), ReasonCode.INVALID_ARGUMENT)
         self.watch("contact", k=20.0)
         self.push(-8.0)
@@ -230,7 +230,7 @@ class Contact(WithArm):
         self.watch("load", mass=0.8, load_share=0.5)
         self.push(-8.0)
         self.happens(True, ReasonCode.LOAD_CARRIED)
-        assert self.contact.share_gone() is None and self.contact.grip() is None, "this hand does not feel"
+        assert self.contact.share_gone() is None and self.contact.grip() is None, "this hand has no force sensors"
         self.watch("release", mass=0.8, load_share=0.5)
         until(lambda: abs(self.contact.share_gone() or 0.0) < 0.1, 1.0, "the whole load")
         self.push(0.0)
@@ -239,7 +239,7 @@ class Contact(WithArm):
         self.contact.disarm()
         assert self.contact.share_gone() is None
 
-    def test_disarmed_it_says_nothing_and_a_frozen_detector_does_not_answer(self):
+    def test_a_disarmed_detector_is_silent_and_a_frozen_one_does_not_answer(self):
         with frozen("/contact_detector"):
             armed = self.contact.arm("contact", 1.0, {})
             time.sleep(0.4)
@@ -250,7 +250,7 @@ class Contact(WithArm):
         self.push(-8.0)
         stays(lambda: self.contact.event() is None, 0.5)
 
-    def test_touch_in_motion_is_found_while_the_arm_moves(self):
+    def test_touch_is_detected_while_the_arm_moves(self):
         self.start_ptp(0.8)
         time.sleep(0.3)
         settle(self.contact.arm("contact_in_motion", 20.0, {}))
@@ -323,7 +323,7 @@ class PerceptionAndDatabase(unittest.TestCase):
         places = settle(perception.free_places("mug", 2.0), 4.0)
         assert places and all(place.parent == "board" for place in places)
 
-    def test_an_offer_and_a_pattern_count_while_they_are_published(self):
+    def test_an_offer_and_a_pattern_expire_when_no_longer_published(self):
         perception = RosPerception()
         beliefs = rospy.Publisher("perception/belief", HandoverBelief, queue_size=1)
         patterns = rospy.Publisher("perception/recognition", Recognition, queue_size=1)
@@ -349,7 +349,7 @@ class PerceptionAndDatabase(unittest.TestCase):
             time.sleep(0.4)
             assert not entry.done() and not ids.done()
             entry.cancel()
-        assert "mug" in settle(ids), "what was not given up is answered in the end"
+        assert "mug" in settle(ids), "a request that was not cancelled is answered in the end"
         assert settle(database.get_object("mug"))["mass"] == 0.31
         assert "elephant" in refused(database.get_object("elephant"), ReasonCode.OBJECT_UNKNOWN).sentence
 

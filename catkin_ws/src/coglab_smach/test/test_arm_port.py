@@ -1,5 +1,5 @@
-"""The arm as the brain sees it over ROS: for how long what its nodes say counts, what is asked of them and how long it
-is waited for; and what becomes of a motion. No master is there, and ages are what the test says."""
+"""RosArm without a ROS master: maximum age of messages, requests and their time limits, and the end of a motion. The
+tests set the ages."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ JOINTS = ["lwr_a1", "lwr_a2", "lwr_e1", "lwr_a3", "lwr_a4", "lwr_a5", "lwr_a6"]
 
 
 class Topic:
-    """In the place of Newest."""
+    """Replaces Newest."""
 
     every: dict[str, Topic] = {}
 
@@ -77,7 +77,7 @@ def robot(monkeypatch):
 
 
 def ended(pending):
-    """Waits for a call that has a thread of its own."""
+    """Waits for a call in its own thread."""
     end = time.monotonic() + 60.0
     while not pending.done():
         assert time.monotonic() < end
@@ -85,11 +85,11 @@ def ended(pending):
     return pending
 
 
-# --- what is known of it ----------------------------------------------------------------------------------------------
+# --- state of the arm -------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("ask", ["motion_allowed", "standing"])
-def test_a_robot_that_was_never_heard_or_not_for_a_second_is_silent(robot, ask):
+def test_a_robot_without_messages_for_one_second_is_silent(robot, ask):
     verdict = getattr(robot.port, ask)
     assert verdict() == Verdict(True)
     robot.topics["lwr/joint_states"].seconds = 1.0
@@ -103,7 +103,7 @@ def test_a_robot_that_was_never_heard_or_not_for_a_second_is_silent(robot, ask):
     assert "has never been published" in verdict().why and verdict().code == ReasonCode.NODE_SILENT
 
 
-def test_joints_are_told_in_wire_order_for_half_a_second(robot):
+def test_joints_are_in_wire_order_and_expire_after_half_a_second(robot):
     assert robot.port.measured() == ((6.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.0), 7.5)
     robot.topics["lwr/joint_states"].seconds = 0.5
     assert robot.port.joint_positions() is not None
@@ -115,7 +115,7 @@ def test_joints_are_told_in_wire_order_for_half_a_second(robot):
     assert robot.port.joint_positions() is None
 
 
-def test_news_of_a_motion_that_is_older_than_its_start_is_none(robot):
+def test_progress_from_before_the_start_of_a_motion_is_ignored(robot):
     feedback = {"state": "reached", "reason": "r", "primitive_id": "p", "phase": 0.2, "remaining_distance": 0.1}
     feedback |= {"reason_code": 4, "remaining_time": 0.3}
     assert robot.port.dmp_progress() == DmpProgress("idle")
@@ -128,10 +128,10 @@ def test_news_of_a_motion_that_is_older_than_its_start_is_none(robot):
     assert robot.port.dmp_progress().state == "reached"
     robot.now = 51.0
     assert started.result() is None
-    assert robot.port.dmp_progress() == DmpProgress("running"), "it has begun when it was accepted"
+    assert robot.port.dmp_progress() == DmpProgress("running"), "an accepted motion counts as running"
 
 
-# --- what is asked of it ----------------------------------------------------------------------------------------------
+# --- requests ---------------------------------------------------------------------------------------------------------
 
 
 # --- the end of a motion ----------------------------------------------------------------------------------------------
@@ -161,7 +161,7 @@ def test_both_the_active_and_the_addressed_controller_are_cancelled(robot):
     assert pending.done() and pending.result() is None
 
 
-def test_cancelling_is_over_when_the_arm_stands_or_at_once_when_it_fails(robot):
+def test_cancelling_ends_when_the_arm_stands_or_immediately_on_failure(robot):
     robot.say("controller_manager/status", **robot.status(standing=False))
     pending = robot.port.cancel_motion("why")
     time.sleep(0.05)
@@ -178,14 +178,14 @@ def finished(robot, ptp_id=3):
     robot.topics["controller_manager/ptp/finished_ptp"].heard(FinishedPtp(ptp_id=ptp_id))
 
 
-def test_a_motion_is_over_when_its_own_end_is_told(robot):
+def test_a_motion_ends_only_with_its_own_end_message(robot):
     motion = robot.port.move_ptp((0.0,) * 7, [])
     finished(robot, 2)
     assert not motion.done()
     finished(robot)
     assert motion.done() and motion.result() is None
     again = robot.port.move_ptp((0.0,) * 7, [])
-    assert not again.done(), "ends of motions before it are forgotten"
+    assert not again.done(), "ends of earlier motions do not count"
     told = UnfinishedPtp(ptp_id=3, reason="cancelled", reason_code=ReasonCode.CANCELLED)
     robot.topics["controller_manager/ptp/unfinished_ptp"].heard(told)
     assert again.done() and again.done()
@@ -195,7 +195,7 @@ def test_a_motion_is_over_when_its_own_end_is_told(robot):
 
 
 @pytest.mark.parametrize("how", ["fault", "not allowed"])
-def test_a_motion_may_end_without_a_word_of_its_own(robot, how):
+def test_a_motion_may_end_without_an_end_message(robot, how):
     motion = robot.port.move_ptp((0.0,) * 7, [])
     assert not motion.done()
     if how == "fault":

@@ -1,4 +1,4 @@
-"""After a point-to-point motion the brain looks where the arm is: what the controller says alone is not believed."""
+"""After a point-to-point motion the brain checks the measured joints; the controller's report is not enough."""
 
 import numpy as np
 import pytest
@@ -9,8 +9,8 @@ JOINT = 3
 
 
 def take_with(aside):
-    """Take with an arm whose joint 3 is measured ``aside(seconds since the motion's end)`` rad from where it was sent,
-    while it was sent to the board. Returns the trial and how long the state took after the motion's end."""
+    """Run take. At the board, joint 3 is measured ``aside(seconds since the motion's end)`` rad beside its target.
+    Returns the trial and the time (s) from the motion's end to the state's end."""
     trial = Trial()
     arm, board = trial.ctx.arm, trial.ctx.config.get("postures.board")
     real, ended, looked = arm.joint_positions, [], []
@@ -38,18 +38,18 @@ def take_with(aside):
 
 
 @pytest.mark.parametrize("size", [0.031, 0.1, -0.1])
-def test_an_arm_that_is_elsewhere_has_not_arrived(size):
+def test_an_arm_beside_its_target_has_not_arrived(size):
     trial = take_with(lambda t: size)
     result = trial.result()
     assert result.outcome == "failed_empty"
     assert "all measured joints within 0.03 rad of posture 'board' within 1.0 s" in result.reason
     assert result.code == ReasonCode.TIME_LIMIT
-    assert not trial.cell.called("close"), "it did not close the hand there"
+    assert not trial.cell.called("close"), "the hand must not close there"
 
 
 def test_an_arm_that_settles_within_a_second_has_arrived():
     assert take_with(lambda t: 0.1 if t < 0.8 else 0.0).result().outcome == "succeeded"
 
 
-def test_within_the_tolerance_it_has_arrived():
+def test_an_arm_within_the_tolerance_has_arrived():
     assert take_with(lambda t: 0.029).result().outcome == "succeeded"

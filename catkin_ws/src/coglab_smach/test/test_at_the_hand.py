@@ -1,4 +1,4 @@
-"""Where palm, object and the person's hand are: what is believed of it, for how long, and what a hand does of it."""
+"""Positions of palm, object and the person's hand: maximum age of sights, and the checks that use them."""
 
 from types import SimpleNamespace
 
@@ -30,7 +30,7 @@ IDENTITY = (0.0, 0.0, 0.0, 1.0)
 
 
 class Seen:
-    """A still arm, and what is seen: name -> (m from the palm, s old)."""
+    """A standing arm and sights: name -> (position relative to the palm in m, age in s)."""
 
     def __init__(self, **things):
         self.trial, self.things, self.turned = Trial(), things, IDENTITY
@@ -47,7 +47,7 @@ class Seen:
         return Ready(Located(name, "world", tuple(PALM.position + off), self.turned, age))
 
     def run(self, state, **ud):
-        """The outcome of its work, and the s that it takes."""
+        """Returns the state's outcome and its duration (s)."""
         state._deadline = 1e9
         with using(self.trial.clock):
             begin = self.trial.clock.now()
@@ -55,11 +55,11 @@ class Seen:
             return outcome, self.trial.clock.now() - begin
 
 
-# --- where it is ------------------------------------------------------------------------------------------------------
+# --- positions --------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("age", "known"), [(0.5, True), (0.51, False)])
-def test_a_sight_tells_for_half_a_second(age, known):
+def test_a_sight_is_valid_for_half_a_second(age, known):
     seen = Seen(mug=(np.array([0.1, 0.0, -0.2]), age), human_hand=(np.array([0.0, 0.3, 0.0]), age))
     goal = {"object": {"frame": "object_mug", "grasp": {"xyz": [0.0, 0.0, 0.05], "quaternion": list(IDENTITY)}}}
     release = {"pose": {"xyz": [0.0, 0.1, 0.0]}}
@@ -85,7 +85,7 @@ def test_a_sight_tells_for_half_a_second(age, known):
     ("offered", "nearer"),
     [((0.1, 0.0, 0.3), (0.08, 0.0, 0.3)), ((-0.06, 0.08, 0.0), (-0.048, 0.064, 0.0)), ((0.01, 0.0, 0.2), (0, 0, 0.2))],
 )
-def test_what_a_person_has_missed_is_brought_two_centimetres_nearer_than_it_was_offered(offered, nearer):
+def test_a_missed_object_is_brought_two_centimetres_nearer(offered, nearer):
     seen = Seen(mug=(np.array([0.0, 0.0, 0.1]), 0.0), human_hand=(np.array([0.3, 0.0, 0.0]), 0.0))
     seen.turned = tuple(about_z(np.pi / 2))
     with using(seen.trial.clock):
@@ -97,11 +97,11 @@ def test_what_a_person_has_missed_is_brought_two_centimetres_nearer_than_it_was_
         assert way_to_hand(seen.state, "mug", {"pose": {"xyz": list(offered)}}) is None
 
 
-# --- whether it is still held -----------------------------------------------------------------------------------------
+# --- held or lost -----------------------------------------------------------------------------------------------------
 
 
 class Carried:
-    """A hand that carries something that is seen ``down`` m below its palm, ``age`` s ago."""
+    """A hand that carries an object, seen ``down`` m below the palm ``age`` s ago."""
 
     def __init__(self, down=0.07, age=0.05):
         self.t, self.down, self.age = 0.0, down, age
@@ -122,7 +122,7 @@ class Carried:
         self.held = HeldObject(self.ctx, "mug", self.grip)
 
     def gone_after(self, down, looks=60):
-        """s after which it is lost, seen so far away every 10 ms; None: it is not."""
+        """Time (s) until the object, seen every 10 ms ``down`` m below the palm, is lost; None if it is not."""
         self.held.check()
         self.down, begin = down, self.t
         for _ in range(looks):
@@ -138,7 +138,7 @@ class Carried:
 @pytest.mark.parametrize(
     ("first", "then", "gone"), [(0.07, 0.215, None), (0.07, 0.23, 0.3), (0.19, 0.335, None), (0.21, 0.345, None)]
 )
-def test_an_object_is_lost_that_is_15_cm_farther_for_three_tenths_of_a_second(first, then, gone):
+def test_an_object_15_cm_farther_for_300_ms_is_lost(first, then, gone):
     carried = Carried(first)
     assert carried.gone_after(then) == (None if gone is None else pytest.approx(gone, abs=0.011))
     assert gone is None or carried.words == f"it is seen {then:.2f} m from the palm"
@@ -147,7 +147,7 @@ def test_an_object_is_lost_that_is_15_cm_farther_for_three_tenths_of_a_second(fi
 @pytest.mark.parametrize(
     ("positions", "lost"), [((0, 250, 254, 254, 254), True), ((254, 249, 254, 254, 254), False), ((), False)]
 )
-def test_fingers_at_their_ends_hold_nothing(positions, lost):
+def test_fully_open_or_closed_fingers_hold_nothing(positions, lost):
     carried = Carried()
     carried.state = HandState(True, True, False, True, positions=positions)
     if lost:
@@ -160,16 +160,13 @@ def test_fingers_at_their_ends_hold_nothing(positions, lost):
 
 
 @pytest.mark.parametrize(("moved", "after", "stays"), [(0.039, 0.16, True), (0.041, 0.16, False), (0.0, 0.14, False)])
-def test_an_object_stays_that_a_later_sight_shows_as_far_from_the_palm_as_at_first(moved, after, stays):
-    """A tenth of a second later, by the time at which the sight was taken."""
+def test_an_object_at_its_first_distance_stays(moved, after, stays):
+    """The sight must be taken at least 0.1 s later."""
     carried = Carried()
     carried.held.check()
     carried.down += moved
     carried.t = after
     assert carried.held.stays(0.0) == stays
-
-
-# --- when fingers close -----------------------------------------------------------------------------------------------
 
 
 # --- to the grasp -----------------------------------------------------------------------------------------------------
@@ -179,7 +176,7 @@ IN_THE_WAY, LATE = "something is in the way", "the way to the grasp within 1.7 s
 
 
 @pytest.mark.parametrize(("newton", "arrives", "why"), [(6.4, 0.5, ""), (6.6, 0.5, IN_THE_WAY), (6.4, 99.0, LATE)])
-def test_the_way_to_the_grasp_ends_where_6_5_newton_push_or_in_time(monkeypatch, newton, arrives, why):
+def test_the_way_to_the_grasp_ends_at_a_push_of_6_5_newton_or_its_time_limit(monkeypatch, newton, arrives, why):
     seen, cancelled = Seen(), []
     clock = seen.trial.clock
     monkeypatch.setattr(regrasp, "way_to_grasp", lambda *_: np.array([0.0, 0.0, -0.03]))

@@ -1,6 +1,6 @@
-"""Bad input: what a node says reaches the person with its code, and a node that dies in an exchange drops nothing.
+"""Bad input: a node's error reaches the operator with its code, and the death of a node drops no object.
 
-The words of the nodes themselves are tested beside the nodes."""
+Tests of the nodes check the sentences themselves."""
 
 import pytest
 from coglab_msgs.msg import ReasonCode
@@ -8,7 +8,7 @@ from coglab_smach.ports.pending import PortError
 from conftest import Trial
 
 EXCHANGE = "exchange_human_to_robot"
-WORDS = "the words of a node that this test has made up 4711"
+WORDS = "an invented sentence of a node 4711"
 
 
 def goal_lost(t):
@@ -36,7 +36,7 @@ PASSED_ON = {
 
 
 @pytest.mark.parametrize("prepare", PASSED_ON, ids=lambda f: f.__name__)
-def test_what_a_node_says_reaches_the_person_word_for_word_with_its_code(prepare):
+def test_the_error_of_a_node_reaches_the_operator_unchanged_with_its_code(prepare):
     trial = Trial()
 
     def script(t):
@@ -78,12 +78,12 @@ def test_hand_node_dies_during_the_exchange(moment, hub, sentence, code):
 
 
 @pytest.mark.parametrize("action", [EXCHANGE, "take"])
-def test_a_hand_node_that_dies_once_the_fingers_have_closed_has_not_said_that_they_closed_on_nothing(action):
+def test_a_hand_node_that_dies_after_closing_does_not_count_as_empty(action):
     trial = Trial()
 
     def script(t):
         t.wait_hub("wait_without_object")
-        # Until it dies the hand says that it holds nothing, so that the brain gives it time to say otherwise.
+        # Until it dies, the hand reports that it is empty, and the brain waits for a grip.
         t.cell.faults.empty_grasp = True
         t.start(action)
         t.until(lambda: t.ctx.journal.marked("closed"))
@@ -94,15 +94,15 @@ def test_a_hand_node_that_dies_once_the_fingers_have_closed_has_not_said_that_th
 
     trial.run(script)
     assert trial.ctx.holding == "mug" and "missed" not in trial.result().marks
-    assert not trial.cell.called("open") and not trial.cell.called("preshape"), "what it may hold would fall"
+    assert not trial.cell.called("open") and not trial.cell.called("preshape"), "an object in the hand would fall"
 
 
 def stale(frame, age):
-    """As execute_dmp refuses; what it means is in the code alone, the words may be any."""
+    """A refusal of execute_dmp. Only its code has a meaning."""
     return PortError(f"frame '{frame}': age {age:.2f}, too much", code=ReasonCode.GOAL_STALE)
 
 
-def test_a_goal_that_is_lost_for_a_moment_at_the_start_is_waited_for():
+def test_the_start_waits_for_a_goal_that_is_lost_for_a_moment():
     trial = Trial()
     trial.cell.faults.refuse["execute_dmp"] = stale("object_mug", 0.45)
 

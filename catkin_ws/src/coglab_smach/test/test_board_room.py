@@ -1,4 +1,4 @@
-"""Taking from and putting on the board: the arm is never sent into it, however the tracker sees what lies there."""
+"""Take and put: the arm never moves into the board, even if the tracker sees the object tilted or too low."""
 
 from dataclasses import replace
 
@@ -22,9 +22,9 @@ CONFIG = Config.load(str(SHARE / "config" / "machines.yaml"), {})
 URDF = package_path("lwr_description", "urdf", "lwr_ih2.urdf").read_text(encoding="utf-8")
 OBJECTS = ["ball", "bottle", "mug", "screwdriver", "tea_box"]
 TILTS = [(7.0, 0.0), (0.0, -7.0)]
-"""deg about the board's x and y, as an averaged sight may be off"""
+"""deg about the board's x and y, error of an averaged sight"""
 LOW = 0.008
-"""m by which it may be seen too low"""
+"""m, error of the seen height"""
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +33,7 @@ def room():
 
 
 def palm_for(object_id, tilt=(0.0, 0.0), low=0.0):
-    """The palm at the default grasp of an object that stands in the middle of the board, as it is seen."""
+    """The palm at the default grasp of an object in the middle of the board, seen tilted (deg) and too low (m)."""
     entry = parse_object((objects_folder() / f"{object_id}.yaml").read_text(), object_id)
     seen = {"frame": "board", "xyz": [0.0, 0.0, -low], "rpy_deg": [*tilt, 0.0]}
     goal = place_goal(entry, entry["grasps"][entry["default_grasp"]], seen, "take", 0.012)
@@ -45,19 +45,19 @@ def test_shipped_grasps_leave_room(room, object_id):
     assert room.over(BOARD, palm_for(object_id)) > 0.005
 
 
-def test_room_is_told_as_the_description_has_it(room):
-    # The hand lies level on its side: the lowest is the ball of the wrist, 57 mm about the palm's height.
+def test_clearance_follows_the_robot_description(room):
+    # The hand lies level on its side. The lowest part is the ball of the wrist, 57 mm around the palm's height.
     palm = palm_for("mug")
     assert room.over(BOARD, palm) == pytest.approx(palm.position[2] - BOARD.position[2] - 0.057, abs=1e-3)
     higher = Pose(palm.position + [0.0, 0.0, 0.1], palm.orientation)
     assert room.over(BOARD, higher) == pytest.approx(room.over(BOARD, palm) + 0.1, abs=5e-3)
-    # Where the arm has no posture nothing is said about the board.
+    # A goal without a posture of the arm is not checked against the board.
     assert room.over(BOARD, Pose(np.array([3.0, 0.0, 0.1]), palm.orientation)) == np.inf
 
 
 @pytest.mark.parametrize("object_id", OBJECTS)
 @pytest.mark.parametrize("tilt", TILTS)
-def test_a_palm_is_raised_by_what_is_missing_and_no_more(room, object_id, tilt):
+def test_a_palm_is_raised_only_as_far_as_needed(room, object_id, tilt):
     palm = palm_for(object_id, tilt, LOW)
     lift, raised = room.raised(BOARD, palm, 0.01, 0.05)
     assert raised is not None and raised.orientation == pytest.approx(palm.orientation)
@@ -67,13 +67,13 @@ def test_a_palm_is_raised_by_what_is_missing_and_no_more(room, object_id, tilt):
         assert lift == 0.0
     else:
         assert room.over(BOARD, raised) == pytest.approx(0.01, abs=1e-3)
-    # What would need more than is allowed is refused.
+    # A lift above the limit is refused.
     if before < 0.0:
         assert room.raised(BOARD, palm, 0.01, 0.005)[1] is None
 
 
 def seen_otherwise(trial, tilt, low):
-    """From now on perception sees the mug tilted about the board's axes and too low."""
+    """From now on, perception sees the mug tilted about the board's axes and too low."""
     locate = trial.ctx.perception.locate_object
 
     def otherwise(object_id, time_limit):
@@ -94,7 +94,7 @@ def seen_otherwise(trial, tilt, low):
 
 
 @pytest.mark.parametrize("tilt", [(0.0, -7.0), (7.0, 0.0)])
-def test_an_object_that_is_seen_tilted_and_low_is_taken_without_running_into_the_board(tilt):
+def test_an_object_seen_tilted_and_low_is_taken_without_touching_the_board(tilt):
     smach.set_loggers(*[lambda *a: None] * 4)
     trial = VirtualTrial(world=World(8001, CONSIDERATE, "world"))
     seen_otherwise(trial, tilt, LOW)
@@ -103,24 +103,24 @@ def test_an_object_that_is_seen_tilted_and_low_is_taken_without_running_into_the
     assert trial.last_hub == "wait_with_object" and trial.world.cell.truth()["held_by"] == "robot"
 
 
-def test_a_wide_object_is_taken_along_its_approach_axis_and_not_from_above():
+def test_a_wide_object_is_taken_along_its_approach_axis():
     smach.set_loggers(*[lambda *a: None] * 4)
     trial = VirtualTrial(world=World(8001, replace(CONSIDERATE, object_id="tea_box"), "world"))
     assert [r.outcome for r in trial.run("take")] == ["succeeded"], trial.ctx.journal.why()
 
 
-def test_an_object_that_lies_is_refused_before_the_arm_goes_down_to_it():
+def test_a_lying_object_is_refused_before_the_arm_moves_down():
     smach.set_loggers(*[lambda *a: None] * 4)
     trial = VirtualTrial(world=World(8001, CONSIDERATE, "world"))
     seen_otherwise(trial, (0.0, -20.0), 0.02)
     (result,) = trial.run("take")
     assert (result.outcome, result.code) == ("failed_empty", ReasonCode.GOAL_AT_BOARD), trial.ctx.journal.why()
     assert trial.last_hub == "wait_without_object"
-    assert not trial.reaches, "the arm went there all the same"
+    assert not trial.reaches, "the arm moved there"
 
 
 def walked(action, answer):
-    """An action on simulated ports; ``answer``: by how much a palm has to rise, and where it is then."""
+    """Run an action on simulated ports. ``answer``: (lift of the palm in m, lifted palm)."""
     trial = Trial()
     trial.ctx.raised = lambda board, palm, room, most: answer(palm)
 

@@ -1,5 +1,5 @@
-"""Fingers begin to close on the last of the way, where the object is seen between them; a hand that has touched
-something else opens before it comes again, toward where the object is seen."""
+"""Fingers start to close during the reach if the object is seen between them. A hand that has touched something else
+opens before it reaches again."""
 
 import numpy as np
 import pytest
@@ -21,8 +21,8 @@ def at_the_palm(trial):
 
 
 def receive(monkeypatch, away, touch_after=1.5, **settings):
-    """Receive with the object seen ``away(looks)`` m off its grasp, from somebody felt so late (s). Returns the trial
-    and what was called when."""
+    """Receive with the object seen ``away(looks)`` m off its grasp and a touch after ``touch_after`` s. Returns the
+    trial and the calls with their times."""
     trial, looks = Trial(**settings), []
 
     def off_grasp(state, goal):
@@ -37,15 +37,17 @@ def receive(monkeypatch, away, touch_after=1.5, **settings):
     return trial, [name for _, name in trial.cell.calls]
 
 
-def test_fingers_begin_to_close_before_anything_is_felt(monkeypatch):
+def test_fingers_start_to_close_before_contact(monkeypatch):
     trial, calls = receive(monkeypatch, lambda looks: 0.02)
     marks = trial.result().marks
     assert marks["closing_on_the_way"] < marks["contact"] <= marks["closing"]
-    assert calls[: calls.index("arm lift")].count("close") == 1, "asked twice, a hand opens to its preshape in between"
+    assert calls[: calls.index("arm lift")].count("close") == 1, (
+        "a second order would open the hand to its preshape first"
+    )
 
 
 @pytest.mark.parametrize("case", ["switched off", "elsewhere", "not seen"])
-def test_they_stay_open_until_the_contact_where_they_might_close_on_nothing(monkeypatch, case):
+def test_fingers_wait_for_contact_if_they_might_close_on_nothing(monkeypatch, case):
     away = {"switched off": lambda n: 0.02, "elsewhere": lambda n: 0.06, "not seen": lambda n: None}[case]
     settings = {"handover.close_within": 0.0} if case == "switched off" else {}
     trial, calls = receive(monkeypatch, away, **settings)
@@ -53,19 +55,19 @@ def test_they_stay_open_until_the_contact_where_they_might_close_on_nothing(monk
     assert calls[: calls.index("arm lift")].count("close") == 1
 
 
-def test_a_hand_that_met_something_else_opens_before_it_comes_again(monkeypatch):
-    """Two looks: the object is between the fingers, and, at the touch, elsewhere."""
+def test_a_hand_that_touched_something_else_opens_before_it_reaches_again(monkeypatch):
+    """At the first look the object is between the fingers, at the touch it is elsewhere."""
     trial, calls = receive(monkeypatch, lambda looks: 0.2 if looks == 2 else 0.02, touch_after=0.3)
     assert "bumped" in trial.result().marks
     first, again = calls.index("close"), [i for i, name in enumerate(calls) if name == "execute_dmp"][1]
     assert any(name.startswith("preshape") for name in calls[first:again]), calls
-    # It stands before it draws back: what begins in motion brakes with less than all that the joints can.
+    # The arm stands before it retreats: a motion that starts while it moves brakes later.
     assert calls.index("cancel") < calls.index("move_ptp", first), calls
 
 
-def test_a_goal_that_is_hidden_for_a_moment_is_waited_for(monkeypatch):
-    """After a touch of something else the tracker has lost the object for 0.5 s."""
-    # In this cell the object is at the palm from the touch on, wherever the palm is.
+def test_the_arm_waits_for_a_goal_that_is_hidden_for_a_moment(monkeypatch):
+    """After a touch of something else, the tracker loses the object for 0.5 s."""
+    # In this cell the object follows the palm from the touch on.
     trial = Trial(**{"handover.retreat": 2.0, "handover.drop": 0.0})
     trial.cell.partner.touch_after = 0.3
     looks, refused, execute = [], [], trial.ctx.arm.execute_dmp
@@ -89,8 +91,8 @@ def test_a_goal_that_is_hidden_for_a_moment_is_waited_for(monkeypatch):
     assert trial.result().outcome == "succeeded" and len(refused) > 5, trial.ctx.journal.why()
 
 
-def test_a_hand_that_still_takes_its_preshape_is_left_alone(monkeypatch):
-    """Asked to close in the middle, it would end its preshape, and with that the reach."""
+def test_a_running_preshape_is_not_interrupted(monkeypatch):
+    """A closing order would end the preshape, and with it the reach."""
     trial, calls = receive(monkeypatch, lambda looks: 0.02, touch_after=2.0)
     began = [stamp for stamp, name in trial.cell.calls if name.startswith("preshape")][0]
     closed = [stamp for stamp, name in trial.cell.calls if name == "close"][0]
@@ -98,8 +100,8 @@ def test_a_hand_that_still_takes_its_preshape_is_left_alone(monkeypatch):
 
 
 @pytest.mark.parametrize("why", ["contact of an object with the hand", "goal lost"])
-def test_with_fingers_that_do_not_open_again_the_arm_stays_with_what_the_person_holds(monkeypatch, why):
-    """They have begun to close, the reach fails, and the hand is stuck: the person may hold what is in it."""
+def test_the_arm_stays_if_closed_fingers_do_not_open_again(monkeypatch, why):
+    """The fingers have started to close, the reach fails, and the hand is stuck: the person may hold the object."""
     trial = Trial()
     monkeypatch.setattr(reach, "off_grasp", lambda state, goal: 0.02)
     monkeypatch.setattr(recovery, "person_has_it", lambda *_: True)
@@ -114,8 +116,8 @@ def test_with_fingers_that_do_not_open_again_the_arm_stays_with_what_the_person_
             t.cell.arm.end("goal lost", ReasonCode.GOAL_LOST)
         t.wait_hub("stopped")
         t.clock.sleep(5.0)
-        assert t.cell.called("move_ptp") == moved, "the arm went away with it"
-        assert "the person may hold what is in it" in t.ctx.journal.why()
+        assert t.cell.called("move_ptp") == moved, "the arm moved away with it"
+        assert "the person may hold its object" in t.ctx.journal.why()
         t.cell.faults.refuse.clear()
         t.start("reset", "")
         t.wait_hub("wait_without_object")
@@ -126,8 +128,8 @@ def test_with_fingers_that_do_not_open_again_the_arm_stays_with_what_the_person_
 
 
 @pytest.mark.parametrize("person", ["away", "not seen", "at it"])
-def test_what_fingers_have_caught_on_the_way_is_not_dropped_where_the_person_has_let_go(monkeypatch, person):
-    """They let go at the first touch, and then the goal is lost: only who is there to hold the object gets it back."""
+def test_an_object_caught_during_the_reach_is_not_dropped_after_the_person_let_go(monkeypatch, person):
+    """The person lets go at the first touch, then the goal is lost. Only a person at the object gets it back."""
     trial = Trial()
     monkeypatch.setattr(reach, "off_grasp", lambda state, goal: 0.02)
     trial.cell.partner.touch_after = None
@@ -154,8 +156,8 @@ def test_what_fingers_have_caught_on_the_way_is_not_dropped_where_the_person_has
     assert result.code == (ReasonCode.NOT_RELEASED if person == "not seen" else ReasonCode.GOAL_LOST)
 
 
-def test_fingers_that_have_opened_to_come_again_hold_nothing_of_the_persons(monkeypatch):
-    """After a touch of something else the goal is lost, and only then the hand is stuck, open: the arm goes home."""
+def test_reopened_fingers_hold_no_object_of_the_person(monkeypatch):
+    """After a touch of something else the goal is lost, then the open hand is stuck: the arm goes home."""
     trial, looks = Trial(), []
 
     def off_grasp(state, goal):
@@ -178,8 +180,8 @@ def test_fingers_that_have_opened_to_come_again_hold_nothing_of_the_persons(monk
     assert "bumped" in trial.result().marks and trial.result().code == ReasonCode.GOAL_LOST
 
 
-def test_fingers_that_have_begun_to_close_open_before_a_reach_that_paused_goes_on(monkeypatch):
-    """With a fist it would push away what the person offers again."""
+def test_closing_fingers_open_before_a_paused_reach_continues(monkeypatch):
+    """A fist would push the offered object away."""
     trial, waits = Trial(), []
     monkeypatch.setattr(reach, "off_grasp", lambda state, goal: 0.02)
     trial.cell.partner.touch_after, trial.cell.faults.empty_grasp = 3.0, True
@@ -201,7 +203,7 @@ def test_fingers_that_have_begun_to_close_open_before_a_reach_that_paused_goes_o
     assert "paused" in trial.result().marks and any(name.startswith("preshape") for name in between), calls
 
 
-def test_a_stop_ends_fingers_that_have_begun_to_close_at_once(monkeypatch):
+def test_stop_halts_closing_fingers_at_once(monkeypatch):
     trial, cancelled = Trial(), []
     monkeypatch.setattr(reach, "off_grasp", lambda state, goal: 0.02)
     trial.cell.partner.touch_after = None

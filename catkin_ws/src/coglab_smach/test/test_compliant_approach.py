@@ -1,4 +1,4 @@
-"""A compliant approach: its feedback profile is on during the reach, and gone before release is watched for at rest."""
+"""A compliant approach: its feedback profile is on during the reach and off before release is armed at rest."""
 
 import pytest
 from conftest import Trial
@@ -14,7 +14,7 @@ def handover(t):
 
 
 def test_profile_is_on_in_the_reach_and_off_before_release_is_armed():
-    """Contact is found while the arm still moves, from forces that a yielding arm has too; release in one at rest."""
+    """Contact is detected while the compliant arm moves; release is detected at rest."""
     trial = Trial(approach_profile="dmp_compliant")
     trial.run(handover)
     assert [r.outcome for r in trial.ctx.journal.results[-2:]] == ["succeeded", "succeeded"]
@@ -27,7 +27,7 @@ def test_profile_is_on_in_the_reach_and_off_before_release_is_armed():
     first = order.index("switch dmp")
     assert order[first:][:4] == [*reach, "arm contact_in_motion"]
     again = order.index("switch dmp", first + 1)
-    assert "switch ptp" in order[first:again], "what ends the reach ends its profile"
+    assert "switch ptp" in order[first:again], "the end of the reach ends its profile"
     after = [what for what in order[again:] if what != "switch ptp"]
     assert after[:5] == [*reach, "profile dmp", "arm release"]
     assert not trial.ctx.contact.armed_while_moving

@@ -1,4 +1,4 @@
-"""machines.yaml and the table of parameters: what a file may say, and what is refused with file, line and field."""
+"""machines.yaml and the table of parameters: valid files, and refusals with file, line and field."""
 
 import os
 from pathlib import Path
@@ -66,12 +66,12 @@ def test_values_beyond_a_range_are_refused(load, row):
         ("timings: {calm: {handover.doubt: -1.0}}", "-1.0 is less than"),
     ],
 )
-def test_what_does_not_fit_is_named_with_file_line_and_field(load, text, said):
+def test_invalid_values_are_named_with_file_line_and_field(load, text, said):
     with pytest.raises(ConfigError, match=said):
         load(text)
 
 
-def test_parameters_of_the_node_win_and_have_to_fit_too():
+def test_parameters_of_the_node_win_and_are_checked_too():
     assert Config.load(str(SHIPPED), {"hand.open_speed": 100}).get("hand.open_speed") == 100
     with pytest.raises(ConfigError, match="hand.open_speed: 'fast' is not of type 'integer'"):
         Config.load(str(SHIPPED), {"hand.open_speed": "fast"})
@@ -88,7 +88,7 @@ def test_a_timing_wins_over_the_file_and_a_parameter_of_the_node_over_the_timing
     assert calm.get("handover.belief") == natural.get("handover.belief")
 
 
-def test_a_file_that_became_bad_keeps_the_values_read_before(tmp_path):
+def test_the_old_values_stay_if_the_changed_file_is_invalid(tmp_path):
     path, warnings = tmp_path / "machines.yaml", []
     path.write_text("hand: {open_speed: 100}\n")
     config = Config.load(str(path), warn=warnings.append)
@@ -101,7 +101,7 @@ def test_a_file_that_became_bad_keeps_the_values_read_before(tmp_path):
     assert config.get("hand.open_speed") == 200
 
 
-def test_a_value_that_neither_file_nor_table_has_is_missing(load):
+def test_a_value_in_neither_file_nor_table_is_missing(load):
     for name in ("postures.home", "hand.nonsense"):
         with pytest.raises(ConfigError, match=f"'{name}' is missing"):
             load("{}").get(name)

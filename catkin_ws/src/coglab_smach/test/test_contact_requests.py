@@ -1,4 +1,4 @@
-"""Requests to the contact detector act in the order in which they were made, however their threads run."""
+"""Requests to the contact detector act in the order of their calls, independent of their threads."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from coglab_smach.ros import calls, ports
 
 
 class Detector:
-    """Stands for the service: hears a request when its thread is let through, in the order of ``gates``."""
+    """Replaces the service. It receives a request when its thread passes its gate, in the order of ``gates``."""
 
     def __init__(self, monkeypatch):
         self.heard = []
@@ -35,7 +35,7 @@ def until(condition):
         time.sleep(0.005)
 
 
-def test_a_disarm_never_lands_after_a_later_arm(monkeypatch):
+def test_a_disarm_never_arrives_after_a_later_arm(monkeypatch):
     detector = Detector(monkeypatch)
     port = ports.RosContact()
     detector.gates["contact"].set()
@@ -49,7 +49,7 @@ def test_a_disarm_never_lands_after_a_later_arm(monkeypatch):
     assert armed.result() is None and detector.heard == ["contact", "off", "contact"]
 
 
-def test_a_disarm_ends_the_arm_before_it_that_is_still_on_its_way(monkeypatch):
+def test_a_disarm_also_ends_an_earlier_arm_that_arrives_late(monkeypatch):
     detector = Detector(monkeypatch)
     port = ports.RosContact()
     port.arm("contact", 1.0, {})  # slow
@@ -61,7 +61,7 @@ def test_a_disarm_ends_the_arm_before_it_that_is_still_on_its_way(monkeypatch):
     until(lambda: detector.heard == ["contact", "off"])
 
 
-def test_one_that_is_given_up_while_it_waits_is_never_sent(monkeypatch):
+def test_a_request_cancelled_while_it_waits_is_never_sent(monkeypatch):
     detector = Detector(monkeypatch)
     port = ports.RosContact()
     port.arm("contact", 1.0, {})

@@ -1,4 +1,4 @@
-"""Beside a person's hand the fingers close with the lowest force; firmly once it has let go."""
+"""Near a person's hand the fingers close with the lowest force; after it has let go, firmly."""
 
 import numpy as np
 import pytest
@@ -12,12 +12,12 @@ from conftest import Trial
 
 RECEIVE = "exchange_human_to_robot"
 LOWEST = 60
-"""wire speed of the lowest level, with which the fingers follow what shifts while the weight is taken"""
+"""wire speed of the lowest force level"""
 OBJECTS = sorted(path.stem for path in objects_folder().glob("*.yaml"))
 
 
 def receive(trial):
-    """Receive the mug, whose own level is medium; (level, motion) of all that the hand was asked for."""
+    """Receive the mug (level medium). Returns (level, motion) of all orders to the hand."""
     asked, preshape, close = [], trial.ctx.hand.preshape, trial.ctx.hand.close
     trial.ctx.hand.preshape = lambda mode, level: asked.append(level) or preshape(mode, level)
     trial.ctx.hand.close = lambda speed: asked.append(speed) or close(speed)
@@ -27,13 +27,13 @@ def receive(trial):
 
 
 def track(monkeypatch, distance):
-    """The person's hand is so far (m, of the state that asks) from the palm."""
+    """The person's hand is ``distance(state)`` m from the palm."""
     for module in (hand_states, weight):
         monkeypatch.setattr(module, "from_palm", lambda state, track, *_: distance(state))
     monkeypatch.setattr(hand_states, "hand_from_palm", distance)
 
 
-def test_it_closes_firmly_when_the_person_has_let_go():
+def test_the_hand_closes_firmly_when_the_person_has_let_go():
     trial = Trial()
     asked = receive(trial)
     assert set(asked[:-1]) == {"low", LOWEST} and asked[-1] == trial.ctx.config.get("hand.tighten.medium")
@@ -44,7 +44,7 @@ def test_it_closes_firmly_when_the_person_has_let_go():
     assert calls.index("close") < len(calls) - 1 - calls[::-1].index("close") < home
 
 
-def test_a_hand_that_refuses_keeps_what_it_holds():
+def test_a_hand_that_refuses_to_tighten_keeps_the_object():
     trial = Trial()
     refusal = Ready(error=PortError("hand_close refused", ("the port is gone",)))
     trial.ctx.hand.close = lambda speed: refusal
@@ -54,7 +54,7 @@ def test_a_hand_that_refuses_keeps_what_it_holds():
     assert trial.ctx.holding == "mug"
 
 
-def test_a_grasp_that_older_hands_know_firm_alone_is_not_for_a_persons_hand(monkeypatch):
+def test_grasps_without_a_gentle_level_are_not_used_near_a_person(monkeypatch):
     """The screwdriver's handle is held laterally; it has two other grasps."""
     entry = read_object(objects_folder() / "screwdriver.yaml")[0]
     assert {name for name, grasp in entry["grasps"].items() if not closes_gently(grasp)} == {"handle"}
@@ -71,10 +71,13 @@ def test_a_grasp_that_older_hands_know_firm_alone_is_not_for_a_persons_hand(monk
     [
         (lambda since: 0.2, "hand_tighten"),
         (lambda since: 0.06, "tighten_at_home"),  # gone by hand.let_go, but its fingers may be at the object
-        (lambda since: 0.2 if since % 0.3 < 0.13 else 0.0, "tighten_at_home"),  # taken for another one, frame by frame
+        (
+            lambda since: 0.2 if since % 0.3 < 0.13 else 0.0,
+            "tighten_at_home",
+        ),  # confused with another hand in single frames
     ],
 )
-def test_it_closes_firmly_only_where_the_persons_hand_was_seen_to_stay_away(monkeypatch, way, firm_at):
+def test_the_hand_closes_firmly_only_if_the_persons_hand_stays_away(monkeypatch, way, firm_at):
     trial, since = Trial(), []
 
     def distance(state):
@@ -93,7 +96,7 @@ def test_it_closes_firmly_only_where_the_persons_hand_was_seen_to_stay_away(monk
     assert trial.grip.firm == 0
 
 
-def test_at_home_it_stays_held_gently_beside_a_persons_hand(monkeypatch):
+def test_at_home_the_grip_stays_gentle_near_a_persons_hand(monkeypatch):
     trial = Trial()
     track(monkeypatch, lambda state: 0.1 if state.label != "take_weight" else 0.2)
     asked = receive(trial)

@@ -19,7 +19,7 @@ WEIGHT = 0.31 * 9.81
 
 
 def giving(script, **overrides):
-    """A master that holds the mug out to a person who does nothing but what the script does."""
+    """A master that offers the mug. The script acts for the person."""
     trial = Trial(**overrides)
     trial.cell.partner.take_after = None
 
@@ -38,7 +38,7 @@ def finger(trial):
     return trial.ctx.hand.state().positions[2]
 
 
-def test_the_grip_loosens_with_a_part_of_the_load_and_closes_again_when_it_comes_back():
+def test_the_grip_loosens_with_the_load_and_closes_again_when_it_returns():
     def script(t):
         grip = finger(t)
         t.clock.sleep(0.5)
@@ -49,7 +49,7 @@ def test_the_grip_loosens_with_a_part_of_the_load_and_closes_again_when_it_comes
             t.clock.sleep(0.8)
             loose.append(grip - finger(t))
         assert 0 < loose[0] < loose[1] <= 8, loose
-        assert t.grip.shared, "the arm must not go away with what the person holds too"
+        assert t.grip.shared, "the arm must not move away with a shared object"
         t.cell.push(0.0)
         t.clock.sleep(1.5)
         assert finger(t) == grip and t.cell.called("close") and not t.grip.shared
@@ -61,7 +61,7 @@ def test_the_grip_loosens_with_a_part_of_the_load_and_closes_again_when_it_comes
     assert trial.ctx.holding == "mug" and "the person's taking of the load within 8.0 s" in trial.ctx.journal.why()
 
 
-def test_who_takes_the_load_gets_the_object():
+def test_a_person_who_takes_the_load_gets_the_object():
     def script(t):
         t.cell.push(0.9 * WEIGHT)
         t.wait_hub("wait_without_object")
@@ -70,8 +70,8 @@ def test_who_takes_the_load_gets_the_object():
     assert trial.result().outcome == "succeeded" and trial.ctx.holding == ""
 
 
-def test_a_person_who_holds_on_to_a_part_keeps_the_arm_there():
-    """At the end of the time both hold it: the grip is closed, and the arm does not pull it away."""
+def test_the_arm_stays_while_the_person_carries_a_part_of_the_load():
+    """At the time limit both hold the object: the grip closes, and the arm does not pull it away."""
 
     def script(t):
         t.cell.push(0.4 * WEIGHT)
@@ -84,8 +84,8 @@ def test_a_person_who_holds_on_to_a_part_keeps_the_arm_there():
     assert "the person may still hold 'mug'" in trial.ctx.journal.why()
 
 
-def test_a_person_who_is_told_that_it_is_over_lets_go_and_goes():
-    """The grip closes again as gently as beside any person's fingers, and firmly where nobody's are."""
+def test_the_person_leaves_after_the_message_that_the_action_is_over():
+    """The grip closes gently near the person's fingers, and firmly after they have left."""
     asked = []
 
     def script(t):
@@ -111,7 +111,7 @@ def test_a_person_who_is_told_that_it_is_over_lets_go_and_goes():
 
 @pytest.mark.parametrize("waits", [True, False])
 def test_the_object_is_brought_to_a_hand_that_waits_elsewhere(monkeypatch, waits):
-    """A reach toward where a hand would be has ended before that hesitated. A hand that still comes is left alone."""
+    """The hand hesitates beside the predicted place. A hand that still moves is left alone."""
     looks = []
 
     def way(state, object_id, delivery):
@@ -128,8 +128,8 @@ def test_the_object_is_brought_to_a_hand_that_waits_elsewhere(monkeypatch, waits
     assert giving(script, **{"give.near": 2.0}).result().outcome == "failed_holding"
 
 
-def test_a_hand_that_does_not_open_for_the_person_ends_in_its_time():
-    """A frozen node: the wait for its fingers ends, and the arm stays with what both hold."""
+def test_a_hand_that_does_not_open_ends_at_its_time_limit():
+    """A frozen node: the wait for the fingers ends, and the arm stays with the shared object."""
 
     def script(t):
         t.ctx.hand.preshape = lambda mode, level: Polled(lambda: False, lambda: None)
@@ -143,8 +143,8 @@ def test_a_hand_that_does_not_open_for_the_person_ends_in_its_time():
 
 
 @pytest.mark.parametrize(("pressed", "sinks"), [(0.5, 0), (1.5, 1)])
-def test_the_arm_sinks_at_once_with_a_hand_that_presses_the_object_down(monkeypatch, pressed, sinks):
-    """It is held too high for the hand that has it; what torques are wrong by is no hand."""
+def test_the_arm_sinks_with_a_hand_that_presses_the_object_down(monkeypatch, pressed, sinks):
+    """The object is too high for the hand at it. A torque error must not count as a hand."""
     monkeypatch.setattr(give, "way_to_hand", lambda *_: None)  # it is not brought anywhere
 
     def script(t):
@@ -169,7 +169,7 @@ def test_stop_in_the_middle_closes_the_grip():
 
 
 class Carried:
-    """A hand at one posture with an object that is seen so far (m, up) from its palm at 30 Hz."""
+    """A standing hand with an object, seen at 30 Hz ``up`` m above its palm."""
 
     def __init__(self):
         posture = [0.0, 0.5, 0.0, 1.0, 0.0, 0.5, 0.0]
@@ -192,7 +192,7 @@ class Carried:
         return self.held
 
 
-def test_an_object_that_sinks_in_the_hand_is_seen_and_one_wrong_sight_is_nothing():
+def test_sinking_in_the_hand_needs_two_sights():
     carried = Carried()
     assert carried.look().sunk == pytest.approx(0.0)
     carried.up -= 0.04
@@ -200,7 +200,7 @@ def test_an_object_that_sinks_in_the_hand_is_seen_and_one_wrong_sight_is_nothing
     assert carried.look(0.034).sunk == pytest.approx(0.04)
 
 
-def test_what_falls_as_it_is_given_was_not_given():
+def test_an_object_that_falls_while_it_is_given_counts_as_failed():
     def script(t):
         t.cell.push(0.9 * WEIGHT)
         hand = t.cell.objects["human_hand"]
@@ -215,7 +215,7 @@ def test_what_falls_as_it_is_given_was_not_given():
     assert "'mug' fell as it was given" in trial.ctx.journal.why() and trial.ctx.holding == ""
 
 
-def test_the_palm_draws_back_while_the_hand_opens_and_then_the_person_is_told():
+def test_the_palm_retreats_while_the_hand_opens_then_the_person_is_informed():
     told = []
 
     def script(t):
@@ -232,11 +232,11 @@ def test_the_palm_draws_back_while_the_hand_opens_and_then_the_person_is_told():
         "move_ptp",
     ], after
     spoken = [stamp for stamp, code in told if code == Say.YOU_HAVE_IT]
-    assert len(spoken) == 1 and spoken[0] >= opening + 0.8, "once the fingers are out of the way"
+    assert len(spoken) == 1 and spoken[0] >= opening + 0.8, "after the fingers have left the object"
 
 
-def test_what_a_delivery_asks_for_is_what_is_waited_for():
-    """Seven tenths of the weight, for five seconds."""
+def test_the_wait_uses_the_share_and_time_of_the_delivery():
+    """70 % of the weight, at most 5 s."""
     trial = Trial()
     entry = trial.database.get("mug")
     delivery = {**entry["deliveries"]["handle_first"], "release": {"threshold": 0.7, "timeout": 5.0}}
@@ -253,7 +253,7 @@ def test_what_a_delivery_asks_for_is_what_is_waited_for():
         t.wait_hub("wait_with_object")
 
     trial.run(script)
-    # Then it is felt whether the person holds it all the same.
+    # Afterwards, the arm measures whether the person holds the object.
     assert armed[-2:] == [("release", limit, {"mass": 0.31, "load_share": 0.7}) for limit in (10.0, 16.0)]
     assert "the person's taking of the load within 5.0 s" in trial.ctx.journal.why()
     assert ("lift", 5.0, {"mass": 0.31, "load_share": 0.5}) in armed

@@ -1,4 +1,4 @@
-"""Who pulls at what the robot's hand closes on, or has closed on, is given way to: the palm goes along."""
+"""The palm follows a person who pulls at the object while the hand closes or has closed."""
 
 import numpy as np
 import pytest
@@ -16,14 +16,14 @@ def palm(trial):
 
 
 def pull(trial, force, seconds):
-    """Sideways with so many N, for so long."""
+    """Pull sideways with ``force`` N for ``seconds``."""
     trial.cell.pulled = tuple(force * ASIDE)
     trial.clock.sleep(seconds)
     trial.cell.pulled = (0.0, 0.0, 0.0)
 
 
 def receiving(script, let_go_after=0.2, **overrides):
-    """Receive; ``script`` when the fingers begin to close. The trial, once a hub is open again."""
+    """Receive; run ``script`` from the start of closing. Returns the trial when a hub is open again."""
     trial = Trial(**overrides)
     trial.cell.partner.let_go_after = let_go_after
 
@@ -47,7 +47,7 @@ def motions(trial):
     return [name for name in trial.cell.called() if name in ("move_ptp", "cancel")]
 
 
-def test_the_palm_goes_along_while_the_fingers_close():
+def test_the_palm_follows_a_pull_while_the_fingers_close():
     gone = []
 
     def script(t):
@@ -60,7 +60,7 @@ def test_the_palm_goes_along_while_the_fingers_close():
     assert 0.01 < gone[0] < 0.055
 
 
-def test_the_palm_goes_along_while_the_arm_takes_the_weight_and_every_motion_ends_before_the_next():
+def test_the_palm_follows_a_pull_during_the_lift_and_motions_do_not_overlap():
     gone, height = [], []
 
     def script(t):
@@ -73,8 +73,8 @@ def test_the_palm_goes_along_while_the_arm_takes_the_weight_and_every_motion_end
         t.cell.let_go()
 
     trial = receiving(script, let_go_after=None)
-    assert 0.03 < gone[0] < 0.055, "as far as pull.way lets it"
-    assert height[0] > 0.015, "the rise goes on when the pull is over"
+    assert 0.03 < gone[0] < 0.055, "as far as pull.way allows"
+    assert height[0] > 0.015, "the rise continues after the pull"
     assert trial.result().outcome == "succeeded" and "gave_way" in trial.result().marks
     order = motions(trial)
     assert order[:3] == ["move_ptp", "cancel", "move_ptp"], order
@@ -90,14 +90,14 @@ def test_a_short_jolt_is_no_pull():
 
 
 @pytest.mark.parametrize("weight", [-9.0, 9.0])
-def test_what_hangs_on_the_palm_or_lifts_it_is_no_pull(weight):
+def test_a_vertical_force_is_no_pull(weight):
     trial = Trial()
     trial.cell.pulled = (4.0, 3.0, weight)
     pull = YieldToPull(trial.ctx).pull()
     assert pull[2] == 0.0 and np.linalg.norm(pull) <= 5.0
 
 
-def test_who_presses_into_the_palm_gives_and_does_not_pull():
+def test_a_press_into_the_palm_is_no_pull():
     trial = Trial()
     outward = palm_axis(trial.ctx)
     trial.cell.pulled = tuple(-12.0 * outward)
@@ -106,7 +106,7 @@ def test_who_presses_into_the_palm_gives_and_does_not_pull():
     assert np.linalg.norm(YieldToPull(trial.ctx).pull()) == pytest.approx(12.0 * np.linalg.norm(outward[:2]))
 
 
-def test_nothing_is_given_way_to_where_the_detector_does_not_tell():
+def test_the_palm_does_not_yield_without_a_measured_force():
     def script(t):
         t.cell.pulled = None
         t.wait_hub("wait_with_object")

@@ -1,4 +1,4 @@
-"""Geometry and times that the machines reckon with: goals, costs of a grasp, durations, room above a board."""
+"""Geometry and times of the machines: goals, costs of a grasp, durations, clearance above the board."""
 
 import math
 from xml.etree import ElementTree
@@ -28,7 +28,7 @@ ENTRY = {"dmp": {"receive": "a", "give": "b", "take": "c", "put": "d"}, "grasps"
 # --- goals ------------------------------------------------------------------------------------------------------------
 
 
-def test_a_palm_is_drawn_back_against_the_approach_axis():
+def test_the_standoff_of_a_palm_is_against_the_approach_axis():
     assert palm_at_grasp(GRASP).position == pytest.approx([0.0, -0.065, 0.07]), "as stored"
     assert palm_at_grasp(GRASP, 0.0).position == pytest.approx([0.0, -0.04, 0.07])
     assert palm_at_grasp(GRASP, 0.1).position == pytest.approx([0.0, -0.14, 0.07])
@@ -39,21 +39,21 @@ def test_a_palm_is_drawn_back_against_the_approach_axis():
     assert approach_of(bare, 0.03) == pytest.approx([0.0, 0.03, 0.0])
 
 
-def test_a_grasp_costs_for_fingertips_the_persons_hand_and_a_palm_that_turns_away():
+def test_the_cost_of_a_grasp_counts_fingertips_the_persons_hand_and_the_palms_direction():
     seen = Pose(np.array([1.0, 0.0, 0.0]))
     palm = np.array([1.0, -0.04, 0.07])
     tips = {**GRASP, "hand": {"mode": "tridigit", "level": "low"}}
     assert cost(GRASP, seen, None, None) == 0.0 and cost(tips, seen, None, None) == 1.0
     for distance, price in ((0.0, 1.0), (0.03, 0.75), (0.12, 0.0), (0.3, 0.0)):
         assert cost(GRASP, seen, palm + [0.0, distance, 0.0], None) == pytest.approx(price)
-    # The palm's x axis against the way from where the palm is.
+    # Angle between the palm's x axis and the path from the present palm.
     for start, price in (([0.5, 0, 0], 0.0), ([0, 0.5, 0], 0.5), ([-0.5, 0, 0], 1.0), ([0.5, 0.5, 0], 0.25)):
         assert cost(GRASP, seen, None, palm - start) == pytest.approx(price, abs=1e-6)
-    assert cost(GRASP, seen, None, palm) == pytest.approx(0.5), "it is there"
+    assert cost(GRASP, seen, None, palm) == pytest.approx(0.5), "the palm is already at the grasp"
 
 
 @pytest.mark.parametrize(("better", "stays"), [(0.19, True), (0.21, False)])
-def test_a_grasp_that_was_chosen_stays_until_another_is_better_by_a_fifth(better, stays):
+def test_the_chosen_grasp_stays_until_another_is_better_by_a_fifth(better, stays):
     far = {**GRASP, "pose": {**GRASP["pose"], "xyz": [0.0, -0.04 - 0.12 * better, 0.07]}}
     entry, person = {"grasps": {"near": GRASP, "far": far}}, np.array([1.0, -0.04, 0.07])
     seen = Pose(np.array([1.0, 0.0, 0.0]))
@@ -69,7 +69,7 @@ def limits(velocity=2.0, acceleration=4.0, hand=math.inf):
     return MotionLimits((velocity,) * 7, (acceleration,) * 7, (0.5,) * 7, (1.0,) * 7, hand)
 
 
-def test_a_point_to_point_motion_takes_its_slowest_joint_or_the_hands_way():
+def test_ptp_time_follows_the_slowest_joint_or_the_hands_path():
     way = [0.0, 0.2, 0.0, -1.0, 0.0, 0.0, 0.0]
     assert ptp_time(limits(), [0.0] * 7, way) == pytest.approx(1.0 / 0.5 + 0.5 / 1.0)
     assert ptp_time(limits(), way, [0.0] * 7, [0.25] * 7) == pytest.approx(1.0 / 0.25 + 0.25)
@@ -83,14 +83,14 @@ def test_a_point_to_point_motion_takes_its_slowest_joint_or_the_hands_way():
     assert hand_path([0.0] * 7, bent, 3) < hand_path([0.0] * 7, bent)
 
 
-def test_a_reach_takes_the_way_the_turn_and_the_start():
+def test_reach_time_counts_path_rotation_and_start():
     assert reach_time(limits(), 0.4) == pytest.approx(0.4 / 0.8 + math.pi / 2.0 + 0.5)
     assert reach_time(limits(hand=0.1), 0.4) == pytest.approx(4.0 + math.pi / 2.0 + 0.5)
     uneven = MotionLimits((2.0, *[1.0] * 6), (4.0, 1.0, *[4.0] * 5), (1.0,) * 7, (1.0,) * 7)
     assert reach_time(uneven, 0.4) == pytest.approx(1.0 + math.pi + 1.0)
 
 
-def test_limits_are_those_of_the_managers_parameters():
+def test_limits_come_from_the_managers_parameters():
     table = load_joint_limits(str(package_path("lwr_description", "config", "joint_limits.yaml")), "default")
     plain = read_limits({})
     assert plain.velocity == pytest.approx(table.velocity) and plain.acceleration == pytest.approx(table.acceleration)
@@ -109,9 +109,6 @@ def test_limits_are_those_of_the_managers_parameters():
     assert asked.ptp_acceleration == pytest.approx(0.1 * np.array(table.acceleration)) and asked.hand_speed == 0.3
     for hand, elbow, speed in ((0.0, 0.7, 0.7), (0.7, 0.0, 0.7), (0.0, 0.0, math.inf)):
         assert read_limits({"hand_speed_limit": hand, "elbow_speed_limit": elbow}).hand_speed == speed
-
-
-# --- what the arm can reach -------------------------------------------------------------------------------------------
 
 
 # --- the board --------------------------------------------------------------------------------------------------------

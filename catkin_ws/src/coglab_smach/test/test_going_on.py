@@ -1,4 +1,4 @@
-"""A hand that has arrived and feels nothing goes on along the grasp's approach axis, once, and no farther."""
+"""A hand at its goal without contact moves deeper along the grasp's approach axis, once."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from conftest import Trial
 
 
 def receive(touch_after, refuse="", **settings):
-    """Receive from somebody who is felt so late (s; None: never). Returns the trial and the requests of the reach."""
+    """Receive with a touch after ``touch_after`` s (None: never). Returns the trial and the requests of the reach."""
     trial = Trial(**settings)
     trial.cell.partner.touch_after = touch_after
     asked, execute = [], trial.ctx.arm.execute_dmp
@@ -29,7 +29,7 @@ def receive(touch_after, refuse="", **settings):
     return trial, asked
 
 
-def test_it_goes_on_once_by_what_the_settings_say():
+def test_the_hand_goes_deeper_once_by_the_configured_distance():
     trial, asked = receive(4.0)
     assert trial.result().outcome == "succeeded"
     assert len(asked) == 2
@@ -43,17 +43,17 @@ def test_it_goes_on_once_by_what_the_settings_say():
     assert marks["went_on"] - marks["motion_reached"] >= trial.ctx.config.get("handover.feel") - 1e-6
 
 
-def test_who_is_felt_at_once_is_not_pressed_on():
+def test_the_hand_does_not_go_deeper_after_an_early_touch():
     trial, asked = receive(0.2)
     assert trial.result().outcome == "succeeded" and len(asked) == 1
 
 
-def test_nothing_there_ends_in_its_outcome():
+def test_without_any_contact_the_action_fails():
     trial, asked = receive(None)
     assert trial.result().code == ReasonCode.NO_CONTACT and len(asked) == 2
 
 
-def test_an_arm_that_may_not_go_on_waits_where_it_is():
+def test_an_arm_that_is_refused_to_go_deeper_waits():
     trial, asked = receive(4.0, refuse="the goal is 0.3 s old")
     assert trial.result().outcome == "succeeded" and len(asked) == 2
     assert "went_on" not in trial.result().marks

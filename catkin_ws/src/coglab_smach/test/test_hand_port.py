@@ -1,5 +1,5 @@
-"""The hand as the brain sees it over ROS: what its node says counts for a second; and what becomes of a calibration,
-also where the node falls silent in the middle. The clock goes on as the test says, and no master is there."""
+"""RosHand without a ROS master: maximum age of a status, ends of actions and of calibrations, also with a silent node.
+The tests set the clock."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from coglab_smach.ros import calls, hand
 
 
 class Client:
-    """An action server that takes every goal at once; the test says how it ends."""
+    """An action server that accepts every goal at once; the test ends it."""
 
     def __init__(self, name, kind):
         self.name, self.goals, self.there, self.ends_at_once = name, [], True, False
@@ -31,7 +31,7 @@ class Client:
 
 
 class Handle:
-    """One goal, as actionlib.ClientGoalHandle."""
+    """One goal, like actionlib.ClientGoalHandle."""
 
     def __init__(self, transition_cb):
         self.transition_cb, self.cancelled = transition_cb, 0
@@ -48,15 +48,15 @@ class Handle:
 
 
 class Thread:
-    """Runs at once."""
+    """Runs its target at once."""
 
     def __init__(self, target, args, name, daemon):
-        assert daemon, "it must not keep a process that ends"
+        assert daemon, "it must not block the end of the process"
         self.start = lambda: target(*args)
 
 
 class Node:
-    """Stands for the hand's node: the port on it, and the clock."""
+    """Replaces the hand's node; with the port and the clock."""
 
     def __init__(self, monkeypatch):
         self.now, self.listens, self.orders = 100.0, 1, []
@@ -83,7 +83,7 @@ class Node:
         )
 
     def say(self, passed=0.0, **fields):
-        """A hand_status of a hand that is well but for ``fields``, ``passed`` s later."""
+        """Publish the hand_status of a healthy hand, changed by ``fields``, ``passed`` s later."""
         self.now += passed
         motors = [MotorStatus(motor=n, position=10 * n) for n in range(5)]
         self.take(HandStatus(**{"connected": True, "motors": motors, **fields}))
@@ -106,17 +106,17 @@ def refused(pending, code):
     return raised.value
 
 
-# --- what is known of it ----------------------------------------------------------------------------------------------
+# --- status -----------------------------------------------------------------------------------------------------------
 
 
-def test_a_hand_that_was_never_heard_is_silent(node):
+def test_a_hand_without_any_status_is_silent(node):
     state = node.port.state()
     assert state == HandState(message="right_hand/hand_status is silent", event=ReasonCode.NODE_SILENT)
-    node.now = 0.3  # as young as a computer that has just started
+    node.now = 0.3  # the computer has just started
     assert node.port.state() == state
 
 
-def test_what_it_has_said_counts_for_one_second(node):
+def test_a_status_is_valid_for_one_second(node):
     node.say(calibrated=True, holding=True)
     node.now += 1.0
     assert node.port.state().holding
@@ -136,7 +136,7 @@ def test_goal_that_ends_while_it_is_sent_is_done(node):
     assert node.port.close(200).done()
 
 
-def test_late_end_of_an_older_goal_ends_that_goal_alone(node):
+def test_late_end_of_an_older_goal_ends_only_that_goal(node):
     first, second = node.port.close(200), node.port.close(300)
     older, newer = node.client("hand_close").handles
     older.end(GoalStatus.PREEMPTED, None)
@@ -146,7 +146,7 @@ def test_late_end_of_an_older_goal_ends_that_goal_alone(node):
     assert (older.cancelled, newer.cancelled) == (0, 1)
 
 
-def test_an_action_that_is_cancelled_before_its_goal_was_sent_never_moves_the_hand(monkeypatch):
+def test_an_action_cancelled_before_its_goal_was_sent_never_moves_the_hand(monkeypatch):
     client = Client("hand_open", None)
     client.there = False
     monkeypatch.setattr(hand, "server_is_there", lambda client: client.there)
@@ -193,14 +193,14 @@ def test_ends_of_an_action(node):
 
 
 def asked(node, mode="fast"):
-    """A calibration that the hand has been told of."""
+    """A calibration whose order was sent."""
     node.say()
     calibration = node.port.calibrate(mode)
     assert not calibration.done() and node.orders[-1:] == [mode]
     return calibration
 
 
-def test_the_order_waits_until_the_hand_listens(node):
+def test_the_calibration_order_waits_for_a_subscriber(node):
     node.listens = 0
     calibration = node.port.calibrate("fast")
     for connected, listens in ((None, 1), (False, 1), (True, 0)):
@@ -212,7 +212,7 @@ def test_the_order_waits_until_the_hand_listens(node):
     assert not calibration.done() and not calibration.done() and node.orders == ["fast"], "once"
 
 
-def test_a_hand_that_holds_is_given_two_seconds_to_be_empty(node):
+def test_calibration_waits_two_seconds_for_an_empty_hand(node):
     node.say(holding=True)
     calibration = node.port.calibrate("fast")
     assert not calibration.done()
@@ -227,15 +227,15 @@ def test_a_hand_that_holds_is_given_two_seconds_to_be_empty(node):
     assert not calibration.done() and node.orders == ["fast", "slow"]
 
 
-def test_one_that_was_over_before_it_was_seen(node):
+def test_a_calibration_that_ends_before_its_start_was_seen(node):
     calibration = asked(node)
     node.say(0.5, calibrated=True)
-    assert not calibration.done(), "that may be from before the order"
+    assert not calibration.done(), "this status may be older than the order"
     node.say(0.01, calibrated=True)
     assert calibration.done() and calibration.result() is None
 
 
-def test_one_that_ends_without_success(node):
+def test_a_calibration_without_success(node):
     calibration = asked(node)
     node.say(0.1, calibrating=True)
     assert not calibration.done()
@@ -244,10 +244,10 @@ def test_one_that_ends_without_success(node):
     assert refused(calibration, ReasonCode.OUT_OF_RANGE).causes == ("a finger is blocked",)
 
 
-def test_one_that_the_hand_refuses(node):
+def test_a_refused_calibration(node):
     calibration = asked(node)
     node.say(0.19, message="it holds", event_code=ReasonCode.HAND_REFUSED, calibrated=True)
-    assert not calibration.done(), "that may be from before the order"
+    assert not calibration.done(), "this status may be older than the order"
     node.say(0.02, message="it holds", event_code=ReasonCode.HAND_REFUSED, calibrated=True)
     error = refused(calibration, ReasonCode.HAND_REFUSED)
     assert "after the order 'fast'" in error.sentence and error.causes == ("it holds",)
@@ -256,15 +256,15 @@ def test_one_that_the_hand_refuses(node):
         refused(calibration, ReasonCode.HAND_REFUSED)
 
 
-def test_one_that_hand_status_says_nothing_about(node):
+def test_a_calibration_without_any_status_fails(node):
     calibration = asked(node)
     node.say(3.0)
     assert not calibration.done()
     node.say(0.01)
-    assert refused(calibration, ReasonCode.NODE_SILENT).causes == ("hand_status says nothing about it",)
+    assert refused(calibration, ReasonCode.NODE_SILENT).causes == ("hand_status does not report it",)
 
 
-def test_a_node_that_dies_while_it_calibrates(node):
+def test_a_node_that_dies_during_calibration(node):
     calibration = asked(node)
     node.say(0.1, calibrating=True)
     assert not calibration.done()
@@ -275,7 +275,7 @@ def test_a_node_that_dies_while_it_calibrates(node):
     assert error.causes == ("right_hand/hand_status is silent",)
 
 
-def test_a_dead_node_is_told_nothing(node):
+def test_a_dead_node_receives_no_order(node):
     node.say()
     node.now += 1.01
     calibration = node.port.calibrate("fast")

@@ -1,4 +1,4 @@
-"""The action coglab/handover on scripted ports in virtual time: what a client is told, whatever happens."""
+"""The action coglab/handover on scripted ports in virtual time: results, rejections and cancelling."""
 
 import pytest
 import rospy
@@ -8,7 +8,7 @@ from conftest import Trial
 
 
 class Handle:
-    """A goal as the action server has it. ``state`` is its last one."""
+    """A goal handle like that of the action server. ``state``: its last state."""
 
     def __init__(self, **fields):
         self.goal = HandoverGoal(**fields)
@@ -41,7 +41,7 @@ class Handle:
 
 
 class Served(Trial):
-    """A master with the action."""
+    """A master with the action server."""
 
     def __init__(self, **overrides):
         super().__init__(**overrides)
@@ -73,7 +73,7 @@ class Served(Trial):
         return handle.state, handle.result
 
 
-def test_a_goal_is_executed_told_by_phases_and_has_a_typed_result():
+def test_a_goal_publishes_its_phases_and_has_a_typed_result():
     trial = Served()
 
     def script(t):
@@ -98,7 +98,7 @@ def test_a_goal_is_executed_told_by_phases_and_has_a_typed_result():
     trial.run(script)
 
 
-def test_while_one_runs_another_one_is_rejected_and_the_first_is_not_disturbed():
+def test_a_second_goal_is_rejected_and_does_not_disturb_the_first():
     trial = Served()
 
     def script(t):
@@ -108,7 +108,7 @@ def test_while_one_runs_another_one_is_rejected_and_the_first_is_not_disturbed()
         state, result = t.end_of(t.send("give"))
         assert (state, result.outcome, result.reason_code) == ("rejected", "refused", ReasonCode.BUSY)
         assert "a handover of another client runs ('receive'" in result.reason
-        t.server.on_cancel(Handle())  # of a goal that does not run
+        t.server.on_cancel(Handle())  # not the running goal
         assert t.end_of(first)[0] == "succeeded"
 
     trial.run(script)
@@ -126,7 +126,7 @@ def test_while_one_runs_another_one_is_rejected_and_the_first_is_not_disturbed()
         ({"action": "take", "delivery": "rim_first"}, ReasonCode.INVALID_ARGUMENT, "the hand is empty"),
     ],
 )
-def test_a_goal_that_does_not_fit_is_rejected_in_words_and_nothing_moves(fields, code, said):
+def test_an_invalid_goal_is_rejected_with_a_reason_and_nothing_moves(fields, code, said):
     trial = Served()
 
     def script(t):
@@ -141,7 +141,7 @@ def test_a_goal_that_does_not_fit_is_rejected_in_words_and_nothing_moves(fields,
     trial.run(script)
 
 
-def test_cancel_is_stop_and_reset_by_the_same_action_goes_on():
+def test_cancel_is_stop_and_the_same_action_can_request_reset():
     trial = Served()
 
     def script(t):
@@ -194,8 +194,8 @@ def test_after_its_time_limit_the_action_is_stopped():
     trial.run(script)
 
 
-def test_a_client_that_ends_leaves_an_action_that_ends_by_itself():
-    """Without its client the goal goes on to its own end and nothing follows; the next client is served."""
+def test_the_action_of_a_dead_client_ends_by_itself():
+    """Without its client the goal runs to its end and nothing follows. The next client is served."""
     trial = Served()
 
     def script(t):
@@ -210,7 +210,7 @@ def test_a_client_that_ends_leaves_an_action_that_ends_by_itself():
     trial.run(script)
 
 
-def test_an_accepted_action_that_the_hub_drops_is_told():
+def test_an_accepted_action_that_the_hub_drops_has_a_result():
     trial = Served()
 
     def script(t):
@@ -229,7 +229,7 @@ def test_an_accepted_action_that_the_hub_drops_is_told():
     trial.run(script)
 
 
-def test_a_result_that_no_goal_asked_for_is_told_without_labels():
+def test_the_result_of_an_action_without_a_goal_has_no_labels():
     trial = Served()
 
     def script(t):

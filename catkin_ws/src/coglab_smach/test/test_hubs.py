@@ -1,4 +1,4 @@
-"""What happens while a hub waits: STOP and hold show and are reset by the operator; what is held survives a restart."""
+"""Events while a hub waits: STOP and hold are shown and reset by the operator; the held object survives a restart."""
 
 import json
 
@@ -8,7 +8,7 @@ from coglab_py.pose import Pose
 from coglab_smach.context.holding import HoldingMemory
 from conftest import Trial
 
-WORDS = "words of the perception node that are made up here 4714"
+WORDS = "an invented sentence of the perception node 4714"
 
 
 @pytest.mark.parametrize("with_object", [False, True])
@@ -19,7 +19,7 @@ def test_a_hold_in_a_hub_is_shown_and_needs_a_reset(with_object):
         t.receive() if with_object else t.wait_hub("wait_without_object")
         hub = t.ctx.requests.hub()
         before = len(t.cell.called())
-        t.cell.arm.held = True  # somebody sent 'hold' to the robot without asking this machine
+        t.cell.arm.held = True  # somebody sent 'hold' directly to the robot
         t.wait_hub("stopped", limit=2.0)
         assert t.ctx.journal.why() == (
             "the arm is blocked: hold is latched; reset first; when its cause is away, type: ./coglab start reset"
@@ -103,7 +103,7 @@ def test_a_hold_during_an_action_never_opens_the_hand():
     )
 
 
-def test_a_robot_node_that_came_back_empty_ends_in_fault_with_that_reason():
+def test_a_restarted_robot_node_without_plugins_ends_in_fault():
     trial = Trial()
 
     def script(t):
@@ -121,7 +121,7 @@ def test_a_robot_node_that_came_back_empty_ends_in_fault_with_that_reason():
 
 
 class Restarted(Trial):
-    """A brain that starts while the hand holds an object, with what a former one noted on disk."""
+    """A brain that starts while the hand holds an object, with the note of an earlier brain on disk."""
 
     def __init__(self, path, **overrides):
         super().__init__(**overrides)
@@ -138,7 +138,7 @@ def noted(tmp_path):
     return path
 
 
-def test_a_restart_with_the_object_in_the_hand_goes_on_with_it(noted):
+def test_a_restarted_brain_continues_with_the_held_object(noted):
     trial = Restarted(noted)
 
     def script(t):
@@ -153,7 +153,7 @@ def test_a_restart_with_the_object_in_the_hand_goes_on_with_it(noted):
     assert json.loads(noted.read_text()) == {"object_id": ""}
 
 
-def test_a_restart_that_remembers_nothing_asks_for_the_objects_name(tmp_path):
+def test_a_restarted_brain_without_a_note_needs_the_objects_name(tmp_path):
     trial = Restarted(tmp_path / "none.json")
 
     def script(t):
@@ -176,14 +176,14 @@ def test_a_restart_that_remembers_nothing_asks_for_the_objects_name(tmp_path):
     assert trial.result().outcome == "succeeded" and trial.result().object_id == "mug"
 
 
-def test_a_note_about_an_object_that_is_gone_is_not_believed(noted):
+def test_a_note_does_not_count_if_the_hand_is_empty(noted):
     trial = Restarted(noted)
     trial.cell.hand_positions = (0, 0, 0, 0, 0)
     trial.run(lambda t: t.wait_hub("wait_without_object"))
     assert trial.ctx.holding == ""
 
 
-def test_an_object_that_was_taken_away_ends_in_the_hub_without():
+def test_a_removed_object_leads_to_the_hub_without_object():
     trial = Trial()
 
     def script(t):
@@ -215,7 +215,7 @@ def test_an_old_belief_does_not_trigger():
         t.wait_hub("wait_with_object")
         partner.offer, partner.request = 0.0, 0.95
         t.clock.sleep(3.0)
-        assert t.ctx.requests.hub() == "wait_with_object", "an old reach counted as a new one"
+        assert t.ctx.requests.hub() == "wait_with_object", "an old reach must not count as a new one"
         partner.request = 0.05
         t.clock.sleep(0.5)
         partner.request = 0.95

@@ -1,4 +1,4 @@
-"""When a person has let go, and when not: who it was, and what became of the object."""
+"""When a person has let go of the object, and when not."""
 
 import numpy as np
 import pytest
@@ -36,7 +36,7 @@ def test_a_stop_ends_the_firm_closing_as_well(moment):
     assert firm and cancelled == firm
 
 
-def test_who_pulls_it_out_has_not_let_go(monkeypatch):
+def test_an_object_pulled_out_of_the_hand_is_not_let_go(monkeypatch):
     lifted = Lifted(monkeypatch)
     lifted.state._farther, lifted.away, lifted.kept, lifted.held.moved = 0.14, 0.2, False, True
     with using(lifted.trial.clock) as clock:
@@ -44,14 +44,14 @@ def test_who_pulls_it_out_has_not_let_go(monkeypatch):
             assert not lifted.state._has_let_go()
             clock.sleep(0.01)
         lifted.held.moved = False
-        assert lifted.state._has_let_go(), "nobody sees it, and the fingers have not closed past it"
+        assert lifted.state._has_let_go(), "it is not seen, and the fingers have not closed past it"
         lifted.held.there = lambda: False
         assert not lifted.state._has_let_go(), "it is seen away from the palm"
         lifted.held.there, lifted.held.moved, lifted.away = (lambda: True), True, 0.31
-        assert lifted.state._has_let_go(), "it has slipped a little, and stays where the hand is not"
+        assert lifted.state._has_let_go(), "it has slipped a little, and stays away from the hand"
 
 
-def test_an_arm_that_may_not_move_says_so_and_not_that_the_person_holds_on(monkeypatch):
+def test_a_blocked_arm_is_the_reason_and_not_the_person(monkeypatch):
     lifted = Lifted(monkeypatch)
     lifted.ctx.arm.motion_allowed = lambda: Verdict(False, "the operator holds it", int(ReasonCode.HELD))
     with pytest.raises(TimeLimit) as error:
@@ -59,7 +59,7 @@ def test_an_arm_that_may_not_move_says_so_and_not_that_the_person_holds_on(monke
     assert error.value.code == ReasonCode.HELD and "the operator holds it" in " ".join(error.value.causes)
 
 
-def test_what_has_gone_with_the_persons_hand_was_taken_back(monkeypatch):
+def test_an_object_that_moves_with_the_persons_hand_was_taken_back(monkeypatch):
     lifted, lost = Lifted(monkeypatch), PortError("'mug' has left the hand", ("open",), ReasonCode.OBJECT_NOT_SEEN)
     taken, fell = ReasonCode.GOAL_WITHDRAWN, ReasonCode.OBJECT_NOT_SEEN
     sights, lifted.state._deadline = {}, 1e9
@@ -71,32 +71,32 @@ def test_what_has_gone_with_the_persons_hand_was_taken_back(monkeypatch):
             begun = clock.now()
             assert lifted.state._taken_back("mug", lost).code == code
             looks = 0.4 if thing and age <= 0.15 else 0.8
-            assert clock.now() - begun == pytest.approx(looks, abs=0.06), "what falls has to have fallen by then"
+            assert clock.now() - begun == pytest.approx(looks, abs=0.06), "a falling object is far below by then"
 
 
 def seen(track, way, frames=5, frame=0.033, since=0.0, jitter=0.0):
-    """Sights of a hand on its way (m by s); s of the last one."""
+    """Feed sights of a hand at x = ``way(s)`` m. Returns the time (s) of the last sight."""
     for k in range(1, frames + 1):
         track.follow(since + k * frame, np.array([way(k * frame) + jitter * (-1) ** k, 0.0, 0.4]))
     return since + frames * frame
 
 
 @pytest.mark.parametrize("shift", [0.25, 0.4, 0.6, -0.3])
-def test_a_hand_that_is_elsewhere_from_one_sight_to_the_next_is_another_one(shift):
+def test_a_hand_that_jumps_between_sights_is_another_one(shift):
     track = HandTrack()
     t = seen(track, lambda s: 0.9, jitter=0.01)
     assert track.is_one
     t = seen(track, lambda s: 0.9 + shift, frames=60, since=t, jitter=0.01)
-    assert not track.is_one, "however long it is taken for it"
+    assert not track.is_one, "even if the confusion lasts"
     track.follow(t - 5.0, np.array([0.9 + shift, 0.0, 0.4]))
-    assert not track.is_one, "an old sight told again says nothing"
+    assert not track.is_one, "a repeated old sight does not count"
     t = seen(track, lambda s: 0.9, since=t)
     assert track.is_one, "back where it was"
 
 
 @pytest.mark.parametrize("hidden", [0.033, 0.1, 0.3])
 @pytest.mark.parametrize("speed", [0.3, 1.0, 1.9])
-def test_a_hand_that_goes_and_is_hidden_now_and_then_is_one(speed, hidden):
+def test_a_leaving_hand_with_short_gaps_is_the_same_hand(speed, hidden):
     track, t = HandTrack(), 0.0
     for _ in range(5):
         t = seen(track, lambda s, t=t: speed * (t + s), since=t)
@@ -104,7 +104,7 @@ def test_a_hand_that_goes_and_is_hidden_now_and_then_is_one(speed, hidden):
     assert track.is_one
 
 
-def test_what_the_brain_waits_for_is_told_all_the_while_and_no_look_beside_it():
+def test_the_published_wait_does_not_change_with_each_sight():
     trial, told = Trial(), []
     trial.cell.partner.let_go_after = None
 

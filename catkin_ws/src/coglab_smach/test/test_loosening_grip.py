@@ -1,4 +1,4 @@
-"""Fingers that loosen as a person takes the load: the felt grip follows it, and comes back with it."""
+"""Fingers that loosen while a person takes the load: the measured grip force follows the load, both ways."""
 
 from types import SimpleNamespace
 
@@ -9,7 +9,7 @@ from test_giving import WEIGHT, giving
 
 
 class Hand:
-    """A hand whose fingers squeeze with 5 N a count, at 50 counts/s opened and 100 closed."""
+    """A hand with a grip of 5 N per count; it opens with 50 counts/s and closes with 100 counts/s."""
 
     def __init__(self):
         self.closed, self.way, self.at, self.orders = 160.0, 0.0, 160.0, []
@@ -36,7 +36,7 @@ class Hand:
         self.at = min(self.closed, self.at + 0.01 * self.way)
 
 
-def test_the_force_follows_the_part_that_is_asked_for_both_ways():
+def test_the_grip_force_follows_the_wanted_part_both_ways():
     hand = Hand()
     grip = LooseningGrip(hand, 40, 120, 150, hand.force)
     for k, part in enumerate((1.0, 0.8, 0.5, 0.3, 0.6, 0.9, 0.4)):
@@ -47,8 +47,8 @@ def test_the_force_follows_the_part_that_is_asked_for_both_ways():
 
 
 @pytest.mark.parametrize("late", [0, 2, 4, 6])
-def test_what_is_felt_late_does_not_make_the_fingers_swing(late):
-    """Late by so many periods of 10 ms, as over the hand's line."""
+def test_delayed_force_does_not_make_the_fingers_oscillate(late):
+    """``late``: delay of the force in periods of 10 ms, as on the hand's serial line."""
     hand = Hand()
     felt = [hand.force()] * (late + 1)
     grip = LooseningGrip(hand, 40, 120, 150, lambda: felt[-1 - late])
@@ -59,7 +59,7 @@ def test_what_is_felt_late_does_not_make_the_fingers_swing(late):
     assert len(hand.orders) <= 4 and 1.0 - WEAKER - 0.02 < hand.force() / 25.0 < 1.0 + FIRMER + 0.02
 
 
-def test_it_is_never_weaker_than_friction_asks_for_nor_looser_than_allowed():
+def test_the_grip_keeps_the_friction_force_and_the_limit_of_loosening():
     for least, counts, force in ((20.0, 12.0, 20.0), (0.0, 4.0, 30.0)):
         hand = Hand()
         grip = LooseningGrip(hand, 40, 120, 150, hand.force)
@@ -69,13 +69,13 @@ def test_it_is_never_weaker_than_friction_asks_for_nor_looser_than_allowed():
         assert hand.force() == pytest.approx(force, rel=0.2)
 
 
-def test_a_hand_that_feels_nothing_is_left_to_the_counts():
+def test_a_hand_without_force_sensors_loosens_by_counts():
     hand = Hand()
     grip = LooseningGrip(hand, 40, 120)
     assert not grip.ease_to(0.5, 1.0, 12.0, 0.0) and not hand.orders
 
 
-def test_the_felt_grip_falls_with_the_load_and_comes_back_with_it():
+def test_the_measured_grip_falls_and_returns_with_the_load():
     def script(t):
         t.cell.touch, grips = 5.0, []
         firm = t.ctx.contact.grip()
@@ -86,7 +86,7 @@ def test_the_felt_grip_falls_with_the_load_and_comes_back_with_it():
         assert grips == pytest.approx([0.7, 0.55, 0.42], abs=0.13) and grips == sorted(grips, reverse=True)
         t.cell.push(0.3 * WEIGHT)
         t.clock.sleep(1.5)
-        assert t.ctx.contact.grip() > 1.3 * grips[-1] * firm, "a part of the load has come back"
+        assert t.ctx.contact.grip() > 1.3 * grips[-1] * firm, "a part of the load has returned"
         t.cell.push(0.0)
         t.clock.sleep(1.5)
         assert t.ctx.contact.grip() == firm and not t.grip.shared

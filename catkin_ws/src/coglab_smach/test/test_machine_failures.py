@@ -1,5 +1,5 @@
-"""Whatever breaks, the machine ends in a hub, in 'stopped' or in 'fault', with a sentence; never stuck,
-never by opening the hand."""
+"""After any failure the machine ends in a hub, in 'stopped' or in 'fault', with a reason. It is never stuck and never
+drops the object."""
 
 import pytest
 from coglab_msgs.msg import ReasonCode
@@ -7,7 +7,7 @@ from coglab_py.pose import Pose
 from coglab_smach.states import weight
 from conftest import Trial
 
-WORDS, CAUSE = "words of a node that are made up here 4712", "a cause that is made up here 4713"
+WORDS, CAUSE = "an invented sentence of a node 4712", "an invented cause 4713"
 
 
 def failed_exchange(prepare, hub="wait_without_object", action="exchange_human_to_robot", object_id="mug", **overrides):
@@ -49,7 +49,7 @@ FAILURES = {
     "an empty hand": (lambda t: setattr(t.cell.faults, "empty_grasp", True), None, "the hand closed on nothing"),
     "a programming error": (lambda t: setattr(t.ctx.database, "get_object", None), ReasonCode.UNEXPECTED, "TypeError"),
 }
-"""what is done, code of the result (None: any), and a word of its reason"""
+"""preparation, code of the result (None: any), part of its reason"""
 
 
 @pytest.mark.parametrize("prepare, code, word", FAILURES.values(), ids=FAILURES)
@@ -62,8 +62,8 @@ def test_a_failure_ends_at_home_with_an_empty_hand_and_its_reason(prepare, code,
         assert "execute_dmp" not in trial.cell.called(), "the arm has not moved"
 
 
-def test_who_goes_back_while_the_robot_lets_time_pass_is_not_gone_after():
-    """The offer has to last for ``start_after``; who goes back before, and offers again, is met then."""
+def test_the_arm_does_not_follow_an_offer_withdrawn_before_its_start():
+    """The offer must last for ``start_after``. A withdrawn offer starts nothing; a second one does."""
     trial = Trial(**{"handover.start_after": 1.0})
 
     def script(t):
@@ -90,7 +90,7 @@ def test_a_person_who_does_not_let_go_gets_the_object_back(monkeypatch):
     assert_recovered_empty(trial, "the person did not let go of 'mug' within 5 s")
 
 
-def test_an_object_whose_weight_is_carried_is_not_dropped_when_the_person_is_seen_no_more():
+def test_a_carried_object_is_not_dropped_when_the_person_disappears():
     trial = Trial()
 
     def script(t):
@@ -100,7 +100,7 @@ def test_an_object_whose_weight_is_carried_is_not_dropped_when_the_person_is_see
         t.wait_hub("stopped")
         assert t.cell.called("open") == [] and t.ctx.holding == "mug"
         assert "the person's hand is not seen any more" in t.ctx.journal.why()
-        # The operator looks: the robot alone holds it.
+        # The operator has looked: only the robot holds the object.
         t.start("reset", "")
         t.wait_hub("wait_with_object")
 
@@ -108,7 +108,7 @@ def test_an_object_whose_weight_is_carried_is_not_dropped_when_the_person_is_see
     assert trial.result().code == ReasonCode.NOT_RELEASED
 
 
-def test_an_object_that_the_person_was_lost_from_is_kept_though_its_weight_was_not_felt_to_come():
+def test_an_object_is_kept_when_the_person_disappears_without_measured_weight():
     trial = Trial()
 
     def script(t):
@@ -159,7 +159,7 @@ def test_failed_start_up_ends_in_fault_with_the_reason():
     trial.run(script)
 
 
-def test_a_robot_controller_that_starts_late_is_asked_again():
+def test_the_start_is_repeated_for_a_late_robot_controller():
     trial = Trial()
     trial.cell.faults.refuse["lwr start"] = "no datagrams from the robot controller"
 
@@ -196,7 +196,7 @@ def test_stop_holds_never_opens_the_hand_and_needs_a_reset(moment):
     assert "STOP" in trial.ctx.journal.results[-1].reason
 
 
-def test_another_object_named_in_wait_with_object_means_the_one_held(trial):
+def test_a_request_for_another_object_uses_the_held_one(trial):
     def script(t):
         t.receive()
         t.start("put", "bottle")

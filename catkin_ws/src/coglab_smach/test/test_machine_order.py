@@ -1,5 +1,5 @@
-"""The machines walk in D4.10's order (section 3.2, Figures 3 to 8), asserted from the journal; and what holds for every
-state: a time limit, a way out on failure, and an end on preemption."""
+"""The order of the states is that of D4.10 (section 3.2, Figures 3 to 8), checked in the journal. Every state has a
+time limit, a transition on failure, and an end on preemption."""
 
 import math
 
@@ -154,7 +154,7 @@ def test_take_order_with_preshape_before(trial):
     ]
     assert set(trial.labels("/approach_board")) == {"locate_object", "move_to_board"}
     goal = trial.master.get_children()["take"].userdata.goal
-    # In the board frame, from detection and database: the object as seen there, the grasp, 12 mm of clearance.
+    # Goal in the board frame: the seen object, its grasp, 12 mm of clearance.
     assert goal["frame"] == "board"
     assert goal["offset"] == pytest.approx([0.78 - 0.45, 0.03 + 0.55 - 0.04 - 0.012, 0.43 - 0.05 + 0.07])
 
@@ -171,7 +171,7 @@ def test_take_with_preshape_during_the_precise_motion():
     assert "hand_preshape" in trial.labels("/take/precise_motion")
 
 
-def test_put_asks_for_free_places_while_moving(trial):
+def test_put_requests_free_places_while_moving(trial):
     def script(t):
         t.receive()
         t.start("put")
@@ -201,7 +201,7 @@ def leaves(container, path=""):
             yield from leaves(child, f"{path}/{label}")
 
 
-def test_every_state_but_those_that_wait_for_the_operator_has_a_time_limit(trial):
+def test_only_states_that_wait_for_the_operator_have_no_time_limit(trial):
     found = list(leaves(trial.master))
     assert len(found) > 40
     for path, state, _ in found:

@@ -46,7 +46,7 @@ def master(monkeypatch, tmp_path):
     return made
 
 
-def test_a_deadline_of_the_steady_clock_is_told_in_the_clock_of_ros(master):
+def test_deadlines_are_published_in_ros_time(master):
     for deadline, told in ((0.0, 0.0), (103.5, 53.5), (99.0, 50.001)):
         master.on_state(MasterState("s", True, ("a", "b"), "mug", "why", 3, "rain", 4, deadline))
         message = master.sent[-1][1]
@@ -71,7 +71,7 @@ def test_stop_is_latched_whatever_the_arm_answers(master):
     assert len(master.pressed) == 4
 
 
-def test_transitions_and_results_are_told_and_written(master):
+def test_transitions_and_results_are_published_and_written(master):
     for outcome, level in (
         ("succeeded", "loginfo"),
         ("failed", "logwarn"),
@@ -90,7 +90,7 @@ def test_transitions_and_results_are_told_and_written(master):
     assert [t.to_sec() for t in (typed.started, typed.ended, typed.marks[0].stamp)] == [1001.0, 1003.5, 1002.0]
     master.on_result(record)
     lines = Path(master.result_file).read_text().splitlines()
-    row = json.loads(lines[0])  # beside bags, and beside videos and questionnaires
+    row = json.loads(lines[0])  # times in ROS time for bags, and in UTC for videos and questionnaires
     assert (row["started_ros"], row["ended_ros"]) == (1001.0, 1003.5) and row["ended_utc"] > row["started_utc"]
     assert row["marks_ros"] == {"closed": 1002.0} and typed.id == f"{row['started_utc']}_take"
     assert len(lines) == 2 and row["duration_s"] == 2.5 and master.sent[-1][1].data == lines[0]
@@ -107,7 +107,7 @@ def test_transitions_and_results_are_told_and_written(master):
     }
 
 
-def test_what_is_held_is_noted_in_one_file_for_each_namespace(master, monkeypatch):
+def test_each_namespace_has_its_own_file_for_the_held_object(master, monkeypatch):
     read = {"~state_file": ""}
     monkeypatch.setattr(master.module.parameters, "read", lambda name, kind, default: read[name])
     monkeypatch.setattr(master.module.rospkg, "get_ros_home", lambda: "/home/ros")
@@ -131,7 +131,7 @@ def test_a_node_that_cannot_be_configured_ends_with_status_1(monkeypatch):
     assert module.main() == 1 and len(said) == 1
 
 
-def test_the_objects_tool_tells_by_its_exit_status_how_it_went(monkeypatch, tmp_path, capsys):
+def test_the_exit_status_of_the_object_tool(monkeypatch, tmp_path, capsys):
     tool = script("object_tool")
     run = lambda *words: (monkeypatch.setattr("sys.argv", ["object_tool", *words]), tool.main())[1]  # noqa: E731
     folder = ("--folder", str(tmp_path))

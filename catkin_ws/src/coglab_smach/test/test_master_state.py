@@ -1,4 +1,4 @@
-"""coglab/state and coglab/why follow what happens; a start that cannot work is refused at once, by name."""
+"""coglab/state and coglab/why follow the machine; an impossible start is refused at once with its reason."""
 
 import json
 import math
@@ -16,7 +16,7 @@ RECEIVE, GIVE = "exchange_human_to_robot", "exchange_robot_to_human"
 
 
 class Watched(Trial):
-    """A trial with all that was published."""
+    """A trial that collects all published states."""
 
     def __init__(self, **overrides):
         super().__init__(**overrides)
@@ -27,7 +27,7 @@ class Watched(Trial):
         return ask_for(self.ctx, action, object_id)
 
 
-def test_why_is_told_until_the_operator_has_answered():
+def test_the_reason_is_published_until_the_operator_acts():
     trial = Watched()
 
     def script(t):
@@ -38,7 +38,7 @@ def test_why_is_told_until_the_operator_has_answered():
         stopped = t.shown[-1]
         assert stopped.state == "/coglab_master/stopped" and stopped.in_hub and stopped.actions == ("reset",)
         assert stopped.reason_code == ReasonCode.HELD and stopped.why.endswith("type: ./coglab start reset")
-        # Somebody lifts the hold at the robot itself: the machine still waits, and the same recipe goes on.
+        # Somebody ends the hold directly at the robot: the machine still waits for the operator's reset.
         t.cell.arm.held = False
         t.clock.sleep(1.0)
         assert t.ctx.requests.hub() == "stopped"
@@ -59,14 +59,14 @@ def test_why_is_told_until_the_operator_has_answered():
     assert held and any(s.state.endswith("/approach/arm_motion/wait_stop") for s in trial.shown)
 
 
-def test_what_is_waited_for_is_told_with_its_deadline():
-    """Giving: the offer of the hand, the end of the reach, the person's taking; each with the limit that ends it."""
+def test_waits_are_published_with_their_deadline():
+    """Giving waits for the hand, the end of the reach and the taking; each wait has its time limit."""
     trial, timed = Watched(), []
     StateWatch(trial.ctx, lambda state: timed.append((trial.clock.now(), state)))
 
     def script(t):
         t.wait_hub("wait_without_object")
-        assert (t.shown[-1].waits_for, t.shown[-1].deadline) == ("", 0.0)  # a hub waits without end
+        assert (t.shown[-1].waits_for, t.shown[-1].deadline) == ("", 0.0)  # a hub has no time limit
         for action, hub in ((RECEIVE, "wait_with_object"), (GIVE, "wait_without_object")):
             assert t.ask(action, "mug").ok
             t.wait_hub(hub)
@@ -76,7 +76,7 @@ def test_what_is_waited_for_is_told_with_its_deadline():
     assert all((s.deadline > 0.0) == bool(s.waits_for) == bool(s.waits_code) for s in trial.shown)
     receiving = {s.waits_for for s in trial.shown if f"/{RECEIVE}/" in s.state}
     giving = {s.waits_for for s in trial.shown if f"/{GIVE}/" in s.state}
-    assert {"'mug' on offer", "contact of an object with the hand"} <= receiving  # the reach ends in that
+    assert {"'mug' on offer", "contact of an object with the hand"} <= receiving  # the end of the reach
     assert {"the person's hand within reach", "the end of the reach", "the person's taking of the load"} <= giving
     codes = {s.waits_for: s.waits_code for s in trial.shown}
     assert codes["'mug' on offer"] == codes["the person's taking of the load"] == ReasonCode.WAITS_FOR_PERSON
@@ -86,12 +86,12 @@ def test_what_is_waited_for_is_told_with_its_deadline():
     assert codes["opening of the hand"] == ReasonCode.WAITS_FOR_HAND
     assert codes["start of perception"] == ReasonCode.WAITS_FOR_SIGHT
     left = [s.deadline - stamp for stamp, s in timed if s.waits_for == "the person's taking of the load"]
-    assert left and abs(left[0] - 8.0) < 0.05  # as the mug's delivery says
-    # What looks on beside the motion is waited for by nobody, also between two waits of the motion itself.
+    assert left and abs(left[0] - 8.0) < 0.05  # the limit in the mug's delivery
+    # The monitor beside the motion is never shown as a wait, not even between two waits of the motion.
     assert "another reaching pattern" not in receiving
 
 
-def test_a_wait_that_is_put_off_is_told_again():
+def test_an_extended_wait_is_published_again():
     journal = Journal(lambda: 0.0)
     told = []
     journal.listen_waits(lambda: told.append(journal.wait()))
@@ -99,14 +99,14 @@ def test_a_wait_that_is_put_off_is_told_again():
     journal.waits("/m/b", Wait("another pattern", math.inf))
     assert journal.wait() == Wait("the reach", 5.0)
     with journal.waiting("/m/c", Wait("the sight", 2.0)):
-        assert journal.wait().what == "the sight"  # the one that gives up first
+        assert journal.wait().what == "the sight"  # the wait with the earliest limit
     journal.waits("/m/a", Wait("the reach", 7.0))
     assert journal.wait().deadline == 7.0
     journal.waits("/m/a", None)
     assert journal.wait() == Wait() and len(told) == 6
 
 
-def test_what_is_waited_for_aside_is_told_where_nothing_else_is_done():
+def test_a_wait_of_a_monitor_is_published_only_if_nothing_else_runs():
     journal = Journal(lambda: 0.0)
     journal.entered("/m/monitor")
     journal.waits("/m/monitor", Wait("another pattern", 5.0, aside=True))
@@ -120,7 +120,7 @@ def test_what_is_waited_for_aside_is_told_where_nothing_else_is_done():
     assert journal.wait().what == "another pattern"
 
 
-def test_a_failure_is_told_until_the_next_success():
+def test_a_failure_is_published_until_the_next_success():
     trial = Watched()
 
     def script(t):
@@ -153,7 +153,7 @@ def no_name(t):
 
 
 def asked_twice(t):
-    t.ctx.requests.open("wait_without_object", ["take"], default_object="mug")  # nobody takes from it
+    t.ctx.requests.open("wait_without_object", ["take"], default_object="mug")  # no hub takes the request
     assert t.ask("take", "mug").ok
     return t.ask("take", "mug")
 
@@ -169,7 +169,7 @@ def broken_database(t):
 
 
 def held_by_the_hub(t):
-    """Refused after it was taken: the database lost the object meanwhile."""
+    """Refused after it was accepted: meanwhile the database has lost the object."""
     t.cell.faults.refuse["get mug"] = PortError("'mug' is not in the database", code=ReasonCode.OBJECT_UNKNOWN)
     t.ctx.holding = "unknown"
     t.cell.arm.held = True
@@ -189,14 +189,14 @@ def held_by_the_hub(t):
         (no_hub, ReasonCode.WRONG_STATE, "is not in a hub now"),
         (lambda t: t.ask(GIVE), ReasonCode.WRONG_STATE, "wait_without_object takes"),
         (no_name, ReasonCode.OBJECT_UNKNOWN, "not known after a restart"),
-        (asked_twice, ReasonCode.BUSY, "'take' was asked for a moment ago"),
+        (asked_twice, ReasonCode.BUSY, "'take' was requested a moment ago"),
         (silent_database, ReasonCode.NODE_SILENT, "database has not answered within 2 s"),
         (broken_database, ReasonCode.NODE_SILENT, "list_objects is not there"),
         (lambda t: t.ask("take", "elephant"), ReasonCode.OBJECT_UNKNOWN, "'elephant' is not in the database"),
         (held_by_the_hub, ReasonCode.OBJECT_UNKNOWN, "'mug' is not in the database"),
     ],
 )
-def test_every_refusal_says_why_and_ends_with_what_to_type(refuse, code, words):
+def test_every_refusal_has_a_reason_and_ends_with_a_command(refuse, code, words):
     trial = Watched()
 
     def script(t):

@@ -1,5 +1,5 @@
-"""Who starts a motion ends it: whatever fails, runs out of time or is preempted, the arm stands before the next state
-begins, and recovery goes nowhere with an object that a person may hold."""
+"""The state that starts a motion ends it: after a failure, time limit or preemption the arm stands before the next
+state begins. Recovery does not move with an object that a person may hold."""
 
 import coglab_trials.scripted.arm as model
 import pytest
@@ -42,7 +42,7 @@ def test_a_motion_beyond_its_time_limit_is_ended_before_recovery_begins(monkeypa
         t.wait_hub("wait_without_object")
         monkeypatch.setattr(model, "ptp_time", lambda *a: 10.0 * ptp_time(*a))
         t.start("take")
-        t.wait_hub("fault", 200.0)  # recovery cannot go home in its time either
+        t.wait_hub("fault", 200.0)  # recovery cannot reach home within its limit either
         assert t.cell.arm.standing().ok
 
     trial = watched(script)
@@ -76,7 +76,7 @@ def test_a_sibling_that_fails_ends_the_reach_of_the_other():
     assert trial.cell.called("cancel")
 
 
-def test_where_cancelling_fails_the_arm_is_held():
+def test_the_arm_is_held_if_cancelling_fails():
     def script(t):
         t.wait_hub("wait_without_object")
         t.cell.faults.refuse["cancel"] = "no such service"
@@ -93,8 +93,8 @@ def test_where_cancelling_fails_the_arm_is_held():
     watched(script)
 
 
-def test_preempted_after_the_last_look_nothing_follows():
-    """The request comes while the state returns its success: the next state would have started the arm."""
+def test_no_state_follows_a_preemption_after_the_last_check():
+    """The request arrives while the state returns its success; the next state would start the arm."""
     trial = Trial()
 
     def script(t):
@@ -119,8 +119,8 @@ def test_preempted_after_the_last_look_nothing_follows():
     assert ended["switch_to_dmp"] == "preempted"
 
 
-def test_a_request_that_a_failure_overtook_does_not_end_the_next_handover():
-    """A sibling's failure asks the arm's machine to end in the moment in which that fails itself."""
+def test_an_unserved_preemption_does_not_end_the_next_handover():
+    """A sibling's failure preempts the arm's machine at the moment when that machine fails itself."""
     trial = Trial()
 
     def script(t):
@@ -147,7 +147,7 @@ def test_a_request_that_a_failure_overtook_does_not_end_the_next_handover():
     assert trial.result().outcome == "succeeded"
 
 
-def test_a_limit_follows_the_limits_of_speed_and_the_speed_scale():
+def test_a_time_limit_follows_speed_limits_and_speed_scale():
     t1 = read_limits({"joint_limits_profile": "t1"})
 
     def prepare(t):
@@ -172,8 +172,8 @@ def test_a_limit_follows_the_limits_of_speed_and_the_speed_scale():
     trial.run(script)
 
 
-def test_a_limit_follows_the_duration_of_the_primitive(monkeypatch):
-    """The longest that an object's file may ask for."""
+def test_a_time_limit_follows_the_duration_of_the_primitive(monkeypatch):
+    """The longest duration that an object's file allows."""
     trial = Trial()
     entry = trial.database.get("mug")
     slow = {**entry, "dmp": {**entry["dmp"], "dmp_ratio": 10.0}}
@@ -192,8 +192,8 @@ def test_a_limit_follows_the_duration_of_the_primitive(monkeypatch):
 
 
 @pytest.mark.parametrize("hub_after", ["stopped"])
-def test_a_person_who_holds_on_and_a_hand_that_does_not_open(hub_after, monkeypatch):
-    """The arm must not go away with the person's object."""
+def test_the_arm_stays_if_the_person_holds_on_and_the_hand_does_not_open(hub_after, monkeypatch):
+    """The arm must not move away with the person's object."""
     monkeypatch.setattr(weight, "from_palm", lambda state, track, *_: 0.1)
 
     def script(t):
@@ -209,7 +209,7 @@ def test_a_person_who_holds_on_and_a_hand_that_does_not_open(hub_after, monkeypa
         assert why.startswith("the arm stays where it is: the hand could not be opened") and "did not let go" in why
         assert "type: ./coglab start reset" in why
         t.start("reset", "")
-        t.wait_hub("stopped")  # as stuck as before: it still stays
+        t.wait_hub("stopped")  # still stuck: the arm stays
         assert t.cell.joints == place
         t.cell.faults.refuse.clear()
         t.clock.sleep(0.5)
@@ -220,7 +220,7 @@ def test_a_person_who_holds_on_and_a_hand_that_does_not_open(hub_after, monkeypa
     assert trial.result().code == ReasonCode.NOT_RELEASED
 
 
-def test_a_person_who_has_taken_the_load_and_a_hand_that_does_not_open():
+def test_the_arm_stays_if_the_hand_does_not_open_after_the_load_was_taken():
     def script(t):
         t.receive()
         t.cell.faults.refuse |= {"open": "motors 2, 3 are stuck", "preshape cylindrical": "motors 2, 3 are stuck"}
@@ -230,14 +230,14 @@ def test_a_person_who_has_taken_the_load_and_a_hand_that_does_not_open():
         t.wait_hub("stopped")
         t.clock.sleep(3.0)
         assert t.cell.joints == place and "the person may still hold 'mug'" in t.ctx.journal.why()
-        # The operator has looked: the object is the robot's after all.
+        # The operator has looked: only the robot holds the object.
         t.start("reset", "")
         t.wait_hub("wait_with_object")
 
     watched(script)
 
 
-def test_a_failed_monitor_is_no_reason_of_a_success():
+def test_a_failed_monitor_is_not_recorded_as_a_failure():
     trial = Trial()
 
     def broken():

@@ -1,4 +1,4 @@
-"""When something counts as offered, what is believed, and the goals that are made of it."""
+"""When an object counts as offered, predicted places, and the goals for them."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ IDENTITY = (0.0, 0.0, 0.0, 1.0)
 
 
 class Offers:
-    """A state that waits for an offer of the mug, which is seen at ``at(s)`` (m) and so old (s)."""
+    """A state that waits for an offer of the mug, seen at ``at(s)`` (m) by sights of ``age`` s."""
 
     def __init__(self, at=lambda t: INSIDE, age=0.0, **settings):
         self.trial, self.age, self.at = Trial(**settings), age, at
@@ -41,7 +41,7 @@ class Offers:
         return Ready(found)
 
     def wait(self, target="mug", margin=0.0, goals=lambda seen: [GOAL]):
-        """The goal, and the s until it came."""
+        """Returns the goal and the time (s) until it was found."""
         with using(self.trial.clock):
             goal = await_offer(self.state, target, goals, margin)
         return goal, self.trial.clock.now()
@@ -49,7 +49,7 @@ class Offers:
 
 @pytest.mark.parametrize("axis", range(3))
 @pytest.mark.parametrize("margin", [0.0, 0.1])
-def test_the_region_counts_to_its_walls_and_a_still_object_a_tenth_of_a_metre_beyond(axis, margin):
+def test_the_region_is_10_cm_larger_for_a_still_object(axis, margin):
     for wall, out in ((LOW, -1.0), (HIGH, 1.0)):
         for beyond, moving, still in ((-0.001, True, True), (0.001, False, True), (0.099, False, True)):
             place = np.array(INSIDE)
@@ -65,7 +65,7 @@ def test_the_region_counts_to_its_walls_and_a_still_object_a_tenth_of_a_metre_be
         assert error.value.sentence.startswith(f"'mug' was not offered within 8 s: it stayed at ({where}) m")
 
 
-def test_an_offer_without_a_posture_is_told_when_the_time_is_over():
+def test_an_unreachable_offer_is_reported_at_the_time_limit():
     offers = Offers()
     offers.ctx.reachable = lambda palm: False
     with pytest.raises(PortError) as error:
@@ -99,7 +99,7 @@ LOCATED = {"frame": "object_mug", "xyz": [1.3, 0.0, 0.4], "quaternion": list(IDE
         (ahead(offer=0.99, place=(0.6, -0.51, 0.4)), False, False),
     ],
 )
-def test_where_something_will_be_is_believed_from_the_timings_probability_on(seen, person, is_believed):
+def test_a_predicted_place_counts_from_the_probability_of_the_timing(seen, person, is_believed):
     offers = Offers()
     offers.ahead, region = seen, HandoverRegion(offers.ctx)
     found = believed(offers.ctx, "mug", LOCATED, person, region)
@@ -108,7 +108,7 @@ def test_where_something_will_be_is_believed_from_the_timings_probability_on(see
         assert found == {**LOCATED, "frame": seen.frame, "xyz": list(seen.place)}
     offers.ctx.config.set("handover.belief", 0.0)
     offers.ctx.config.set("handover.belief_request", 0.0)
-    assert believed(offers.ctx, "mug", LOCATED, person, region) is None, "the timing starts on no belief"
+    assert believed(offers.ctx, "mug", LOCATED, person, region) is None, "this timing ignores beliefs"
 
 
 def test_a_reach_begins_on_a_belief_before_the_object_is_there():
@@ -119,8 +119,8 @@ def test_a_reach_begins_on_a_belief_before_the_object_is_there():
 
 
 @pytest.mark.parametrize(("believed_end", "frame"), [(0.9, ""), (0.4, "object_mug_ahead")])
-def test_who_passes_through_the_region_offers_nothing_there(believed_end, frame):
-    """The object goes through the region at 0.8 m/s, and is believed to stop outside, or in it."""
+def test_an_object_passing_through_the_region_is_not_offered(believed_end, frame):
+    """The object moves through the region at 0.8 m/s; its predicted end is outside or inside."""
     offers = Offers(lambda t: (0.7, min(-0.6 + 0.8 * t, 0.9), 0.4))
     offers.ahead = ahead(offer=0.99, place=(0.7, believed_end, 0.4))
     if frame:
@@ -132,7 +132,7 @@ def test_who_passes_through_the_region_offers_nothing_there(believed_end, frame)
 
 
 @pytest.mark.parametrize(("age", "good"), [(0.5, True), (0.51, False)])
-def test_a_sight_for_a_goal_is_half_a_second_old_at_most(age, good):
+def test_a_goal_needs_a_sight_not_older_than_half_a_second(age, good):
     offers = Offers(age=age)
     with using(offers.trial.clock):
         if good:
@@ -156,7 +156,7 @@ def test_a_reach_has_the_pace_of_the_timing_and_arrives_slowly():
     assert paced(Offers(timing="natural").ctx, GOAL)["dmp_ratio"] == pytest.approx(2.0)
 
 
-def test_the_first_goal_with_a_posture_is_taken_where_it_is_checked():
+def test_the_first_reachable_goal_is_used_if_reach_is_checked():
     offers, asked = Offers(), []
     goals = [{**GOAL, "offset": [x, 0.0, 0.0]} for x in (0.1, 0.2, 0.3)]
     offers.ctx.reachable = lambda palm: asked.append(palm.position[0]) or palm.position[0] > 1.45
@@ -166,6 +166,3 @@ def test_the_first_goal_with_a_posture_is_taken_where_it_is_checked():
     assert palm_of(seen, goals[2]).position == pytest.approx([1.6, 0.0, 0.4])
     offers.ctx.config.set("handover.check_reach", False)
     assert first_reachable(offers.ctx, seen, goals)["offset"][0] == 0.1
-
-
-# --- hubs -------------------------------------------------------------------------------------------------------------

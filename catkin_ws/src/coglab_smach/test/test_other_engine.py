@@ -1,4 +1,4 @@
-"""The brain needs nothing of smach and smach_ros but what the ROS distributions' packages have too."""
+"""The brain uses only features that the ROS distributions' smach and smach_ros also have."""
 
 import importlib.metadata
 import json
@@ -12,7 +12,7 @@ PACKAGE = Path(__file__).resolve().parent.parent
 
 
 def run_on(engine, *files):
-    """What other_engine.py prints, in a process of its own."""
+    """Run other_engine.py in its own process. Returns its output."""
     ended = subprocess.run(
         [sys.executable, str(PACKAGE / "test" / "other_engine.py"), engine, *files],
         cwd=PACKAGE / "test",
@@ -26,7 +26,7 @@ def run_on(engine, *files):
 
 
 def handover_on(engine):
-    """The report of a handover there."""
+    """The report of a handover on this engine."""
     report = json.loads(run_on(engine)[-1])
     assert [outcome for _, outcome, _ in report["outcomes"]] == ["succeeded", "succeeded"], report
     assert report["held_by"] == "human" and not report["dropped"] and report["limit_violations"] == 0
@@ -48,6 +48,6 @@ def test_a_handover_on_the_engine_of_the_ros_distributions():
 
 
 @pytest.mark.skipif(distribution() is None, reason="standalone-smach is not installed (test-oracles.txt)")
-def test_who_starts_a_motion_ends_it_on_the_engine_of_the_ros_distributions():
+def test_motion_ownership_on_the_engine_of_the_ros_distributions():
     lines = run_on(str(distribution()), "test_motion_ownership.py")
     assert Path(lines[0]).resolve().is_relative_to(distribution()) and " passed" in lines[-1]

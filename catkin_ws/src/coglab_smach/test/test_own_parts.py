@@ -1,4 +1,4 @@
-"""Parts of a user's package, deliveries and the choice of the grasp: what runs, and what is refused in words."""
+"""Parts of a user's package, deliveries and the choice of the grasp: valid parts run, others are refused."""
 
 import os
 import sys
@@ -59,7 +59,7 @@ def received(t):
     t.wait_hub("wait_with_object")
 
 
-def test_an_action_of_a_user_runs_has_a_result_and_comes_back_to_the_hub():
+def test_a_users_action_runs_has_a_result_and_returns_to_the_hub():
     trial = Trial(actions=WIPE)
 
     def script(t):
@@ -75,7 +75,7 @@ def test_an_action_of_a_user_runs_has_a_result_and_comes_back_to_the_hub():
     trial.run(script)
 
 
-def test_a_failure_of_a_user_goes_through_recovery():
+def test_a_failure_in_a_users_action_goes_through_recovery():
     trial = Trial(actions=WIPE)
 
     def script(t):
@@ -89,7 +89,7 @@ def test_a_failure_of_a_user_goes_through_recovery():
     trial.run(script)
 
 
-def test_a_state_of_a_user_takes_the_place_of_a_shipped_one():
+def test_a_users_state_replaces_a_shipped_one():
     trial = Trial(states={"exchange_human_to_robot/query_database": "my_lab.states:AnnounceAndQuery"})
     said = []
     trial.ctx.say = lambda code, text: said.append(text)
@@ -112,12 +112,12 @@ def test_a_state_of_a_user_takes_the_place_of_a_shipped_one():
         ({"deliveries": {"low": "my_lab.deliveries:lower"}}, "deliveries.low: .* no function 'lower'; it has: low"),
     ],
 )
-def test_a_part_that_cannot_be_used_is_refused_in_words(settings, said):
+def test_an_unusable_part_is_refused_with_a_reason(settings, said):
     with pytest.raises(ConfigError, match=said):
         Trial(**settings)
 
 
-def test_a_module_that_fails_at_its_import_is_named_with_its_line(tmp_path, monkeypatch):
+def test_a_failing_import_is_reported_with_module_and_line(tmp_path, monkeypatch):
     (tmp_path / "bad_lab.py").write_text("import math\nmath.nonsense\n")
     (tmp_path / "ends_itself.py").write_text("raise SystemExit(3)\n")
     (tmp_path / "lacks_more.py").write_text("import no_such_thing_4714\n")
@@ -131,7 +131,7 @@ def test_a_module_that_fails_at_its_import_is_named_with_its_line(tmp_path, monk
             Trial(actions={"wipe": f"{module}:build"})
 
 
-def test_a_module_beside_machines_yaml_is_found_and_a_change_of_the_parts_waits_for_the_next_start(tmp_path):
+def test_a_module_beside_machines_yaml_is_found_and_changed_parts_need_a_restart(tmp_path):
     shipped = (Path(__file__).parents[1] / "config" / "machines.yaml").read_text()
     (tmp_path / "lab_4714.py").write_text("from my_lab.machines import build_wipe\n")
     path, warnings = tmp_path / "machines.yaml", []
@@ -145,10 +145,10 @@ def test_a_module_beside_machines_yaml_is_found_and_a_change_of_the_parts_waits_
     path.write_text(shipped + "\nactions: {polish: lab_4714:no_such}\nptp_timeout: 7.0\n")
     os.utime(path, ns=(5, 5))
     assert config.get("ptp_timeout") == 7.0 and list(config.get("actions")) == ["wipe"]
-    assert len(warnings) == 1 and "'actions' has changed; what was read at the start stays" in warnings[0]
+    assert len(warnings) == 1 and "'actions' has changed; the value read at the start stays" in warnings[0]
 
 
-def test_every_delivery_of_an_object_can_be_asked_for():
+def test_every_delivery_of_an_object_can_be_requested():
     trial = Trial(deliveries={"low": "my_lab.deliveries:low", "far": f"{__name__}:no_delivery"})
     given = []
 
@@ -165,12 +165,12 @@ def test_every_delivery_of_an_object_can_be_asked_for():
             t.wait_hub("wait_without_object")
             assert t.result().outcome == "succeeded" and t.master.userdata.delivery_name == name
             given.append(tuple(t.cell.arm.request.goal_offset))
-        assert len(set(given)) == len(given), "each delivery has a place of its own"
+        assert len(set(given)) == len(given), "each delivery has its own place"
         received(t)
         assert asks(t, "give", "", "far").ok
         t.wait_hub("wait_with_object")
         assert "deliveries.far" in t.result().reason and t.result().code == ReasonCode.BAD_FILE
-        assert asks(t, "give").ok  # without a name: the default again, not the one before
+        assert asks(t, "give").ok  # without a name: the default, not the previous one
         t.wait_hub("wait_without_object")
         assert t.master.userdata.delivery_name == t.database.get("mug")["default_delivery"]
 
@@ -191,7 +191,7 @@ def build_fetch(ctx):
     return build_take(ctx)
 
 
-def test_a_machine_with_its_own_recovery_stays_as_it_is():
+def test_a_machine_with_its_own_recovery_is_not_wrapped():
     trial = Trial(actions={"fetch": f"{__name__}:build_fetch"})
 
     def script(t):
@@ -212,14 +212,14 @@ def test_a_machine_with_its_own_recovery_stays_as_it_is():
         ("deliveries", "low", "without_arguments(entry, hand)"),
     ],
 )
-def test_a_function_that_takes_other_arguments_is_refused_with_its_line(group, name, call):
+def test_a_function_with_wrong_arguments_is_refused_with_its_line(group, name, call):
     with pytest.raises(ConfigError) as refused:
         Trial(**{group: {name: f"{__name__}:without_arguments"}})
     line = without_arguments.__code__.co_firstlineno
     assert call in str(refused.value) and f"test_own_parts.py:{line}" in str(refused.value)
 
 
-def test_an_outcome_that_does_not_exist_is_a_failure_and_the_machine_goes_on():
+def test_an_unknown_outcome_is_a_failure_and_the_machine_continues():
     trial = Trial(states={"exchange_human_to_robot/query_database": f"{__name__}:ReturnsNonsense"})
 
     def script(t):
@@ -232,7 +232,7 @@ def test_an_outcome_that_does_not_exist_is_a_failure_and_the_machine_goes_on():
     trial.run(script)
 
 
-def test_an_action_that_does_not_exist_is_refused_with_those_that_do_while_another_runs():
+def test_an_unknown_action_is_refused_with_the_known_names():
     trial = Trial(actions=WIPE)
 
     def script(t):

@@ -1,5 +1,5 @@
-"""Parts of the brain one by one: what is remembered and configured, triggers and the journal, how the machines are put
-together, and states that wait for the operator or begin a motion."""
+"""Single parts of the brain: memory and configuration, triggers and the journal, structure of the machines, and states
+that wait for the operator or start a motion."""
 
 import json
 import os
@@ -21,7 +21,7 @@ RECEIVE, GIVE = "exchange_human_to_robot", "exchange_robot_to_human"
 # --- memory and configuration -----------------------------------------------------------------------------------------
 
 
-def test_what_is_held_is_noted_whole_and_read_again(tmp_path, monkeypatch):
+def test_the_note_of_the_held_object_is_written_in_one_step_and_read_again(tmp_path, monkeypatch):
     path, warnings = tmp_path / "a" / "b" / "holding.json", []
     memory = HoldingMemory(str(path), warnings.append)
     assert memory.recall() == "" and warnings == []
@@ -59,10 +59,10 @@ def test_a_trigger_waits_two_seconds_for_the_database():
         assert ok or answer.code == ReasonCode.NODE_SILENT
 
 
-# --- how the machines are put together --------------------------------------------------------------------------------
+# --- structure of the machines ----------------------------------------------------------------------------------------
 
 
-def test_what_was_taken_from_the_board_is_held_as_its_grasp_says_and_named_again_it_is_the_same(trial):
+def test_an_object_from_the_board_keeps_its_grasp_and_may_be_named_again(trial):
     def walk(t):
         t.wait_hub("wait_without_object")
         t.grip.firm = 140
@@ -74,21 +74,21 @@ def test_what_was_taken_from_the_board_is_held_as_its_grasp_says_and_named_again
 
     trial.run(walk)
     reasons = [t.reason for t in trial.ctx.journal.transitions if t.from_state == "wait_with_object"]
-    assert reasons[0] == "operator asked for put of 'mug'"
+    assert reasons[0] == "operator requested put of 'mug'"
 
 
 # --- states -----------------------------------------------------------------------------------------------------------
 
 
 def ran(trial, state, **ud):
-    """Its outcome and the s that it took."""
+    """Returns the state's outcome and its duration (s)."""
     state._deadline = trial.clock.now() + state.time_limit()
     with using(trial.clock):
         begin = trial.clock.now()
         return state.run(SimpleNamespace(**ud)), trial.clock.now() - begin
 
 
-def test_an_arm_that_was_left_in_another_mode_is_stopped_first():
+def test_an_arm_left_in_another_mode_is_stopped_first():
     trial, asked = Trial(), []
     trial.ctx.arm.motion_allowed = lambda: Verdict("start" in asked, "why", 9)
 
@@ -103,7 +103,7 @@ def test_an_arm_that_was_left_in_another_mode_is_stopped_first():
 
 @pytest.mark.parametrize(("holds", "code", "tries"), [(2, 405, 3), (9, 405, 4), (9, 403, 1)])
 def test_motion_home_is_resumed_once_the_person_has_let_go(holds, code, tries):
-    """The person holds the arm for ``holds`` tries. 405: it did not come to its target; 403: a joint is at its stop."""
+    """The person holds the arm for ``holds`` tries. 405: target not reached; 403: a joint is at its limit."""
     trial = Trial()
     state, begun, home = PtpMotion(trial.ctx, "home"), [], trial.ctx.config.get("postures.home")
     trial.ctx.arm.joint_positions = lambda: tuple(home)

@@ -1,4 +1,4 @@
-"""What a tracker gets wrong, end to end in virtual time: two people in view, and identity swaps."""
+"""Tracker errors in whole trials in virtual time: two people in view, and identity swaps."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ SENTENCE = "2 people are in view; one partner is expected: ask the others to ste
 
 @pytest.fixture(autouse=True)
 def quiet():
-    """The engine's log of hundreds of transitions helps nobody here."""
+    """Switch off the engine's log of transitions."""
     smach.set_loggers(*[lambda *a: None] * 4)
 
 
 class SharedTracker:
-    """Stands where the rig has one tracker per frame, and shows the partner and a second person to one Vision."""
+    """Replaces the rig's trackers (one per frame). It passes the partner and a second person to one Vision."""
 
     def __init__(self, vision, other):
         self.vision, self.other = vision, other
@@ -40,14 +40,14 @@ class SharedTracker:
         self.waiting = {"object_mug": [], "human_hand": []}
 
     def of(self, name):
-        """The rig's view of it: a tracker of one frame."""
+        """Returns the tracker of one frame, as the rig uses it."""
         return type("Tracker", (), {"step": lambda _, t, frame, palm, others: self.step(name, t, frame, palm)})()
 
     def step(self, name, t, frame, palm):
         if name == "object_mug":
             self.object = frame
         else:
-            # Neither name nor order tells who the partner is.
+            # Neither name nor order identifies the partner.
             other = self.other(t)
             hands = {"right": frame} if other is None else {"left": Pose(other), "right": frame}
             for sight in self.vision.see(hands, {"object_mug": self.object}, palm):
@@ -57,8 +57,8 @@ class SharedTracker:
 
 
 class VisionPort:
-    """PerceptionPort on a Vision whose time is the trial's. Recognised and believed is what the rest of the trial makes
-    of the sights that the Vision broadcasts."""
+    """PerceptionPort on a Vision in the trial's time. Recognition and belief come from the trial, computed from the
+    sights of the Vision."""
 
     def __init__(self, trial, vision):
         self.trial, self.vision = trial, vision
@@ -96,7 +96,7 @@ class VisionPort:
 
 
 def two_people(seed, margin, other, **overrides):
-    """A trial as shipped whose perception sees the partner and somebody else at ``other(t)``; None: nobody else."""
+    """A trial as shipped. Perception sees the partner, and a second person at ``other(t)`` if that is not None."""
     recogniser = Recogniser(*load_patterns(PATTERNS))
     trial = VirtualTrial(seed, CONSIDERATE, recogniser=recogniser, settings=overrides)
     trial.perception = trial.ctx.perception
@@ -114,19 +114,19 @@ def two_people(seed, margin, other, **overrides):
     return trial
 
 
-def test_two_people_as_near_as_each_other_end_the_action_with_the_sentence():
+def test_two_people_at_the_same_distance_end_the_action():
     trial = two_people(1, 0.0, lambda t: BESIDE)
     results = trial.run(RECEIVE)
     assert results[0].outcome == "failed_empty"
     assert SENTENCE in " ".join([results[0].reason, *results[0].causes])
     assert results[0].code == ReasonCode.NOT_PERCEIVED
-    assert not trial.reaches, "the arm has not moved toward anybody"
+    assert not trial.reaches, "the arm must not move"
     assert trial.last_hub == "wait_without_object"
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-def test_the_partner_among_two_is_served_and_served_only(seed):
-    """Somebody walks to and fro behind the partner; the nearer one by 0.3 m is the partner."""
+def test_only_the_nearer_of_two_people_is_served(seed):
+    """A second person walks behind the partner. The partner is nearer by more than 0.3 m."""
     trial = two_people(seed, 0.3, lambda t: BEHIND + [0.0, 0.5 * np.sin(0.8 * t), 0.0])
     results = trial.run(RECEIVE, GIVE)
     assert [r.outcome for r in results] == ["succeeded", "succeeded"], [r.reason for r in results]
@@ -134,21 +134,21 @@ def test_the_partner_among_two_is_served_and_served_only(seed):
     assert trial.world.robot.limit_violations == 0
 
 
-def test_two_hands_of_one_person_that_come_together_are_not_told_apart():
-    """The other one comes along 0.15 m beside the hand that gives: nobody can say which gives, and the action ends with
-    the sentence, before the arm has closed on either."""
+def test_two_hands_side_by_side_cannot_be_distinguished():
+    """The other hand moves 0.15 m beside the giving hand. The giving hand cannot be identified, and the action ends
+    before the arm moves."""
     trial = two_people(1, 0.2, lambda t: np.asarray(trial.world.truth["human_hand"]["position"]) + [0.0, 0.15, 0.0])
     results = trial.run(RECEIVE)
     assert results[0].outcome == "failed_empty"
     assert SENTENCE in " ".join([results[0].reason, *results[0].causes])
     assert results[0].code == ReasonCode.NOT_PERCEIVED
-    # The reach does not begin, so that nothing can close.
+
     assert not trial.reaches and trial.last_hub == "wait_without_object"
 
 
 def comes_along(found, begun, stays=np.inf, beside=(0.0, 0.15, 0.0)):
-    """A second hand that is ``beside`` the partner's (m) for ``stays`` s once ``begun()``, and in nobody's sight
-    before."""
+    """Returns the position of a second hand: ``beside`` the partner's (m) for ``stays`` s from ``begun()`` on, else
+    None."""
     there = []
 
     def at(t):
@@ -162,7 +162,7 @@ def comes_along(found, begun, stays=np.inf, beside=(0.0, 0.15, 0.0)):
 
 
 def joined(direction, seed=1, margin=0.0, stays=np.inf, beside=(0.0, 0.15, 0.0), **overrides):
-    """A trial in which a second hand comes as soon as the arm reaches in this direction."""
+    """A trial in which a second hand appears when the reach of the action ``direction`` starts."""
     found = []
     reaches = lambda: found[0].reach is not None and found[0].begun[-1:] == [direction]  # noqa: E731
     trial = two_people(seed, margin, comes_along(found, reaches, stays, beside), **overrides)
@@ -170,21 +170,21 @@ def joined(direction, seed=1, margin=0.0, stays=np.inf, beside=(0.0, 0.15, 0.0),
     return trial
 
 
-def test_a_reach_on_a_belief_ends_where_a_second_hand_comes_beside_the_first():
-    """What was believed is of nobody's hand any more: the arm stands, waits, and gives up with the sentence; before,
-    it said that the person did not offer any more."""
+def test_a_reach_on_a_belief_ends_if_a_second_hand_appears():
+    """The belief belongs to neither hand: the arm pauses and gives up. The reason is the two people, not a withdrawn
+    offer."""
     trial = joined(RECEIVE)
     result = trial.run(RECEIVE)[0]
     assert result.outcome == "failed_empty" and trial.last_hub == "wait_without_object"
     assert trial.reaches[0].request.goal_frame == "object_mug_ahead"
     assert result.code == ReasonCode.NOT_PERCEIVED and SENTENCE in " ".join([result.reason, *result.causes])
-    assert result.marks["paused"] < result.marks["motion_started"] + 1.0, "before it was there"
+    assert result.marks["paused"] < result.marks["motion_started"] + 1.0, "the pause begins before arrival"
     assert "contact" not in result.marks and trial.world.cell.truth()["held_by"] == "human"
     assert trial.world.robot.limit_violations == 0
 
 
-def test_nor_is_anything_given_to_one_of_two():
-    """The same the other way round: the robot keeps the object."""
+def test_nothing_is_given_if_a_second_hand_appears():
+    """The robot keeps the object."""
     trial = joined(GIVE)
     results = trial.run(RECEIVE, GIVE)
     assert [r.outcome for r in results] == ["succeeded", "failed_holding"], [r.reason for r in results]
@@ -194,8 +194,8 @@ def test_nor_is_anything_given_to_one_of_two():
 
 
 @pytest.mark.parametrize("direction", [RECEIVE, GIVE])
-def test_the_reach_goes_on_once_the_second_hand_has_gone(direction):
-    """It was there for a second: the arm has stood, and serves who is left."""
+def test_the_reach_continues_after_the_second_hand_has_left(direction):
+    """The second hand stays for 1 s. The arm pauses, then serves the partner."""
     trial = joined(direction, stays=1.0)
     results = trial.run(RECEIVE, GIVE)
     assert [r.outcome for r in results] == ["succeeded", "succeeded"], [r.reason for r in results]
@@ -205,33 +205,33 @@ def test_the_reach_goes_on_once_the_second_hand_has_gone(direction):
 
 @pytest.mark.parametrize("direction", [RECEIVE, GIVE])
 @pytest.mark.parametrize("stays", [0.1, 0.5])
-def test_a_second_hand_that_is_taken_for_the_first_misleads_nobody(direction, stays):
-    """It is nearer to the robot by more than the margin, so that for a while it is the partner's, 0.4 m from where that
-    was and will be again; what is seen of it is a jump."""
+def test_confusion_with_a_second_hand_does_not_mislead_the_arm(direction, stays):
+    """The second hand is nearer to the robot by more than the margin. It counts as the partner's for a while, as a jump
+    of 0.4 m."""
     trial = joined(direction, margin=0.1, stays=stays, beside=(-0.3, 0.3, 0.0))
     results = trial.run(RECEIVE, GIVE)
     assert [r.outcome for r in results] == ["succeeded", "succeeded"], [r.reason for r in results]
     assert trial.world.cell.truth()["held_by"] == "human" and trial.world.robot.limit_violations == 0
 
 
-def test_a_second_hand_that_comes_beside_the_first_during_the_reach():
-    """Of a reach that does not rest on a belief: the object is seen as before and tells where to go, so it is taken,
-    with the lowest force level, since anybody's fingers may be there, and nothing falls."""
+def test_a_reach_to_a_seen_object_continues_beside_a_second_hand():
+    """This reach needs no belief: the object is still seen, and is taken. Somebody's fingers may be there, so the hand
+    uses the lowest force level. Nothing falls."""
     trial = joined(RECEIVE, timing="calm")
     levels, preshape = set(), trial.ctx.hand.preshape
     trial.ctx.hand.preshape = lambda mode, level: levels.add(level) or preshape(mode, level)
     result = trial.run(RECEIVE)[0]
     truth = trial.world.cell.truth()
     assert result.outcome == "succeeded" and truth["held_by"] == "robot" and trial.last_hub == "wait_with_object"
-    # Whose fingers were at the object is not known: it is held firmly once the arm is at home.
+    # The owner of the fingers at the object is unknown: the grip is tightened only at home.
     states = [move.from_state for move in trial.ctx.journal.transitions if move.outcome == "succeeded"]
     assert result.marks["tightened"] > result.ended - 0.5 and "tighten_at_home" in states
     assert levels == {"low"} and not truth["dropped"] and trial.world.robot.limit_violations == 0
 
 
 @pytest.mark.parametrize("jump", [0.08, 0.30])
-def test_identity_swaps_neither_mislead_the_arm_nor_go_unsaid(jump):
-    """The tracker takes something else for the object or the hand for four frames at a time, about every 3 s."""
+def test_identity_swaps_end_in_success_or_a_stated_reason(jump):
+    """About every 3 s, the tracker confuses the object or the hand with something else for four frames."""
     settings = PerceptionSettings(swap_probability=0.01, swap_jump=jump)
     good = 0
     for seed in range(3):

@@ -1,5 +1,5 @@
-"""Perception, object database and contact detector as the brain sees them over ROS: how long what they say counts, what
-is asked of them, and how long they are waited for."""
+"""ROS ports of perception, object database and contact detector: maximum age of messages, requests and their time
+limits."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from test_arm_port import Topic, ended
 
 
 class Nodes:
-    """The ports, and what is asked of their nodes: (name, wait, fields)."""
+    """The ports, and the requests to their nodes: (name, wait, fields)."""
 
     def __init__(self, monkeypatch):
         self.now, self.asked, self.answer = 50.0, [], None
@@ -52,7 +52,7 @@ def nodes(monkeypatch):
 
 
 @pytest.mark.parametrize(("seconds", "known"), [(0.3, True), (0.31, False)])
-def test_what_is_believed_counts_for_three_tenths_of_a_second(nodes, seconds, known):
+def test_a_belief_is_valid_for_300_ms(nodes, seconds, known):
     assert nodes.perception.ahead() == Ahead()
     message = HandoverBelief(offer=0.9, request=0.1, object_id="mug", object_frame="object_mug", hand="human_hand")
     message.place, message.place_covariance = Point(1.0, 2.0, 3.0), [0.01, 9, 9, 9, 0.04, 9, 9, 9, 0.02]
@@ -71,7 +71,7 @@ def test_what_is_believed_counts_for_three_tenths_of_a_second(nodes, seconds, kn
 # --- contact ----------------------------------------------------------------------------------------------------------
 
 
-def test_a_request_to_the_detector_has_what_the_settings_say(nodes):
+def test_a_request_to_the_detector_contains_the_settings(nodes):
     assert ended(nodes.contact.arm("contact", 6.0, {})).result() is None
     name, wait, fields = nodes.asked[0]
     assert (name, wait) == ("contact_detector/arm", 2.0) and fields["joints"] == [] and fields["frame"] == ""
@@ -98,7 +98,7 @@ def sent(nodes, count):
         time.sleep(0.002)
 
 
-def test_it_is_disarmed_once(nodes):
+def test_the_detector_is_disarmed_once(nodes):
     nodes.contact.disarm()
     ended(nodes.contact.arm("contact", 6.0, {}))
     nodes.contact.disarm()
@@ -109,11 +109,11 @@ def test_it_is_disarmed_once(nodes):
 
 
 @pytest.mark.parametrize(("mode", "contact"), [("contact", True), ("lift", True), ("release", False)])
-def test_the_first_event_of_what_was_armed_for_is_kept(nodes, mode, contact):
+def test_the_first_event_of_the_armed_kind_is_kept(nodes, mode, contact):
     topic = "coglab/contact"
     nodes.say(topic, Contact(contact=True))
     nodes.say(topic, Contact(contact=False))
-    assert nodes.contact.event() is None, "nobody watches"
+    assert nodes.contact.event() is None, "the detector is not armed"
     nodes.contact.arm(mode, 6.0, {})
     nodes.say(topic, Contact(contact=not contact))
     assert nodes.contact.event() is None
@@ -131,7 +131,7 @@ def signal(nodes, seconds=0.0, stamp=50.0, **fields):
     nodes.say("contact_detector/signal", ContactSignal(**{**watching, **fields}), seconds, stamp)
 
 
-def test_the_share_that_is_gone_is_that_of_this_arming(nodes):
+def test_the_share_gone_belongs_to_this_arming(nodes):
     assert nodes.contact.share_gone() is None
     nodes.contact.arm("release", 6.0, {"load_share": 0.6})
     assert nodes.contact.share_gone() is None
@@ -144,7 +144,7 @@ def test_the_share_that_is_gone_is_that_of_this_arming(nodes):
         assert nodes.contact.share_gone() is None, fields
     signal(nodes)
     nodes.contact.arm("release", 6.0, {})
-    assert nodes.contact.share_gone() == pytest.approx(0.75), "half of the load where nothing is said"
+    assert nodes.contact.share_gone() == pytest.approx(0.75), "half of the load by default"
     nodes.contact.disarm()
     assert nodes.contact.share_gone() is None
     nodes.contact.arm("contact", 6.0, {"load_share": 0.6})
@@ -152,7 +152,7 @@ def test_the_share_that_is_gone_is_that_of_this_arming(nodes):
 
 
 @pytest.mark.parametrize("over", [True, False])
-def test_a_topic_that_is_closed_while_the_node_ends_is_no_error(monkeypatch, over):
+def test_a_topic_closed_at_the_end_of_the_node_is_no_error(monkeypatch, over):
     def closed(message):
         raise rospy.ROSException("publish() to a closed topic")
 
@@ -164,10 +164,10 @@ def test_a_topic_that_is_closed_while_the_node_ends_is_no_error(monkeypatch, ove
             publish.publish(SimpleNamespace(publish=closed), "m")
 
 
-# --- what takes time --------------------------------------------------------------------------------------------------
+# --- threads ----------------------------------------------------------------------------------------------------------
 
 
-def test_a_call_in_a_thread_of_its_own():
+def test_a_call_in_its_own_thread():
     good = ended(Threaded(lambda permit: permit.check() or 5, "it"))
     assert good.result() == 5 and not good.failed()
     bad = ended(Threaded(lambda permit: 1 / 0, "it"))

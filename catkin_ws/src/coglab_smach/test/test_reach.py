@@ -1,4 +1,4 @@
-"""A reach for a person: what ends it, what makes it pause, and when the hand closes, goes on or comes again."""
+"""A reach for a person: reasons to end or pause it, and when the hand closes, goes deeper or tries again."""
 
 from types import SimpleNamespace
 
@@ -31,7 +31,7 @@ GOAL = {
 HERE = (0.4, 0.0, 0.4)
 
 
-def test_a_request_has_what_its_goal_says():
+def test_a_request_contains_the_fields_of_its_goal():
     plain = dmp_request({"primitive": "p", "frame": "f", "offset": (1, 2, 3)})
     assert not plain.orientation_control and plain.goal_approach == (0.0, 0.0, 0.0)
     whole = dmp_request({**GOAL, "approach": [0.0, 0.05, 0.0], "arrival_speed": 0.05}, "q")
@@ -40,11 +40,11 @@ def test_a_request_has_what_its_goal_says():
     assert target_of(GOAL) == "mug" and target_of({"frame": "human_hand_ahead"}) == "human_hand"
 
 
-# --- what is seen and believed ----------------------------------------------------------------------------------------
+# --- sights and beliefs -----------------------------------------------------------------------------------------------
 
 
 class Watched:
-    """A ReachWatch of a palm at the origin; the test sets what is seen (``place``) and believed (``ahead``)."""
+    """A ReachWatch with the palm at the origin. The test sets the sight (``place``) and the belief (``ahead``)."""
 
     def __init__(self, monkeypatch, grip=None, frame="object_mug_ahead", closes=False):
         self.t, self.place, self.refusal = 0.0, HERE, None
@@ -64,7 +64,7 @@ class Watched:
         return self.reach.hopeful()
 
 
-def test_doubt_takes_a_moment_and_is_forgiven(monkeypatch):
+def test_doubt_begins_after_its_delay_and_can_end(monkeypatch):
     early = Watched(monkeypatch)
     early.ahead, early.place = Ahead(), None
     doubted = []
@@ -87,7 +87,7 @@ def test_a_predicted_place_outside_the_region_is_not_followed(monkeypatch, beyon
 
 
 @pytest.mark.parametrize(("beyond", "offered"), [(0.099, True), (0.101, False)])
-def test_an_object_held_still_a_little_outside_is_offered(monkeypatch, beyond, offered):
+def test_an_object_held_still_slightly_outside_is_offered(monkeypatch, beyond, offered):
     early, place = Watched(monkeypatch), (HIGH[0] + beyond, 0.0, 0.4)
     early.ahead = Ahead()
     looks = [early.look(*place) for _ in range(12)]
@@ -97,7 +97,7 @@ def test_an_object_held_still_a_little_outside_is_offered(monkeypatch, beyond, o
     assert (goal["limits"]["goal_retreat"], goal["limits"]["goal_drop"]) == (0.10, 0.08)
 
 
-def test_an_old_sight_repeated_is_not_held_still(monkeypatch):
+def test_a_repeated_old_sight_does_not_count_as_held_still(monkeypatch):
     early = Watched(monkeypatch)
     early.ahead, early.place = Ahead(1.0, 0.0, "mug", "object_mug_ahead", (0.4, 1.2, 0.4)), (0.4, 0.9, 0.4)
     begin = early.t
@@ -112,18 +112,18 @@ def test_a_reach_toward_a_seen_target_needs_no_belief_but_does_not_leave_the_reg
     seen.ahead = Ahead(1.0, 0.0, "mug", "object_mug_ahead", (0.4, 1.2, 0.4))
     assert not seen.look(0.45, 0.05, 0.4) and seen.reach.doubt()[0] == ReasonCode.GOAL_AHEAD_OUTSIDE
     seen.ahead = Ahead(0.0, 1.0, "", "human_hand_ahead", (0.4, 1.2, 0.4))
-    assert seen.look(0.45, 0.08, 0.4), "the place of something else does not count"
+    assert seen.look(0.45, 0.08, 0.4), "the predicted place of another frame does not count"
     seen.ahead = Ahead(0.5, 0.0, "mug", "object_mug_ahead", HERE)
     assert not seen.look(0.45, 1.01, 0.4) and seen.reach.doubt()[0] == ReasonCode.GOAL_LEFT_REGION
 
 
-def test_a_target_that_goes_back_a_little_and_is_held_there_is_met(monkeypatch):
+def test_a_target_held_still_after_a_short_retreat_is_offered_there(monkeypatch):
     early = Watched(monkeypatch)
     early.look(0.6, 0.0, 0.0), early.look(0.6, 0.0, 0.0)
     assert not early.look(0.68, 0.0, 0.0) and early.reach.doubted()
     looks = [early.look(0.68, 0.0, 0.0) for _ in range(12)]
     assert not any(looks[:8]) and looks[-1]
-    with pytest.raises(TimeLimit) as end:  # 0.11 m from where it was nearest
+    with pytest.raises(TimeLimit) as end:  # 0.11 m from its nearest place
         early.look(0.71, 0.0, 0.0)
     assert end.value.code == ReasonCode.GOAL_WITHDRAWN
 
@@ -137,7 +137,7 @@ def test_the_arm_waits_for_a_hand_that_begins_to_go_back(monkeypatch, back, wait
     assert early.look(0.51, 0.0, 0.0)
 
 
-def test_a_jump_is_another_thing_unless_it_stays_there(monkeypatch):
+def test_a_jump_is_ignored_unless_it_lasts(monkeypatch):
     hand = Watched(monkeypatch)
     for place, frames in ((HERE, 10), ((0.28, 0.0, 0.28), 4), (HERE, 30)):
         for _ in range(frames):
@@ -150,14 +150,14 @@ def test_a_jump_is_another_thing_unless_it_stays_there(monkeypatch):
     assert hand.t - begin < SWAPPED + 3 * FRAME
 
 
-def test_a_hand_that_is_lowered_has_not_gone_back(monkeypatch):
+def test_a_lowered_hand_has_not_gone_back(monkeypatch):
     hand = Watched(monkeypatch, frame="human_hand_ahead")
     hand.ahead, hand.reach.may = Ahead(0.0, 1.0, "", "human_hand_ahead", HERE), {**GOAL["watch"], "drop": 0.0}
     assert all(hand.look(0.4, 0.0, 0.4 - 0.025 * k) for k in range(12))
 
 
 @pytest.mark.parametrize("closing", [False, True])
-def test_a_hand_that_takes_back_what_it_hides_has_withdrawn_it(monkeypatch, closing):
+def test_a_hand_that_goes_back_with_a_hidden_object_withdraws_it(monkeypatch, closing):
     hand = [0.5]
     early = Watched(monkeypatch, SimpleNamespace(), "object_mug", closing)
     sight = lambda state, name, limit=0.3: Located(name, "world", (hand[0], 0.0, 0.4), IDENTITY, 0.0)  # noqa: E731
@@ -171,7 +171,7 @@ def test_a_hand_that_takes_back_what_it_hides_has_withdrawn_it(monkeypatch, clos
         assert early.look()
     hand[0] = 0.63
     if closing:
-        assert early.look(), "the person lets go, and goes away"
+        assert early.look(), "the person lets go and leaves"
         return
     with pytest.raises(TimeLimit) as end:
         early.look()
@@ -179,7 +179,7 @@ def test_a_hand_that_takes_back_what_it_hides_has_withdrawn_it(monkeypatch, clos
 
 
 @pytest.mark.parametrize("code", [ReasonCode.NOT_PERCEIVED, ReasonCode.OBJECT_NOT_SEEN])
-def test_a_hand_that_cannot_be_told_from_another_is_no_withdrawal(monkeypatch, code):
+def test_an_unidentified_hand_is_no_withdrawal(monkeypatch, code):
     hand = Watched(monkeypatch)
     hand.look(), hand.look()
     hand.ahead, hand.refusal = Ahead(), PortError("2 people are in view", code=code)
@@ -191,7 +191,7 @@ def test_a_hand_that_cannot_be_told_from_another_is_no_withdrawal(monkeypatch, c
 
 
 class Hand:
-    """A person's hand ``above`` the object (m), and how old the two sights are (s)."""
+    """A person's hand ``above`` the object (m), and the ages of the two sights (s)."""
 
     def __init__(self, monkeypatch, above=0.05):
         self.t, self.above, self.ages, self.first = 0.0, above, (0.0, 0.0), []
@@ -222,7 +222,7 @@ class Hand:
         ([0.05] * 6, (0.0, 0.0), True),
     ],
 )
-def test_an_object_has_fallen_if_most_sights_show_it_lower_against_the_hand(monkeypatch, above, ages, fell):
+def test_an_object_has_fallen_if_most_sights_show_it_below_the_hand(monkeypatch, above, ages, fell):
     person = Hand(monkeypatch)
     person.first = above if isinstance(above, list) else []
     person.above, person.ages = 0.111 if fell and person.first else 0.05 if person.first else above, ages
@@ -230,7 +230,7 @@ def test_an_object_has_fallen_if_most_sights_show_it_lower_against_the_hand(monk
     assert found == (ReasonCode.GOAL_FELL if fell else ReasonCode.GOAL_WITHDRAWN)
 
 
-def test_an_object_that_nobody_was_seen_to_hold_has_fallen(monkeypatch):
+def test_a_dropping_object_never_seen_with_a_hand_has_fallen(monkeypatch):
     person = Hand(monkeypatch, None)
     person.above = 0.05
     assert person.grip.fell_or_withdrawn() == ReasonCode.GOAL_FELL
@@ -242,7 +242,7 @@ def test_an_object_that_nobody_was_seen_to_hold_has_fallen(monkeypatch):
 
 
 class Reaching:
-    """A WaitContact on an arm whose progress the test says; it has run up to the wait for contact, which is armed."""
+    """A WaitContact in the armed wait for contact. The test sets the arm's progress."""
 
     def __init__(self, monkeypatch, progress, off=0.02, doubted=lambda: False, fell=None, **settings):
         self.trial = Trial(**settings)
@@ -265,7 +265,7 @@ class Reaching:
         self.grip.preshaped = True
 
     def run(self, touched_after=None):
-        """Outcome or error, and the s that it took."""
+        """Returns the outcome or error, and the duration (s)."""
         grasp = {"hand": {"mode": "cylindrical", "level": "low"}}
         ud = SimpleNamespace(goal=GOAL, grasp=grasp, object_entry={"mass": 0.3}, grip=self.grip)
         self.state._deadline = 1e9
@@ -296,8 +296,8 @@ def test_the_hand_slides_in_after_a_light_touch_beside_the_grasp(monkeypatch, of
 
 
 def received(monkeypatch, off):
-    """A reach of the whole machine with the object seen ``off(touches)`` m off its grasp."""
-    # In this cell the object is at the palm from the touch on, wherever the palm is, and goes with it.
+    """Run the whole machine with the object seen ``off(touches)`` m off its grasp."""
+    # In this cell the object follows the palm from the touch on.
     anywhere = {"handover.region_low": [-2.0] * 3, "handover.region_high": [2.0] * 3, "handover.retreat": 2.0}
     trial, looks = Trial(**{"handover.close_within": 0.0, "handover.drop": 0.0, **anywhere}), []
     monkeypatch.setattr(reach, "off_grasp", lambda state, goal: off(looks.append(1) or len(looks)))
@@ -312,7 +312,7 @@ def received(monkeypatch, off):
     return trial
 
 
-def test_the_arm_comes_again_twice_and_then_gives_up(monkeypatch):
+def test_the_arm_tries_again_twice_and_then_gives_up(monkeypatch):
     trial = received(monkeypatch, lambda looks: 0.2 if looks <= 2 else 0.02)
     assert trial.result().outcome == "succeeded" and trial.cell.called().count("execute_dmp") == 3
     trial = received(monkeypatch, lambda looks: 0.2)
@@ -342,7 +342,7 @@ def test_the_arm_pauses_for_a_person_and_gives_up_after_a_while(monkeypatch, bac
         (DmpProgress("aborted", "", "p", 0.5, 0.2, ReasonCode.GOAL_FELL), True, ReasonCode.GOAL_WITHDRAWN),
     ],
 )
-def test_an_aborted_reach_says_why(monkeypatch, progress, predicted, code):
+def test_an_aborted_reach_has_its_reason(monkeypatch, progress, predicted, code):
     lowered = {"fell_or_withdrawn": lambda: ReasonCode.GOAL_WITHDRAWN}
     reaching = Reaching(monkeypatch, progress, fell=lowered)
     reaching.watch.predicted = predicted

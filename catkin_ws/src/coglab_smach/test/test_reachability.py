@@ -34,7 +34,7 @@ def test_goals_are_the_palm_relative_to_the_goal_frame():
     assert receive["offset"] == pytest.approx([0.0, -0.065, 0.07])
     assert grasp_goal(mug, grasp, "object_mug", "take", 0.0)["offset"] == pytest.approx([0.0, -0.04, 0.07])
     give = delivery_goal(mug, grasp, mug["deliveries"]["handle_first"], "human_hand")
-    # Palm in the hand frame, then the object from the palm, must give the delivery pose back.
+    # The palm in the hand frame, then the object from the palm, must result in the delivery pose.
     palm = Pose.from_dict({"xyz": give["offset"], "quaternion": give["orientation"]})
     held = palm * palm_at_grasp(grasp, 0.0).inverse()
     assert held.position == pytest.approx(mug["deliveries"]["handle_first"]["pose"]["xyz"])

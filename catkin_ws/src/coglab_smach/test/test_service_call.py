@@ -1,4 +1,4 @@
-"""A service call that is given up before it was sent never acts, however late its server comes or thaws."""
+"""A service call cancelled before it was sent never acts, even if its server starts or resumes later."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from coglab_smach.ros import calls
 
 
 class Server:
-    """Stands for the master and a server: ``there`` is when it is registered, ``thawed`` when it takes connections."""
+    """Replaces the master and a server. ``there``: it is registered. ``thawed``: it accepts connections."""
 
     def __init__(self, monkeypatch):
         self.there, self.thawed = threading.Event(), threading.Event()
@@ -28,7 +28,7 @@ class Server:
     def call(self, request):
         assert self.thawed.wait(60.0)
         buff = io.BytesIO()
-        request.serialize(buff)  # as rospy does once the connection stands
+        request.serialize(buff)  # as rospy does when the connection exists
         self.heard.append(request.event)
         return self.answer
 
@@ -41,7 +41,7 @@ def ended(call):
 
 
 @pytest.mark.parametrize("late", ["there", "thawed"])
-def test_given_up_before_it_was_sent(monkeypatch, late):
+def test_a_call_cancelled_before_it_was_sent(monkeypatch, late):
     server = Server(monkeypatch)
     if late == "thawed":
         server.there.set()
@@ -57,8 +57,8 @@ def test_given_up_before_it_was_sent(monkeypatch, late):
     assert server.heard == []
 
 
-def test_given_up_while_no_server_is_there_its_thread_ends(monkeypatch):
-    """Not when it would have run out of time: a machine that tries again and again would collect them."""
+def test_the_thread_of_a_cancelled_call_without_server_ends(monkeypatch):
+    """It ends before its time limit: otherwise repeated calls would collect threads."""
     server = Server(monkeypatch)
     call = calls.call("lwr/command", LwrCommand, wait=20.0, event="reset")
     time.sleep(0.05)
@@ -69,11 +69,11 @@ def test_given_up_while_no_server_is_there_its_thread_ends(monkeypatch):
     assert raised.value.code == ReasonCode.CANCELLED
     until = time.monotonic() + 60.0
     while any(t.name == "call:service lwr/command" for t in threading.enumerate()):
-        assert time.monotonic() < until, "its thread is left"
+        assert time.monotonic() < until, "its thread must end"
         time.sleep(0.01)
 
 
-def test_a_refusal_brings_its_code(monkeypatch):
+def test_a_refusal_has_its_code(monkeypatch):
     server = Server(monkeypatch)
     server.there.set()
     server.thawed.set()
@@ -85,7 +85,7 @@ def test_a_refusal_brings_its_code(monkeypatch):
     assert raised.value.code == ReasonCode.HELD
 
 
-def test_a_server_that_never_comes(monkeypatch):
+def test_a_server_that_never_starts(monkeypatch):
     Server(monkeypatch)
     call = calls.call("lwr/command", LwrCommand, wait=0.1, event="start")
     assert ended(call)

@@ -1,5 +1,5 @@
-"""The arm takes the weight without drawing its gentle fingers along what the person still holds, and says that it has
-an object only where it stands around one, and still has it at home."""
+"""The arm takes the weight without pulling its gentle fingers along an object that the person still holds. The robot
+reports an object only if its fingers stand around it, and still do at home."""
 
 from dataclasses import replace
 
@@ -23,8 +23,8 @@ def height(trial):
 
 
 def receiving(script, **overrides):
-    """Receive the mug from a person who lets go only when the script says so; ``script`` once the weight is watched
-    for."""
+    """Receive the mug from a person who lets go at the end of ``script``. It starts when the detector is armed for the
+    weight."""
     trial = Trial(**overrides)
     trial.cell.partner.let_go_after = None
     let_go, trial.cell.let_go = trial.cell.let_go, lambda: None
@@ -39,7 +39,7 @@ def receiving(script, **overrides):
     return trial.run(walk)
 
 
-def test_the_rise_stands_when_the_weight_has_come_and_goes_on_in_steps_where_the_person_holds_on():
+def test_the_rise_stops_with_the_weight_and_continues_in_steps():
     rises = []
 
     def script(t):
@@ -52,13 +52,13 @@ def test_the_rise_stands_when_the_weight_has_come_and_goes_on_in_steps_where_the
 
     trial = receiving(script, **{"hand.load_timeout": 8.0})
     step, whole = (float(trial.ctx.config.get(f"hand.{name}")) for name in ("lift_step", "lift"))
-    assert rises[0] < 0.4 * whole, "as far as it had come with the weight"
+    assert rises[0] < 0.4 * whole, "stopped by the weight"
     assert rises[1] == pytest.approx(rises[0] + step, abs=0.003)
-    assert rises[2] == pytest.approx(whole, abs=0.006), "never farther than the whole rise"
+    assert rises[2] == pytest.approx(whole, abs=0.006), "at most the whole rise"
     assert trial.result().outcome == "succeeded"
 
 
-def test_fingers_that_follow_what_a_person_lets_go_of_stand_once_they_have():
+def test_repeated_closing_ends_when_the_person_has_let_go():
     ended = []
 
     def script(t):
@@ -67,13 +67,13 @@ def test_fingers_that_follow_what_a_person_lets_go_of_stand_once_they_have():
         t.clock.sleep(1.0)
         t.cell.push(-0.9 * WEIGHT)
         t.clock.sleep(0.3)
-        assert not ended, "they go on around what the person still holds"
+        assert not ended, "they continue while the person holds the object"
         t.ctx.hand.close = close
 
     assert receiving(script).result().outcome == "succeeded" and len(ended) == 1
 
 
-def test_without_a_sight_of_the_person_the_rise_is_whole():
+def test_the_arm_rises_fully_if_the_person_is_not_seen():
     rises = []
 
     def script(t):
@@ -92,7 +92,7 @@ def test_without_a_sight_of_the_person_the_rise_is_whole():
 
     trial.cell.partner.let_go_after = None
     trial.run(walk)
-    assert rises[0] > 0.2, "the time that the rest of the rise takes"
+    assert rises[0] > 0.2, "duration of the rest of the rise"
 
 
 @pytest.mark.parametrize(
@@ -113,8 +113,8 @@ def test_fingers_around_an_object(mode, positions, around):
 
 
 def edged(times, person_gone=False):
-    """Receive the mug; so many times only the ring finger stands on it. ``person_gone``: the person has left
-    by then."""
+    """Receive the mug; the first ``times`` closings hold it only with the ring finger. ``person_gone``: the person
+    has left by then."""
     trial, closings = Trial(), []
     state = trial.ctx.hand.state
 
@@ -137,7 +137,7 @@ def edged(times, person_gone=False):
     return trial.run(script)
 
 
-def test_what_is_held_by_an_edge_is_grasped_once_more():
+def test_an_object_held_by_an_edge_is_grasped_again():
     trial = edged(1)
     assert "missed" in trial.result().marks and trial.result().outcome == "succeeded"
     order = [name for name in trial.cell.called() if name in ("preshape cylindrical", "close", "arm lift")]
@@ -147,19 +147,19 @@ def test_what_is_held_by_an_edge_is_grasped_once_more():
     assert labels[labels.index("open_beside") :][:4] == ["open_beside", "seat", "hand_close", "take_weight"]
 
 
-def test_what_is_held_by_an_edge_is_kept_where_the_person_has_gone():
+def test_an_object_held_by_an_edge_is_kept_if_the_person_has_left():
     trial = edged(1, person_gone=True)
     assert trial.result().outcome == "succeeded" and "missed" not in trial.result().marks
     assert "tightened" in trial.result().marks
 
 
-def test_what_is_held_by_an_edge_again_stays_with_the_person():
+def test_an_object_held_by_an_edge_twice_stays_with_the_person():
     trial = edged(2)
     assert trial.result().outcome == "failed_empty" and trial.result().code == ReasonCode.OBJECT_NOT_SEEN
     assert "by an edge" in trial.ctx.journal.why() and trial.ctx.holding == ""
 
 
-def test_an_object_that_falls_in_the_last_moment_of_the_way_is_no_success():
+def test_an_object_that_falls_at_the_end_of_the_motion_is_no_success():
     trial = Trial()
 
     def script(t):
@@ -177,7 +177,7 @@ def test_an_object_that_falls_in_the_last_moment_of_the_way_is_no_success():
     assert trial.ctx.holding == ""
 
 
-def test_fingers_that_close_past_it_on_the_way_hold_nothing():
+def test_fingers_that_close_past_the_object_during_the_motion_hold_nothing():
     trial = Trial()
     state = trial.ctx.hand.state
     past = (200, AT_END, 254, 254, 254)
@@ -195,8 +195,8 @@ def test_fingers_that_close_past_it_on_the_way_hold_nothing():
     assert "closed past it" in trial.ctx.journal.why()
 
 
-def test_an_object_whose_giver_was_hidden_while_the_fingers_closed_and_is_gone_is_not_dropped():
-    """Its weight was not felt either. A hand is seen again, far away: it is felt that nobody but the robot holds it."""
+def test_an_object_from_a_hidden_person_is_not_dropped():
+    """Its weight was not measured. Later a hand is seen far away, and the arm measures that nobody holds it."""
     trial = Trial()
 
     def script(t):
@@ -216,7 +216,7 @@ def test_an_object_whose_giver_was_hidden_while_the_fingers_closed_and_is_gone_i
     assert trial.result().outcome == "succeeded"
 
 
-def test_the_person_is_told_that_the_robot_has_it_once_its_weight_is_carried():
+def test_the_person_is_informed_when_the_robot_carries_the_weight():
     told, trial = [], Trial()
 
     def say(code, text):
@@ -235,7 +235,7 @@ def test_the_person_is_told_that_the_robot_has_it_once_its_weight_is_carried():
     assert len(have) == 1 and have[0] is not None, told
 
 
-def test_a_person_who_does_not_let_go_is_never_told_that_the_robot_has_it(monkeypatch):
+def test_a_person_who_holds_on_is_never_informed_that_the_robot_has_it(monkeypatch):
     monkeypatch.setattr(weight, "from_palm", lambda state, track, *_: 0.1)
     told, trial = [], Trial()
     trial.ctx.say = lambda code, text: told.append(code)

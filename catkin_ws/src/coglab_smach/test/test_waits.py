@@ -1,4 +1,4 @@
-"""How long a state waits, what it tells meanwhile, and what becomes of how it ends; and the end of a motion."""
+"""Time limits of states, their published waits, the result of each kind of end, and the end of a motion."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ NEVER = lambda: False  # noqa: E731
 
 
 class Probe(CoglabState):
-    """Does what the test says."""
+    """Runs the test's function."""
 
     def __init__(self, ctx, work):
         super().__init__(ctx, ["succeeded", "other"])
@@ -40,7 +40,7 @@ class Never(Pending):
 
 
 def walked(work, prepare=lambda trial, state: None, **flags):
-    """(trial, state, its record, s that it took)"""
+    """Returns (trial, state, its record, duration in s)."""
     trial = Trial()
     state = Probe(trial.ctx, work)
     for name, value in flags.items():
@@ -57,7 +57,7 @@ def walked(work, prepare=lambda trial, state: None, **flags):
 @pytest.mark.parametrize(
     ("limit", "own", "took"), [(2.0, 10.0, 2.0), (None, 10.0, 10.0), (20.0, 10.0, 10.0), (0.0, 10.0, 0.0)]
 )
-def test_a_wait_ends_with_its_own_limit_or_the_states(limit, own, took):
+def test_a_wait_ends_at_its_own_limit_or_the_states(limit, own, took):
     _, _, record, seconds = walked(lambda s: s.wait_for(NEVER, "rain", limit), default_time_limit=own)
     assert took <= seconds <= took + 0.021
     assert (record.outcome, record.code) == ("failed", ReasonCode.TIME_LIMIT)
@@ -65,7 +65,7 @@ def test_a_wait_ends_with_its_own_limit_or_the_states(limit, own, took):
 
 
 @pytest.mark.parametrize(("pace", "took"), [(1.0, 2.0), (0.5, 4.0), (0.0, 20.0), (0.1, 20.0), (3.0, 2.0)])
-def test_a_wait_for_a_motion_counts_in_its_pace_down_to_a_tenth(pace, took):
+def test_the_limit_of_a_wait_for_a_motion_follows_its_pace_down_to_a_tenth(pace, took):
     left = []
 
     def work(state):
@@ -75,10 +75,10 @@ def test_a_wait_for_a_motion_counts_in_its_pace_down_to_a_tenth(pace, took):
             left.append(state.left())
 
     _, _, _, seconds = walked(work)
-    assert seconds == pytest.approx(took, abs=0.15) and left[0] == pytest.approx(8.0, abs=0.1), "put off likewise"
+    assert seconds == pytest.approx(took, abs=0.15) and left[0] == pytest.approx(8.0, abs=0.1), "extended likewise"
 
 
-def test_a_call_that_is_given_up_is_cancelled_and_one_that_is_answered_is_not():
+def test_only_a_call_without_an_answer_is_cancelled():
     never, good = Never(), Ready(5)
     good.cancel = lambda: pytest.fail("it was answered")
     _, _, record, seconds = walked(lambda s: s.await_pending(never, "the answer", 1.5))
@@ -89,7 +89,7 @@ def test_a_call_that_is_given_up_is_cancelled_and_one_that_is_answered_is_not():
 
 
 @pytest.mark.parametrize("configured", [False, True])
-def test_a_state_may_take_what_it_allows_itself_unless_the_configuration_says_otherwise(configured):
+def test_the_configured_time_limit_wins_over_the_states_own(configured):
     def prepare(trial, state):
         trial.ctx.config.set("time_limits", {"Probe": 3.0} if configured else {})
 
@@ -118,7 +118,7 @@ def raising(error):
         (ValueError("odd"), "Probe: ValueError: odd (test_waits.py:", ReasonCode.UNEXPECTED),
     ],
 )
-def test_whatever_a_state_raises_is_a_failure_with_a_sentence_and_a_code(error, sentence, code):
+def test_any_exception_of_a_state_is_a_failure_with_sentence_and_code(error, sentence, code):
     trial, _, record, _ = walked(raising(error))
     assert record.outcome == "failed" and record.reason.startswith(sentence) and record.code == code
     first = trial.ctx.journal.first_failure()
@@ -126,7 +126,7 @@ def test_whatever_a_state_raises_is_a_failure_with_a_sentence_and_a_code(error, 
 
 
 @pytest.mark.parametrize(("deaf", "outcome"), [(False, "failed"), (True, "succeeded")])
-def test_stop_ends_a_state_that_is_not_deaf_to_it(deaf, outcome):
+def test_stop_ends_a_state_unless_it_ignores_stop(deaf, outcome):
     def prepare(trial, state):
         state.trial = trial
 
@@ -141,17 +141,17 @@ def test_stop_ends_a_state_that_is_not_deaf_to_it(deaf, outcome):
         assert record.code == ReasonCode.STOP_LATCHED
 
 
-def test_a_request_to_end_is_obeyed_in_the_middle_and_at_the_end():
+def test_a_preemption_is_served_during_a_wait_and_at_the_end():
     for work in (lambda s: s.request_preempt() or s.pause(1.0), lambda s: s.request_preempt() or "other"):
         _, state, record, seconds = walked(work)
         assert (record.outcome, record.code, seconds) == ("preempted", ReasonCode.PREEMPTED, 0.0)
-        assert record.reason == "Probe was preempted" and not state.preempt_requested(), "served"
+        assert record.reason == "Probe was preempted" and not state.preempt_requested(), "the request is served"
     _, state, record, _ = walked(lambda s: s.request_preempt() or "failed")
-    assert record.outcome == "failed" and state.preempt_requested(), "passed on by what is around it"
+    assert record.outcome == "failed" and state.preempt_requested(), "the container passes it on"
 
 
 @pytest.mark.parametrize(("outcome", "cancelled"), [("succeeded", 0), ("failed", 1)])
-def test_who_owns_a_motion_ends_it_where_it_fails(outcome, cancelled):
+def test_a_failed_state_ends_the_motion_that_it_owns(outcome, cancelled):
     trial, _, _, _ = walked(lambda s: outcome, owns_motion=True)
     assert len(trial.cell.called("cancel")) == cancelled
     assert not walked(lambda s: "failed")[0].cell.called("cancel")
@@ -170,7 +170,7 @@ def test_who_owns_a_motion_ends_it_where_it_fails(outcome, cancelled):
         ("succeeded", "preempted", True, "preempted"),
     ],
 )
-def test_a_group_is_over_when_all_have_succeeded_or_one_has_not(first, second, over, end):
+def test_a_group_ends_when_all_have_succeeded_or_one_has_failed(first, second, over, end):
     decide, conclude = require_all(["a", "b"])
     outcomes = {"a": first, "b": second, "looks on": "failed"}
     assert decide(outcomes) == over
@@ -181,7 +181,7 @@ def test_a_group_is_over_when_all_have_succeeded_or_one_has_not(first, second, o
 
 
 def rested(sway, look=lambda: None):
-    """s that are waited for an arm that sways so (rad at s)."""
+    """Returns the wait (s) for an arm that sways by ``sway(s)`` rad."""
     trial = Trial()
     trial.ctx.arm.joint_positions = lambda: (0.0, sway(trial.clock.now()), *[0.0] * 5)
     with using(trial.clock):
@@ -189,11 +189,11 @@ def rested(sway, look=lambda: None):
     return trial.clock.now()
 
 
-def test_an_arm_rests_that_has_moved_by_no_more_than_a_milliradian_for_a_fifth_of_a_second():
+def test_an_arm_that_moves_less_than_1_mrad_in_200_ms_is_at_rest():
     assert rested(lambda t: 0.0) == pytest.approx(0.2, abs=0.011)
     assert rested(lambda t: 0.0009 * (t > 0.1)) == pytest.approx(0.2, abs=0.011)
     assert rested(lambda t: 0.0011 * (t > 0.095)) == pytest.approx(0.3, abs=0.011)
-    assert rested(lambda t: -0.01 * t) == pytest.approx(1.5, abs=0.021), "a millirad in 0.1 s: no longer than 1.5 s"
+    assert rested(lambda t: -0.01 * t) == pytest.approx(1.5, abs=0.021), "1 mrad in 0.1 s: the wait ends after 1.5 s"
     assert rested(lambda t: 0.0, lambda: True) == 0.0
     looks = []
     assert rested(lambda t: 0.1 * t, lambda: looks.append(1) or len(looks) > 10) == pytest.approx(0.1)
@@ -207,7 +207,7 @@ def test_an_arm_rests_that_has_moved_by_no_more_than_a_milliradian_for_a_fifth_o
         (False, "succeeds", 0.5, "the motion could not be ended: the robot is silent"),
     ],
 )
-def test_a_motion_that_cannot_be_cancelled_is_held_and_a_silent_robot_is_not_waited_for(there, hold, took, words):
+def test_the_arm_is_held_if_cancelling_fails_and_a_silent_robot_ends_the_wait(there, hold, took, words):
     trial, held = Trial(), []
     refusal = Ready(error=PortError("held already"))
     trial.ctx.arm.cancel_motion = lambda reason: Never()
@@ -230,7 +230,7 @@ def test_a_shift_moves_the_palm_straight_and_each_joint_by_its_share(by):
     ((target, speed),) = asked
     (before, turn), (after, turned) = default_arm().fk(here), default_arm().fk(target)
     assert after - before == pytest.approx(by, abs=5e-3) and abs(turn @ turned) > 0.9999
-    # The way takes its length over its speed; no joint is told less than 1 mrad/s.
+    # Duration: path length over speed. The smallest commanded joint speed is 1 mrad/s.
     seconds = float(np.linalg.norm(by)) / 0.04
     assert speed == pytest.approx(np.maximum(np.abs(target - here) / seconds, 1e-3))
     assert shift_time(trial.ctx, np.array(by), 0.04) >= seconds

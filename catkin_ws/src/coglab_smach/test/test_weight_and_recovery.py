@@ -1,4 +1,4 @@
-"""Taking a weight, and recovering from what failed, at the edges of their figures: metres, newtons and seconds."""
+"""Taking a weight and recovery at their limits: metres, newtons and seconds."""
 
 from types import SimpleNamespace
 
@@ -27,7 +27,7 @@ def seen_all_the_way():
 
 
 class Lifted:
-    """A TakeWeight whose parts the test calls; ``rises``: m and m/s."""
+    """A TakeWeight whose methods the test calls. ``rises``: (m, m/s) of each rise."""
 
     def __init__(self, monkeypatch, carried=False):
         self.trial, self.rises, self.z, self.away = Trial(), [], 0.5, 0.1
@@ -51,7 +51,7 @@ class Lifted:
 
 
 @pytest.mark.parametrize("stop", [True, False])
-def test_every_end_ends_the_closing_of_fingers_that_follow(stop):
+def test_the_repeated_closing_ends_with_the_state(stop):
     trial, cancelled = Trial(), []
     trial.ctx.hand.close = lambda speed: Polled(lambda: False, lambda: None, lambda: cancelled.append(speed))
     trial.cell.partner.let_go_after = None
@@ -80,9 +80,7 @@ def test_every_end_ends_the_closing_of_fingers_that_follow(stop):
         (0.1, None, True),
     ],
 )
-def test_a_person_gets_the_object_back_whose_hand_is_within_30_cm_and_carries_it(
-    monkeypatch, away, holds, loaded, keeps
-):
+def test_a_hand_within_30_cm_that_carries_the_object_gets_it_back(monkeypatch, away, holds, loaded, keeps):
     lifted = Lifted(monkeypatch)
     lifted.away, lifted.ctx.holding = away, "mug"
     lifted.event = ContactEvent(True, "x", 1.0) if loaded else None
@@ -95,7 +93,7 @@ def test_a_person_gets_the_object_back_whose_hand_is_within_30_cm_and_carries_it
 # --- recovery ---------------------------------------------------------------------------------------------------------
 
 
-def test_a_fault_lifts_a_hold_that_is_latched_at_the_robot():
+def test_leaving_fault_resets_a_hold_latched_at_the_robot():
     trial = Trial()
 
     def script(t):
@@ -106,14 +104,14 @@ def test_a_fault_lifts_a_hold_that_is_latched_at_the_robot():
         t.cell.arm.held = True
         assert "silent" in t.ctx.journal.why()
         t.start("initialise")
-        assert not t.ctx.journal.newest_failure().sentence, "the operator has answered"
+        assert not t.ctx.journal.newest_failure().sentence, "the operator has confirmed the failure"
         t.wait_hub("wait_without_object")
         assert not t.cell.arm.held
 
     trial.run(script)
 
 
-def test_an_abort_of_a_falling_goal_is_a_withdrawal_where_the_hand_is_still_at_it():
+def test_a_falling_goal_with_the_hand_at_it_is_a_withdrawal():
     for above, code in ((0.02, ReasonCode.GOAL_WITHDRAWN), (0.12, ReasonCode.GOAL_FELL)):
         trial = Trial()
 

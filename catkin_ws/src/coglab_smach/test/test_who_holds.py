@@ -1,4 +1,4 @@
-"""Whether the person holds what the fingers have closed on: the arm sinks, and the real LeavingLoad weighs."""
+"""Measures whether the person holds the object: the arm sinks, and the real LeavingLoad measures the load."""
 
 import numpy as np
 import pytest
@@ -12,14 +12,14 @@ from coglab_trials.virtual_clock import using
 from test_weight_and_recovery import Lifted
 
 GIVING = np.array([-0.535, -1.109, 1.799, 1.305, 0.686, -0.385, 1.182])
-"""rad, where the arm gives"""
+"""rad, posture of giving"""
 WAY, SPEED = 0.03, 0.03
 """m by which the arm sinks, and m/s"""
 
 
 class Scale:
-    """What hangs on the palm of an arm that sinks; ``lifts``: N by which a person lifts the object, of m sunk and s
-    since the sinking began (negative before). ``over_ros``: the share as it is told over ROS."""
+    """The load on the palm of a sinking arm. ``lifts(m sunk, s since the start, negative before)``: force (N) by which
+    a person lifts the object. ``over_ros``: use the share as transmitted over ROS."""
 
     def __init__(self, monkeypatch, mass, lifts, pull=0.0, over_ros=False):
         self.lifted = Lifted(monkeypatch)
@@ -28,7 +28,7 @@ class Scale:
         self.lifts, self.carried, self.over_ros = lifts, 9.81 * mass + pull, over_ros
         self.load, self.fed = None, 0.0
         self.ways: list[tuple[float, float, float]] = []
-        """s when it began, m sunk then, and m that the motion was to end at"""
+        """start (s), sunk distance then (m), target of the motion (m)"""
         monkeypatch.setattr(weight, "palm_at", lambda ctx: np.array([0.0, 0.0, 0.5 - self.sunk()]))
         there = _joint_way(self.ctx, GIVING, np.array([0.0, 0.0, -WAY]), 0.03)[0]
         self.way, contact = np.asarray(there) - GIVING, self.ctx.contact
@@ -70,7 +70,7 @@ class Scale:
 
 
 def spring(before, stiffness):
-    """N, and N/m."""
+    """``before``: N. ``stiffness``: N/m."""
     return lambda sunk, since: before + stiffness * sunk
 
 
@@ -85,21 +85,21 @@ def spring(before, stiffness):
         (1.0, 9.8, 150),
     ],
 )
-def test_a_hand_holds_it_whatever_it_lifts_or_presses_before(monkeypatch, mass, before, stiffness, over_ros):
+def test_a_holding_hand_is_detected_for_any_force_before(monkeypatch, mass, before, stiffness, over_ros):
     scale = Scale(monkeypatch, mass, spring(before, stiffness), over_ros=over_ros)
     assert scale.ask(person_holds) is True
 
 
 @pytest.mark.parametrize("mass", [0.06, 0.31, 0.53, 1.0])
 @pytest.mark.parametrize("noise", [0.0, 0.2, -0.2])
-def test_nobody_holds_what_weighs_the_same_lower_down(monkeypatch, mass, noise):
+def test_nobody_holds_an_object_with_the_same_weight_lower_down(monkeypatch, mass, noise):
     scale = Scale(monkeypatch, mass, lambda sunk, since: noise * sunk / WAY)
     assert scale.ask(person_holds) is False
 
 
 @pytest.mark.parametrize("pull", [1.5, 6.0])
-def test_a_pull_that_ends_before_the_arm_sinks_may_be_a_hand_that_follows(monkeypatch, pull):
-    """The weight that it takes along is gone from the palm: nothing is opened for that, nor taken away."""
+def test_a_pull_that_ends_before_the_sinking_is_uncertain(monkeypatch, pull):
+    """The load is gone, but the hand may follow the object: the fingers stay closed and the arm stays."""
     scale = Scale(monkeypatch, 0.31, spring(0.0, 0.0), pull)
     assert scale.ask(person_holds) is None
 
@@ -108,8 +108,8 @@ def test_a_pull_that_ends_before_the_arm_sinks_may_be_a_hand_that_follows(monkey
 @pytest.mark.parametrize("late", [0.05, 0.5, 1.6])
 @pytest.mark.parametrize("mass", [0.06, 0.53])
 @pytest.mark.parametrize("goes", [0.0, 0.6])
-def test_who_ends_a_pull_while_the_arm_sinks_has_left_it_to_the_robot(monkeypatch, goes, mass, late, over_ros):
-    """With a hand that stays there, or goes at so many m/s."""
+def test_the_robot_keeps_the_object_if_a_pull_ends_during_the_sinking(monkeypatch, goes, mass, late, over_ros):
+    """The hand stays, or leaves with ``goes`` m/s."""
     scale = Scale(monkeypatch, mass, lambda sunk, since: 0.0, 3.0, over_ros)
     scale.ctx.holding = "mug"
 
@@ -124,7 +124,7 @@ def test_who_ends_a_pull_while_the_arm_sinks_has_left_it_to_the_robot(monkeypatc
 
 
 @pytest.mark.parametrize("stiffness", [60, 100])
-def test_one_signal_that_comes_late_stops_no_arm_that_sinks(monkeypatch, stiffness):
+def test_one_late_signal_does_not_stop_the_sinking(monkeypatch, stiffness):
     scale, missed = Scale(monkeypatch, 0.31, spring(-2.0, stiffness), over_ros=True), []
     told = scale.share
     scale.ctx.contact.share_gone = lambda: None if scale.ways and not missed and not missed.append(1) else told()
@@ -132,18 +132,18 @@ def test_one_signal_that_comes_late_stops_no_arm_that_sinks(monkeypatch, stiffne
 
 
 @pytest.mark.parametrize(("away", "has"), [(0.1, True), (0.3, True), (0.31, False), (None, False)])
-def test_who_has_it_has_their_hand_there(monkeypatch, away, has):
+def test_the_person_has_the_object_only_with_a_hand_at_it(monkeypatch, away, has):
     scale = Scale(monkeypatch, 0.31, spring(0.0, 200.0))
     scale.lifted.away = away
     assert scale.ask(person_has_it, scale.lifted.hand) is has and bool(scale.ways) is has
 
 
-def test_a_person_is_not_pressed_down_for_longer_than_it_takes_to_feel_them(monkeypatch):
+def test_the_sinking_ends_as_soon_as_the_person_is_felt(monkeypatch):
     scale = Scale(monkeypatch, 0.31, spring(0.0, 500.0))
     assert scale.ask(person_holds) is True and scale.ways[1][1] < 0.2 * WAY
 
 
-def test_an_arm_that_sinks_no_further_has_felt_nothing(monkeypatch):
+def test_an_arm_that_cannot_sink_is_uncertain(monkeypatch):
     scale = Scale(monkeypatch, 0.31, spring(0.0, 0.0))
     monkeypatch.setattr(weight, "rise", lambda *_: Ready(error=PortError("refused")))
     assert scale.ask(person_holds) is None

@@ -1,4 +1,4 @@
-"""Two hands in reach: which one counts, and that another one frees nothing and makes no finger close firmly."""
+"""Two hands in reach: another hand releases no object and starts no firm closing."""
 
 from dataclasses import replace
 
@@ -32,7 +32,7 @@ def follow(track, frames, place, near=True):
 
 
 def receive(trial, moment, then, limit=60.0):
-    """Ask for the mug and call ``then`` once ``moment`` has come; the action's record."""
+    """Request the mug and call ``then`` when ``moment`` is true. Returns the action's record."""
 
     def script(t):
         t.wait_hub("wait_without_object")
@@ -46,19 +46,19 @@ def receive(trial, moment, then, limit=60.0):
     return trial.result()
 
 
-def test_a_hand_that_comes_out_elsewhere_may_be_another_one():
+def test_a_hand_that_reappears_elsewhere_may_be_another_one():
     track = HandTrack()
     follow(track, range(10), HERE)
     assert track.is_one and track.is_sure
     follow(track, range(17, 40), THERE, near=False)
-    assert track.is_one and not track.is_sure, "no hand is too slow for that, and nobody saw it go"
+    assert track.is_one and not track.is_sure, "the hand may have moved there, but unseen"
     follow(track, range(40, 60), THERE + [0.0, 0.1, 0.0])
-    assert not track.is_sure, "it stays unsure wherever it goes"
+    assert not track.is_sure, "it stays unsure during its motion"
     follow(track, range(70, 72), HERE + [0.0, 0.05, 0.0])
     assert track.is_sure, "back where it was"
 
 
-def test_a_hand_that_is_seen_all_the_way_is_sure_however_far_it_goes():
+def test_a_hand_tracked_without_a_gap_is_sure_at_any_distance():
     track = HandTrack()
     for k in range(60):
         track.follow(k * FRAME, HERE + [1.2 * k * FRAME, 0.0, 0.0], k < 5)
@@ -70,13 +70,13 @@ def test_a_hand_that_was_never_seen_at_the_object_is_not_sure():
     follow(track, range(10), THERE, near=False)
     assert track.is_one and not track.is_sure
     follow(track, range(10, 12), HERE)
-    assert not track.is_one, "another one"
+    assert not track.is_one, "another hand"
     follow(track, range(20, 22), THERE, near=True)
     assert track.is_one and track.is_sure
 
 
 @pytest.mark.parametrize("swap", [0.13, 0.4])
-def test_a_hand_counts_again_where_it_was_though_a_sight_was_lost_between(swap):
+def test_a_hand_is_sure_again_at_its_place_after_a_lost_sight(swap):
     track = HandTrack()
     follow(track, range(10), HERE)
     follow(track, range(10, 14), HERE + [0.0, swap, 0.0])
@@ -85,7 +85,7 @@ def test_a_hand_counts_again_where_it_was_though_a_sight_was_lost_between(swap):
     assert track.is_one and track.is_sure
 
 
-def test_a_hand_counts_again_where_it_was_though_another_one_came_out_first():
+def test_a_hand_is_sure_again_at_its_place_after_another_hand_appeared():
     track = HandTrack()
     follow(track, range(10), HERE)
     follow(track, range(20, 24), HERE + [0.0, 0.13, 0.0])
@@ -94,7 +94,7 @@ def test_a_hand_counts_again_where_it_was_though_another_one_came_out_first():
     assert track.is_one and track.is_sure
 
 
-def test_nothing_is_closed_firmly_where_another_hand_comes_into_view_while_the_person_holds_on():
+def test_another_hand_starts_no_firm_closing_while_the_person_holds_on():
     trial, firm = Trial(), []
     close = trial.ctx.hand.close
     trial.ctx.hand.close = lambda speed: (firm.append(speed) if speed > 60 else None) or close(speed)
@@ -108,14 +108,14 @@ def test_nothing_is_closed_firmly_where_another_hand_comes_into_view_while_the_p
         t.cell.faults.not_seen.discard("human_hand")
         t.clock.sleep(4.0)
         assert not firm and not t.ctx.journal.marked("released")
-        t.cell.partner.take_after = 0.5  # the arm sinks, and they hold it
+        t.cell.partner.take_after = 0.5  # the arm sinks, and the person holds the object
 
     result = receive(trial, lambda t: "arm lift" in t.cell.called(), other_hand)
     assert (result.outcome, result.code) == ("stopped", ReasonCode.NOT_RELEASED) and not firm
 
 
 @pytest.mark.parametrize("weight", [True, False])
-def test_a_hand_that_was_hidden_as_it_went_has_let_go_where_the_weight_has_come(weight):
+def test_a_hand_that_left_hidden_has_let_go_only_with_the_weight(weight):
     trial = Trial()
     trial.cell.partner.let_go_after = trial.cell.partner.take_after = None
 
@@ -132,7 +132,7 @@ def test_a_hand_that_was_hidden_as_it_went_has_let_go_where_the_weight_has_come(
     assert result.outcome == ("succeeded" if weight else "stopped"), result
 
 
-def test_who_has_let_go_before_the_fingers_close_is_not_waited_for(monkeypatch):
+def test_the_robot_does_not_wait_for_a_person_who_let_go_before_closing(monkeypatch):
     trial = Trial()
     trial.cell.partner.let_go_after, trial.cell.let_go = None, lambda: None
     monkeypatch.setattr(reach, "off_grasp", lambda state, goal: 0.02)
@@ -149,7 +149,7 @@ def test_who_has_let_go_before_the_fingers_close_is_not_waited_for(monkeypatch):
 
 
 def tells_late(hand, clock, late):
-    """The hand tells so late (s) after the order that it holds something."""
+    """The hand reports its grip ``late`` s after the end of the closing order."""
     close, state, ended = hand.close_on_object, hand.state, []
 
     def closing():
@@ -162,8 +162,8 @@ def tells_late(hand, clock, late):
 
 
 @pytest.mark.parametrize(("touched", "seen_after"), [(False, 1.5), (True, 1.5), (False, 0.6)])
-def test_fingers_that_have_caught_something_open_for_no_glimpse_of_it(monkeypatch, touched, seen_after):
-    """The person has let go at the first touch, and what is in the robot's fingers is seen again after a pause."""
+def test_fingers_that_caught_the_object_do_not_open_when_it_is_seen_again(monkeypatch, touched, seen_after):
+    """The person lets go at the first touch. The object in the robot's fingers is seen again after a pause."""
     trial, opened = Trial(), []
     tells_late(trial.ctx.hand, trial.clock, 0.1)
     monkeypatch.setattr(reach, "off_grasp", lambda state, goal: 0.02)
@@ -184,7 +184,7 @@ def test_fingers_that_have_caught_something_open_for_no_glimpse_of_it(monkeypatc
     trial.ctx.hand.preshape = watched
 
     def lets_go(t):
-        # It stays where it was offered, within the region.
+        # The object stays at its place, within the region.
         t.cell.at_palm = ("mug", t.cell.objects["mug"].inverse() * Pose(*default_arm().fk(t.cell.arm.position())))
         t.cell.goes = t.clock.now(), np.array([1.6, 0.0, 0.4])
         t.cell.faults.not_seen.add("mug")
@@ -193,10 +193,10 @@ def test_fingers_that_have_caught_something_open_for_no_glimpse_of_it(monkeypatc
 
     result = receive(trial, lambda t: t.ctx.journal.marked("closing_on_the_way"), lets_go)
     assert "paused" in result.marks and not opened, result
-    assert "contact" in result.marks, "what the fingers hold has come into the hand, felt or not"
+    assert "contact" in result.marks, "a held object counts as contact, even if none was detected"
 
 
-def test_another_hand_does_not_free_what_was_caught_on_the_way(monkeypatch):
+def test_another_hand_does_not_release_an_object_caught_during_the_reach(monkeypatch):
     trial = Trial()
     monkeypatch.setattr(reach, "off_grasp", lambda state, goal: 0.02)
     trial.cell.partner.touch_after = None
@@ -211,7 +211,7 @@ def test_another_hand_does_not_free_what_was_caught_on_the_way(monkeypatch):
     assert result.outcome == "stopped" and trial.grip.shared and not trial.cell.called("open")
 
 
-def test_another_hand_does_not_send_the_arm_away_with_what_the_taker_holds():
+def test_another_hand_does_not_move_the_arm_while_the_taker_holds_the_object():
     def script(t):
         t.cell.goes = t.clock.now(), palm_of(t) + [0.1, 0.0, 0.0]
         t.clock.sleep(0.5)
@@ -226,8 +226,8 @@ def test_another_hand_does_not_send_the_arm_away_with_what_the_taker_holds():
 
 @pytest.mark.parametrize("holds", [True, False])
 @pytest.mark.parametrize("hand", ["near", "hidden", "gone"])
-def test_who_may_hold_a_light_object_is_felt_before_the_arm_goes(hand, holds):
-    """Their share is not sure to be felt while the arm stands."""
+def test_a_grip_on_a_light_object_is_measured_before_the_arm_moves(hand, holds):
+    """At rest, the person's share of a light load may be too small to measure."""
 
     def script(t):
         t.cell.partner.take_after = None
@@ -242,12 +242,12 @@ def test_who_may_hold_a_light_object_is_felt_before_the_arm_goes(hand, holds):
         t.until(lambda: t.ctx.requests.hub() in ("stopped", "wait_with_object"), 60.0)
 
     result = giving(script, **{"give.near": 0.01}).result()
-    # Who has gone in full view is not felt for, whatever the script says.
+    # For a hand that was seen to leave, nothing is measured.
     assert result.outcome == ("stopped" if hand != "gone" and holds else "failed_holding")
 
 
 @pytest.mark.parametrize("trouble", ["refuses", "silent", "the arm stands", ""])
-def test_what_cannot_be_felt_is_not_taken_for_nobodys(monkeypatch, trouble):
+def test_a_failed_measurement_does_not_mean_that_nobody_holds(monkeypatch, trouble):
     lifted = Lifted(monkeypatch)
     lifted.state._deadline, contact = 1e9, lifted.ctx.contact
     contact.share_gone = lambda: None if trouble == "silent" else 0.0
@@ -260,7 +260,7 @@ def test_what_cannot_be_felt_is_not_taken_for_nobodys(monkeypatch, trouble):
 
 
 @pytest.mark.parametrize("perception", ["seen", "silent"])
-def test_a_pull_while_the_fingers_close_waits_for_no_sight(perception):
+def test_yielding_during_closing_does_not_wait_for_a_sight(perception):
     trial, took = Trial(), []
     trial.cell.partner.let_go_after = None
 
@@ -278,7 +278,7 @@ def test_a_pull_while_the_fingers_close_waits_for_no_sight(perception):
     assert took[0] < 0.1
 
 
-def test_what_falls_out_beside_the_persons_hand_was_not_taken_back():
+def test_an_object_falling_beside_the_persons_hand_was_not_taken_back():
     trial = Trial()
     trial.cell.partner.let_go_after = None
 
@@ -295,7 +295,7 @@ def test_what_falls_out_beside_the_persons_hand_was_not_taken_back():
     assert (result.outcome, result.code) == ("failed_empty", ReasonCode.OBJECT_NOT_SEEN), result
 
 
-def test_stop_ends_the_closing_while_the_person_is_first_looked_at():
+def test_stop_ends_the_closing_during_the_first_look_at_the_person():
     trial, begun, cancelled = Trial(), [], []
     trial.ctx.hand.close_on_object = lambda: (
         begun.append(1) or Polled(lambda: False, lambda: None, lambda: cancelled.append(1))
@@ -312,7 +312,7 @@ def test_stop_ends_the_closing_while_the_person_is_first_looked_at():
     assert begun and cancelled
 
 
-def test_the_sinking_has_as_much_longer_as_the_arm_is_slower(monkeypatch):
+def test_the_time_limit_of_sinking_follows_the_speed_scale(monkeypatch):
     lifted = Lifted(monkeypatch)
     lifted.state._deadline, lifted.ctx.contact.share_gone = 1e9, lambda: 0.0
     lifted.ctx.arm.speed_scale = lambda: 0.2

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The node /trial_recorder: records every handover into a folder of its own, with the seconds before it."""
+"""The node /trial_recorder: records every handover into its own folder, with the seconds before it."""
 
 import sys
 

@@ -8,7 +8,7 @@ import pytest
 TOP = Path(__file__).resolve().parents[4]
 BASH = """
 eval "$(./coglab completion)"
-compopt() { :; }  # it works in a real completion alone
+compopt() { :; }  # it works only in a real completion
 COMP_LINE=$1 COMP_POINT=${#1} COMP_TYPE=9
 read -ra COMP_WORDS <<<"$1x"
 COMP_CWORD=$((${#COMP_WORDS[@]} - 1))

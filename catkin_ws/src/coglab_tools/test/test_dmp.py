@@ -1,4 +1,4 @@
-"""Recordings in, primitives out: units, faults, cut, learning, and teaching from the led arm to its motion."""
+"""From recordings to primitives: units, faults, cut, learning, and teaching with a hand-guided arm."""
 
 import json
 import resource
@@ -29,7 +29,7 @@ def share(u):
 
 
 def reach(rate=120.0, way=WAY, duration=DURATION):
-    """Times (s) and positions (m) of a reach with a bow, at rest before and after."""
+    """Times (s) and positions (m) of a curved reach, at rest before and after."""
     times = np.arange(0.0, 2 * REST + duration, 1.0 / rate)
     s = share((times - REST) / duration)
     return times, START + np.outer(s, way) + np.outer(np.sin(np.pi * s), [0.0, 0.0, 0.05])
@@ -42,17 +42,17 @@ def write(path, header, columns):
 
 
 def follows(found, times, places):
-    """Whether positions are those of the file; samples that repeat the one before were left out of them."""
+    """True if the positions are those of the file, without repeated samples."""
     return np.allclose(found.positions, [[np.interp(t, times, c) for c in places.T] for t in found.times], atol=1e-5)
 
 
-def test_units_and_lost_samples_are_found_and_said(tmp_path):
+def test_units_and_lost_samples_are_detected_and_noted(tmp_path):
     times, places = reach()
     yaw = np.degrees(0.6 * share((times - REST) / DURATION))
     table = np.column_stack([1000 * times, 1000 * places, 0 * times, 0 * times, yaw, 100 * share((times - 1.0) / 0.5)])
     table[60, 1] = np.nan
     table[100, 1:4] = table[99, 1:4]
-    table[120, 1:4] += 800.0  # something else was taken for the hand
+    table[120, 1:4] += 800.0  # confusion with something else
     demonstration = read(write(tmp_path / "a.csv", "t,x,y,z,roll,pitch,yaw,closing", table.T))
     said = "; ".join(demonstration.notes)
     for words in ("time is in ms", "lengths are in mm", "turns are in degrees", "taken as percent", "not finite"):
@@ -79,13 +79,13 @@ def test_each_column_has_the_unit_of_its_name(tmp_path):
 
 
 @pytest.mark.parametrize(("scale", "said"), [(100.0, "lengths are in cm"), (1000.0, "lengths are in mm")])
-def test_lengths_without_a_unit_are_judged(tmp_path, scale, said):
+def test_a_missing_unit_of_length_is_guessed(tmp_path, scale, said):
     times, places = reach()
     found = read(write(tmp_path / "a.csv", "t,x,y,z", [times, *(scale * places).T]))
     assert follows(found, times, places) and any(said in note for note in found.notes)
 
 
-def test_turns_without_a_unit_are_told(tmp_path):
+def test_a_missing_unit_of_rotation_is_noted(tmp_path):
     times, places = reach()
     columns = [times, *places.T, 0 * times, 0 * times, 0.3 * share(times)]
     found = read(write(tmp_path / "a.csv", "t,x,y,z,roll,pitch,yaw", columns))
@@ -106,8 +106,8 @@ def test_a_table_with_semicolons_and_decimal_commas_is_read(tmp_path):
     assert follows(read(path), times, places)
 
 
-def test_what_is_imported_can_be_learnt(tmp_path):
-    """Noise makes the speed uneven where a reach begins: the cut is where the hand rests all the same."""
+def test_imported_demonstrations_can_be_learnt(tmp_path):
+    """Noise makes the speed uneven at the start of a reach: the cut is still at the rest of the hand."""
     for seed in range(10):
         rng = np.random.default_rng(seed)
         times, places = reach(duration=float(rng.uniform(0.8, 1.6)))
@@ -128,7 +128,7 @@ def test_a_jump_of_a_resting_hand_is_no_reach(tmp_path):
         cut.reaches(read(write(tmp_path / "a.csv", "t,x,y,z", [times, *places.T])))
 
 
-def test_ways_back_and_pauses_are_cut(tmp_path):
+def test_motions_back_and_pauses_are_cut(tmp_path):
     times, there = reach()
     back = there[::-1]
     path = write(tmp_path / "a.csv", "t,x,y,z", [np.arange(3 * len(times)) / 120.0, *np.vstack([there, back, there]).T])
@@ -137,7 +137,7 @@ def test_ways_back_and_pauses_are_cut(tmp_path):
     assert len(cut.reaches(recording, back=True)) == 3
 
 
-def test_an_arm_that_swings_back_when_it_is_let_go_makes_no_second_reach():
+def test_an_arm_that_swings_back_on_release_makes_no_second_reach():
     times, there = reach()
     swing = there[-1] - np.outer(share((times - 0.1) / DURATION), 0.4 * WAY)
     whole = Demonstration("a", np.arange(2 * len(times)) / 120.0, np.vstack([there, swing]))
@@ -146,7 +146,7 @@ def test_an_arm_that_swings_back_when_it_is_let_go_makes_no_second_reach():
 
 
 def faulty(name, tmp_path):
-    """A file with one fault, and a part of the sentence that is expected."""
+    """A file with one fault, and a part of the expected message."""
     times, places = reach()
     path = tmp_path / f"{name}.csv"
     if name == "empty":
@@ -216,7 +216,7 @@ FAULTS = (
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_a_file_that_cannot_be_used_is_refused_with_its_name_and_place(tmp_path, name):
+def test_an_unusable_file_is_refused_with_its_name_and_place(tmp_path, name):
     path, words = faulty(name, tmp_path)
     with pytest.raises(CommandError) as refused:
         cut.reaches(read(path))
@@ -235,13 +235,13 @@ def full_disk():
 
 
 @pytest.mark.parametrize(("verb", "option", "file"), [("export", "-o", "a.npz"), ("inspect", "--plot", "a.png")])
-def test_a_full_disk_leaves_no_half_of_a_file(tmp_path, capsys, verb, option, file):
+def test_a_full_disk_leaves_no_incomplete_file(tmp_path, capsys, verb, option, file):
     with full_disk():
         assert run(["dmp", verb, "--id", "reach_human", option, str(tmp_path / file)]) == 1
     assert file in capsys.readouterr().err and list(tmp_path.iterdir()) == []
 
 
-def test_a_full_disk_is_found_before_the_arm_gives_way(tmp_path, capsys):
+def test_a_full_disk_is_detected_before_hand_guiding(tmp_path, capsys):
     with full_disk():
         assert run(["dmp", "record", "a", "--out", str(tmp_path), "--master", "http://127.0.0.1:9"]) == 1
     assert "a.csv cannot be written" in capsys.readouterr().err and list(tmp_path.iterdir()) == []
@@ -290,8 +290,8 @@ def test_a_bag_has_hands_and_joints(bag):
         read(bag, Source(frame="nobody"))
 
 
-def test_noisy_recordings_with_gaps_are_imitated(tmp_path):
-    """0.5 mm per axis at 120 Hz, as two recorded hands have (0.3 and 0.7 mm); every 30th sample and 3 gaps missing."""
+def test_noisy_recordings_with_gaps_can_be_learnt(tmp_path):
+    """0.5 mm noise per axis at 120 Hz, like two recorded hands (0.3 and 0.7 mm); lost samples and 3 gaps."""
     errors = []
     for seed in range(12):
         rng = np.random.default_rng(seed)
@@ -341,7 +341,7 @@ def test_from_files_to_a_checked_library(tmp_path, capsys):
 
 
 class LateRobot:
-    """A led arm whose measurements, every 5 ms, arrive in bursts: 0.1 s without one, then all that were missed."""
+    """A guided arm, measured every 5 ms, whose measurements arrive in bursts every 0.1 s."""
 
     state = SimpleNamespace(state="waits", holding="", actions=("receive",), fingers=())
     arm = SimpleNamespace(guided=nullcontext)
@@ -359,13 +359,13 @@ class LateRobot:
         ), self.time - measured
 
 
-def test_each_sample_of_a_led_arm_has_the_time_of_its_measurement():
+def test_each_sample_of_a_guided_arm_has_its_measurement_time():
     recorded = record(LateRobot(), "a")
     assert follows(recorded, *reach())
 
 
 class Leads:
-    """A hand that leads the palm of a World by a spring: `at(t)` is its place (m), t in s since `begin`."""
+    """A hand that pulls the palm of a World with a spring: `at(t)` is its place (m), t in s since `begin`."""
 
     def __init__(self, world, at, begin):
         self.at, self.begin, self.last = at, begin, None
@@ -382,7 +382,7 @@ class Leads:
         world.push(force * min(1.0, 40.0 / max(1e-9, float(np.linalg.norm(force)))), 0.02)
 
 
-def test_what_a_led_arm_was_taught_it_repeats_within_2_mm(tmp_path):
+def test_a_motion_taught_by_hand_guiding_is_repeated_within_2_mm(tmp_path):
     library = tmp_path / "taught.xml"
     with coglab.World(seed=1, person="accustomed", perfect_perception=True) as world:
         start = world.robot.arm.palm.position.copy()
@@ -396,8 +396,8 @@ def test_what_a_led_arm_was_taught_it_repeats_within_2_mm(tmp_path):
         world.after_period.clear()
         left = world.robot.arm.palm.position
         world.step(0.5)
-        assert np.linalg.norm(world.robot.arm.palm.position - left) < 0.005, "it stands where it was led"
-        assert world.robot.state.can_move and "receive" in world.robot.state.actions, "and the brain waits in its hub"
+        assert np.linalg.norm(world.robot.arm.palm.position - left) < 0.005, "the arm stands in place"
+        assert world.robot.state.can_move and "receive" in world.robot.state.actions, "the brain waits in its hub"
     demonstration = cut.reaches(recorded)[0]
     taught = train("taught", [demonstration], mapping="none")
     add_to_library(taught, library)
@@ -417,9 +417,9 @@ def test_what_a_led_arm_was_taught_it_repeats_within_2_mm(tmp_path):
     assert np.linalg.norm(palm[-1] - demonstration.positions[-1]) < 0.002
 
 
-def test_without_a_robot_recording_says_what_to_do(tmp_path, monkeypatch, capsys):
+def test_recording_without_a_robot_names_the_next_step(tmp_path, monkeypatch, capsys):
     monkeypatch.delenv("COGLAB_TOP", raising=False)
-    with ThreadPoolExecutor() as pool:  # also in a thread that hears no signals
+    with ThreadPoolExecutor() as pool:  # also in a thread without signal handlers
         record = ("dmp", "record", "a", "--out", tmp_path, "--master", "http://127.0.0.1:9")
         status, data = pool.submit(answer, capsys, *record).result(60)
     assert status == NotThere.status and "start a robot" in data["error"] and not list(tmp_path.iterdir())

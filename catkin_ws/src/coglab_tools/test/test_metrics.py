@@ -30,7 +30,7 @@ def test_metrics_equal_their_closed_forms():
         assert found[name] == pytest.approx(value, rel=0.01, abs=0.03 if name == "reaction_s" else 0.003), name
 
 
-def test_the_person_alone_with_the_object_gives_no_force_of_both():
+def test_the_force_counts_only_while_both_touch_the_object():
     trial = measured()
     trial.person_force = [(t, 3.0 if t < 7.0 else 0.0) for t, _ in trial.person_force]  # holds it from the start
     found = metrics_of(trial)
@@ -52,7 +52,7 @@ def test_sparc_does_not_depend_on_the_rate(rate):
     assert sparc_of_speed(30 * s**2 * (1 - s) ** 2, rate) == pytest.approx(-1.40, rel=0.02)
 
 
-def test_a_hand_that_nobody_sees_gives_no_figures_of_the_person():
+def test_an_unseen_hand_gives_no_figures_of_the_person():
     trial = measured()
     trial.series.truth = [(t, palm, [np.nan] * 3, thing, np.nan) for t, palm, _, thing, _ in trial.series.truth]
     found = metrics_of(trial)
@@ -61,7 +61,7 @@ def test_a_hand_that_nobody_sees_gives_no_figures_of_the_person():
     assert activities(trial)[0] == []
 
 
-def test_two_actions_of_a_recording_have_figures_of_their_own():
+def test_two_actions_of_a_recording_have_their_own_figures():
     trial = measured()
     first = trial.exchanges[0]
     marks = {"motion_started": 6.0, "motion_reached": 8.0, "contact": 9.0, "opening": 9.0}

@@ -1,4 +1,4 @@
-"""Recordings of people: the two data sets' forms, what recording:= plays of them, and what is learnt from them."""
+"""Recordings of people: the formats of two data sets, playing with recording:=, and learning from them."""
 
 import json
 from pathlib import Path
@@ -66,7 +66,7 @@ def test_a_handover_in_the_robots_world_plays(folder, tmp_path):
         write_recording(file, handover.recording(role))
         hand, _ = open_recorded_hand({"file": str(file), "object": "in_hand"}, "object_mug")
         end = hand.at(hand.arrived)
-        assert np.linalg.norm(end.position - MEETING) < 0.02, "it comes where people hand over to the robot"
+        assert np.linalg.norm(end.position - MEETING) < 0.02, "it ends at the place of handovers"
         assert hand.at(0.0).position[0] > MEETING[0] + 0.3, "from the person's side"
         assert end.rotation.magnitude() < 0.05
     with pytest.raises(RecordingError, match="a handover needs the frame 'object_mug'"):
@@ -75,7 +75,7 @@ def test_a_handover_in_the_robots_world_plays(folder, tmp_path):
     assert open_recorded_hand({"file": str(file)}, "object_mug")[0].object_in_hand is not None
 
 
-def test_samples_that_the_tracker_lost_within_a_reach_are_bridged(folder):
+def test_lost_samples_within_a_reach_are_bridged(folder):
     path = folder / "giver_RHand_pose_saved.csv"
     lines = path.read_text(encoding="utf-8").splitlines()
     lines[200:206] = [lines[200]] * 6
@@ -86,13 +86,13 @@ def test_samples_that_the_tracker_lost_within_a_reach_are_bridged(folder):
     assert any("4 of 600 samples are not finite" in note for note in handover.notes)
 
 
-def test_without_forces_the_way_back_is_not_taken_for_the_reach(folder):
+def test_without_forces_the_motion_back_is_not_the_reach(folder):
     reach = read_kth(folder).span("giver")
     (folder / "Wrench_taker_saved.csv").unlink()
     assert read_kth(folder).span("giver") == reach
 
 
-def test_a_folder_that_cannot_be_used_is_refused_with_the_file(folder):
+def test_an_unusable_folder_is_refused_with_the_file(folder):
     (folder / "giver_RHand_pose_saved.csv").write_text("x,y,z,q0,q1,q2,q3\n1,2\n", encoding="utf-8")
     with pytest.raises(CheckFailed, match=r"giver_RHand_pose_saved\.csv:2: expected 7 columns, got 2"):
         read_kth(folder)
@@ -147,11 +147,11 @@ def test_dexycb_and_its_cache_have_the_same_wrist(dexycb):
     assert reach.way == pytest.approx(np.linalg.norm([0.35, 0.1, 0.25]), abs=0.01)
     assert np.linalg.norm(read_dexycb(cache).recording()["human_hand"].positions[-1] - MEETING) < 0.02
     (raw.parents[2] / "calibration" / "extrinsics_a" / "extrinsics.yml").unlink()
-    with pytest.raises(NotThere, match="without it nobody knows where up is"):
+    with pytest.raises(NotThere, match="without it the vertical is unknown"):
         read_dexycb(raw)
 
 
-def test_what_is_learnt_says_from_what(folder, tmp_path, capsys):
+def test_learnt_files_name_their_sources(folder, tmp_path, capsys):
     primitives, patterns = tmp_path / "p.xml", tmp_path / "p.json"
     assert run(["people", "learn", str(folder), "--primitives", str(primitives), "--patterns", str(patterns)]) == 0
     library = load_library(primitives)
@@ -170,7 +170,7 @@ def test_what_is_learnt_says_from_what(folder, tmp_path, capsys):
     assert right >= 72, "of 80"
 
 
-def test_a_giver_alone_teaches_giving(dexycb, tmp_path, capsys):
+def test_a_recorded_giver_teaches_only_giving(dexycb, tmp_path, capsys):
     assert run(["people", "learn", str(dexycb[1]), "--primitives", str(tmp_path / "p.xml")]) == 0
     library = load_library(tmp_path / "p.xml")
     assert "learnt from 1 recorded giver" in library["give_human"].description

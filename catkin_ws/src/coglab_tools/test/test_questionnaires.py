@@ -31,7 +31,7 @@ def read(tmp_path, text):
     return read_answers(file, study_in(tmp_path))
 
 
-def test_a_reversed_item_is_turned_over():
+def test_a_reversed_item_is_inverted():
     godspeed = find("godspeed", HERE)
     safety = godspeed.scores({"anxious_relaxed": 5, "agitated_calm": 4, "quiescent_surprised": 1})
     assert safety == {"perceived_safety": pytest.approx((5 + 4 + 5) / 3)}
@@ -81,7 +81,7 @@ def test_the_terminal_corrects_goes_back_and_keeps_complete_questionnaires(tmp_p
     assert ask(study, "P01", line=lambda prompt: "30") == 1
 
 
-def test_ctrl_c_keeps_what_was_answered(tmp_path):
+def test_ctrl_c_keeps_the_answers(tmp_path):
     lines = iter(["10", "20"])
 
     def line(prompt):
@@ -104,7 +104,7 @@ def test_a_table_of_a_german_excel_is_read(tmp_path):
 @pytest.mark.parametrize(
     "line", ["P01,1,calm,nasa_tlx,effort", "P01,one,calm,nasa_tlx,effort,5", '"P01,1,calm', "Q,,,,,"]
 )
-def test_an_answers_file_that_was_edited_by_hand_is_refused_with_file_and_line(tmp_path, line):
+def test_an_invalid_answers_file_is_refused_with_file_and_line(tmp_path, line):
     (tmp_path / "questionnaires.csv").write_text(f"participant,block,condition,questionnaire,item,answer\n{line}\n")
     with pytest.raises(CheckFailed, match="questionnaires.csv:2:"):
         answers_of(study_in(tmp_path))

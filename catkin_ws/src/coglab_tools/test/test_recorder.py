@@ -1,4 +1,4 @@
-"""The recorder without ROS: a handover becomes one whole folder, whatever disk, results and end of the system do."""
+"""The recorder without ROS: each handover becomes one complete folder, despite faults of disk, results and system."""
 
 import io
 import json
@@ -21,7 +21,7 @@ PARAMETERS = {
 
 
 class Cell:
-    """A recorder and what it is fed with; `disk`: free bytes."""
+    """A recorder and its input. `disk`: free bytes."""
 
     def __init__(self, folder, disk=1e12):
         self.disk, self.said = disk, []
@@ -52,7 +52,7 @@ class Cell:
         self.send(ended, "/coglab/results", String(json.dumps({**row, **changes})), latching="1")
 
     def run(self, begin, end, step=0.1):
-        """Joint states at 10 Hz, and the steps of the recorder."""
+        """Send joint states at 10 Hz, and step the recorder."""
         for k in range(round((end - begin) / step)):
             now = begin + k * step
             self.send(now, "/lwr/joint_states", JointState(position=[0.0] * 7, velocity=[0.0] * 7))
@@ -69,7 +69,7 @@ def handover(cell, begun=2020.0, ended=2024.0, **changes):
     cell.run(ended, ended + 4.0)
 
 
-def test_a_handover_becomes_a_whole_folder_with_what_came_before(tmp_path):
+def test_a_handover_becomes_a_complete_folder_with_the_seconds_before(tmp_path):
     cell = Cell(tmp_path)
     handover(cell)
     (place,) = find_trials(tmp_path)
@@ -86,7 +86,7 @@ def test_a_handover_becomes_a_whole_folder_with_what_came_before(tmp_path):
         assert len(list(bag.read_messages("/coglab/transitions"))) == 2
 
 
-def test_a_note_is_of_the_handover_that_runs_or_of_the_last_one(tmp_path):
+def test_a_note_belongs_to_the_running_or_the_last_handover(tmp_path):
     cell = Cell(tmp_path)
     cell.send(2000.0, "/coglab/note", String("before the first"))
     cell.run(2000.0, 2001.0)
@@ -103,7 +103,7 @@ def test_a_note_is_of_the_handover_that_runs_or_of_the_last_one(tmp_path):
     assert [mark for mark in record.marks if "note" in mark["name"]] == [{"name": "note: looked away", "time_s": 1.0}]
 
 
-def test_a_failure_keeps_its_code_and_a_second_one_of_the_same_second_its_folder(tmp_path):
+def test_failures_keep_their_code_and_have_their_own_folders(tmp_path):
     cell = Cell(tmp_path)
     handover(cell, outcome="failed_empty", reason_code=40, reason="nobody let go")
     handover(cell, 2020.5, 2023.0, started_ros=2020.0)
@@ -113,7 +113,7 @@ def test_a_failure_keeps_its_code_and_a_second_one_of_the_same_second_its_folder
 
 
 @pytest.mark.parametrize("text", ["no JSON", '{"kind": 3}', "[]", '{"kind": "exchange_human_to_robot"}'])
-def test_a_strange_result_is_no_end_and_the_transition_tells_the_outcome(tmp_path, text):
+def test_an_invalid_result_is_ignored_and_the_transition_has_the_outcome(tmp_path, text):
     cell = Cell(tmp_path)
     cell.move(2020.0, "wait_without_object", ACTION, ACTION)
     cell.run(2020.0, 2021.0)
@@ -125,7 +125,7 @@ def test_a_strange_result_is_no_end_and_the_transition_tells_the_outcome(tmp_pat
     assert not record.outcome.success and record.duration_s == pytest.approx(2.0)
 
 
-def test_a_full_disk_is_said_and_ends_the_recording_alone(tmp_path):
+def test_a_full_disk_is_reported_and_ends_only_the_recording(tmp_path):
     cell = Cell(tmp_path, disk=400e6)
     handover(cell)
     assert not any(tmp_path.iterdir()) and "400 MB left" in cell.said[0][1] and cell.said[0][0]
@@ -139,7 +139,7 @@ def test_a_full_disk_is_said_and_ends_the_recording_alone(tmp_path):
     assert "recording stopped before the end" in TrialRecord.load(place).notes
 
 
-def test_a_disk_that_fails_leaves_nothing_half_written_and_the_next_handover_is_recorded(tmp_path, monkeypatch):
+def test_a_disk_error_leaves_no_incomplete_file_and_recording_continues(tmp_path, monkeypatch):
     cell = Cell(tmp_path)
 
     def full(*_arguments, **_options):
@@ -153,7 +153,7 @@ def test_a_disk_that_fails_leaves_nothing_half_written_and_the_next_handover_is_
     assert len(find_trials(tmp_path)) == 1
 
 
-def test_the_end_of_the_system_keeps_what_was_recorded(tmp_path):
+def test_the_end_of_the_system_keeps_the_recording(tmp_path):
     cell = Cell(tmp_path)
     cell.run(2018.0, 2020.0)
     cell.move(2020.0, "wait_without_object", ACTION, ACTION)
@@ -164,7 +164,7 @@ def test_the_end_of_the_system_keeps_what_was_recorded(tmp_path):
     assert "ended before the action" in record.outcome.text and record.duration_s == pytest.approx(0.9)
 
 
-def test_a_handover_that_began_before_the_recorder_is_said_to_be_missing(tmp_path):
+def test_a_handover_that_began_before_the_recorder_is_reported_as_missing(tmp_path):
     cell = Cell(tmp_path)
     cell.move(2020.0, ACTION, "succeeded", "wait_with_object")
     cell.run(2020.0, 2021.0)
@@ -173,6 +173,6 @@ def test_a_handover_that_began_before_the_recorder_is_said_to_be_missing(tmp_pat
     assert len(find_trials(tmp_path)) == 1 and not cell.said[-1][0]
 
 
-def test_the_hash_changes_with_a_setting_alone():
+def test_the_hash_changes_only_with_a_setting():
     same = configuration_hash({"/a": 1, "/fri_port_bound": 4000})
     assert same == configuration_hash({"/fri_port_bound": 4001, "/a": 1}) != configuration_hash({"/a": 2})

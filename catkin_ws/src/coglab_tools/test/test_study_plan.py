@@ -1,4 +1,4 @@
-"""study.yaml: what is refused, with file and line, and the plan that is made of it."""
+"""study.yaml: refusals with file and line, and the resulting plan."""
 
 from __future__ import annotations
 

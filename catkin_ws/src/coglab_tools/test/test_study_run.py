@@ -1,4 +1,4 @@
-"""Simulated studies: conditions act, and whatever is killed, the rows are those of the undisturbed run."""
+"""Simulated studies: conditions act, and after any crash the rows are those of the undisturbed run."""
 
 from __future__ import annotations
 
@@ -90,17 +90,17 @@ def test_conditions_act_and_the_report_compares_them(undisturbed):
     assert (undisturbed / "report.pdf").read_bytes().startswith(b"%PDF")
 
 
-def test_a_crashed_study_goes_on_with_the_same_rows(undisturbed, tmp_path):
+def test_a_crashed_study_continues_with_the_same_rows(undisturbed, tmp_path):
     folder = make(tmp_path / "kill")
     lines = (undisturbed / ROWS).read_bytes().splitlines(keepends=True)
-    (folder / ROWS).write_bytes(b"".join(lines[:4]) + lines[4][:40])  # as a crash in mid-write leaves it
+    (folder / ROWS).write_bytes(b"".join(lines[:4]) + lines[4][:40])  # like after a crash during writing
     with open_rows(load(folder), write=True), pytest.raises(UsageError, match="another process"):
         run_simulated(load(folder), workers=1)
     assert run_simulated(load(folder), workers=1)["trials_now"] == 1
     assert (folder / "trials.csv").read_bytes() == (undisturbed / "trials.csv").read_bytes()
 
 
-def test_a_local_cluster_listens_on_loopback_alone(tmp_path):
+def test_a_local_cluster_listens_only_on_loopback(tmp_path):
     distributed = pytest.importorskip("distributed")
     with local_cluster(distributed, 1, str(tmp_path)):
         found = subprocess.run(["ps", "-o", "pid=", "--ppid", str(os.getpid())], capture_output=True, text=True)
@@ -194,7 +194,7 @@ def test_an_edited_study_is_refused(undisturbed, tmp_path, old, new, words):
         (2, b'{"trial": 1, "rows": [{}]}', "rows.jsonl:2: .*its trial runs again"),
     ],
 )
-def test_a_line_that_was_edited_by_hand_is_named(undisturbed, tmp_path, number, line, words):
+def test_an_invalid_line_is_named(undisturbed, tmp_path, number, line, words):
     folder = make(tmp_path / "kill")
     lines = (undisturbed / ROWS).read_bytes().splitlines()
     lines[number - 1] = line
@@ -203,7 +203,7 @@ def test_a_line_that_was_edited_by_hand_is_named(undisturbed, tmp_path, number, 
         run_simulated(load(folder))
 
 
-def test_a_study_of_which_all_was_skipped_has_no_report(tmp_path):
+def test_a_study_with_all_trials_skipped_has_no_report(tmp_path):
     folder = make(tmp_path / "kill")
     with open_rows(load(folder), write=True) as rows:
         rows.begin({}, simulated=False)
@@ -215,11 +215,11 @@ def test_a_study_of_which_all_was_skipped_has_no_report(tmp_path):
 @pytest.mark.parametrize(
     "words", [["--workers", "-3"], ["--workers", "0"], ["--workers", "2", "--scheduler", "tcp://x"]]
 )
-def test_workers_that_cannot_be_are_refused(tmp_path, words, capsys):
+def test_invalid_numbers_of_workers_are_refused(tmp_path, words, capsys):
     assert run(["study", "run", str(make(tmp_path / "kill")), *words]) == 2
 
 
-def test_ctrl_c_names_the_way_on(undisturbed, tmp_path, monkeypatch, capsys):
+def test_ctrl_c_names_the_command_to_continue(undisturbed, tmp_path, monkeypatch, capsys):
     folder = make(tmp_path / "kill")
     lines = (undisturbed / ROWS).read_bytes().splitlines(keepends=True)
     (folder / ROWS).write_bytes(b"".join(lines[:3]))
@@ -242,7 +242,7 @@ def test_primitive_delivery_and_feedback_reach_the_world():
         assert world.feedback.is_enabled("ee_admittance") and world.feedback.get_execution_order()[0] == "ee_admittance"
 
 
-def test_own_files_act_and_the_recording_says_for_whom_it_is(tmp_path):
+def test_own_files_act_and_the_recording_names_the_participant(tmp_path):
     folder = make(tmp_path / "kill", YAML.replace("record: false\n", "").replace("participants: 2", "participants: 1"))
     (folder / "objects").mkdir()
     mug = package_path("coglab_objects", "objects", "mug.yaml").read_text()
@@ -261,7 +261,7 @@ def test_own_files_act_and_the_recording_says_for_whom_it_is(tmp_path):
 
 
 class StubSystem:
-    """Conditions of a live session, noted only: what the World of the test runs under stays as it is."""
+    """Records the conditions of a live session without applying them to the test's World."""
 
     def __init__(self) -> None:
         self.calls: list[str] = []
@@ -279,7 +279,7 @@ class StubSystem:
         self.calls.append("restored")
 
 
-def test_a_live_session_notes_repeats_and_goes_on(tmp_path, capsys):
+def test_a_live_session_with_notes_repetition_and_resume(tmp_path, capsys):
     text = YAML.replace("[receive]", "[receive, give]").replace("simulated:", "questionnaires: [nasa_tlx]\nsimulated:")
     folder, system = make(tmp_path / "kill", text), StubSystem()
     with coglab.World(seed=3, person="accustomed", perfect_perception=True) as world:

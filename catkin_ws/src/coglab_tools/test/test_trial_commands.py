@@ -44,13 +44,13 @@ page_of(measured())
 """
 
 
-def test_a_report_needs_only_what_the_demo_builds():
+def test_a_report_needs_only_the_libraries_that_the_demo_builds():
     command, place = [sys.executable, "-c", AFTER_THE_FIRST_DEMO], Path(__file__).parent
     ended = subprocess.run(command, cwd=place, capture_output=True, text=True, timeout=120)
     assert ended.returncode == 0, ended.stderr
 
 
-def test_the_list_names_whole_unreadable_and_unfinished_trials(tmp_path, capsys):
+def test_the_list_has_complete_unreadable_and_unfinished_trials(tmp_path, capsys):
     write(tmp_path, record())
     write(tmp_path, record(id="failed", outcome=Outcome(False, 41, "NOT_RELEASED", "nobody let go")))
     (tmp_path / "bad").mkdir()
@@ -62,7 +62,7 @@ def test_the_list_names_whole_unreadable_and_unfinished_trials(tmp_path, capsys)
 
 
 @pytest.mark.parametrize("kind", ["missing", "empty", "cut", "no bag", "foreign", "wrong type"])
-def test_a_bag_that_cannot_be_used_is_named_and_nothing_is_written(tmp_path, capsys, kind):
+def test_an_unusable_bag_is_named_and_nothing_is_written(tmp_path, capsys, kind):
     place = write(tmp_path, record())
     bag = place / "trial.bag"
     if kind == "empty":
@@ -81,7 +81,7 @@ def test_a_bag_that_cannot_be_used_is_named_and_nothing_is_written(tmp_path, cap
     assert {each.name for each in place.iterdir()} <= {"trial.yaml", "trial.bag"}
 
 
-def test_a_bag_of_joints_alone_with_nan_gets_a_page(tmp_path, capsys):
+def test_a_bag_with_only_joints_and_nan_gets_a_page(tmp_path, capsys):
     place = write(tmp_path, record(marks=(), duration_s=2.0))
     bag_of(place, *[
         ("/lwr/joint_states", JointState(position=[np.nan] * 7, velocity=[0.0] * 7), 10.0 + k / 100) for k in range(200)
@@ -91,7 +91,7 @@ def test_a_bag_of_joints_alone_with_nan_gets_a_page(tmp_path, capsys):
     assert answer(capsys, "show", place)[1]["metrics"]["peak_force_n"] is None and data["file"].endswith("report.html")
 
 
-def test_a_failure_is_explained_in_ten_lines_with_what_went_wrong_first():
+def test_a_failure_is_explained_in_ten_lines_with_its_first_cause():
     trial = measured()
     trial.record = record(
         outcome=Outcome(False, 41, "NOT_RELEASED", "the person did not let go"),
@@ -105,7 +105,7 @@ def test_a_failure_is_explained_in_ten_lines_with_what_went_wrong_first():
     assert lines[-1] == "notes: P03 laughed"
 
 
-def test_the_page_holds_everything_and_escapes_what_people_typed():
+def test_the_page_is_complete_and_escapes_typed_text():
     trial = measured()
     trial.record = record(notes="<script>alert(1)</script>")
     text = page_of(trial)
@@ -125,7 +125,7 @@ def test_two_actions_of_one_recording_have_their_own_figures_and_plots():
     assert "succeeded in 6.00 s" in text and "nobody took it" in text
 
 
-def test_a_trial_is_named_by_the_beginning_of_its_name_if_one_fits(tmp_path, capsys, monkeypatch):
+def test_a_trial_is_found_by_a_unique_start_of_its_name(tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("ROS_HOME", str(tmp_path))
     write(tmp_path / "trials", record(id="20261128T1000_a"))
     write(tmp_path / "trials", record(id="20261128T1100_b"))

@@ -1,4 +1,4 @@
-"""Trials made up for tests, with known figures."""
+"""Invented trials for tests, with known figures."""
 
 from pathlib import Path
 

@@ -1,10 +1,9 @@
 #!/usr/bin/python3
 """Learns the shipped thresholds of the moving arm from simulated reaches without contact: [NUMBER] [FILE].
 
-The seeds, from 50000 on, are those of no test and no benchmark. On a robot the service
-/contact_detector/learn_motion does the same, and learns the offsets between two rests too. Here these are not learnt:
-the simulated sensors' torques have none that depends on the posture, and limits from them would take a real arm's own
-for an early contact.
+Seeds from 50000 on, which no test and no benchmark uses. On a robot the service /contact_detector/learn_motion does the
+same, and also learns the offsets between two rests. Here these are not learnt: the simulated offsets do not depend on
+the posture, and with limits from them the offsets of a real arm would count as contact.
 """
 
 import sys
@@ -20,16 +19,16 @@ from moving_reaches import DT, MovingReach, wrong_urdf
 
 FIRST = 50000
 BEFORE = 0.6
-"""s of rest before the motion"""
+"""s, rest before the motion"""
 
 
 def jacobian(q: Any) -> np.ndarray:
-    """Of the palm's position (3, 7)."""
+    """Returns the Jacobian of the palm's position, shape (3, 7)."""
     return position_jacobian(default_arm(), q)
 
 
 def main() -> int:
-    """Write the file."""
+    """Learn the thresholds and write the file."""
     number = int(sys.argv[1]) if len(sys.argv) > 1 else 400
     file = Path(sys.argv[2] if len(sys.argv) > 2 else "contact_thresholds.yaml")
     none = Thresholds(np.ones((7, len(FEATURES))), 1.0, np.ones(7), 1.0)

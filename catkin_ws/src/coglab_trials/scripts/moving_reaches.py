@@ -35,17 +35,17 @@ LIBRARY = str(package_path("coglab_controllers", "config", "primitives.xml"))
 OBJECTS = ("mug", "bottle", "ball", "screwdriver", "tea_box")
 FRAME = "object_mug"
 GRASP = Pose(np.array([0.0, -0.065, 0.07]), np.array([0.5, 0.5, 0.5, 0.5]))
-"""palm in the frame that is reached for: the mug's grasp, drawn back by its approach distance"""
+"""pose of the palm in the goal frame: the mug's grasp, moved back by its approach distance"""
 NEWTON, RISE = 3.0, 0.06
 FOLLOWED = 0.40
-"""s that a reach is followed after a push has begun"""
+"""s, recorded after the start of a push"""
 AFTERWARDS = 0.3
-"""s that a reach without a push is followed after it has ended"""
+"""s, recorded after the end of a reach without a push"""
 
 
 @dataclass(frozen=True)
 class Draw:
-    """What is drawn for one reach."""
+    """Drawn values of one reach."""
 
     place: np.ndarray
     turn: float
@@ -61,7 +61,7 @@ class Draw:
 
     @staticmethod
     def of(seed: int) -> Draw:
-        """The draw of this seed; the place has a posture of the arm."""
+        """Returns the draw of this seed. The arm has a posture for its place."""
         rng = np.random.default_rng([seed, 53])
         while True:
             place = rng.uniform([0.70, -0.20, 0.25], [0.84, 0.20, 0.50])
@@ -85,7 +85,7 @@ class Draw:
 
 @dataclass
 class Recording:
-    """One reach as measured, sample by sample (n), and the truth about it."""
+    """Measurements of one reach, n samples, and the true values."""
 
     seed: int
     payload: tuple[float, np.ndarray]
@@ -94,7 +94,7 @@ class Recording:
     """s, start of the motion"""
     reached: float | None = None
     one_newton: float | None = None
-    """s, from which the true force is 1 N or more"""
+    """s, time from which the true force is at least 1 N"""
     stamp: list[float] = field(default_factory=list)
     position: list[np.ndarray] = field(default_factory=list)
     torque: list[np.ndarray] = field(default_factory=list)
@@ -102,13 +102,13 @@ class Recording:
     velocity: list[np.ndarray] = field(default_factory=list)
     """as on lwr/joint_states"""
     touch: list[dict[str, np.ndarray]] = field(default_factory=list)
-    """N on phalanges and palm, without noise; empty where a force is put on the palm itself"""
+    """N, on phalanges and palm, without noise; empty if the push is a force on the palm itself"""
     hand: list[Any] = field(default_factory=list)
-    """motors of the hand as its node reads them at rest, 5 times a second; the same object until they are read again"""
+    """hand motors as polled at rest, 5 Hz; the same object until the next poll"""
     sight: list[tuple[float, Pose] | None] = field(default_factory=list)
-    """(s, pose) of the newest sight of the target of the reach"""
+    """(s, pose) of the newest sight of the target"""
     aborted: str = ""
-    """why the motion ended early; it counts as a reach all the same"""
+    """reason of an early end; the record counts as a reach"""
 
 
 @lru_cache(maxsize=1)
@@ -119,7 +119,7 @@ def urdf() -> str:
 
 
 def wrong_urdf(seed: int, payload_error: float = 0.10, inertia_error: float = 0.05) -> str:
-    """The robot description with drawn errors of the mass of the hand and of the inertias."""
+    """Returns the robot description with drawn errors of the hand's mass and of the inertias."""
     rng = np.random.default_rng([seed, 59])
     robot = ElementTree.fromstring(urdf())
     hand = 1.0 + payload_error * rng.uniform(-1.0, 1.0)
@@ -167,14 +167,14 @@ class MovingReach:
 
     @staticmethod
     def _in_palm(thing: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
-        """The object's axis along the palm's y, its middle before the palm, as fingers hold it."""
+        """Pose of the object in the palm frame: its axis along y, its middle in front of the palm."""
         size = thing["size"]
         half = size[0 if thing["shape"]["type"] != "box" else 1] / 2
         turn = np.array([-0.5, -0.5, -0.5, 0.5])
         return np.array([half, 0.0, 0.0]) - Pose(np.zeros(3), turn).apply([0.0, 0.0, size[2] / 2]), turn
 
     def _grasp(self) -> None:
-        """The preshape of a power grasp, the object into the hand, fingers closed, and nothing else holds it."""
+        """Take the preshape of a power grasp and close the fingers on the object, which nobody else holds."""
         self.cell.set_motors([1.0] * 5, [0.96, 0.02, 0.12, 0.20, 0.20], [240.0] * 5)
         self.run_for(1.0)
         self.cell.place("robot_hand", *self.in_palm)
@@ -189,7 +189,7 @@ class MovingReach:
         return float(self.virtual.now)
 
     def step(self) -> None:
-        """One FRI period; what was measured is kept."""
+        """Run one FRI period and record the measurements."""
         if self.hand is not None:
             place, _ = self.hand.at(self.now)
             for sight in self.tracker.step(self.now, Pose(place, about_z(self.draw.turn))):
@@ -215,7 +215,7 @@ class MovingReach:
             record.touch.append({name: np.array(force) for name, force in self.cell.touch().items()})
 
     def prepare(self) -> None:
-        """Command mode, fingers closed on what is held, plug-ins loaded, arm at rest."""
+        """Enter command mode, close the fingers on the object if there is one, load plug-ins, wait for rest."""
         virtual = self.virtual
         self._until(lambda: self.robot.report["fri_period"] > 0.0, 5.0)
         for event in ("position", "start"):
@@ -231,14 +231,14 @@ class MovingReach:
         self.run_for(0.6)
 
     def run(self) -> Recording:
-        """The whole reach; RuntimeError where it was refused, aborted or lost what it held."""
+        """Run the whole reach. RuntimeError if it is refused or aborted, or if the hand loses its object."""
         draw, record = self.draw, self.record
         self.prepare()
         self.hand = Reach(draw.from_where, draw.place, self.now, draw.hand_time)
         self.run_for(max(0.2, draw.start_share * draw.hand_time))
         primitive = "give_human" if draw.held else "reach_human"
         goal = (primitive, draw.ratio, list(GRASP.position), True, list(GRASP.orientation), FRAME)
-        # As the machines do, a tracker that has lost the goal for a moment gets a second.
+        # Like the machines, wait up to 1 s for a goal that the tracker has lost.
         end = self.now + 1.0
         while not (answer := self.virtual.execute_dmp(*goal))[0]:
             if self.now > end:
@@ -271,7 +271,7 @@ class MovingReach:
         self.run_for(AFTERWARDS)
 
     def _push(self) -> None:
-        """The force of a period is what the ramp has at its end."""
+        """Apply the force of the ramp at the end of this period."""
         line = self.draw.place * [1.0, 1.0, 0.0]
         aside = np.cross([0.0, 0.0, 1.0], line / np.linalg.norm(line))
         direction = np.cos(self.draw.angle) * aside + np.sin(self.draw.angle) * np.array([0.0, 0.0, 1.0])

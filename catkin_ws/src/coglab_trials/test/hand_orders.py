@@ -1,4 +1,4 @@
-"""With which force the hand of a VirtualTrial is told to close, and whether a person's hand is there then."""
+"""Force of each closing order in a VirtualTrial, and whether a person's hand is at the object at that time."""
 
 import numpy as np
 from ih2_hand.emulator.hand import GRASP_CURRENT
@@ -6,17 +6,17 @@ from ih2_hand.emulator.motor import STALL_CURRENT
 from ih2_hand.wire_choices import WIRE
 
 REACHES = 0.15
-"""m from a person's hand to the object within which its fingers may be at it: it holds by 0.1 m at most"""
+"""m, distance from hand to object within which a person's fingers may be at it; a holding hand is within 0.1 m"""
 
 
 def gentle_speed():
-    """Wire speed at which closing fingers stand with the current of the lowest force level."""
+    """Returns the wire speed at which closing fingers stall with the current of the lowest force level."""
     return GRASP_CURRENT["low"] / STALL_CURRENT * WIRE.speed_max
 
 
 class HandOrders:
-    """Watches a trial from its beginning. ``beside``: of each order to close, the level asked for last or the wire
-    speed, while the person's hand was at the object in truth; ``alone``: the same with no hand there."""
+    """Records the closing orders of a trial. ``beside``: force level or wire speed of each order while the true hand
+    of the person was at the object. ``alone``: the same without a hand there."""
 
     def __init__(self, trial):
         self.trial, self.beside, self.alone, self._level = trial, [], [], ""
@@ -35,7 +35,7 @@ class HandOrders:
         (self.beside if away < REACHES else self.alone).append(force)
 
     def gentle(self):
-        """Whether nothing but the lowest force was asked for beside the person's hand, and anything was."""
+        """True if there were orders beside the person's hand, all with the lowest force."""
         levels = {each for each in self.beside if isinstance(each, str)}
         speeds = [each for each in self.beside if not isinstance(each, str)]
         return bool(self.beside) and levels <= {"low"} and all(speed <= gentle_speed() for speed in speeds)

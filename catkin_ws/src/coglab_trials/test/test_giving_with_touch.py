@@ -1,4 +1,4 @@
-"""Whole trials with touch sensors in the hand: grip and load go together, as people's do."""
+"""Whole trials with touch sensors in the hand: the grip force follows the load, as with people."""
 
 import os
 
@@ -9,12 +9,12 @@ from coglab_trials import GIVE, RECEIVE, Conditions, VirtualTrial
 
 LONG = os.environ.get("COGLAB_LONG") == "1"
 NOISE = 0.05
-"""N, of one component of a touch sensor"""
+"""N, noise of one component of a touch sensor"""
 
 
 class Given:
-    """A trial in which an object is received and given back; ``rows``: time (s), share of the load that has gone and
-    grip (N), 100 times a second while the load is given; ``last``: N of grip at the end."""
+    """A trial in which an object is received and given back. ``rows``: time (s), share of the load that has gone, grip
+    (N), at 100 Hz while the load is given. ``last``: grip (N) at the end."""
 
     def __init__(self, object_id, seed, **overrides):
         self.trial = VirtualTrial(seed, Conditions(object_id=object_id), touch=NOISE, settings=overrides)
@@ -42,20 +42,20 @@ def test_the_grip_falls_as_the_person_takes_the_load(object_id, seed):
     correlation = np.corrcoef(share, grip)[0, 1]
     print(f"{object_id}: share and grip correlate with {correlation:.2f}, {grip[0]:.1f} N to {grip[-1]:.1f} N")
     assert correlation < -0.7
-    # Mean grip by growing share: it does not rise again, but for the band within which no finger moves.
+    # Mean grip over growing share: it does not rise again, except within the dead band of the fingers.
     means = [grip[(low <= share) & (share < low + 0.2)] for low in np.arange(-0.1, 0.9, 0.2)]
     means = np.array([each.mean() for each in means if len(each)])
     assert np.all(np.diff(means) < 0.05 * grip[0]) and means[-1] < 0.85 * means[0], means
 
 
-def test_a_load_that_comes_back_is_held_again(monkeypatch):
-    """The person lifts until they have half of the load, waits, and sinks again."""
+def test_the_grip_closes_again_when_the_load_returns(monkeypatch):
+    """The person lifts until they carry half of the load, waits, and sinks again."""
     begun, risen, enough = [], [0.0], [False]
 
     def half(self, t, dt, seen):
         begun.append(t)
         since = t - begun[0]
-        enough.append(enough[-1] or self._load_share(seen) > 0.12)  # felt late: it gets half
+        enough.append(enough[-1] or self._load_share(seen) > 0.12)  # 0.12: measured late, the share reaches one half
         speed = 0.0 if enough[-1] else 0.003
         if since > 2.0:
             speed = -min(0.003, risen[0] / dt)
@@ -66,15 +66,15 @@ def test_a_load_that_comes_back_is_held_again(monkeypatch):
             self._go("releasing", t)
 
     monkeypatch.setattr(VirtualHuman, "_lifting", half)
-    # An arm that sinks would lay the object into their hand after all.
+    # A sinking arm would lay the object into the person's hand.
     given = Given("mug", 7000, **{"give.lower_after": 60.0})
     t, share, grip = given.rows.T
     loose = int(np.argmin(grip))
     print(f"share {share.max():.2f}, grip {grip[0]:.1f} N, {grip[loose]:.1f} N, {grip[-1]:.1f} N")
     assert grip[loose] < 0.75 * grip[0], "it was loosened"
-    # Beside the person's fingers no more than the lowest force is asked for, which may be what is left.
-    assert grip[-1] >= 0.98 * grip[loose] and t[-1] > t[loose], "and is no looser any more"
-    assert given.last > 0.75 * grip[0], "firmly at home"
+    # Near the person's fingers the grip closes only with the lowest force, perhaps the present one.
+    assert grip[-1] >= 0.98 * grip[loose] and t[-1] > t[loose], "the grip does not loosen further"
+    assert given.last > 0.75 * grip[0], "at home the grip is firm"
     assert share[-1] < 0.1 and t[-1] > t[loose] + 0.5
     assert given.results[-1].outcome == "failed_holding" and given.trial.ctx.holding == "mug"
     assert not given.trial.world.truth["dropped"]

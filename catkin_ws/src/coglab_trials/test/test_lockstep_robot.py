@@ -1,4 +1,4 @@
-"""A whole handover in virtual time: person, object, FRI, DMP and point-to-point, in one thread."""
+"""The robot in lockstep in one thread: periods, a frozen process, and refused requests."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ PRIMITIVES = str(package_path("coglab_controllers", "config", "primitives.xml"))
 # --- lockstep ---------------------------------------------------------------------------------------------------------
 
 
-def test_time_goes_by_periods_and_a_frozen_process_answers_nothing():
+def test_time_advances_by_periods_and_a_frozen_process_does_not_answer():
     robot = Robot(3, krc__period=0.002).virtual
     robot.advance(0.5)
     assert robot.now == pytest.approx(1.5) and robot.cell.time == pytest.approx(0.5) and robot.cell.quality == 3
@@ -35,7 +35,7 @@ NAN = float("nan")
 
 @pytest.fixture(scope="module")
 def arm():
-    """The port of the arm, ready to move, and a posture near the one it is in."""
+    """The arm port, ready to move, and a posture near the present one."""
     world = World(1, object_on="world")
     port = VirtualArm(world)
 
@@ -75,13 +75,13 @@ def refused(pending):
         ({"orientation_control": True, "target_orientation": (0.0, 0.0, 0.0, 2.0)}, ReasonCode.INVALID_ARGUMENT),
     ],
 )
-def test_reaches_that_make_no_sense_are_refused_with_their_code(arm, fields, code):
+def test_invalid_reaches_are_refused_with_their_code(arm, fields, code):
     port, _ = arm
     port.switch_controller("dmp").result()
     assert refused(port.execute_dmp(replace(REACH, **fields))) == code
 
 
-def test_other_requests_that_make_no_sense_are_refused_with_their_code(arm):
+def test_other_invalid_requests_are_refused_with_their_code(arm):
     port, near = arm
     assert refused(port.switch_controller("nobody")) == ReasonCode.UNKNOWN_NAME
     assert refused(port.load_controller("x", "coglab/NoController")) == ReasonCode.UNKNOWN_NAME

@@ -1,4 +1,4 @@
-"""A recording drives the person's hand, with the object in it, through a whole handover."""
+"""A whole handover in which a recording moves the person's hand with the object."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ FRAMES = ("human_hand", "object_mug")
 
 @pytest.fixture(scope="module")
 def handover():
-    """Rows (t, pose of hand, pose of object) at 50 Hz of a simulated person who gives; from the reach on."""
+    """Rows (t, pose of hand, pose of object) at 50 Hz of a simulated giving person, from the reach on."""
     trial, rows = VirtualTrial(seed=3, conditions=CONSIDERATE), []
 
     def beside(t):
@@ -37,8 +37,8 @@ def write_csv(path, rows, frames=FRAMES):
 
 
 def play(file, person, timing="natural", **more):
-    """Outcome of a handover with the recorded hand, the trial, and the distance (m) of its hand from the recorded one
-    during the reach, largest, as long as it alone holds the object."""
+    """Returns the outcome of a handover with the recorded hand, the trial, and the largest distance (m) of the hand
+    from the recorded one while only that hand holds the object."""
     recording = {"file": file, "person": person, **more}
     trial, off = VirtualTrial(world=World(8, CONSIDERATE, recording=recording), settings={"timing": timing}), [0.0]
 
@@ -60,12 +60,12 @@ def test_a_recorded_person_who_waits_hands_over(tmp_path, handover):
     assert result.outcome == "succeeded", result.reason
     truth = trial.world.cell.truth()
     assert truth["held_by"] == "robot" and not truth["dropped"]
-    assert 0.0 < off < 0.02, "the plant's hand follows the recorded one"
+    assert 0.0 < off < 0.02, "the simulated hand follows the recorded one"
 
 
 @pytest.mark.parametrize("person", ["no_wait", "leave"])
-def test_a_recorded_person_goes_on_or_leaves_at_the_recorded_time(tmp_path, handover, person):
-    """What comes of it is control's matter: printed by the bench. Here: the hand went as recorded, and it ended."""
+def test_a_recorded_person_continues_or_leaves_at_the_recorded_time(tmp_path, handover, person):
+    """Checks only that the hand follows the recording and the action ends. The benchmark prints the outcome."""
     file = write_csv(tmp_path / "handover.csv", handover)
     result, trial, off = play(file, person)
     assert off < 0.02 and trial.world.robot.limit_violations == 0
@@ -77,8 +77,8 @@ def test_a_recorded_person_goes_on_or_leaves_at_the_recorded_time(tmp_path, hand
 
 
 @pytest.mark.parametrize("person, outcome", [("leave", "failed_empty"), ("no_wait", "succeeded")])
-def test_who_leaves_early_takes_the_object_along(tmp_path, handover, person, outcome):
-    """The same handover without its waiting, so fast that a calm robot comes too late: two seconds in all."""
+def test_a_person_who_leaves_early_takes_the_object_along(tmp_path, handover, person, outcome):
+    """The same handover without its wait, 2 s in total: too fast for a calm robot."""
     begin, end = handover[0][0], handover[-1][0]
     reach = [row for row in handover if row[0] < begin + 1.6]
     back = [(row[0] - end + begin + 3.0, *row[1:]) for row in handover if row[0] > end - 1.4]

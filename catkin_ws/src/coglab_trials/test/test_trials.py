@@ -1,4 +1,4 @@
-"""Whole trials: the machines against the real cell, bridge, controller cores and hand emulator.
+"""Whole trials: the machines with the simulated cell, bridge, controller cores and hand emulator.
 
 A sample by default; COGLAB_LONG=1 runs the campaign (100 trials of each action, each misbehaviour 20 times).
 """
@@ -26,7 +26,7 @@ from coglab_trials.world import LIMITS
 LONG = os.environ.get("COGLAB_LONG") == "1"
 SOURCES = Path(__file__).resolve().parents[2]
 BY_HOLDER = ("succeeded", "failed_empty")
-"""where the robot holds the object in the end, in truth; where it does not"""
+"""true holder of the object at the end, for outcomes in which the robot holds it, and in which it does not"""
 OUTCOMES = {
     (RECEIVE, "slow"): "succeeded",
     (RECEIVE, "hesitant"): "succeeded",
@@ -45,12 +45,12 @@ OUTCOMES = {
     (GIVE, "never_release"): "succeeded",
     (GIVE, "pull_back"): "failed_holding",
 }
-"""(action, behaviour) -> the outcome that coglab_smach's README documents, or two, one of which the holder decides"""
+"""(action, behaviour) -> documented outcome, or two that depend on the holder"""
 
 
 def checked(trial, *actions, moves=True, **how):
-    """Results of a trial in which no limit is exceeded, no contact is watched for at the wrong time, and which ends in
-    a hub. ``moves``: whether the arm does."""
+    """Run a trial and return its results. It must exceed no limit, watch for contact only at the right time, and end in
+    a hub. ``moves``: the arm must move."""
     results = trial.run(*actions, **how)
     assert trial.world.robot.limit_violations == 0
     assert trial.contact.watched_while_moving == 0
@@ -78,8 +78,8 @@ def test_receive_and_give_back(seed):
 
 
 @pytest.mark.parametrize("seed", range(20 if LONG else 2))
-def test_people_and_tracker_as_they_are(seed):
-    """Not every exchange succeeds in the default world, but each ends in an outcome of its own with a reason."""
+def test_drawn_people_and_a_realistic_tracker(seed):
+    """In the default world not every exchange succeeds, but each ends in an outcome with a reason."""
     for result in checked(VirtualTrial(700 + seed), RECEIVE, GIVE):
         assert result.outcome in ("succeeded", "failed_empty", "failed_holding"), result.reason
         assert (result.outcome == "succeeded") != bool(result.reason)
@@ -139,7 +139,7 @@ def test_misbehaviour_ends_in_its_documented_outcome(action, behaviour):
         assert trial.last_hub == ("wait_with_object" if held else "wait_without_object")
         assert (last.outcome == "succeeded") != bool(last.reason)
         if (action, behaviour) == (RECEIVE, "early_release"):
-            # Nobody else holds it: what the robot has not caught lies on the floor.
+            # Nobody else holds the object: without the robot it lies on the floor.
             assert truth["dropped"] == (last.outcome == "failed_empty"), (truth["held_by"], last.reason)
 
 
@@ -150,7 +150,7 @@ def test_an_object_that_cannot_be_reached_is_refused_before_the_arm_moves():
 
 
 @pytest.mark.parametrize("turned", [2.6, -1.8])
-def test_an_object_out_of_reach_all_the_same_ends_with_what_remained(turned):
+def test_a_reach_to_an_unreachable_object_ends_with_its_reason(turned):
     world = World(1, CONSIDERATE, turned=turned)
     trial = VirtualTrial(world=world, settings={"handover.check_reach": False})
     (result,) = checked(trial, RECEIVE)
@@ -164,9 +164,9 @@ def test_an_object_out_of_reach_all_the_same_ends_with_what_remained(turned):
     ), trial.why()
 
 
-def test_a_place_that_is_corrected_while_the_hand_still_comes_is_followed():
-    """Of this person the predicted place is near at first and 0.07 m farther when the hand is there; an arm that stands
-    where it was near never meets them. A hand that comes does not fall either, whatever its height does."""
+def test_a_corrected_predicted_place_is_followed():
+    """The first predicted place is 0.07 m nearer than the person's hand at its end: an arm that stops there never meets
+    it. The changing height of a coming hand is no fall."""
     trial = VirtualTrial(6004, Conditions(object_id="screwdriver"))
     succeed(trial, RECEIVE, GIVE)
     goal = trial.arm.request
@@ -178,7 +178,7 @@ def test_the_same_seed_gives_the_same_trial():
     assert one == other
 
 
-def test_what_cannot_be_asked_for_is_refused():
+def test_impossible_requests_are_refused():
     with pytest.raises(ValueError, match="not both"):
         VirtualTrial(world=World(1), conditions=CONSIDERATE)
     with pytest.raises(ConfigError, match="reach_ration"):
@@ -220,12 +220,12 @@ def test_natural_starts_before_calm_and_both_take_the_object():
     "actions, where", [(("take",), "world")] + [((RECEIVE, "put", "take", GIVE), "human_hand")] * LONG
 )
 def test_actions_succeed_within_the_limits_of_t1(tmp_path, actions, where):
-    """With the reduced limits of the operating mode T1 what takes long is waited for."""
+    """With the reduced limits of operating mode T1, the machines wait for the longer motions."""
     table = yaml.safe_load(Path(LIMITS).read_text(encoding="utf-8"))
     reduced = tmp_path / "joint_limits.yaml"
     reduced.write_text(yaml.safe_dump({**table, "default": {**table["default"], **copy.deepcopy(table["t1"])}}))
     results = succeed(VirtualTrial(world=World(3, CONSIDERATE, where, limits=str(reduced))), *actions, limit=200.0)
-    # Fixed limits for the full speed would not have been enough: the way to the board alone takes 20 s.
+    # Fixed limits for full speed would be too short: the motion to the board alone takes 20 s.
     assert max(r.ended - r.started for r in results) > 40.0
 
 
@@ -240,7 +240,7 @@ def switched(trial):
     return [t.reason for t in trial.ctx.journal.transitions if t.outcome == "switched"]
 
 
-def test_an_object_held_high_gets_the_primitive_for_it():
+def test_an_object_held_high_gets_its_own_primitive():
     trial = VirtualTrial(5, CONSIDERATE, recogniser=recogniser())
     trial.world.scene.handover_object = np.array([0.78, 0.03, 0.60])
     trial.world.scene.region_high = np.array([0.81, 0.16, 0.66])
@@ -264,7 +264,7 @@ def test_a_person_who_reaches_out_starts_the_exchange():
         t.world.human.command("give")
         t.wait_hub("wait_with_object")
         t.clock.sleep(4.0)
-        assert t.hub == "wait_with_object", "the hand that went back counted as a reach"
+        assert t.hub == "wait_with_object", "a hand that goes back must not count as a reach"
 
     trial.run(script=script)
     assert [r.code for r in trial.results] == [ReasonCode.NONE]
@@ -274,7 +274,7 @@ def test_a_person_who_reaches_out_starts_the_exchange():
 
 
 def test_nothing_in_control_reads_the_truth():
-    """Only the partner, the tracker, recorders and tests may: no file of a control package names the topic."""
+    """Only partner, tracker, recorders and tests may read it: no file of a control package names the topic."""
     for package in (
         "coglab_smach",
         "coglab_perception",
@@ -291,6 +291,6 @@ def test_nothing_in_control_reads_the_truth():
                     if path.suffix == ".py":
                         names = {n.module or "" for n in ast.walk(ast.parse(text)) if isinstance(n, ast.ImportFrom)}
                         assert not any(name.startswith(("coglab_sim", "coglab_trials")) for name in names), path
-    # The true frames go to a topic of their own, so that no tf listener can look them up.
+    # The true frames have their own topic, so that no tf listener can look them up.
     text = (SOURCES / "coglab_sim" / "scripts" / "truth_markers.py").read_text(encoding="utf-8")
     assert "TransformBroadcaster" not in text and 'rospy.Publisher("truth/tf"' in text

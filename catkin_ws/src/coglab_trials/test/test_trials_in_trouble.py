@@ -1,5 +1,5 @@
-"""Whole trials in which something breaks, or the person does what nobody wants: each ends in a hub with its reason, no
-limit is exceeded, nothing that is withdrawn is followed, and nothing is pressed firmly or dropped beside a hand."""
+"""Whole trials with faults or a difficult person. Each ends in a hub with its reason and exceeds no limit. The arm does
+not follow a withdrawn object; near a hand, the fingers neither close firmly nor drop the object."""
 
 import threading
 import time
@@ -24,7 +24,7 @@ def trial_of(behaviour="normal", seed=4, **settings):
 
 
 def once(trial, condition, act):
-    """Calls act(trial) at the first moment at which it is so; the list that is returned has the time then."""
+    """Call act(trial) when ``condition`` is first true. Returns a list that then contains the time."""
     happened, before = [], trial.beside
 
     def look(t):
@@ -38,7 +38,7 @@ def once(trial, condition, act):
 
 
 def into_reach(seconds, action=""):
-    """So long after the arm has begun to reach, in this action if it is named."""
+    """Condition: ``seconds`` after the start of a reach, in ``action`` if given."""
 
     def condition(t):
         begun = t.reach is not None and t.world.t > t.reach.begin + seconds
@@ -48,7 +48,7 @@ def into_reach(seconds, action=""):
 
 
 def pushed(trial, condition, force, seconds):
-    """Somebody pushes the arm then (N, for s)."""
+    """From ``condition`` on, push the arm with ``force`` (N) for ``seconds``."""
 
     def look(t):
         if begun:
@@ -66,7 +66,7 @@ def at_home(trial):
 
 
 def ended(trial, outcome, codes, held_by="", dropped=False):
-    """The last result, which has to be this one; arm at home, hub as the outcome says."""
+    """Returns the last result after checks of its outcome and code, the hub, and the arm at home."""
     result, truth = trial.results[-1], trial.world.cell.truth()
     assert result.outcome == outcome and result.code in codes, result
     holding = (result.action == RECEIVE) == (outcome == "succeeded") if outcome != "failed_empty" else False
@@ -78,18 +78,18 @@ def ended(trial, outcome, codes, held_by="", dropped=False):
     return result
 
 
-# --- what breaks ------------------------------------------------------------------------------------------------------
+# --- faults -----------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("after, slow, outcome", [(0.3, 4.0, "failed_empty"), (0.5, 1.0, "succeeded")])
-def test_a_goal_that_is_lost_half_way_or_for_the_rest_of_a_short_way(after, slow, outcome):
+def test_a_lost_goal_ends_a_slow_reach_but_not_the_end_of_a_fast_one(after, slow, outcome):
     trial = trial_of(**{"handover.reach_ratio": slow} if slow != 1.0 else {})
     once(trial, into_reach(after), lambda t: t.world.blind.add("object_mug"))
     trial.run(RECEIVE)
     ended(trial, outcome, {ReasonCode.NONE if outcome == "succeeded" else ReasonCode.GOAL_LOST})
 
 
-def test_command_mode_lost_in_mid_reach_and_reset():
+def test_reset_after_command_mode_was_lost_during_a_reach():
     trial = trial_of()
     cut = once(trial, into_reach(0.4), lambda t: t.world.cell.leave_command_mode("cut by the test"))
 
@@ -106,8 +106,8 @@ def test_command_mode_lost_in_mid_reach_and_reset():
 
 
 def test_stop_while_the_hand_opens_and_the_person_takes_the_object():
-    """The fingers stay as STOP has left them and say that they hold something. Where the object is seen with the person
-    the hand is empty all the same, and the next exchange is theirs to begin."""
+    """STOP halts the fingers, and the hand reports a grip. The object is seen with the person, so the hand counts as
+    empty, and the next hub is the one without an object."""
     trial = trial_of()
     trial.submitted = False
     opens = lambda t: [r.to_state for r in t.ctx.journal.transitions[-1:]] == ["hand_open"]  # noqa: E731
@@ -119,7 +119,7 @@ def test_stop_while_the_hand_opens_and_the_person_takes_the_object():
         t.wait_hub("stopped")
         while t.world.cell.truth()["held_by"] != "human" or t.world.human.phase != "idle":
             t.clock.sleep(0.05)
-        assert t.ctx.hand.state().holding, "else this test shows nothing"
+        assert t.ctx.hand.state().holding, "condition of this test"
         assert t.submit("reset", "")
         t.wait_hub("wait_without_object")
         assert not t.ctx.hand.state().holding and t.ctx.holding == ""
@@ -129,8 +129,8 @@ def test_stop_while_the_hand_opens_and_the_person_takes_the_object():
 
 
 @pytest.mark.parametrize("when", ["home", "to the person"])
-def test_an_object_that_leaves_the_hand_on_the_way(when):
-    """The fingers open by themselves. The arm does not go on to the person, and nobody is told that they have it."""
+def test_an_object_that_leaves_the_robots_hand_during_a_motion(when):
+    """The fingers open by themselves. The arm does not continue to the person, and no message is sent."""
     trial = trial_of()
     weighed = lambda t: any(move.from_state == "take_weight" for move in t.ctx.journal.transitions)  # noqa: E731
 
@@ -146,8 +146,8 @@ def test_an_object_that_leaves_the_hand_on_the_way(when):
     assert Say.YOU_HAVE_IT not in [code for _, code in trial.said]
 
 
-def test_an_object_that_leaves_the_persons_hand_on_the_way():
-    """It falls while the arm comes: the reach ends at once, with its own reason, and the arm does not dive after it."""
+def test_an_object_that_falls_during_the_reach():
+    """It falls from the person's hand: the reach ends at once with its reason, and the arm does not follow."""
     trial, fastest = trial_of(), [0.0]
 
     def drop(t):
@@ -170,11 +170,11 @@ def test_an_object_that_leaves_the_persons_hand_on_the_way():
     assert fastest[0] < 0.25
 
 
-# --- who pushes and pulls ---------------------------------------------------------------------------------------------
+# --- pushes and pulls -------------------------------------------------------------------------------------------------
 
 
-def test_a_partner_who_pushes_the_arm_away_while_it_gives():
-    """60 N for a second: the arm holds on to the object and gives it to the person who waits for it."""
+def test_a_push_while_the_robot_gives():
+    """60 N for 1 s: the hand keeps the object, then gives it to the waiting person."""
     trial = trial_of()
     begun = pushed(trial, into_reach(0.8, GIVE), [-60.0, 0.0, 0.0], 1.0)
     trial.run(RECEIVE, GIVE)
@@ -182,9 +182,9 @@ def test_a_partner_who_pushes_the_arm_away_while_it_gives():
 
 
 @pytest.mark.parametrize("after, outcomes", [(0.3, ["succeeded"]), (0.8, ["succeeded", "failed_empty"])])
-def test_a_partner_who_pushes_the_arm_away_while_it_receives(after, outcomes):
-    """40 N for a second. On the way that is no object in the hand: the arm draws back, comes again and takes it. Beside
-    the object it may be taken for one; then the hand has closed on nothing, or on an edge, and says so."""
+def test_a_push_while_the_robot_receives(after, outcomes):
+    """40 N for 1 s. Early in the reach it is no contact: the arm retreats, reaches again and takes the object. Near the
+    object it may count as contact; then the hand has closed on nothing or on an edge, and the action fails."""
     trial = trial_of()
     begun = pushed(trial, into_reach(after), [-40.0, 0.0, 0.0], 1.0)
     (result,) = trial.run(RECEIVE)
@@ -195,7 +195,7 @@ def test_a_partner_who_pushes_the_arm_away_while_it_receives(after, outcomes):
 
 
 def pull(trial, condition):
-    """Largest force (N) between the two hands, from when it is so; read it after the trial."""
+    """Returns a list; after the trial it has the largest force (N) between the two hands from ``condition`` on."""
     largest, before = [0.0], trial.beside
 
     def look(t):
@@ -208,7 +208,7 @@ def pull(trial, condition):
 
 
 def test_a_tug_while_the_hand_has_closed():
-    """A person who pulls to and fro before letting go: at most 15 N between the two hands."""
+    """The person pulls in both directions before letting go: at most 15 N between the two hands."""
     trial = trial_of("tug", 31)
     largest = pull(trial, lambda t: t.begun and t.reach is None)
     trial.run(RECEIVE)
@@ -217,20 +217,20 @@ def test_a_tug_while_the_hand_has_closed():
 
 
 def test_a_tug_while_the_fingers_close():
-    """14 N for 0.3 s: the palm goes along, and the object is received all the same."""
+    """14 N for 0.3 s: the palm yields, and the object is received."""
     trial = trial_of()
     orders, closing = HandOrders(trial), once(trial, lambda t: t.ctx.journal.marked("closing"), lambda t: None)
     pushed(trial, lambda t: closing and t.world.t > closing[0] + 0.1, [0.0, 14.0, 0.0], 0.3)
     largest = pull(trial, lambda t: closing)
     trial.run(RECEIVE)
     assert "gave_way" in ended(trial, "succeeded", {ReasonCode.NONE}, "robot").marks
-    # The tug itself is 14 N: what the hand adds to it is no more than the arm's own inertia.
+    # The tug itself is 14 N; the hand adds at most the arm's inertia.
     assert largest[0] <= 15.0 and orders.gentle()
 
 
-def test_a_hand_that_stays_in_the_gripper():
-    """The person holds on until the robot gives up: closed with the lowest force level, pulled at with 15 N at most,
-    and given back."""
+def test_a_person_who_never_lets_go():
+    """The person holds on until the robot gives up. The robot uses the lowest force level, pulls with at most 15 N, and
+    gives the object back."""
     trial = trial_of("never_release", 31)
     orders, largest = HandOrders(trial), pull(trial, lambda t: t.ctx.journal.marked("closing"))
     trial.run(RECEIVE)
@@ -238,12 +238,12 @@ def test_a_hand_that_stays_in_the_gripper():
     assert orders.gentle() and 1.0 < largest[0] <= 15.0
 
 
-# --- who withdraws ----------------------------------------------------------------------------------------------------
+# --- withdrawals ------------------------------------------------------------------------------------------------------
 
 
-def test_an_offer_that_is_withdrawn_five_times_is_not_chased():
-    """Each ends because the goal went back or left the region, and the sixth offer is taken. The palm goes toward the
-    hand with at most 0.25 m/s from 0.2 s after that is 0.10 m back."""
+def test_the_arm_does_not_follow_five_withdrawn_offers():
+    """Each reach ends because the goal went back or left the region; the sixth offer is taken. From 0.2 s after the
+    hand is 0.10 m back, the palm moves toward it with at most 0.25 m/s."""
     trial, fastest, turned, back = trial_of("withdraws"), [0.0], {}, {}
 
     def look(t):
@@ -267,7 +267,7 @@ def test_an_offer_that_is_withdrawn_five_times_is_not_chased():
 
 
 def receiving(there_before):
-    """A script: one exchange, of an object that is offered with it, or has been ``there_before``."""
+    """Returns a script: one exchange. The object is offered from then on, or was ``there_before``."""
 
     def script(t):
         t.wait_hub("wait_without_object")
@@ -285,9 +285,9 @@ def receiving(there_before):
 
 
 @pytest.mark.parametrize("timing, there_before", [("calm", False), ("natural", False), ("natural", True)])
-def test_who_pushes_the_arm_and_goes_is_not_chased(timing, there_before):
-    """40 N for a second; as the arm draws back, the person takes the object away. What the arm then begins anew toward
-    was in the region before, whether the reach had begun on a belief or on a sight."""
+def test_the_arm_does_not_follow_a_person_who_pushes_it_and_leaves(timing, there_before):
+    """40 N for 1 s; while the arm retreats, the person takes the object away. The arm does not follow, whether the
+    reach began on a belief or on a sight."""
     trial, toward = trial_of(timing=timing), []
     pushed(trial, into_reach(0.3), [-40.0, 0.0, 0.0], 1.0)
     gone = once(trial, lambda t: t.ctx.journal.marked("bumped"), lambda t: t.world.human.command("rest"))
@@ -307,7 +307,7 @@ def test_who_pushes_the_arm_and_goes_is_not_chased(timing, there_before):
     assert max(toward) < 0.05
 
 
-def test_what_is_hidden_as_the_hand_takes_it_back_ends_the_reach():
+def test_a_hidden_object_that_is_taken_back_ends_the_reach():
     trial = trial_of()
 
     def take_back(t):
@@ -320,12 +320,12 @@ def test_what_is_hidden_as_the_hand_takes_it_back_ends_the_reach():
     assert result.code in {ReasonCode.GOAL_WITHDRAWN, ReasonCode.GOAL_LOST}, result
 
 
-# --- who holds it -----------------------------------------------------------------------------------------------------
+# --- holders ----------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("when", ["closed", "loaded"])
-def test_a_hand_that_stays_and_does_not_hold_gets_nothing_back(when):
-    """Before or after the weight has come the person lets go, but leaves the hand at the object: it would fall."""
+def test_the_robot_keeps_the_object_beside_a_hand_that_does_not_hold(when):
+    """The person lets go, but the hand stays at the object, which would fall if the robot opened."""
     trial = trial_of("never_release")
 
     def lets_go(t):
@@ -340,8 +340,8 @@ def test_a_hand_that_stays_and_does_not_hold_gets_nothing_back(when):
 
 
 @pytest.mark.parametrize("aside, mark, later", [(0.25, "closed", 0.0), (0.6, "closing", 0.3)])
-def test_another_hand_that_the_tracker_takes_for_the_persons_frees_nothing(aside, mark, later):
-    """The person never lets go; their hand seems to be elsewhere, and to stay there."""
+def test_a_confused_tracker_does_not_release_the_object(aside, mark, later):
+    """The person never lets go. The tracker shows their hand elsewhere from ``mark`` on."""
     trial = trial_of("never_release")
     locate = trial.ctx.perception.locate_object
     since = once(trial, lambda t: t.begun and t.ctx.journal.marked(mark), lambda t: None)
@@ -360,8 +360,8 @@ def test_another_hand_that_the_tracker_takes_for_the_persons_frees_nothing(aside
 
 
 @pytest.mark.parametrize("after", [0.5, 0.8])
-def test_what_a_hand_has_let_go_of_beside_closed_fingers_is_not_dropped(after):
-    """The reach ends as the fingers close; the person lets go and leaves their hand where it is."""
+def test_an_object_in_closed_fingers_is_not_dropped_after_the_person_let_go(after):
+    """The reach ends while the fingers close. The person lets go, and the hand stays there."""
     trial, held = trial_of(), []
     step = trial.world.human.step
     began = once(trial, lambda t: t.begun and t.ctx.journal.marked("closing_on_the_way"), lambda t: None)
@@ -381,7 +381,7 @@ def test_what_a_hand_has_let_go_of_beside_closed_fingers_is_not_dropped(after):
 
 
 class Rests(smach.State):
-    """Waits for 100 s, whatever comes."""
+    """Waits for 100 s and ignores preemption."""
 
     def __init__(self, clock):
         smach.State.__init__(self, ["done"])
@@ -392,8 +392,8 @@ class Rests(smach.State):
         return "done"
 
 
-def test_a_trial_whose_clock_stalls_leaves_no_thread_behind(monkeypatch):
-    """A world that goes on for ever would keep its process alive."""
+def test_a_stalled_trial_leaves_no_thread_behind(monkeypatch):
+    """A world that runs on would keep its process alive."""
     monkeypatch.setattr("coglab_trials.trial.VirtualClock", partial(VirtualClock, stall_limit=0.4))
     before, trial = set(threading.enumerate()), VirtualTrial(4, machine=lambda ctx: Rests(ctx.clock))
     once(trial, lambda t: t.clock.now() > 0.1, lambda t: time.sleep(2.0))

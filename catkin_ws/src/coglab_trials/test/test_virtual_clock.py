@@ -1,4 +1,4 @@
-"""The clock in which waiting costs no time, and machines that run by it."""
+"""The virtual clock, and state machines on it."""
 
 import re
 import signal
@@ -38,7 +38,7 @@ def both(clock, *seconds):
     return result
 
 
-def test_a_request_at_a_moment_of_virtual_time():
+def test_a_preemption_at_a_virtual_time():
     with using(VirtualClock()) as clock:
         machine = both(clock, 10.0, 50.0)
         caller = clock.start_thread(lambda: (clock.sleep(20.05), machine.request_preempt()), "caller")
@@ -94,7 +94,7 @@ def test_an_outside_thread_can_set_an_event():
     assert seen == [True]
 
 
-def test_deadlock_is_an_error_and_no_hang():
+def test_a_deadlock_raises_an_error():
     clock = VirtualClock(stall_limit=0.2)
     with pytest.raises(ClockStalled, match=re.escape(threading.current_thread().name)), clock.attached():
         clock.event().wait()
@@ -103,7 +103,7 @@ def test_deadlock_is_an_error_and_no_hang():
     assert clock.now() == 1.0
 
 
-def test_a_member_that_does_not_wait_through_the_clock_is_named():
+def test_a_thread_that_does_not_wait_through_the_clock_is_named():
     clock = VirtualClock(stall_limit=0.2)
     stuck = threading.Event()
     thread = clock.start_thread(lambda: stuck.wait(10), "stubborn")
@@ -128,8 +128,8 @@ print("on")
 """
 
 
-def test_a_process_that_was_stopped_goes_on():
-    """Ctrl-Z and fg, or a virtual machine that stood still: no thread is to blame."""
+def test_a_stopped_process_continues():
+    """Ctrl-Z and fg, or a suspended virtual machine, are no stall of a thread."""
     with subprocess.Popen([sys.executable, "-c", STOPPED], stdout=subprocess.PIPE, text=True) as child:
         assert child.stdout.readline() == "stop\n"
         child.send_signal(signal.SIGSTOP)
@@ -138,7 +138,7 @@ def test_a_process_that_was_stopped_goes_on():
         assert child.communicate(timeout=30)[0] == "on\n"
 
 
-def test_a_member_that_raises_gives_its_turn_away():
+def test_a_thread_that_raises_passes_its_turn_on():
     with using(VirtualClock()) as clock:
         hook, threading.excepthook = threading.excepthook, lambda args: None
         try:
@@ -149,8 +149,8 @@ def test_a_member_that_raises_gives_its_turn_away():
         assert clock.now() == 1.0
 
 
-def test_each_thread_may_use_a_clock_of_its_own():
-    """A Concurrence gets the threads of the clock of the thread that makes it."""
+def test_each_thread_may_use_its_own_clock():
+    """A Concurrence uses the clock of the thread that creates it."""
     import smach
 
     both, seen = threading.Barrier(2), {}
@@ -162,7 +162,7 @@ def test_each_thread_may_use_a_clock_of_its_own():
             child.start()
             clock.sleep(2 * seconds)
             now = clock.now()
-            child.join(10)  # its last sleep has ended; a busy computer may end the thread itself later
+            child.join(10)  # its last sleep is over; on a busy computer the thread may end later
             seen[seconds] = (now, child.is_alive())
             both.wait(10)
 

@@ -1,5 +1,5 @@
-"""The world in one process: what it is made of, what tracker and person are shown, the hand's tasks in it, and the
-limits of the arm as they are counted."""
+"""The world in one process: its parts, sights of tracker and person, tasks of the hand, and counted violations of the
+arm's limits."""
 
 import importlib
 import os
@@ -25,7 +25,7 @@ def stepped(world, seconds):
     return world
 
 
-# --- what it is made of -----------------------------------------------------------------------------------------------
+# --- parts ------------------------------------------------------------------------------------------------------------
 
 
 def test_conditions_reach_person_plant_and_tracker():
@@ -39,18 +39,18 @@ def test_conditions_reach_person_plant_and_tracker():
 
 
 @pytest.mark.parametrize("module", ["coglab_sim._cell", "coglab_sim._virtual"])
-def test_a_library_that_is_missing_is_named_with_what_to_do(monkeypatch, module):
+def test_a_missing_library_is_named_with_a_remedy(monkeypatch, module):
     monkeypatch.setitem(sys.modules, module, None)
     monkeypatch.delitem(sys.modules, "coglab_trials.world", raising=False)
     with pytest.raises(ImportError, match=rf"cannot be loaded \(.*{module}.*\): .*run ./coglab build.* libmujoco-dev"):
         importlib.import_module("coglab_trials.world")
 
 
-# --- what is seen -----------------------------------------------------------------------------------------------------
+# --- sights -----------------------------------------------------------------------------------------------------------
 
 
-def test_the_tracker_sees_the_hand_where_it_is():
-    """An arm is compliant: on the way, the hand is not where the person wants it."""
+def test_the_tracker_sees_the_true_place_of_the_hand():
+    """A person's arm is compliant: during a motion, the hand is not at its wanted place."""
     world = World(2, CONSIDERATE)
     world.human.command("give mug")
     true, wanted, apart = {}, {}, []
@@ -73,7 +73,7 @@ def test_the_tracker_sees_the_hand_where_it_is():
     assert max(apart) > 0.002
 
 
-def test_what_is_seen_has_an_age_and_a_blind_tracker_sees_nothing():
+def test_sights_have_an_age_and_a_blind_tracker_sees_nothing():
     world = World(2, CONSIDERATE)
     assert world.newest("object_mug")[0] is None
     stepped(world, 0.2)
@@ -84,8 +84,8 @@ def test_what_is_seen_has_an_age_and_a_blind_tracker_sees_nothing():
     assert world.newest("object_mug")[1] == pytest.approx(age + 0.5) and world.newest("human_hand")[1] <= 0.05
 
 
-def test_the_closure_that_is_seen_is_that_of_the_fingers_joints():
-    """Not of the motors: a tendon that is let go gives way before its finger does."""
+def test_the_seen_closure_is_that_of_the_finger_joints():
+    """Not of the motors: a released tendon moves before its finger does."""
     robot = Robot(3, object__start="world", object__position=[1.5, 1.0, 0.0])
     cell = robot.cell  # only a view
 
@@ -111,7 +111,7 @@ def test_the_closure_that_is_seen_is_that_of_the_fingers_joints():
 
 
 def calibrated():
-    """A world whose hand has calibrated; the object lies elsewhere."""
+    """Returns a world with a calibrated hand; the object is elsewhere."""
     world = World(3, PATIENT, "world")
     assert world.hand.calibrate("fast force") is None
     with pytest.raises(Exception, match="the hand calibrates"):
@@ -120,7 +120,7 @@ def calibrated():
     while not world.hand.calibration_over(world.t):
         world.step()
         assert world.t < begun + 5.0
-    assert world.t - begun > 0.5, "it takes its time in the world, too"
+    assert world.t - begun > 0.5, "it takes time in the world too"
     return world
 
 
@@ -141,14 +141,14 @@ def test_the_hand_preshapes_closes_on_nothing_and_opens():
     assert finished(world, world.hand.begin("hand_open", speed=255)).ok and max(world.hand.positions[2:]) < 20
 
 
-def test_a_new_goal_ends_the_one_that_runs():
+def test_a_new_goal_ends_the_running_one():
     world = calibrated()
     first = world.hand.begin("hand_close", speed=50)
     stepped(world, 0.2)
     second = world.hand.begin("hand_open", speed=255)
     assert first.verdict.reason == Reason.SUPERSEDED and world.hand.job is second
     world.hand.end(first, "late", Reason.CANCELLED)
-    assert world.hand.job is second, "one that has ended stays as it is"
+    assert world.hand.job is second, "an ended goal does not change"
     world.hand.end(second, "enough", Reason.CANCELLED)
     before = world.cell.truth()["hand_closure"]
     assert stepped(world, 0.3).cell.truth()["hand_closure"] == pytest.approx(before, abs=0.05), "the fingers stop"
@@ -160,7 +160,7 @@ def test_a_locale_with_decimal_commas_changes_no_number(tmp_path):
     )
     (tmp_path / "letters").write_text("<escape_char> /\n<mb_cur_max> 1\nCHARMAP\n<U002C> /x2c COMMA\nEND CHARMAP\n")
     made = ["localedef", "-c", "-i", tmp_path / "source", "-f", tmp_path / "letters", tmp_path / "xx_XX"]
-    subprocess.run(made, capture_output=True, check=False)  # warns of the categories that it has not
+    subprocess.run(made, capture_output=True, check=False)  # it warns of missing categories
     program = (
         "import locale, lwr_fri_bridge\n"
         "from coglab_py.packages import package_path\n"

@@ -28,7 +28,7 @@ class BackEnd(Protocol):
         """Short name of each action of the brain -> its name there. Empty: this robot has no brain."""
 
     def check(self) -> None:
-        """RuntimeError in words if the cell cannot be used now: closed, or from another thread or process."""
+        """RuntimeError with a reason if the cell cannot be used now: closed, or from another thread or process."""
 
     def now(self) -> float:
         """Returns the time, s."""
@@ -55,11 +55,11 @@ class BackEnd(Protocol):
         """Returns the newest pose of a frame, and its age (s). None: it was never seen."""
 
     def show_frame(self, name: str, pose: Pose) -> None:
-        """Show a frame of one's own, as goal of a motion, until it is shown elsewhere or the cell is closed."""
+        """Show an own frame, as goal of a motion, until it is shown elsewhere or the cell is closed."""
 
     @property
     def frame_delay(self) -> float:
-        """s until the robot surely knows a frame that is shown"""
+        """s, time until the robot certainly knows a shown frame"""
 
     def events(self) -> list[Event]:
         """Returns the events since the last call, at most the newest 10 000."""

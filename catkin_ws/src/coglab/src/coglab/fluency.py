@@ -20,7 +20,7 @@ import numpy as np
 Interval = tuple[float, float]
 GAP, BLIP = 0.15, 0.10  # s: a shorter pause does not interrupt an activity; a shorter activity is none
 PERSON_SPEED, PALM_SPEED = 0.05, 0.05  # m/s, from which a hand counts as active
-TOUCH = 0.05  # N, from which the person touches the object
+TOUCH = 0.05  # N, from which the person counts as touching the object
 FINGER_SPEED = 20.0  # counts of 254 per s, from which the robot's fingers count as active
 
 
@@ -44,8 +44,8 @@ class Fluency:
 
 
 def speed_of(times: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Mean speed (m/s) over the 60 ms around each time of a path, times [n] s and points [n, 3] m. Shape (n,). Late
-    stamps of single points change it by little."""
+    """Mean speed (m/s) over the 60 ms around each time of a path, times [n] s and points [n, 3] m. Shape (n,). Single
+    late stamps have little effect."""
     if len(times) < 3:
         return np.zeros(len(times))
     first, last = np.maximum(times - 0.03, times[0]), np.minimum(times + 0.03, times[-1])

@@ -154,7 +154,7 @@ def _hands(path_axis: Axes, speed_axis: Axes, truth: list[tuple], start: float) 
 def _torques(axis: Axes, rows: list[tuple], start: float) -> None:
     """External torques: one trace per joint, one above the other, on one scale that the bar at the right shows."""
     times, torques = _column(rows, 1, start)
-    low, high = np.percentile(torques, [0.5, 99.5], axis=0)  # so that one peak does not flatten the other traces
+    low, high = np.percentile(torques, [0.5, 99.5], axis=0)  # one peak must not flatten the other traces
     step = 1.2 * float(np.max(high - low)) or 1.0
     for k in range(len(JOINTS)):
         axis.axhline(-k * step, color="0.85", lw=0.5)

@@ -1,4 +1,4 @@
-"""What the robot's methods return: frozen records with a reason code, a sentence and times."""
+"""Return values of the robot's methods: frozen records with a reason code, a sentence and times."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def reason_name(code: int) -> str:
 
 
 class Refused(RuntimeError):
-    """A request was refused before anything moved. The sentence says what to do.
+    """A request was refused before anything moved. The sentence has the next step.
 
     ``code``: its coglab_msgs/ReasonCode. ``name``: the name of the code.
     """
@@ -51,7 +51,7 @@ class Result:
     code: int = ReasonCode.NONE
     """coglab_msgs/ReasonCode; 0 after success"""
     sentence: str = ""
-    """why it failed; empty after success"""
+    """reason of the failure; empty after success"""
     causes: tuple[str, ...] = ()
     """causes of the reason, nearest first"""
     started: float = 0.0
@@ -127,7 +127,7 @@ class RobotState:
     state: str
     """path of the innermost active state; empty without a brain"""
     actions: tuple[str, ...]
-    """what the brain accepts now: names of ``coglab.ACTIONS``, actions of your own, "reset" or "initialise"; empty
+    """actions that the brain accepts now: names of ``coglab.ACTIONS``, own actions, "reset" or "initialise"; empty
     while an action runs"""
     holding: str
     """id of the object in the robot's hand; empty if the hand is empty"""
@@ -136,7 +136,7 @@ class RobotState:
     code: int
     """coglab_msgs/ReasonCode of ``why``"""
     waits_for: str
-    """what the brain waits for; empty if for nothing"""
+    """awaited event of the brain; empty if none"""
     can_move: bool
     """the arm follows motions now"""
     blocked_by: str

@@ -169,7 +169,7 @@ class Arm:
         *,
         limit: float = 30.0,
     ) -> MotionResult:
-        """Bring the palm to a pose, in joint space. A frame is where it is now; it is not followed.
+        """Bring the palm to a pose, in joint space. A frame counts at its present place; it is not followed.
 
         ``target``: a Pose in the base frame, (position [3] m, quaternion [4]), 7 numbers, a 4 x 4 matrix, the name of a
         frame, such as "object_mug", or a position [3], which keeps the orientation of the palm. ``offset``: pose of the
@@ -246,7 +246,7 @@ class Arm:
         begun = self._robot.time
         request = DmpRequest(primitive, name, position, ratio, any(orientation), orientation)
         self._robot._await(self._cell.arm.execute_dmp(request), ANSWER, f"the answer to reach '{primitive}'")
-        self._robot._pause(2 * POLL)  # until the progress is that of this motion
+        self._robot._pause(2 * POLL)  # until the progress belongs to this motion
         return self._begin(Motion(self._robot, "reach", limit, lambda: self._look_at_reach(begun)))
 
     def follow(
@@ -290,8 +290,8 @@ class Arm:
 
     @contextmanager
     def guided(self) -> Iterator[None]:
-        """Inside the block the arm gives way to a hand that leads it: joint impedance with almost no stiffness, the
-        robot controller carries its weight. Afterwards it stands where it was left, in position mode. The brain may
+        """Inside the block a person can lead the arm by hand: joint impedance with almost no stiffness, the robot
+        controller carries its weight. Afterwards it stands at its last place, in position mode. The brain may
         stop while the arm changes its mode: ``robot.reset()`` brings arm and brain home. Example::
 
             with robot.arm.guided():
@@ -427,8 +427,8 @@ class Hand:
         return self._do(f"preshape {name}", lambda: self._port().preshape(name, force), limit)
 
     def close(self, speed: int | None = None, *, limit: float = 10.0) -> Result:
-        """Close the fingers: the preshaped grasp, or with ``speed`` (1 .. 511, sets the force too) from where they
-        are."""
+        """Close the fingers: the preshaped grasp, or with ``speed`` (1 .. 511, sets the force too) from their present
+        positions."""
         if speed is None:
             return self._do("close", lambda: self._port().close_on_object(), limit)
         wire = _wire(speed)
@@ -564,7 +564,7 @@ class Robot:
         ok = arm.motion_allowed().ok and not self._resettable()
         return Result("reset", ok, 0 if ok else state.reason_code, "" if ok else state.why, (), begun, self.time)
 
-    # --- what is ---
+    # --- state ---
 
     @property
     def time(self) -> float:
@@ -573,7 +573,7 @@ class Robot:
 
     @property
     def state(self) -> RobotState:
-        """What robot and brain do now."""
+        """Present state of robot and brain."""
         self._check()
         brain, arm, hand = self._cell.state(), self._cell.arm, self._cell.hand
         allowed, position = arm.motion_allowed(), arm.joint_positions()
@@ -597,7 +597,7 @@ class Robot:
         )
 
     def events(self) -> list[Event]:
-        """Returns the events since the last call: transitions of the machines, results, and what was said to the
+        """Returns the events since the last call: transitions of the machines, results, and messages to the
         person. The newest 10 000 are kept."""
         self._check()
         return self._cell.events()
@@ -608,7 +608,7 @@ class Robot:
         return self.seen(name)[0]
 
     def seen(self, name: str) -> tuple[Pose, float]:
-        """Like ``frame``, with the age of what is seen, s."""
+        """Like ``frame``, with the age of the sight, s."""
         self._check()
         pose, age = self._cell.frame(str(name))
         if pose is None and name == "palm":
@@ -624,10 +624,10 @@ class Robot:
         self._check()
         self._pause(number(seconds, "seconds", "s", 0.0))
 
-    # --- its end ---
+    # --- end ---
 
     def close(self) -> None:
-        """Stop what this object has started, wait until the arm stands, and disconnect. Twice does no harm."""
+        """Stop the motion of this object, wait until the arm stands, and disconnect. May be called twice."""
         if self._closed:
             return
         try:
@@ -656,7 +656,7 @@ class Robot:
         self._cell.pause(seconds)
 
     def _wait(self, condition: Callable[[], bool], limit: float, what: str) -> None:
-        """Let time pass until the condition is true. TimeoutError names what was waited for."""
+        """Let time pass until the condition is true. TimeoutError names ``what``."""
         end = self._cell.clock() + limit
         while not condition():
             if self._cell.clock() >= end:
@@ -664,7 +664,7 @@ class Robot:
             self._pause(POLL)
 
     def _await(self, pending: Pending, limit: float, what: str) -> Any:
-        """Value of a pending answer. Refused: the answer is no."""
+        """Returns the value of a pending answer. Raises Refused for a refusal."""
         try:
             self._wait(pending.done, limit, what)
         except BaseException:
@@ -748,7 +748,7 @@ class Robot:
             known = ", ".join(
                 [*self._cell.actions, *(each for each in state.actions if each not in self._cell.actions)]
             )
-            return f"'{name}' is no action that can be asked for now; there are {known}"
+            return f"'{name}' is no action that can be requested now; there are {known}"
         held = f"the hand holds the {state.holding}" if state.holding else "the hand is empty"
         own = [each for each in state.actions if each not in self._cell.actions]
         can = " or ".join(f"do('{each}')" if each in own else f"{each}()" for each in state.actions)

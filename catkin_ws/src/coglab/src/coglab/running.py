@@ -48,16 +48,16 @@ LATCHED = 0.2  # s in which a latched message comes after its topic is connected
 
 
 class NoRobot(ConnectionError):
-    """There is no robot to connect to. The sentence says what to do."""
+    """There is no robot to connect to. The sentence has the next step."""
 
 
 def connect(master: str = "", *, namespace: str = "", limit: float = 10.0) -> Robot:
     """Connect to the running robot and return it. Use it in a ``with`` block.
 
     ``master``: address of the ROS master, such as "http://127.0.0.1:11311", or its port; by default ROS_MASTER_URI.
-    ``namespace``: of the robot, if it was launched in one. ``limit``: s until the arm has to be heard.
+    ``namespace``: of the robot, if it was launched in one. ``limit``: s, longest wait for messages of the arm.
 
-    The process becomes a node of its own, "coglab_python_..."; a process that is a node already stays that node.
+    The process becomes a new node, "coglab_python_..."; a process that is already a node stays that node.
     Several connections in a process are possible, to one master. NoRobot: no master, no robot, or a robot of another
     version.
     Example::
@@ -123,7 +123,7 @@ def _services() -> list[str]:
     try:
         return [name for name, _ in rosgraph.Master("/coglab_python").getSystemState()[2]]
     except (OSError, rosgraph.MasterException) as error:
-        raise NoRobot(f"what answers at {os.environ['ROS_MASTER_URI']} is no ROS master: {error}") from None
+        raise NoRobot(f"the program at {os.environ['ROS_MASTER_URI']} is no ROS master: {error}") from None
     finally:
         socket.setdefaulttimeout(before)
 
@@ -152,7 +152,7 @@ def _check_version(service: str, kind: Any) -> None:
 
 
 def _become_node() -> None:
-    """rospy.init_node for this process, once. The process ends as always; Ctrl-C stays Python's own."""
+    """rospy.init_node for this process, once. The end of the process and Ctrl-C stay Python's own."""
     if rospy.core.is_initialized():
         return
     rospy.init_node("coglab_python", anonymous=True, disable_signals=True, disable_rosout=True)
@@ -191,7 +191,7 @@ class _RunningBackEnd:
         self._show.start()
 
     def await_news(self, limit: float) -> None:
-        """Wait until arm, brain and hand have been heard. NoRobot after ``limit`` s."""
+        """Wait for messages of arm, brain and hand. NoRobot after ``limit`` s."""
         heard: dict[str, Callable[[], bool]] = {
             "joint positions of the arm": lambda: self.arm.joint_positions() is not None,
             "the state of the arm": lambda: self.arm.motion_allowed().code != ReasonCode.NODE_SILENT,
@@ -209,7 +209,7 @@ class _RunningBackEnd:
                 raise NoRobot(f"{' and '.join(missing)} did not come within {limit:g} s; see ./coglab status")
             time.sleep(0.02)
         if self.actions:
-            time.sleep(LATCHED)  # so that an old result is not taken for a new one
+            time.sleep(LATCHED)  # an old result must not count as a new one
 
     def close(self) -> None:
         """Unsubscribe from everything. The node stays for other connections."""
@@ -274,7 +274,7 @@ class _RunningBackEnd:
         except PortError as error:
             return Answer(False, error.sentence.partition(" refused: ")[2] or error.sentence, error.code)
         self._submitted = submitted
-        # The state from before the request must not be taken for the hub after the action.
+        # The state before the request must not count as the hub after the action.
         end = time.monotonic() + 1.0
         while self.state().in_hub and action in self.state().actions and time.monotonic() < end:
             time.sleep(0.005)

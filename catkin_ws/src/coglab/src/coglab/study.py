@@ -54,7 +54,7 @@ def trials(
     limit: float = 60.0,
     **world: Any,
 ) -> list[Any]:
-    """Run many trials, each in a World of its own, and return their records in the order of the seeds.
+    """Run many trials, each in its own World, and return their records in the order of the seeds.
 
     ``n``: number of trials, with the seeds 1 .. n; or ``seeds``: these seeds. ``actions``: as for ``World.trial``,
     by default "receive". ``workers``: processes; 1: in this process. ``limit``: s of virtual time for each action.
@@ -78,7 +78,7 @@ def trials(
         results: Iterable[tuple[int, Any]] = enumerate(map(_result, jobs))
     else:
         try:
-            pickle.dumps((world, each))  # what multiprocessing does to send them; here the reason can be named
+            pickle.dumps((world, each))  # multiprocessing does this too; here the reason is reported
         except Exception as error:
             raise ValueError(
                 f"these arguments cannot be sent to another process ({error}): use functions of a module instead of "

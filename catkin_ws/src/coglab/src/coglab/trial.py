@@ -1,4 +1,4 @@
-"""The record of a trial: results, phases, and what hands, object and forces did."""
+"""The record of a trial: results, phases, and traces of hands, object and forces."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class Phase:
 @dataclass(frozen=True, eq=False, repr=False)
 class Trial:
     """Record of one trial in a World. Arrays have one row per sample, every 10 ms. Poses in the base frame: positions
-    in m, orientations as quaternions x y z w. All of it is the truth of the simulation, not what the robot sees.
+    in m, orientations as quaternions x y z w. All values are true ones of the simulation, not the robot's measurements.
 
     Read it, ``plot()`` it, ``save()`` it; ``Trial.load()`` reads it again. ``bool(trial)``: all actions succeeded.
     """
@@ -90,7 +90,7 @@ class Trial:
     contacts: tuple[tuple[float, bool, float, str], ...]
     """events of the contact detector: (s, True: contact or load, False: load taken over; margin, text)"""
     said: tuple[tuple[float, str], ...]
-    """what the robot said to the person: (s, name of coglab_msgs/Say)"""
+    """messages to the person: (s, name of coglab_msgs/Say)"""
     time: np.ndarray
     """s, shape (n,)"""
     palm_position: np.ndarray
@@ -115,7 +115,7 @@ class Trial:
     held_by: np.ndarray
     """index into HOLDERS, shape (n,)"""
     labels: Mapping[str, str] = field(default_factory=dict)
-    """whom and what for: participant, condition, study, session, notes, as in the trial.yaml of a recorded handover"""
+    """participant, condition, study, session, notes, as in the trial.yaml of a recorded handover"""
 
     def __repr__(self) -> str:
         said = "; ".join(map(str, self.results)) or "no action"
@@ -148,12 +148,12 @@ class Trial:
 
     @property
     def peak_force(self) -> float:
-        """N, largest force on the robot's hand while the person touches the object too; 0 if that never was."""
+        """N, largest force on the robot's hand while the person touches the object too; 0 if never."""
         shared = np.linalg.norm(self.person_force, axis=1) > TOUCH
         return float(np.linalg.norm(self.hand_force[shared], axis=1).max(initial=0.0))
 
     def series(self) -> Series:
-        """The record as the rows that plots and reports of running systems use, too."""
+        """The record as rows, as in plots and reports of running systems."""
         rows = range(len(self.time))
         forces = np.linalg.norm(self.hand_force, axis=1)
         truth: list[tuple[Any, ...]] = [
@@ -204,7 +204,7 @@ class Trial:
 
     @staticmethod
     def load(folder: str | os.PathLike[str]) -> Trial:
-        """Read what ``save()`` wrote. ValueError names the file and what is wrong with it."""
+        """Read the files of ``save()``. ValueError names the file and the error."""
         place = Path(folder)
         words, numbers = place / "trial.yaml", place / "trial.npz"
         for file in (words, numbers):
@@ -228,7 +228,7 @@ class Trial:
             return Trial(**data, **arrays)
         except FileNotFoundError:
             raise
-        except Exception as error:  # of yaml, zip, numpy, or a field that is missing
+        except Exception as error:  # from yaml, zip, numpy, or a missing field
             raise ValueError(f"{place} has no trial that can be read: {error}") from None
 
 
@@ -257,7 +257,7 @@ class Recording:
 
     def _look(self) -> None:
         """Take a sample; called after each period."""
-        world, now = self._virtual.world, self._virtual.clock.now() + DT  # the period that has just been made
+        world, now = self._virtual.world, self._virtual.clock.now() + DT  # the period that has just ended
         event = self._virtual.contact.event()
         if event is not None and event is not self._event:
             self._contacts.append((now, bool(event.contact), float(event.margin), f"{event.source}: {event.message}"))

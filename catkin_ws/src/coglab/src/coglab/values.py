@@ -1,4 +1,4 @@
-"""Checks of the arguments of this package. Each ValueError says what was expected and what came."""
+"""Checks of the arguments of this package. Each ValueError has the expected and the actual value."""
 
 from __future__ import annotations
 

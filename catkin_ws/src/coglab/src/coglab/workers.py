@@ -15,7 +15,7 @@ from typing import Any
 
 from coglab_trials.virtual_clock import ClockStalled
 
-TRIES = 2  # a job whose process was lost, or whose clock stalled on a busy machine, runs once more
+TRIES = 2  # a job with a lost process, or a stalled clock on a busy machine, runs again
 
 
 class WorkerLost(RuntimeError):
@@ -68,8 +68,8 @@ def run_each(
 
 
 def _call(function: Callable[[Any], Any], job: Any) -> bytes:
-    """Runs one job in its process. Returns its result or its exception, pickled as multiprocessing does it. Here, so
-    that what cannot be sent is the job's own error, and does not end the pool."""
+    """Runs one job in its process. Returns its result or its exception, pickled as multiprocessing does it. A
+    failed pickling is thus an error of the job, and does not end the pool."""
     try:
         result = function(job)
     except Exception as error:
@@ -101,7 +101,7 @@ def _answer(future: Future[bytes], limit: float | None) -> Any:
 
 
 def _stalled(error: BaseException | None) -> ClockStalled | None:
-    """ClockStalled among the causes of an error: state machines raise errors of their own from it."""
+    """ClockStalled among the causes of an error: state machines raise their own errors from it."""
     while error is not None and not isinstance(error, ClockStalled):
         error = error.__cause__ or error.__context__
     return error

@@ -47,8 +47,8 @@ if TYPE_CHECKING:
     from ctrl_more import FeedbackControllersManager
 
 LOG = logging.getLogger("coglab")
-START_LIMIT = 60.0  # s of virtual time until the robot waits for its first action
-REST_LIMIT = 20.0  # s of virtual time until the person's hand is back, after a trial
+START_LIMIT = 60.0  # s of virtual time, limit of the initialisation
+REST_LIMIT = 20.0  # s of virtual time, limit for the return of the person's hand after a trial
 KEPT_EVENTS = 10_000
 PUSH_LIMIT = 500.0  # N, largest push
 
@@ -171,7 +171,7 @@ class World:
         return 0.0 if self._clock is None else round(self._clock.now(), 6)
 
     def step(self, seconds: float = DT) -> None:
-        """Let so much time pass, in periods of 5 ms; at least one."""
+        """Let ``seconds`` pass, in periods of 5 ms; at least one."""
         self._check()
         self._advance(max(1, round(number(seconds, "seconds", "s", 0.0) / DT)))
 
@@ -244,11 +244,11 @@ class World:
         except BaseException as error:
             self._machine_error = error
 
-    # --- what is, and what can be done to it ---
+    # --- state, and actions on the cell ---
 
     @property
     def truth(self) -> Mapping[str, Any]:
-        """What really happens, SI units, base frame: "held_by", "dropped", poses of "object", "human_hand" and
+        """True state of the cell, SI units, base frame: "held_by", "dropped", poses of "object", "human_hand" and
         "robot_hand" (dicts of position [3] and rotation [4]), "touch_force" and "human_force" [3] N, ..."""
         self._check()
         truth: Mapping[str, Any] = self.cell.cell.truth()
@@ -287,7 +287,7 @@ class World:
 
     def add_motion(self, name: str, motion: OwnMotion) -> None:
         """Load a motion of ``coglab.control`` into the control cycle, as ``./coglab controller run`` does on the
-        running robot. Refused: the name is in use. ValueError: no motion; and whatever ``configure`` raises."""
+        running robot. Refused: the name is in use. ValueError: no motion; and the errors of ``configure``."""
         self._check()
         missing = [each for each in ("configure", "start", "reference", "done") if not hasattr(motion, each)]
         if isinstance(motion, type) or missing:
@@ -363,12 +363,12 @@ class World:
         self.cell.cell.set_loss(*shares)
 
     def leave_command_mode(self, reason: str = "the robot controller left command mode") -> None:
-        """The robot controller falls back to monitor mode, as after a fault of its own."""
+        """The robot controller falls back to monitor mode, as after an own fault."""
         self._check()
         self.cell.cell.leave_command_mode(reason)
 
     def block(self, on: bool = True) -> None:
-        """Hold the arm where it is by force, or let it go."""
+        """Hold the arm in place by force, or release it."""
         self._check()
         self.cell.cell.block(bool(on))
 
@@ -386,7 +386,7 @@ class World:
         ``actions``: "receive", "give", "take", "put" or one of your own in ``settings``, such as
         ``trial("receive", "give")``. ``limit``: s of virtual time for each. The record ends when the person's hand is
         back. TimeoutError: an action does not end; the robot is stopped.
-        Refused: the first action does not fit to what the hand holds.
+        Refused: the first action does not fit the state of the hand.
         """
         self._check()
         known = [*ACTIONS, *(own.name for own in self.virtual_trial.ctx.parts.actions)]
@@ -410,7 +410,7 @@ class World:
 
     @contextmanager
     def record(self) -> Iterator[Recording]:
-        """Record what is done inside the block; then ``recording.trial`` is the Trial. Example::
+        """Record the events inside the block; then ``recording.trial`` is the Trial. Example::
 
         with world.record() as recording:
             world.robot.receive()
@@ -430,7 +430,7 @@ class World:
     # --- its end ---
 
     def close(self) -> None:
-        """Stop the arm, wait until it stands, end the machines. Twice does no harm; other uses are refused."""
+        """Stop the arm, wait until it stands, end the machines. May be called twice; other uses are refused."""
         trial = self._trial
         if trial is None:
             return
@@ -444,7 +444,7 @@ class World:
         finally:
             try:
                 self._end_machine(trial)
-            finally:  # whatever an own part raised, this thread may open another World
+            finally:  # after any error of an own part, this thread may open another World
                 self._trial = None
                 self._stack.close()
                 self._release_thread()
@@ -469,7 +469,7 @@ class World:
 
     @staticmethod
     def opened() -> World | None:
-        """Returns the open World of this thread, or None: to close one that no variable names any more."""
+        """Returns the open World of this thread, or None. Use it to close a World without a variable."""
         with _HERE:
             there = _open_worlds.get(threading.get_ident())
         world = there() if there is not None else None
@@ -492,7 +492,7 @@ class World:
                 del _open_worlds[self._thread]
 
     def _check(self) -> None:
-        """RuntimeError in words if this World cannot be used here."""
+        """RuntimeError with a reason if this World cannot be used here."""
         if os.getpid() != self._pid:
             raise RuntimeError(
                 "this World was opened before the process forked, and a fork does not take its threads along: open it "
@@ -595,7 +595,7 @@ class _VirtualBackEnd:
         self._world.cell.cell.set_push(list(force))
 
     def look(self) -> None:
-        """After each period: show the caller's frames again, end a push, take what was said."""
+        """After each period: show the caller's frames again, end a push, collect messages."""
         for name, pose in self._frames.items():
             self._set_frame(name, pose)
         if self._push_until and self._world.time >= self._push_until:

@@ -29,7 +29,7 @@ GTEST_CASE = re.compile(r"^\s*(TYPED_TEST|TEST_F|TEST_P|TEST)\(\s*(\w+)\s*,\s*(\
 def demo_parser(top: Path) -> Parser:
     """./coglab demo"""
     parser = Parser(prog="coglab demo", description="Takes an object from the simulated person and gives it back.")
-    parser.add_argument("--headless", action="store_true", help="no rviz, whatever is installed")
+    parser.add_argument("--headless", action="store_true", help="no rviz, even if it is installed")
     parser.add_argument("--no-console", action="store_true", help="without the experimenter's page")
     parser.add_argument("--seed", type=seed, default=7, help="seed of the virtual person and of all noise")
     parser.add_argument(
@@ -37,14 +37,14 @@ def demo_parser(top: Path) -> Parser:
         type=writable_folder,
         default=top / "out" / "demo",
         metavar="DIR",
-        help="where result.json and trial.png go",
+        help="folder of result.json and trial.png",
     )
     parser.add_argument(
         "--person",
         choices=("patient", "accustomed", "drawn"),
         default="patient",
-        help="patient: waits for the robot, seen without noise or delay (default); accustomed: helps it by habit, too; "
-        "drawn: as people are, by the seed, and seen by the tracker as it is; not every handover succeeds, least with "
+        help="patient: waits for the robot, seen without noise or delay (default); accustomed: also helps it by habit; "
+        "drawn: realistic, by the seed, and seen by a realistic tracker; not every handover succeeds, least with "
         "drawn people",
     )
     return parser
@@ -151,7 +151,7 @@ class Wanted(NamedTuple):
 
 
 NAMED_IN_A_TEST = r"""(?:\bfind |\bpkg=['"]|\bfrom |\bimport |_path\(['"]|\brosrun['"], ['"])(\w+)"""
-"""How launch files and Python programs name a package that they run or import."""
+"""Pattern of a package name in launch files and Python programs that run or import it."""
 
 
 def test_targets(top: Path, wanted: list[Wanted]) -> list[str]:
@@ -193,16 +193,14 @@ def test_options(top: Path, words: list[str]) -> argparse.Namespace:
     parser = Parser(prog="coglab test", description="Runs every test; the last line counts them.")
     parser.add_argument("tests", nargs="*", metavar="PACKAGE[/FILE[::CASE]]", type=Wanted.of, help="default: all")
     parser.add_argument("--long", action="store_true", help="the campaigns too (hours)")
-    parser.add_argument(
-        "--repeat", type=int, default=1, metavar="N", help="N times; lists what was not always the same"
-    )
-    parser.add_argument("--load", action="store_true", help="beside two busy processes")
+    parser.add_argument("--repeat", type=int, default=1, metavar="N", help="run N times; list the cases that differ")
+    parser.add_argument("--load", action="store_true", help="run beside two busy processes")
     parser.add_argument(
         "--out",
         type=writable_folder,
         default=top / "out" / "test",
         metavar="DIR",
-        help="where JUnit files and logs go; what was there is removed (default: out/test)",
+        help="folder of JUnit files and logs, emptied first (default: out/test)",
     )
     options = parser.parse_args(words)
     out: Path = options.out
@@ -223,9 +221,11 @@ def test_options(top: Path, words: list[str]) -> argparse.Namespace:
 def bench_options(top: Path, words: list[str]) -> argparse.Namespace:
     """./coglab bench"""
     known = benchmarks(top)
-    parser = Parser(prog="coglab bench", description="Measures, beside goals and other programs.")
+    parser = Parser(
+        prog="coglab bench", description="Runs the benchmarks, with goals and other programs for comparison."
+    )
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"{', '.join(known)}; default: all, without --report")
-    parser.add_argument("--quick", action="store_true", help="few repetitions; prints the rows and keeps none")
+    parser.add_argument("--quick", action="store_true", help="few repetitions; prints the rows and stores none")
     parser.add_argument("--report", action="store_true", help="writes docs/benchmarks.md from benchmarks/results.csv")
     options = parser.parse_args(words)
     _named(options.names, known, "benchmark")

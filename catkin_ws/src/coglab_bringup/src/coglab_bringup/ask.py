@@ -44,7 +44,7 @@ def ask_parser(command: str) -> Parser:
     """./coglab start, status, hold, stop"""
     about = {
         "start": "Waits for the hub, then starts an action; by default takes from the person, or gives back.",
-        "status": "State, object and why, of the system that runs.",
+        "status": "State, held object and reason, of the running system.",
         "hold": "Brakes and latches; ./coglab start reset goes on.",
         "stop": "STOP: brakes, latches and ends the action; ./coglab start reset goes on.",
     }[command]
@@ -63,18 +63,18 @@ def ask_parser(command: str) -> Parser:
             default="",
             type=lambda word: word if not word.startswith("delivery:=") else f"/{delivery_name(word)}",
             metavar="OBJECT",
-            help="of the object database",
+            help="object of the database",
         )
         parser.add_argument(
             "delivery",
             nargs="?",
             type=delivery_name,
             metavar="delivery:=NAME",
-            help="how the object is given, of its file",
+            help="delivery of the object's file: how it is given",
         )
-        parser.add_argument("--wait", type=float, default=90.0, metavar="S", help="for the hub, at most (default 90)")
+        parser.add_argument("--wait", type=float, default=90.0, metavar="S", help="longest wait, s (default 90)")
     parser.add_argument(
-        "-p", type=master_port, default=0, dest="port", metavar="PORT", help="of the ROS master, if several systems run"
+        "-p", type=master_port, default=0, dest="port", metavar="PORT", help="port of the ROS master, if not clear"
     )
     return parser
 
@@ -103,7 +103,7 @@ def find_master(top: Path, port: int, users_own: str) -> str:
         return users_own
     if len(systems) > 1:
         there = ", ".join(f"-p {number} ({command})" for number, command in systems.items())
-        raise Refused(f"several systems run; say which: {there}")
+        raise Refused(f"several systems run; choose one: {there}")
     if systems:
         return f"http://127.0.0.1:{next(iter(systems))}"
     if brain_of(DEFAULT_MASTER):
@@ -163,7 +163,7 @@ class Brain:
         try:
             return call(self.master, name, request, ANSWER_LIMIT)
         except NoAnswer as error:
-            raise Refused(f"{name} does not answer ({error}); what runs: ./coglab shell rosnode list") from error
+            raise Refused(f"{name} does not answer ({error}); list the nodes: ./coglab shell rosnode list") from error
 
     def command(self, name: str, *words: str) -> tuple[bool, str]:
         """Success and message of a service whose response has the fields success, reason_code and message."""
@@ -184,7 +184,7 @@ class Brain:
 def sentence_of(state: State) -> str:
     """State, object and reason, one per line."""
     name = state.state.rpartition("/")[2]
-    takes = f"takes {', '.join(state.actions)}" if state.in_hub else "an action is under way"
+    takes = f"takes {', '.join(state.actions)}" if state.in_hub else "an action runs"
     held = state.object_id or "none"
     return f"state:  {name} ({takes})\nobject: {held}\nwhy:    {state.why or 'nothing failed'}"
 
@@ -193,7 +193,7 @@ def status(brain: Brain, _options: argparse.Namespace) -> int:
     """Print the latched state."""
     if not brain.wait_for_state(lambda state: True, STATE_LIMIT):
         raise Refused(
-            "/coglab/state says nothing: the brain is starting, or it has ended; its words are in the terminal "
+            "/coglab/state is not published: the brain is starting, or has ended; see its messages in the terminal "
             "of ./coglab launch"
         )
     print(sentence_of(brain.state))

@@ -62,7 +62,7 @@ def say_console(home: Path, alive: Callable[[], bool], limit: float = CONSOLE_LI
     late, link = time.monotonic() + limit, home / "console.url"
     while not link.is_file() and alive():
         if time.monotonic() > late:
-            print(f"[coglab] console: still starting after {limit:.0f} s; its words are in roslaunch.log", flush=True)
+            print(f"[coglab] console: still starting after {limit:.0f} s; see roslaunch.log", flush=True)
             late = float("inf")
         time.sleep(0.2)
     if link.is_file():
@@ -89,7 +89,7 @@ class PaceWatch:
             self.lowest = factor
             print(
                 f"[coglab] this computer is too busy for real time: the simulated cell runs at {factor:g} of it, "
-                "and everything takes that much longer; what was measured is in roslaunch.log",
+                "and everything takes that much longer; measurements are in roslaunch.log",
                 flush=True,
             )
 
@@ -146,14 +146,14 @@ def unfinished(kind: str, error: BaseException) -> dict:
 PEOPLE = {
     "patient": (
         ("profile:=patient", "perfect_perception:=true"),
-        "a patient person, who waits for the robot and is seen without noise or delay; people as they are: "
+        "a patient person, who waits for the robot and is seen without noise or delay; realistic people: "
         "./coglab demo --person drawn",
     ),
     "accustomed": (
         ("profile:=accustomed", "perfect_perception:=true"),
         "an accustomed person, who waits for the robot, helps it by habit and is seen without noise or delay",
     ),
-    "drawn": ((), "a person drawn by the seed, as people are, seen by the tracker as it is"),
+    "drawn": ((), "a realistic person, drawn by the seed and seen by a realistic tracker"),
 }
 """Launch arguments of each kind of person, and their description."""
 
@@ -175,7 +175,7 @@ def main(arguments: list[str]) -> int:
 
 def run(top: Path, options: argparse.Namespace) -> int:
     """Launch the system, do the handovers, write the results, stop. Returns the exit status."""
-    signal.signal(signal.SIGTERM, _interrupt)  # so that the results up to this moment are written
+    signal.signal(signal.SIGTERM, _interrupt)  # write the results up to this moment
     out: Path = options.out.absolute()
     out.mkdir(parents=True, exist_ok=True)
     person, words = PEOPLE[options.person]

@@ -111,7 +111,7 @@ def findings(top: Path) -> Iterator[Finding]:
         slow = "a simulated cell runs slower than real time and answers to a robot may come late"
         yield True, f"this computer is busy: load {load:.1f} on {cores} cores; {slow}: end other programs"
     if shutil.disk_usage(top).free < 2e9:
-        yield False, "less than 2 GB free where this folder lies; make room before building"
+        yield False, "less than 2 GB free on the disk of this folder; make room before building"
 
 
 def main(arguments: list[str]) -> int:

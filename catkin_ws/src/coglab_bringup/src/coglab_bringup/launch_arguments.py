@@ -22,7 +22,7 @@ READ = ("controllers", "feedback", "managers", "signals", "primitives", "dmp_lib
 WRITTEN = ("results", "result_file", "contact_learnt_file", "record", "log_file", "hand_trace")
 HELP = """usage: ./coglab launch [-p PORT] [ARGUMENT:=VALUE ...] [OPTION of roslaunch ...]
 
-Starts coglab.launch on a free port of its own for the ROS master, or on PORT. Arguments, with what they are by default:
+Starts coglab.launch with its own ROS master on a free port, or on PORT. Arguments with their defaults:
 """
 Check = Callable[[str], object]  # raises an exception for an invalid value
 
@@ -86,7 +86,7 @@ def _file(value: str) -> None:
 
 
 def _controller_file(value: str) -> None:
-    """/robot knows shipped files by their names, and files of packages."""
+    """/robot finds shipped files by their names, and files of packages."""
     if "/" in value and not value.startswith("package://"):
         _file(value)
 
@@ -154,7 +154,7 @@ def split_port(words: list[str]) -> tuple[int, list[str]]:
 
 
 def whole_path(word: str) -> str:
-    """ARGUMENT:=VALUE with the whole path of a file that is named from this folder: nodes run in another one."""
+    """ARGUMENT:=VALUE with the absolute path of a file in this folder: nodes run in another one."""
     name, _, value = word.partition(":=")
     named = value and value != "none" and not value.startswith(("package://", "$("))
     if named and (name in WRITTEN or (name in READ and Path(value).exists())):

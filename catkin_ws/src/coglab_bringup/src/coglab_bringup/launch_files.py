@@ -23,7 +23,7 @@ def check(arguments: Mapping[str, str]) -> None:
         except ValueError as error:
             raise ValueError(f"{name}:={value}: {' '.join(str(error).split())}") from None
     if arguments.get("split", "false").lower() == "true" and arguments.get("arm", "fri") != "fri":
-        raise ValueError(f"split:=true: the two nodes know arm:=fri alone; leave split out, or arm:={arguments['arm']}")
+        raise ValueError(f"split:=true: it needs arm:=fri; leave split out, or arm:={arguments['arm']}")
     source, simulated = arguments.get("perception", "none"), arguments.get("sim", "true").lower() == "true"
     if source not in PERCEPTION:
         raise ValueError(f"perception:={source}: expected one of {', '.join(PERCEPTION)}")
@@ -68,7 +68,7 @@ def _mapping(value: str) -> None:
         mark = getattr(error, "problem_mark", None)
         where = f"line {mark.line + 1}: " if mark else ""
         raise ValueError(f"{where}not YAML: {getattr(error, 'problem', None) or error}") from None
-    except (RecursionError, ValueError, TypeError) as error:  # nested without end; a date that is none; a list as a key
+    except (RecursionError, ValueError, TypeError) as error:  # endless nesting, an invalid date, or a list as a key
         raise ValueError(f"not YAML that can be used: {error}") from None
     if not isinstance(found, dict):
         kind = "nothing but comments" if found is None else f"a {type(found).__name__}"
@@ -76,7 +76,7 @@ def _mapping(value: str) -> None:
 
 
 def _controller_file(value: str) -> None:
-    """A YAML file as /robot finds it: whole path, package://name/path, or the name of a shipped one, as `palm`."""
+    """A YAML file as /robot finds it: absolute path, package://name/path, or the name of a shipped one (`palm`)."""
     package, within = "coglab_controllers", f"config/{value}"
     if value.startswith("package://"):
         package, _, within = value.removeprefix("package://").partition("/")
@@ -128,7 +128,7 @@ def _primitives(value: str) -> None:
 def _patterns(value: str) -> None:
     try:
         found = json.loads(_bytes(value))
-    except (RecursionError, ValueError) as error:  # the file's own faults are ValueErrors, too
+    except (RecursionError, ValueError) as error:  # invalid contents are ValueErrors too
         wrong = isinstance(error, (json.JSONDecodeError, UnicodeDecodeError, RecursionError))
         raise ValueError(f"not JSON: {error}; train_patterns.py writes such a file" if wrong else str(error)) from None
     if not isinstance(found, dict):
@@ -164,7 +164,7 @@ def _objects(value: str) -> None:
 
 
 def _written(value: str) -> None:
-    """A file that a node writes."""
+    """A file to be written by a node."""
     path = Path(value)
     if path.is_dir():
         raise ValueError("expected a file to write, this is a folder")

@@ -80,9 +80,9 @@ def reach_errors(trial: Series, kind: str, entry: Mapping[str, Any] | None, star
     nobody = {
         "the goal of this action is no grasp of a person's object": kind not in (TAKES, GIVES),
         "no reach began": not rows,
-        "the object database did not tell the object's grasps": entry is None,
-        "there is no truth on /coglab_sim/truth/cell, as with a real robot": not trial.poses,
-        "the truth or the choice of the grasp was not told at the end of the reach": last["error_mm"] is None,
+        "the object database did not return the object": entry is None,
+        "no truth is published on /coglab_sim/truth/cell, as with a real robot": not trial.poses,
+        "truth or chosen grasp are unknown at the end of the reach": last["error_mm"] is None,
     }
     why = next((f"nobody: {reason}" for reason, true in nobody.items() if true), "truth of the simulated cell")
     errors = {"final_error_mm": last["error_mm"], "final_error_deg": last["error_deg"]}

@@ -21,7 +21,7 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Raise Refused; argparse calls this."""
-        raise Refused(f"{message}; what there is: ./{self.prog} --help")
+        raise Refused(f"{message}; the options: ./{self.prog} --help")
 
 
 def seed(text: str) -> int:

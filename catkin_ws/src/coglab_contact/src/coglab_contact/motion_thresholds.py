@@ -94,7 +94,7 @@ class Thresholds:
             steady, steady_limit = np.array(data["steady"], dtype=float), float(data["steady_limit"])
             lag = float(data["lag"])
         except (KeyError, TypeError, ValueError) as error:
-            raise ThresholdError(f"{path}: a figure is missing or is none: {error}") from error
+            raise ThresholdError(f"{path}: a figure is missing or invalid: {error}") from error
         good = all(np.all(np.isfinite(each)) and np.all(each >= 0.0) for each in (variance, steady))
         if not good or variance.shape != (7, len(FEATURES)) or steady.shape != (7,):
             raise ThresholdError(f"{path}: expected 7 x {len(FEATURES)} variances and 7 deviations, all 0 or more")

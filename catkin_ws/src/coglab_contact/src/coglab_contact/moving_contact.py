@@ -1,6 +1,6 @@
 """Contact from the torques of a moving arm: momentum observer, change of its residual, learnt thresholds.
 
-The computation is C++: see include/coglab_contact/moving_contact.hpp. Here are the thresholds' use and their learning.
+The computation is C++: see include/coglab_contact/moving_contact.hpp. This module uses and learns the thresholds.
 """
 
 from __future__ import annotations
@@ -51,11 +51,11 @@ def unwritable(file: str) -> str:
     if path.is_dir():
         return f"{path} is a folder: name a file in it"
     if path.exists():
-        return "" if os.access(path, os.W_OK) else f"{path} may not be written"
+        return "" if os.access(path, os.W_OK) else f"{path}: no permission to write"
     folder = path.absolute().parent
     if not folder.is_dir():
-        return f"{path} cannot be written, for the folder {folder} is not there: create it"
-    return "" if os.access(folder, os.W_OK) else f"{path} cannot be written, for the folder {folder} may not be written"
+        return f"{path} cannot be written: the folder {folder} does not exist; create it"
+    return "" if os.access(folder, os.W_OK) else f"{path} cannot be written: no permission to write in {folder}"
 
 
 class MotionRecorder:

@@ -1,1 +1,1 @@
-"""Code that the Python packages of CogLab share: poses, checked YAML files, checked ROS parameters."""
+"""Common code of CogLab's Python packages: poses, checked YAML files, checked ROS parameters."""

@@ -76,7 +76,7 @@ def init_node(name: str, **options: Any) -> None:
     end = time.monotonic() + PATIENCE
     while there := _living(os.environ.get("ROS_MASTER_URI", ""), full):
         if time.monotonic() > end:
-            refuse(f"another node has this name: {there}; end it first, or use a ROS master of your own")
+            refuse(f"another node has this name: {there}; end it first, or use your own ROS master")
         time.sleep(0.2)
     rospy.init_node(name, **options)
     log_without_raising()

@@ -12,11 +12,11 @@ from coglab_py.pose import Pose
 
 
 def pose_of(message: Any) -> Pose:
-    """geometry_msgs/Pose as a Pose."""
+    """Converts a geometry_msgs/Pose to a Pose."""
     p, q = message.position, message.orientation
     return Pose(np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w]))
 
 
 def pose_message(pose: Pose) -> PoseMessage:
-    """A Pose as geometry_msgs/Pose."""
+    """Converts a Pose to a geometry_msgs/Pose."""
     return PoseMessage(Point(*pose.position), Quaternion(*pose.orientation))

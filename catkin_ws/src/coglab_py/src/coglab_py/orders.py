@@ -23,8 +23,8 @@ def latin_row(conditions: Sequence[str], number: int) -> list[str]:
 def order_of(conditions: Sequence[str], blocks: int, order: str, number: int) -> list[str]:
     """The conditions of all blocks, one after the other. A block holds each condition once.
 
-    ``order``: "latin_square", "random", or anything else: as listed. ``number``: of the participant; the row of the
-    square, and the seed of a random order."""
+    ``order``: "latin_square", "random", or anything else: as listed. ``number``: of the participant; it selects the
+    row of the square, and is the seed of a random order."""
     chance = random.Random(number)
     listed: list[str] = []
     for block in range(blocks):

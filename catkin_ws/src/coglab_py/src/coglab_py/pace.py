@@ -39,7 +39,7 @@ class Pace:
 
     def follow(self, topic: str = TOPIC) -> Pace:
         """Subscribe to the cell's factor. Returns self."""
-        import rospy  # here, so that programs without ROS can use this module
+        import rospy  # here: programs without ROS can use this module
         from std_msgs.msg import Float64
 
         self._subscriber = rospy.Subscriber(topic, Float64, lambda message: self.change(message.data))

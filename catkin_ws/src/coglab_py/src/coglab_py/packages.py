@@ -19,5 +19,5 @@ def package_path(package: str, *path: str) -> Path:
     except rospkg.ResourceNotFound:
         found = Path("/".join((package, *path)))
     if not found.exists():
-        raise FileNotFoundError(f"{found} is not there: build the workspace, or install the package {package} again")
+        raise FileNotFoundError(f"{found} does not exist: build the workspace, or install the package {package} again")
     return found

@@ -1,7 +1,7 @@
 """Numbers of a node that rqt_reconfigure and other clients of dynamic_reconfigure can show and change.
 
 The numbers come from the program at run time, so no .cfg file describes them. The library's own server is not used: it
-cuts values off at their range without a word, and takes no value that is no number for an answer.
+silently limits values to their range, and does not reject values that are no numbers.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Field(NamedTuple):
 
 class ReconfigureServer:
     """Serves numbers below the node's name: service ``~set_parameters``, latched topics ``~parameter_descriptions`` and
-    ``~parameter_updates``. If a name is unknown, or a value is no number within its range, nothing changes: the answer
+    ``~parameter_updates``. If a name is unknown, or a value is no number within its range, nothing changes: the reply
     has the values in force, the log the reason."""
 
     def __init__(self, fields: Sequence[Field], use: Callable[[dict[str, float]], None]) -> None:
@@ -56,7 +56,7 @@ class ReconfigureServer:
         return Config(doubles=doubles, groups=[GroupState("Default", True, 0, 0)])
 
     def _set(self, request: Any) -> ReconfigureResponse:
-        """Answers with the values in force: clients of this protocol have no field for a sentence."""
+        """Returns the values in force: the protocol has no field for a reason."""
         with self._lock:
             try:
                 self._change(request.config)

@@ -1,7 +1,7 @@
 """Rotation of a rigid frame in plain floats.
 
 The methods are those of scipy's Rotation, for one rotation at a time, with the same order of operations. A call takes
-about 1 us instead of 5 to 20, which matters to what runs 100 times per second and more.
+about 1 us instead of 5 to 20, which matters at 100 calls per second and more.
 """
 
 from __future__ import annotations
@@ -96,12 +96,12 @@ class Rotation:
         return np.array([(a * x + c * z) + b * y for a, b, c in self._rows()])
 
     def inv(self) -> Rotation:
-        """The rotation back."""
+        """The inverse rotation."""
         x, y, z, w = self._q
         return Rotation._of((x, y, z, -w))
 
     def __mul__(self, other: Rotation) -> Rotation:
-        """First the other rotation, then this one."""
+        """The composition: first the other rotation, then this one."""
         a, b, c, d = self._q
         e, f, g, h = other._q
         return Rotation(

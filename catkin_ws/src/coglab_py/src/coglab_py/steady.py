@@ -46,7 +46,7 @@ def spin() -> int:
 
 
 def worker(function: Callable[[], object], name: str) -> threading.Thread:
-    """A thread (not started) that the node cannot work without. An exception in it is logged and ends the node, so that
+    """A thread (not started) that the node needs. An exception in it is logged and ends the node, so that
     roslaunch restarts it."""
 
     def run() -> None:
@@ -154,7 +154,7 @@ def service_answers(name: str) -> bool:
             header = {"probe": "1", "md5sum": "*", "callerid": caller, "service": name}
             rosgraph.network.write_ros_handshake_header(link, header)
         return True
-    except Exception:  # of the socket, of XML-RPC, or of a master without this service
+    except Exception:  # from the socket, XML-RPC, or a master without this service
         return False
 
 
@@ -192,7 +192,7 @@ class ClockWatch:
             self._look_at_simulated(ros, steady)
         elif abs(step := ros - self._ros - (steady - self._steady)) > STEP:
             rospy.logwarn(
-                "this computer's clock was set %s by %.1f s; stamps from before are of no use",
+                "this computer's clock was set %s by %.1f s; earlier stamps are invalid",
                 "forward" if step > 0.0 else "back",
                 abs(step),
             )
@@ -201,14 +201,14 @@ class ClockWatch:
 
     def _look_at_simulated(self, ros: float, steady: float) -> None:
         if ros < self._ros:
-            rospy.logwarn("/clock went back by %.1f s; stamps from before are of no use", self._ros - ros)
+            rospy.logwarn("/clock went back by %.1f s; earlier stamps are invalid", self._ros - ros)
         if ros != self._ros:
             self._moved = steady
             if self.fault:
                 rospy.loginfo("/clock runs again")
             self.fault = ""
         elif not self.fault and steady - self._moved > SILENCE:
-            self.fault = f"/clock is silent for {SILENCE:g} s: start what publishes it, or set /use_sim_time to false"
+            self.fault = f"/clock is silent for {SILENCE:g} s: start its publisher, or set /use_sim_time to false"
             rospy.logerr(self.fault)
 
 

@@ -187,7 +187,7 @@ TABLE = (
     _row("handover.still_margin", 0.10, "m",
          "The region is larger by this margin for an object that is held still.", 0, 2),
     _row("handover.hand_margin", 0.10, "m",
-         "The region is larger by this margin for a hand that asks for the object.", 0, 2),
+         "The region is larger by this margin for a hand that requests the object.", 0, 2),
     _row("handover.belief", 0.85, "",
          "The arm starts at this probability of an offer. 0: only when the object or hand is seen in the region.",
          0, 1, timed=True),

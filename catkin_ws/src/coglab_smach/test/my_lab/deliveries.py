@@ -1,4 +1,4 @@
-"""A delivery of its own, for every object.
+"""A user's delivery, for every object.
 
 machines.yaml::
 

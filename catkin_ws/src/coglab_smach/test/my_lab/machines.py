@@ -1,4 +1,4 @@
-"""An action of its own: the robot wipes the board with the object in its hand.
+"""A user's action: the robot wipes the board with the object in its hand.
 
 machines.yaml::
 
@@ -14,7 +14,7 @@ from my_lab.states import Announce
 
 
 class CountStrokes(CoglabState):
-    """Count the strokes that are done. Outcome ``again`` until there are three."""
+    """Count the strokes. Outcome ``again`` until there are three."""
 
     def __init__(self, ctx: Context) -> None:
         super().__init__(ctx, outcomes=["succeeded", "again"])
@@ -29,7 +29,7 @@ class CountStrokes(CoglabState):
 
 
 def build_wipe(ctx: Context) -> CoglabMachine:
-    """say it -> three times: to the board and home. Failures go to the recovery of the brain."""
+    """Announcement, then three times: to the board and home. Failures go to the recovery of the brain."""
     machine = CoglabMachine(ctx, "strokes", ["succeeded", "failed", "preempted"], input_keys=["object_id"])
     with machine:
         machine.add_state("announce", Announce(ctx), {"succeeded": "to_board"})

@@ -1,4 +1,4 @@
-"""States of its own: one for any machine, and one that takes the place of a shipped state.
+"""A user's states: one for any machine, and one that replaces a shipped state.
 
 machines.yaml::
 
@@ -13,7 +13,7 @@ from coglab_smach.states.knowledge import QueryDatabase
 
 
 class Announce(CoglabState):
-    """Say what comes, and leave the person a second to understand it."""
+    """Announce the object, and wait 1 s so that the person can understand it."""
 
     def __init__(self, ctx: Context) -> None:
         super().__init__(ctx, input_keys=["object_id"])

@@ -1,7 +1,7 @@
 # PYTHON_ARGCOMPLETE_OK
 """`python3 -m coglab_tools NOUN VERB [ARG ...]`, which `./coglab NOUN VERB` calls.
 
-Exit codes: 0 done, 1 a check failed, 2 the command cannot be used like this, 3 robot, ROS or a library is not there.
+Exit codes: 0 done, 1 a check failed, 2 invalid arguments, 3 robot, ROS or a library is missing.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Raise UsageError; argparse calls this."""
-        raise UsageError(f"{message}; what there is: ./{self.prog} --help")
+        raise UsageError(f"{message}; the options: ./{self.prog} --help")
 
 
 def make_parser(chosen: str = "") -> Parser:
-    """The parser of all nouns; `chosen`: only the verbs of this noun are filled in ("": of all)."""
+    """The parser of all nouns; `chosen`: add only the verbs of this noun ("": of all)."""
     parser = Parser(prog="coglab", description="The researcher's daily commands.")
     nouns = parser.add_subparsers(metavar="NOUN", required=True, dest="noun", parser_class=Parser)
     for name in NOUNS:
@@ -51,7 +51,7 @@ def run(words: list[str]) -> int:
             import argcomplete
 
             argcomplete.autocomplete(parser, always_complete_options=False)
-        except ImportError:  # completion alone needs it
+        except ImportError:  # only completion needs it
             pass
         options = parser.parse_args(words)
         answer: Answer = options.run(options)
@@ -60,7 +60,7 @@ def run(words: list[str]) -> int:
     except ModuleNotFoundError as error:
         return _refuse(f"the library {error.name} is missing; ./coglab install tools gets it", NOT_THERE, as_json)
     except KeyboardInterrupt as error:
-        return _refuse(str(error) or "ended by Ctrl-C; what was finished is kept", 130, as_json)
+        return _refuse(str(error) or "ended by Ctrl-C; the finished part is kept", 130, as_json)
     if as_json:
         print(json.dumps(answer.data, indent=1, default=str))
     else:

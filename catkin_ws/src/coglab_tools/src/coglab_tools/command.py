@@ -1,4 +1,4 @@
-"""What the commands `./coglab NOUN VERB` share: answers, errors with exit codes, progress bars.
+"""Common parts of the commands `./coglab NOUN VERB`: answers, errors with exit codes, progress bars.
 
 A noun is a module `coglab_tools.NOUN.commands` with `HELP`, one sentence, and `add(verbs)`, which adds its verbs to an
 argparse subparsers object and sets `run` of each to a function from the options to an Answer::
@@ -19,14 +19,14 @@ from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 OK, CHECK_FAILED, USAGE, NOT_THERE = 0, 1, 2, 3
-"""exit codes: done; a check failed; the command cannot be used like this; robot, ROS or a library is not there"""
+"""exit codes: done; a check failed; invalid arguments; robot, ROS or a library is missing"""
 
 Item = TypeVar("Item")
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What a command found out. ``--json`` prints ``data``, otherwise ``text`` and the next command are printed."""
+    """Result of a command. ``--json`` prints ``data``, otherwise ``text`` and the next command are printed."""
 
     text: str
     """for people: sentences or a table"""
@@ -39,13 +39,13 @@ class Answer:
 
 
 class CommandError(Exception):
-    """A command ended without an answer. The message says what was expected, what came and what to do next."""
+    """A command ended without an answer. The message has the expected and the actual value and the next step."""
 
     status = CHECK_FAILED
 
 
 class CheckFailed(CommandError):
-    """The input was read and judged, and it cannot be used: exit code 1."""
+    """The input was read and checked, and is unusable: exit code 1."""
 
 
 class UsageError(CommandError):
@@ -55,7 +55,7 @@ class UsageError(CommandError):
 
 
 class NotThere(CommandError):
-    """The robot, ROS, a file's device or a library is not there: exit code 3."""
+    """The robot, ROS, a file or a library is missing: exit code 3."""
 
     status = NOT_THERE
 

@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all."""
+"""Writes files completely or not at all."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from coglab_tools.command import CheckFailed
 
 
 def write_whole(path: Path, content: str | bytes) -> Path:
-    """Write a file under another name first and move it to its place, so that nobody ever reads a half of it. Its
-    folder is made if need be. Returns the path. CheckFailed: it cannot be written; what was there before is kept."""
+    """Write a file under another name first and move it to its place, so that no reader sees a part of it.
+    Creates its folder. Returns the path. CheckFailed: it cannot be written; the earlier file is kept."""
     half = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -24,7 +24,7 @@ def write_whole(path: Path, content: str | bytes) -> Path:
         half.replace(path)
     except OSError as error:
         why = error.strerror or error
-        raise CheckFailed(f"{path} cannot be written: {why}; what was there before is kept") from None
+        raise CheckFailed(f"{path} cannot be written: {why}; the earlier file is kept") from None
     finally:
         with suppress(OSError):
             half.unlink(missing_ok=True)
@@ -42,5 +42,5 @@ def write_by(path: Path, write: Callable[[Path], object]) -> Path:
             made.replace(path)
     except OSError as error:
         why = error.strerror or error
-        raise CheckFailed(f"{path} cannot be written: {why}; what was there before is kept") from None
+        raise CheckFailed(f"{path} cannot be written: {why}; the earlier file is kept") from None
     return path

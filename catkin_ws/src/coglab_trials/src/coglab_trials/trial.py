@@ -170,7 +170,7 @@ class VirtualTrial:
             self.clock.start_thread(lambda: self._run_script(walk), "script")
             try:
                 self.master.execute()
-            finally:  # also if the clock has stalled: the world must not go on for ever
+            finally:  # also if the clock has stalled: the world must not run on for ever
                 self._over = True
         self._end_reach()  # a machine that was stopped leaves its reach open
         if self._failure is not None:

@@ -4,8 +4,8 @@ The threads of the clock take turns. One thread runs until it waits, then the ne
 ready, the time jumps to the nearest deadline. Therefore, every run is the same. Other threads may also set events and
 sleep on the clock, but the operating system decides when they do so.
 
-To hand a turn to another thread costs much more than most turns do. So what is polled (`poll`) is called by the thread
-that waits next, in the same order; the polling thread gets its turn when that has come true.
+Passing the turn to another thread costs much more than most turns do. Therefore, the thread that waits next calls the
+polled conditions (`poll`), in the same order. The polling thread gets its turn when its condition is true.
 
 `using` runs a machine under such a clock. It requires only that `smach.concurrence` takes its threads, events and
 conditions from `threading`. Our engine and those of the ROS distributions do so.
@@ -34,7 +34,7 @@ class ClockStalled(RuntimeError):
 
 
 class _Poll:
-    """What a waiting thread polls, and its result: `over`, or an `error`. Neither: it is time to call it again."""
+    """Condition polled by a waiting thread, and its result: `over`, or an `error`. Neither: call it again."""
 
     __slots__ = ("call", "error", "over", "period")
 
@@ -45,7 +45,7 @@ class _Poll:
 
 
 class _Parked:
-    """One waiting thread. `going`: it has its turn. `fired`: an event woke it, not the time. `poll`: what it polls.
+    """One waiting thread. `going`: it has its turn. `fired`: an event woke it, not the time. `poll`: its condition.
 
     The gate is a bare lock that is held until the turn comes. An event of `threading` would cost several locks.
     """
@@ -295,7 +295,7 @@ class VirtualClock(Clock):
         """Wait for the event or the time; with `poll`, until that has a result. Returns True if the event came."""
         me = threading.current_thread()
         if self._poller is me:
-            raise RuntimeError("what is polled on a virtual clock waits itself; wait for it in a loop with sleep()")
+            raise RuntimeError("a condition polled on a virtual clock must not wait; use a loop with sleep()")
         parked = _Parked(me, poll)
         with self._lock:
             if event is not None:
@@ -368,7 +368,7 @@ class VirtualClock(Clock):
         return not again
 
     def _await_turn(self, parked: _Parked) -> None:
-        # Two halves without progress: a process that was stopped and goes on misses one of them at most.
+        # Two halves without progress: a stopped and continued process misses at most one of them.
         seen = -1.0
         while not parked.gate.acquire(timeout=self._stall_limit / 2.0):
             with self._lock:
@@ -431,7 +431,7 @@ def _count_users(change: int) -> None:
 @contextmanager
 def using(clock: VirtualClock) -> Iterator[VirtualClock]:
     """Inside the block, the calling thread belongs to `clock`. So do the children of each Concurrence that is
-    created and executed there. Each thread of a process may use a clock of its own. Example::
+    created and executed there. Each thread of a process may use its own clock. Example::
 
         with using(VirtualClock()) as clock:
             machine = build()

@@ -1,8 +1,8 @@
-"""Runs a feedback controller of ctrl_more for the robot's control cycle, in a process of its own.
+"""Runs a feedback controller of ctrl_more for the robot's control cycle, in its own process.
 
-The controller runs in a `ctrl_more.FeedbackControllersManager`, as it does in the robot: the same checks of its
-description, the same gains, and the same undoing of what is wrong. Its states are copies of the robot's, which the slot
-carries. The slot takes one correction back, a shift and a turn of the hand's reference.
+The controller runs in a `ctrl_more.FeedbackControllersManager`, as in the robot: with the same checks of its
+description, the same gains, and the same removal of invalid corrections. The slot transmits copies of the robot's
+states, and returns one correction, a shift and a turn of the hand's reference.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ from ctrl_more import (
 from coglab.control import slot as wire
 from coglab.control.motion import JOINTS, ControlError, Vector
 
-GAP = 0.1  # s without a question, after which the controller forgets its internal state
+GAP = 0.1  # s without a question, after which the controller resets its internal state
 WIRE = "joints in wire order"
-# What a slot carries: key, size, unit, frame and the field of the question. The robot's own stores have the same.
+# States in a slot: key, size, unit, frame, field of the question. The robot's own stores have the same.
 MEASURED = (
     ("joint_position", 7, "rad", WIRE, "joints"),
     ("joint_velocity", 7, "rad/s", WIRE, "joint_velocity"),
@@ -76,10 +76,10 @@ class FeedbackHost:
         config: Path | None = None,
         period: float = 0.005,
     ) -> None:
-        """`gains`: in place of those of the description or of the file `config`; `period`: intended cycle time, s.
+        """`gains`: replace those of the description or of the file `config`; `period`: intended cycle time, s.
 
-        Raises ControlError if the controller needs what a slot does not carry, if its description is refused, or for
-        gains that it does not take.
+        Raises ControlError if the controller needs a state that a slot does not carry, if its description is refused,
+        or for invalid gains.
         """
         self.controller, self.name = controller, type(controller).__name__
         self._log = Logger()
@@ -106,7 +106,7 @@ class FeedbackHost:
         self._failed = False
 
     def _judge(self) -> None:
-        """Refuse what a slot cannot carry."""
+        """Refuse a controller that needs more than a slot carries."""
         name, description = self.name, self.manager.describe(self.name)
         if description.stage != "task":
             raise ControlError(f"{name} acts in the {description.stage} stage, a slot in the task stage. {CARRIED}")
@@ -118,7 +118,7 @@ class FeedbackHost:
             raise ControlError(f"{name} does not modify {POSE}/ee, so it would do nothing here. {CARRIED}")
 
     def set(self, gains: Mapping[str, float | list[float]]) -> None:
-        """Set gains, all or none; they hold from the next question on. Raises ControlError."""
+        """Set gains, all or none, from the next question on. Raises ControlError."""
         if not gains:
             return
         try:
@@ -165,12 +165,12 @@ class FeedbackHost:
         return True
 
     def _show(self, record: LogRecord) -> None:
-        """Print what the controller logs. Of the library's own records, `_fail` prints those that matter here."""
+        """Print the controller's log records. `_fail` prints the important ones of the library."""
         if record.source == self.name and not record.file:
             print(f"{record.source}: {record.level}: {record.message}", flush=True)
 
     def _begin(self, run: int) -> None:
-        """The controller begins anew: the robot has enabled the slot, or this process has slept."""
+        """Restart the controller: the robot has enabled the slot, or this process was suspended."""
         self._run = run
         if self.manager.status(self.name).paused:
             self.manager.resume(self.name, "fault")

@@ -30,15 +30,15 @@ from coglab.control.motion import (
 )
 
 POLL = 0.0005  # s between two looks for a question; a wake-up would cost the robot's cycle a system call
-ALIVE = 0.5  # s between two looks whether the robot is still there
-LONGEST = 1.0  # s, a controller that takes longer is named
-SILENT = 1.0  # s without a question, after which that is said
+ALIVE = 0.5  # s between two checks that the robot still runs
+LONGEST = 1.0  # s, longer calls of the controller are reported
+SILENT = 1.0  # s without a question, after which that is reported
 MOTION_METHODS = ("start", "reference", "done")
 FEEDBACK_METHODS = ("describe", "initialize", "update")
 
 
 def load_module(file: Path) -> ModuleType:
-    """Run a Python file as a module. Raises ControlError with the place of what went wrong in it."""
+    """Run a Python file as a module. Raises ControlError with the place of the error."""
     if not file.is_file():
         raise ControlError(f"there is no file {file}")
     spec = importlib.util.spec_from_file_location(file.stem, file)
@@ -57,7 +57,7 @@ def load_module(file: Path) -> ModuleType:
 
 
 def find_class(module: ModuleType, name: str = "") -> tuple[type, int]:
-    """The controller class of a module and what it is (`slot.MOTION` or `slot.FEEDBACK`).
+    """Returns the controller class of a module and its kind (`slot.MOTION` or `slot.FEEDBACK`).
 
     Raises ControlError if there is none, or several and no name.
     """
@@ -96,7 +96,7 @@ class MotionHost:
     """One motion object and the arguments of its next start."""
 
     def __init__(self, motion: Any, given: Mapping[str, Any], robot: Any = None) -> None:
-        """Configure the motion. Raises ControlError for arguments that it does not take."""
+        """Configure the motion. Raises ControlError for invalid arguments."""
         self.motion = motion
         setup = MotionSetup(robot)
         configure = getattr(motion, "configure", None)
@@ -114,7 +114,7 @@ class MotionHost:
     def answer(self, question: np.void, answer: npt.NDArray[np.void]) -> bool:
         """Fill in the answer to a question. Return false if there is nothing to answer.
 
-        An exception of the motion ends it: the answer says so, and the traceback is printed.
+        An exception of the motion ends it: the answer is GIVE_UP, and the traceback is printed.
         """
         run = int(question["run"])
         if not question["running"]:
@@ -139,14 +139,14 @@ class MotionHost:
             answer["done"] = int(is_done(self.motion))
         except Exception:
             traceback.print_exc()
-            print("the motion is given up; correct the file and run it again", file=sys.stderr, flush=True)
+            print("the motion has ended; correct the file and run it again", file=sys.stderr, flush=True)
             self._failed = True
             answer["kind"] = wire.GIVE_UP
         return True
 
 
 def set_point(question: np.void) -> SetPoint:
-    """The set-point at the start of the run that a question belongs to."""
+    """Returns the set-point at the start of the run of this question."""
     return SetPoint(
         joints=question["from_joints"].copy(),
         joint_velocity=question["from_joint_velocity"].copy(),
@@ -182,7 +182,7 @@ class Latencies:
         self._times.append(1e-6 * (time.monotonic_ns() - int(question["written_ns"])))
 
     def note(self, question: np.void) -> tuple[int, int]:
-        """Count the cycles that were late and the answers that were refused since the last note."""
+        """Returns the numbers of late cycles and refused answers since the last call."""
         if int(question["run"]) != self._run:
             self._run, self._late, self._refused = int(question["run"]), 0, 0
         late, refused = int(question["late"]) - self._late, int(question["refused"]) - self._refused
@@ -190,7 +190,7 @@ class Latencies:
         return late, refused
 
     def report(self) -> str:
-        """Median and 99th percentile in ms as a sentence, and start again; empty if there was no answer."""
+        """Returns median and 99th percentile (ms) as a sentence and resets; empty if there was no answer."""
         if not self._times:
             return ""
         median, high = np.percentile(self._times, [50, 99])
@@ -200,12 +200,12 @@ class Latencies:
 
 
 class Watch:
-    """A thread that says so when the controller keeps the process longer than `LONGEST`."""
+    """A thread that reports a call of the controller longer than `LONGEST`."""
 
     def __init__(self, tell: Callable[[str], None]) -> None:
-        """`tell`: gets the sentence."""
+        """`tell`: called with the sentence."""
         self._tell, self._ended = tell, threading.Event()
-        self.began = math.inf  # s, when the call under way began; infinite: none is
+        self.began = math.inf  # s, start of the running call; infinite: none runs
         threading.Thread(target=self._look, name="watch", daemon=True).start()
 
     def end(self) -> None:
@@ -235,7 +235,7 @@ def serve(
 ) -> None:
     """Answer the questions of a slot until the robot lets go or `ends()` is true.
 
-    Each `period` s it tells how fast the answers were and how many came late. `silent`: what it tells when no question
+    Each `period` s it reports the delay of the answers and the number of late ones. `silent`: the report if no question
     has come for `SILENT`.
     """
     watch = Watch(tell)
@@ -268,7 +268,7 @@ def _serve(
                 slot.answer(answer)
                 latencies.add(question)
             if asked < 0.0:
-                tell("the robot asks again")
+                tell("the robot sends questions again")
             asked = time.monotonic()
             more = latencies.note(question)
             late, refused = late + more[0], refused + more[1]
@@ -276,7 +276,7 @@ def _serve(
         if now - looked > ALIVE:
             looked = now
             if not slot.alive():
-                tell("the robot has let go: it has ended, or its controller was unloaded")
+                tell("the robot has closed the slot: it has ended, or its controller was unloaded")
                 return
         if silent and asked > 0.0 and now - asked > SILENT:
             asked = -1.0

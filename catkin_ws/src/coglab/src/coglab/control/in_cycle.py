@@ -8,10 +8,10 @@ from coglab.control.motion import Motion, MotionCycle, MotionSetup, MotionStart,
 
 
 class InCycle:
-    """What `LockstepRobot.add_motion` calls, for a motion (a `Motion`, or an object with its four methods)."""
+    """Adapter of a motion (a `Motion`, or an object with its four methods) for `LockstepRobot.add_motion`."""
 
     def __init__(self, motion: Motion, robot: Any = None, cycle_time: float = 0.005) -> None:
-        """``robot``: has ``chain`` and ``limits`` of the arm; ``cycle_time``: s. Raises what `configure` raises."""
+        """``robot``: has ``chain`` and ``limits`` of the arm; ``cycle_time``: s. Raises the errors of `configure`."""
         self.motion = motion
         self.setup = MotionSetup(robot, cycle_time)
         motion.configure(self.setup)

@@ -19,12 +19,11 @@ import numpy.typing as npt
 Vector = npt.NDArray[np.float64]
 
 JOINTS = 7
-MOST_ARGUMENTS = 16  # as many as a request of the robot's controller manager carries
+MOST_ARGUMENTS = 16  # limit of a request to the robot's controller manager
 
 
 class ControlError(ValueError):
-    """A motion or a controller, or what it returned, is not as expected. The message says what was expected and what
-    came."""
+    """A motion, a controller, or its returned value is invalid. The message has the expected and the actual value."""
 
 
 @dataclass(frozen=True)
@@ -70,14 +69,14 @@ class MotionSetup:
     """Input of `Motion.configure()`: the robot, and the place to declare arguments."""
 
     def __init__(self, robot: Any = None, cycle_time: float = 0.005) -> None:
-        """`robot`: what has `chain` and `limits` of the arm (`None` without a robot); `cycle_time`: s."""
+        """`robot`: an object with `chain` and `limits` of the arm (`None` without a robot); `cycle_time`: s."""
         self.robot = robot
         self.cycle_time = cycle_time
         self._arguments: dict[str, Argument] = {}
 
     @property
     def arguments(self) -> tuple[Argument, ...]:
-        """What has been declared, in that order."""
+        """The declared arguments, in the order of declaration."""
         return tuple(self._arguments.values())
 
     def argument(self, name: str, unit: str, default: float, low: float, high: float) -> str:
@@ -102,9 +101,9 @@ class MotionSetup:
         return name
 
     def values(self, given: Mapping[str, float]) -> dict[str, float]:
-        """The value of every argument: as given, else its default.
+        """Returns the value of every argument: the given one, else its default.
 
-        Raises ControlError for an unknown name, for what is no number and for a value outside of its range.
+        Raises ControlError for an unknown name, a value that is no number, or a value outside of its range.
         """
         unknown = sorted(set(given) - set(self._arguments))
         if unknown:
@@ -138,7 +137,7 @@ def _numbers(name: str, value: npt.ArrayLike, size: int) -> Vector:
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """What the arm shall do in this cycle: joints with their velocity, a pose of the palm with its twist, or rest.
+    """Reference of the arm for this cycle: joints with their velocity, a pose of the palm with its twist, or rest.
 
     `Reference(joints=q, joint_velocity=v)`, `Reference(position=p, orientation=o, twist=t)` or `Reference()`: the arm
     brakes and stands. A velocity that is left out is zero. Raises ControlError for wrong shapes, for numbers that are
@@ -203,7 +202,7 @@ class Motion:
 
 
 def is_done(motion: Any) -> bool:
-    """Whether a motion has ended. Raises ControlError if its done() returns no truth value."""
+    """Returns whether a motion has ended. ControlError if its done() returns no truth value."""
     value = motion.done()
     if not isinstance(value, (bool, np.bool_)):
         raise ControlError(f"done() returned {value!r}; True or False is expected")

@@ -22,7 +22,7 @@ class @TYPE@(Motion):
     """Sways the sixth joint by `size` within `duration`, from rest to rest."""
 
     def configure(self, setup: MotionSetup) -> None:
-        """Declare what a request may give: name, unit, default, smallest and largest value."""
+        """Declare the arguments of a request: name, unit, default, smallest and largest value."""
         self.size = setup.argument("size", "rad", 0.3, 0.0, 0.5)
         self.duration = setup.argument("duration", "s", 3.0, 1.0, 20.0)
 
@@ -82,10 +82,10 @@ import numpy as np
 
 
 class @TYPE@(ctrl_more.FeedbackController):
-    """Shifts the hand's reference along the force that is felt, by force / stiffness."""
+    """Shifts the hand's reference along the measured force, by force / stiffness."""
 
     def describe(self) -> ctrl_more.Description:
-        """Declare what it reads and corrects, and its gains: name, value, smallest and largest, unit."""
+        """Declare inputs, correction and gains: name, value, smallest and largest, unit."""
         d = ctrl_more.Description(
             "Lets the hand yield to a push.",
             use="Enable it, then push the hand.",
@@ -103,7 +103,7 @@ class @TYPE@(ctrl_more.FeedbackController):
         return d
 
     def initialize(self, setup: ctrl_more.Setup) -> None:
-        """Fetch a handle for everything that is used."""
+        """Get the handles of inputs, correction and gains."""
         self.wrench, self.ee = setup.read("wrench"), setup.modify("ee")
         self.stiffness, self.time_constant = setup.gain("stiffness"), setup.gain("time_constant")
         self.dead_band = setup.gain("dead_band")
@@ -169,7 +169,7 @@ if __name__ == "__main__":
 def make(name: str, into: Path, motion: bool = False) -> Path:
     """Write the file of a motion or of a feedback controller and return its path.
 
-    Raises ValueError or OSError with what was expected.
+    Raises ValueError or OSError that names the expected value.
     """
     if not re.fullmatch(r"[A-Z][A-Za-z0-9]*[a-z][A-Za-z0-9]*", name):
         raise ValueError(f"a controller's name is CamelCase, letters and digits, like WristSway; got '{name}'")
@@ -192,7 +192,7 @@ def main() -> int:
     """Command line."""
     parser = argparse.ArgumentParser(prog="./coglab controller new --python", description=__doc__)
     parser.add_argument("name", help="class of the controller in CamelCase, for example WristSway")
-    parser.add_argument("--into", type=Path, default=Path("."), help="folder to make it in")
+    parser.add_argument("--into", type=Path, default=Path("."), help="folder of the new file")
     parser.add_argument("--motion", action="store_true", help="a motion of the arm, instead of a feedback controller")
     parser.add_argument("--python", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()

@@ -16,7 +16,7 @@ WAIT = 10.0  # s, longest wait for a service
 
 
 class SlotServices:
-    """Loads a slot into the running robot, and lets it act."""
+    """Loads, enables and starts a slot in the running robot."""
 
     def load(self, slot: str, kind: str) -> None:
         """Load a slot of the type `kind`. Raises SlotError if no robot runs, or with its refusal."""
@@ -32,7 +32,7 @@ class SlotServices:
         self._call(f"{MANAGER}/{slot}/start_motion", StartMotion, [], [], False)
 
     def robot(self) -> int:
-        """Number of the process that offers the controller manager. Raises SlotError."""
+        """Returns the process number of the controller manager. Raises SlotError."""
         try:
             uri = self._node_of(f"{MANAGER}/load_controller")
             proxy: Any = ServerProxy(uri)

@@ -22,17 +22,17 @@ from coglab.control.ros import MANAGER, SlotServices
 
 SLOTS = {wire.MOTION: "python_motion", wire.FEEDBACK: "python_feedback"}
 TYPES = {wire.MOTION: "coglab/RemoteMotion", wire.FEEDBACK: "RemoteFeedback"}
-MOST_SLOTS = 4  # feedback controllers that find a slot by themselves
-REPORT = 5.0  # s between two lines about latency and misses
-APPEARS = 3.0  # s until a slot that another process loads can be seen
-LAST = 1.0  # s after Ctrl-C until a controller that does not return is ended
+MOST_SLOTS = 4  # slots for feedback controllers without --slot
+REPORT = 5.0  # s between two reports of latency and late answers
+APPEARS = 3.0  # s, longest wait for a slot that another process loads
+LAST = 1.0  # s from Ctrl-C until the process of a blocked controller is ended
 
 Numbers: TypeAlias = dict[str, float | list[float]]
 Host: TypeAlias = MotionHost | FeedbackHost
 
 
 class Flag:
-    """Whether the command shall end. A signal may set it at any time, also twice: no lock, no new thread."""
+    """Flag for the end of the command. A signal may set it at any time, even twice: no lock, no new thread."""
 
     def __init__(self) -> None:
         self._up = False
@@ -42,7 +42,7 @@ class Flag:
         self._up = True
 
     def is_set(self) -> bool:
-        """Return whether it shall end."""
+        """Returns True if the command shall end."""
         return self._up
 
 
@@ -50,7 +50,7 @@ def parser() -> argparse.ArgumentParser:
     """Arguments of the command."""
     result = argparse.ArgumentParser(
         prog="./coglab controller run",
-        description="Connects a Python motion or feedback controller to the robot that runs. Ctrl-C lets go: the arm "
+        description="Connects a Python motion or feedback controller to the running robot. Ctrl-C disconnects: the arm "
         "brakes, or the correction fades. In a terminal, NAME=VALUE and Enter changes a gain, or an argument of the "
         "next motion.",
     )
@@ -94,7 +94,7 @@ def numbers(words: list[str]) -> Numbers:
 
 
 def make_host(options: argparse.Namespace) -> tuple[Host, int]:
-    """The controller of the file in its host, and what it is. Raises ControlError."""
+    """Returns the host with the controller of the file, and its kind. Raises ControlError."""
     controller, kind = find_class(load_module(options.file), options.name)
     given = numbers(options.numbers)
     try:
@@ -120,7 +120,7 @@ def choose(slot: str, robot: int) -> wire.Address | None:
 def connect(options: argparse.Namespace, kind: int, services: SlotServices) -> wire.Slot:
     """Connect to the slot. Load it into the robot if it is missing. Raises SlotError.
 
-    A feedback controller that named no slot takes the first one that no other process holds.
+    A feedback controller without --slot gets the first slot that no other process holds.
     """
     ids = [options.slot or SLOTS[kind]]
     if kind == wire.FEEDBACK and not options.slot:
@@ -170,7 +170,7 @@ def run(words: list[str]) -> int:
             if kind == wire.FEEDBACK:
                 act, how = services.enable, f"rosservice call {MANAGER}/feedback/enable '{{names: [{address.slot}]}}'"
                 silent = (
-                    f"the robot does not ask: {address.slot} is disabled, as by a motion whose feedback profile does "
+                    f"the robot sends no question: {address.slot} is disabled, as by a motion whose profile does "
                     f"not name it, or the robot measures nothing. Enable it: {how}"
                 )
             if options.start or (kind == wire.FEEDBACK and not options.wait):
@@ -205,7 +205,7 @@ def _listen(host: Host, ended: Flag) -> None:
     """Take NAME=VALUE from the terminal."""
     while not ended.is_set():
         ready, _, _ = select.select([sys.stdin], [], [], 0.2)
-        # A process in the background would be stopped if it read.
+        # The shell would stop a background process that reads.
         if not ready or os.tcgetpgrp(sys.stdin.fileno()) != os.getpgrp():
             time.sleep(0.2)
             continue
@@ -220,7 +220,7 @@ def _listen(host: Host, ended: Flag) -> None:
 
 
 def _watch(ended: Flag, over: threading.Event) -> None:
-    """End a process whose controller does not return after Ctrl-C; the robot sees its end."""
+    """End this process if its controller does not return after Ctrl-C. The robot detects the end."""
     while not ended.is_set():
         if over.wait(0.1):
             return

@@ -53,9 +53,9 @@ def simulate(
     cycle_time: float = 0.005,
     longest: float = 60.0,
 ) -> Simulated:
-    """Start a motion and take its references until it is done. The measured joints are those of the last reference.
+    """Run a motion until it is done and collect its references. The measured joints are those of the last reference.
 
-    `arguments`: as in a request; `set_point`: where it starts (default: at rest in the home posture, the palm at
+    `arguments`: as in a request; `set_point`: its start (default: at rest in the home posture, the palm at
     0.5, 0, 0.5 m); `longest`: s of motion time. Raises ControlError if it takes longer, changes between joints and
     poses, or returns no Reference.
     """

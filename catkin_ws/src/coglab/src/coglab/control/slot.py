@@ -1,6 +1,6 @@
 """The Python end of a slot of the robot's control cycle: shared memory, handed over by a local socket.
 
-The robot makes the memory and keeps it; the socket shows it when this process ends. The fields are those of
+The robot creates and owns the memory; the socket shows the robot the end of this process. The fields are those of
 coglab_controllers/remote/layout.hpp, and the checksum that of remote/shared_record.hpp.
 """
 
@@ -19,8 +19,8 @@ import numpy as np
 import numpy.typing as npt
 
 INTERFACE = 1
-MOTION, FEEDBACK = 1, 2  # what a slot is for
-REST, JOINTS, POSE, CORRECTION, GIVE_UP = 0, 1, 2, 3, 4  # what an answer contains; GIVE_UP: the controller failed
+MOTION, FEEDBACK = 1, 2  # kinds of slots
+REST, JOINTS, POSE, CORRECTION, GIVE_UP = 0, 1, 2, 3, 4  # kinds of answers; GIVE_UP: the controller failed
 GREETING_TIME = 3.0  # s, longest wait for the robot's answer to the greeting
 
 QUESTION = np.dtype(
@@ -56,7 +56,7 @@ def checksum(words: npt.NDArray[np.uint64], number: int) -> int:
 
 
 class SlotError(RuntimeError):
-    """No slot could be had. The message says why, and what to do."""
+    """No slot is available. The message has the reason and a remedy."""
 
 
 class SlotTaken(SlotError):
@@ -104,7 +104,7 @@ class Slot:
         self._answer_head = answer[: HEAD // 8]
         self._answer_words = answer[HEAD // 8 : (HEAD + ANSWER.itemsize) // 8]
         self._seen = 0
-        self._number = time.monotonic_ns()  # another than that of a process before this one
+        self._number = time.monotonic_ns()  # differs from that of an earlier process
 
     def _greet(self, kind: int, interface: int) -> mmap.mmap:
         self._socket.settimeout(GREETING_TIME)
@@ -163,7 +163,7 @@ class Slot:
         copy = self._question_words.copy()
         number, words = int(copy[0]), copy[HEAD // 8 :]
         if int(copy[1]) != checksum(words, number):
-            return None  # it is being written; the next look finds it whole
+            return None  # it is being written; the next call returns it
         self._seen = number
         record: np.void = words.view(QUESTION)[0]
         return record

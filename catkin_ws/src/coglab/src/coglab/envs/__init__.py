@@ -9,7 +9,7 @@
     observation, info = env.reset(seed=1)
     observation, reward, terminated, truncated, info = env.step(env.action_space.sample())
 
-Many at once, each in a process of its own: ``coglab.envs.make_vec("coglab/Receive-v0", 4)``. The table of baselines:
+Many at once, each in its own process: ``coglab.envs.make_vec("coglab/Receive-v0", 4)``. The table of baselines:
 ``python3 -m coglab.envs leaderboard``.
 """
 

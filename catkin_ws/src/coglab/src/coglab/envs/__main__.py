@@ -17,9 +17,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "leaderboard",
         help="compare the shipped brain, a straight-line reach and random actions on the test people",
         description="Runs the missing episodes, keeps them in a folder, and prints the table. Stop it at any time: the "
-        "next call goes on.",
+        "next call continues.",
     )
-    board.add_argument("--people", type=int, default=300, help="first so many people of each split (default 300)")
+    board.add_argument("--people", type=int, default=300, help="number of people of each split (default 300)")
     board.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes (default: one per core)")
     board.add_argument("--out", type=Path, default=Path("out/leaderboard"), help="folder of the results")
     board.add_argument("--environment", choices=("receive", "give"), action="append", help="default: both")

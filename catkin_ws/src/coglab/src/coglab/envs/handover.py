@@ -23,16 +23,16 @@ PERIODS = round(1.0 / (RATE * DT))  # of the world in one step
 SPEED = 0.6  # m/s, speed of the palm along an axis at an action of 1
 TURNING = 1.5  # rad/s, the same about an axis
 CONTROLS = {"palm_twist": "twist_stream", "joint_velocity": "joint_velocity_stream"}
-OLDEST = 10.0  # s, age of what was never seen, and the largest age
+OLDEST = 10.0  # s, largest age; also the age of an object that was never seen
 FARTHEST = 3.0  # m, bound of positions in observations
 STRONGEST = 100.0  # Nm, bound of torques in observations
 
 
 @dataclass(frozen=True)
 class Reward:
-    """Weights of the reward. Each step gives ``progress`` times the way (m) by which the palm comes nearer to the true
-    place of the handover, until it touches; less ``time`` per s and ``force`` per N s above 5 N on the person. The end
-    gives ``success``, or takes ``failure`` if the object falls, the person gives up or the arm stops."""
+    """Weights of the reward. Each step adds ``progress`` times the approach (m) of the palm to the true place of the
+    handover, until the first touch. It subtracts ``time`` per s, and ``force`` per N s above 5 N on the person. The end
+    adds ``success``, or subtracts ``failure`` if the object falls, the person gives up or the arm stops."""
 
     success: float = 1.0
     failure: float = 1.0
@@ -42,8 +42,8 @@ class Reward:
 
 
 class HandoverEnv(gymnasium.Env):
-    """A person gives an object to the robot, or takes one from it. One step is 50 ms. The arm keeps all its limits,
-    whatever the action.
+    """A person gives an object to the robot, or takes one from it. One step is 50 ms. The arm keeps all its limits
+    for any action.
 
     ``split``: people of "train", "validation", "test" or "test_hard" (coglab.envs.SPLITS). ``objects``: ids of the
     objects, in turn over the people. ``control``: "palm_twist" or "joint_velocity". ``time_limit``: s until the episode
@@ -58,13 +58,13 @@ class HandoverEnv(gymnasium.Env):
     tracker saw them last (7,) with ``human_hand_age`` and ``object_age`` s (1,), ``goal`` (7,): pose of the palm at the
     handover in the frame of the object (Receive) or of the person's hand (Give), ``external_torque`` Nm as the arm
     estimates it (7,), ``phase`` of the robot's hand: 0 open, 1 closing, 2 closed, 3 opening; ``time`` s (1,). Poses:
-    position m and quaternion x y z w in the base frame. What was never seen has an age of 10 s.
+    position m and quaternion x y z w in the base frame. An object or hand that was never seen has the age 10 s.
 
     Info: ``success``, ``time`` s until the receiver held the object alone (infinite without success), ``force`` N,
-    largest on the person, ``dropped``, ``gave_up``, ``stopped``: why the arm follows no more (empty while it does),
-    ``person`` (seed), ``object``, ``reward``: its parts. The first five are the truth, which no observation has.
+    largest on the person, ``dropped``, ``gave_up``, ``stopped``: reason why the arm does not follow (empty if it does),
+    ``person`` (seed), ``object``, ``reward``: its parts. The first five are true values, not part of an observation.
 
-    The robot speaks by itself, as with the shipped machines: it asks the person at the beginning, and says "I have it"
+    The robot speaks by itself, like the shipped machines: it asks the person at the start, and says "I have it"
     or "You have it" once its hand has closed on the object or has opened.
 
     ``reset(seed=...)`` draws a person of the split; ``reset(options={"person": 7})`` takes the eighth one. The same
@@ -85,7 +85,7 @@ class HandoverEnv(gymnasium.Env):
     ) -> None:
         self.split = split_named(split)
         self.objects = (objects,) if isinstance(objects, str) else tuple(objects)
-        self.split.conditions(self.split.seeds[0], self.objects)  # refuses unknown objects
+        self.split.conditions(self.split.seeds[0], self.objects)  # raises for unknown objects
         if control not in CONTROLS:
             raise ValueError(f"control '{control}' is none of {', '.join(CONTROLS)}")
         if number(time_limit, "time_limit", "s", 0.0) > 600.0:
@@ -214,7 +214,7 @@ class HandoverEnv(gymnasium.Env):
             self._stopped = str(self.stage.world.robot.report["reason"] or why)
 
     def _distance(self) -> float:
-        """m from the palm to its true place at the handover."""
+        """Returns the distance (m) of the palm from its true place at the handover."""
         stage = self.stage
         truth = stage.world.cell.truth()
         anchor = pose_of_truth(truth["object" if self.task == RECEIVE else "human_hand"])
@@ -254,7 +254,7 @@ class HandoverEnv(gymnasium.Env):
             "external_torque": report["external_torque"],
             "time": [world.t - self._begun],
         }
-        # All bounded at once: a step has little time.
+        # Clip all values in one call: a step has little time.
         flat = np.concatenate([seen[name] for name, _ in self._places])
         bounded = np.clip(flat, self._low, self._high).astype(np.float32)
         observation: dict[str, Any] = {name: bounded[place] for name, place in self._places}

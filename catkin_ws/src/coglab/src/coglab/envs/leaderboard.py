@@ -1,6 +1,6 @@
 """The table of baselines: success, time, force and falls of policies and of the shipped brain on the same test people.
 
-Results lie in one file of JSON lines per environment, split and policy. A run that was stopped goes on where it ended.
+Results are in one file of JSON lines per environment, split and policy. A stopped run can be continued.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ def run_policy(policy: Policy, task: str, split: str, person: int, objects: Sequ
 
 
 def run_brain(task: str, split: str, person: int, objects: Sequence[str] = OBJECTS) -> dict[str, Any]:
-    """The same with the shipped state machines, with the same person and conditions. The object that the brain gives
-    was handed to it by an accustomed person before; that does not count, but a failure there does."""
+    """The same with the shipped state machines, for the same person and conditions. Before giving, an accustomed person
+    hands over the object; if that fails, the episode has failed."""
     people = split_named(split)
     seed = people.seeds[person]
     conditions = people.conditions(seed, objects)
@@ -79,7 +79,7 @@ def run_brain(task: str, split: str, person: int, objects: Sequence[str] = OBJEC
         else:
             trial.run(script=give)
     except TimeoutError:
-        pass  # the referee's figures tell that it has failed
+        pass  # the referee's figures show the failure
     if not judge:
         return {"success": False, "time": math.inf, "force": 0.0, "dropped": False, "gave_up": False}
     for _ in range(round(KEPT / DT) + 1):  # an action may end before the object was kept long enough
@@ -88,7 +88,7 @@ def run_brain(task: str, split: str, person: int, objects: Sequence[str] = OBJEC
         world.step()
         judge[0].look()
     figures = judge[0].info()
-    in_time = figures["success"] and figures["time"] <= LIMIT  # as an episode is truncated
+    in_time = figures["success"] and figures["time"] <= LIMIT  # like the truncation of an episode
     return {**figures, "success": in_time, "time": figures["time"] if in_time else math.inf}
 
 
@@ -126,7 +126,7 @@ class Results:
         return self.folder / f"{task}-{split}-{policy}.jsonl"
 
     def read(self, task: str, split: str, policy: str) -> dict[int, dict[str, Any]]:
-        """Episodes by person. A line that was not written to its end is left out: its episode runs again."""
+        """Episodes by person. An incomplete line is ignored: its episode runs again."""
         path, found = self.path(task, split, policy), {}
         for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
             try:
@@ -146,8 +146,8 @@ class Results:
 
 
 def play(jobs: Sequence[Job], results: Results, workers: int, say: Callable[[str], None]) -> int:
-    """Runs the episodes that ``results`` does not have yet, in processes of their own. One that raises, or whose
-    process dies or takes longer than WALL_LIMIT twice, is named and gets no result. Returns how many these are."""
+    """Runs the episodes missing in ``results``, in new processes. An episode that raises, or whose process dies
+    or takes longer than WALL_LIMIT twice, is reported and has no result. Returns the number of these."""
     done = {key: results.read(*key) for key in {job[:3] for job in jobs}}
     left = [job for job in jobs if job[3] not in done[job[:3]]]
     if left:
@@ -214,8 +214,8 @@ def _cells(r: dict[str, Any]) -> list[str]:
 def leaderboard(
     folder: Path, people: int, workers: int, tasks: Sequence[str], splits: Sequence[str], policies: Sequence[str]
 ) -> tuple[str, int]:
-    """Runs what is missing. Returns the table, which also lies in ``folder``/leaderboard.md, and how many episodes of
-    it have failed."""
+    """Runs the missing episodes. Returns the table, also written to ``folder``/leaderboard.md, and the number of failed
+    episodes."""
     results = Results(folder)
     jobs = [
         (task, split, policy, person)
@@ -226,6 +226,6 @@ def leaderboard(
     ]
     failed = play(jobs, results, workers, lambda text: print(text, file=sys.stderr, flush=True))
     text = table(results, tasks, splits, policies, people)
-    folder.mkdir(parents=True, exist_ok=True)  # also where every episode has failed
+    folder.mkdir(parents=True, exist_ok=True)  # even if every episode has failed
     (folder / "leaderboard.md").write_text(text, encoding="utf-8")
     return text, failed

@@ -27,7 +27,7 @@ class Split:
         if not objects:
             raise ValueError(f"objects is empty; expected some of {', '.join(OBJECTS)}")
         plain = Conditions(object_id=objects[seed % len(objects)])
-        # Not in step with the objects: all of them meet all hardships.
+        # Independent of the objects: each object meets all hardships.
         return hardship(list(HARDSHIPS)[seed // len(OBJECTS) % len(HARDSHIPS)], seed, plain) if self.hard else plain
 
 

@@ -1,4 +1,4 @@
-"""What truly happens in a handover: success, time, force on the person, a fallen object. Policies do not see it."""
+"""True result of a handover: success, time, force on the person, a fallen object. Policies do not see it."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import Any
 from coglab_trials.world import DT, World
 
 RECEIVE, GIVE = "receive", "give"
-KEEPER = {RECEIVE: "robot", GIVE: "human"}  # who holds the object after a success
+KEEPER = {RECEIVE: "robot", GIVE: "human"}  # holder of the object after a success
 KEPT = 1.0  # s that the receiver must hold the object alone
-GENTLE = 5.0  # N; less force on the person costs nothing
+GENTLE = 5.0  # N, force on the person without a penalty
 
 
 class Referee:

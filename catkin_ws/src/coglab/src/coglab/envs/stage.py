@@ -1,4 +1,4 @@
-"""A world that is ready for a handover: arm in command mode, hand preshaped, object where it begins, stream open."""
+"""A world ready for a handover: arm in command mode, hand preshaped, object at its start, stream open."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ih2_hand.errors import HandError, RefusedError
 from coglab.envs.referee import RECEIVE
 
 LONGEST = 10.0  # s, limit of each step of the preparation
-LOOKS = 0.2  # s before the beginning, in which the tracker sees hand and object
+LOOKS = 0.2  # s, sights of hand and object before the start
 OPEN, CLOSING, CLOSED, OPENING = range(4)  # phases of the robot's hand
 
 
@@ -45,7 +45,7 @@ class Stage:
     def _prepare(self, in_palm: Pose, stream: str) -> None:
         world = self.world
         world.step()  # the person takes the object
-        world.hand.emulator.calibration_scale = 0.0  # what takes the real hand 1.7 s shows nothing here
+        world.hand.emulator.calibration_scale = 0.0  # skip the 1.7 s of a calibration
         self._until(lambda: world.cell.quality == 3 and not world.hand.holding, "the robot controller does not connect")
         ticket, outcome = world.robot.virtual.submit("start"), []
         refused = world.hand.calibrate("fast")
@@ -65,7 +65,7 @@ class Stage:
             raise RuntimeError(f"the arm does not start: {outcome[0][1]}")
         self._until(self._done, "the hand does not take its preshape")
         if self.task != RECEIVE:
-            # First the order, from the preshape: closed fingers would take their preshape once more, and drop it.
+            # Give the order from the preshape: closed fingers would open to their preshape first and drop it.
             self._order(True)
             world.cell.place("robot_hand", in_palm.position, in_palm.orientation)
             self._until(self._done, "the hand does not close on the object")
@@ -107,7 +107,7 @@ class Stage:
             self._order(False)  # its preshape was lost: take it first
 
     def look(self) -> None:
-        """After each period: the robot says what its hand has done, as it does with the shipped machines."""
+        """Call after each period. The robot announces the action of its hand, like the shipped machines."""
         if self._told or not self._done():
             return
         self._told = True
@@ -119,7 +119,7 @@ class Stage:
 
     @property
     def phase(self) -> int:
-        """OPEN, CLOSING, CLOSED or OPENING: what the robot's hand does."""
+        """Phase of the robot's hand: OPEN, CLOSING, CLOSED or OPENING."""
         if self._closed:
             return CLOSED if self._done() else CLOSING
         return OPEN if self._done() else OPENING

@@ -96,7 +96,7 @@ class Config:
                 return
             for name in AT_START:
                 if values.get(name) != self._values.get(name):
-                    self._warn(f"{self.path}: '{name}' has changed; what was read at the start stays in force")
+                    self._warn(f"{self.path}: '{name}' has changed; the value read at the start stays in force")
                 values[name] = self._values.get(name, {})
             self._values = values
 

@@ -38,7 +38,7 @@ class HandTrack:
         self._newest = at, place
         jumped = before is not None and _too_far(before, at, place)
         if jumped or not self.is_one:
-            # The hand may continue from its last sure place, whatever the tracker took for it in between.
+            # The hand may continue from its last sure place, even if the tracker confused it in between.
             self.is_one = any(
                 far(place, each[1]) <= PLACE or (jumped and not _too_far(each, at, place))
                 for each in (self._last, sure)

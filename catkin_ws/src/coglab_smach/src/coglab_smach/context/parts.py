@@ -1,4 +1,4 @@
-"""Parts of the machines that a user's package brings: actions, states and deliveries, by name in machines.yaml.
+"""Parts of the machines from a user's package: actions, states and deliveries, by name in machines.yaml.
 
 A name is ``module:function``. All names are imported when the machines are built. One that cannot be used ends the
 start with a ConfigError, so that nothing is half-loaded.
@@ -18,7 +18,7 @@ from typing import Any
 from coglab_smach.context.config import Config, ConfigError
 
 HANDS = ("empty", "holding", "any")
-"""What the hand holds when an action may start."""
+"""States of the hand in which an action may start."""
 BUILD = ("ctx",)
 """arguments of a function that builds an action or a state: the Context"""
 DELIVER = ("entry", "hand")
@@ -76,7 +76,7 @@ class Parts:
 
 def imported(name: str, spec: str, arguments: tuple[str, ...]) -> Callable[..., Any]:
     """Returns the function ``module:function`` that the field ``name`` of machines.yaml gives, and that takes
-    ``arguments``. ConfigError in words."""
+    ``arguments``. ConfigError with a reason."""
     module, _, function = spec.partition(":")
     if not function.isidentifier() or not all(word.isidentifier() for word in module.split(".")):
         raise ConfigError(f"{name}: 'module:function' is expected, such as my_lab.machines:build_polish, got '{spec}'")
@@ -103,13 +103,13 @@ def imported(name: str, spec: str, arguments: tuple[str, ...]) -> Callable[..., 
             f"{name}: {function}{inspect.signature(part)} of {_file_and_line(part)} is called as "
             f"{function}({', '.join(arguments)}): give it these arguments"
         ) from None
-    except ValueError:  # of a compiled function: nobody can tell
+    except ValueError:  # a compiled function has no signature
         pass
     return part
 
 
 def built(name: str, build: Callable[[Any], Any], ctx: Any) -> Any:
-    """Returns what the user's function builds. ConfigError if it raises."""
+    """Returns the state or machine that the user's function builds. ConfigError if it raises."""
     try:
         return build(ctx)
     except ConfigError:

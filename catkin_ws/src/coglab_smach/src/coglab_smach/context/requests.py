@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 DATABASE_WAIT = 2.0  # s, time limit of the object database for a trigger
 COMMAND = "./coglab start"  # command that requests an action
 SHORT_NAMES = {"receive": "exchange_human_to_robot", "give": "exchange_robot_to_human"}
-"""Short names of actions that a trigger may use."""
+"""Short names of actions in a trigger."""
 
 
 def command(*actions: str) -> str:
@@ -58,7 +58,7 @@ class Requests:
         self.default_object: str | None = None
         """object of a trigger without an object id; None if triggers do not refer to an object of the database"""
         self.known: tuple[str, ...] = ()
-        """every action of this machine, in whatever hub; empty: not told"""
+        """all actions of this machine, in any hub; empty: unknown"""
 
     def open(
         self, hub: str, allowed: Iterable[str], names_object: bool = False, default_object: str | None = None
@@ -106,7 +106,7 @@ class Requests:
         if self._request is not None:
             return Answer(
                 False,
-                f"'{action}' refused: '{self._request.action}' was asked for a moment ago; "
+                f"'{action}' refused: '{self._request.action}' was requested a moment ago; "
                 f"when that is over, {command(action)}",
                 ReasonCode.BUSY,
             )

@@ -47,14 +47,14 @@ class EndMotion(CoglabState):
     def run(self, ud: Any) -> str:
         if self.ctx.stop.pressed():
             ud.grip.stop()
-            self.reason = f"STOP: {self.ctx.stop.reason}; the hand keeps what it holds; to go on {command('reset')}"
+            self.reason = f"STOP: {self.ctx.stop.reason}; the hand keeps its object; to go on {command('reset')}"
             return "stopped"
         self.ctx.contact.disarm()
         trouble = "" if arm_is_blocked(self).ok else end_motion(self.ctx, "recovery after a failure")
         blocked = arm_is_blocked(self)
         if blocked.ok:
             self.reason = (
-                f"the arm is blocked: {blocked.why}; the hand keeps what it holds; when its cause is away, "
+                f"the arm is blocked: {blocked.why}; the hand keeps its object; when its cause is away, "
                 f"{command('reset')}"
             )
             self.ctx.journal.stopped(self.reason, blocked.why, blocked.code)
@@ -115,7 +115,7 @@ class SecureHand(CoglabState):
         except PortError as error:
             if self._grip.shared:
                 return self._stay(
-                    f"the hand could not be opened, and the person may hold what is in it ({error.sentence})"
+                    f"the hand could not be opened, and the person may hold its object ({error.sentence})"
                 )
             # A dead hand must not keep the arm from going home. Its object is unknown, so the hand is not forced.
             self.reason = f"the hand could not be opened: {error.sentence}"
@@ -194,7 +194,7 @@ class WhatIsHeld(CoglabState):
         held = self._seen_by_the_hand()
         if held is None:
             self.reason = (
-                f"the hand does not tell; as noted before, "
+                f"the hand does not report its grip; according to the last note, "
                 f"{f'it holds {self.ctx.holding!r}' if self.ctx.holding else 'it is empty'}"
             )
         elif held and not self.ctx.holding:

@@ -10,7 +10,7 @@ from coglab_msgs.msg import ReasonCode
 
 
 class PortError(Exception):
-    """A port could not fulfil a request. One sentence: what was expected, what came, what to do next.
+    """A port could not fulfil a request. One sentence: expected value, actual value, next step.
 
     ``causes``: causes of the error, nearest first. ``code``: its coglab_msgs/ReasonCode. Programs use only the code,
     not the text.

@@ -157,7 +157,7 @@ class RosHand:
                 return fail(state.message, state.event)
             if begun["seen"] or (state.calibrated and since > 0.5):
                 return True
-            return since > 3.0 and fail(state.message or "hand_status says nothing about it", ReasonCode.NODE_SILENT)
+            return since > 3.0 and fail(state.message or "hand_status does not report it", ReasonCode.NODE_SILENT)
 
         def value() -> None:
             if begun["error"] is not None:

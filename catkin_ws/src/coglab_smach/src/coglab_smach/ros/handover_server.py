@@ -1,6 +1,6 @@
 """The action coglab/handover: requests an action of the brain as /coglab/start does, and returns its result.
 
-One thread runs the accepted goal. The class needs no ROS master: tests give it goal handles of their own.
+One thread runs the accepted goal. The class needs no ROS master: tests use their own goal handles.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ STOPPING = 10.0  # s for the action to end after STOP
 UNTAKEN = 0.5  # s in which a hub begins an accepted action
 LONGEST_TEXT = 64  # characters of a field
 OPERATORS = ("reset", "initialise")
-"""requests that have no record of their own: they end in the next hub"""
+"""requests without a record: they end in the next hub"""
 
 
 class HandoverServer:
@@ -69,7 +69,7 @@ class HandoverServer:
             self._cancelled = self._cancelled or handle == self._handle
 
     def result_of(self, record: ActionRecord) -> HandoverResult:
-        """Returns the message for an action that has ended. It is the result of the goal too, if that asked for it."""
+        """Returns the message for an action that has ended. It is also the result of the goal that requested it."""
         with self._lock:
             goal = self._handle.get_goal() if self._handle is not None and self._begun else HandoverGoal()
             asked = SHORT_NAMES.get(goal.action, goal.action) == record.kind

@@ -35,7 +35,7 @@ class Interrupted(Exception):
 
 
 class TimeLimit(PortError):
-    """A time limit has run out. The sentence names what the state waited for."""
+    """A time limit has run out. The sentence names the awaited event."""
 
     def __init__(self, sentence: str, causes: tuple[str, ...] = (), code: int = ReasonCode.TIME_LIMIT) -> None:
         super().__init__(sentence, causes, code)

@@ -191,15 +191,15 @@ class HandTighten(CoglabState):
     def run(self, ud: Any) -> str:
         speed = ud.grip.firm if self.ctx.holding else 0
         if speed == 0:
-            self.reason = "nothing is held more gently than its grasp asks for"
+            self.reason = "the grip already has the force of its grasp"
             return "succeeded"
         if self.at_home:
             away = hand_from_palm(self)
             if away is not None and away < AT_HAND:
-                self.reason = f"it stays held gently: the person's hand is {away:.2f} m from the palm"
+                self.reason = f"the grip stays gentle: the person's hand is {away:.2f} m from the palm"
                 return "succeeded"
         elif not (ud.hand_seen_away and self._is_free(ud.hand_distance, ud.grip.hand)):
-            self.reason = "the person's hand was not seen to go: at home"
+            self.reason = "the person's hand was not seen to leave: the grip is tightened at home"
             return "succeeded"
         closing, end = self.ctx.hand.close(speed), self.ctx.config.number("hand.settle_after_close")
         # The closing continues while the arm moves. A STOP ends it then (EndMotion).

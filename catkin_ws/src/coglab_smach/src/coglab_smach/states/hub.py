@@ -93,7 +93,7 @@ class Hub(CoglabState):
                 self.path(), self.label, "refused", self.label, refusal, (), ReasonCode.OBJECT_UNKNOWN
             )
         ud.delivery_name = request.delivery
-        self.reason += f"{request.source} asked for {request.action} of '{ud.object_id}'"
+        self.reason += f"{request.source} requested {request.action} of '{ud.object_id}'"
         return request.action
 
     def _open(self, ud: Any) -> None:
@@ -144,7 +144,7 @@ class Hub(CoglabState):
         if ud.object_id == UNKNOWN:
             self.ctx.holding = ud.object_id = request.object_id
         elif request.object_id and request.object_id != ud.object_id:
-            self.reason = f"asked for '{request.object_id}', but the hand holds '{ud.object_id}': that one is meant. "
+            self.reason = f"requested '{request.object_id}', but the hand holds '{ud.object_id}': this one is used. "
         if ud.object_entry:
             return ""
         try:
@@ -219,7 +219,7 @@ class Fault(CoglabState):
             except PortError:
                 pass  # the robot may not be running yet; if it stays silent, the initialisation reports it
             self.ctx.stop.reset()
-        self.reason = "the operator asked for a new initialisation"
+        self.reason = "the operator requested a new initialisation"
         return "succeeded"
 
 

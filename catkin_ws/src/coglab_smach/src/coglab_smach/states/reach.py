@@ -143,7 +143,7 @@ class WaitStop(CoglabState):
         """Wait until ``near()``. The time limit is computed from the first feedback of the motion."""
         arm = self.ctx.arm
         try:
-            self.wait_for(lambda: self.arrived() or arm.dmp_progress().primitive_id != "", "news of the reach", 2.0)
+            self.wait_for(lambda: self.arrived() or arm.dmp_progress().primitive_id != "", "the reach's start", 2.0)
             begun = arm.dmp_progress()
             asked = begun.remaining_time + reach_time(arm.motion_limits(), begun.remaining_distance)
             limit = self.ctx.config.number("reach_timeout") + asked
@@ -209,11 +209,11 @@ class WaitForPerson(WaitStop):
         """Pause for the person; possible in every phase. ``code``, ``why``: the reason if the arm gives up."""
         limit = self.ctx.config.number("handover.pause")
         self.allow(limit + 8.0)
-        resting = self.ctx.arm.cancel_motion("the arm waits: nobody offers or asks")
+        resting = self.ctx.arm.cancel_motion("the arm waits: nobody offers or requests")
         self.await_pending(resting, "rest of the arm", 3.0, code=ARM)
         self.ctx.journal.mark("paused")
         try:
-            self.wait_for(watch.hopeful, "that the person goes on", limit, code=PERSON)
+            self.wait_for(watch.hopeful, "a new offer or request of the person", limit, code=PERSON)
         except TimeLimit as error:
             if error.code != ReasonCode.TIME_LIMIT:
                 raise
@@ -251,9 +251,9 @@ class Phase(Enum):
     """Phases of WaitContact; each ends with the next phase. The reach can pause in any of them (WaitForPerson)."""
 
     REACH = "the hand goes to the object"
-    NEAR_GOAL = "contact is watched for, the fingers may begin to close, and the hand goes on where it feels nothing"
+    NEAR_GOAL = "contact is watched for, the fingers may start to close, and a hand without contact moves on"
     TOUCHED = "the hand slides on to the grasp, if it has brushed the object on its way past"
-    BUMPED = "something else was touched: draw back, and come again"
+    BUMPED = "something else was touched: retreat and reach again"
     HELD = "the object is between the fingers"
 
 
@@ -363,7 +363,7 @@ class WaitContact(WaitForPerson):
             offset = np.array(goal["offset"]) + self.ctx.config.number("handover.deeper") / length * axis
             request = dmp_request({**goal, "offset": offset.tolist(), "approach": np.zeros(3).tolist()})
             try:
-                self.await_pending(self.ctx.arm.execute_dmp(request), "the last of the way", 3.0)
+                self.await_pending(self.ctx.arm.execute_dmp(request), "the rest of the way", 3.0)
                 self.ctx.journal.mark("went_on")
             except TimeLimit:
                 raise
@@ -546,7 +546,7 @@ class ReachWatch:
             return self._outside
         if self._untold is not None:
             return int(ReasonCode.NOT_PERCEIVED), self._untold.sentence
-        return int(ReasonCode.GOAL_WITHDRAWN), "the person does not offer or ask any more"
+        return int(ReasonCode.GOAL_WITHDRAWN), "the person does not offer or request any more"
 
     def doubted(self) -> bool:
         """Returns True if nobody has offered or requested for DOUBT_TIME, or if the target goes back. TimeLimit, which

@@ -102,7 +102,7 @@ def _share_at_rest(state: CoglabState) -> float:
         return bool(shares)
 
     state.pause(SETTLES)
-    state.wait_for(has_come, "the share of the weight that the contact detector tells", TELLS)
+    state.wait_for(has_come, "the weight share from the contact detector", TELLS)
     return shares[0]
 
 

@@ -100,4 +100,4 @@ class YieldToPull:
     def stop(self) -> None:
         """End all motion."""
         if not self.idle() and self._ending is None:
-            self._end("nothing is to be given way to any more")
+            self._end("no pull is to be followed any more")

@@ -1,4 +1,4 @@
-"""Runs a primitive on the model of the arm, without a robot: joint speeds, limits, and which goals it reaches."""
+"""Runs a primitive on the model of the arm, without a robot: joint speeds, limits, reached goals."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from coglab_smach.kinematics.reachability import default_arm, home_posture, join
 from coglab_tools.dmp.demonstration import Array
 
 CYCLE = 0.01  # s
-SETTLE = 1.35  # a course is followed for this many durations
+SETTLE = 1.35  # length of a course, in durations of the primitive
 NEAR = 0.01  # m, largest distance from the goal at the end
 FULL_SPEED = 0.99  # factor on the palm's speed below which the arm counts as slowed by a limit
 NAMES = ("A1", "A2", "E1", "A3", "A4", "A5", "A6")
@@ -34,7 +34,7 @@ class Course:
     shares: Array
     """joint speeds as share of their limits, (n, 7)"""
     error: float
-    """m, from the goal at the end"""
+    """m, distance from the goal at the end"""
     stopped_by: str
     """joint that is at its stop, or the border of the workspace that the goal violates; empty: none"""
     slowest: float
@@ -57,7 +57,7 @@ class Course:
 
     @property
     def verdict(self) -> str:
-        """reached, slowed (the arm takes longer than the primitive), or what is in the way."""
+        """reached, slowed (the arm takes longer than the primitive), or the obstacle."""
         if not self.reached:
             return self.stopped_by or f"ends {1000 * self.error:.0f} mm off"
         return "slowed" if self.slowest < FULL_SPEED else "reached"
@@ -72,7 +72,7 @@ def home_palm() -> tuple[Array, Array]:
 
 @lru_cache(maxsize=1)
 def region() -> tuple[Array, Array]:
-    """Corners (3,) in m of the region in which people hand over, as the machines are configured; base frame."""
+    """Corners (3,) in m of the handover region in the machines' configuration, base frame."""
     handover = read(package_path("coglab_smach", "config", "machines.yaml")).value["handover"]
     return np.array(handover["region_low"], dtype=float), np.array(handover["region_high"], dtype=float)
 
@@ -109,7 +109,7 @@ def run(primitive: cc.Primitive, goal: Array, ratio: float = 1.0) -> Course:
 
 
 def grid(counts: tuple[int, int, int] = (4, 5, 4)) -> list[Array]:
-    """Goals all over the handover region, each (3,) m."""
+    """Goals on a grid of the handover region, each (3,) m."""
     low, high = region()
     axes = [np.linspace(a, b, n) for a, b, n in zip(low, high, counts, strict=True)]
     return [np.array([x, y, z]) for z in axes[2] for y in axes[1] for x in axes[0]]

@@ -18,22 +18,20 @@ FAULTS = ("short", "brief", "jump", "moving", "noisy")
 
 def add(verbs: argparse._SubParsersAction[Any]) -> None:
     """Add the verbs of `dmp`."""
-    parser = verbs.add_parser("record", help="records a demonstration: the arm led by hand, or a tracked hand")
-    parser.add_argument("name", help="of the demonstration")
-    parser.add_argument("--frame", default="", help="tf frame of a tracked hand; default: the arm, led by hand")
+    parser = verbs.add_parser("record", help="records a demonstration: the hand-guided arm, or a tracked hand")
+    parser.add_argument("name", help="name of the demonstration")
+    parser.add_argument("--frame", default="", help="tf frame of a tracked hand; default: the hand-guided arm")
     parser.add_argument("--out", type=Path, default=Path("demonstrations"), help="folder of the demonstrations")
     parser.add_argument(
-        "--button", default="", metavar="TOPIC", help="std_msgs/Bool or sensor_msgs/Joy: held = recorded"
+        "--button", default="", metavar="TOPIC", help="Bool or Joy topic of a button, held while recording"
     )
     parser.add_argument("--wait", type=int, default=3, metavar="S", help="count-down (3)")
     parser.add_argument("--limit", type=float, default=30.0, metavar="S", help="longest demonstration (30)")
-    parser.add_argument(
-        "--stay", action="store_true", help="leave the arm where it was led, instead of bringing it home"
-    )
+    parser.add_argument("--stay", action="store_true", help="leave the arm in place, instead of bringing it home")
     parser.add_argument("--master", default="", help="ROS master of the robot, address or port")
     parser.set_defaults(run=record)
 
-    parser = verbs.add_parser("import", help="reads recordings, judges them and cuts their reaches into demonstrations")
+    parser = verbs.add_parser("import", help="reads and checks recordings and cuts their reaches into demonstrations")
     _reading(parser)
     parser.add_argument("--out", type=Path, default=Path("demonstrations"), help="folder of the demonstrations")
     parser.set_defaults(run=import_files)
@@ -41,9 +39,9 @@ def add(verbs: argparse._SubParsersAction[Any]) -> None:
     parser = verbs.add_parser("train", help="learns a primitive from recordings or demonstrations")
     _reading(parser)
     parser.add_argument("--id", required=True, help="name of the primitive")
-    parser.add_argument("-o", "--library", type=Path, default=Path("primitives.xml"), help="library that gets it")
-    parser.add_argument("--replace", action="store_true", help="take the place of a primitive of this name")
-    parser.add_argument("--mapping", choices=MAPPINGS, default="similarity", help="of the shape for other goals")
+    parser.add_argument("-o", "--library", type=Path, default=Path("primitives.xml"), help="library to extend")
+    parser.add_argument("--replace", action="store_true", help="replace a primitive of this name")
+    parser.add_argument("--mapping", choices=MAPPINGS, default="similarity", help="mapping of the shape to other goals")
     parser.add_argument("--basis", type=int, default=20, metavar="N", help="number of basis functions, 2..64")
     parser.add_argument("--description", default="", help="for people")
     parser.add_argument("--allow", action="append", default=[], choices=FAULTS, help="a fault that is accepted")
@@ -53,7 +51,7 @@ def add(verbs: argparse._SubParsersAction[Any]) -> None:
     parser = verbs.add_parser("inspect", help="shows one primitive: figures and a picture")
     _of_library(parser)
     parser.add_argument("--id", required=True)
-    parser.add_argument("--goal", type=_metres, nargs=3, metavar=("X", "Y", "Z"), help="m, base frame, of the courses")
+    parser.add_argument("--goal", type=_metres, nargs=3, metavar=("X", "Y", "Z"), help="goal of the courses, m, base")
     parser.add_argument(
         "--with", dest="demonstrations", type=Path, nargs="+", default=[], help="demonstrations to show"
     )
@@ -66,15 +64,15 @@ def add(verbs: argparse._SubParsersAction[Any]) -> None:
 
     parser = verbs.add_parser("validate", help="runs primitives on the model of the arm; exit code 1 if one fails")
     _of_library(parser)
-    parser.add_argument("--id", help="only this one")
-    parser.add_argument("--needed", type=float, default=0.5, metavar="SHARE", help="of the goals to be reached (0.5)")
+    parser.add_argument("--id", help="name of the only primitive to check")
+    parser.add_argument("--needed", type=float, default=0.5, metavar="SHARE", help="needed share of goals (0.5)")
     parser.set_defaults(run=validate)
 
     parser = verbs.add_parser("export", help="writes the path of a primitive as CSV, npz or JSON")
     _of_library(parser)
     parser.add_argument("--id", required=True)
     parser.add_argument(
-        "--goal", type=_metres, nargs=3, metavar=("X", "Y", "Z"), help="m from the start (default: taught)"
+        "--goal", type=_metres, nargs=3, metavar=("X", "Y", "Z"), help="goal, m from start (default: taught)"
     )
     parser.add_argument("--ratio", type=float, default=1.0, help="dmp_ratio")
     parser.add_argument("-o", "--out", type=Path, required=True, help="a .csv, .npz or .json file")
@@ -86,10 +84,10 @@ def _reading(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--frame", default="", help="tf frame, or the hand's name in the file (human_hand)")
     parser.add_argument("--world", default="world", help="parent frame of the transforms in a bag")
     parser.add_argument("--topic", default="", help="topic in a bag")
-    parser.add_argument("--length", default="", help="unit m, cm or mm (default: judged)")
-    parser.add_argument("--time", default="", help="unit s, ms, us or ns (default: judged)")
-    parser.add_argument("--angle", default="", help="unit rad or deg (default: judged)")
-    parser.add_argument("--back", action="store_true", help="ways back are reaches, too")
+    parser.add_argument("--length", default="", help="unit m, cm or mm (default: guessed)")
+    parser.add_argument("--time", default="", help="unit s, ms, us or ns (default: guessed)")
+    parser.add_argument("--angle", default="", help="unit rad or deg (default: guessed)")
+    parser.add_argument("--back", action="store_true", help="use motions back as reaches too")
 
 
 def _metres(text: str) -> float:
@@ -154,10 +152,10 @@ def record(options: argparse.Namespace) -> Answer:
     from coglab_tools.dmp.cut import reaches
 
     terminal = recorder.Terminal()
-    write_whole(path, bytes(1_000_000))  # a folder or disk that cannot be written is found out before anything moves
+    write_whole(path, bytes(1_000_000))  # detect an unwritable folder or disk before the arm moves
     path.unlink()
-    if threading.current_thread() is threading.main_thread():  # elsewhere Python sets no handlers
-        for number in (signal.SIGHUP, signal.SIGTERM):  # as Ctrl-C: hand guiding has to end
+    if threading.current_thread() is threading.main_thread():  # other threads cannot set handlers
+        for number in (signal.SIGHUP, signal.SIGTERM):  # like Ctrl-C: hand guiding must end
             signal.signal(number, signal.default_int_handler)
     try:
         with coglab.connect(options.master or _running_master()) as robot:
@@ -165,7 +163,7 @@ def record(options: argparse.Namespace) -> Answer:
                 recorder.check_free(robot)
             button = recorder.Button(options.button) if options.button else None
             if not options.frame:
-                terminal.say("hand guiding: take the robot's hand. The arm gives way as soon as the count is over")
+                terminal.say("hand guiding: take the robot's hand. The arm yields after the countdown")
             if button is not None:
                 terminal.say(f"hold the button {options.button} while you demonstrate")
                 recorder.await_button(button, robot)
@@ -205,7 +203,7 @@ def record(options: argparse.Namespace) -> Answer:
 
 
 def _running_master() -> str:
-    """Address of the system that runs; empty: ROS_MASTER_URI says it."""
+    """Address of the running system; empty: that of ROS_MASTER_URI."""
     import os
 
     from coglab_bringup.ask import Refused, find_master
@@ -223,7 +221,7 @@ def _running_master() -> str:
 
 
 def _free(folder: Path, name: str) -> Path:
-    """A path that is not there yet: name.csv, name_2.csv, ..."""
+    """A path that does not exist yet: name.csv, name_2.csv, ..."""
     path, number = folder / f"{name}.csv", 1
     while path.exists():
         number += 1
@@ -247,7 +245,7 @@ def import_files(options: argparse.Namespace) -> Answer:
         except CheckFailed as error:
             raise CheckFailed(f"{error}; {len(paths) - 1} of {len(found)} demonstrations were written") from None
     wrote = f"wrote {len(paths)} demonstrations to {options.out}"
-    wrote += f"; {replaced} took the place of earlier files" if replaced else ""
+    wrote += f"; {replaced} replaced earlier files" if replaced else ""
     text = [_of_files(options.files, found), *_table(found), wrote]
     return Answer(
         "\n".join(text),
@@ -288,9 +286,7 @@ def train(options: argparse.Namespace) -> Answer:
     if taught.closing is not None:
         lines.append(f"fingers: {fingers_in_words(taught.closing, primitive.duration)}; kept beside the library")
     if taught.strange:
-        lines.append(
-            f"far from the others: {', '.join(taught.strange)}; look at the picture, and leave them out if wrong"
-        )
+        lines.append(f"far from the others: {', '.join(taught.strange)}; check the picture, and leave out wrong ones")
     lines.append(f"wrote {options.library} ({count} primitives) and {path}")
     data = {
         "id": options.id,
@@ -481,7 +477,7 @@ def _of_files(files: Sequence[Path], found: Sequence[Any]) -> str:
 
 
 def _notes(found: Sequence[Any]) -> list[str]:
-    """What was found out, each sentence once with the number of demonstrations."""
+    """The notes, each sentence once with its number of demonstrations."""
     counts = Counter(note for d in found for note in d.notes if not note.startswith("reach from"))
     return [f"  {note}{f' (in {count} of {len(found)})' if len(found) > 1 else ''}" for note, count in counts.items()]
 

@@ -1,9 +1,9 @@
 """Smooths a recorded motion, which also bridges its gaps, and cuts the reaches out of it.
 
 Smoothing is a cubic smoothing spline with a cut-off of 6 Hz and no delay: people's reaches end below 5 Hz, a tracker's
-noise does not. Onset and end come from the speed, with two thresholds: a reach begins to count at the higher one, and
-goes from where the speed left the lower one to where it comes back to it. A hand that never rests between two motions,
-as in a handover, is cut where it is slowest.
+noise does not. Onset and end come from the speed, with two thresholds: a motion counts as a reach above
+the higher one, and lasts from leaving the lower one until returning to it. Two motions without a rest between them, as
+in a handover, are cut at the slowest point.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from coglab_tools.dmp.demonstration import Array, Demonstration
 
 CUT_OFF = 6.0  # Hz; usual for motions of the arm (Winter, Biomechanics and Motor Control of Human Movement)
 SHORTEST = 0.1  # m, farthest point of a reach from its start
-NOTED_GAP = 0.05  # s without a sample that a note tells
+NOTED_GAP = 0.05  # s without a sample, mentioned in a note
 LONGEST_GAP = 0.2  # s without a sample within a reach
-LARGEST_STEP = 0.5  # share of a reach between two samples without a gap; above it the tracker took something else
+LARGEST_STEP = 0.5  # share of a reach between two samples without a gap; above it the tracker lost the hand
 LOW, LOW_SHARE = 0.02, 0.05  # m/s, and share of the peak speed: below the larger one the hand rests
 HIGH_SHARE = 0.25  # share of the largest speed that a motion must reach
 PAUSE_SHARE = 0.35  # slowest point between two motions, share of the smaller of their peaks
-MOVING_SHARE = 0.5  # of the mean speed: a reach that is faster at its first or last sample is not whole
+MOVING_SHARE = 0.5  # of the mean speed: a reach that is faster at its first or last sample is incomplete
 BACK, BACK_SHARE = -0.5, 1.2  # cosine to the last reach, and share of its way: a motion below both is a way back
 
 
 def smooth(raw: Demonstration) -> Demonstration:
-    """The motion without noise, at its own rate, without gaps. `noise` is what was taken away."""
+    """The motion without noise, at its own rate, without gaps. `noise`: the removed part."""
     from scipy.interpolate import make_smoothing_spline
     from scipy.spatial.transform import Rotation
 
@@ -57,8 +57,8 @@ def smooth(raw: Demonstration) -> Demonstration:
 
 
 def reaches(raw: Demonstration, back: bool = False, cut_off: bool = False) -> list[Demonstration]:
-    """The reaches of a recording, in order, smoothed and each from time 0; ways back too if `back`, and those during
-    which the recording begins or ends if `cut_off`.
+    """The reaches of a recording, in order, smoothed and each from time 0; motions back too if `back`, and
+    incomplete reaches at the ends of the recording if `cut_off`.
 
     CheckFailed if there is none, or if a gap or a jump lies in one.
     """
@@ -131,7 +131,7 @@ def motions(times: Array, speed: Array) -> list[tuple[int, int]]:
 
 
 def _goes_back(line: Array, before: Array) -> bool:
-    """Whether a motion by `line` takes the way back, or a part of it, of a reach by `before`; (3,) m."""
+    """True if a motion by `line` goes back, at least partly, after a reach by `before`; (3,) m."""
     a, b = float(np.linalg.norm(line)), float(np.linalg.norm(before))
     return bool(line @ before < BACK * a * b and a < BACK_SHARE * b)
 
@@ -175,5 +175,5 @@ def _refuse_jump(raw: Demonstration, begin: float, end: float, way: float) -> No
     if steps[worst] > LARGEST_STEP * way:
         raise CheckFailed(
             f"{raw.name}: the hand jumps by {steps[worst]:.2f} m at {t[worst + 1]:.2f} s, from one sample to the next: "
-            "the tracker took something else for it; cut the file there, or record again"
+            "the tracker confused it with something else; cut the file there, or record again"
         )

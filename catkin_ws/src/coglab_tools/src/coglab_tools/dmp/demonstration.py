@@ -1,6 +1,6 @@
 """One demonstrated motion, and its file.
 
-A demonstration file is a CSV that `recording:=` plays, too: a header `t,x,y,z[,qx,qy,qz,qw][,closing]`, then one line
+A demonstration file is a CSV that `recording:=` can play: a header `t,x,y,z[,qx,qy,qz,qw][,closing]`, then one line
 per sample. t in s, x y z in m, quaternion of length 1, closing of the fingers 0 (open) .. 1 (closed).
 """
 
@@ -19,7 +19,7 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Demonstration:
-    """Samples of a hand or a palm in one frame, and what was found out about them."""
+    """Samples of a hand or a palm in one frame, and notes about them."""
 
     name: str
     times: Array
@@ -33,9 +33,9 @@ class Demonstration:
     notes: tuple[str, ...] = ()
     """sentences on units, gaps, repeated samples and the cut"""
     begin: float = 0.0
-    """s, of time 0 in the recording that it was cut from"""
+    """s, time in the recording at time 0 of this part"""
     noise: float = 0.0
-    """m, standard deviation per axis of what smoothing took away"""
+    """m, standard deviation per axis of the noise removed by smoothing"""
 
     @property
     def duration(self) -> float:
@@ -44,7 +44,7 @@ class Demonstration:
 
     @property
     def way(self) -> float:
-        """m, from the first sample to the farthest one."""
+        """m, distance from the first sample to the farthest one."""
         return float(np.linalg.norm(self.positions - self.positions[0], axis=1).max())
 
     @property
@@ -53,7 +53,7 @@ class Demonstration:
         return np.asarray(np.linalg.norm(np.gradient(self.positions, self.times, axis=0), axis=1), dtype=float)
 
     def save(self, path: Path) -> Path:
-        """Write the demonstration file. It is there whole or not at all. Returns its path."""
+        """Write the demonstration file. It is written completely or not at all. Returns its path."""
         columns, header = [self.times - self.times[0], *self.positions.T], "t,x,y,z"
         if self.orientations is not None:
             columns, header = [*columns, *self.orientations.T], header + ",qx,qy,qz,qw"
@@ -64,5 +64,5 @@ class Demonstration:
 
 
 def for_shell(path: Path) -> str:
-    """The path as a launch argument needs it: absolute."""
+    """The absolute path, for a launch argument."""
     return str(path) if path.is_absolute() else f"$PWD/{path}"

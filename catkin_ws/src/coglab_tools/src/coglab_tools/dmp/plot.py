@@ -1,4 +1,4 @@
-"""The picture of a primitive: how well it repeats the demonstrations, and what the arm makes of it."""
+"""The picture of a primitive: its reproduction of the demonstrations, and its courses on the arm."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ KINDS = (".png", ".pdf", ".svg")
 RATIOS = (1.0, 1.5, 2.0)
 """dmp_ratio of the three speeds"""
 SHIFT = 0.1
-"""m, by which the goal is shifted to each side"""
+"""m, shift of the goal to each side"""
 VERDICTS = {"reached": ("tab:green", "o"), "slowed": ("tab:orange", "s"), "not reached": ("tab:red", "x")}
 
 
@@ -32,7 +32,7 @@ def picture(
     closing: Array | None = None,
     goal: Array | None = None,
 ) -> Any:
-    """A matplotlib Figure. `goal`: (3,) m in the base frame, of the courses on the arm; None: middle of the region."""
+    """A matplotlib Figure. `goal`: (3,) m in the base frame, for the courses on the arm; None: middle of the region."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -146,7 +146,7 @@ def _joint_speeds(axis: Any, c: check.Course) -> None:
 
 
 def _reachable(above: Any, side: Any, courses: Sequence[check.Course]) -> None:
-    """All goals, spread a little so that those behind one another are seen."""
+    """All goals, slightly spread so that none hides another."""
     reached = sum(c.reached for c in courses)
     for axis, (a, b), third in ((above, (0, 1), 2), (side, (1, 2), 0)):
         low = min(c.goal[third] for c in courses)

@@ -1,4 +1,4 @@
-"""Reads motions from CSV, npz and bag files, and judges units, gaps and samples that cannot be true.
+"""Reads motions from CSV, npz and bag files, and checks units, gaps and impossible samples.
 
 Columns of a CSV, arrays of an npz (each (n,), or `position` (n, 3) and `orientation` (n, 4)) and topics of a bag:
 
@@ -8,8 +8,8 @@ Columns of a CSV, arrays of an npz (each (n,), or `position` (n, 3) and `orienta
 * fingers: `closing`, 0 open .. 1 closed, or in percent, or as the hand's bytes 0 .. 254;
 * `frame`: several hands or objects in one file.
 
-A unit may stand behind a name: `x_mm`, `x [mm]`, `t_ms`, `yaw_deg`; each column has its own. Columns without one are
-judged together from the numbers, and a note says so. A CSV may have commas, semicolons or tabs between its columns;
+A name may end with a unit: `x_mm`, `x [mm]`, `t_ms`, `yaw_deg`; each column has its own. Without units, they are
+guessed from the numbers, with a note. A CSV may have commas, semicolons or tabs between its columns;
 with the latter two, a comma in a number is a decimal comma.
 """
 
@@ -27,8 +27,8 @@ import numpy as np
 from coglab_tools.command import CheckFailed, NotThere, UsageError
 from coglab_tools.dmp.demonstration import Array, Demonstration
 
-FASTEST = 5.0  # m/s between two samples; above it the tracker took something else for the hand
-BRIEF_JUMP = 0.1  # s; a jump that is taken back within this time is left out
+FASTEST = 5.0  # m/s between two samples; above it the tracker confused the hand with something else
+BRIEF_JUMP = 0.1  # s; a jump that ends within this time is left out
 MOST_SAMPLES = 1_000_000
 LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
@@ -39,12 +39,12 @@ MOTOR_CLOSED = 254.0  # position of a closed motor of the IH2 hand
 Table = dict[str, Array]
 """Numbers by column name, each (n,)"""
 Place = Callable[[int], str]
-"""Where a sample is in its file, in words, by its index"""
+"""function: index of a sample -> its place in the file, as text"""
 
 
 @dataclass(frozen=True)
 class Source:
-    """What to read from a file, and its units. Empty: judge it."""
+    """Data to read from a file, and its units. Empty: guess it."""
 
     frame: str = ""
     """frame or name of the hand; empty: the only one, or `human_hand`"""
@@ -77,7 +77,7 @@ def read(path: Path, source: Source = Source()) -> Demonstration:
     return _judge(path, table, units, place, source)
 
 
-# --- the three kinds of file: numbers by column name, units by column name, and where sample i is in the file ---
+# --- three kinds of files: numbers by column name, units by column name, and place of sample i in the file ---
 
 
 def _read_csv(path: Path, source: Source) -> tuple[Table, dict[str, str], Place]:
@@ -211,7 +211,7 @@ def _read_bag(path: Path, source: Source) -> tuple[Table, dict[str, str], Place]
         raise CheckFailed(f"{path}: no readable bag ({error}); if it was cut off: rosbag reindex {path}") from None
     except CheckFailed:
         raise
-    except Exception as error:  # of rosbag, genpy, struct or the file: a foreign or damaged bag
+    except Exception as error:  # from rosbag, genpy, struct or the file: a foreign or damaged bag
         raise CheckFailed(f"{path}: no readable bag ({' '.join(str(error).split())})") from None
     if not rows:
         what = f"'{source.world}' -> '{source.frame or 'human_hand'}'" if "tf" in topic else "pose and no seven joints"
@@ -292,7 +292,7 @@ def _fingers(bag: Any, info: Mapping[str, Any]) -> Array:
     return np.array(rows).reshape(-1, 2)
 
 
-# --- judging ---
+# --- checks ---
 
 
 def _judge(path: Path, table: Table, units: dict[str, str], place: Place, source: Source) -> Demonstration:
@@ -344,7 +344,7 @@ def _judge(path: Path, table: Table, units: dict[str, str], place: Place, source
 
 
 def _moves(places: Array) -> Array:
-    """Where the hand moves within 5 samples on both sides: only there a repeated sample is a lost one."""
+    """True where the hand moves within 5 samples on both sides: only there a repeated sample is a lost one."""
     at, last = np.arange(len(places)), len(places) - 1
     far = np.linalg.norm(places[np.minimum(at + 5, last)] - places[np.maximum(at - 5, 0)], axis=1)
     return np.asarray(far > 1e-6)
@@ -358,8 +358,8 @@ def _turn_names(table: Table) -> tuple[str, ...]:
 
 
 def _convert_named(path: Path, table: Table, units: dict[str, str], source: Source, notes: list[str]) -> None:
-    """Bring columns of one kind whose names have units to m and rad, each by its own unit. Nothing to do where no name
-    has one, or where the caller has said the unit. CheckFailed: some of them have one, others have none."""
+    """Bring columns of one kind whose names have units to m and rad, each by its own unit. Nothing to do if no name
+    has one, or if the caller gave the unit. CheckFailed: some of them have one, others have none."""
     for names, known, given in (
         (("x", "y", "z"), LENGTH, source.length),
         (("roll", "pitch", "yaw"), ANGLE, source.angle),
@@ -395,7 +395,7 @@ def _time_unit(t: Array, given: str, notes: list[str]) -> float:
 
 
 def _length_unit(path: Path, places: Array, given: str, notes: list[str]) -> float:
-    """Judged by how far the hand moves: between 0.1 m, the shortest reach, and 3 m."""
+    """Guess the unit from the extent of the motion: between 0.1 m, the shortest reach, and 3 m."""
     if given:
         if given != "m":
             notes.append(f"lengths are in {given}, converted to m")
@@ -414,7 +414,7 @@ def _length_unit(path: Path, places: Array, given: str, notes: list[str]) -> flo
 
 
 def _angle_unit(path: Path, angles: Array, given: str, what: str, notes: list[str]) -> float:
-    """Angles go up to half a turn in either unit. What is a whole turn in rad, and little in degrees, is refused."""
+    """Angles go up to half a turn in either unit. Values that fit neither rad nor degrees clearly are refused."""
     most = float(np.abs(angles).max())
     if not given and 3.2 < most <= 2.0 * np.pi + 0.1:
         raise CheckFailed(f"{path}: {what} go up to {most:.1f}: rad or degrees? Name the unit with --angle")
@@ -475,7 +475,7 @@ def _closing(path: Path, table: Table, notes: list[str]) -> Array | None:
 
 
 def _without_jumps(path: Path, times: Array, places: Array, kept: Any, notes: list[str]) -> Any:
-    """Indices of the samples that can be true. A jump that is taken back soon is left out; another one is refused."""
+    """Indices of the possible samples. A jump that soon ends is left out; another one is refused."""
     good: list[int] = []
     left, since, before = 0, -1, -1  # samples left out; where the hand jumped away; the sample before
     for i in np.flatnonzero(kept):
@@ -493,7 +493,7 @@ def _without_jumps(path: Path, times: Array, places: Array, kept: Any, notes: li
                 way = np.linalg.norm(places[since] - places[good[-1]])
                 raise CheckFailed(
                     f"{path}: the hand jumps by {way:.2f} m at {times[since] - times[0]:.2f} s and stays there: "
-                    "the tracker took something else for it; cut the file there, or record again"
+                    "the tracker confused it with something else; cut the file there, or record again"
                 )
     if left:
         notes.append(f"{left} samples jump faster than {FASTEST:g} m/s and were left out")
@@ -501,5 +501,5 @@ def _without_jumps(path: Path, times: Array, places: Array, kept: Any, notes: li
 
 
 def _faster(places: Array, times: Array, a: int, b: int) -> bool:
-    """Whether the hand would be faster than FASTEST from sample a to sample b."""
+    """True if the hand would be faster than FASTEST from sample a to sample b."""
     return bool(np.linalg.norm(places[b] - places[a]) > FASTEST * (times[b] - times[a]))

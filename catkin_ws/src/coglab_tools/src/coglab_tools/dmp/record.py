@@ -1,7 +1,7 @@
-"""Records a demonstration: the arm that is led by hand, or a hand that a tracker sees.
+"""Records a demonstration: the hand-guided arm, or a tracked hand.
 
 `record()` works on the running robot and in a `coglab.World`. The arm is in hand guiding (`robot.arm.guided()`) only
-while it is recorded; then it stands where it was left, in position mode.
+during the recording; then it stands in place, in position mode.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from coglab_tools.dmp.cut import LOW, SHORTEST
 from coglab_tools.dmp.demonstration import Demonstration
 
 PERIOD = 0.005  # s between two looks at the palm or at a tracked hand
-SAME_SIGHT = 0.002  # s; times that are nearer are the same sight, with the error of its age
-STILL = 0.5  # s at rest after a reach that end a demonstration
+SAME_SIGHT = 0.002  # s; sights with a smaller difference in time are the same one
+STILL = 0.5  # s at rest after a reach, end of a demonstration
 WINDOW = 0.1  # s over which the speed is taken
-FASTEST = 1.5  # m/s; a guided palm that is faster is not led any more
+FASTEST = 1.5  # m/s; a faster palm is not guided by a hand
 TRACE = 0.1  # s between two lines of the live trace
 MOTOR_CLOSED = 254.0
 
 
 class Trace:
-    """Where the hand is, how fast and how far from its start, s by s."""
+    """Positions, speed and distance from the start of the hand over time."""
 
     def __init__(self) -> None:
         self.times: list[float] = []
@@ -37,7 +37,7 @@ class Trace:
         self.still_since: float | None = None
 
     def add(self, t: float, pose: Any, fingers: tuple[int, ...]) -> None:
-        """A sample at t (s). One that is not newer than the last, or the same sight again, is left out."""
+        """Add a sample at t (s). An older sample, or the same sight again, is ignored."""
         if self.times and t <= self.times[-1] + SAME_SIGHT:
             return
         self.times.append(t)
@@ -65,7 +65,7 @@ class Trace:
 
     @property
     def over(self) -> bool:
-        """A reach was made, and the hand rests."""
+        """True if the hand rests after a reach."""
         if not self.times:
             return False
         rests = self.still_since is not None and self.times[-1] - self.still_since >= STILL
@@ -92,9 +92,9 @@ def record(
 ) -> Demonstration:
     """Record one demonstration with the robot of `coglab.connect()` or `World.robot`.
 
-    `frame`: tf frame of the tracked hand; empty: the arm is led by hand. It ends when `ends()` is true, when the hand
-    rests for 0.5 s after a reach, or after `limit` s. `show` gets a line ten times a second. CheckFailed if the arm
-    runs away, the brain begins to act, or nothing was recorded.
+    `frame`: tf frame of the tracked hand; empty: the hand-guided arm. It ends when `ends()` is true, when the
+    hand rests for 0.5 s after a reach, or after `limit` s. `show` gets ten lines per second. CheckFailed if the arm is
+    too fast, the brain starts an action, or nothing was recorded.
     """
     if not frame:
         check_free(robot)
@@ -106,7 +106,7 @@ def record(
     except (Refused, TimeoutError) as error:
         if not trace.over and not ends():
             raise
-        problem = f"the end of hand guiding failed: {error}"  # what was recorded is good
+        problem = f"the end of hand guiding failed: {error}"  # the recording is valid
     if len(trace.times) < 10:
         raise CheckFailed(f"{len(trace.times)} samples were recorded, expected at least 10")
     closing = np.array(trace.closing)
@@ -186,15 +186,15 @@ class Terminal:
             pause(1.0)
 
     def begin(self) -> None:
-        """Say that it begins, and what ends it."""
+        """Announce the start and the ways to end the recording."""
         self.say("now; rest ends it" + (", and so does any key" if self.interactive else ""))
 
     def say(self, line: str) -> None:
-        """A line that stays."""
+        """Print a permanent line."""
         print(f"\r{line:100}" if self.interactive else line, file=sys.stderr, flush=True)
 
     def show(self, line: str) -> None:
-        """A line in place of the last one; without a terminal only each tenth."""
+        """Replace the last line; without a terminal print only each tenth."""
         self._lines += 1
         if self.interactive:
             print(f"\r{line}", end="", file=sys.stderr, flush=True)
@@ -203,7 +203,7 @@ class Terminal:
 
     @contextmanager
     def keys(self) -> Iterator[Callable[[], bool]]:
-        """Inside the block: a function that is true once a key was pressed."""
+        """Yields a function that is true once a key was pressed."""
         if not self.interactive:
             yield lambda: False
             return

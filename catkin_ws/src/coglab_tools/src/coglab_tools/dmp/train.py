@@ -1,7 +1,7 @@
-"""Learns a primitive from demonstrations, and what a primitive cannot hold: turn and fingers, in a file beside it.
+"""Learns a primitive from demonstrations, and its rotation and finger closing, stored in a file beside it.
 
-Demonstrations are aligned by their onset and end: all of them count from 0 to 1 of their own duration. (Warping one
-onto another would move the peak of the speed, which is what is to be learnt.) The library's primitive is the path. The
+Demonstrations are aligned by their onset and end: each counts from 0 to 1 of its own duration. (Warping one
+onto another would move the peak of the speed.) The library's primitive is the path. The
 robot turns its palm along its own curve to the goal's orientation; the demonstrated turn is kept beside the library,
 with the largest difference between the two, and so is the closing of the fingers.
 """
@@ -30,12 +30,12 @@ CLOSED_ENOUGH = 0.05  # change of the fingers that counts as closing or opening
 
 @dataclass(frozen=True)
 class Taught:
-    """What was learnt from some demonstrations."""
+    """Result of learning from demonstrations."""
 
     primitive: cc.Primitive
     demonstrations: tuple[Demonstration, ...]
     rmse: Array
-    """m, (number of demonstrations,): of the reproduction from each one's start to its goal"""
+    """m, (number of demonstrations,): error of the reproduction from each one's start to its goal"""
     turn: Array | None = None
     """mean rotation vector from the start, (51, 3) rad, axes of the recording's world; None: not recorded"""
     turn_error: float = 0.0
@@ -72,7 +72,7 @@ def train(
     description: str = "",
     allow: Sequence[str] = (),
 ) -> Taught:
-    """Learn from reaches, each from rest to rest. UsageError, CheckFailed in words."""
+    """Learn from reaches, each from rest to rest. UsageError, CheckFailed with a reason."""
     if not demonstrations:
         raise UsageError("expected at least one demonstration")
     try:
@@ -184,7 +184,7 @@ def load_beside(library: Path) -> dict[str, Any]:
 
 
 def add_to_library(taught: Taught, library: Path, replace: bool = False) -> int:
-    """Add the primitive to a library file, which is made if need be, and its entry to the file beside it.
+    """Add the primitive to a library file, which is created if it is missing, and its entry to the file beside it.
 
     Returns the number of primitives in the library. UsageError if the name is taken, unless `replace`.
     """

@@ -1,4 +1,4 @@
-"""`./coglab people VERB`: recordings of people: read, made playable, and learnt from."""
+"""`./coglab people VERB`: makes recordings of people playable, and learns from them."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ def add(verbs: argparse._SubParsersAction[Any]) -> None:
     _recordings(parser)
     parser.add_argument("--out", type=Path, default=Path("people"), help="folder of the files")
     parser.add_argument("--role", choices=("giver", "taker"), default="giver", help="whose hand is the person's")
-    parser.add_argument("--object", default="", metavar="ID", help="write the object as frame object_ID, too")
-    parser.add_argument("--turn", type=float, default=0.0, metavar="DEG", help="more turn about the vertical")
+    parser.add_argument("--object", default="", metavar="ID", help="also write the object, as frame object_ID")
+    parser.add_argument("--turn", type=float, default=0.0, metavar="DEG", help="additional rotation about the vertical")
     parser.set_defaults(run=import_recordings)
 
     parser = verbs.add_parser("learn", help="learns the robot's primitives and the reaching patterns from handovers")
@@ -105,7 +105,7 @@ def learn(options: argparse.Namespace) -> Answer:
         names = learnable(found)
         lines += [f"  {name}: {library[name].description}" for name in names]
         if left := [name for name in PRIMITIVES if name not in names]:
-            lines.append(f"  {', '.join(left)}: not learnt, nobody was recorded in this role; the shipped ones stay")
+            lines.append(f"  {', '.join(left)}: not learnt: there is no recording of this role; the shipped ones stay")
         lines.append(f"wrote {options.primitives}: {', '.join(library.ids())}")
         data["primitives"] = {name: library[name].duration for name in names}
         follow.append(f"primitives:={for_shell(options.primitives)}")

@@ -118,7 +118,7 @@ def _meta(path: Path, raw: bool) -> dict[str, Any]:
     """Values of meta.yml, or of meta_NNN.json."""
     beside = path.with_name("meta.yml" if raw else path.name.replace("pose_", "meta_").replace(".npz", ".json"))
     if not beside.is_file():
-        raise NotThere(f"{beside}: no such file; it says which hand and which object of {path.name} is meant")
+        raise NotThere(f"{beside}: no such file; it names the hand and the object of {path.name}")
     text = beside.read_text(encoding="utf-8")
     try:
         values = yaml.safe_load(text) if raw else json.loads(text)
@@ -140,6 +140,6 @@ def _tag(path: Path, calibration: str) -> Array:
             except (yaml.YAMLError, KeyError, TypeError, ValueError) as error:
                 raise CheckFailed(f"{file}: expected extrinsics: apriltag: 12 numbers ({error})") from None
     raise NotThere(
-        f"{path}: no calibration/extrinsics_{calibration}/extrinsics.yml in a folder above: without it nobody knows "
-        "where up is; keep DexYCB's folders together"
+        f"{path}: no calibration/extrinsics_{calibration}/extrinsics.yml in a folder above: without it the "
+        "vertical is unknown; keep DexYCB's folders together"
     )

@@ -1,8 +1,8 @@
-"""One recorded handover between people, in the axes of its recording, and how it comes into the robot's world.
+"""One recorded handover between people, in the axes of its recording, and its mapping to the robot's world.
 
-In the robot's world the robot takes the place of one of the two. The person's hand comes along -x and meets the robot's
-hand where people hand over to it; up stays up. The hand's turn counts from the one at the handover, where the frame
-`human_hand` is parallel to the world, as the simulated person's is.
+In the robot's world the robot takes the place of one of the two. The person's hand moves along -x and meets the robot's
+hand at the place of handovers; up stays up. The hand's rotation is relative to that at the handover, where the frame
+`human_hand` is parallel to the world, like that of the simulated person.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from coglab_tools.dmp.cut import reaches, smooth
 from coglab_tools.dmp.demonstration import Array, Demonstration
 from coglab_tools.files import write_whole
 
-REST = 0.5  # s before the reach that a recording begins with
-MEETING = np.array([0.86, 0.03, 0.44])  # m, base frame: a person's palm at a handover, as the simulated people hold it
+REST = 0.5  # s, rest before the reach in a recording
+MEETING = np.array([0.86, 0.03, 0.44])  # m, base frame: palm of the (simulated) person at a handover
 BEFORE, AFTER = 0.6, 0.6  # s around the touch in which a reach may end
 
 
@@ -31,11 +31,11 @@ class Handover:
     """by role: "giver", "taker"; whole recordings with one clock"""
     object: Demonstration | None = None
     toward_giver: Array | None = None
-    """horizontal direction from taker to giver, (3,); None: not recorded, the reach says it"""
+    """horizontal direction from taker to giver, (3,); None: not recorded, taken from the reach"""
     touch: float | None = None
     """s, when both hold the object first; None: not recorded"""
     source: str = ""
-    """where it comes from, with its licence"""
+    """source and licence"""
     notes: tuple[str, ...] = field(default=())
 
     def whole(self, role: str) -> Demonstration:

@@ -22,7 +22,7 @@ FARTHEST = 5.0  # m that a hand, a chest or the baton moves in a handover
 
 
 def is_kth(folder: Path) -> bool:
-    """Whether this is a folder of one handover."""
+    """Returns whether this is a folder of one handover."""
     return folder.is_dir() and any(folder.glob("giver_*_pose_saved.csv"))
 
 

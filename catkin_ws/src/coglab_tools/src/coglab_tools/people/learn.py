@@ -1,8 +1,8 @@
 """Learns the robot's primitives and the recogniser's patterns from recorded handovers between people.
 
-The robot takes as the recorded taker does, and gives as the recorded giver does. Patterns are of the person's reaches:
-each recorded reach is mapped to drawn ends about the pattern's place, because one recording says how a hand moves and
-not where people hand over. Both files say what they were learnt from.
+The robot takes like the recorded taker, and gives like the recorded giver. Patterns are of the person's reaches: each
+recorded reach is mapped to drawn ends near the pattern's place, because one recording shows the motion of a hand, but
+not all places of handovers. Both files name their sources.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ PLACES = {
     "left": (0.90, -0.28, 0.42),
     "right": (0.92, 0.42, 0.40),
 }
-"""m, base frame: where a person's hand ends a reach of each pattern"""
-REST = np.array([1.30, 0.20, 0.15])  # m, where it begins
+"""m, base frame: end of a person's reach for each pattern"""
+REST = np.array([1.30, 0.20, 0.15])  # m, its start
 REST_SCATTER, PLACE_SCATTER = 0.02, np.array([0.03, 0.035, 0.03])  # m, standard deviation per axis
-TIME_SCATTER = 0.15  # of the logarithm of the duration
+TIME_SCATTER = 0.15  # standard deviation of the logarithm of the duration
 RATE, NOISE = 30.0, 0.004  # Hz, m: of a tracker
 HOLD, BEFORE = 0.4, 0.6  # s at rest after and before a reach
 PER_PATTERN, SEED = 40, 2026
@@ -80,8 +80,8 @@ def _mirrored(reach: Demonstration) -> Demonstration:
 def mapped_reach(reach: Demonstration, start: Array, end: Array, stretch: float) -> tuple[Array, Array]:
     """Times (n,) s and positions (n, 3) m of a recorded reach from another start to another end (3,) m.
 
-    Turned about the vertical, stretched along the horizontal and, by its own factor, along the vertical way; what
-    deviates from the line is scaled with its length. `stretch`: factor on the duration.
+    The path is rotated about the vertical and stretched horizontally and vertically; deviations from the straight line
+    are scaled with its length. `stretch`: factor on the duration.
     """
     share = reach.times / reach.duration
     was = reach.positions[-1] - reach.positions[0]
@@ -125,7 +125,7 @@ def recorded_demonstrations(
 def learn_patterns(handovers: Sequence[Handover], path: Path) -> dict[str, int]:
     """Train patterns of the recorded givers' and takers' reaches and write them. Returns recordings by pattern.
 
-    The file says what it was trained on.
+    The file names its sources.
     """
     reaches = [h.reach(role) for h in handovers for role in h.hands]
     demonstrations = recorded_demonstrations(reaches)
@@ -142,7 +142,7 @@ def learn_patterns(handovers: Sequence[Handover], path: Path) -> dict[str, int]:
         save_patterns(str(half), patterns, RecogniserSettings(), source)
         write_whole(path, json.dumps(json.loads(half.read_text(encoding="utf-8")), indent=1) + "\n")
     except OSError as error:
-        raise CheckFailed(f"{path} cannot be written: {error.strerror}; what was there before is kept") from None
+        raise CheckFailed(f"{path} cannot be written: {error.strerror}; the earlier file is kept") from None
     finally:
         with suppress(OSError):
             half.unlink(missing_ok=True)

@@ -1,6 +1,6 @@
 """Metrics of one trial, each with its definition, from a bag or from virtual time.
 
-`metrics_of(read_trial(folder))` gives the values; METRICS says what each of them is.
+`metrics_of(read_trial(folder))` gives the values; METRICS has their definitions.
 """
 
 from __future__ import annotations
@@ -66,12 +66,12 @@ METRICS = {
     "detection_delay_s": Metric(
         "detection delay",
         "s",
-        f"From the first true force above {FIRST_TOUCH} N on the hand to the detector's sample. Simulation alone.",
+        f"From the first true force above {FIRST_TOUCH} N on the hand to the detector's sample. Only in simulation.",
     ),
     "peak_palm_speed": Metric("peak speed of the palm", "m/s", "Largest speed of the palm, smoothed over 60 ms."),
     "nearest_m": Metric("least distance of the hands", "m", "Least distance of the palm from the person's hand."),
 }
-"""Name of each metric -> what it is."""
+"""Name of each metric -> its unit and definition."""
 
 
 def spans_of(marks: Mapping[str, float]) -> dict[str, float]:
@@ -149,7 +149,7 @@ def _active(
             closing = np.abs(np.gradient(positions, at, axis=0)).max(axis=1)
             robot |= np.interp(times, at, closing, left=0.0, right=0.0) > FINGER_SPEED
     with np.errstate(invalid="ignore"):
-        human = speed_of(times, person) > PERSON_SPEED  # NaN, a hand that nobody sees, is not active
+        human = speed_of(times, person) > PERSON_SPEED  # an unseen hand (NaN) is not active
     return active_intervals(times, human), active_intervals(times, robot)
 
 

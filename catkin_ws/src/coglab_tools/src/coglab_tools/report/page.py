@@ -1,4 +1,4 @@
-"""One self-contained page for a trial: outcome, what happened, figures with their definitions, plots, configuration."""
+"""One self-contained page for a trial: outcome, events, figures with their definitions, plots, configuration."""
 
 from __future__ import annotations
 
@@ -143,7 +143,7 @@ def write_pdf(page: Path, file: Path) -> Path:
             except subprocess.TimeoutExpired:
                 raise CheckFailed(f"{browser} did not print {page} within {PDF_LIMIT:g} s") from None
         if not part.is_file():
-            last = (done.stderr.strip().splitlines() or ["it said nothing"])[-1]
+            last = (done.stderr.strip().splitlines() or ["it printed no message"])[-1]
             raise CheckFailed(f"{browser} did not print {page}: {last}; print it from a browser")
 
     return write_by(file, write)

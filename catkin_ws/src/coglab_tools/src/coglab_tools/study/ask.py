@@ -10,7 +10,7 @@ from coglab_tools.study.questionnaires import AnswerRow, Questionnaire, add_answ
 
 
 def ask(study: Study, participant: str, condition: str = "", block: int = 0, line: Callable[[str], str] = input) -> int:
-    """Ask for each item that is not answered yet, and write the answers of each questionnaire at its end.
+    """Ask for each unanswered item, and write the answers of each questionnaire at its end.
 
     ``condition``: "": all, in the participant's order. ``block``: 0: all. ``line``: reads a line after a prompt. A line
     "skip" leaves an item out, "back" returns to the one before. Returns the number of answers.
@@ -37,7 +37,7 @@ def ask(study: Study, participant: str, condition: str = "", block: int = 0, lin
                     _items(questionnaire, items, say, line, answers)
                 except EOFError:
                     return count + len(answers)
-                finally:  # also after Ctrl-C: what was answered is kept, the other items are asked next time
+                finally:  # also after Ctrl-C: answers are kept, the other items come next time
                     if answers:
                         add_answers(study, [AnswerRow(*head, item, answer) for item, answer in answers.items()])
                 count += len(answers)
@@ -47,7 +47,7 @@ def ask(study: Study, participant: str, condition: str = "", block: int = 0, lin
 def _items(
     questionnaire: Questionnaire, items: list[str], say: str, line: Callable[[str], str], answers: dict[str, float]
 ) -> None:
-    """Ask for the items, and put what is answered into ``answers``."""
+    """Ask for the items, and store the answers in ``answers``."""
     print(f"\n{questionnaire.title}: {say}")
     print(
         f"  {questionnaire.low:g} = {questionnaire.ends[0]}, {questionnaire.high:g} = {questionnaire.ends[1]}; "

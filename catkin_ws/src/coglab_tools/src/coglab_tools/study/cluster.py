@@ -50,8 +50,8 @@ def results(jobs: Sequence[simulate.Job], workers: int = 0, scheduler: str = "")
     import dask
     import distributed
 
-    for name in ("distributed", "distributed.client"):  # each has a level of its own
-        logging.getLogger(name).setLevel(logging.CRITICAL)  # what it would say is said here in a sentence
+    for name in ("distributed", "distributed.client"):  # each has its own level
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # errors are reported here in one sentence
     dask.config.set({"distributed.comm.timeouts.connect": "10s", "distributed.scheduler.allowed-failures": 3})
     if scheduler:
         yield from _with_scheduler(jobs, distributed, scheduler)
@@ -61,7 +61,7 @@ def results(jobs: Sequence[simulate.Job], workers: int = 0, scheduler: str = "")
 
 
 def local_cluster(distributed: Any, count: int, place: str) -> Any:
-    """A cluster on this computer's loopback. Ctrl-C is for this process alone: it ends the workers itself."""
+    """A cluster on this computer's loopback. Ctrl-C reaches only this process, which ends the workers itself."""
     main = threading.current_thread() is threading.main_thread()
     before = signal.signal(signal.SIGINT, signal.SIG_IGN) if main else None  # children inherit it
     try:

@@ -18,7 +18,7 @@ def add(verbs: argparse._SubParsersAction[Any]) -> None:
     init.set_defaults(run=_init)
     for verb, text in (
         ("run", "runs a study from its beginning"),
-        ("resume", "runs what an interrupted study has left"),
+        ("resume", "runs the remaining trials of an interrupted study"),
     ):
         parser = verbs.add_parser(verb, help=text)
         _folder(parser)
@@ -31,7 +31,7 @@ def add(verbs: argparse._SubParsersAction[Any]) -> None:
         parser.add_argument("--live", action="store_true", help="with participants, at the running system")
         parser.add_argument("--participant", default="", metavar="P03", help="of a live session; default: the next one")
         parser.set_defaults(run=_run, fresh=verb == "run")
-    status = verbs.add_parser("status", help="shows what is done and what comes next")
+    status = verbs.add_parser("status", help="shows finished trials and the next step")
     _folder(status)
     status.set_defaults(run=_status)
     ask = verbs.add_parser("ask", help="fills in the questionnaires of a participant on the terminal")

@@ -34,25 +34,25 @@ LIVE = "live"
 ANSWER = 5.0  # s, limit for an answer of a node
 PARAMETERS, NOTES = "/coglab/trial", "/coglab/note"
 HELP = (
-    "Enter starts, n TEXT notes something about the trial that was just done (before the first: about that one), r "
-    "does the last one again, s skips this one, c resets the robot, q ends the session"
+    "Enter starts, n TEXT adds a note to the last trial (before the first trial: to that one), r "
+    "repeats the last one, s skips this one, c resets the robot, q ends the session"
 )
 
 
 class System(Protocol):
-    """What a session needs from the running system beside the Robot."""
+    """Access of a session to the running system, besides the Robot."""
 
     def apply(self, condition: str) -> None:
-        """Let the settings of a condition take effect. CheckFailed or NotThere if they cannot."""
+        """Apply the settings of a condition. CheckFailed or NotThere if they cannot."""
 
     def announce(self, trial: Trial, session: str) -> None:
-        """Say which trial is next, for recorders."""
+        """Announce the next trial to recorders."""
 
     def note(self, text: str) -> None:
-        """Tell recorders a note of the experimenter."""
+        """Pass a note of the experimenter to recorders."""
 
     def restore(self) -> None:
-        """Put everything back as it was before the session."""
+        """Restore the state before the session."""
 
 
 def run_live(study: Study, participant: str = "") -> dict[str, Any]:
@@ -114,7 +114,7 @@ class _Session:
         self._notes: list[str] = []
         """before the first trial of the session"""
         self._last: tuple[int, list[dict[str, Any]]] | None = None
-        """number and rows of the trial that was just done"""
+        """number and rows of the last trial"""
         self._attempts: dict[int, int] = {}
 
     def run(self, left: list[Trial]) -> None:
@@ -248,7 +248,7 @@ def result_fields(result: Any) -> dict[str, Any]:
     }
 
 
-# --- the files that the system is launched with -------------------------------------------------------------------
+# --- files of the launched system -------------------------------------------------------------------
 
 
 def machines_file(study: Study) -> Path:
@@ -262,12 +262,12 @@ def objects_copy(study: Study) -> Path:
 
 
 def primitives_copy(study: Study) -> Path:
-    """The library of primitives during a session, where the study has primitives of its own."""
+    """The library of primitives during a session, if the study has own primitives."""
     return (study.folder / LIVE / PRIMITIVES).resolve()
 
 
 def recordings_folder(study: Study) -> Path:
-    """Where the recorder writes the handovers of this study."""
+    """Folder of the recorded handovers of this study."""
     return (study.folder / RECORDINGS).resolve()
 
 
@@ -281,8 +281,8 @@ def launch_line(study: Study) -> str:
 
 
 def prepare(study: Study) -> None:
-    """Write them as they are without a condition: from the study's own machines.yaml, primitives.xml and objects/,
-    beside what is shipped. CheckFailed: they cannot be written."""
+    """Write these files without a condition: from the study's own machines.yaml, primitives.xml and objects/, and the
+    shipped ones. CheckFailed: they cannot be written."""
     write_machines(study, {})
     write_objects(study, "", {})
     if study.own.primitives:
@@ -308,7 +308,7 @@ def write_machines(study: Study, settings: Mapping[str, Any]) -> None:
 
 
 def with_settings(values: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
-    """A copy of a machines.yaml's values with parameters set. What a timing sets wins over the file, so parameters of
+    """Returns a copy of a machines.yaml's values with these parameters. A timing wins over the file, so parameters of
     timings are set in the active one."""
     changed: dict[str, Any] = copy.deepcopy(dict(values))
     if "timing" in settings:
@@ -414,7 +414,7 @@ class RunningSystem:
         rospy.set_param(PARAMETERS, values)
 
     def note(self, text: str) -> None:
-        """See System: publishes it on /coglab/note, where recorder and console hear it."""
+        """See System: publishes it on /coglab/note, for recorder and console."""
         from std_msgs.msg import String
 
         self._publisher.publish(String(text))
@@ -469,7 +469,7 @@ class RunningSystem:
             status = rospy.wait_for_message("controller_manager/feedback/status", FeedbackStatus, timeout=ANSWER)
         except rospy.ROSException:
             raise NotThere(
-                f"controller_manager/feedback/status has said nothing for {ANSWER:g} s; ./coglab status"
+                f"controller_manager/feedback/status has not been published for {ANSWER:g} s; ./coglab status"
             ) from None
         return list(status.controllers)
 

@@ -1,6 +1,6 @@
 """Primitives and objects of the study's own: `primitives.xml` and `objects/` in its folder, beside the shipped ones.
 
-An own primitive or object takes the place of a shipped one of the same name.
+An own primitive or object replaces a shipped one of the same name.
 """
 
 from __future__ import annotations

@@ -76,9 +76,9 @@ class Trial:
     repetition: int
     """from 1, in this block and condition"""
     person_seed: int
-    """draws the virtual person: the same for all trials of a participant"""
+    """seed of the virtual person: the same for all trials of a participant"""
     seed: int
-    """of what varies from trial to trial: the same for all conditions of a block and repetition"""
+    """seed of the variation between trials: the same for all conditions of a block and repetition"""
 
     @property
     def label(self) -> str:
@@ -108,7 +108,7 @@ class Study:
     record: bool
     simulated: Mapping[str, Any]
     plan: Mapping[str, Any]
-    """the file's values, and the hashes of the own files: what must not change after the first trial"""
+    """the file's values and the hashes of the own files; they must not change after the first trial"""
     own: OwnFiles
     """primitives and objects of the study's own"""
 

@@ -67,7 +67,7 @@ class Questionnaire:
     """sentences by item; an item without one is shown by its name"""
 
     def shown(self, item: str) -> str:
-        """What participants read."""
+        """Text that participants read."""
         return self.wording.get(item) or item.replace("_", " ")
 
     @property
@@ -76,7 +76,7 @@ class Questionnaire:
         return tuple(item for items in self.scales.values() for item in items)
 
     def problem(self, answer: float) -> str:
-        """Why this is no answer; empty if it is one."""
+        """Reason why this answer is invalid; empty if it is valid."""
         steps = (answer - self.low) / self.step if math.isfinite(answer) else math.nan
         if self.low <= answer <= self.high and abs(steps - round(steps)) < 1e-6:
             return ""
@@ -107,7 +107,7 @@ class AnswerRow:
 
     @property
     def place(self) -> tuple[str, int, str, str, str]:
-        """What is answered."""
+        """Key of the answered item."""
         return self.participant, self.block, self.condition, self.questionnaire, self.item
 
 

@@ -14,7 +14,7 @@ NEAR = 10.0  # s between the request of a handover and the start of its recordin
 
 
 def joined(study: Study, table: Sequence[Mapping[str, Any]]) -> tuple[list[dict[str, Any]], list[str]]:
-    """The rows with the measures of their recordings, and what could not be read, in words.
+    """Returns the rows with the measures of their recordings, and a sentence for each unreadable recording.
 
     A recording belongs to the row of its session and action that was requested last before it. A row that has no
     recording stays as it is.
@@ -53,5 +53,5 @@ def joined(study: Study, table: Sequence[Mapping[str, Any]]) -> tuple[list[dict[
 
 
 def _seconds(utc: str) -> float:
-    """Time (s) of a UTC stamp in ISO 8601. ValueError: it is none."""
+    """Time (s) of a UTC stamp in ISO 8601. ValueError: it is invalid."""
     return datetime.fromisoformat(utc.replace("Z", "+00:00")).timestamp()

@@ -48,7 +48,7 @@ class Rows:
         return bool((self.header or {}).get("simulated", True))
 
     def begin(self, identity: Mapping[str, Any], simulated: bool) -> None:
-        """Write the head of a new file, or check that these results may be added to it: CheckFailed in words."""
+        """Write the head of a new file, or check that these results may be added to it: CheckFailed with a reason."""
         kind = {True: "simulated", False: "live"}
         if self.header is None:
             self.header = {
@@ -80,7 +80,7 @@ class Rows:
         return [row for number in sorted(self.trials) for row in self.trials[number]]
 
     def _write(self, line: Mapping[str, Any]) -> None:
-        assert self._stream is not None  # opened for reading alone
+        assert self._stream is not None  # opened only for reading
         try:
             content = json.dumps(line).encode() + b"\n"
             if self._stream.write(content) < len(content):
@@ -147,13 +147,13 @@ def _read(study: Study, content: bytes, stream: IO[bytes] | None) -> Rows:
                     f"{path}: trial {number} has the condition '{strange['condition']}', which {study.folder / FILE} "
                     "does not have; remove its line, and it runs again"
                 )
-    else:  # no trial has ended: the plan may still change
+    else:  # no finished trial: the plan may still change
         rows.header, rows.dropped = None, len(content)
     return rows
 
 
 def _row(value: Mapping[str, Any]) -> dict[str, Any]:
-    """One row of a handover. KeyError, TypeError or ValueError: it is none."""
+    """One row of a handover. KeyError, TypeError or ValueError: it is invalid."""
     row = dict(value)
     for name in ("participant", "condition", "action", "outcome", "reason_code"):
         row[name] = str(row[name])
@@ -179,13 +179,13 @@ def _check_plan(study: Study, header: Mapping[str, Any]) -> None:
 
 
 def _line(path: Path, name: str) -> str:
-    """File and line of a key of study.yaml; of the file alone where the key is gone."""
+    """File and line of a key of study.yaml; only the file if the key is missing."""
     line = read(path).lines.get((name,))
     return f"{path}:{line}" if line else str(path)
 
 
 def difference(a: Mapping[str, Any], b: Mapping[str, Any]) -> str:
-    """The first difference of two identities in words; empty if they are the same."""
+    """The first difference of two identities as text; empty if they are the same."""
     for name in sorted(a.keys() | b.keys()):
         if a.get(name) != b.get(name):
             return f"{name} {a.get(name)}, and here it is {b.get(name)}"

@@ -1,4 +1,4 @@
-"""Runs a simulated study, from its first trial or from where it was interrupted."""
+"""Runs a simulated study, from its first trial or after an interruption."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from coglab_tools.study.rows import open_rows, undone, write_table
 def run_simulated(study: Study, workers: int = 0, scheduler: str = "") -> dict[str, Any]:
     """Run all trials that are not done yet, and write trials.csv. Returns numbers of trials and handovers.
 
-    ``workers``, ``scheduler``: see cluster.results. Whatever interrupts it, the finished trials are kept.
+    ``workers``, ``scheduler``: see cluster.results. After any interruption, the finished trials are kept.
     """
     with open_rows(study, write=True) as rows:
         left = list(undone(study, rows))

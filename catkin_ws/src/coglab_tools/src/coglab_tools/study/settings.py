@@ -1,4 +1,4 @@
-"""What a condition of a study changes, and its effect in virtual time. `live` has the effect on the running system."""
+"""Settings of a study's conditions, and their effect in virtual time. `live` applies them to the running system."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ OWN = {
 }
 """Settings of a condition beside `timing` and the other parameters of machines.yaml: name and meaning."""
 CLOSED = ("auto_trigger", "controllers", "default_object", "dmp_library", "lwr_commands", "timings")
-"""Parameters of machines.yaml that are no condition: they belong to the cell."""
+"""Parameters of machines.yaml that belong to the cell and cannot be in a condition."""
 ROLES = ("receive", "give", "take", "put")
 SLOWEST = 0.05  # of `speed`
 
 
 def problem(name: str, value: Any, objects: set[str], own: OwnFiles) -> str:
-    """Why a condition cannot have this setting; empty if it can. ``objects``: ids of the study's objects. ``own``:
-    primitives and objects of the study's own."""
+    """Reason why a condition cannot have this setting; empty if it can. ``objects``: ids of the study's objects.
+    ``own``: primitives and objects of the study's own."""
     check = _CHECKS.get(name)
     if check is not None:
         return check(value, objects, own)
@@ -81,10 +81,10 @@ def object_with(entry: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[s
 
 
 def apply(world: World, settings: Mapping[str, Any]) -> None:
-    """Change a new World as the condition says, beside `machines_settings`, which are arguments of the World."""
+    """Apply the settings to a new World, except `machines_settings`, which are arguments of the World."""
     inside = world.virtual_trial
     entry = inside.ctx.database.get_object(world.conditions.object_id).result()
-    entry.update(object_with(entry, settings))  # the entry belongs to this World alone
+    entry.update(object_with(entry, settings))  # the entry belongs only to this World
     if "speed" in settings:
         world.cell.robot.virtual.speed_scale(float(settings["speed"]))
         world.cell.speed_scale = float(settings["speed"])

@@ -26,22 +26,22 @@ PACKAGES = (
     "coglab", "coglab_controllers", "coglab_objects", "coglab_perception", "coglab_py", "coglab_sim", "coglab_smach",
     "coglab_trials", "ctrl_more", "ih2_hand", "lwr_description", "lwr_fri_bridge",
 )  # fmt: skip
-"""packages whose Python, configuration and C++ decide about a trial"""
+"""packages whose Python, configuration and C++ influence a trial"""
 OWN = tuple(
     f"coglab_tools.{name}"
     for name in ("study.simulate", "study.settings", "study.own_files", "study.measures", "report.metrics")
 )
-"""modules of this package that do, too"""
+"""modules of this package that do too"""
 KINDS = {".py", ".pyi", ".yaml", ".xml", ".json", ".cpp", ".hpp", ".urdf"}
 
 
 class OtherVersion(RuntimeError):
-    """This worker has another version of the code than the one that asks for the trial."""
+    """This worker has another version of the code than the sender of the job."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """What a worker needs for one trial."""
+    """Data of one trial for a worker."""
 
     study: str
     trial: Trial
@@ -73,7 +73,7 @@ def job_of(study: Study, trial: Trial) -> Job:
 
 @lru_cache(maxsize=1)
 def identity() -> Mapping[str, Any]:
-    """Versions that decide about the rows: the code of the packages (a hash), Python and numpy."""
+    """Versions that influence the rows: the code of the packages (a hash), Python and numpy."""
     import numpy as np
 
     digest = hashlib.sha256()
@@ -150,7 +150,7 @@ def _run(job: Job, files: Mapping[str, Any]) -> tuple[list[dict[str, Any]], byte
 
 
 def _person(job: Job) -> dict[str, Any]:
-    """Fields of the virtual person: drawn by the participant's seed; what varies from trial to trial by the trial's."""
+    """Fields of the virtual person: drawn by the participant's seed; variations by the trial's seed."""
     from coglab_sim.person.participant import Participant
 
     given = job.simulated.get("person", "drawn")
@@ -169,7 +169,7 @@ def _rest(world: Any, limit: float = 20.0) -> None:
 
 
 def rows_of(trial: Trial, job: Job, record: Any, failure: str = "") -> list[dict[str, Any]]:
-    """A row per handover that was begun. ``failure``: a handover without a result came after them."""
+    """A row per handover that was begun. ``failure``: reason of a last handover without a result."""
     from coglab_tools.study.measures import measures_of
 
     rows = []

@@ -78,7 +78,7 @@ def _noncentral(statistic: float, df: int, level: float) -> tuple[float, float]:
     def below(c: float) -> float:
         with np.errstate(all="ignore"):
             value = float(nct.cdf(statistic, df, c))
-        return value if math.isfinite(value) else float(c < statistic)  # scipy has NaN far out, where it is 1 or 0
+        return value if math.isfinite(value) else float(c < statistic)  # scipy returns NaN far out, instead of 1 or 0
 
     def at(share: float) -> float:
         return float(brentq(lambda c: below(c) - share, statistic - width, statistic + width))

@@ -1,1 +1,1 @@
-"""Recorded handovers: what was recorded, and what it shows."""
+"""Recorded handovers: recording, reading and showing them."""

@@ -23,23 +23,23 @@ def add(verbs: argparse._SubParsersAction[Any]) -> None:
     parser.set_defaults(run=list_trials)
     for name, run, words in (
         ("show", show, "outcome, marks, metrics and configuration of a trial"),
-        ("explain", explain_trial, "what happened, in at most ten lines with times"),
+        ("explain", explain_trial, "the events, in at most ten lines with times"),
         ("plot", plot, "phases, paths, torques, fingers and forces as a picture"),
         ("report", report, "one HTML page with outcome, plots and figures"),
         ("video", video, "a moving picture, drawn from the recording without a screen"),
-        ("replay", replay, "publishes the bag again, on a ROS master of its own"),
+        ("replay", replay, "publishes the bag again, on its own ROS master"),
     ):
         parser = verbs.add_parser(name, help=words)
         given = parser.add_argument(
-            "trial", nargs="?", default="", help='folder of a trial, or how its name begins; "" or "last": the newest'
+            "trial", nargs="?", default="", help='folder of a trial, or the start of its name; "" or "last": the newest'
         )
         given.completer = _names  # of argcomplete
         if name in ("plot", "report", "video"):
             parser.add_argument("-o", "--out", type=Path, help="file to write; default: in the folder of the trial")
         if name == "report":
-            parser.add_argument("--pdf", action="store_true", help="also as PDF, beside the page")
+            parser.add_argument("--pdf", action="store_true", help="also write a PDF beside the page")
         if name == "replay":
-            parser.add_argument("--rate", type=float, default=1.0, help="times real time")
+            parser.add_argument("--rate", type=float, default=1.0, help="playback speed, times real time")
             parser.add_argument("--rviz", action="store_true", help="open rviz")
         parser.set_defaults(run=run)
 
@@ -50,7 +50,7 @@ def _names(prefix: str, **_: Any) -> list[str]:
 
 
 def _place(options: argparse.Namespace) -> Path:
-    """Folder of the trial that was asked for: a path, how a name in the default folder begins, or the newest."""
+    """Folder of the requested trial: a path, the start of a name in the default folder, or the newest."""
     given = options.trial
     if given in ("", "last"):
         found = find_trials(trials_folder()) if trials_folder().is_dir() else []
@@ -100,7 +100,7 @@ def list_trials(options: argparse.Namespace) -> Answer:
     good = sum(row["outcome"] == "succeeded" for row in rows)
     lines.append(f"{len(rows)} trials in {folder}, {good} succeeded")
     lines += [f"cannot be read: {sentence}" for sentence in bad]
-    lines += [f"being recorded, or cut off: {part}; rosbag reindex {part}/{BAG} saves what there is" for part in parts]
+    lines += [f"being recorded, or cut off: {part}; rosbag reindex {part}/{BAG} saves the rest" for part in parts]
     data = {"trials": rows, "unreadable": bad, "unfinished": parts}
     following = f"./coglab trial report {rows[-1]['folder']}" if rows else "./coglab launch, then ./coglab start"
     return Answer("\n".join(lines), data, following, OK)
@@ -134,7 +134,7 @@ def show(options: argparse.Namespace) -> Answer:
 
 
 def explain_trial(options: argparse.Namespace) -> Answer:
-    """What happened, in at most ten lines."""
+    """The events, in at most ten lines."""
     from coglab_tools.trial.explain import explain
 
     place, trial = _measured(options)

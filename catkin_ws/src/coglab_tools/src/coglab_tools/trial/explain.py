@@ -1,4 +1,4 @@
-"""What happened in a trial, in at most ten lines with times."""
+"""The events of a trial, in at most ten lines with times."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from coglab_tools.trial.read import Measured
 
 LINES = 10
 WRONG = ("failed", "failed_empty", "failed_holding", "aborted", "fault", "stopped", "time_out", "timeout", "lost")
-"""outcomes of states that are part of no success"""
+"""outcomes of states that no success contains"""
 MARKS = {
     "offered": "the offer was believed",
     "requested": "the request was believed",
@@ -28,7 +28,7 @@ MARKS = {
     "tightened": "the grip was tightened",
     "switch_dmp": "the primitive was changed",
 }
-"""marks in words; others are named as they are"""
+"""text of marks; others are shown by their names"""
 LESS = ("preshaped", "paused", "closing", "closing_on_the_way", "tightened")  # marks that are left out first
 
 
@@ -43,7 +43,7 @@ def headline(trial: Measured) -> str:
 
 
 def first_failure(trial: Measured) -> tuple[float, str] | None:
-    """The first transition that went wrong: s after the start, and where and why; None if none did."""
+    """The first failed transition: s after the start, and a sentence; None without one."""
     for t, path, state, outcome, _, reason, code in trial.series.transitions:
         if trial.start - 0.05 <= t <= trial.end + 1.0 and outcome in WRONG and code:
             where = path.rpartition("/")[2].replace("_", " ")
@@ -53,7 +53,7 @@ def first_failure(trial: Measured) -> tuple[float, str] | None:
 
 
 def events(trial: Measured) -> list[tuple[float, str, bool]]:
-    """What happened: s after the start, sentence, and whether it can be left out, by time."""
+    """Events by time: (s after the start, sentence, True if it can be left out)."""
     words = MARKS | ({"offered": MARKS["requested"]} if trial.record.action == ACTIONS["give"] else {})
     found = [(mark["time_s"], words.get(mark["name"], mark["name"].replace("_", " ")), mark["name"] in LESS)
              for mark in trial.record.marks]  # fmt: skip
@@ -76,7 +76,7 @@ def _said(text: str) -> str:
 
 
 def explain(trial: Measured) -> list[str]:
-    """At most ten lines for each action: outcome, what went wrong first, why, and what happened when (s after its
+    """At most ten lines for each action: outcome, first failure and its reason, and events (s after its
     start)."""
     lines = [line for part in trial.parts() for line in _explain(part)]
     return [*lines, f"notes: {trial.record.notes}"] if trial.record.notes and len(trial.exchanges) > 1 else lines

@@ -16,7 +16,7 @@ from coglab_tools.command import CheckFailed, UsageError
 from coglab_tools.trial.record import ARRAYS, BAG, Outcome, TrialRecord
 
 JOINTS = "lwr/joint_states"
-MOST_SECONDS = 24 * 3600.0  # of tf that is kept
+MOST_SECONDS = 24 * 3600.0  # kept length of tf
 HALVED = (JOINTS, "lwr/external_torques")  # 100 Hz of them are enough for plots, and are read in half the time
 TRUTH = "coglab_sim/truth/cell"
 WITHOUT_TRUTH = ("tf", "tf_static", "contact_detector/force")
@@ -36,15 +36,15 @@ class Measured:
     series: Series
     exchanges: tuple[Exchange, ...] = ()
     said: list[tuple[float, str]] = field(default_factory=list)
-    """what the robot said to the person"""
+    """messages of the robot to the person"""
     person_force: list[tuple[float, float]] = field(default_factory=list)
     """N on the person's hand; empty without the simulation's truth"""
     orientations: list[tuple[float, tuple[float, ...], tuple[float, ...]]] = field(default_factory=list)
     """(t, person's hand, object): true quaternions x y z w in the world; empty without the truth"""
     true_hands: bool = False
-    """False: paths of the hands and the object are those that perception and joints gave"""
+    """False: paths of the hands and the object come from perception and joints"""
     sources: dict[str, str] = field(default_factory=dict)
-    """what a value came from, by name of the value"""
+    """source of each value, by its name"""
 
     @property
     def marks(self) -> dict[str, float]:
@@ -79,7 +79,7 @@ class Measured:
 
 
 def read_trial(folder: str | Path) -> Measured:
-    """Read the trial in a folder. UsageError: it is none. CheckFailed: a file of it cannot be used, and why."""
+    """Read the trial in a folder. UsageError: there is none. CheckFailed: a file of it is unusable."""
     place = Path(folder)
     record = TrialRecord.load(place)
     if (place / BAG).is_file():
@@ -209,7 +209,7 @@ class _Reader:
     def _result(self, m: Any, _t: float) -> None:
         try:
             row = json.loads(m.data)
-        except ValueError:  # of another node
+        except ValueError:  # from another node
             return
         if isinstance(row, dict) and row not in self.results:
             self.results.append(row)
@@ -229,7 +229,7 @@ class _Reader:
         return self._buffer
 
     def wanted(self, there: set[str]) -> list[str]:
-        """Topics to read: those from which the hands are seen only where the truth is not there."""
+        """Topics to read; those for the hands only if the bag has no truth."""
         return [name for name in self.take if not (TRUTH in there and name in WITHOUT_TRUTH)]
 
     def _frames(self, m: Any, _t: float) -> None:
@@ -243,7 +243,7 @@ class _Reader:
             self._tree().set_transform_static(_own(each), "bag")
 
     def path_of(self, frame: str, stamps: list[float]) -> tuple[np.ndarray, np.ndarray]:
-        """Times (s) and positions (m, [n, 3]) of a frame in the world as tf had it."""
+        """Times (s) and positions (m, [n, 3]) of a frame in the world, from tf."""
         if self._buffer is None:
             return np.empty(0), np.empty((0, 3))
         import genpy
@@ -261,7 +261,7 @@ class _Reader:
 
 
 def _own(frame: Any) -> Any:
-    """The transform as the installed type, which tf wants; that of the bag is made from its own definition."""
+    """Converts a transform of the bag's own type to the installed type, which tf needs."""
     from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
 
     found, move, turn = TransformStamped(), frame.transform.translation, frame.transform.rotation
@@ -280,7 +280,7 @@ def _from_bag(file: Path, record: TrialRecord) -> Measured:
         try:
             reader.take[topic](message, time)
         except AttributeError as error:  # a topic of ours with a message of another type
-            raise CheckFailed(f"{file}: {topic} holds {message._type}, which lacks what is needed: {error}") from None
+            raise CheckFailed(f"{file}: {topic} holds {message._type}, which lacks a field: {error}") from None
     series = reader.series
     for rows in (
         series.joints,
@@ -320,7 +320,7 @@ def _from_bag(file: Path, record: TrialRecord) -> Measured:
 
 
 def _span(file: Path, series: Series, record: TrialRecord) -> tuple[float, float]:
-    """Start and end of the action without a result: by the transitions, else all that was recorded."""
+    """Start and end of an action without a result: from the transitions, else the whole recording."""
     every = [row[0] for rows in (series.joints, series.truth, series.transitions) for row in rows]
     if not every:
         raise CheckFailed(
@@ -348,7 +348,7 @@ def _exchange(row: dict[str, Any]) -> Exchange | None:
 
 
 def _seen(reader: _Reader) -> list[tuple[Any, ...]]:
-    """Rows like those of the truth, from what a real robot has: NaN where nothing was seen."""
+    """Rows like those of the truth, from a real robot's measurements: NaN without a sight."""
     joints = [row[0] for row in reader.series.joints][::2]
     times, palm = reader.path_of(PALM, joints)
     if not len(times):

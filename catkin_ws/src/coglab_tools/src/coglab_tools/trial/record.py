@@ -1,7 +1,7 @@
-"""What a recorded trial says about itself: `trial.yaml` in the trial's folder.
+"""The description of a recorded trial: `trial.yaml` in the trial's folder.
 
 A trial is a folder `<UTC stamp>_<action>[_<object>]` with `trial.yaml` and `trial.bag` (recorded by ROS) or `trial.npz`
-(virtual time, `coglab.Trial.save()`). `trial.yaml` is written last: a folder that has it is whole.
+(virtual time, `coglab.Trial.save()`). `trial.yaml` is written last: a folder that has it is complete.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ class Outcome:
     reason: str = "NONE"
     """name of the code"""
     text: str = ""
-    """why it failed, in words; empty after success"""
+    """reason of the failure; empty after success"""
 
 
 @dataclass(frozen=True)
 class TrialRecord:
-    """Contents of `trial.yaml`. Texts that nobody gave are empty."""
+    """Contents of `trial.yaml`. Missing texts are empty."""
 
     id: str
     """name of the folder"""
@@ -64,7 +64,7 @@ class TrialRecord:
     version: int = VERSION
 
     def save(self, folder: Path) -> Path:
-        """Write `trial.yaml` into `folder`, completely or not at all. Returns its path. OSError: it cannot be."""
+        """Write `trial.yaml` into `folder`, completely or not at all. Returns its path. OSError on failure."""
         file = folder / FILE
         part = file.with_name(f".{FILE}.part")
         try:
@@ -80,7 +80,7 @@ class TrialRecord:
     @staticmethod
     def load(folder: str | os.PathLike[str]) -> TrialRecord:
         """Read the record of a trial's folder, of either kind. UsageError: it is no trial. CheckFailed names the file
-        and what is wrong with it."""
+        and the error."""
         file = Path(folder) / FILE
         data = _read(file)
         try:
@@ -159,7 +159,7 @@ def _virtual(folder: Path, data: Mapping[str, Any]) -> TrialRecord:
 
 
 def trials_folder() -> Path:
-    """Where handovers are recorded unless the launch argument `record` names a folder: out/trials of the workspace for
+    """Default folder of recorded handovers, without the launch argument `record`: out/trials of the workspace for
     systems that ./coglab launch starts, otherwise trials in ROS_HOME (~/.ros)."""
     given = os.environ.get("ROS_HOME", "")
     home = Path(given) if given else Path.home() / ".ros"
@@ -170,7 +170,7 @@ def trials_folder() -> Path:
 
 
 def find_trials(folder: str | os.PathLike[str]) -> list[Path]:
-    """Folders of the whole trials below `folder`, by name; `folder` itself if it is one. UsageError: it is gone."""
+    """Folders of the complete trials below `folder`, by name, or `folder` itself. UsageError: no such folder."""
     place = Path(folder)
     if (place / FILE).is_file():
         return [place]
@@ -186,7 +186,7 @@ def find_trials(folder: str | os.PathLike[str]) -> list[Path]:
 
 
 def _plain(value: Any) -> Any:
-    """The value made of what YAML's safe types can hold."""
+    """The value converted to YAML's safe types."""
     if isinstance(value, Mapping):
         return {str(key): _plain(each) for key, each in value.items()}
     if isinstance(value, list | tuple):

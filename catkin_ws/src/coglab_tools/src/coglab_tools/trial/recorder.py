@@ -1,7 +1,7 @@
-"""Records every handover into a folder of its own: a bag with the seconds before it, and `trial.yaml`.
+"""Records every handover into its own folder: a bag with the seconds before it, and `trial.yaml`.
 
-Messages are kept as the bytes that came and are never deserialised, but for the transitions and results of /coglab,
-which begin and end a recording. Nothing needs the truth of the simulation; where it is published, it is recorded too.
+Messages are stored as received bytes, without deserialising. Only transitions and results of /coglab, which start and
+end a recording, are deserialised. The truth of the simulation is optional; if it is published, it is recorded too.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from coglab_tools.command import CommandError
 from coglab_tools.trial.record import BAG, Outcome, TrialRecord
 
 PRE_ROLL, POST_ROLL = 5.0, 1.0  # s before the action and after its result
-NO_RESULT = 3.0  # s after the action was left, in which its result may come
+NO_RESULT = 3.0  # s, longest wait for the result after the end of the action
 LONGEST = 1800.0  # s, a longer action is cut off
-MOST_WAITING = 100_000  # messages that wait for the disk; older ones are lost, and trial.yaml says so
+MOST_WAITING = 100_000  # messages that wait for the disk; older ones are lost, with a note in trial.yaml
 DISK_CHECK = 1.0  # s between two looks at the free space
 HUBS = ("wait_without_object", "wait_with_object")
 NO_ACTIONS = (*HUBS, "stopped", "fault", "preempted")
@@ -39,7 +39,7 @@ RUN_SPECIFIC = ("rosdistro", "roslaunch", "rosversion", "run_id", "robot_descrip
 
 
 class Raw(NamedTuple):
-    """A message as it came."""
+    """A received message."""
 
     time: float
     """ROS time of receipt, s"""
@@ -52,7 +52,7 @@ class Raw(NamedTuple):
 
 @dataclass
 class _Trial:
-    """A recording in the making."""
+    """A running recording."""
 
     action: str
     begun: float
@@ -61,7 +61,7 @@ class _Trial:
     parameters: Mapping[str, Any]
     result: Mapping[str, Any] | None = None
     left: tuple[float, str, int, str] | None = None
-    """when and how the machine left the action: s, outcome, code, reason"""
+    """end of the action in the machine: s, outcome, code, reason"""
     ends: float = float("inf")
     last: float = 0.0
     """time of the newest message, s"""
@@ -74,7 +74,7 @@ class Recorder:
     """The recorder without ROS: `put` takes messages from any thread, `step` does the work in one thread.
 
     folder: of the trials; parameters: returns all parameters of the system; least_free: bytes of the disk that stay
-    free; say: takes a sentence for the log and True if it is an error.
+    free; say: called with a sentence for the log and True if it is an error.
     """
 
     def __init__(
@@ -91,7 +91,7 @@ class Recorder:
         self._ring: deque[Raw] = deque()
         self._latched: dict[tuple[str, str], Raw] = {}
         self._trial: _Trial | None = None
-        self._begun = ""  # action whose beginning was seen last
+        self._begun = ""  # action that started last
         self._types: dict[str, type] = {}
         self._looked = 0.0
         self._lost = threading.Event()
@@ -101,13 +101,13 @@ class Recorder:
         """notes before the first recording"""
 
     def put(self, message: Raw) -> None:
-        """Take a message. Returns at once; callable from any thread."""
+        """Queue a message. Returns at once; callable from any thread."""
         if len(self._waiting) == MOST_WAITING:
             self._lost.set()
         self._waiting.append(message)
 
     def step(self, now: float) -> None:
-        """Write what came since the last step. `now`: ROS time, s. A full disk ends the recording, not the node."""
+        """Write the messages since the last step. `now`: ROS time, s. A full disk ends the recording, not the node."""
         try:
             self._drain()
             trial = self._trial
@@ -125,13 +125,13 @@ class Recorder:
                         trial.ends = now
                 if now >= trial.ends:
                     self._finish()
-        except Exception as error:  # of the disk, of rosbag, of a strange message
+        except Exception as error:  # from the disk, rosbag, or a strange message
             self._give_up(error)
         while self._ring and self._ring[0].time < now - PRE_ROLL:
             self._ring.popleft()
 
     def close(self) -> None:
-        """End at once; a recording under way is finished as it is."""
+        """End at once; a running recording is finished early."""
         try:
             self._drain()
             if self._trial is not None:
@@ -186,8 +186,8 @@ class Recorder:
             trial.result, trial.ends = row, raw.time + POST_ROLL
 
     def _note(self, raw: Raw) -> None:
-        """A note is of the handover that runs, with its time as a mark; otherwise of the last one; before the first
-        one, of the first."""
+        """A note belongs to the running handover, with its time as a mark; otherwise to the last one; before the
+        first one, to the first."""
         from std_msgs.msg import String
 
         message = String()
@@ -201,7 +201,7 @@ class Recorder:
             try:
                 _noted(TrialRecord.load(self._last), [text]).save(self._last)
             except (CommandError, OSError) as error:  # the recording was moved or removed
-                self._say(f"a note is in no recording ({error}): {text}", True)
+                self._say(f"a note was not recorded ({error}): {text}", True)
 
     def _begin(self, action: str, begun: float) -> None:
         import rosbag
@@ -232,7 +232,7 @@ class Recorder:
         assert self._trial is not None
         header = raw.header
         kind = self._types.get(raw.topic)
-        if kind is None:  # rosbag wants a class, and reads these two of it
+        if kind is None:  # rosbag needs a class with these two fields
             text, digest = header["message_definition"], header["md5sum"]
             kind = self._types[raw.topic] = type("Recorded", (), {"_full_text": text, "_md5sum": digest})
         message = (header["type"], raw.data, header["md5sum"], kind)
@@ -335,7 +335,7 @@ def _noted(record: TrialRecord, texts: Sequence[str]) -> TrialRecord:
 
 
 def _flat(tree: Mapping[str, Any], above: str = "") -> dict[str, Any]:
-    """Parameters by full name, without those of one run alone."""
+    """Parameters by full name, without those of a single run."""
     found: dict[str, Any] = {}
     for name, value in tree.items():
         full = f"{above}/{name}"

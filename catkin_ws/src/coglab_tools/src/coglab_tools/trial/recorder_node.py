@@ -1,5 +1,5 @@
-"""The node /trial_recorder: records every handover. `recorder.py` does it; `config/recorder.yaml` says what is
-recorded."""
+"""The node /trial_recorder: records every handover with `recorder.py`. `config/recorder.yaml` lists the recorded
+topics."""
 
 from __future__ import annotations
 
@@ -55,10 +55,10 @@ class RecorderNode:
     @staticmethod
     def _parameters() -> dict[str, Any]:
         try:
-            # not rospy.get_param(): for "/" it answers with its cache, which is empty
+            # not rospy.get_param(): for "/" it returns its cache, which is empty
             found = rosgraph.Master(rospy.get_name()).getParam(rospy.get_namespace())
             return found if isinstance(found, dict) else {}
-        except Exception as error:  # of the master
+        except Exception as error:  # from the master
             rospy.logwarn("the parameters are not in trial.yaml: %s", error)
             return {}
 
@@ -68,7 +68,7 @@ class RecorderNode:
 
 
 def main() -> int:
-    """Run the node. Exit status 1: it could not begin."""
+    """Run the node. Exit status 1: it could not start."""
     init_node("trial_recorder")
     try:
         RecorderNode()

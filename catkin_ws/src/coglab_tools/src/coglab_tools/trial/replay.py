@@ -1,4 +1,4 @@
-"""Publishes the bag of a trial again, on a ROS master of its own, by its own time (`/clock`)."""
+"""Publishes the bag of a trial again, on its own ROS master, with its own time (`/clock`)."""
 
 from __future__ import annotations
 
@@ -63,6 +63,6 @@ def replay(bag: Path, rate: float, rviz: bool, words: TextIO) -> float:
                 process.wait()
     if status:
         errors.seek(0)
-        last = (errors.read().decode(errors="replace").strip().splitlines() or ["it said nothing"])[-1]
+        last = (errors.read().decode(errors="replace").strip().splitlines() or ["it printed no message"])[-1]
         raise CheckFailed(f"roslaunch ended with status {status} while it played {bag}: {last}")
     return time.monotonic() - begun

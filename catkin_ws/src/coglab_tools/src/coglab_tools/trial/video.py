@@ -18,18 +18,18 @@ from coglab_tools.files import write_by
 from coglab_tools.trial.read import Measured
 
 RATE = 12.5  # frames per second; a GIF shows each for whole hundredths of a second
-BEFORE = 0.5  # s before the action that are drawn, too
+BEFORE = 0.5  # s drawn before the action
 LONGEST = 120.0  # s of a trial that are drawn
 COLOURS = 96  # of a GIF
 KINDS = (".gif", ".mp4")
 STROKE = 254.0  # counts of a finger's motor from open to closed
-FAR = (0.0, 0.0, -5.0)  # m, where what nobody has seen is out of the picture
+FAR = (0.0, 0.0, -5.0)  # m, outside the picture, for unseen objects
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 FFMPEG_LIMIT = 300.0  # s
 
 
 class _World:
-    """The recorded trial in the place of the virtual world that film.Painter draws."""
+    """The recorded trial in the form of a virtual world, for film.Painter."""
 
     def __init__(self, trial: Measured) -> None:
         import coglab_controllers as cc
@@ -61,7 +61,7 @@ class _World:
         return self._truth
 
     def move(self, camera: Any, now: float) -> None:
-        """Put everything where it was at a time (s)."""
+        """Move everything to its recorded place at a time (s)."""
         joints, fingers = _at(self._joints, now), _at(self._fingers, now)
         thing, hand, turns = _at(self._object, now), _at(self._hands, now), _at(self._turns, now)
         person_turn, thing_turn = (turns[:4], turns[4:]) if turns is not None else (UPRIGHT, UPRIGHT)
@@ -154,12 +154,12 @@ def _mp4(frames: Iterator[Any], size: tuple[int, int], file: Path) -> None:
     with tempfile.TemporaryFile() as errors:
         with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=errors) as process:
             assert process.stdin is not None
-            with suppress(BrokenPipeError):  # it ended early, and said why
+            with suppress(BrokenPipeError):  # it ended early with a message
                 for frame in frames:
                     process.stdin.write(frame.convert("RGB").tobytes())
                 process.stdin.close()
             status = process.wait(FFMPEG_LIMIT)
         if status:
             errors.seek(0)
-            said = errors.read().decode(errors="replace").strip().splitlines() or ["it said nothing"]
+            said = errors.read().decode(errors="replace").strip().splitlines() or ["it printed no message"]
             raise CheckFailed(f"ffmpeg could not make {file.name}: {said[-1]}")
