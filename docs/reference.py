@@ -158,6 +158,34 @@ def configuration(top: Path) -> str:
     return "\n".join(page)
 
 
+PYTHON_CLASSES = (  # heading, modules; after a colon: only these names of the module
+    ("The robot, running or in virtual time", "coglab.robot", "coglab.world: World", "coglab.running: connect"),
+    ("Results, trials and studies", "coglab.results", "coglab.trial", "coglab.fluency", "coglab.study"),
+    ("Own motions and feedback controllers", "coglab.control"),
+    ("Environments", "coglab.envs.handover", "coglab.envs.people"),
+    ("The virtual world", "coglab_trials.world: World, Robot, Hand", "coglab_trials.conditions"),
+    ("Virtual trials", "coglab_trials.trial: VirtualTrial, TrialResult", "coglab_trials.virtual_clock: VirtualClock, using"),
+    ("Motion", "coglab_controllers"),
+    ("Hand", "ih2_hand.driver"),
+    ("State machines", "coglab_smach.states.base", "coglab_smach.ports.interfaces"),
+    ("Perception, objects", "coglab_perception.belief", "coglab_objects.database"),
+    ("The simulated cell", "coglab_sim._cell", "coglab_sim._virtual", "coglab_sim.person.participant"),
+)
+
+
+def python_classes(_top: Path) -> str:
+    """Python classes and functions, from their docstrings. Sphinx reads the modules."""
+    page = ["# Python", "", "What can be imported in a shell of the workspace (`./coglab shell`), from the docstrings."]
+    for heading, *modules in PYTHON_CLASSES:
+        page += ["", f"## {heading}", "", "```{eval-rst}"]
+        for entry in modules:
+            module, _, names = entry.partition(": ")
+            page += [f".. automodule:: {module}", f"   :members: {names}".rstrip()]
+            page += [] if "." in module else ["   :imported-members:"]  # a package imports its names from its modules
+        page += ["```"]
+    return "\n".join(page)
+
+
 def launch_arguments(top: Path) -> str:
     """Arguments of every launch file."""
     page = ["# Launch arguments", "", "`./coglab launch NAME:=VALUE` takes those of `coglab.launch`."]
@@ -192,6 +220,7 @@ PAGES = {
     "machine_parameters": machine_parameters,
     "wire_choices": wire_choices,
     "console_commands": console_commands,
+    "python_classes": python_classes,
 }
 
 
