@@ -5,6 +5,8 @@ One function per table. docs/build.py writes them as pages of the site.
 
 from __future__ import annotations
 
+import ast
+import inspect
 import re
 import subprocess
 import xml.etree.ElementTree as ET
@@ -100,6 +102,40 @@ def cell_parameters(_top: Path) -> str:
     return f"# Parameters of the simulated cell\n\n{about}\n\n" + table(
         ("name", "default", "range", "unit", "source", "meaning"), rows
     )
+
+
+def _spread(values: list) -> str:
+    """Median of `values` with the range of 90 % of them; the share of true ones."""
+    if isinstance(values[0], tuple):
+        return "; ".join(_spread(list(axis)) for axis in zip(*values, strict=True))
+    if isinstance(values[0], bool):
+        return f"{100 * sum(values) / len(values):.0f} % true"
+    ordered = sorted(values)
+    low, middle, high = (ordered[round(share * (len(ordered) - 1))] for share in (0.05, 0.5, 0.95))
+    return f"{middle:.2g}" if low == high else f"{middle:.2g} ({low:.2g} .. {high:.2g})"
+
+
+def person_parameters(_top: Path) -> str:
+    """Parameters of the simulated person: meanings from the class, values from 1000 drawn people."""
+    from coglab_sim.person.participant import Participant
+
+    people = [Participant.draw(seed) for seed in range(1000)]
+    body = ast.parse(inspect.getsource(Participant)).body[0].body
+    meanings = {
+        field.target.id: text.value.value
+        for field, text in zip(body, body[1:], strict=False)
+        if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr)
+    }
+    rows = [
+        (code(name), _spread([getattr(person, name) for person in people]), meanings.get(name, ""))
+        for name in vars(people[0])
+        if name not in ("seed", "behaviour")
+    ]
+    about = (
+        "Fields of a person in `coglab_sim/person/participant.py`. Value: median of 1000 people of the profile `drawn`, "
+        "and the range of 90 % of them. Times in s, lengths in m, forces in N, angles in deg."
+    )
+    return f"# Parameters of the simulated person\n\n{about}\n\n" + table(("name", "value", "meaning"), rows)
 
 
 def machine_parameters(_top: Path) -> str:
@@ -218,6 +254,7 @@ PAGES = {
     "reason_codes": reason_codes,
     "configuration": configuration,
     "cell_parameters": cell_parameters,
+    "person_parameters": person_parameters,
     "machine_parameters": machine_parameters,
     "wire_choices": wire_choices,
     "console_commands": console_commands,
