@@ -132,8 +132,8 @@ def person_parameters(_top: Path) -> str:
         if name not in ("seed", "behaviour")
     ]
     about = (
-        "Fields of a person in `coglab_sim/person/participant.py`. Value: median of 1000 people of the profile `drawn`, "
-        "and the range of 90 % of them. Times in s, lengths in m, forces in N, angles in deg."
+        "Fields of a person in `coglab_sim/person/participant.py`. Value: median of 1000 people of the profile "
+        "`drawn`, and the range of 90 % of them. Times in s, lengths in m, forces in N, angles in deg."
     )
     return f"# Parameters of the simulated person\n\n{about}\n\n" + table(("name", "value", "meaning"), rows)
 
