@@ -104,6 +104,22 @@ def cell_parameters(_top: Path) -> str:
     )
 
 
+def machine_parameters(_top: Path) -> str:
+    """Parameters of the state machines, from their table."""
+    from coglab_smach import parameters
+
+    about = "In `coglab_smach/config/machines.yaml`, which is read again whenever it changes."
+    return f"# Parameters of the state machines\n\n{about}\n\n{parameters.markdown()}"
+
+
+def wire_choices(_top: Path) -> str:
+    """The open points of the hand's protocol that public documents leave."""
+    from ih2_hand.wire_choices import as_markdown
+
+    about = "One row per choice of `ih2_hand/wire_choices.py`, which driver and emulator share."
+    return f"# Wire choices of the hand\n\n{about}\n\n{as_markdown()}"
+
+
 def _spread(values: list) -> str:
     """Median of `values` with the range of 90 % of them; the share of true ones."""
     if isinstance(values[0], tuple):
@@ -138,20 +154,33 @@ def person_parameters(_top: Path) -> str:
     return f"# Parameters of the simulated person\n\n{about}\n\n" + table(("name", "value", "meaning"), rows)
 
 
-def machine_parameters(_top: Path) -> str:
-    """Parameters of the state machines, from their table."""
-    from coglab_smach import parameters
+PYTHON_CLASSES = (  # heading, modules; after a colon: only these names of the module
+    ("The robot, running or in virtual time", "coglab.robot", "coglab.world: World", "coglab.running: connect"),
+    ("Results, trials and studies", "coglab.results", "coglab.trial", "coglab.fluency", "coglab.study"),
+    ("Own motions and feedback controllers", "coglab.control"),
+    ("Environments", "coglab.envs.handover", "coglab.envs.people"),
+    ("The virtual world", "coglab_trials.world: World, Robot, Hand", "coglab_trials.conditions"),
+    ("Virtual trials", "coglab_trials.trial: VirtualTrial, TrialResult"),
+    ("Virtual time", "coglab_trials.virtual_clock: VirtualClock, using"),
+    ("Motion", "coglab_controllers"),
+    ("Hand", "ih2_hand.driver"),
+    ("State machines", "coglab_smach.states.base", "coglab_smach.ports.interfaces"),
+    ("Perception, objects", "coglab_perception.belief", "coglab_objects.database"),
+    ("The simulated cell", "coglab_sim._cell", "coglab_sim._virtual", "coglab_sim.person.participant"),
+)
 
-    about = "In `coglab_smach/config/machines.yaml`, which is read again whenever it changes."
-    return f"# Parameters of the state machines\n\n{about}\n\n{parameters.markdown()}"
 
-
-def wire_choices(_top: Path) -> str:
-    """The open points of the hand's protocol that public documents leave."""
-    from ih2_hand.wire_choices import as_markdown
-
-    about = "One row per choice of `ih2_hand/wire_choices.py`, which driver and emulator share."
-    return f"# Wire choices of the hand\n\n{about}\n\n{as_markdown()}"
+def python_classes(_top: Path) -> str:
+    """Python classes and functions, from their docstrings. Sphinx reads the modules."""
+    page = ["# Python", "", "What can be imported in a shell of the workspace (`./coglab shell`), from the docstrings."]
+    for heading, *modules in PYTHON_CLASSES:
+        page += ["", f"## {heading}", "", "```{eval-rst}"]
+        for entry in modules:
+            module, _, names = entry.partition(": ")
+            page += [f".. automodule:: {module}", f"   :members: {names}".rstrip()]
+            page += [] if "." in module else ["   :imported-members:"]  # a package imports its names from its modules
+        page += ["```"]
+    return "\n".join(page)
 
 
 def console_commands(_top: Path) -> str:
@@ -194,35 +223,6 @@ def configuration(top: Path) -> str:
     return "\n".join(page)
 
 
-PYTHON_CLASSES = (  # heading, modules; after a colon: only these names of the module
-    ("The robot, running or in virtual time", "coglab.robot", "coglab.world: World", "coglab.running: connect"),
-    ("Results, trials and studies", "coglab.results", "coglab.trial", "coglab.fluency", "coglab.study"),
-    ("Own motions and feedback controllers", "coglab.control"),
-    ("Environments", "coglab.envs.handover", "coglab.envs.people"),
-    ("The virtual world", "coglab_trials.world: World, Robot, Hand", "coglab_trials.conditions"),
-    ("Virtual trials", "coglab_trials.trial: VirtualTrial, TrialResult"),
-    ("Virtual time", "coglab_trials.virtual_clock: VirtualClock, using"),
-    ("Motion", "coglab_controllers"),
-    ("Hand", "ih2_hand.driver"),
-    ("State machines", "coglab_smach.states.base", "coglab_smach.ports.interfaces"),
-    ("Perception, objects", "coglab_perception.belief", "coglab_objects.database"),
-    ("The simulated cell", "coglab_sim._cell", "coglab_sim._virtual", "coglab_sim.person.participant"),
-)
-
-
-def python_classes(_top: Path) -> str:
-    """Python classes and functions, from their docstrings. Sphinx reads the modules."""
-    page = ["# Python", "", "What can be imported in a shell of the workspace (`./coglab shell`), from the docstrings."]
-    for heading, *modules in PYTHON_CLASSES:
-        page += ["", f"## {heading}", "", "```{eval-rst}"]
-        for entry in modules:
-            module, _, names = entry.partition(": ")
-            page += [f".. automodule:: {module}", f"   :members: {names}".rstrip()]
-            page += [] if "." in module else ["   :imported-members:"]  # a package imports its names from its modules
-        page += ["```"]
-    return "\n".join(page)
-
-
 def launch_arguments(top: Path) -> str:
     """Arguments of every launch file."""
     page = ["# Launch arguments", "", "`./coglab launch NAME:=VALUE` takes those of `coglab.launch`."]
@@ -254,9 +254,9 @@ PAGES = {
     "reason_codes": reason_codes,
     "configuration": configuration,
     "cell_parameters": cell_parameters,
-    "person_parameters": person_parameters,
     "machine_parameters": machine_parameters,
     "wire_choices": wire_choices,
+    "person_parameters": person_parameters,
     "console_commands": console_commands,
     "python_classes": python_classes,
 }
