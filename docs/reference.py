@@ -5,6 +5,8 @@ One function per table. docs/build.py writes them as pages of the site.
 
 from __future__ import annotations
 
+import ast
+import inspect
 import re
 import subprocess
 import xml.etree.ElementTree as ET
@@ -128,6 +130,69 @@ def wire_choices(_top: Path) -> str:
     return f"# Wire choices of the hand\n\n{about}\n\n{as_markdown()}"
 
 
+def _spread(values: list) -> str:
+    """Median of `values` with the range of 90 % of them; the share of true ones."""
+    if isinstance(values[0], tuple):
+        return "; ".join(_spread(list(axis)) for axis in zip(*values, strict=True))
+    if isinstance(values[0], bool):
+        return f"{100 * sum(values) / len(values):.0f} % true"
+    ordered = sorted(values)
+    low, middle, high = (ordered[round(share * (len(ordered) - 1))] for share in (0.05, 0.5, 0.95))
+    return f"{middle:.2g}" if low == high else f"{middle:.2g} ({low:.2g} .. {high:.2g})"
+
+
+def person_parameters(_top: Path) -> str:
+    """Parameters of the simulated person: meanings from the class, values from 1000 drawn people."""
+    from coglab_sim.person.participant import Participant
+
+    people = [Participant.draw(seed) for seed in range(1000)]
+    body = ast.parse(inspect.getsource(Participant)).body[0].body
+    meanings = {
+        field.target.id: text.value.value
+        for field, text in zip(body, body[1:], strict=False)
+        if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr)
+    }
+    rows = [
+        (code(name), _spread([getattr(person, name) for person in people]), meanings.get(name, ""))
+        for name in vars(people[0])
+        if name not in ("seed", "behaviour")
+    ]
+    about = (
+        "Fields of a person in `coglab_sim/person/participant.py`. Value: median of 1000 people of the profile "
+        "`drawn`, and the range of 90 % of them. Times in s, lengths in m, forces in N, angles in deg."
+    )
+    return f"# Parameters of the simulated person\n\n{about}\n\n" + table(("name", "value", "meaning"), rows)
+
+
+PYTHON_CLASSES = (  # heading, modules; after a colon: only these names of the module
+    ("The robot, running or in virtual time", "coglab.robot", "coglab.world: World", "coglab.running: connect"),
+    ("Results, trials and studies", "coglab.results", "coglab.trial", "coglab.fluency", "coglab.study"),
+    ("Own motions and feedback controllers", "coglab.control"),
+    ("Environments", "coglab.envs.handover", "coglab.envs.people"),
+    ("The virtual world", "coglab_trials.world: World, Robot, Hand", "coglab_trials.conditions"),
+    ("Virtual trials", "coglab_trials.trial: VirtualTrial, TrialResult"),
+    ("Virtual time", "coglab_trials.virtual_clock: VirtualClock, using"),
+    ("Motion", "coglab_controllers"),
+    ("Hand", "ih2_hand.driver"),
+    ("State machines", "coglab_smach.states.base", "coglab_smach.ports.interfaces"),
+    ("Perception, objects", "coglab_perception.belief", "coglab_objects.database"),
+    ("The simulated cell", "coglab_sim._cell", "coglab_sim._virtual", "coglab_sim.person.participant"),
+)
+
+
+def python_classes(_top: Path) -> str:
+    """Python classes and functions, from their docstrings. Sphinx reads the modules."""
+    page = ["# Python", "", "What can be imported in a shell of the workspace (`./coglab shell`), from the docstrings."]
+    for heading, *modules in PYTHON_CLASSES:
+        page += ["", f"## {heading}", "", "```{eval-rst}"]
+        for entry in modules:
+            module, _, names = entry.partition(": ")
+            page += [f".. automodule:: {module}", f"   :members: {names}".rstrip()]
+            page += [] if "." in module else ["   :imported-members:"]  # a package imports its names from its modules
+        page += ["```"]
+    return "\n".join(page)
+
+
 def console_commands(_top: Path) -> str:
     """Commands of the experimenter's page, for programs."""
     from coglab_console.desk import commands as console
@@ -225,7 +290,9 @@ PAGES = {
     "machine_parameters": machine_parameters,
     "contact_parameters": contact_parameters,
     "wire_choices": wire_choices,
+    "person_parameters": person_parameters,
     "console_commands": console_commands,
+    "python_classes": python_classes,
 }
 
 

@@ -1,6 +1,6 @@
 """Seeded virtual participants. Everything that differs between people is drawn once per person.
 
-docs/people.md lists each parameter with its distribution and source. A draw outside its range is repeated, not clipped.
+docs/people.md has the sources. A draw outside its range is repeated, not clipped.
 """
 
 from __future__ import annotations
