@@ -51,7 +51,7 @@ def test_feedback_controllers_by_order_with_activity_pauses_and_who_changed_what
     assert "yield: force 3.25 N, offset 0.004 m" in page.js("return document.getElementById('page').innerText")
     # Another order is another table, and nobody's correction is said to be nobody's.
     live.put(feedback={"profile": "", "rows": [limit, yields]}, attribution={"rows": [], "inside": []})
-    page.until("return document.getElementById('page').innerText.includes('Nobody changed a reference.')", 60.0)
+    page.until("return document.getElementById('page').innerText.includes('No controller changed a reference.')", 60.0)
     assert [row[:2] for row in page.js(TABLE, 0)] == [["1", "limit"], ["2", "yield"]]
     assert page.js("return document.getElementById('feedback-profile').innerText") == "Profile: none"
     page.tab("Live")
@@ -102,10 +102,10 @@ def test_objects_with_what_the_database_has_against_a_file(live):
     assert page.js("return document.querySelector('#page pre').innerText").strip() == "id: mug"
     live.put(objects={"rows": rows, "asked": True, "problems": []})
     page.until(
-        "return document.getElementById('object-problems').innerText.includes('2 objects, every file fits')", 10.0
+        "return document.getElementById('object-problems').innerText.includes('2 objects, every file is valid')", 10.0
     )
     live.put(objects={"rows": [], "asked": False, "problems": []})
-    page.until("return document.getElementById('object-problems').innerText.includes('has not been asked')", 60.0)
+    page.until("return document.getElementById('object-problems').innerText.includes('was not read yet')", 60.0)
     page.tab("Live")
 
 
