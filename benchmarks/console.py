@@ -34,7 +34,7 @@ LOADED = (
 # The page sends each press by its connection and by a request, the console each to the arm and to the brain.
 ANSWERED = """
 const rows = coglab.events().filter((e) => e.seq > arguments[0] && e.source === 'stop').map((e) => e.text);
-const answers = rows.filter((text) => text.startsWith('STOP, ') || text.includes('cannot be asked')).length;
+const answers = rows.filter((text) => text.startsWith('STOP, ') || text.includes('cannot be reached')).length;
 const presses = rows.filter((text) => text.startsWith('STOP by')).length;
 return presses === arguments[1] && answers === 2 * presses && presses;
 """

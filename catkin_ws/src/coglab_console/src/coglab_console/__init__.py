@@ -1,1 +1,1 @@
-"""The experimenter's console. `desk`, `web` and `scene` know no ROS; `ros` ties them to it; `browser` is for tests."""
+"""The experimenter's console. `desk`, `web` and `scene` need no ROS; `ros` connects them to it; `browser` is for tests."""
