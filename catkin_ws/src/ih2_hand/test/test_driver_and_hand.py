@@ -106,7 +106,7 @@ def test_a_port_is_closed_with_its_block():
 def test_bytes_that_nobody_asked_for_are_thrown_away_before_a_request(bench):
     bench.link._input += b"\x55"
     assert bench.driver.get_finger_status(1)["raw"] == 0x08
-    assert bench.driver.counters.reasons == {"bytes nobody asked for": 1}
+    assert bench.driver.counters.reasons == {"bytes without a request": 1}
 
 
 # -- what is known of a hand at rest ---------------------------------------------------------------

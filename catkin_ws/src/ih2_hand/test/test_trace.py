@@ -70,7 +70,7 @@ def test_what_was_asked_before_a_resynchronisation_gets_no_answer_any_more():
     said(tracer, ">", "44 02")
     said(tracer, ">", "41 " * 13)
     assert "StopALL" in said(tracer, ">", "41")[0]
-    assert "nobody asked" in said(tracer, "<", "D4")[0]
+    assert "without a request" in said(tracer, "<", "D4")[0]
 
 
 def test_script_explains_hex():

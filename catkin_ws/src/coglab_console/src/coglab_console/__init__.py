@@ -1,1 +1,1 @@
-"""The experimenter's console. `desk`, `web` and `scene` need no ROS; `ros` connects them to it; `browser` is for tests."""
+"""The experimenter's console. `desk`, `web`, `scene`: without ROS. `ros`: their connection to ROS. `browser`: for tests."""

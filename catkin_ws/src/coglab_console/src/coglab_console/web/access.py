@@ -1,7 +1,7 @@
 """Access to the console: one-time tokens, sessions, and the lists of hosts and origins. Needs no web library.
 
 A browser opens the printed link with a token (/?t=TOKEN) once and gets a session, stored in its cookie.
-Every request must name a host of the list (against DNS rebinding). The WebSocket and each request that changes something
+Every request must name a host of the list (against DNS rebinding). The WebSocket and requests that change something
 must also come from an origin of the list. A POST must also have a header that a foreign page cannot set.
 
 A program without a browser gets a key for a token (POST /api/session) and sends it as `Authorization: Bearer KEY`. No

@@ -123,7 +123,7 @@ class Client:
         return texts
 
     async def serve(self, send: Callable[[str], Awaitable[None]], limit: float) -> None:
-        """Sends until cancelled. TimeoutError if the browser takes no message or acknowledges no state for `limit` s."""
+        """Sends until cancelled. TimeoutError if the browser takes no message or acknowledges no state in `limit` s."""
         loop = asyncio.get_running_loop()
         while True:
             await self._wake.wait()
