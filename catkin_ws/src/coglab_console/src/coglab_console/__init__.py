@@ -1,1 +1,1 @@
-"""The experimenter's console. `desk`, `web`, `scene`: without ROS. `ros`: their connection to ROS. `browser`: for tests."""
+"""The experimenter's console. `desk`, `web`, `scene`: without ROS. `ros`: joins them to ROS. `browser`: for tests."""
