@@ -109,10 +109,10 @@ class Console(unittest.TestCase):
             time.sleep(0.4)
         return found
 
-    def test_03_the_scene_has_the_hand_where_tf_has_it(self):
+    def test_03_scene_shows_hand_at_its_tf_pose(self):
         self.assertLess(self._distance_to_tf(), 0.002)
 
-    def test_03b_the_hand_is_calibrated_by_a_held_button_and_tells_how_it_ends(self):
+    def test_03b_held_button_calibrates_hand_and_shows_its_end(self):
         self.ready("wait_without_object")
         self.says("calibrate", "is calibrated")
         self.browser.tab("Health")
@@ -241,7 +241,7 @@ class Console(unittest.TestCase):
         uri = rosgraph.Master("/console_test").lookupNode(node)
         return ServerProxy(uri).getPid("/console_test")[2]
 
-    def test_08_a_machine_of_somebody_else_is_shown(self):
+    def test_08_state_machine_of_another_node_is_shown(self):
         with Somebody() as somebody:
             picture = self.browser.until("return coglab.docs()['graph:/somebody']", LIMIT)
             self.assertEqual({node["label"] for node in picture["nodes"]}, {"ALPHA", "BETA"})
@@ -307,11 +307,11 @@ class Console(unittest.TestCase):
         self.assertIn("another console of this ROS master runs at http", said[1])
         self.browser.until("return !document.body.classList.contains('lost')", LIMIT)
 
-    def test_10_the_page_had_nothing_to_complain_about(self):
+    def test_10_browser_logged_no_errors(self):
         rows = [row for row in self.browser.complaints() if not any(word in row for word in KNOWN)]
         self.assertEqual(rows, [])
 
-    def test_11_without_webgl_there_are_two_dimensions(self):
+    def test_11_without_webgl_the_view_is_2d(self):
         used = self.link
         with Browser(webgl=False) as other:
             other.open(fresh_link(Path(rospkg.get_ros_home()), used))

@@ -54,7 +54,7 @@ def test_a_session_that_was_ended_or_is_old_does_not_go_on(tmp_path):
     later.experiment.begin("P08", ["a"], 1, "as_listed", 0)
 
 
-def test_a_file_that_cannot_be_read_again_is_told_and_the_console_begins(tmp_path):
+def test_damaged_session_file_is_reported_and_console_starts(tmp_path):
     begun(tmp_path)
     whole = (tmp_path / FILE).read_text()
     for text in (
@@ -71,7 +71,7 @@ def test_a_file_that_cannot_be_read_again_is_told_and_the_console_begins(tmp_pat
         assert event["level"] == "warning" and FILE in event["text"]
 
 
-def test_a_result_that_is_told_twice_counts_once(tmp_path):
+def test_repeated_result_counts_once(tmp_path):
     """coglab/results is latched: a console that comes back hears the last one again."""
     desk = begun(tmp_path)
     result = {**ROW, "kind": RECEIVE, "outcome": "failed_empty"}
@@ -83,7 +83,7 @@ def test_a_result_that_is_told_twice_counts_once(tmp_path):
     assert "yet" in again.experiment.refusals()["trial_done"]
 
 
-def test_what_the_experimenter_says_of_a_trial_reaches_its_recording(tmp_path):
+def test_outcome_of_a_trial_reaches_its_recording(tmp_path):
     desk = begun(tmp_path)
     desk.experiment.trial_end("skipped")  # nothing was done in it, nothing was recorded
     desk.experiment.trial_begin()
@@ -102,7 +102,7 @@ def test_a_session_does_not_end_in_the_middle_of_a_trial(tmp_path):
     assert "closed" in session.end()
 
 
-def test_an_experiment_without_a_folder_begins(tmp_path):
+def test_experiment_starts_without_a_folder(tmp_path):
     session = Experiment(tmp_path / "gone", time.time, lambda text: None)
     assert session.resume() == ""
 
@@ -152,7 +152,7 @@ def test_a_trial_takes_its_own_action_alone(desk):
     assert len(warned) == 1 and "Take" in warned[0]
 
 
-def test_only_what_has_succeeded_is_done(desk):
+def test_only_a_succeeded_trial_can_be_done(desk):
     desk.backend.now = replace(desk.backend.now, object_id="mug", actions=(GIVE, "put"))
     opened(desk, "give", "give slowly", "by hand")
     ask(desk, "a", "trial_begin")

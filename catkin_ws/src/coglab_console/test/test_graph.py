@@ -47,7 +47,7 @@ def test_a_transition_keeps_its_outcome_also_without_a_reason(told):
     assert (last(told)["outcome"], last(told)["reason"]) == ("failed", "no contact")
 
 
-def test_of_a_machine_that_tells_no_transitions_the_states_are_known(told):
+def test_states_are_known_without_published_transitions(told):
     structure(told)
     status(told, "A")
     status(told, "B")

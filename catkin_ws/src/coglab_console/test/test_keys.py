@@ -14,7 +14,7 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
 
-def test_a_choice_that_was_refused_says_why_and_is_taken_back(live):
+def test_refused_choice_shows_reason_and_old_value(live):
     """An observer's: the list of objects and the speed show what is, not what was wished."""
     objects = {"rows": [{"id": "ball", "name": "ball", "mass": 0.1, "text": ""}], "asked": True, "problems": []}
     live.loop.call_soon_threadsafe(live.console.documents.put, "objects", objects)

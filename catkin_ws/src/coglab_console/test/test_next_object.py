@@ -31,7 +31,7 @@ def asked(desk, action, **more):
     return desk.backend.calls[-1][1]
 
 
-def test_what_is_chosen_while_the_hand_holds_another_is_asked_for_next(cell):
+def test_object_chosen_while_holding_another_is_requested_next(cell):
     stands(cell, "mug")
     assert ask(cell, "a", "select_object", object_id="ball")["success"]
     stands(cell, "mug")
@@ -41,20 +41,20 @@ def test_what_is_chosen_while_the_hand_holds_another_is_asked_for_next(cell):
     assert asked(cell, RECEIVE)["object_id"] == "ball"
 
 
-def test_what_was_in_the_hand_is_not_asked_for_again(cell):
+def test_given_object_is_not_requested_again(cell):
     stands(cell, "tea_box")
     stands(cell)
     assert asked(cell, RECEIVE)["object_id"] == ""
 
 
-def test_an_unknown_object_in_the_hand_is_named_by_the_choice(cell):
+def test_choice_names_an_unknown_object_in_the_hand(cell):
     """After a restart nobody knows what the hand holds; the request says it."""
     stands(cell, "unknown")
     ask(cell, "a", "select_object", object_id="ball")
     assert asked(cell, GIVE)["object_id"] == "ball"
 
 
-def test_an_object_that_is_named_wins(cell):
+def test_object_named_in_the_request_has_priority(cell):
     ask(cell, "a", "select_object", object_id="ball")
     assert asked(cell, RECEIVE, object_id="mug")["object_id"] == "mug"
 

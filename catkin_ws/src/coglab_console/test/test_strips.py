@@ -109,7 +109,7 @@ def test_bars_are_the_phases_and_lie_on_the_axis_of_the_charts(desk):
     desk.state = {}
 
 
-def test_no_two_series_of_a_strip_are_told_by_their_colour_alone(desk):
+def test_series_of_a_strip_differ_by_more_than_colour(desk):
     page = desk.browser
     strips = page.js("return coglab.strips().map(({ series, drawn }) => [series, drawn])")
     legend = page.js(

@@ -66,7 +66,7 @@ def test_controllers_with_their_pauses_and_recognition_with_its_confidences(show
     }  # fmt: skip
 
 
-def test_a_computer_that_is_too_busy_is_said_beside_everything_else(shown):
+def test_overloaded_computer_is_reported_with_many_diagnostics(shown):
     table, documents = shown
 
     def tell(name, level, message):

@@ -85,7 +85,7 @@ TOPICS = {
 
 
 @pytest.mark.parametrize("source", TOPICS)
-def test_what_has_fallen_silent_is_said_within_a_second(seen, monkeypatch, source):
+def test_silent_source_is_reported_within_a_second(seen, monkeypatch, source):
     """Connected, as a program that is frozen; the others go on."""
     view, _, _ = seen
     clock = [1000.0]
@@ -100,7 +100,7 @@ def test_what_has_fallen_silent_is_said_within_a_second(seen, monkeypatch, sourc
     assert list(view.frame()["silent"]) == [source] and view.frame()["silent"][source] > 1.0
 
 
-def test_nothing_of_an_arm_that_is_silent_is_shown_as_news(seen, monkeypatch):
+def test_values_of_a_silent_arm_are_not_shown_as_new(seen, monkeypatch):
     view, _, _ = seen
     clock = [1000.0]
     monkeypatch.setattr(ros_view.time, "monotonic", lambda: clock[0])
@@ -141,7 +141,7 @@ def test_a_transition_belongs_to_the_phase_that_has_ended(seen):
         (ReasonCode.HELD, "warning"),
     ],
 )
-def test_a_motion_that_was_to_end_is_no_warning(seen, code, level):
+def test_requested_end_of_a_motion_is_not_a_warning(seen, code, level):
     """The brain cancels the reach when something touches the hand: that is how an exchange succeeds."""
     view, _, events = seen
     view._on_dmp(DmpFeedback(state="aborted", reason_code=code, reason="something touches the hand"))
@@ -204,7 +204,7 @@ def test_a_path_of_a_controller_that_fell_silent_is_over(seen, monkeypatch):
     assert not view.path_runs()
 
 
-def test_what_is_no_path_is_not_drawn(seen):
+def test_invalid_path_is_not_drawn(seen):
     view, _, _ = seen
     elsewhere = path_of("x", (0.1, 0, 0.3), (0.4, 0, 0.3))
     elsewhere.header.frame_id = "somewhere"

@@ -48,7 +48,7 @@ def test_an_approach_without_an_axis_and_a_grasp_without_an_approach_are_taken()
     assert refusal(changed("mug", line, "")) == ""
 
 
-def test_a_folder_that_is_none_is_told_and_what_was_read_stays(tmp_path):
+def test_missing_folder_is_reported_and_old_entries_stay(tmp_path):
     folder = tmp_path / "objects"
     folder.mkdir()
     write(folder / "mug.yaml", TEXTS["mug"], 1)
@@ -62,7 +62,7 @@ def test_a_folder_that_is_none_is_told_and_what_was_read_stays(tmp_path):
     assert database.reload() == [] and database.problems == []
 
 
-def test_all_is_read_again_unless_only_what_has_changed_is_asked_for(tmp_path):
+def test_reload_reads_all_files_or_only_changed_ones(tmp_path):
     path = tmp_path / "mug.yaml"
     write(path, TEXTS["mug"], 1)
     database = ObjectDatabase(tmp_path)

@@ -124,12 +124,12 @@ class Bridge(unittest.TestCase):
         answer = self.services["free_places"]("mug", 10.0)
         self.assertEqual((answer.success, answer.message), (True, "A2"))
 
-    def test_d_poses_that_are_none_are_not_passed_on(self):
+    def test_d_invalid_poses_are_dropped(self):
         answer = self.services["locate_object"]("ball", 0.2)
         self.assertEqual((answer.success, answer.reason_code), (False, ReasonCode.OBJECT_NOT_SEEN))
         self.assertFalse(self.buffer.can_transform("world", "object_ball", rospy.Time(0)))
 
-    def test_e_a_tracker_that_stops_is_seen_no_more(self):
+    def test_e_stopped_tracker_has_no_frames_in_view(self):
         self.stop_playing()
         for each in ("mug", "human_hand"):
             self.assertTrue(wait_for(lambda e=each: not self.services["locate_object"](e, 0.0).success, LIMIT), each)

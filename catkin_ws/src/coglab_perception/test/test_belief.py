@@ -158,7 +158,7 @@ def test_an_object_that_falls_is_no_offer(fall):
     assert scene.beliefs[-1].place is None
 
 
-def test_what_was_handed_over_is_no_request():
+def test_resting_hand_after_a_handover_is_not_a_request():
     scene = Scene(5).watch(there, carried(there), OVER + 0.3)
     scene.holds = True
     scene.watch(there, carried(there), OVER + 1.0, begin=OVER + 0.3)
@@ -192,7 +192,7 @@ def test_an_object_stays_where_it_is_in_a_hand_that_is_not_seen_for_a_while(unse
         assert max(np.linalg.norm(b.place - b.hand_place - IN_HAND) for b in after) < 0.03
 
 
-def test_an_object_that_is_taken_for_another_for_some_sights_is_still_offered():
+def test_briefly_confused_object_is_still_offered():
     class Swapped(Scene):
         def seen(self, name: str, place: np.ndarray) -> np.ndarray:
             seen = super().seen(name, place)
@@ -213,7 +213,7 @@ def test_a_frame_that_jumps_between_two_hands_is_no_offer(period):
     assert max(b.either for b in scene.beliefs) < LEVEL
 
 
-def test_sights_that_are_none_do_no_harm():
+def test_invalid_sights_are_ignored():
     clean, dirty = Scene(8), Scene(8)
     clean.watch(there, carried(there), ONSET + 0.5)
 
@@ -241,7 +241,7 @@ def test_sights_that_are_none_do_no_harm():
     assert dirty.filter.see_hand(500.0, END, 500.0).either < 0.6
 
 
-def test_nothing_is_believed_while_the_hand_rests_and_few_other_motions_are():
+def test_resting_hands_and_most_other_motions_are_no_offer():
     rest = Scene(9, True).watch(lambda t: START, None, 5.0)
     assert max(b.either for b in rest.beliefs) < LEVEL
     crossed = 0
@@ -284,7 +284,7 @@ def test_the_file_holds_the_defaults_and_faults_in_it_are_said():
             BeliefSettings.from_mapping(wrong)
 
 
-def test_the_predicted_place_does_not_go_to_and_fro():
+def test_predicted_place_does_not_oscillate():
     """What follows it is an arm: each correction that is taken back costs it a change of speed. The same predictions,
     but as they come, go at least twice as far in all."""
 

@@ -14,7 +14,7 @@ SCRIPT = Path(__file__).resolve().parents[1] / "scripts" / "motion_recogniser_no
 
 
 @pytest.mark.parametrize("step", [0.0, -3.0, -30.0, 60.0])
-def test_a_clock_that_is_set_costs_no_sight(monkeypatch, step):
+def test_no_sight_is_lost_when_the_clock_is_set(monkeypatch, step):
     spec = importlib.util.spec_from_file_location("node", SCRIPT)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

@@ -31,7 +31,7 @@ def test_losses_are_shares_of_each_way(session):
             s.cell.set_loss(*wrong)
 
 
-def test_a_load_that_nobody_knows_of_pulls_at_the_palm(session):
+def test_unknown_load_pulls_at_the_palm(session):
     s = session(**EXACT, arm__unknown_load=0.5)
     fields = s.monitor()
     jacobian = np.array(fields["jacobian"]).reshape(6, 7)

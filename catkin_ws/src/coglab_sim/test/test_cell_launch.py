@@ -34,7 +34,7 @@ def resolve():
     return load_config_default([(str(PACKAGE / "launch" / "cell.launch"), [])], None, verbose=False)
 
 
-def test_the_cell_is_needed_and_never_started_again():
+def test_cell_is_required_and_never_respawned():
     config = resolve()
     assert config.params["/coglab_sim/cell/physics"].value == "usable"
     (cell,) = (node for node in config.nodes if node.name == "cell")
@@ -48,7 +48,7 @@ def test_the_cell_is_needed_and_never_started_again():
         ("hand_model: /nowhere/hand.yaml\n", None, "/nowhere/hand.yaml"),
     ],
 )
-def test_what_cannot_begin_ends_the_launch_with_a_sentence(tmp_path, yaml, argument, said):
+def test_unusable_setting_ends_the_launch_with_a_message(tmp_path, yaml, argument, said):
     config = tmp_path / "cell.yaml"
     config.write_text((PACKAGE / "config" / "cell.yaml").read_text() + yaml)
     output = launched(f"config:={config}", *([argument] if argument else []))

@@ -188,7 +188,7 @@ def yields(before, after):
     return jacobian, np.array(after["position"]) - np.array(before["position"])
 
 
-def test_values_of_the_pc_count_while_it_gives_them(session):
+def test_values_of_the_pc_apply_while_it_sends_them(session):
     s = session(**QUIET)
     s.monitor()
     s.client.flags, s.client.stiffness = JOINT_IMPEDANCE, [500.0] * 7

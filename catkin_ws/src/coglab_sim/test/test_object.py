@@ -117,7 +117,7 @@ def test_load_moves_from_person_to_robot(session):
     )
 
 
-def test_what_touches_the_hand_is_told_apart_from_the_object(session):
+def test_touch_of_the_hand_is_distinguished_from_the_object(session):
     """A person's hand on the robot's hand is a touch, and no force of the object."""
     s, _ = scene(session)
     s.cell.place("world", [0.3, 0.9, 0.5])  # it falls beside

@@ -129,7 +129,7 @@ def test_the_arm_collides_with_everything(what):
 @pytest.mark.parametrize(
     "far, speed", [([1.4, 0, 0], [0, 0, 0]), ([50.0, 0, 0], [90.0, 0, 0]), ([0, 0, 0], [0, 90.0, 0])]
 )
-def test_a_hand_that_is_asked_for_more_than_an_arm_can_does_not_end_the_simulation(far, speed):
+def test_impossible_hand_motion_does_not_end_the_simulation(far, speed):
     plant = _cell.Plant(URDF, HOME, BOX, seed=3)
     here = np.array([1.0, 0.2, 0.4])
     plant.set_person(here)

@@ -26,7 +26,7 @@ def same(one, two):
 
 
 @pytest.mark.parametrize("turn", [[0, 0, 0, 0.998], [0, 0, 0, 1.002], [0, 0, 0, np.nan]])
-def test_poses_that_are_none_are_refused(turn):
+def test_invalid_poses_are_refused(turn):
     plant = still()
     for call in (lambda: plant.place("world", [1.0, 0.0, 1.0], turn), lambda: plant.set_person([1.0, 0.0, 1.0], turn)):
         with pytest.raises(ValueError, match="a pose needs finite numbers and a quaternion x y z w of length 1"):

@@ -201,7 +201,7 @@ def test_a_person_who_takes_carries_what_they_lift():
     assert shares[0] < 0.15 and shares[1] > 0.6
 
 
-def test_what_a_person_holds_turns_with_the_hand():
+def test_held_object_turns_with_the_persons_hand():
     """The grip acts at the object's center of mass, here 10 cm from its own origin, and knows how fast that moves."""
     plant, here, center = _cell.Plant(URDF, HOME, {**BOX, "center": [0, 0, 0.1]}), np.array([1.0, 0.3, 0.9]), 0.1
 

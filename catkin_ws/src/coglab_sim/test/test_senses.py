@@ -36,7 +36,7 @@ def test_a_force_is_felt_as_it_was_until_its_change_is_noticed():
     assert feeling([0.05, -0.09, 0.11], **share) == [0.0, 0.0, 0.11]
 
 
-def test_what_is_felt_comes_later_by_its_own_delay():
+def test_touch_has_its_own_delay():
     felt = feeling([0.0, 0.0, 5.0, 5.0, 5.0, 5.0], feeling_delay=2 * STEP, felt_threshold=0.4)
     assert felt == [0.0, 0.0, 0.0, 0.0, 5.0, 5.0]
     load = np.array([1.0, 2.0, 3.0])

@@ -23,7 +23,7 @@ def test_a_normal_giver_goes_through_all_phases(profile):
         assert stage.samples[-1].frame.position == pytest.approx(stage.human.rest, abs=0.01)
 
 
-def test_load_alone_lets_go_and_load_and_grip_together_do_with_less():
+def test_load_alone_or_smaller_load_with_felt_grip_releases():
     """The robot carries everything, or a tenth with a hand seen closed and heard to have it; or nothing is felt."""
     whole = give(carries=1.0)
     together = give(carries=0.1, says=True)
@@ -33,7 +33,7 @@ def test_load_alone_lets_go_and_load_and_grip_together_do_with_less():
     assert p.feeling_delay + p.assurance - DT <= wait <= p.feeling_delay + p.assurance + 0.3
 
 
-def test_a_hand_that_closes_and_carries_nothing_gets_nothing():
+def test_hand_that_closes_without_carrying_gets_no_object():
     """Nothing is felt to be gripped and nothing is said: load and grip are missing."""
     stage = give(carries=0.0, seconds=12.0)
     assert min(s.grip for s in stage.samples) > 0.3
@@ -65,7 +65,7 @@ def test_without_the_habit_an_object_is_pressed_once():
     assert away.phases.count("placing") == 1 and away.samples[-1].grip == 1.0
 
 
-def test_trust_is_waited_for_and_some_do_not_wait():
+def test_giver_waits_for_trust_or_places_while_robot_moves():
     calm = give(changes={"trust": 0.8})
     hasty = give(changes={"trust": 0.1})
     assert calm.first("placing") - hasty.first("placing") == pytest.approx(0.7, abs=0.15)
@@ -227,7 +227,7 @@ def person(name, knows_weight=True):
 
 
 @pytest.mark.parametrize("knows_weight", [True, False])
-def test_who_meets_another_object_is_as_who_began_with_it(knows_weight):
+def test_person_with_a_later_object_acts_as_if_started_with_it(knows_weight):
     human, fresh = person("mug"), person("bottle", knows_weight)
     human.step(0.0, WorldView())
     human.meets(Scene.of(shipped("bottle")), knows_weight)

@@ -76,7 +76,7 @@ def test_locate_waits_for_a_sight_within_its_limit():
 
 
 @pytest.mark.parametrize("limit", [0.05, 0.0, -1.0, float("nan")])
-def test_what_is_not_seen_is_said_within_the_limit(limit):
+def test_unseen_object_is_reported_within_the_limit(limit):
     scene = Scene()
     scene.see()
     began = time.monotonic()
@@ -139,7 +139,7 @@ def test_a_stamp_ahead_of_the_clock_is_no_negative_age():
 
 
 @pytest.mark.parametrize("away, doubt", [(0.199, True), (0.201, False)])
-def test_of_two_people_nobody_is_the_partner_and_what_they_hold_is_nobodys(away, doubt):
+def test_two_people_have_no_partner_and_their_objects_no_owner(away, doubt):
     seen = Scene()
     held = Pose(NEAR.position + [0.0, 0.0, away])
     sights = seen.see({"one": NEAR, "two": Pose(np.array([2.0, 0.0, 0.4]))}, {"object_mug": held})
@@ -173,7 +173,7 @@ def test_a_choice_needs_the_margin_and_is_kept_within_it():
     assert PartnerChoice(0.25).choose(hands(a=0.25, b=0.5), ROBOT) == "a", "the margin itself is enough"
 
 
-def test_who_was_chosen_is_forgotten_when_nobody_can_be_told():
+def test_chosen_partner_is_reset_when_the_choice_is_unclear():
     choice = PartnerChoice(0.3)
     assert choice.choose(hands(a=0.9), ROBOT) == "a"
     assert choice.choose(hands(a=0.9, b=0.8), None) == "", "no robot to be near to"

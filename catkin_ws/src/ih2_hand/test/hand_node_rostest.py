@@ -46,7 +46,7 @@ class HandNode(unittest.TestCase):
         quiet = [meaning for meaning in meanings if "Get" in meaning or "filler" in meaning]
         self.assertEqual(len(quiet), len(meanings), f"readings and StopALL only: {meanings}")
 
-    def test_b_preshape_before_calibration_is_honest(self) -> None:
+    def test_b_preshape_before_calibration_reports_the_reason(self) -> None:
         result = self.hand.run("hand_preshape", "cylindrical", "medium")
         self.assertFalse(result.isOk)
         self.assertIn("not calibrated", result.message)

@@ -142,7 +142,7 @@ except KeyboardInterrupt:
         process.wait()
 
 
-def test_too_few_threads_is_an_error_and_nothing_runs(monkeypatch):
+def test_missing_threads_are_an_error_and_nothing_runs(monkeypatch):
     children = {"A": Says("done"), "B": Says("done")}
     both = concurrence(children=children)
     real, count = threading.Thread.start, []
