@@ -30,7 +30,7 @@ from std_msgs.msg import String
 
 # Of chromium about its own drawing, and its line about a command that was refused, whose reason the page tells: on a
 # busy machine the robot may stop by itself while a button is pressed.
-LIMIT = 60.0  # s, of every wait: the computer may be busy
+LIMIT = 60.0  # s, limit of every wait; the computer may be busy
 KNOWN = ("WebGL", "GPU stall", "willReadFrequently", "409 (Conflict)", "points out of X bounds")
 
 
@@ -69,13 +69,13 @@ class Console(unittest.TestCase):
         self.browser.until("return coglab.state().phase.endsWith(arguments[0])", limit, name)
 
     def enabled(self, action, limit=LIMIT):
-        """The button, when the page lets it be pressed."""
+        """Waits until a button is enabled and returns it."""
         button = f"[data-action={action}]"
         self.browser.until("return !document.querySelector(arguments[0]).hasAttribute('aria-disabled')", limit, button)
         return self.button(action)
 
     def says(self, action, word, limit=LIMIT):
-        """Waits until the words below a button say so."""
+        """Waits for a text below a button."""
         self.browser.until(
             "return document.getElementById('why-' + arguments[0]).textContent.includes(arguments[1])",
             limit,
@@ -103,7 +103,7 @@ class Console(unittest.TestCase):
         self.assertEqual(self.browser.js("return document.getElementById('band').className"), "simulation")
 
     def looked(self, browser=None):
-        """What is wrong with the page, once it is laid out."""
+        """Faults of the page after it is laid out."""
         end = time.monotonic() + LIMIT
         while (found := look(browser or self.browser))[0] and time.monotonic() < end:
             time.sleep(0.4)
@@ -131,7 +131,7 @@ class Console(unittest.TestCase):
         return float(np.linalg.norm(np.array(self.browser.js("return coglab.palm()")) - [place.x, place.y, place.z]))
 
     def receive(self):
-        """Once: whether the object is in the hand at the end; the machine may have stopped by itself."""
+        """Receives once. True if the object is in the hand at the end; the machine may have stopped by itself."""
         self.ready("wait_without_object")
         path = self.browser.until("const p = coglab.docs().path; return p && p.kind === 'ahead' && p", LIMIT)
         self.assertGreater(len(path["points"]), 10)
@@ -176,7 +176,7 @@ class Console(unittest.TestCase):
         self.page_in(hub)
 
     def go_on(self, hub="wait_with_object"):
-        """The two acts after a stop or a fault."""
+        """Does the two steps after a stop or a fault: acknowledge, hold a button."""
         leaf = "/fault" if self.machine.state.endswith("/fault") else "/stopped"
         self.page_in(leaf)
         self.browser.until("return document.getElementById('acknowledge').offsetParent !== null", LIMIT)

@@ -1,4 +1,4 @@
-"""Finds faults of a page of the console as a browser shows it."""
+"""Finds faults of a console page in a browser."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ return { place: [...document.querySelectorAll('*')].indexOf(at),
 
 def look(browser: Browser) -> tuple[list[str], int]:
     """Scroll bars, STOP hidden, controls without a name or too small, pale text; and how many texts were looked at."""
-    browser.painted()  # before that, nobody sees the page as it stands, and it has not judged its own room
+    browser.painted()  # before that, the page has neither its final layout nor measured its own room
     found = browser.js(_LOOK)
     return found["problems"], found["texts"]
 

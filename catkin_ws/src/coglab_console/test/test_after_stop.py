@@ -1,4 +1,4 @@
-"""After a stop: which one is acknowledged, the button that is held, and what begins a motion."""
+"""After a stop: acknowledgement, held button, and start of a motion."""
 
 import asyncio
 from dataclasses import replace
@@ -95,7 +95,7 @@ def test_a_held_button_begins_the_motion_once(desk):
 
 
 def test_button_held_during_its_own_command_is_not_refused(desk):
-    """The state has changed by then, because of that very command."""
+    """The command itself has changed the state by then."""
     clock = Clock()
     desk._held["a"] = HeldButton(clock)
     let = asyncio.Event()
@@ -125,7 +125,7 @@ def test_button_held_during_its_own_command_is_not_refused(desk):
 
 
 def test_a_calibration_is_not_the_first_motion_after_a_stop(desk):
-    """It was held down itself; the arm moves by a held button all the same."""
+    """It needs its own held button, and the first motion of the arm still needs one."""
     ask(desk, "a", "stop")
     ask(desk, "a", "acknowledge", stop=newest(desk))
     (answer,) = hold_for(desk, 1.0, what=("calibrate", {"mode": "fast"}))
@@ -181,7 +181,7 @@ def test_the_real_robot_and_calibrations_that_open_the_hand_need_a_held_button()
 
 
 def test_stop_lifted_in_a_terminal_is_shown_as_over(desk):
-    """`./coglab hold`, `./coglab start reset`: the page does not ask for Go on, which nothing waits for any more."""
+    """After `./coglab hold` and `./coglab start reset` the page does not request Go on: nothing waits for it."""
     desk.observe(False, "")
     desk.observe(True, "the arm is blocked: hold is latched; when its cause is away, press Go on", 1)
     assert not shown(desk)["guard"]["lifted"] and "press Go on" in shown(desk)["guard"]["cause"]

@@ -1,4 +1,4 @@
-"""One console for each ROS master, also where the second one has another ROS_HOME or comes from another computer."""
+"""One console per ROS master, even if the second has another ROS_HOME or runs on another computer."""
 
 import contextlib
 import os
@@ -31,7 +31,7 @@ def serving(functions):
 
 @pytest.fixture
 def master():
-    """A ROS master as far as parameters go."""
+    """A ROS master that only has parameters."""
     values = {}
 
     def get(_caller, name):

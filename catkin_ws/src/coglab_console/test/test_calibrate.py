@@ -1,4 +1,4 @@
-"""Calibrating the hand: refused with the reason where the hand would refuse it, answered with what the hand says."""
+"""Calibration of the hand: refused with a reason if the hand would refuse it, else answered with its message."""
 
 import threading
 import time

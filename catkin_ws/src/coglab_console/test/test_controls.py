@@ -1,5 +1,5 @@
-"""Every control of every page says why it is disabled, also to who only watches; what needs a second thought is held;
-what is silent is said; in a real browser with a double in place of the robot."""
+"""Every control of every page shows why it is disabled, also to observers. Risky commands need a held button. Silent
+sources are shown. In a real browser with a double of the robot."""
 
 import time
 from dataclasses import replace
@@ -19,7 +19,7 @@ FEEDBACK = {
         for name in ("yield", "limit")
     ],
 }  # fmt: skip
-# Every button that sends a command of the operator's, and what is said below it.
+# Every button that sends an operator's command, and the text below it.
 DISABLED = """
 return [...document.querySelectorAll('[aria-disabled=true]')].filter((one) => one.getClientRects().length)
   .map((one) => [one.getAttribute('aria-label') || one.labels?.[0]?.innerText || one.innerText,

@@ -1,4 +1,4 @@
-"""Who may do what and when: roles, reasons, the list of commands, sessions; with a double of the robot."""
+"""Roles, reasons of refusals, the list of commands, sessions; with a double of the robot."""
 
 import time
 from dataclasses import replace
@@ -95,7 +95,7 @@ def test_two_browsers_want_to_operate_and_one_disconnects():
 
 
 def test_role_of_absent_operator_becomes_free():
-    """Its browser was closed: whoever comes next operates, and who watches is told how to."""
+    """Its browser was closed: the next browser operates, and observers see how to take over."""
     said, clock = [], Clock()
     roles = Roles(lambda text, level: said.append(text), clock)
     roles.connected("a")
@@ -139,7 +139,7 @@ def test_thresholds_do_not_change_under_way(desk):
 
 
 def test_thresholds_stay_while_brain_is_silent_in_an_action(desk):
-    """It may only be frozen, and go on."""
+    """The brain may only be frozen and continue later."""
     desk.backend.now = replace(desk.backend.now, in_hub=False, master_alive=False)
     for name, arguments in (("contact_arm", {"mode": "off"}), ("calibrate", {"mode": "fast"}), ("home", {})):
         assert "under way" in ask(desk, "a", name, **arguments)["message"]

@@ -1,4 +1,4 @@
-"""The session of a console that was killed goes on in the next one; trials take what fits them; recorders are told."""
+"""The next console resumes the session of a killed one; trials accept only their actions; recorders get the names."""
 
 import itertools
 import time
@@ -72,7 +72,7 @@ def test_damaged_session_file_is_reported_and_console_starts(tmp_path):
 
 
 def test_repeated_result_counts_once(tmp_path):
-    """coglab/results is latched: a console that comes back hears the last one again."""
+    """coglab/results is latched: a restarted console receives the last result again."""
     desk = begun(tmp_path)
     result = {**ROW, "kind": RECEIVE, "outcome": "failed_empty"}
     desk.result(dict(result))
@@ -112,7 +112,7 @@ TIMES = itertools.count(10.0, 5.0)
 
 
 def results(desk, kind, outcome, held=""):
-    """The robot has done this, and its hand holds that."""
+    """Reports a result of the robot, and the object in its hand."""
     at = next(TIMES)
     desk.result({**ROW, "kind": kind, "outcome": outcome, "started": at, "ended": at + 1})
     desk.backend.now = replace(desk.backend.now, object_id=held, actions=(GIVE, "put") if held else (RECEIVE, "take"))
@@ -124,7 +124,7 @@ def opened(desk, *conditions):
 
 
 def test_a_trial_begins_with_the_hand_that_its_action_needs(desk):
-    """Also where a Latin square has Give before Receive: the hand is filled between the trials."""
+    """Also if a Latin square has Give before Receive: the hand is filled between the trials."""
     assert unprepared(order_of(["receive", "give"], 2, "latin_square", 1), held=False) == [1, 3]
     assert "before trial 1" in opened(desk, "give", "receive ball", "give slowly")["message"]
     refused = ask(desk, "a", "trial_begin")

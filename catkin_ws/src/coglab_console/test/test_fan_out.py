@@ -1,4 +1,4 @@
-"""Events without a gap, states bounded: a browser that comes back misses nothing, one that never reads slows nobody."""
+"""Events without gaps, few queued states: a reconnecting browser misses no event; one that never reads slows none."""
 
 import asyncio
 import json
@@ -38,7 +38,7 @@ def test_a_slow_client_gets_the_newest_state_and_every_event():
 
 
 def test_states_on_the_way_are_limited_by_the_window():
-    """What lies in the network's buffers is old when it comes: the next state goes when the last was taken."""
+    """States in the network's buffers become old, so the next state is sent after an acknowledgement."""
     log, documents = EventLog(time.time), Documents()
     client = Client("a", 0, documents, log)
     sent = []
@@ -86,7 +86,7 @@ def test_reconnect_loses_no_event(tmp_path):
 
 
 def deaf_browser(console, key):
-    """A WebSocket that shakes hands and then never reads; its buffer is small."""
+    """A WebSocket with a small buffer that never reads after its handshake."""
     deaf = socket.socket()
     deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
     deaf.connect(("127.0.0.1", console.port))

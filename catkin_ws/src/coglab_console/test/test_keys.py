@@ -1,4 +1,4 @@
-"""Keys and lists in a real browser: Space is STOP wherever the focus is; a choice is made, or taken back."""
+"""Keys and lists in a real browser: Space is STOP at any focus; a choice is made or restored."""
 
 import shutil
 import time
@@ -15,7 +15,7 @@ from selenium.webdriver.common.keys import Keys
 
 
 def test_refused_choice_shows_reason_and_old_value(live):
-    """An observer's: the list of objects and the speed show what is, not what was wished."""
+    """For an observer, the list of objects and the speed show the current value, not the wish."""
     objects = {"rows": [{"id": "ball", "name": "ball", "mass": 0.1, "text": ""}], "asked": True, "problems": []}
     live.loop.call_soon_threadsafe(live.console.documents.put, "objects", objects)
     with Browser() as page:

@@ -1,4 +1,4 @@
-"""The object of the next action: what was chosen, or what the trial of the session's order names, is in the request."""
+"""The request names the object of the next action: the chosen one, or that of the session's trial."""
 
 import time
 from dataclasses import replace
@@ -25,7 +25,7 @@ def stands(desk, held=""):
 
 
 def asked(desk, action, **more):
-    """What was asked of the machine."""
+    """The request to the machine."""
     answer = ask(desk, "a", "start", action=action, **more)
     assert answer["success"], answer
     return desk.backend.calls[-1][1]

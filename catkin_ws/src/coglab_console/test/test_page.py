@@ -1,4 +1,4 @@
-"""The page in a real browser, a double in place of the robot: a dead connection, a slow computer, reasons, touch."""
+"""The page in a real browser with a double of the robot: dead connection, slow computer, reasons, touch."""
 
 import time
 
@@ -80,7 +80,7 @@ def test_a_click_on_a_disabled_button_says_why(live):
 
 
 def test_a_button_is_held_by_touch(live):
-    """As on a tablet: nothing comes of a short touch, something of a long one, nothing of one that slides away."""
+    """As on a tablet: a long touch starts the command; a short one, or one that slides off, does not."""
     page = live.browser
     live.loop.call_soon_threadsafe(live.console.desk.guard.stop, "a test")
     live.loop.call_soon_threadsafe(lambda: live.console.desk.guard.acknowledge(live.console.desk.guard.stops))
@@ -208,7 +208,7 @@ def test_without_graphviz_the_page_has_the_states_and_says_what_is_missing(live)
 
 
 def test_path_to_active_state_shows_its_name_in_full(live):
-    """Where there is no room for all containers the outer ones give way."""
+    """Without room for all containers, the outer ones are left out."""
     leaf = "/M/exchange_human_to_robot/approach/arm_motion/wait_stop"
     picture = {**Layout("no-such-program").of({"/M": Container("/M", ("A",), ())}), "problem": "", "roots": ["/M"]}
     live.loop.call_soon_threadsafe(live.console.documents.put, "graph:/coglab", picture)
@@ -222,7 +222,7 @@ def test_path_to_active_state_shows_its_name_in_full(live):
 
 @pytest.mark.parametrize("promised", [False, True])
 def test_without_libjs_the_view_is_2d_with_a_message(tmp_path, promised):
-    """Also where a library was there when the console began, and half of it is not served."""
+    """Also if a library existed when the console started but is only partly served."""
     live = Desk(tmp_path, {"three": promised, "charts": promised}, libraries=tmp_path)
     try:
         page = live.browser
@@ -239,7 +239,7 @@ def test_without_libjs_the_view_is_2d_with_a_message(tmp_path, promised):
 
 
 def test_page_without_session_shows_what_to_do_and_that_stop_failed(live):
-    """As after the console was killed and started anew, which knows no session of before."""
+    """As after a restart of the console, which does not know earlier sessions."""
     with Browser() as page:
         page.driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": IN_HAND})
         page.open(live.console.link())

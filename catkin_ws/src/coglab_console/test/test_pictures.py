@@ -1,4 +1,4 @@
-"""What is drawn: the graph by Graphviz and without it, the robot's kinematics, primitives and the path ahead, bytes."""
+"""Data of the drawings: graph with and without Graphviz, kinematics, primitives, path of the next motion, tf bytes."""
 
 import io
 import random

@@ -1,4 +1,4 @@
-"""How the node begins: its port, the one console of a ROS master, the link that only its user can read."""
+"""Start of the node: its port, one console per ROS master, a link that only its user can read."""
 
 import asyncio
 import socket

@@ -49,7 +49,7 @@ def test_feedback_controllers_by_order_with_activity_pauses_and_who_changed_what
     assert page.js("return document.getElementById('feedback-profile').innerText") == "Profile: approach"
     assert page.js(TABLE, 1) == [["yield", "velocity", "0.0125", "0.034"], ["limit", "stiffness", "12.5", "0"]]
     assert "yield: force 3.25 N, offset 0.004 m" in page.js("return document.getElementById('page').innerText")
-    # Another order is another table, and nobody's correction is said to be nobody's.
+    # Another order gives another table, and a cycle without corrections is shown as such.
     live.put(feedback={"profile": "", "rows": [limit, yields]}, attribution={"rows": [], "inside": []})
     page.until("return document.getElementById('page').innerText.includes('No controller changed a reference.')", 60.0)
     assert [row[:2] for row in page.js(TABLE, 0)] == [["1", "limit"], ["2", "yield"]]

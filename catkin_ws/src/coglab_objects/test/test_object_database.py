@@ -1,4 +1,4 @@
-"""The object database: the sample objects are good, bad files are refused with file, line and field, the old
+"""The object database: the shipped objects are valid; invalid files are refused with file, line and field, and the old
 entry stays."""
 
 import os

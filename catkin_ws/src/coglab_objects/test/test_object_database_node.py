@@ -1,4 +1,4 @@
-"""The database's node beside a parameter server that takes what XML-RPC takes: no file ends it or its timer."""
+"""The database's node with a parameter server that accepts only XML-RPC types: no file ends the node or its timer."""
 
 import importlib.util
 import shutil

@@ -1,4 +1,4 @@
-"""The object database at its edges: lengths that are just right, files that come, go or stay, a folder that is none."""
+"""Edge cases of the object database: lengths at the tolerance, added and removed files, a missing folder."""
 
 import os
 
@@ -14,13 +14,13 @@ TEXTS = {name: (objects_folder() / f"{name}.yaml").read_text() for name in ("mug
 
 
 def changed(name, before, after):
-    """An object of those that are shipped with one thing changed."""
+    """A shipped object with one change."""
     assert before in TEXTS[name]
     return TEXTS[name].replace(before, after)
 
 
 def refusal(text, name="mug"):
-    """What is said of a text, behind the file's name and line; empty if it is taken."""
+    """The error for a text, without file name and line; empty if the text is valid."""
     try:
         parse_object(text, f"{name}.yaml")
     except ObjectError as error:

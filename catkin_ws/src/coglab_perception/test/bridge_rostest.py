@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The perception bridge with a tracker of its own frames and topics, which a bag plays."""
+"""The perception bridge with a tracker, played from a bag, that has its own frames and topics."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def stamped(kind, stamp, place, **fields):
 
 
 def write_bag(path):
-    """Two minutes of a tracker, as it was years ago."""
+    """Writes two minutes of a tracker with stamps of years ago."""
     with rosbag.Bag(path, "w") as bag:
         for i in range(3600):
             stamp = rospy.Time.from_sec(1.6e9 + i / 30.0)
@@ -89,7 +89,7 @@ class Bridge(unittest.TestCase):
         """Play the bag."""
         cls = type(self)
         command = ["rosbag", "play", "--quiet", str(self.bag)]
-        # A group of its own, because `rosbag play` starts another program.
+        # In its own process group, because `rosbag play` starts another program.
         cls.player = subprocess.Popen(command, stdin=subprocess.DEVNULL, start_new_session=True)
         answer = self.services["init_vision"](LIMIT)
         self.assertTrue(answer.success, answer.message)

@@ -1,4 +1,4 @@
-"""The belief about offers and requests: early and settled, withdrawn and fallen objects, and sights that are none."""
+"""Belief in offers and requests: early and settled predictions, withdrawn and fallen objects, invalid sights."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def there(t: float) -> np.ndarray:
 
 
 def and_back(t: float, at: float = OVER + 0.6, way: float = 1.0) -> np.ndarray:
-    """The same, and from `at` on back."""
+    """The same reach, but the hand goes back from `at` on."""
     return there(t) + way * (START - END) * share((t - at) / TIME)
 
 
@@ -73,7 +73,7 @@ class Scene:
 
 
 def steps(beliefs: list[Belief]) -> list[float]:
-    """How far the predicted place goes from sight to sight, in standard deviations."""
+    """Change of the predicted place from sight to sight, in standard deviations."""
     return [
         float(np.linalg.norm(b.place - a.place)) / math.sqrt(np.trace(a.covariance))
         for a, b in zip(beliefs, beliefs[1:], strict=False)
@@ -285,8 +285,8 @@ def test_the_file_holds_the_defaults_and_faults_in_it_are_said():
 
 
 def test_predicted_place_does_not_oscillate():
-    """What follows it is an arm: each correction that is taken back costs it a change of speed. The same predictions,
-    but as they come, go at least twice as far in all."""
+    """The arm follows this place, so each reversed correction changes its speed. Without the filter the predictions
+    move at least twice as far in total."""
 
     def way(seed: int, **times: float) -> tuple[float, float]:
         scene = Scene(seed)

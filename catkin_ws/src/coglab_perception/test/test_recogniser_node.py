@@ -1,4 +1,4 @@
-"""The recogniser's node takes every sight once, whatever ROS time does. No roscore."""
+"""The recogniser's node processes every sight once, even if ROS time steps. No roscore."""
 
 import importlib.util
 import time

@@ -212,7 +212,7 @@ class CellNode(unittest.TestCase):
         os.unlink(path)
 
     def test_91_a_simulation_that_diverges_ends_with_its_reason_and_status_1(self) -> None:
-        """Braked or not, the arm's last joints do not stand against 1000 Nm."""
+        """With or without brakes, the arm's last joints cannot resist 1000 Nm."""
         push = rospy.Publisher("/torn/push", Wrench, queue_size=1, latch=True)
         push.publish(Wrench(torque=Vector3(1000.0, 1000.0, 1000.0), force=Vector3(1000.0, 1000.0, 1000.0)))
         run = subprocess.run(

@@ -1,4 +1,4 @@
-"""A cell that cannot begin, or has ended for a reason, ends its launch in words: it is not started again for ever."""
+"""A cell that cannot start, or has ended, ends its launch with an error message and is not respawned."""
 
 import os
 import signal
@@ -15,7 +15,7 @@ PACKAGE = Path(rospkg.RosPack().get_path("coglab_sim"))
 
 
 def launched(*arguments):
-    """What a launch of the cell alone says until it ends by itself; a hang is a failure."""
+    """Output of a launch of the cell alone, until it ends by itself; a hang is a failure."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = str(free.getsockname()[1])

@@ -1,4 +1,4 @@
-"""Launched with a person who cannot begin, the launch ends with a sentence; nothing is started again for ever."""
+"""A launch with an unusable person ends with an error message; nothing is respawned."""
 
 import signal
 import socket

@@ -1,4 +1,4 @@
-"""The KRL programs: each convention asked exactly as its own PC stack asks (table of exchange arrays)."""
+"""The KRL programs: each convention with exactly the requests of its own PC stack (table of exchange arrays)."""
 
 import numpy as np
 import pytest
@@ -77,7 +77,7 @@ def until(s, condition, limit=20.0, **answers):
 
 
 def test_coglab_request_of_an_earlier_run_is_ignored(session):
-    """By the run of the program before, which the operator has started anew."""
+    """The request belongs to the run before the operator restarted the program."""
     s = session()
     s.monitor()
     s.client.ints[0:3] = [1, 10, 9]

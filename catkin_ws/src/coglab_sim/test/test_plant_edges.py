@@ -1,5 +1,4 @@
-"""The plant at its edges: depths that are accepted, grips that begin and end, hands that nobody speaks for, brakes,
-blocks and pushes."""
+"""Edge cases of the plant: accepted depths, begin and end of grips, hands without messages, brakes, blocks, pushes."""
 
 import numpy as np
 import pytest
@@ -18,7 +17,7 @@ def still(thing=MUG, board=False, **parameters):
 
 
 def same(one, two):
-    """Whether two quaternions are the same rotation."""
+    """True if two quaternions are the same rotation."""
     return abs(np.dot(one, two)) == pytest.approx(1.0, abs=1e-9)
 
 
@@ -91,5 +90,5 @@ def test_a_hand_goes_on_for_50_ms_after_its_message_and_then_stands():
     run(plant, 0.03)
     plant.set_person(here + [0.012, 0.0, 0.0], velocity=[0.4, 0.0, 0.0])
     state = run(plant, 1.0)
-    # It was wanted 0.4 m/s x 50 ms farther than the last message said.
+    # It ends 0.4 m/s x 50 ms beyond the pose of the last message.
     assert state["person_hand"][0] == pytest.approx(here + [0.012 + 0.020, 0.0, 0.0], abs=6e-4)

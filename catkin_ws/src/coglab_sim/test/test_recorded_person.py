@@ -1,5 +1,5 @@
-"""A person whose hand goes as one was recorded: when it arrives and lets go, what is refused, and the three ways after
-the reach."""
+"""A person whose hand follows a recording: arrival, release, refused recordings, and the three variants after the
+reach."""
 
 from dataclasses import replace
 
@@ -115,7 +115,7 @@ def test_settings_of_a_recorded_hand(tmp_path):
 
 
 class Shown:
-    """A recorded person in virtual time, told directly what they perceive."""
+    """A recorded person in virtual time, with given percepts."""
 
     def __init__(self, way="wait", hand=None, **changes):
         self.hand = hand or recorded()

@@ -1,4 +1,4 @@
-"""What a person perceives: late, noisy, above a threshold; the figures are those of the participant."""
+"""Perception of a person, with the participant's delays, noise and thresholds."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ BLIND = {"seen_noise": 0.0, "seen_turn": 0.0, "seen_speed": 0.0}
 
 
 class Steady:
-    """In the place of the generator: the same number for ever."""
+    """Double of the random generator: always returns the same number."""
 
     def __init__(self, value):
         self.value = value

@@ -1,4 +1,4 @@
-"""What rviz is shown of the truth: frames, the person's body, the object in its shape, and how often."""
+"""True state in rviz: frames, the person's body, shape of the object, rate."""
 
 import numpy as np
 import pytest

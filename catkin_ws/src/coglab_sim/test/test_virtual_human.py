@@ -1,4 +1,4 @@
-"""The virtual human against a robot's hand that is simply there: phases, timing, and what each misbehaviour does."""
+"""The virtual human with a simple robot hand: phases, timing, and the effect of each behaviour."""
 
 import dataclasses
 
@@ -24,7 +24,7 @@ def test_a_normal_giver_goes_through_all_phases(profile):
 
 
 def test_load_alone_or_smaller_load_with_felt_grip_releases():
-    """The robot carries everything, or a tenth with a hand seen closed and heard to have it; or nothing is felt."""
+    """The robot carries everything, or a tenth with a hand seen closed and 'I have it' heard; or nothing is felt."""
     whole = give(carries=1.0)
     together = give(carries=0.1, says=True)
     assert whole.samples[-1].grip == 0.0 and "releasing" in together.phases
@@ -34,14 +34,14 @@ def test_load_alone_or_smaller_load_with_felt_grip_releases():
 
 
 def test_hand_that_closes_without_carrying_gets_no_object():
-    """Nothing is felt to be gripped and nothing is said: load and grip are missing."""
+    """The person feels no grip and hears nothing: load and grip are missing."""
     stage = give(carries=0.0, seconds=12.0)
     assert min(s.grip for s in stage.samples) > 0.3
     assert stage.phases[-1] in ("holding", "releasing", "retreating")
 
 
 def test_an_object_is_pressed_again_into_an_open_hand_that_backs_away_but_not_for_ever():
-    """The palm stands 3 cm farther away from the moment on at which it was touched first."""
+    """From the first touch on, the palm is 3 cm farther away."""
     stage = Stage(closes=False)
     stage.human.hear(0.0, Say.READY_TO_RECEIVE)
     while stage.human.phase != "holding":
@@ -221,7 +221,7 @@ def test_the_taker_goes_when_the_robots_hand_is_seen_to_open():
 
 
 def person(name, knows_weight=True):
-    """Who begins with that object; nobody misjudges a weight that was felt."""
+    """A person who begins with this object and knows its weight."""
     participant = dataclasses.replace(Participant.draw(3), weight_error=0.2)
     return VirtualHuman(participant, Scene.of(shipped(name)), knows_weight)
 

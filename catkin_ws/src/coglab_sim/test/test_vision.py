@@ -1,4 +1,4 @@
-"""Perception's answers: fresh, within the time limit, with a sentence; and whose hand is the partner's."""
+"""Answers of perception: fresh, within the time limit, with a message; and the choice of the partner's hand."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_locate_gives_frame_sight_and_age():
 
 
 def test_the_calibration_shifts_the_board_like_everything_else():
-    """One error for the whole tracker: what lies on the board is seen to lie on it, 5 mm and 1 deg off together."""
+    """The whole tracker has one error: board and objects on it are seen with the same 5 mm and 1 deg."""
     quiet = {"position_noise": (0, 0, 0), "orientation_noise": 0.0, "latency": 0.0, "latency_sigma": 0.0}
     scene = Scene(perfect=False, **quiet, dropout_start=0.0, swap_probability=0.0, occlusion_distance=0.0)
     error = scene.vision.settings.calibration(1)
@@ -156,7 +156,7 @@ def test_two_people_have_no_partner_and_their_objects_no_owner(away, doubt):
 
 
 def hands(**distances):
-    """Hands so far from the robot."""
+    """Hands at given distances from the robot."""
     return {name: Pose(ROBOT.position + [away, 0.0, 0.0]) for name, away in distances.items()}
 
 

@@ -10,7 +10,7 @@ from ih2_hand.wire_choices import WIRE
 
 
 class Raw:
-    """A hand spoken to in hex."""
+    """A hand with requests and answers in hex."""
 
     def __init__(self, **options):
         self.clock = SteppedClock()

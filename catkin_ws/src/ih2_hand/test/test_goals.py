@@ -1,4 +1,4 @@
-"""The queue of goals: at most one moves the fingers, each ends once, and who asked learns why."""
+"""The queue of goals: at most one moves the fingers, each ends once, and its client gets the reason."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ih2_hand.ros import goals
 
 
 class Desk:
-    """A queue whose entries are worked off here, one by one, on a clock of its own."""
+    """A queue whose entries the test processes one by one, with its own clock."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.now = 100.0

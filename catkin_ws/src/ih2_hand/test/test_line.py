@@ -1,4 +1,4 @@
-"""Requests and answers on a line without checksums: what is counted, what is believed, how long it takes."""
+"""Requests and answers on a line without checksums: counters, accepted values, durations."""
 
 from __future__ import annotations
 

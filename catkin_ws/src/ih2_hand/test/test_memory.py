@@ -1,4 +1,4 @@
-"""What is remembered of a hand between requests: calibration, preshape and grip."""
+"""State of a hand between requests: calibration, preshape and grip."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""When a task is done, stalled, blocked or not taken: motor status polls, typed by hand, against the verdicts."""
+"""Verdicts of tasks (done, stalled, blocked, not accepted) on hand-written polls of the motors."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ TARGETS = (110, 5, 160, 245, 245)
 
 
 def sent_preshape(is_sent: bool = True) -> tuple[PreshapeTask, list]:
-    """A preshape on its way, and what the driver was told."""
+    """A running preshape, and the calls of the driver."""
     told: list = []
     driver = SimpleNamespace(
         preshapes={"lateral": TARGETS},
