@@ -28,8 +28,8 @@ from selenium.webdriver.common.keys import Keys
 from somebody import Somebody, show_machine
 from std_msgs.msg import String
 
-# Of chromium about its own drawing, and its line about a command that was refused, whose reason the page tells: on a
-# busy machine the robot may stop by itself while a button is pressed.
+# Lines of chromium about its own drawing, and about a refused command, whose reason is on the page: on a busy computer
+# the robot may stop by itself while a button is pressed.
 LIMIT = 60.0  # s, limit of every wait; the computer may be busy
 KNOWN = ("WebGL", "GPU stall", "willReadFrequently", "409 (Conflict)", "points out of X bounds")
 
@@ -291,8 +291,8 @@ class Console(unittest.TestCase):
     def test_09_a_second_console_of_this_master_is_refused_and_says_so(self):
         command = ["rosrun", "coglab_console", "console_node.py"]
         with tempfile.TemporaryDirectory() as home:
-            # Beside each other. The other one has this one's name and a ROS_HOME of its own, as from a second terminal:
-            # it would end the first one.
+            # In parallel. The other one has the same name but its own ROS_HOME, as from a second terminal: it would end
+            # the first one.
             begun = [
                 subprocess.Popen([*command, *name], stderr=subprocess.PIPE, text=True, env={**os.environ, **changed})
                 for name, changed in ((["__name:=another_console"], {}), ([], {"ROS_HOME": home}))

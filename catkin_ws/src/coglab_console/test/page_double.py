@@ -46,8 +46,8 @@ STATUS: dict = {
 
 
 class Desk:
-    """A console that serves in a thread of its own, 30 states a second, and a browser at its page. `model`: changes of
-    that document; `files`: of where the page's files lie."""
+    """A console in its own thread, with 30 states per second, and a browser at its page. `model`: changes of that
+    document; `files`: changes of the paths of the page's files."""
 
     def __init__(self, folder, model=None, **files):
         self.robot = RobotDouble()

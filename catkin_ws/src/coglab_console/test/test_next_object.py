@@ -48,7 +48,7 @@ def test_given_object_is_not_requested_again(cell):
 
 
 def test_choice_names_an_unknown_object_in_the_hand(cell):
-    """After a restart nobody knows what the hand holds; the request says it."""
+    """After a restart the held object is unknown; the request names it."""
     stands(cell, "unknown")
     ask(cell, "a", "select_object", object_id="ball")
     assert asked(cell, GIVE)["object_id"] == "ball"
@@ -96,6 +96,6 @@ def test_a_trial_that_was_under_way_when_the_console_was_killed_names_its_object
     after = desk_in(tmp_path, lambda: time.time() + 1.0)
     after.connected("a")
     assert shown(after)["object"] == ""
-    # The database is asked a moment later.
+    # The database is read a moment later.
     stands(after)
     assert asked(after, RECEIVE)["object_id"] == "ball"

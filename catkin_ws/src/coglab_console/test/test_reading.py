@@ -1,5 +1,5 @@
-"""Whoever looks can read all of it: the last event with its reason, what is waited for, why the robot stands still.
-What has no room is shown in full by focus and by the mouse. In a real browser with a double in place of the robot."""
+"""All texts can be read: last event with its reason, condition of a wait, cause of a standstill. Focus and mouse unfold
+texts that are cut off. In a real browser with a double of the robot."""
 
 import time
 

@@ -1,5 +1,5 @@
-"""What the pages Feedback, Primitives, Objects and Contact show is what was sent, in words and numbers; in a real
-browser with a double in place of the robot."""
+"""The pages Feedback, Primitives, Objects and Contact show the sent data in words and numbers; in a real browser with
+a double of the robot."""
 
 import time
 

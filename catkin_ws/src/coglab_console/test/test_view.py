@@ -161,7 +161,7 @@ def tf_of(*children, stamp=100.0):
 
 
 def test_the_picture_follows_its_frames_beside_a_motion_capture_system(seen):
-    """Hundreds of markers and of joints of other robots, told first and over and over."""
+    """Hundreds of markers, and of joints of other robots, are published first and repeatedly."""
     view, _, _ = seen
     view.entry = lambda: {"frame": "object_mug"}
     view.named |= {"object_mug"}

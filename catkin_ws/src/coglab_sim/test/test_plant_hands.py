@@ -184,7 +184,7 @@ def test_a_hand_does_not_feel_its_own_motion_as_a_load():
 
 
 def test_a_person_who_takes_carries_what_they_lift():
-    """A grip on what the robot holds takes no load by itself; the hand has to rise."""
+    """A grip on an object that the robot holds takes no load; the hand must rise."""
     trial = GraspTrial(objects()["mug"], "index up")
     trial.close()
     plant = trial.plant

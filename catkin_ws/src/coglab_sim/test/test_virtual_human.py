@@ -57,7 +57,7 @@ def test_an_object_is_pressed_again_into_an_open_hand_that_backs_away_but_not_fo
 
 
 WITHOUT = {f.name: f.default for f in dataclasses.fields(Participant) if f.name in HABITS}
-"""what nobody drawn has"""
+"""Values of drawn people, who have no habits."""
 
 
 def test_without_the_habit_an_object_is_pressed_once():

@@ -145,7 +145,7 @@ class Campaign:
         self.read += 1
         if right:
             return
-        # Told apart to see where a wrong value comes from; a resynchronisation on the way excuses none.
+        # Counted separately to find the cause of a wrong value; a resynchronisation is no excuse for one.
         if counters.resynchronisations > resyncs:
             self.wrong_but_counted += 1
         else:

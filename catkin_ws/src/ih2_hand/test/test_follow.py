@@ -1,4 +1,4 @@
-"""Movements followed to their end in virtual time, and what the core may import."""
+"""Movements followed to their end in virtual time, and the allowed imports of the core."""
 
 from __future__ import annotations
 

@@ -129,7 +129,7 @@ except KeyboardInterrupt:
     print("INTERRUPTED", both.is_running(), flush=True)
 """
     env = {**os.environ, "PYTHONPATH": os.pathsep.join([p for p in sys.path if p])}
-    # Whoever runs the tests in the background hands on that Ctrl-C is ignored.
+    # A shell that runs the tests in the background makes its processes ignore Ctrl-C.
     command = ["env", "--default-signal=INT", sys.executable, "-c", code]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=env)
     try:

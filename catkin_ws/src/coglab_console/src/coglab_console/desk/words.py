@@ -1,5 +1,5 @@
-"""Words for the experimenter instead of names of states, actions and commands. The brain publishes itself what it waits
-for, and the time left (MasterState)."""
+"""Words for the experimenter instead of names of states, actions and commands. The brain itself publishes the
+condition of a wait and the time left (MasterState)."""
 
 from __future__ import annotations
 

@@ -281,7 +281,7 @@ class HandNode(HandMemory):
         return self.task_for(name, goal, self.connected_driver())
 
     def task_ended(self, task: Task, verdict: Verdict) -> None:
-        """Store what the finished task shows about preshape and grip, and publish it."""
+        """Store preshape and grip as shown by the finished task, and publish them."""
         self.task_over(task, verdict)
         self._event = (verdict.reason, f"{task.name}: {verdict.text}")
         self._tell_again()  # before the result, so that the client finds the grip published
