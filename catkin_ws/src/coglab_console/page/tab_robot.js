@@ -24,7 +24,7 @@ export function contactPage(page) {
   page.append(
     h('div', {}, h('h2', {}, title), ...bars.map((bar) => bar.row),
       h('p', {}, 'Input of the contact detector. Bar: the largest change of the last second. Black line: its threshold, k robust standard deviations at rest. ●: the joint counts now.')),
-    h('div', {}, h('h2', {}, 'Noise at rest'), learnt, h('div', { class: 'row' }, commandButton('Learn anew at rest', { name: 'contact_learn', told, held: true, request: () => ['contact_learn', {}] })),
+    h('div', {}, h('h2', {}, 'Noise at rest'), learnt, h('div', { class: 'row' }, commandButton('Learn again at rest', { name: 'contact_learn', told, held: true, request: () => ['contact_learn', {}] })),
       h('h2', {}, 'Try the detector'), detector,
       h('div', { class: 'row' }, field('Threshold k', k), field('For, s', timeout),
         commandButton('Watch for contact', { name: 'contact_arm', told, held: true, request: () => ['contact_arm', { mode: 'contact', k: Number(k.value), timeout: Number(timeout.value) }] }),

@@ -38,7 +38,7 @@ OPERATORS = {
         "Object",
     },
     "Experiment": {"Begin the session"},
-    "Contact": {"Learn anew at rest", "Watch for contact", "Off"},
+    "Contact": {"Learn again at rest", "Watch for contact", "Off"},
     "Objects": {"Read the files again"},
     "Feedback": {"disable yield", "pause yield", "yield later", "limit earlier"},
     "Health": {"Complete calibration", "Forced calibration"},
@@ -137,7 +137,7 @@ def test_disabled_controls_show_the_operator_the_reason_in_every_tab(desk):
     "tab, label, command",
     [
         ("Contact", "Watch for contact", "contact_arm"),
-        ("Contact", "Learn anew at rest", "contact_learn"),
+        ("Contact", "Learn again at rest", "contact_learn"),
         ("Objects", "Read the files again", "objects_reload"),
         ("Health", "Forced calibration", "calibrate"),
         ("Feedback", "disable", "feedback"),

@@ -140,7 +140,7 @@ def test_contact_by_joint_against_its_threshold_and_learning(live):
     page.until(f"{words}.includes('Learning; leave the arm alone: 12 samples')", 60.0)
     page.until(f"{words}.includes('Armed for contact; waits until the arm stands still')", 60.0)
     button = page.js(
-        "return [...document.querySelectorAll('#page button')].find((b) => b.innerText === 'Learn anew at rest')"
+        "return [...document.querySelectorAll('#page button')].find((b) => b.innerText === 'Learn again at rest')"
     )
     press_and_hold(page, button, lambda: live.robot.calls == [("contact_learn", {})])
     live.state = {}
