@@ -29,7 +29,7 @@ ROD = "{type: cylinder, radius: 0.035, height: 0.2}"
 
 
 class Bridge(threading.Thread):
-    """Answers on a UDP port of its own and publishes it as the bridge does."""
+    """Answers on its own UDP port and publishes the port like the bridge."""
 
     def __init__(self, namespace: str = "") -> None:
         super().__init__(daemon=True)
