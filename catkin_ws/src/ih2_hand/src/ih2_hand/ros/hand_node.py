@@ -195,7 +195,7 @@ class HandNode(HandMemory):
             raise HandPortError(f"parameter {name} cannot be read ({error}): is the ROS master there?") from error
         if not port:
             raise HandPortError(
-                f"parameter {rospy.resolve_name(name)} is not set: start the hand emulator, which sets it"
+                f"parameter {rospy.resolve_name(name)} is not set: start the node that sets it, e.g. hand_emulator"
             )
         return port
 
