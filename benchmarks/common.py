@@ -1,4 +1,4 @@
-"""What the benchmark programs share: rows and their file, intervals, files of the workspace, worker processes."""
+"""Common parts of the benchmark programs: rows and their file, intervals, files of the workspace, worker processes."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def number(value: float) -> str:
 
 
 def share(row: str, good: Sequence[bool], against: str = "") -> Row:
-    """Percent of those that are true, with Wilson's 95 % interval."""
+    """Percentage of true values, with Wilson's 95 % interval."""
     n, p, z = len(good), float(np.mean(good)) if len(good) else 0.0, 1.96
     middle = (p + z * z / (2 * n)) / (1 + z * z / n) if n else 0.5
     half = z / (1 + z * z / n) * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n)) if n else 0.5
@@ -69,7 +69,7 @@ def share(row: str, good: Sequence[bool], against: str = "") -> Row:
 
 
 def quantile(row: str, values: Sequence[float | None], part: float, unit: str, against: str = "") -> Row:
-    """A value by rank, with the ranks' 95 % interval; None is infinitely late, and no value is left out."""
+    """Quantile `part` (0..1) with its 95 % interval by rank. None counts as infinite; no value is left out."""
     ordered = sorted(math.inf if value is None else value for value in values)
     n = len(ordered)
     at = min(n - 1, math.ceil(part * n) - 1 if part < 1.0 else n - 1)
@@ -85,7 +85,7 @@ def median(row: str, values: Sequence[float | None], unit: str, against: str = "
 
 
 def minimum_jerk(u: np.ndarray) -> np.ndarray:
-    """Share of the way at share u of the time."""
+    """Share of the path at share u of the time."""
     u = np.clip(u, 0.0, 1.0)
     return u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
 
@@ -102,7 +102,7 @@ def helper(name: str) -> str:
 
 
 def shared_module(name: str) -> Any:
-    """A module that lies beside tests or scripts of a package, and so is in no package itself."""
+    """Imports a module from the tests or scripts of a package."""
     path = next(path for path in SOURCES.rglob(f"{name}.py") if {"test", "scripts"} & set(path.parts))
     if str(path.parent) not in sys.path:
         sys.path.append(str(path.parent))
@@ -110,13 +110,13 @@ def shared_module(name: str) -> Any:
 
 
 def in_parallel(work: Callable[[In], Out], items: Iterable[In]) -> list[Out]:
-    """work() of each item, in as many processes as there are cores."""
+    """Returns work() of each item, computed in one process per core."""
     with ProcessPoolExecutor(os.cpu_count(), multiprocessing.get_context("fork")) as pool:
         return list(pool.map(work, items))
 
 
 def machine() -> str:
-    """Kind of this machine: cores and processor."""
+    """Number of cores and processor of this machine."""
     text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
     names = [line.partition(":")[2].strip() for line in text.splitlines() if line.startswith("model name")]
     return f"{os.cpu_count()} cores, {names[0] if names else 'unknown processor'}"
@@ -129,7 +129,7 @@ def read_results() -> list[dict[str, str]]:
 
 
 def write_results(benchmark: str, rows: Sequence[Row]) -> None:
-    """Puts these rows into results.csv, in place of those of the same names."""
+    """Writes rows to results.csv; they replace rows of the same names."""
     about = {"date": datetime.date.today().isoformat(), "machine": machine()}
     new = {row.row: {"benchmark": benchmark, **row._asdict(), "value": number(row.value), **about} for row in rows}
     for line in (lines := read_results()):
@@ -142,8 +142,8 @@ def write_results(benchmark: str, rows: Sequence[Row]) -> None:
 
 
 def main(benchmark: str, *parts: Callable[[bool], Iterable[Row]]) -> None:
-    """Runs the parts of a benchmark, prints their rows and writes them to results.csv. `--quick`: a short look, with
-    few repetitions, that writes nothing. A part that fails is told, and the others run."""
+    """Runs the parts of a benchmark, prints their rows and writes them to results.csv. `--quick`: few
+    repetitions, nothing is written. A part that fails is reported, and the others still run."""
     parser = argparse.ArgumentParser(prog=f"./coglab bench {benchmark}")
     parser.add_argument("--quick", action="store_true", help="few repetitions; prints the rows and keeps none")
     quick = parser.parse_args().quick

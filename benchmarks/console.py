@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The experimenter's page against the running cell: STOP from the key's way down in the browser to the bridge's hold,
+"""The experimenter's page with the running cell: time from the key press of STOP in the browser to the bridge's hold,
 both by this computer's clock, and first paint with an empty cache."""
 
 from __future__ import annotations
@@ -24,24 +24,24 @@ from common import Row, end, main, median, quantile
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
 
-READY = 120.0  # s until the hub
-REQUEST_LIMIT = 9.0  # s after which the page gives a request up
+READY = 120.0  # s, longest wait for the hub
+REQUEST_LIMIT = 9.0  # s, time limit of the page's requests
 OPERATING = "return document.getElementById('role').innerText.startsWith('you operate')"
 LOADED = (
     "return coglab.view() === '3D' && document.querySelectorAll('#charts canvas').length >= 5"
     " && performance.getEntriesByName('first-contentful-paint').length > 0"
 )
-# The page sends each press by its connection and by a request, the console each to the arm and to the brain.
+# The page sends each press by its connection and by a request. The console sends each of them to the arm and the brain.
 ANSWERED = """
 const rows = coglab.events().filter((e) => e.seq > arguments[0] && e.source === 'stop').map((e) => e.text);
-const answers = rows.filter((text) => text.startsWith('STOP, ') || text.includes('cannot be asked')).length;
+const answers = rows.filter((text) => text.startsWith('STOP, ') || text.includes('cannot be reached')).length;
 const presses = rows.filter((text) => text.startsWith('STOP by')).length;
 return presses === arguments[1] && answers === 2 * presses && presses;
 """
 
 
 class Cell:
-    """The launched system with its console; ends with the stack."""
+    """The launched system with its console. It ends with the stack."""
 
     def __init__(self, stack: ExitStack) -> None:
         self.home = Path(stack.enter_context(tempfile.TemporaryDirectory(ignore_cleanup_errors=True)))
@@ -63,7 +63,7 @@ class Cell:
         self.arm = message
 
     def wait(self, ready: Callable[[], bool], limit: float, what: str) -> None:
-        """TimeoutError if it does not come."""
+        """Waits until ready(). TimeoutError after `limit` s."""
         last = time.monotonic() + limit
         while not ready():
             if time.monotonic() > last:
@@ -74,7 +74,7 @@ class Cell:
 
 
 def first_paint(cell: Cell, loads: int) -> list[float]:
-    """s, of so many browsers."""
+    """First paint (s) in each of `loads` new browsers."""
     found = []
     for _ in range(loads):
         with Browser() as browser:
@@ -86,7 +86,7 @@ def first_paint(cell: Cell, loads: int) -> list[float]:
 
 
 def stop_latencies(cell: Cell, presses: int) -> list[float]:
-    """ms from the key's way down to the hold."""
+    """Times (ms) from the key press to the hold."""
     chance, found = random.Random(1), []
     with Browser() as browser:
         browser.open(fresh_link(cell.home, limit=60.0), 60.0)
@@ -96,7 +96,7 @@ def stop_latencies(cell: Cell, presses: int) -> list[float]:
         pressed = "(e) => { window.pressedAt = performance.timeOrigin + e.timeStamp; }"
         browser.js(f"window.addEventListener('keydown', {pressed}, true)")
         for _ in range(presses):
-            time.sleep(chance.uniform(0.05, 0.15))  # not in the rhythm of the cycle
+            time.sleep(chance.uniform(0.05, 0.15))  # random, not synchronous with the control cycle
             since, cell.held_at = browser.js("return coglab.events().at(-1)?.seq ?? 0"), 0.0
             ActionChains(browser.driver).send_keys(Keys.SPACE).perform()
             cell.wait(lambda: cell.held_at > 0.0, 3.0, "the hold")
@@ -104,7 +104,7 @@ def stop_latencies(cell: Cell, presses: int) -> list[float]:
             try:
                 browser.until(ANSWERED, REQUEST_LIMIT + 6.0, since, 2)
             except TimeoutError:
-                browser.until(ANSWERED, 1.0, since, 1)  # the connection was being made anew: one way alone
+                browser.until(ANSWERED, 1.0, since, 1)  # the page was reconnecting: only the request arrived
             rospy.ServiceProxy("/lwr/command", LwrCommand)("reset")
             cell.wait(lambda: not cell.arm.hold_latched, 10.0, "the end of the hold")
     return found

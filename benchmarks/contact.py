@@ -1,11 +1,11 @@
 #!/usr/bin/python3
-"""Contact detection while the arm moves and while it rests, in the physics of the virtual world.
+"""Contact detection while the arm moves and at rest, in the physics of the virtual world.
 
 A reach: a hand moves into the handover region, seen by the shipped tracker, and the arm reaches for it with the shipped
-primitives; see moving_reaches.py for what is drawn. Moving push: across the way, 0 to 3 N in 60 ms; found: an event
-within 80 ms after the force has reached 1 N; an event before the push is a miss. False alarm: any event in a reach
-without a push, of torques, fingers, sight and touch together. A reach that is refused, or ends before its push, is
-replaced by the next seed. At rest: 3 N to the side on synthetic torques.
+primitives; moving_reaches.py describes the drawn quantities. Moving push: across the path, 0 to 3 N in 60 ms. It is
+found if an event occurs within 80 ms after the force has reached 1 N; an event before the push is a miss. False alarm:
+any event in a reach without a push, from torques, fingers, sight or touch. If a reach is refused or ends before its
+push, the next seed replaces it. At rest: 3 N to the side on synthetic torques.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ from common import Row, in_parallel, main, median, share, shared_module
 FIRST_SEED = 300_000  # the shipped thresholds were learnt on seeds from 50 000 on
 WITHIN = 0.080  # s
 TOUCH_NOISE = 0.05  # N, of each component of the touch sensors
-BEFORE = 0.6  # s of rest before the motion that the detector sees
+BEFORE = 0.6  # s of rest before the motion that are fed to the detector
 OLDEST_SIGHT = 0.15  # s
 
 
 def detector(seed: int) -> FusedDetector:
-    """As its node makes it; its model of the arm is wrong in its own way."""
+    """A detector as its node makes it, but with a wrong model of the arm, drawn by the seed."""
 
     def jacobian(q):
         return position_jacobian(default_arm(), q)
@@ -48,14 +48,14 @@ def detector(seed: int) -> FusedDetector:
 
 
 def grasp_of(frame: str) -> Pose:
-    """The palm in the frame of the object that is reached for."""
+    """Pose of the palm in the frame of the goal object."""
     thing, _ = read_object(objects_folder() / f"{frame.removeprefix('object_')}.yaml")
     pose = thing["grasps"][thing["default_grasp"]]["pose"]
     return Pose(np.array(pose["xyz"]), np.array(pose["quaternion"]))
 
 
 def feed_hand_and_sight(fused: FusedDetector, record, k: int, grasp: Pose):
-    """What the node receives of the hand's motors and of the object's place, in sample k."""
+    """Feeds the status of the hand's motors and the sight of the object in sample k. Returns an event or None."""
     now, event = record.stamp[k], None
     if record.hand[k] and (k == 0 or record.hand[k] is not record.hand[k - 1]):
         event = fused.feed_hand(now, record.hand[k])
@@ -68,7 +68,7 @@ def feed_hand_and_sight(fused: FusedDetector, record, k: int, grasp: Pose):
 
 
 def first_event(record, everything: bool) -> float | None:
-    """When (s) the detector finds contact in a reach; None: never. `everything`: by fingers, sight and touch, too."""
+    """Time (s) of the first contact in a reach; None: never. `everything`: also by fingers, sight and touch."""
     fused, grasp = detector(record.seed), grasp_of(shared_module("moving_reaches").FRAME)
     fused.set_payload(*record.payload)
     fused.holds = record.payload[0] > 0.0
@@ -91,7 +91,7 @@ def first_event(record, everything: bool) -> float | None:
 
 
 def one_reach(job: tuple[int, str]) -> float | bool:
-    """Of a reach with a push: delay (s) of the event after 1 N, infinite for none. Without: whether it was alarmed."""
+    """With a push: delay (s) of the event after 1 N, infinite without an event. Without a push: True for an alarm."""
     seed, kind = job
     for attempt in range(20):
         try:

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
-"""The simulated cell beside MuJoCo alone, and its dynamics beside KDL.
+"""The simulated cell compared with MuJoCo alone, and its dynamics compared with KDL.
 
-Step: processor time of a complete 1 ms step over mj_step on the same states, median of the blocks' ratios; a mug lies
-in the fingers. Difference: largest element of mass matrix, gravity, and Coriolis torques over 100 random states.
+Step: processor time of a complete 1 ms step / that of mj_step on the same states, median of the blocks' ratios; a mug
+is in the fingers. Difference: largest element of mass matrix, gravity, and Coriolis torques over 100 random states.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def step(quick: bool) -> Iterator[Row]:
 
 
 def against_kdl(_quick: bool) -> Iterator[Row]:
-    """The plant with all its fingers beside a tree of KDL, as the package's own test prints it, if that is built."""
+    """The plant with all its fingers compared with a KDL tree, as printed by the package's test, if that is built."""
     for program in sorted((DEVEL / "lib" / "coglab_sim").glob("coglab_sim_test_*")):
         command = [str(program), "--gtest_filter=*Kdl*:*KDL*:PlantTerms*"]
         text = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False).stdout

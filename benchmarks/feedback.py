@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Feedback controllers: time of one of 100 per cycle as they run on a robot (bounded, judged, timed and attributed).
+"""Feedback controllers: time of one of 100 per cycle, as on a robot (bounded, checked, timed and attributed).
 Processor time, median of repetitions by google-benchmark, interleaved with a bare loop over the same controllers."""
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 #!/usr/bin/python3
-"""The hand: time of a request beside a bare pyserial loop, delay of a result, slip of a held object.
+"""The hand: time of a request compared with a bare pyserial loop, delay of a result, slip of a held object.
 
-Request: median ratio of blocks that alternate between driver and loop on the same pseudo-terminal; blocks in which the
-line was disturbed are left out, at most a tenth. Result: from the last finger's stop to the action's result, over ROS.
-Slip: farthest that an object moves in the palm in 3 s of shaking at 5 m/s^2, five objects in five directions.
+Request: median ratio of blocks that alternate between driver and loop on the same pseudo-terminal. Blocks with a
+disturbed line are left out, at most a tenth. Result: time from the last finger's stop to the action's result, over ROS.
+Slip: largest displacement of an object in the palm in 3 s of shaking at 5 m/s^2; five objects, five directions.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def driver_sweep(driver: HandSerialDriver) -> None:
 
 
 def bare_sweep(port: serial.Serial) -> None:
-    """The same by write and read, without checks."""
+    """The same requests by plain write and read, without checks."""
     for motor in range(WIRE.motors):
         for code, count in REQUESTS:
             port.write(bytes((code, motor)))
@@ -53,7 +53,7 @@ def bare_sweep(port: serial.Serial) -> None:
 
 
 def microseconds(sweep, port) -> float:
-    """Time of a request."""
+    """Time of a request, us."""
     begin = time.perf_counter()
     for _ in range(4):
         sweep(port)
@@ -85,7 +85,7 @@ def requests(quick: bool) -> Iterator[Row]:
 
 
 class TimedHand(EmulatedHand):
-    """Notes when the fingers will have reached their open ends."""
+    """Computes when the fingers will reach their open ends (`stops`, s, monotonic)."""
 
     stops = 0.0
 
@@ -97,7 +97,7 @@ class TimedHand(EmulatedHand):
 
 
 def wait_for(ready, seconds: float, what: str) -> None:
-    """TimeoutError if it does not come."""
+    """Waits until ready(). TimeoutError after `seconds`."""
     limit = time.monotonic() + seconds
     while not ready():
         if time.monotonic() > limit:
@@ -154,7 +154,7 @@ def result(quick: bool) -> Iterator[Row]:
 
 
 def slip_mm(case: tuple[str, str]) -> float:
-    """Of one object with the palm in one direction; infinite if it is lost."""
+    """Slip of one object with the palm in one direction; infinite if the object is lost."""
     trials = shared_module("grasp_trial")
     outcome = trials.GraspTrial(trials.objects()[case[0]], case[1]).run()
     return float("inf") if outcome.lost else 1e3 * outcome.slip

@@ -1,13 +1,12 @@
 #!/usr/bin/python3
-"""Whole handovers with drawn people, each result with its true quantity from the simulated cell.
+"""Whole handovers with drawn people. Each result is measured on the true state of the simulated cell.
 
-Success: the machine says so, and at the end of the action the robot (receiving) or the person (giving) holds the object
-in truth; an action that never began has failed. First movement: speed above 0.02 m/s for 0.1 s, of the person's own
-motion without sway; an arm that does not start is infinitely late. False starts: hands that scratch, point or reach
-aside while the robot was asked for an action; the palm moves over 30 mm, or the trial could not be carried out. Pulls:
-people who withdraw the object once it is felt, or pull to and fro once the hand is closed. Later than a person: until
-the palm stays within 5 mm of its goal or meets the person, less a person's time over the same way; accustomed people,
-noisy tracker.
+Success: the machine reports success, and at the end of the action the robot (receiving) or the person (giving) truly
+holds the object. An action that never began has failed. First movement: speed above 0.02 m/s for 0.1 s; for the person
+without sway. An arm that does not start is infinitely late. False starts: hands scratch, point or reach aside after the
+robot got a request; the palm moves over 30 mm, or the trial failed. Pulls: people withdraw the object when they feel
+the robot, or pull to and fro when the hand is closed. Later than a person: time until the palm stays within 5 mm of its
+goal or meets the person, less a person's time over the same distance; accustomed people, noisy tracker.
 """
 
 from __future__ import annotations
@@ -26,20 +25,20 @@ NOISY = PerceptionSettings(
 
 
 def jobs(first: int, count: int, **conditions: object) -> list[Job]:
-    """Trials of so many people, the objects in turn."""
+    """Trials of `count` people, with the objects in turn."""
     return [
         Job(FIRST_SEED + first + i, Conditions(object_id=OBJECTS[i % len(OBJECTS)], **conditions)) for i in range(count)
     ]
 
 
 def success(name: str, trials: list[dict], goal: str) -> Row:
-    """Directions that succeed in truth, two of each trial."""
+    """Share of directions that truly succeed, two per trial."""
     good = [one["good"] for trial in trials for one in trial["directions"]]
     return share(name, good + [False] * (2 * len(trials) - len(good)), goal)
 
 
 def drawn_people(quick: bool) -> Iterator[Row]:
-    """People as they are, tracker as it is."""
+    """Drawn people and the default tracker."""
     trials = in_parallel(run_trial, jobs(0, 4 if quick else 500))
     directions = [one for trial in trials for one in trial["directions"]]
     reaches = [reach for one in directions for reach in one["reaches"]]
@@ -59,7 +58,7 @@ def drawn_people(quick: bool) -> Iterator[Row]:
 
 
 def accustomed_people(quick: bool) -> Iterator[Row]:
-    """People who know the robot, before a calibrated tracker with noise, latency and dropouts."""
+    """People who know the robot, and a calibrated tracker with noise, latency and dropouts."""
     trials = in_parallel(run_trial, jobs(20_000, 4 if quick else 100, profile="accustomed", perception=NOISY))
     yield success("handovers that succeed, accustomed people", trials, ">= 97")
     late = [value for trial in trials for value in trial["late"] or [None]]
@@ -67,7 +66,7 @@ def accustomed_people(quick: bool) -> Iterator[Row]:
 
 
 def false_starts(quick: bool) -> Iterator[Row]:
-    """Hands that are about something else."""
+    """Hand motions that are neither offer nor request."""
     count = 6 if quick else 200
     others = [Job(FIRST_SEED + 40_000 + i, Conditions(), i) for i in range(count)]
     moved = [trial["moved"] is None or trial["moved"] > 0.030 for trial in in_parallel(run_trial, others)]

@@ -1,9 +1,9 @@
 #!/usr/bin/python3
-"""Inverse kinematics and the control cycle beside KDL, and how random reaches end.
+"""Inverse kinematics and the control cycle compared with KDL, and the ends of random reaches.
 
 Times: processor time of a call, median of repetitions by google-benchmark, interleaved with those of the peer. Reaches:
-300 random ones of 0.3 to 0.6 m with a turn of up to 60 degrees through bridge, controller manager and simulated arm in
-lockstep; one that is refused, aborted, or ends more than 1 mm or 3 degrees off its goal counts.
+300 random ones of 0.3 to 0.6 m, with rotations up to 60 degrees, through bridge, controller manager and simulated arm
+in lockstep. A reach counts as missed if it is refused, aborted, or ends over 1 mm or 3 degrees from its goal.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ def times(quick: bool) -> Iterator[Row]:
 
 
 def forbidden_calls(_quick: bool) -> Iterator[Row]:
-    """Allocations, locks and system calls in 100 000 cycles while services are called, as the package's own test counts
-    them, if that test is built."""
+    """Allocations, locks and system calls in 100 000 cycles while services are called, as counted by the package's
+    test, if that is built."""
     for program in sorted((DEVEL / "lib" / "coglab_controllers").glob("coglab_controllers_test_*")):
         with tempfile.TemporaryDirectory() as folder:
             report = Path(folder) / "report.xml"
@@ -103,13 +103,13 @@ def wait(robot: _virtual.LockstepRobot, condition, limit: float = START_LIMIT) -
 
 
 def must(answer: tuple) -> None:
-    """Raises what a service refused."""
+    """Raises RuntimeError with the message if a service refused."""
     if not answer[0]:
         raise RuntimeError(answer[1])
 
 
 def ready(posture: np.ndarray) -> _virtual.LockstepRobot:
-    """The whole robot in virtual time, in command mode in a posture, with the DMP plug-in active."""
+    """A whole robot in virtual time, in command mode at a posture, with the DMP plug-in active."""
     text = (PACKAGE / "config" / "controllers.yaml").read_text()
     manager = re.sub(r"package://(\w+)", lambda found: str(SOURCES / found.group(1)), text)
     cell = {"krc/period": PERIOD, "seed": 1, "home": [float(q) for q in posture]}
@@ -118,7 +118,7 @@ def ready(posture: np.ndarray) -> _virtual.LockstepRobot:
     must(robot.load_dmps(str(PACKAGE / "config" / "primitives.xml")))
     wait(robot, lambda: robot.cell.quality == 3)
     ticket = robot.submit("start")
-    outcomes: list[tuple] = []  # an outcome is told once
+    outcomes: list[tuple] = []  # an outcome is returned only once
     wait(robot, lambda: (outcome := robot.outcome(ticket)) is not None and not outcomes.append(outcome))
     must(outcomes[0])
     must(robot.switch_controller("dmp"))
@@ -126,7 +126,7 @@ def ready(posture: np.ndarray) -> _virtual.LockstepRobot:
 
 
 def off_goal(reach: Reach) -> bool:
-    """Whether a reach is refused, aborted, or ends off its goal."""
+    """True if a reach is refused, aborted, or ends off its goal."""
     robot = ready(reach.posture)
     robot.set_frame("goal", reach.goal, reach.target)
     upright = [0.0, 0.0, 0.0, 1.0]
@@ -147,7 +147,7 @@ def off_goal(reach: Reach) -> bool:
 
 
 def reaches(quick: bool) -> Iterator[Row]:
-    """Random reaches, many of which lead to a joint's stop."""
+    """Random reaches, many of which lead to a joint limit."""
     missed = in_parallel(off_goal, draw_reaches(8 if quick else 300))
     yield Row("random reaches that end off their goal", sum(missed), "", "<= 0", f"of {len(missed)}")
 

@@ -1,9 +1,10 @@
 #!/usr/bin/python3
-"""Limits and stopping while datagrams are lost (docs/limits_under_loss.md), in lockstep and without ROS.
+"""Limits and stopping under loss of datagrams (docs/limits_under_loss.md), in lockstep and without ROS.
 
-Every joint goes to the ends of its range at full speed at FRI periods of 1 to 20 ms with 0, 1, 5 and 10 % of the cycles
-lost, singly and in bursts of up to 5; half lose the measurement, half the answer. A run that did not start or lost
-command mode counts as a violation. Interpolator: 100 000 random states at each of four periods beside ruckig.
+Every joint moves to the ends of its range at full speed, at FRI periods of 1 to 20 ms, with 0, 1, 5 and 10 % of the
+cycles lost, singly and in bursts of up to 5; half of them lose the measurement, half the answer. A run that did not
+start or lost command mode counts as a violation. Interpolator: 100 000 random states at each of four periods beside
+ruckig.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from common import Row, helper, main
 
 
 def losses(quick: bool) -> Iterator[Row]:
-    """What the set-points do."""
+    """Violations of the set-points, and stopping angles."""
     seeds = 5 if quick else 1000
     run = subprocess.run([helper("loss_campaign"), str(seeds)], stdout=subprocess.PIPE, text=True, check=True)
     lines = [(words[0], [float(word) for word in words[1:]]) for words in map(str.split, run.stdout.splitlines())]

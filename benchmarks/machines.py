@@ -1,8 +1,8 @@
 #!/usr/bin/python3
-"""The state machine engine beside the engine of the ROS distributions (PyPI's standalone-smach, if it is installed).
+"""The state machine engine compared with that of the ROS distributions (PyPI's standalone-smach, if installed).
 
-A transition: median of 30 runs of 1000 states that do nothing. Preempts: requested at random moments of nested machines
-and concurrences, also before the run; lost if the run does not end as preempted within 5 s.
+Transition: median of 30 runs of 1000 empty states. Preempts: requested at random moments of nested machines and
+concurrences, also before the run; lost if the run does not end as preempted within 5 s.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ COUNT = 1000  # states
 
 
 def transition_us() -> float:
-    """Median time of a transition, us, of whichever smach is imported."""
+    """Median time of a transition (us) of the imported smach."""
     machine = smach.StateMachine(["end"])
     with machine:
         for i in range(COUNT):
@@ -42,7 +42,7 @@ def transition_us() -> float:
 
 
 def peer_us() -> float | None:
-    """The same of upstream's engine in a process of its own; None if it is not installed."""
+    """The same for the upstream engine, in its own process; None if it is not installed."""
     try:
         folder = importlib.metadata.distribution("standalone-smach").locate_file("")
     except importlib.metadata.PackageNotFoundError:
@@ -62,7 +62,7 @@ def transitions(_quick: bool) -> Iterator[Row]:
 
 
 class Hop(smach.State):
-    """Looks at the flag once, then goes on."""
+    """Checks the preempt flag once, then goes on."""
 
     def __init__(self) -> None:
         super().__init__(["on", "preempted"])
@@ -76,7 +76,7 @@ class Hop(smach.State):
 
 
 def endless(depth: int) -> smach.StateMachine:
-    """Concurrences in machines in concurrences, which end by a request only."""
+    """Concurrences in machines in concurrences that end only by a request."""
     machine = smach.StateMachine(["preempted"])
     with machine:
         smach.StateMachine.add("A", Hop(), {"on": "B"})

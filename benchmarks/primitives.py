@@ -1,10 +1,10 @@
 #!/usr/bin/python3
-"""Dynamic movement primitives beside the Python package movement_primitives.
+"""Dynamic movement primitives compared with the Python package movement_primitives.
 
-Imitation: 44 curves of each of five kinds, 20 basis functions on both sides, begun with the same velocity; root mean
+Imitation: 44 curves of each of five kinds, 20 basis functions and equal start velocity for both; root mean
 square error over a curve in percent of its length. Goal: one reach of 1 s in cycles of 5 ms whose goal jumps by 100 mm
-to the side at 0.3 s, or moves at 0.1 m/s; lag: largest distance to the goal from 1 s to 2.5 s; where it is seen at
-30 Hz with 4 mm of noise, of the mean of 60 motions in each cycle.
+to the side at 0.3 s, or moves at 0.1 m/s. Lag: largest distance to the goal from 1 s to 2.5 s. If the goal is seen at
+30 Hz with 4 mm of noise: lag of the mean of 60 motions in each cycle.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def error(path: np.ndarray, wanted: np.ndarray) -> float:
 
 
 def peer_error(wanted: np.ndarray) -> float:
-    """The same of the peer."""
+    """The same error for the peer."""
     dt = CURVE[1]
     dmp = DMP(n_dims=3, execution_time=1.0, dt=dt, n_weights_per_dim=BASIS)
     dmp.imitate(CURVE, wanted)
@@ -71,7 +71,7 @@ def peer_error(wanted: np.ndarray) -> float:
 
 
 def imitation(quick: bool) -> Iterator[Row]:
-    """How well a curve is learnt."""
+    """Error of learnt curves."""
     rng = np.random.default_rng(11)
     wanted = [curve(kind, rng) for kind in KINDS for _ in range(4 if quick else 44)]
     learnt = [cc.learn("curve", [(CURVE, path)], basis_count=BASIS, allow=("moving",)) for path in wanted]
@@ -110,7 +110,7 @@ def run(goal_at: Callable[[float], np.ndarray], cycles: int) -> tuple[np.ndarray
 
 
 def run_peer(goal_at: Callable[[float], np.ndarray], cycles: int) -> tuple[np.ndarray, np.ndarray]:
-    """The same of the peer."""
+    """The same motion of the peer."""
     dmp = DMP(n_dims=3, execution_time=DURATION, dt=CYCLE, n_weights_per_dim=BASIS)
     dmp.imitate(TIMES, DEMONSTRATION)
     dmp.configure(start_y=np.zeros(3), goal_y=GOAL)

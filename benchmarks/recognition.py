@@ -1,10 +1,10 @@
 #!/usr/bin/python3
-"""Recognition of a person's motion by the shipped patterns, on people that they were not learnt from.
+"""Recognition of a person's motion by the shipped patterns, on people who are not in the training data.
 
-Reaches alone: 60 people with habits of their own (rest, ends, tempo, arc), drawn anew; the tracker's error wanders;
-one motion in five is no reach of a pattern. The peer is the nearest direction seen so far. Whole trials: drawn people
-and the default tracker; the true pattern of a reach is that of its displacement, and reaches of none are left out.
-Right: the most likely pattern is the true one after 40 % of the reach's time.
+Reaches alone: 60 newly drawn people with their own habits (rest, ends, tempo, arc); the tracker's error varies slowly;
+one motion in five is not a reach of a pattern. The peer chooses the nearest direction so far. Whole trials: drawn
+people and the default tracker; the true pattern of a reach follows from its displacement; reaches of no pattern are
+left out. Right: the most likely pattern is the true one after 40 % of the reach's time.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ FIRST_SEED = 200_000
 
 
 class Person:
-    """Habits: where the hand rests, where each pattern ends, tempo, arc."""
+    """Habits: rest of the hand, end of each pattern, tempo, arc."""
 
     def __init__(self, rng: np.random.Generator) -> None:
         self.shapes = shared_module("synthetic_reaches")
@@ -70,7 +70,7 @@ class Person:
 
 
 def nearest_direction(displacement: np.ndarray) -> str:
-    """The peer."""
+    """The peer: name of the pattern whose direction is nearest to a displacement (m)."""
     shapes = shared_module("synthetic_reaches")
     lines = {name: np.array(end) - shapes.START for name, end in shapes.ENDS.items()}
     return max(lines, key=lambda name: float(displacement @ lines[name] / np.linalg.norm(lines[name])))
@@ -98,11 +98,13 @@ def alone(quick: bool) -> Iterator[Row]:
 
 
 class Recognised(Watch):
-    """What is recognised while the person reaches."""
+    """Records the recognised patterns while the person reaches."""
 
     def __init__(self, trial: Any) -> None:
         super().__init__(trial)
-        self.reaches: list[list[tuple[float, np.ndarray, str]]] = []  # of each: own speed, place, likeliest pattern
+        self.reaches: list[
+            list[tuple[float, np.ndarray, str]]
+        ] = []  # per reach: own speed, position, most likely pattern
         self._was_reaching = False
 
     def look(self, trial: Any) -> None:
@@ -120,7 +122,7 @@ class Recognised(Watch):
         self._was_reaching = reaching
 
     def figures(self) -> dict[str, Any]:
-        """`right`: of each reach of a known pattern, whether it was the likeliest one."""
+        """`right`: for each reach of a known pattern, True if this pattern was the most likely one."""
         right = []
         for reach in self.reaches:
             true = shared_module("synthetic_reaches").pattern_of(reach[-1][1] - reach[0][1])

@@ -1,9 +1,9 @@
 #!/usr/bin/python3
 """Own controllers in Python (coglab.control): in the cycle of a World, and in a process beside the running robot.
 
-On the real clock: the robot node with its ideal arm, and a Python process that answers at 200 Hz. An answer that comes
-before the next cycle is one cycle late, which is the least that is possible. In lockstep: processes are stopped and
-killed at random moments, and each cycle is checked (coglab/test/remote_process.py).
+In real time: the robot node with its ideal arm, and a Python process that answers at 200 Hz. An answer before the next
+cycle is one cycle late, the smallest possible delay. In lockstep: processes are stopped and killed at random moments,
+and each cycle is checked (coglab/test/remote_process.py).
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Yields(ctrl_more.FeedbackController):
     """The law of EeAdmittance for translation: a mass on a spring and a damper, integrated by Euler's method."""
 
     def describe(self) -> ctrl_more.Description:
-        """What it reads, corrects and is tuned by."""
+        """Inputs, corrected signals and gains."""
         d = ctrl_more.Description("lets the hand yield to force")
         d.measured("wrench", size=6, max_age=0.1)
         d.modifies("taskSpaceReferencePose", "ee", limit=ctrl_more.CorrectionLimit(size=0.5))
@@ -56,7 +56,7 @@ class Yields(ctrl_more.FeedbackController):
         self.reset()
 
     def gains_changed(self) -> None:
-        """The matrix of the differential equation, and what a force does."""
+        """Updates the matrix of the differential equation, and the effect of a force."""
         self.lightness, self.least = 1.0 / self.gain(self.mass), self.scalar(self.dead_band)
         spring, damper = self.gain(self.stiffness) * self.lightness, self.gain(self.damping) * self.lightness
         self.rates = np.block([[np.zeros((3, 3)), np.eye(3)], [np.diag(-spring), np.diag(-damper)]])
@@ -84,7 +84,7 @@ class Yields(ctrl_more.FeedbackController):
 
 
 def in_the_cycle(quick: bool) -> Iterator[Row]:
-    """What a law in Python costs in the cycle of a World, more than the same law in C++: medians of 200 cycles."""
+    """Time of a law in Python in the cycle of a World, less that of the same law in C++: medians of 200 cycles."""
     with coglab.World(seed=1, person="patient") as world:
         manager, robot = world.feedback, world.cell.robot.virtual
         manager.add_controller(Yields(), "yields")
@@ -108,7 +108,7 @@ def in_the_cycle(quick: bool) -> Iterator[Row]:
 
 
 class Timed:
-    """A host that notes how old each question is when its answer is complete, s."""
+    """A host that records the age (s) of each question when its answer is complete."""
 
     def __init__(self, host: Any) -> None:
         self.host, self.ages = host, []  # type: ignore[var-annotated]
@@ -131,7 +131,7 @@ def wait(condition: Callable[[], bool], what: str) -> None:
 
 
 def serving(address: wire.Address, kind: int, host: Any, act: Callable[[], None]) -> list[float]:
-    """Answer the questions of a slot while `act` runs; the ages of the answers in s."""
+    """Answers the questions of a slot while `act` runs. Returns the ages of the answers, s."""
     timed, ended = Timed(host), threading.Event()
     with wire.Slot(address, kind) as slot:
         thread = threading.Thread(target=serve, args=(slot, timed), kwargs={"ends": ended.is_set})
@@ -183,7 +183,7 @@ def answers(quick: bool) -> Iterator[Row]:
 
 
 def disturbed(quick: bool) -> Iterator[Row]:
-    """Processes that are stopped or killed at random moments, and what becomes of correction and motion."""
+    """Correction and motion after their process was stopped or killed at a random moment."""
     remote = shared_module("remote_process")
     draw = random.Random(4)
     with coglab.World(seed=1, person="patient") as world:

@@ -36,7 +36,7 @@ SIGNS = {"<=": "at most", ">=": "at least"}
 
 
 def words(row: Row) -> str:
-    """Goal or peer, as a reader expects it."""
+    """Goal or peer in words."""
     if not row.against:
         return ""
     sign, *name, limit = row.against.split()
@@ -44,7 +44,7 @@ def words(row: Row) -> str:
 
 
 def ratio(row: Row) -> float | None:
-    """How many times better than goal or peer; None where one of both is 0 or negative for just one."""
+    """How many times better than goal or peer; None if one of both is 0 or only one is negative."""
     if not row.against:
         return None
     limit = float(row.against.split()[-1])
@@ -55,7 +55,7 @@ def ratio(row: Row) -> float | None:
 
 
 def plot(rows: list[Row], file: Path) -> None:
-    """One dot a row, on a logarithmic axis: right of 1 is better than goal or peer. From 0.01 to 1000."""
+    """One dot per row on a logarithmic axis from 0.01 to 1000: right of 1 is better than goal or peer."""
     shown = [(row, value) for row in reversed(rows) if (value := ratio(row)) is not None]
     figure, axes = pyplot.subplots(figsize=(8.0, 0.6 + 0.28 * len(shown)))
     for y, (row, value) in enumerate(shown):

@@ -1,9 +1,9 @@
 #!/usr/bin/python3
-"""The researcher's daily commands (coglab_tools) and the virtual world under them, as long as a user waits.
+"""Waiting time of a user for the researcher's daily commands (coglab_tools) and for the virtual world.
 
-Commands are whole processes, from the start of Python to the last written file. Demonstrations: minimum-jerk reaches at
-120 Hz. Noisy recordings: 0.5 and 1 mm of noise per axis, 3 % of the samples and three longer gaps missing; the error is
-that of the reproduced path to the path without noise. Trials on workers: `study run` on one worker and on two.
+Commands are timed from the start of Python to the last written file. Demonstrations: minimum-jerk reaches at
+120 Hz. Noisy recordings: 0.5 and 1 mm of noise per axis, without 3 % of the samples and three longer gaps; the error
+compares the reproduced path with the path without noise. Trials on workers: `study run` on one worker and on two.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def teaching(quick: bool) -> Iterator[Row]:
 
 
 def imitation(quick: bool) -> Iterator[Row]:
-    """How well noisy recordings are learnt."""
+    """Error of noisy recordings that were learnt."""
     for noise in (0.0005, 0.001):
         errors = []
         for seed in range(10 if quick else 100):
@@ -98,7 +98,7 @@ def reports(quick: bool) -> Iterator[Row]:
 
 
 def workers(quick: bool) -> Iterator[Row]:
-    """Virtual trials on two workers over one."""
+    """Speed of virtual trials on two workers / on one."""
     plan = "version: 1\nname: pilot\nconditions: {usual: {timing: natural}}\nrepetitions: 4\ntrial: [receive, give]\n"
     plan += "participants: %d\n"
     spent = []
@@ -118,7 +118,7 @@ def workers(quick: bool) -> Iterator[Row]:
 
 
 def environment(quick: bool) -> Iterator[Row]:
-    """Steps of an environment without the shipped brain, over the processor time of one core."""
+    """Simulated time of an environment without the shipped brain / processor time of one core."""
     import coglab.envs  # noqa: F401  (registers the environments)
     import gymnasium
     from coglab.envs.policies import StraightReach

@@ -1,5 +1,5 @@
-"""Trials of handovers.py and recognition.py: drawn people in the virtual world, and what truly happened in each period
-of the simulated cell. Nothing here asks the machines how it went."""
+"""Trials of handovers.py and recognition.py: drawn people in the virtual world, and the true state in each period of
+the simulated cell. Only the outcome of an action comes from the machines."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from scipy.spatial.transform import Rotation
 
 RECEIVE, GIVE = EXCHANGES = ("exchange_human_to_robot", "exchange_robot_to_human")
 OBJECTS = ("mug", "bottle", "ball", "tea_box", "screwdriver")
-HOLDER = {RECEIVE: "robot", GIVE: "human"}  # who holds the object after a success
+HOLDER = {RECEIVE: "robot", GIVE: "human"}  # holder of the object after a success
 DT = 0.005  # s, a period of the world
 RATE = 1.0 / DT
-MOVES, KEPT = 0.02, 0.10  # m/s above which a hand moves, if for so many s
-TOUCH = 0.5  # N on palm and fingers from which something touches the hand
-AT_TOUCH = 0.10  # s of contact whose largest force is that at touch
-CALMS = 0.5  # s after the end of a reach in which its own braking belongs to it
-NEAR = 0.005  # m: the hand is at its goal
+MOVES, KEPT = 0.02, 0.10  # m/s and s: a hand moves if it is faster than MOVES for KEPT
+TOUCH = 0.5  # N on palm and fingers that count as a touch
+AT_TOUCH = 0.10  # s after touch in which the largest force counts as force at touch
+CALMS = 0.5  # s after the end of a reach in which braking belongs to it
+NEAR = 0.005  # m from its goal within which the hand has arrived
 LISTENS = 0.5  # s between the request and another motion of the hand
 CALM = 0.8  # s after another motion in which the palm may still move because of it
 
@@ -86,7 +86,7 @@ def human_time(way: float) -> float:
 
 @dataclass
 class Series:
-    """A row of each for every FRI period of the robot."""
+    """One value of each per FRI period of the robot."""
 
     time: list[float] = field(default_factory=list)  # s of the machines' clock
     palm: list[np.ndarray] = field(default_factory=list)  # m
@@ -99,7 +99,7 @@ class Series:
     moving: list[bool] = field(default_factory=list)  # a DMP motion is under way
 
     def between(self, begin: int, end: int) -> dict[str, np.ndarray]:
-        """As arrays."""
+        """The values from `begin` to `end` as arrays."""
         return {name: np.array(values[begin:end]) for name, values in vars(self).items()}
 
 
@@ -109,12 +109,12 @@ class Watch:
     def __init__(self, trial: VirtualTrial) -> None:
         self.trial, self.world, self.series = trial, trial.world, Series()
         self.begun: list[int] = []  # index in the series at which each action began
-        self.sample: Any = None  # what the person's hand does
+        self.sample: Any = None  # newest HandSample of the person
         trial.beside = self.look
         self.watch_person()
 
     def watch_person(self) -> None:
-        """Keeps what the person's hand does in each step."""
+        """Keeps the newest sample of the person's hand."""
         step = self.world.human.step
 
         def watched(t: float, view: Any) -> Any:
@@ -142,7 +142,7 @@ class Watch:
             self.begun.append(len(series.time) - 1)
 
     def figures(self) -> dict[str, Any]:
-        """`directions`: of each action, see `direction`; an action that never began has none."""
+        """`directions`: results of each action that began, see `direction`."""
         results = [r for r in self.trial.results if r.action in self.trial.begun]
         found = []
         for k, begin in enumerate(self.begun):
@@ -171,7 +171,7 @@ def direction(part: dict[str, np.ndarray], action: str, outcome: str) -> dict[st
 
 
 def reaches_of(part: dict[str, np.ndarray]) -> list[dict[str, float]]:
-    """Of each DMP motion in which the palm moves: `detour` (path over straight line), speed `peaks`, `sparc`."""
+    """For each DMP motion in which the palm moves: `detour` (path / straight line), speed `peaks`, `sparc`."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], part["moving"].astype(int), [0]])))
     found = []
     for begin, stop in zip(edges[::2], edges[1::2], strict=True):
@@ -187,8 +187,8 @@ def reaches_of(part: dict[str, np.ndarray]) -> list[dict[str, float]]:
 
 
 def arrives_late(reach: Any) -> float | None:
-    """s by which the arm stays within 5 mm of its goal, or meets the person on the way, later than a person would, of a
-    ReachRecord; None: never."""
+    """Delay (s) of a ReachRecord compared with a person, until the arm stays within 5 mm of its goal or meets the
+    person; None: never."""
     if not (reach.stood or reach.met) or len(reach.path) < 20:
         return None
     times, palm, goal = (np.array(column) for column in zip(*reach.path, strict=True))
@@ -208,7 +208,7 @@ def arrives_late(reach: Any) -> float | None:
 
 
 class OtherHand:
-    """In place of the person: a hand that moves as `motion` says once it is told to."""
+    """Replaces the person: a hand that performs `motion` from the time `begun` on."""
 
     phase = "idle"
 
@@ -231,7 +231,7 @@ class OtherHand:
         return Pose(self.rest + way + sway, turned.as_quat())
 
     def step(self, t: float, view: Any) -> HandSample:
-        """As the person's."""
+        """Same as VirtualHuman.step."""
         since = 0.0 if self.begun is None else t - self.begun
         now, soon = self._at(since), self._at(since + DT if self.begun is not None else since)
         spin = (soon.rotation * now.rotation.inv()).as_rotvec() / DT
@@ -240,8 +240,8 @@ class OtherHand:
 
 
 class OtherWatch(Watch):
-    """How far the palm moves because of such a hand, which carries the object in every second trial; in the others the
-    person has given it to the robot before."""
+    """Measures how far the palm moves because of an OtherHand. If `robot_holds`, the person first gives the object to
+    the robot; otherwise the hand carries the object."""
 
     def __init__(self, trial: VirtualTrial, motion: Any, rng: np.random.Generator, robot_holds: bool) -> None:
         super().__init__(trial)
@@ -256,7 +256,7 @@ class OtherWatch(Watch):
         self.watch_person()
 
     def walk(self, trial: VirtualTrial) -> None:
-        """An object for the robot, if it has to hold one; then the request and the motion, until the machine waits."""
+        """Script of the trial: gives the robot an object if it must hold one, then request and motion, until a hub."""
         trial.wait_hub("wait_without_object")
         if self._robot_holds:
             trial.submit(RECEIVE)
@@ -281,7 +281,7 @@ class OtherWatch(Watch):
             trial.clock.sleep(0.05)
 
     def figures(self) -> dict[str, Any]:
-        """`moved`: m, farthest that the palm was from where it stood; None: the motion was not carried out."""
+        """`moved`: largest displacement of the palm, m; None: the motion was not carried out."""
         palm = np.array(self.series.palm[slice(*self._span)])
         return {"moved": float(np.linalg.norm(palm - palm[0], axis=1).max()) if len(palm) else None}
 

@@ -1,10 +1,10 @@
 #!/usr/bin/python3
-"""Time in which the robot node answers a FRI datagram, beside a bare echo, at 1 kHz: in monitor mode, and while a
-point-to-point motion runs to and fro with the shipped feedback controllers enabled.
+"""Time until the robot node answers a FRI datagram, compared with a bare echo, at 1 kHz: in monitor mode, and during
+point-to-point motions to and fro with the shipped feedback controllers enabled.
 
-Blocks of 500 packets go to echo, bridge, bridge, echo; both get one in every millisecond, the one whose block it is
-first. Ratio: of the medians of neighbouring blocks, median over all pairs. An answer that does not come within 20 ms
-counts as 20 ms. The node is robot.launch as it ships.
+Blocks of 500 packets go to echo, bridge, bridge, echo. Both get one packet per millisecond; the one under test gets its
+packet first. Ratio: of the medians of neighbouring blocks, median over all pairs. An answer that does not come within
+20 ms counts as 20 ms. The node is robot.launch as it ships.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from coglab_bringup.run_directory import free_port, run_environment
 from common import Row, end, helper, main, median
 
 MISSING = 20_000.0  # us
-PATIENCE = 60.0  # s, of each step of the start
-SHARE = 0.8  # of the answers that have to move the arm while its motion runs
+PATIENCE = 60.0  # s, longest duration of each step of the start
+SHARE = 0.8  # smallest share of the answers that must move the arm while its motion runs
 HOME = [-1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782]
 AWAY = [value + 0.25 for value in HOME]
 
@@ -92,7 +92,7 @@ def measure(moving: bool, quads: int) -> dict[str, object]:
 
 
 def read(text: str, moving: bool) -> dict[str, object]:
-    """What fri_peer has printed."""
+    """Parses the output of fri_peer."""
     blocks: list[tuple[str, float]] = []  # kind, median
     numbers = {}
     for kind, *values in map(str.split, text.splitlines()):
@@ -112,13 +112,13 @@ def read(text: str, moving: bool) -> dict[str, object]:
 
 
 def measured(way: str, quick: bool) -> dict:
-    """measure() in a process of its own: a process can be a node of one master only."""
+    """measure() in its own process, because a process can be a node of only one master."""
     command = [sys.executable, __file__, "--way", way, "2" if quick else "40"]
     return json.loads(subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True, timeout=1200).stdout)
 
 
 def answers(quick: bool) -> Iterator[Row]:
-    """Both ways."""
+    """Monitor mode and moving."""
     found = measured("monitor", quick)
     yield Row("answer to a FRI datagram, monitor mode", found["us"], "us", f"<= {1.1 * found['echo']:.4g}")
     yield median("answer over a bare echo, monitor mode", found["ratios"], "", "<= 1.1")

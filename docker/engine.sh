@@ -1,6 +1,6 @@
 # Sourced by docker/test, docker/run and docker/prove_bare. Reads --suite bookworm|trixie (Debian 12 or 13) off their arguments.
-# prepare_engine finds a container engine that really starts a container, and a base image of that suite, and sets
-# engine_build and engine_run (arrays). It uses a registry only if the base image is neither present nor makeable.
+# prepare_engine finds a container engine that can start a container, and a base image of that suite. It sets the arrays
+# engine_build and engine_run. It uses a registry only if the base image is missing and cannot be made here.
 
 say() { printf '[container] %s\n' "$*" >&2; }
 die() { local status=$1; shift; say "error: $*"; exit "$status"; }
@@ -13,10 +13,10 @@ fi
 case $suite in bookworm | trixie) ;; *) die 2 "no suite named '$suite'; there are: bookworm trixie" ;; esac
 base=debian:$suite
 image=coglab:$suite
-# podman's defaults ask for more than some hosts' hard limits allow; these stay below them
+# some hosts' hard limits are lower than podman's defaults; these values are not
 limits=(--ulimit "nofile=$(ulimit -Hn):$(ulimit -Hn)" --ulimit nproc=30000:30000)
 
-starts() { # starts COMMAND ... : whether this way of running starts a container of the base image
+starts() { # starts COMMAND ... : true if this command starts a container of the base image
   "$@" run --rm --network none "${extra[@]}" "$base" true >/dev/null 2>&1
 }
 
@@ -25,7 +25,7 @@ find_engine() {
     engine=(docker)
     return
   fi
-  command -v podman >/dev/null || die 69 "neither a docker daemon answers nor is podman installed; get one: apt-get install --no-install-recommends podman crun debootstrap"
+  command -v podman >/dev/null || die 69 "no docker daemon answers and podman is not installed; install one: apt-get install --no-install-recommends podman crun debootstrap"
   engine=(podman)
 }
 
@@ -52,7 +52,7 @@ make_base() {
   have_base
 }
 
-find_way() { # the first way in which podman starts a container here
+find_way() { # finds the first command with which podman starts a container here
   extra=()
   if [ "${engine[0]}" = docker ] || starts "${engine[@]}"; then return; fi
   extra=("${limits[@]}")
@@ -70,7 +70,7 @@ find_way() { # the first way in which podman starts a container here
 prepare_engine() {
   find_engine
   have_base || make_base || "${engine[@]}" pull "$base" >/dev/null ||
-    die 70 "no image $base: it is not here, debootstrap (as root) made none, and no registry gave one"
+    die 70 "no image $base: it is missing, debootstrap (as root) could not make it, and no registry provided it"
   find_way
   engine_build=("${engine[@]}" build)
   [ "${engine[0]}" = docker ] || engine_build+=(--isolation=chroot)

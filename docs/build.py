@@ -23,7 +23,7 @@ CPP_PACKAGES = ("coglab_rt", "lwr_fri_bridge", "ctrl_more", "coglab_controllers"
 
 
 def places() -> dict[Path, str]:
-    """Every page of the project, with its path on the site."""
+    """Every page and picture of the project, with its path on the site."""
     found = {page: page.name for page in DOCS.glob("*.md")}
     found |= {TOP / "CHANGELOG.md": "changelog.md", TOP / "CONTRIBUTING.md": "contributing.md"}
     for page in sorted(SOURCES.glob("*/README.md")):
@@ -34,7 +34,7 @@ def places() -> dict[Path, str]:
 
 
 def with_links(text: str, page: Path, found: dict[Path, str]) -> str:
-    """The text of a page with its links changed to those of the site. Links to other files become plain text."""
+    """Returns the text of a page with links to the site's paths. Links to other files become plain text."""
 
     def link(match: re.Match[str]) -> str:
         mark, label, target = match.groups()
@@ -127,7 +127,7 @@ def main() -> int:
     html = BUILD / "html"
     command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-c", DOCS, source, html]
     if subprocess.run(command, check=False).returncode:
-        print("[coglab] error: the site has the faults above", file=sys.stderr)
+        print("[coglab] error: Sphinx reported the problems above", file=sys.stderr)
         return 1
     print(f"[coglab] documentation: {html / 'index.html'}")
     return 0

@@ -1,4 +1,4 @@
-"""Generates a part of the reference from message files, tables in the code, launch files and --help.
+"""Generates part of the reference from message files, tables in the code, launch files and --help.
 
 One function per table. docs/build.py writes them as pages of the site.
 """
@@ -24,7 +24,7 @@ def table(head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
 
 
 def code(value: object) -> str:
-    """`value` as Markdown code; empty if there is none."""
+    """`value` as Markdown code; empty for an empty value."""
     text = f"{value:g}" if isinstance(value, float) else str(value)
     return f"`{text}`" if text else ""
 

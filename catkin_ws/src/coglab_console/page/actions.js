@@ -1,4 +1,4 @@
-// STOP, and the buttons that set something going; why one is disabled stands below it.
+// STOP and the action buttons. Below a disabled button stands the reason.
 import { h, setAttribute, setText } from './dom.js';
 import { command, onDocs, stop, store } from './link.js';
 import { actionButton, blocked, choice, refuse, watch } from './controls.js';
@@ -14,7 +14,7 @@ const BUTTONS = [
   ['reset', 'Go on'],
 ];
 
-/** Space everywhere, Ctrl+Space where one types: on the way down, before anything else sees the key. */
+/** True for Space, or Ctrl+Space in a text field. Used in the capture phase, before any other listener gets the key. */
 function isStop(event) {
   if (event.code !== 'Space') return false;
   const typing = event.target.closest?.('textarea, input:not([type=range])');
@@ -26,7 +26,7 @@ export function armStop(button) {
     button.classList.add('pressed');
     setTimeout(() => button.classList.remove('pressed'), 300);
     stop().then((answer) => {
-      if (!answer.success) refuse(`STOP has not been taken: ${answer.message}. If the arm moves, use the red button of the robot controller.`);
+      if (!answer.success) refuse(`STOP was not executed: ${answer.message}. If the arm moves, use the red button of the robot controller.`);
     });
   };
   document.addEventListener('keydown', (event) => {
@@ -37,7 +37,7 @@ export function armStop(button) {
     }
   }, true);
   document.addEventListener('keyup', (event) => {
-    if (isStop(event)) event.preventDefault(); // or the button in focus would be clicked, too
+    if (isStop(event)) event.preventDefault(); // otherwise the focused button would be clicked, too
   }, true);
   button.addEventListener('pointerdown', press);
   button.addEventListener('click', (event) => {
@@ -54,7 +54,7 @@ function argumentsOf(name) {
   return ['start', { action: name }];
 }
 
-/** Sends a choice. One that is refused is taken back by `show`, and why is said. */
+/** Sends a choice. If it is refused, shows the reason, and `show` restores the old choice. */
 async function choose(label, name, args, show) {
   const answer = await command(name, args);
   if (answer.success) return;
@@ -74,7 +74,7 @@ function objectChoice() {
   return list.button;
 }
 
-/** How the object is given, where it has more than one way. */
+/** List of the ways to deliver the object; hidden if there is only one. */
 function deliveryChoice() {
   const list = choice({ id: 'delivery', 'aria-label': 'Delivery: how the object is given', hidden: true, onchange: () => {
     delivery = list.button.value;
@@ -105,7 +105,7 @@ function speedChoice() {
   return input;
 }
 
-/** Why the object cannot be chosen or the speed not be changed, one line for both. */
+/** Reason why the object cannot be chosen or the speed cannot be changed: one line for both. */
 function sideReason() {
   const words = h('span', { class: 'why', id: 'why-side' });
   watch(words, () => {
@@ -115,7 +115,7 @@ function sideReason() {
   return words;
 }
 
-/** One button with the reason below it why it is disabled. */
+/** One action button. If it is disabled, the reason stands below it. */
 function oneAction(name, label) {
   const why = h('span', { class: 'why', id: `why-${name}` });
   let told = '';
@@ -140,7 +140,7 @@ function oneAction(name, label) {
   return { button, row: h('div', { class: 'act' }, button, why) };
 }
 
-/** Actions of a user's configuration, where the machine takes them now. */
+/** Buttons for the actions of a user's configuration that the state machine accepts now. */
 function ownActions() {
   const place = h('div', { class: 'own', hidden: true });
   let shown = '';
@@ -164,7 +164,7 @@ export function showActions(parent) {
   return buttons;
 }
 
-/** The cause of a stop with its acknowledgement, above the log. */
+/** The cause of a stop and the button to acknowledge it, above the log. */
 export function showCause(place) {
   const words = h('span');
   const why = h('span', { id: 'why-acknowledge' });
@@ -179,7 +179,7 @@ export function showCause(place) {
     const guard = store.docs.desk?.guard;
     const reason = blocked('acknowledge');
     place.parentElement.classList.toggle('told', Boolean(guard?.unacknowledged));
-    button.value = guard?.stop ?? 0; // the stop whose cause stands beside it
+    button.value = guard?.stop ?? 0; // number of the stop whose cause is shown
     setText(words, guard?.unacknowledged ? guard.cause : guard?.hold ? 'The next motion needs a held button.' : '');
     button.hidden = why.hidden = !guard?.unacknowledged;
     setAttribute(button, 'aria-disabled', reason ? 'true' : null);

@@ -1,4 +1,4 @@
-// What there is to draw, whatever draws it: plain shapes with their poses in the world, in metres; and kinematics.
+// Shapes and poses (world, m) for the 2D and the 3D view, and the kinematics.
 import { store } from './link.js';
 
 export const IDENTITY = [0, 0, 0, 0, 0, 0, 1];
@@ -10,7 +10,7 @@ function turn([x, y, z, w], [a, b, c]) {
   return [a + w * tx + y * tz - z * ty, b + w * ty + z * tx - x * tz, c + w * tz + x * ty - y * tx];
 }
 
-/** Pose b, given in the frame of a. */
+/** Pose b, given in the frame of a, in the parent frame of a. */
 export function compose(a, b) {
   const [px, py, pz] = turn(a.slice(3), b);
   const [ax, ay, az, aw] = a.slice(3);
@@ -31,7 +31,7 @@ function motion(joint, q) {
   return [0, 0, 0, joint.axis[0] * s, joint.axis[1] * s, joint.axis[2] * s, Math.cos(q / 2)];
 }
 
-/** Pose of each link in the root, by name. `order`: names of the moving joints, `q` their positions. */
+/** Pose of each link in the root frame, by name. `order`: names of the moving joints; `q`: their positions. */
 export function linkPoses(robot, order, q) {
   const positions = Object.fromEntries(order.map((name, i) => [name, q[i] ?? 0]));
   const poses = { [robot.root]: IDENTITY };
@@ -48,7 +48,7 @@ const OBJECT = '#009e73';
 const WOOD = '#cdb489';
 const PALM = 'ih2_palm';
 
-/** Shapes that stand still once they are known: { kind, size, pose, colour }. */
+/** Shapes that do not move: { kind, size, pose, colour }. */
 export function fixedShapes() {
   const shapes = [{ kind: 'box', size: [0.3, 0.3, 0.75], pose: [0, 0, -0.375, 0, 0, 0, 1], colour: '#9aa2aa' }];
   const board = store.state?.frames.board;
@@ -69,7 +69,7 @@ export function robotPoses() {
   return model?.robot && store.state ? linkPoses(model.robot, model.order, store.state.q) : {};
 }
 
-/** Where the palm of the robot's hand is in the picture, m; null before it is known. */
+/** Position of the robot's palm in the picture, m; null if unknown. */
 export function palmInScene() {
   return robotPoses()[PALM]?.slice(0, 3) ?? null;
 }
@@ -82,7 +82,7 @@ export const HAND_SHAPES = [
   { kind: 'cylinder', size: [0.035, 0.26], pose: [0.16, 0, -0.06, 0, 0.79, 0, 0.61], colour: SLEEVE },
 ];
 
-/** The object of the next action, or in the hand, as a shape in its own frame (origin: middle of its underside). */
+/** Shape of the held object or of the next action's object, in its own frame (origin: middle of its underside). */
 export function objectShape() {
   const id = store.docs.status?.machine.object || store.docs.desk?.object || store.docs.status?.machine.fallback;
   const row = store.docs.objects?.rows.find((one) => one.id === id);
@@ -93,7 +93,7 @@ export function objectShape() {
   return { kind: 'box', size: row.size, pose: [0, 0, row.size[2] / 2, 0, 0, 0, 1], colour: OBJECT };
 }
 
-/** What is known of a frame: seen now, long ago, or never. */
+/** Age of a frame in words, or 'not seen'. */
 export function ageWords(role) {
   const age = store.state?.ages[role];
   if (age === undefined) return 'not seen';

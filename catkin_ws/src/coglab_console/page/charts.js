@@ -1,11 +1,11 @@
-// Strip charts on one time axis (the last 20 s), drawn by Debian's dygraphs; phases as bars above them.
+// Strip charts of the last 20 s, drawn by Debian's dygraphs. Bars above them show the phases.
 import { drawn, h, setText, svg } from './dom.js';
 import { on, onDocs, store } from './link.js';
 
 const WINDOW = 20; // s
 const JOINTS = [0, 1, 3]; // A1, A2, A3 (wire joints 1, 2, 4) carry the lever of a hand-over
 const COLOURS = ['#0072b2', '#d55e00', '#009e73', '#1b1f24', '#cc79a7'];
-const DASHES = [null, [7, 4], [12, 3, 2, 3], [2, 3], [18, 4]]; // one for each colour, which alone tells nobody enough
+const DASHES = [null, [7, 4], [12, 3, 2, 3], [2, 3], [18, 4]]; // one per colour, because colour alone is not enough for every reader
 const BARS = ['#56b4e9', '#cfd6dc', '#f0e442', '#b9c2ca'];
 
 const STRIPS = [
@@ -21,14 +21,14 @@ function limit(state) {
   return counted.length ? Math.min(...counted) : null;
 }
 
-const LEFT = 42; // px of the canvas of the phases where the charts' time axis begins
-const RIGHT = 4; // px beyond its end
+const LEFT = 42; // px of the phase canvas to the left of the charts' time axis
+const RIGHT = 4; // px to the right of it
 
 let phases = []; // [from (s), label]
 let latest = 0;
-let bars = []; // of the phases, as they were drawn last, in px of the page
+let bars = []; // phase bars as drawn last, px of the page
 
-/** Speed of the newest path of the motion under way now; 0 without one. */
+/** Planned speed (m/s) of the running motion now; 0 without a motion. */
 function planned(state) {
   const shown = store.docs.path;
   if (shown?.kind !== 'running') return 0;
@@ -41,13 +41,13 @@ function planned(state) {
 function remember(strip, state) {
   const row = [state.stamp, ...strip.of(state, planned(state))];
   const last = strip.rows[strip.rows.length - 1];
-  if (last && row[0] < last[0]) strip.rows.length = 0; // another clock
+  if (last && row[0] < last[0]) strip.rows.length = 0; // the clock was set back
   if (!last || row[0] > last[0]) strip.rows.push(row);
   const old = strip.rows.findIndex(([stamp]) => stamp >= state.stamp - WINDOW - 2);
   if (old > 60) strip.rows.splice(0, old);
 }
 
-/** The phases as they lie on a canvas of this width: { label, from (s), left, right (px) }. */
+/** The phase bars on a canvas of this width: { label, from (s), left, right (px) }. */
 function barsIn(width) {
   const x = (stamp) => LEFT + ((stamp - latest + WINDOW) / WINDOW) * (width - LEFT - RIGHT);
   return phases.map(([from, label], i) => ({ label, from, left: Math.max(LEFT, x(from)), right: x(phases[i + 1]?.[0] ?? latest) }));
@@ -87,12 +87,12 @@ function rememberPhase(state) {
   while (phases.length > 1 && phases[1][0] < state.stamp - WINDOW) phases.shift();
 }
 
-/** Its legend sets a style in markup, which the page's policy forbids; ours is beside the chart. */
+/** Removes dygraphs' legend: it sets inline styles, which the page's security policy forbids. Ours is beside the chart. */
 function withoutLegend() {
   window.Dygraph.PLUGINS = window.Dygraph.PLUGINS.filter((plugin) => plugin !== window.Dygraph.Plugins.Legend);
 }
 
-/** dygraphs as a script of its own: it is no module. */
+/** Loads dygraphs as a script, because it is not a module. */
 function load() {
   return new Promise((resolve, reject) => {
     document.head.append(h('link', { rel: 'stylesheet', href: '/lib/dygraphs/dygraph.css' }));
@@ -120,7 +120,7 @@ function optionsOf(strip, last) {
   };
 }
 
-/** A name of the legend with a piece of its line, as the chart draws it. */
+/** Legend entry: a sample of the line, and its name. */
 function legend(name, i) {
   const line = svg('line', { x1: 0, y1: 5, x2: 22, y2: 5, stroke: COLOURS[i], 'stroke-width': 3, ...(DASHES[i] && { 'stroke-dasharray': DASHES[i].join(' ') }) });
   return h('i', {}, svg('svg', { width: 22, height: 10, 'aria-hidden': 'true' }, line), name);
@@ -173,8 +173,8 @@ export function showCharts(parent) {
 }
 
 /**
- * A copy of what the strips show, for the tests: { name, series, rows (stamp and a value per series), axis (s), edges (px of
- * the page where it begins and ends), drawn (dash and colour per series) }; without the last three before they are drawn.
+ * For the tests, a copy of the strips: { name, series, rows (stamp and a value per series), axis (s), edges (px of the page
+ * at both ends of the axis), drawn (dash and colour per series) }. A strip that is not drawn yet lacks the last three.
  */
 export function stripsShown() {
   return STRIPS.map(({ name, series, rows, chart, place }) => {
@@ -187,7 +187,7 @@ export function stripsShown() {
   });
 }
 
-/** A copy of the bars of the phases as they were drawn last: { label, from (s), left, right (px of the page) }. */
+/** For the tests, a copy of the phase bars as drawn last: { label, from (s), left, right (px of the page) }. */
 export function barsShown() {
   return structuredClone(bars);
 }

@@ -1,12 +1,12 @@
-// Buttons and lists: they say why they are disabled, are held where that is needed, and stay within the page.
+// Buttons and lists: they show the reason if disabled, need holding where required, and stay within the page.
 import { h, setAttribute, setText } from './dom.js';
 import { command, on, onDocs, operating, send, store } from './link.js';
 
 const HOLD_PERIOD = 100; // ms
-const watched = new Map(); // control: what brings it up to date
+const watched = new Map(); // control -> { update, seen }
 let made = 0;
 
-/** Why this browser cannot use a control now, as the server sees it; empty where it can. */
+/** Reason of the server why this browser cannot use a control now; empty if it can. */
 export function blocked(name) {
   const desk = store.docs.desk;
   if (store.lost) return 'not live';
@@ -15,7 +15,7 @@ export function blocked(name) {
   return desk.reasons[name] ?? '';
 }
 
-/** Calls `update` now and whenever a reason may have changed, for as long as the control is on the page. */
+/** Calls `update` now and whenever a reason may have changed, until the control leaves the page. */
 export function watch(control, update) {
   watched.set(control, { update, seen: false });
   update();
@@ -32,7 +32,7 @@ function updateAll() {
 on('link', updateAll);
 onDocs(['desk'], updateAll);
 
-/** Says above the actions, for some seconds, why something was not done. */
+/** Shows for 6 s, above the actions, why something was not done. */
 export function refuse(text) {
   const told = document.getElementById('told');
   told.textContent = text;
@@ -43,7 +43,7 @@ export function refuse(text) {
   }, 6000);
 }
 
-/** Tells the server ten times a second that a button is down, from `hold()` until it is answered or `release()`. */
+/** Sends ten times a second that a button is down, from `hold()` until the server answers or until `release()`. */
 function holding(button, { request, tell }) {
   let timer = null;
   const release = () => {
@@ -69,13 +69,13 @@ function holding(button, { request, tell }) {
 }
 
 /**
- * A button that acts when pressed, or after 0.8 s of holding where `mustHold()`; Enter is as good as the mouse.
- * Letting go, losing the focus or the page ends the holding.
+ * A button that acts when pressed, or, if `mustHold()`, after it was held for 0.8 s. Enter works like the mouse.
+ * Release, loss of the focus, or a hidden page ends the holding.
  */
 export function actionButton(label, { blockedBy, mustHold, request, tell, answered = () => {} }) {
   const button = h('button', { type: 'button' }, label, h('span', { class: 'fill' }));
   const { hold, release } = holding(button, { request, tell });
-  let held = false; // the click that ends a holding is none
+  let held = false; // the click event at the end of a holding does not count
   const begin = (event) => {
     held = !blockedBy() && mustHold();
     if (held) {
@@ -85,10 +85,10 @@ export function actionButton(label, { blockedBy, mustHold, request, tell, answer
   };
   button.addEventListener('pointerdown', (event) => {
     if (event.button !== 0) return;
-    if (button.hasPointerCapture(event.pointerId)) button.releasePointerCapture(event.pointerId); // a finger that slides away leaves, too
+    if (button.hasPointerCapture(event.pointerId)) button.releasePointerCapture(event.pointerId); // so that a finger that slides off causes pointerleave
     begin(event);
   });
-  button.addEventListener('contextmenu', (event) => event.preventDefault()); // that of a long touch
+  button.addEventListener('contextmenu', (event) => event.preventDefault()); // menu after a long touch
   for (const name of ['pointerup', 'pointerleave', 'pointercancel', 'blur']) button.addEventListener(name, release);
   document.addEventListener('visibilitychange', release);
   button.addEventListener('keydown', (event) => {
@@ -118,8 +118,8 @@ export function actionButton(label, { blockedBy, mustHold, request, tell, answer
 }
 
 /**
- * A button for a command, with the reason below it where it is disabled: { name (of the control, as the server's reasons
- * know it), request, told (shows the answer), answered (gets it), held (0.8 s), words (its accessible name), why (a reason that several share) }.
+ * A button for a command; if disabled, the reason stands below it. { name (of the control in the server's reasons), request,
+ * told (element for the answer), answered (callback for it), held (0.8 s), words (accessible name), why (reason element shared by several buttons) }.
  */
 export function commandButton(label, { name, request, told, answered, held = false, words = null, why = null }) {
   const tell = (text) => setText(told, text);
@@ -137,10 +137,10 @@ export function commandButton(label, { name, request, told, answered, held = fal
 }
 
 const STEPS = { ArrowDown: 1, ArrowUp: -1 };
-const LINE = 44; // px, for a finger
-const EDGE = 8; // px to the border of the window and to the footer, where STOP is
+const LINE = 44; // px, height of a list line: wide enough for a finger
+const EDGE = 8; // px between a list and the border of the window or the footer with STOP
 
-/** Below the button where there is room above the footer, otherwise where there is more. */
+/** Places the list below the button if it fits above the footer, otherwise on the side with more room. */
 function place(list, button) {
   const box = button.getBoundingClientRect();
   const below = document.getElementById('foot').getBoundingClientRect().top - box.bottom - EDGE;
@@ -158,15 +158,15 @@ function onKey(event, isOpen, { open, close, step, take }) {
     if (isOpen) step(STEPS[event.key]);
     else open();
   } else if (isOpen && event.key === 'Enter') {
-    event.preventDefault(); // or the button would be clicked, too
+    event.preventDefault(); // otherwise the button would be clicked, too
     take();
   } else if (event.key === 'Escape') close();
 }
 
 /**
- * A button with a list: { button, offer(pairs of value and words), show(value) }. What is chosen is `button.value`, and
- * told as `change`. Arrows go through the open list, Enter takes, Escape and whatever takes the focus leave it. Where
- * `blockedBy()` has a reason the list stays closed, and `refused` is told it.
+ * A button with a list: { button, offer(pairs of value and words), show(value) }. `button.value` is the choice; a new choice
+ * causes the event `change`. Arrows move in the open list, Enter chooses, Escape or loss of the focus closes it. If
+ * `blockedBy()` returns a reason, the list stays closed and `refused` gets the reason.
  */
 export function choice({ blockedBy = () => '', refused = () => {}, ...attributes }) {
   const id = `choice-${made++}`;

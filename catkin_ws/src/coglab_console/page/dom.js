@@ -20,7 +20,7 @@ export function svg(tag, attributes = {}, ...children) {
   return element;
 }
 
-/** Sets the text only where it differs: a screen reader is not told the same again. */
+/** Sets the text only if it differs, so that a screen reader does not repeat it. */
 export function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
@@ -30,10 +30,10 @@ export function setAttribute(element, name, value) {
   else if (element.getAttribute(name) !== String(value)) element.setAttribute(name, value);
 }
 
-const FRAME = 17; // ms, the screen's own
+const FRAME = 17; // ms per picture of a 60 Hz screen
 const MARKS = { ok: '●', warn: '▲', fault: '■', idle: '○' };
 
-/** Shape and word for a level: colour is never the only code. */
+/** Symbol for a level, so that colour is never the only code. */
 export function mark(level) {
   return h('span', { class: `mark ${level}`, 'aria-hidden': 'true' }, MARKS[level]);
 }
@@ -45,12 +45,12 @@ export function table(header, rows, caption) {
   return h('table', {}, caption ? h('caption', { hidden: true }, caption) : null, h('thead', {}, head), h('tbody', {}, body));
 }
 
-const MOST = 10000; // ms, the longest rest after a picture
-const asked = new Set(); // drawings that are to be done
+const MOST = 10000; // ms, longest pause after a picture
+const asked = new Set(); // requested drawings
 let armed = false;
 let restUntil = 0;
 
-/** A function that asks for `update`, which changes words alone: done at most once a `period` (ms), whatever is drawn. */
+/** Returns a function that requests `update`, for text only: runs at most once per `period` (ms), independent of drawings. */
 export function paced(update, period) {
   let due = 0;
   let waiting = false;
@@ -67,9 +67,9 @@ export function paced(update, period) {
 }
 
 /**
- * A function that asks for `draw`: done in the next picture, at most once a `period()` (ms), never while the page is hidden.
- * All drawings together take a quarter of the time: the time of a picture is what the page waited for its turn, drew, and was
- * busy afterwards, which without a graphics card is most of it, and messages and clicks would stand in line behind it.
+ * Returns a function that requests `draw`: runs in the next picture, at most once per `period()` (ms), never on a hidden page.
+ * All drawings together get a quarter of the time, so that messages and clicks do not wait. The time of a picture includes the
+ * waiting before it and the busy time after it; without a graphics card that is most of it.
  */
 export function drawn(draw, period) {
   const job = { draw, period, due: 0 };
@@ -97,7 +97,7 @@ function picture(since) {
     try {
       job.draw();
     } catch (error) {
-      console.error(error); // one panel that fails takes no other along
+      console.error(error); // a failing panel must not stop the others
     }
   }
   setTimeout(() => {
@@ -109,13 +109,13 @@ function picture(since) {
   });
 }
 
-const places = new Map(); // words: their place
+const places = new Map(); // element with the text -> its place
 
 function isCut(words) {
   return [words, ...words.querySelectorAll('li')].some((one) => one.scrollHeight > one.clientHeight + 1 || one.scrollWidth > one.clientWidth + 1);
 }
 
-/** Tab stops only where something is cut off. What is being read stays as it is until it is left. */
+/** Makes a text a Tab stop only if it is cut off. A text that is being read stays unchanged. */
 function judge(words) {
   const place = places.get(words);
   if (place.matches('.unfolded, :focus')) return;
@@ -126,8 +126,8 @@ function judge(words) {
 const sizes = new ResizeObserver((entries) => entries.forEach(({ target }) => judge(target)));
 
 /**
- * Makes a `place` on the page readable in full. `words`, the one element in it, is cut off by the style sheet, and lies
- * above its surroundings while it is unfolded; under the mouse it takes no clicks, because it may lie over a button.
+ * Lets a reader unfold a cut-off text. `words`, the only element in `place`, is cut off by the style sheet. Unfolded, it lies
+ * above its surroundings. Under the mouse it takes no clicks, because it may cover a button.
  */
 export function more(place, words) {
   place.classList.add('more');
@@ -136,7 +136,7 @@ export function more(place, words) {
   const turn = () => {
     const unfold = place.hasAttribute('tabindex') && place.matches(':focus, :hover');
     if (unfold === place.classList.contains('unfolded')) return;
-    // The surroundings stay where they are while the words have left their place.
+    // keeps the surroundings in place while the text is unfolded
     place.style.minHeight = unfold ? `${place.offsetHeight}px` : '';
     place.classList.toggle('unfolded', unfold);
     if (!unfold) judge(words);

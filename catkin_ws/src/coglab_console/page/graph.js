@@ -1,11 +1,11 @@
-// The graph of a state machine as Graphviz laid it out; active states thick and filled, the last transition in words.
+// The graph of a state machine, laid out by Graphviz: active states are thick and filled; the last transition is text.
 import { h, more, setText, svg } from './dom.js';
 import { on, onDocs, store } from './link.js';
 import { choice } from './controls.js';
 
 const MAIN = '/coglab';
-const READABLE = 14 / 11; // px a unit of the picture, whose letters are 11 high, to be 14
-const CRUMBS = 40; // characters for which there is room
+const READABLE = 14 / 11; // px per unit of the picture at which its letters (11 units) are 14 px high
+const CRUMBS = 40; // characters that fit into the line
 let drawn = null;
 let parts = {};
 
@@ -56,7 +56,7 @@ function frameOf(active, follow, place) {
   const leaf = parts.items[deepest]?.[2];
   if (!box || !leaf) return whole;
   const [x, y, w, high] = box.box;
-  const limit = [place.clientWidth, place.clientHeight].map((size) => Math.max(60, size / READABLE - 12)); // beyond that nobody can read it: the surroundings of the state instead
+  const limit = [place.clientWidth, place.clientHeight].map((size) => Math.max(60, size / READABLE - 12)); // larger containers would be unreadable: show the surroundings of the state
   if (w <= limit[0] && high <= limit[1]) return [x - 6, y - 6, w + 12, high + 12];
   const width = Math.min(w, limit[0]);
   const height = Math.min(high, limit[1]);
@@ -64,7 +64,7 @@ function frameOf(active, follow, place) {
   return [clamp(leaf[0] + leaf[2] / 2 - width / 2, x, x + w - width) - 4, clamp(leaf[1] + leaf[3] / 2 - height / 2, y, y + high - height) - 4, width + 8, height + 8];
 }
 
-/** Containers down to a state; where that is too long, outer ones give way. */
+/** Containers down to a state; outer ones are left out if the text is too long. */
 function wayTo(path) {
   const all = path.split('/').filter(Boolean).slice(1);
   const parts = [...all];

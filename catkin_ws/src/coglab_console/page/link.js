@@ -1,11 +1,11 @@
-// The connection to the server, commands, and what the server has sent: the newest state, documents, events.
+// The connection to the server, the commands, and the received data: newest state, documents, events.
 import { setText } from './dom.js';
 
 export const store = {
   state: null, // the newest state, see RosView.frame
   stateAt: -Infinity, // ms of performance.now
   heardAt: -Infinity,
-  fastest: Infinity, // ms of performance.now minus the console's clock, of the state that came fastest: the best guess of their difference
+  fastest: Infinity, // ms, smallest difference of performance.now and the console's clock at a received state: best estimate of the clock offset
   docs: {},
   events: [],
   seq: 0,
@@ -22,7 +22,7 @@ export function on(kind, listener) {
   listeners[kind].push(listener);
 }
 
-/** Listens to some documents by name, and is called once with those that are there. */
+/** Calls the listener now, and at each change of the named documents. */
 export function onDocs(names, listener) {
   on('doc', (name) => {
     if (names.includes(name)) listener();
@@ -35,7 +35,7 @@ export function tell(kind, ...values) {
     try {
       listener(...values);
     } catch (error) {
-      console.error(error); // one panel that fails takes no other along, least of all STOP
+      console.error(error); // a failing panel must not stop the others, least of all STOP
     }
   }
 }
@@ -83,19 +83,19 @@ export function operating() {
 }
 
 const HEADERS = { 'Content-Type': 'application/json', 'X-CogLab-Console': '1' };
-const SILENCE = 700; // ms without a word after which the page is greyed
-const BEHIND = 500; // ms of age from which the page says how old it is
+const SILENCE = 700; // ms without a state after which the page turns grey
+const BEHIND = 500; // ms, age of the state from which the page shows the age
 const RETRY = 500; // ms
-const STOP_LIMIT = 2000; // ms until a STOP without an answer is told
-const GIVEN_UP = 2500; // ms without a word after which a connection that says it is open is taken to be dead
+const STOP_LIMIT = 2000; // ms after which a STOP without an answer is reported
+const GIVEN_UP = 2500; // ms without a message after which an open connection counts as dead
 
 let socket = null;
 let openedAt = -Infinity;
 let nextId = 1;
-let refusal = ''; // why the console lets this page in no more
+let refusal = ''; // reason why the console no longer accepts this page
 const waiting = new Map();
 
-/** A new connection in place of the one before, which is not listened to any more. */
+/** Opens a new connection. Messages of the one before are ignored. */
 function open() {
   const mine = new WebSocket(`ws://${location.host}/ws`);
   socket = mine;
@@ -110,7 +110,7 @@ function open() {
     const message = JSON.parse(event.data);
     if (message.t === 'answer') answered(message);
     else take(message);
-    if (message.t === 'state') mine.send(`{"t":"seen","n":${message.n}}`); // the next ones come only then
+    if (message.t === 'state') mine.send(`{"t":"seen","n":${message.n}}`); // the server sends further states only after this
   };
   mine.onclose = () => {
     askWhy();
@@ -118,7 +118,7 @@ function open() {
   };
 }
 
-/** A WebSocket is not told why it was refused; a console that was started anew knows this page no more. */
+/** Requests the reason of a refusal by HTTP, because a WebSocket does not get it. A restarted console does not know this page. */
 async function askWhy() {
   try {
     const response = await fetch('/page/link.js', { method: 'GET', cache: 'no-store', signal: AbortSignal.timeout(2000) });
@@ -128,7 +128,7 @@ async function askWhy() {
   }
 }
 
-/** A cable that was pulled closes nothing: the browser would wait for the network's own limit, many minutes. */
+/** Replaces a dead connection. With a pulled cable the browser would wait for the network's own limit, many minutes. */
 function comeBack() {
   if (performance.now() - Math.max(store.heardAt, openedAt) < GIVEN_UP) return;
   const dead = socket;
@@ -141,7 +141,7 @@ function answered(message) {
   waiting.delete(message.id);
 }
 
-/** A frame to the server; false where there is no connection. `onAnswer` is called at most once. */
+/** Sends a frame to the server; false without a connection. `onAnswer` is called at most once. */
 export function send(frame, onAnswer) {
   if (socket?.readyState !== WebSocket.OPEN) return false;
   const id = nextId++;
@@ -162,12 +162,12 @@ async function post(address, body) {
   }
 }
 
-/** A command of the closed list; its answer { success, message, data }. */
+/** Sends a command of the closed list. Returns its answer { success, message, data }. */
 export function command(name, args = {}) {
   return post('/api/command', { name, arguments: args });
 }
 
-/** STOP: over the connection that stands, and besides by a request of its own; the answer of whichever is first. */
+/** Sends STOP over the open connection and as a separate request. Returns the first answer. */
 export function stop() {
   const sent = new Promise((resolve, reject) => {
     if (!send({ t: 'stop' }, resolve)) reject(new Error('no connection'));
@@ -180,7 +180,7 @@ export function stop() {
   return Promise.race([first, late]);
 }
 
-/** s from the moment when what is shown left the console until now, without what the fastest message took. */
+/** Age (s) of the shown state since it left the console, less the travel time of the fastest message. */
 export function behind() {
   return (performance.now() - store.state?.at - store.fastest) / 1000;
 }

@@ -5,7 +5,7 @@ import { fixedShapes, HAND_SHAPES, objectShape, path, robotPoses, robotShapes } 
 import { store } from './link.js';
 
 const HALF_HIGH = Math.tan((19 * Math.PI) / 180); // half the height of the picture, at a distance of 1
-const NARROW = 1.5; // width by height below which the picture keeps its width: arm and person stay in it
+const NARROW = 1.5; // width / height below which the visible width stays constant, so that arm and person stay in the picture
 const CAMERAS = {
   front: [[1.75, -1.55, 0.75], [0.42, 0.02, 0.24]],
   side: [[0.45, -2.2, 0.5], [0.45, 0, 0.27]],
@@ -32,14 +32,14 @@ function place(object, [x, y, z, qx, qy, qz, qw]) {
   object.quaternion.set(qx, qy, qz, qw);
 }
 
-/** Without a graphics card each picture costs the processor that the robot runs on: fewer of them then. */
+/** True without a graphics card. Each picture then loads the robot's processor, so fewer are drawn. */
 function drawsInSoftware(renderer) {
   const context = renderer.getContext();
   const known = context.getExtension('WEBGL_debug_renderer_info');
   return !known || /swiftshader|llvmpipe|software/i.test(context.getParameter(known.UNMASKED_RENDERER_WEBGL));
 }
 
-/** A view in `parent`; throws where there is no WebGL. */
+/** A 3D view in `parent`; throws without WebGL. */
 export class Scene3D {
   constructor(parent) {
     this.renderer = new THREE.WebGLRenderer({ antialias: false });
@@ -183,7 +183,7 @@ export class Scene3D {
     this.canvas.hidden = false;
   }
 
-  /** Place of the palm as the scene has it, m. */
+  /** Position of the palm in the scene, m. */
   palm() {
     const at = new THREE.Vector3();
     if (!this.links.ih2_palm) return null;

@@ -1,4 +1,4 @@
-// The column on the left and the events: three lines in the footer, and a page of their own.
+// The status column on the left, and the events: three lines in the footer, and the page Events.
 import { h, mark, more, paced, setText } from './dom.js';
 import { on, onDocs, store } from './link.js';
 import { ageWords } from './cell.js';
@@ -31,15 +31,15 @@ const NOW = ['Phase', 'Waits']; // above everything else
 const ROWS = ['FRI', 'Arm', 'Motion', 'Hand', 'Person', 'Object', 'Contact', 'Why', 'Last'];
 const LONG = ['Why', 'Last'];
 const MOST_LINES = 6;
-const OLD = 0.5; // s, sights of perception older than this deserve a mark
+const OLD = 0.5; // s, age of a perceived frame from which it is marked
 const UNKNOWN = ['fault', 'not known, the brain is silent'];
-const RECENT = 5; // s for which a recognised reach is shown
+const RECENT = 5; // s, time for which a recognised reach is shown
 const MODES = { POSITION: 'position control', CART_IMP: 'Cartesian impedance', JNT_IMP: 'joint impedance', OTHER: 'another control' };
 const CONTROLLERS = { dmp: 'reach', ptp: 'to a posture' };
 const MOTIONS = { idle: 'at rest', running: 'under way', holding: 'waits where it is', fault: 'fault' };
 const CONTACTS = { contact: 'a touch', load: 'the weight', release: 'the person letting go' };
 
-/** Where a source is not there or has fallen silent: its row; null where it speaks. `who` begins a sentence. */
+/** Row of a source that is missing or silent; null if it sends. `who`: its name at the start of a sentence. */
 function missing(source, alive, who) {
   if (!alive) return ['fault', `${who} is not there`];
   const silence = store.state?.silent[source];
@@ -110,7 +110,7 @@ function phase({ alive, hub, words }, stood) {
   return missing('brain', alive, 'the brain') ?? [stood ? 'fault' : hub ? 'ok' : 'idle', store.state?.words || words];
 }
 
-/** What the brain waits for and when it gives up, as it tells itself. */
+/** What the brain waits for, and the time left, as the brain publishes them. */
 function waiting({ alive }) {
   const { since = 0, left = null, waits = '' } = store.state ?? {};
   if (missing('brain', alive, '')) return UNKNOWN;
@@ -143,7 +143,7 @@ function rows() {
   };
 }
 
-/** The rows, each with the element of its words: { cell, all (mark and words), words, level }. */
+/** The rows by name, each with its elements: { cell, all (mark and words), words, level }. */
 function makeRows(names, list) {
   const cells = {};
   for (const name of names) {
@@ -177,14 +177,14 @@ export function showStatus(parent, now) {
     }
     if (changed) fit(parent, list);
   }, 100);
-  // The column gets smaller without a new word in it, too: a reason below a button, another window.
+  // The column may get smaller without new text: by a reason below a button, or by another window size.
   new ResizeObserver(() => fit(parent, list)).observe(parent);
   on('state', update);
   on('events', update);
   onDocs(['status', 'desk', 'recognition'], update);
 }
 
-/** Long rows have as many lines as there is room for; with two of them all rows fit, whatever they say. */
+/** Gives long rows as many lines as fit. With two lines each, all rows always fit. */
 function fit(parent, list) {
   list.classList.remove('tight');
   for (let lines = MOST_LINES; lines >= 2; lines -= 1) {

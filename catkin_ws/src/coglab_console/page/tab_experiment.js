@@ -18,7 +18,7 @@ function form(told) {
   const repetitions = h('input', { type: 'number', min: 1, max: 50, value: 5 });
   const order = choice({});
   order.offer(['as_listed', 'latin_square', 'random'].map((word) => [word, word]));
-  order.show('as_listed'); // the one that receive and give go through without an action between trials
+  order.show('as_listed'); // in this order, receive and give need no action between trials
   const request = () => ['session_begin', {
     participant: participant.value.trim(),
     number: Number(number.value),
@@ -49,16 +49,16 @@ function running(told, session) {
   ];
 }
 
-/** The newest recorded handovers, as ./coglab trial list has them. */
+/** The newest recorded handovers, as in `./coglab trial list`. */
 function recorded({ folder = '', recording = false, rows = [] } = {}) {
   const cells = rows.map((row) => [row.started?.slice(11, 19), [row.action, row.object].join(' '), [row.participant, row.condition].filter(Boolean).join(', '), row.outcome, row.duration_s, row.notes]);
   return [
-    h('p', {}, recording ? `Each handover is recorded into ${folder}; ./coglab trial explain last, ./coglab trial report last.` : 'No recorder is there: launch without record:=none, or nothing of a session is written.'),
+    h('p', {}, recording ? `Each handover is recorded into ${folder}; ./coglab trial explain last, ./coglab trial report last.` : 'No recorder runs, so nothing of a session is written: launch without record:=none.'),
     rows.length ? table(['UTC', 'Handover', 'Trial of', 'Outcome', 's', 'Notes'], cells, 'Recorded handovers') : null,
   ];
 }
 
-/** A questionnaire of the study that is run live: one number per item. What is left empty is asked again. */
+/** A questionnaire of the live study: one number per item. Items left empty stay on the page. */
 function asked(one, told) {
   const inputs = one.items.map(([, text]) => h('input', { type: 'number', min: one.low, max: one.high, step: one.step, 'aria-label': text }));
   const request = () => ['answer', { questionnaire: one.name, answers: Object.fromEntries(one.items.flatMap(([item], i) => (inputs[i].value === '' ? [] : [[item, Number(inputs[i].value)]]))) }];
@@ -86,13 +86,13 @@ export function experimentPage(page) {
     const answer = await command('note', { text: note.trim() });
     sending = false;
     setText(told, answer.message);
-    if (answer.success && text.value === note) text.value = ''; // what was typed meanwhile, or was not taken, stays
+    if (answer.success && text.value === note) text.value = ''; // keep text typed meanwhile or refused
   } }, 'Add the note');
   const open = h('div');
   const recordings = h('div');
   page.append(
     h('div', {}, h('h2', {}, 'Session'), left, told, open),
-    h('div', {}, h('h2', {}, 'Notes'), field('A note with the time of now (M); the recording has it, too', text), h('div', { class: 'row' }, add), notes,
+    h('div', {}, h('h2', {}, 'Notes'), field('A note with the current time (M); it goes into the recording, too', text), h('div', { class: 'row' }, add), notes,
       h('h2', {}, 'Recorded handovers'), recordings));
   let shown = '';
   const draw = () => {
@@ -108,7 +108,7 @@ export function experimentPage(page) {
   let before = '';
   const drawStudy = () => {
     const key = JSON.stringify(store.docs.study ?? null);
-    if (key === before) return; // what is being typed stays
+    if (key === before) return; // keep what is being typed
     before = key;
     open.replaceChildren(...questions(store.docs.study, told).filter(Boolean));
   };
@@ -119,7 +119,7 @@ export function experimentPage(page) {
   return { docs: { desk: draw, study: drawStudy, recordings: drawRecordings } };
 }
 
-/** Fits the band at the top. */
+/** Shows the session in the band at the top. */
 export function showSession(place) {
   onDocs(['desk'], () => {
     const session = store.docs.desk?.experiment;

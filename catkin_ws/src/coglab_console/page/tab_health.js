@@ -1,4 +1,4 @@
-// Health: diagnostics tree, versions, parameters, browsers; and Help.
+// The pages Health (diagnostics tree, versions, parameters, browsers) and Help.
 import { h, mark, setText, table } from './dom.js';
 import { command, operating, store } from './link.js';
 import { viewKind } from './view.js';
@@ -6,7 +6,7 @@ import { commandButton, watch } from './controls.js';
 
 const LEVELS = [['ok', 'ok'], ['warn', 'warning'], ['fault', 'error'], ['idle', 'silent']];
 
-/** Rows by the node that tells them, which stands before the colon: Map of node to [row, its own name]. */
+/** Rows by the publishing node, whose name stands before the colon: Map of node to [row, name without the node]. */
 function byNode(rows) {
   const nodes = new Map();
   for (const row of rows) {
@@ -16,7 +16,7 @@ function byNode(rows) {
   return nodes;
 }
 
-/** One line of the tree that opens: its element, and a function that shows level and words in it. */
+/** One line of the tree that can be opened: its element, and a function that shows level and words in it. */
 function line(name, open, ...inside) {
   const words = h('span');
   const summary = h('summary', { 'data-name': name }, mark('idle'), words);
@@ -33,11 +33,11 @@ function line(name, open, ...inside) {
 }
 
 /**
- * The diagnostics as a tree: a branch per node with the worst of its leaves. Lines are made anew only when there are other
- * ones, because a line that is being pressed must stay; then, too, what was opened and the focus stay.
+ * The diagnostics as a tree: a branch per node with the worst level of its leaves. Lines are rebuilt only if their names change,
+ * because a line that is being pressed must stay. A rebuild keeps the opened lines and the focus.
  */
 function diagnosticsTree(tree) {
-  const turned = new Set(); // names that are the other way than at first: branches open, leaves closed
+  const turned = new Set(); // names of lines that differ from the default (branches open, leaves closed)
   let made = '';
   let shows = [];
   const item = (name, isOpen, ...inside) => {
@@ -96,7 +96,7 @@ export function healthPage(page) {
   } }, 'Read again');
   const marked = h('p');
   page.append(h('div', {}, h('h2', {}, 'Diagnostics'), tree),
-    h('div', {}, h('h2', {}, 'Versions and browsers'), versions, h('h2', {}, 'Hand'), h('p', {}, 'A complete or forced calibration opens the hand, whatever it holds: hold the button.'), h('div', { class: 'row' }, commandButton('Complete calibration', { name: 'calibrate_complete', told, held: true, request: () => ['calibrate', { mode: 'complete' }] }), commandButton('Forced calibration', { name: 'calibrate_forced', told, held: true, request: () => ['calibrate', { mode: 'complete', force: true }] })), told,
+    h('div', {}, h('h2', {}, 'Versions and browsers'), versions, h('h2', {}, 'Hand'), h('p', {}, 'A complete or forced calibration opens the hand, even if it holds an object: hold the button.'), h('div', { class: 'row' }, commandButton('Complete calibration', { name: 'calibrate_complete', told, held: true, request: () => ['calibrate', { mode: 'complete' }] }), commandButton('Forced calibration', { name: 'calibrate_forced', told, held: true, request: () => ['calibrate', { mode: 'complete', force: true }] })), told,
       h('h2', {}, 'Parameters'), marked, h('div', { class: 'row' }, read, h('label', {}, 'Filter', filter)), parameters));
   const draw = () => {
     const { rows = [], versions: words = {}, browsers = [] } = store.docs.health ?? {};
@@ -110,7 +110,7 @@ export function healthPage(page) {
 }
 
 const KEYS = [
-  ['Space', 'STOP, everywhere; in a text field Ctrl+Space'], ['1 … 8', 'to an action; Enter triggers it, or is held where a held button is asked for'],
+  ['Space', 'STOP, everywhere; in a text field Ctrl+Space'], ['1 … 8', 'to an action; Enter triggers it; hold Enter if a held button is required'],
   ['O', 'to the list of objects; ↑ ↓ open it and go through it, Enter takes, Escape leaves it'], ['M', 'to a new note'], ['?', 'this page'], ['Tab, Shift+Tab', 'through everything'], ['← →', 'between pages, with the focus on one'],
 ];
 
@@ -126,11 +126,11 @@ export function helpPage(page) {
     h('div', {}, h('h2', {}, 'Keys'), table(['Key', 'Does'], KEYS, 'Keys'),
       h('h2', {}, 'After a stop'), h('p', {}, 'STOP brakes the arm, latches, and ends the action; the hand keeps what it holds. Then two acts: acknowledge the cause, and hold the button of the next motion for 0.8 s. Nothing is ever reset by itself.'),
       h('h2', {}, 'What this is not'), h('p', {}, 'STOP MOTION is software. It has no safety function: the red button of the robot controller is the emergency stop. Whether the robot is real or simulated is decided when the system is launched, never here.')),
-    h('div', {}, h('h2', {}, 'One operator'), h('p', {}, 'One browser operates, all others watch; STOP and notes are everybody’s. Taking over is announced to the operator, who has 3 s to keep the control. A browser that has been away for 10 s operates no more.'),
-      h('div', { class: 'row' }, takeOver(told), invite), h('label', {}, 'To be used once', link), told,
-      h('h2', {}, 'Who can move the robot'), h('p', {}, 'This page asks for a link with a one-time token, and listens on this computer alone unless it was launched otherwise. ROS 1 itself has no authentication: whoever reaches the ROS master can do everything, without this page. Keep the master on loopback or on a private network. From elsewhere: ssh -L 8790:127.0.0.1:8790 LAB-PC.'),
+    h('div', {}, h('h2', {}, 'One operator'), h('p', {}, 'One browser operates, all others watch; STOP and notes are everybody’s. Taking over is announced to the operator, who has 3 s to keep the control. A browser that has been away for 10 s no longer operates.'),
+      h('div', { class: 'row' }, takeOver(told), invite), h('label', {}, 'Valid once', link), told,
+      h('h2', {}, 'Who can move the robot'), h('p', {}, 'This page needs a link with a one-time token, and listens on this computer alone unless it was launched otherwise. ROS 1 itself has no authentication: anybody who reaches the ROS master can do everything, without this page. Keep the master on loopback or on a private network. From elsewhere: ssh -L 8790:127.0.0.1:8790 LAB-PC.'),
       h('h2', {}, 'Words of the picture'), h('p', {}, 'Orange: arm. Green: object. Pink: goal. Thin sky-blue path, dashed in 2D: where the next motion would go; thick blue: the motion under way. Sky-blue lines: workspace.'),
-      h('p', {}, 'Graph of the state machine, whole: all of the machine, with letters as small as that takes; follow: letters that can be read, around the active state.')));
+      h('p', {}, 'Graph of the state machine, whole: all of the machine, in small letters if necessary; follow: the surroundings of the active state, in readable letters.')));
   return {};
 }
 

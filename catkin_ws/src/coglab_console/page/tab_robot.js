@@ -23,8 +23,8 @@ export function contactPage(page) {
   const timeout = h('input', { type: 'number', min: 1, max: 60, value: 20 });
   page.append(
     h('div', {}, h('h2', {}, title), ...bars.map((bar) => bar.row),
-      h('p', {}, 'What the contact detector sees and compares. Bar: the largest change of the last second. Black line: its threshold, k robust standard deviations at rest; with a mark: the joint counts now.')),
-    h('div', {}, h('h2', {}, 'Noise at rest'), learnt, h('div', { class: 'row' }, commandButton('Learn anew at rest', { name: 'contact_learn', told, held: true, request: () => ['contact_learn', {}] })),
+      h('p', {}, 'Input of the contact detector. Bar: the largest change of the last second. Black line: its threshold, k robust standard deviations at rest. ●: the joint counts now.')),
+    h('div', {}, h('h2', {}, 'Noise at rest'), learnt, h('div', { class: 'row' }, commandButton('Learn again at rest', { name: 'contact_learn', told, held: true, request: () => ['contact_learn', {}] })),
       h('h2', {}, 'Try the detector'), detector,
       h('div', { class: 'row' }, field('Threshold k', k), field('For, s', timeout),
         commandButton('Watch for contact', { name: 'contact_arm', told, held: true, request: () => ['contact_arm', { mode: 'contact', k: Number(k.value), timeout: Number(timeout.value) }] }),
@@ -42,10 +42,10 @@ export function contactPage(page) {
       setText(bar.value, i in state.rate ? bar.peak.toFixed(3) : '–');
     });
     const { alive, state: stands, mode } = store.docs.status?.contact ?? {};
-    setText(detector, !alive ? 'The detector says nothing: it is not there, or no torques come.'
-      : state.margin !== null ? `Watching for ${mode}: margin ${state.margin.toFixed(2)}; it counts from 1.`
-        : stands === 'waiting' ? `Armed for ${mode}; waits until the arm stands still and enough was learnt.` : 'The detector is off.');
-    onStatus(); // the deviations are those of the newest thresholds
+    setText(detector, !alive ? 'The detector is silent: it does not run, or it gets no torques.'
+      : state.margin !== null ? `Watching for ${mode}: margin ${state.margin.toFixed(2)}; contact from 1.`
+        : stands === 'waiting' ? `Armed for ${mode}; waits until the arm stands still and the noise is learnt.` : 'The detector is off.');
+    onStatus(); // its deviations follow from the newest thresholds
   };
   const onStatus = () => {
     const contact = store.docs.status?.contact;
@@ -70,7 +70,7 @@ export function objectsPage(page) {
     h('div', {}, h('h2', {}, 'Entry'), entry));
   const draw = () => {
     const { rows = [], asked = false, problems: words = [] } = store.docs.objects ?? {};
-    const all = asked ? [['ok', `The database has checked its files: ${rows.length} objects, every file fits.`]] : [['idle', 'The object database has not been asked, or is not there.']];
+    const all = asked ? [['ok', `The database has checked its files: ${rows.length} objects, every file is valid.`]] : [['idle', 'The object database does not run, or was not read yet.']];
     problems.replaceChildren(...(words.length ? words.map((text) => ['warn', text]) : all).map(([level, text]) => h('li', { class: level === 'warn' ? 'warnrow' : '' }, mark(level), text)));
     list.replaceChildren(table(['Object', 'Name', 'kg', 'Shape', ''], rows.map((row) => [row.id, row.name, row.mass, row.shape?.type ?? '', h('button', { type: 'button', 'aria-label': `Show ${row.id}`, onclick: () => setText(entry, row.text) }, 'Show')]), 'Objects'));
     if (!entry.textContent && rows.length) setText(entry, rows[0].text);
@@ -120,7 +120,7 @@ export function primitivesPage(page) {
   const recognise = () => {
     const seen = store.docs.recognition;
     const age = seen && store.state ? `, ${Math.max(0, store.state.stamp - seen.stamp).toFixed(0)} s ago` : '';
-    setText(verdict, seen ? `${seen.decided ? 'Decided' : 'Not decided'}: ${seen.pattern}, ${Math.round(seen.progress * 100)} % of the reach seen${age}` : 'No recognition yet: the recogniser tells when the person’s hand moves.');
+    setText(verdict, seen ? `${seen.decided ? 'Decided' : 'Not decided'}: ${seen.pattern}, ${Math.round(seen.progress * 100)} % of the reach seen${age}` : 'No recognition yet: the recogniser publishes when the person’s hand moves.');
     bars.replaceChildren(...(seen?.rows ?? []).map(([name, share]) => {
       const fill = h('i');
       fill.style.width = `${100 * share}%`;
@@ -142,8 +142,8 @@ export function feedbackPage(page) {
   const told = h('p', { 'aria-live': 'polite' });
   const list = h('div');
   const shares = h('div');
-  page.append(h('h2', {}, 'Feedback controllers in execution order'), told, list, h('h2', {}, 'Who changed what in the newest cycle'), shares);
-  // Rows are made anew only when there are other ones: a button that is held down must stay.
+  page.append(h('h2', {}, 'Feedback controllers in execution order'), told, list, h('h2', {}, 'Corrections in the newest cycle'), shares);
+  // Rows are rebuilt only if they change, because a button that is held down must stay.
   let made = '';
   let shown = [];
   const why = h('p', { id: 'feedback-why' });
@@ -166,7 +166,7 @@ export function feedbackPage(page) {
     if (key !== made) make(rows);
     made = key;
     const silence = store.state?.silent.controllers;
-    const since = silence === undefined ? '' : `; silent for ${silence.toFixed(1)} s: what is shown is as old`;
+    const since = silence === undefined ? '' : `; silent for ${silence.toFixed(1)} s: the values shown are as old`;
     setText(document.getElementById('feedback-profile') ?? told, rows.length ? `Profile: ${profile || 'none'}${since}` : 'No feedback controllers are loaded.');
     rows.forEach((row, i) => {
       setText(shown[i].activity, row.activity + (row.waiting ? ` ${row.waiting}` : ''));
@@ -177,7 +177,7 @@ export function feedbackPage(page) {
   const attribute = () => {
     const { rows = [], inside = [] } = store.docs.attribution ?? {};
     shares.replaceChildren(
-      rows.length ? table(['Controller', 'Reference', 'Changed by', 'Turned by, rad'], rows.map((row) => [row.controller, row.signal, row.size, row.angle]), 'Corrections') : h('p', {}, 'Nobody changed a reference.'),
+      rows.length ? table(['Controller', 'Reference', 'Changed by', 'Turned by, rad'], rows.map((row) => [row.controller, row.signal, row.size, row.angle]), 'Corrections') : h('p', {}, 'No controller changed a reference.'),
       ...inside.map((one) => h('p', {}, `${one.controller}: ${one.values.map(([name, value, unit]) => `${name} ${value} ${unit}`).join(', ')}`)));
   };
   draw();

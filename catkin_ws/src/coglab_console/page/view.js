@@ -1,4 +1,4 @@
-// The picture of the cell: 3D where there is WebGL and libjs-three, otherwise 2D; cameras by button.
+// The picture of the cell: 3D with WebGL and libjs-three, otherwise 2D; buttons choose the camera.
 import { compose, fixedShapes, HAND_SHAPES, objectShape, palmInScene, path, robotPoses, robotShapes, viewWords } from './cell.js';
 import { on, onDocs, store } from './link.js';
 import { drawn, h, setAttribute, setText } from './dom.js';
@@ -8,7 +8,7 @@ const VIEWS = [
   { name: 'from above', across: 0, up: 1, low: [-0.55, -0.85], high: [1.6, 0.85] },
 ];
 
-/** Ends of a shape's longest line and its half width, in the world. */
+/** End points of a shape's axis (world frame) and its half width, m. */
 function barOf({ kind, size, pose }) {
   if (kind === 'sphere') return [pose, pose, size[0]];
   const [length, half] = kind === 'cylinder' ? [size[1], size[0]] : [size[2], Math.max(size[0], size[1]) / 2];
@@ -120,7 +120,7 @@ export class Scene2D {
 let scene = null;
 let redraw = () => {};
 
-/** Place of the palm as the picture shows it, m: the tests compare it with tf. */
+/** Position of the palm in the picture, m; the tests compare it with tf. */
 export function palmShown() {
   return scene?.palm() ?? null;
 }

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
-"""A picture of the console while the arm reaches for the mug, taken of a simulated system of its own.
+"""Takes a picture of the console while the arm reaches for the mug. Starts its own simulated system.
 
 Usage: ./coglab console picture [FILE]   (default: docs/images/console.png below the checkout). Exit status: 0 taken,
-1 not, 2 usage.
+1 not taken, 2 wrong usage.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ STOPPED = "/[/](stopped|fault)$/.test(coglab.state().phase)"
 
 
 def free_port() -> int:
-    """For the ROS master."""
+    """Returns a free TCP port for the ROS master."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
 
 
 def take(home: Path, path: Path) -> None:
-    """Opens the page, begins an exchange, and keeps what is seen in the middle of the reach."""
+    """Opens the page, begins an exchange, and saves a picture in the middle of the reach."""
     with Browser() as browser:
         browser.open(fresh_link(home, limit=LIMIT), LIMIT)
         button = "[data-action=exchange_human_to_robot]"
@@ -45,12 +45,12 @@ def take(home: Path, path: Path) -> None:
         browser.js("document.activeElement.blur()")
         browser.until(f"const s = coglab.state(); return {REACHES} || {STOPPED}", 90.0)
         if browser.js(f"return {STOPPED}"):
-            raise TimeoutError(f"the machine has stopped by itself; {browser.summary()}")
+            raise TimeoutError(f"the state machine stopped; {browser.summary()}")
         browser.picture(path)
 
 
 def of_a_system(path: Path) -> None:
-    """A simulated system from its start to its end, and the picture of it. TimeoutError where there is none."""
+    """Starts a simulated system, takes the picture and ends the system. TimeoutError if no picture was taken."""
     with tempfile.TemporaryDirectory(prefix="coglab-picture-") as folder:
         port = free_port()
         environment = {

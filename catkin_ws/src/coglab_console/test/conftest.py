@@ -1,4 +1,4 @@
-"""What several of the tests begin with."""
+"""Fixtures of the console's tests."""
 
 import pytest
 from desk_double import desk_in
@@ -7,7 +7,7 @@ from page_double import Desk
 
 @pytest.fixture
 def desk(tmp_path):
-    """A desk with the browsers a, which operates, and b."""
+    """A desk with browser a, the operator, and browser b."""
     made = desk_in(tmp_path)
     made.connected("a")
     made.connected("b")

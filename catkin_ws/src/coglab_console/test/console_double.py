@@ -50,7 +50,7 @@ PAGE_DOCUMENTS = {
 
 
 def page_state(stamp: float) -> dict:
-    """A state as the node sends it, of a robot that stands still."""
+    """A state of a robot at rest, as the node sends it."""
     return {
         "stamp": stamp,
         "q": [],
@@ -76,7 +76,7 @@ def page_state(stamp: float) -> dict:
 
 
 class RobotDouble:
-    """Writes down what it is asked for."""
+    """Records its requests."""
 
     def __init__(self, real: bool = False) -> None:
         self.real = real
@@ -106,7 +106,7 @@ class RobotDouble:
 
 
 class Console:
-    """One server and what stands behind it."""
+    """A web server with its desk, events and documents."""
 
     def __init__(self, folder: Path, robot: RobotDouble, hosts: Iterable[str] = (), **files: object) -> None:
         self.robot, self.socket = robot, socket.socket()
@@ -126,7 +126,7 @@ class Console:
 
     @property
     def headers(self) -> dict[str, str]:
-        """Of a POST by the console's own page."""
+        """Headers of a POST by the console's own page."""
         return {"Origin": self.origin, CSRF_HEADER: "1"}
 
     @contextlib.asynccontextmanager

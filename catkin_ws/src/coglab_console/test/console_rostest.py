@@ -28,9 +28,9 @@ from selenium.webdriver.common.keys import Keys
 from somebody import Somebody, show_machine
 from std_msgs.msg import String
 
-# Of chromium about its own drawing, and its line about a command that was refused, whose reason the page tells: on a
-# busy machine the robot may stop by itself while a button is pressed.
-LIMIT = 60.0  # s, of every wait: the computer may be busy
+# Lines of chromium about its own drawing, and about a refused command, whose reason is on the page: on a busy computer
+# the robot may stop by itself while a button is pressed.
+LIMIT = 60.0  # s, limit of every wait; the computer may be busy
 KNOWN = ("WebGL", "GPU stall", "willReadFrequently", "409 (Conflict)", "points out of X bounds")
 
 
@@ -69,13 +69,13 @@ class Console(unittest.TestCase):
         self.browser.until("return coglab.state().phase.endsWith(arguments[0])", limit, name)
 
     def enabled(self, action, limit=LIMIT):
-        """The button, when the page lets it be pressed."""
+        """Waits until a button is enabled and returns it."""
         button = f"[data-action={action}]"
         self.browser.until("return !document.querySelector(arguments[0]).hasAttribute('aria-disabled')", limit, button)
         return self.button(action)
 
     def says(self, action, word, limit=LIMIT):
-        """Waits until the words below a button say so."""
+        """Waits for a text below a button."""
         self.browser.until(
             "return document.getElementById('why-' + arguments[0]).textContent.includes(arguments[1])",
             limit,
@@ -103,16 +103,16 @@ class Console(unittest.TestCase):
         self.assertEqual(self.browser.js("return document.getElementById('band').className"), "simulation")
 
     def looked(self, browser=None):
-        """What is wrong with the page, once it is laid out."""
+        """Faults of the page after it is laid out."""
         end = time.monotonic() + LIMIT
         while (found := look(browser or self.browser))[0] and time.monotonic() < end:
             time.sleep(0.4)
         return found
 
-    def test_03_the_scene_has_the_hand_where_tf_has_it(self):
+    def test_03_scene_shows_hand_at_its_tf_pose(self):
         self.assertLess(self._distance_to_tf(), 0.002)
 
-    def test_03b_the_hand_is_calibrated_by_a_held_button_and_tells_how_it_ends(self):
+    def test_03b_held_button_calibrates_hand_and_shows_its_end(self):
         self.ready("wait_without_object")
         self.says("calibrate", "is calibrated")
         self.browser.tab("Health")
@@ -131,7 +131,7 @@ class Console(unittest.TestCase):
         return float(np.linalg.norm(np.array(self.browser.js("return coglab.palm()")) - [place.x, place.y, place.z]))
 
     def receive(self):
-        """Once: whether the object is in the hand at the end; the machine may have stopped by itself."""
+        """Receives once. True if the object is in the hand at the end; the machine may have stopped by itself."""
         self.ready("wait_without_object")
         path = self.browser.until("const p = coglab.docs().path; return p && p.kind === 'ahead' && p", LIMIT)
         self.assertGreater(len(path["points"]), 10)
@@ -176,7 +176,7 @@ class Console(unittest.TestCase):
         self.page_in(hub)
 
     def go_on(self, hub="wait_with_object"):
-        """The two acts after a stop or a fault."""
+        """Does the two steps after a stop or a fault: acknowledge, hold a button."""
         leaf = "/fault" if self.machine.state.endswith("/fault") else "/stopped"
         self.page_in(leaf)
         self.browser.until("return document.getElementById('acknowledge').offsetParent !== null", LIMIT)
@@ -241,7 +241,7 @@ class Console(unittest.TestCase):
         uri = rosgraph.Master("/console_test").lookupNode(node)
         return ServerProxy(uri).getPid("/console_test")[2]
 
-    def test_08_a_machine_of_somebody_else_is_shown(self):
+    def test_08_state_machine_of_another_node_is_shown(self):
         with Somebody() as somebody:
             picture = self.browser.until("return coglab.docs()['graph:/somebody']", LIMIT)
             self.assertEqual({node["label"] for node in picture["nodes"]}, {"ALPHA", "BETA"})
@@ -291,8 +291,8 @@ class Console(unittest.TestCase):
     def test_09_a_second_console_of_this_master_is_refused_and_says_so(self):
         command = ["rosrun", "coglab_console", "console_node.py"]
         with tempfile.TemporaryDirectory() as home:
-            # Beside each other. The other one has this one's name and a ROS_HOME of its own, as from a second terminal:
-            # it would end the first one.
+            # In parallel. The other one has the same name but its own ROS_HOME, as from a second terminal: it would end
+            # the first one.
             begun = [
                 subprocess.Popen([*command, *name], stderr=subprocess.PIPE, text=True, env={**os.environ, **changed})
                 for name, changed in ((["__name:=another_console"], {}), ([], {"ROS_HOME": home}))
@@ -307,11 +307,11 @@ class Console(unittest.TestCase):
         self.assertIn("another console of this ROS master runs at http", said[1])
         self.browser.until("return !document.body.classList.contains('lost')", LIMIT)
 
-    def test_10_the_page_had_nothing_to_complain_about(self):
+    def test_10_browser_logged_no_errors(self):
         rows = [row for row in self.browser.complaints() if not any(word in row for word in KNOWN)]
         self.assertEqual(rows, [])
 
-    def test_11_without_webgl_there_are_two_dimensions(self):
+    def test_11_without_webgl_the_view_is_2d(self):
         used = self.link
         with Browser(webgl=False) as other:
             other.open(fresh_link(Path(rospkg.get_ros_home()), used))

@@ -1,4 +1,4 @@
-"""A desk with a double of the robot behind it, and what a browser does at it."""
+"""A desk with a double of the robot, and the actions of a browser."""
 
 import asyncio
 import json
@@ -14,7 +14,7 @@ RECEIVE = {"action": "exchange_human_to_robot"}
 
 
 class Clock:
-    """A clock that stands until it is moved."""
+    """A clock that only a test advances."""
 
     def __init__(self) -> None:
         self.time = 100.0
@@ -24,7 +24,7 @@ class Clock:
 
 
 def desk_in(folder, now=time.time):
-    """One whose sessions are written to this folder."""
+    """A desk that writes its sessions to this folder."""
     return Desk(RobotDouble(), EventLog(now), Documents(), folder, now, lambda: "http://link")
 
 
@@ -33,7 +33,7 @@ def ask(desk, who, command, /, **arguments):
 
 
 def shown(desk):
-    """The document of the desk, as the page has it."""
+    """The document `desk` of the page."""
     desk.tick()
     documents = [json.loads(text) for text in desk.documents.newer({})]
     return next(one["value"] for one in documents if one["name"] == "desk")

@@ -1,4 +1,4 @@
-// What is wrong with the page as it stands: scroll bars, STOP hidden, controls without a name, too small or
+// Faults of the page now: scroll bars, STOP hidden, controls without a name, too small or
 // disabled without a reason, pale text.
 const problems = [];
 const root = document.scrollingElement;

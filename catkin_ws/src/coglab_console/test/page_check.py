@@ -1,4 +1,4 @@
-"""Finds faults of a page of the console as a browser shows it."""
+"""Finds faults of a console page in a browser."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ return { place: [...document.querySelectorAll('*')].indexOf(at),
 
 
 def look(browser: Browser) -> tuple[list[str], int]:
-    """Scroll bars, STOP hidden, controls without a name or too small, pale text; and how many texts were looked at."""
-    browser.painted()  # before that, nobody sees the page as it stands, and it has not judged its own room
+    """Faults (scroll bars, STOP hidden, controls without a name or too small, pale text), and the number of texts."""
+    browser.painted()  # before that, the page has neither its final layout nor measured its own room
     found = browser.js(_LOOK)
     return found["problems"], found["texts"]
 
 
 def focus_order(browser: Browser) -> tuple[list[str], list[str]]:
-    """Goes through the page with the Tab key: names in order, and what is wrong: something that is not reached, out of
-    order, out of sight or without a ring, or STOP missing."""
+    """Goes through the page with the Tab key. Returns the names in order, and the faults: controls not reached, out of
+    order, out of sight or without a focus ring, or STOP missing."""
     from selenium.webdriver.common.action_chains import ActionChains
     from selenium.webdriver.common.keys import Keys
 

@@ -46,14 +46,14 @@ STATUS: dict = {
 
 
 class Desk:
-    """A console that serves in a thread of its own, 30 states a second, and a browser at its page. `model`: changes of
-    that document; `files`: of where the page's files lie."""
+    """A console in its own thread, with 30 states per second, and a browser at its page. `model`: changes of that
+    document; `files`: changes of the paths of the page's files."""
 
     def __init__(self, folder, model=None, **files):
         self.robot = RobotDouble()
         self._documents = {**PAGE_DOCUMENTS, "model": {**PAGE_DOCUMENTS["model"], **(model or {})}}
         self._files = files
-        self.state: dict = {}  # what the next states have other than those of a robot that stands still
+        self.state: dict = {}  # values of the next states that differ from those of a robot at rest
         self.loop = asyncio.new_event_loop()
         self._ready, self._over = threading.Event(), asyncio.Event()
         self._thread = threading.Thread(target=self.loop.run_until_complete, args=(self._serve(folder),))
@@ -76,12 +76,12 @@ class Desk:
         self.loop.call_soon_threadsafe(self.console.events.add, "test", text)
 
     def put(self, **documents):
-        """Documents by name."""
+        """Sets documents by name."""
         for name, value in documents.items():
             self.loop.call_soon_threadsafe(self.console.documents.put, name, value)
 
     def age(self):
-        """s since the newest state that the page has left the console."""
+        """Age (s) of the page's newest state since it left the console."""
         return time.monotonic() - self.browser.js("return coglab.state().stamp")
 
     def close(self):

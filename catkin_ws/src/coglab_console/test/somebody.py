@@ -1,5 +1,5 @@
-"""A state machine of somebody else on the same ROS master: ALPHA, then BETA until it is told to end; and how the page
-shows it."""
+"""Another state machine on the same ROS master: ALPHA, then BETA until a request to end; and a helper to show it on the
+page."""
 
 import threading
 
@@ -9,7 +9,7 @@ from selenium.webdriver.common.by import By
 
 
 class Somebody:
-    """Publishes itself as `/somebody` for as long as the context lasts; `begin` runs it."""
+    """Publishes itself as `/somebody` while the context lasts; `begin` runs it."""
 
     def __init__(self):
         self._over = threading.Event()
@@ -37,7 +37,7 @@ class Somebody:
 
 
 def show_machine(browser, name):
-    """Chooses it in the list above the graph of the page."""
+    """Chooses this machine in the list above the page's graph."""
     browser.driver.find_element(By.CSS_SELECTOR, "[aria-label='State machine to show']").click()
     line = "[...document.querySelectorAll('ul.choice li')].find((one) => one.textContent === arguments[0])"
     browser.until(f"return {line}", 10.0, name).click()

@@ -1,4 +1,4 @@
-"""After a stop: which one is acknowledged, the button that is held, and what begins a motion."""
+"""After a stop: acknowledgement, held button, and start of a motion."""
 
 import asyncio
 from dataclasses import replace
@@ -27,7 +27,7 @@ def test_a_stop_by_somebody_else_counts(desk):
     assert not desk.guard.unacknowledged  # the same stop
 
 
-def test_an_acknowledgement_names_its_stop_and_lifts_no_newer_one(desk):
+def test_acknowledgement_of_old_stop_does_not_lift_newer_stop(desk):
     stop = ask(desk, "a", "stop")["data"]["stop"]
     assert stop == newest(desk)
     desk.observe(True, "the arm is blocked: no datagrams")
@@ -46,7 +46,7 @@ def test_without_a_stop_nothing_is_acknowledged(desk):
     assert not answer["success"] and "no stop" in answer["message"]
 
 
-def test_a_fault_after_a_stop_is_a_stop_of_its_own_though_the_robot_never_moved(desk):
+def test_fault_after_stop_without_motion_counts_as_new_stop(desk):
     """STOP, acknowledged, `./coglab start reset`: the arm does not obey, and the machine goes from stopped to fault."""
     stands = Standstills()
     stands.arm(True)
@@ -61,7 +61,7 @@ def test_a_fault_after_a_stop_is_a_stop_of_its_own_though_the_robot_never_moved(
     assert told == ["stopped: STOP", "stopped: no command mode"]
 
 
-def test_a_stop_that_was_over_between_two_looks_counts(desk):
+def test_short_stop_between_two_polls_counts(desk):
     desk.observe(False, "")
     stands = Standstills()
     stands.arm(True)
@@ -70,7 +70,7 @@ def test_a_stop_that_was_over_between_two_looks_counts(desk):
     assert desk.guard.unacknowledged
 
 
-def test_a_hold_and_the_machine_that_stops_because_of_it_are_one_stop():
+def test_hold_and_resulting_machine_stop_count_as_one():
     stands = Standstills()
     stands.machine("/m/wait_without_object")
     stands.arm(True)
@@ -94,8 +94,8 @@ def test_a_held_button_begins_the_motion_once(desk):
     assert ask(desk, "a", "start", **RECEIVE)["success"]  # the next one needs a press only
 
 
-def test_a_button_that_is_still_held_while_its_command_is_carried_out_is_not_refused(desk):
-    """The state has changed by then, because of that very command."""
+def test_button_held_during_its_own_command_is_not_refused(desk):
+    """The command itself has changed the state by then."""
     clock = Clock()
     desk._held["a"] = HeldButton(clock)
     let = asyncio.Event()
@@ -125,7 +125,7 @@ def test_a_button_that_is_still_held_while_its_command_is_carried_out_is_not_ref
 
 
 def test_a_calibration_is_not_the_first_motion_after_a_stop(desk):
-    """It was held down itself; the arm moves by a held button all the same."""
+    """It needs its own held button, and the first motion of the arm still needs one."""
     ask(desk, "a", "stop")
     ask(desk, "a", "acknowledge", stop=newest(desk))
     (answer,) = hold_for(desk, 1.0, what=("calibrate", {"mode": "fast"}))
@@ -152,7 +152,7 @@ def test_a_held_button_with_gaps_starts_nothing(gap):
         clock.time += gap
 
 
-def test_another_action_begins_the_holding_anew():
+def test_holding_restarts_with_another_action():
     clock = Clock()
     button = HeldButton(clock)
     for what in "aaaaaabbbbbb":
@@ -180,8 +180,8 @@ def test_the_real_robot_and_calibrations_that_open_the_hand_need_a_held_button()
     assert plain.guarded("calibrate", {"mode": "complete"})
 
 
-def test_a_stop_that_was_lifted_in_a_terminal_is_said_to_be_over(desk):
-    """`./coglab hold`, `./coglab start reset`: the page does not ask for Go on, which nothing waits for any more."""
+def test_stop_lifted_in_a_terminal_is_shown_as_over(desk):
+    """After `./coglab hold` and `./coglab start reset` the page does not request Go on: nothing waits for it."""
     desk.observe(False, "")
     desk.observe(True, "the arm is blocked: hold is latched; when its cause is away, press Go on", 1)
     assert not shown(desk)["guard"]["lifted"] and "press Go on" in shown(desk)["guard"]["cause"]

@@ -1,4 +1,4 @@
-"""One console for each ROS master, also where the second one has another ROS_HOME or comes from another computer."""
+"""One console per ROS master, even if the second has another ROS_HOME or runs on another computer."""
 
 import contextlib
 import os
@@ -31,7 +31,7 @@ def serving(functions):
 
 @pytest.fixture
 def master():
-    """A ROS master as far as parameters go."""
+    """A ROS master that only has parameters."""
     values = {}
 
     def get(_caller, name):
@@ -68,13 +68,13 @@ def test_the_first_console_begins_and_the_second_is_told_where_the_first_is(mast
     look_for_another(master)  # it has ended
 
 
-def test_another_node_where_a_console_was_is_no_console(master):
+def test_other_node_at_the_address_of_a_console_is_not_a_console(master):
     with node(4711) as uri:
         master.values[PLACE] = [uri, 4712]
         look_for_another(master)
 
 
-def test_a_console_that_is_frozen_is_one(master):
+def test_frozen_console_counts_as_running(master):
     with socket.socket() as frozen:
         frozen.bind(("127.0.0.1", 0))
         frozen.listen()
@@ -83,7 +83,7 @@ def test_a_console_that_is_frozen_is_one(master):
             look_for_another(master)
 
 
-def test_one_that_is_just_ending_is_waited_for(master, monkeypatch):
+def test_start_waits_for_a_console_that_is_ending(master, monkeypatch):
     monkeypatch.setattr(startup, "PATIENCE", 10.0)
     with contextlib.ExitStack() as stack:
         uri = stack.enter_context(node(4711))
@@ -93,12 +93,12 @@ def test_one_that_is_just_ending_is_waited_for(master, monkeypatch):
 
 
 @pytest.mark.parametrize("value", ["x", 3, [], ["http://127.0.0.1:1/"], [3, 4], {"a": 1}, ["no address", 3], ["", 0]])
-def test_what_somebody_else_has_written_there_refuses_nobody(master, value):
+def test_foreign_value_of_the_parameter_refuses_no_console(master, value):
     master.values[PLACE] = value
     look_for_another(master)
 
 
-def test_without_a_master_nobody_is_refused_and_nothing_waits():
+def test_without_master_console_is_neither_refused_nor_delayed():
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         gone = f"http://127.0.0.1:{probe.getsockname()[1]}/"

@@ -54,7 +54,7 @@ async def test_of_two_operators_at_once_one_is_served_and_the_other_is_told_who_
             assert [status for status, _ in answers] == [200] * 5 + [409] * 5
             assert all("browser 1 is the operator" in answer["message"] for _, answer in answers[5:])
             assert len(console.robot.calls) == 5
-            # Held down by both at once: the one who watches begins nothing and is told why.
+            # Both hold at once: the observer starts nothing and gets the reason.
             console.desk.guard.stop("a test")
             console.desk.guard.acknowledge(console.desk.guard.stops)
             frame = json.dumps({"t": "hold", "id": 7, "name": "start", "arguments": RECEIVE})
@@ -201,7 +201,7 @@ async def test_whatever_the_depth_of_a_request_it_is_refused_in_words(console, c
         async with client.post(f"{console.url}/api/command", data=text, headers=console.headers) as answer:
             assert answer.status in (400, 409), (depth, answer.status, await answer.text())
             assert (await answer.json())["success"] is False
-        await asyncio.sleep(0.03)  # within the rate that one browser may ask at
+        await asyncio.sleep(0.03)  # within the request rate of one browser
 
 
 @served()

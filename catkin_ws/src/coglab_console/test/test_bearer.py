@@ -1,4 +1,4 @@
-"""Programs without a browser: a key for a one-time token, carried as Authorization: Bearer, and what is refused."""
+"""Programs without a browser: a key for a one-time token, sent as Authorization: Bearer, and refused requests."""
 
 import asyncio
 

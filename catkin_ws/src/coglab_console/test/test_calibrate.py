@@ -1,4 +1,4 @@
-"""Calibrating the hand: refused with the reason where the hand would refuse it, answered with what the hand says."""
+"""Calibration of the hand: refused with a reason if the hand would refuse it, else answered with its message."""
 
 import threading
 import time
@@ -26,13 +26,13 @@ FAST, FORCED = {"mode": "fast"}, {"mode": "complete", "force": True}
         ({"in_hub": False}, "under way", "under way"),
     ],
 )
-def test_it_is_refused_where_the_hand_would_refuse_it(change, plain, forced):
+def test_calibration_is_refused_if_the_hand_would_refuse_it(change, plain, forced):
     found = reasons(replace(Standing(**READY), **change), MotionGuard())
     for button, part in (("calibrate", plain), ("calibrate_complete", plain), ("calibrate_forced", forced)):
         assert (found[button] == "") == (part == "") and part in found[button], button
 
 
-def test_a_hand_that_is_calibrated_is_calibrated_again_by_force_alone(desk):
+def test_calibrated_hand_needs_force_to_calibrate_again(desk):
     desk.backend.now = replace(desk.backend.now, calibrated=True)
     assert "is calibrated" in ask(desk, "a", "calibrate", **FAST)["message"]
     (refused,) = hold_for(desk, 0.1, what=("calibrate", {"mode": "complete"}))
@@ -72,7 +72,7 @@ REFUSED = HandStatus(event_code=ReasonCode.HAND_REFUSED, message="calibration re
 BEGUN = HandStatus(calibrating=True, event_code=ReasonCode.HAND_STARTED, message="calibration complete started")
 
 
-def test_the_answer_is_what_the_hand_says(monkeypatch):
+def test_answer_is_the_message_of_the_hand(monkeypatch):
     hand = Hand(HandStatus(), REFUSED)
     answer = calibrated_by(hand, monkeypatch, **FAST)
     assert not answer["success"] and "may hold an object" in answer["message"] and hand.orders == ["fast"]
@@ -81,14 +81,14 @@ def test_the_answer_is_what_the_hand_says(monkeypatch):
     assert answer["success"] and "started" in answer["message"] and hand.orders == ["complete force"]
 
 
-def test_a_hand_that_says_nothing_is_told(monkeypatch):
+def test_silent_hand_is_reported(monkeypatch):
     answer = calibrated_by(Hand(), monkeypatch, **FAST)
     assert not answer["success"] and "has not answered" in answer["message"]
     answer = calibrated_by(Hand(connections=0), monkeypatch, **FAST)
     assert not answer["success"] and "not there" in answer["message"]
 
 
-def test_a_refusal_from_before_is_no_answer(monkeypatch):
+def test_earlier_refusal_is_not_taken_as_answer(monkeypatch):
     hand = Hand(REFUSED, REFUSED, BEGUN)
     hand.hand = REFUSED
     assert calibrated_by(hand, monkeypatch, **FAST)["success"]

@@ -1,5 +1,5 @@
-"""Every control of every page says why it is disabled, also to who only watches; what needs a second thought is held;
-what is silent is said; in a real browser with a double in place of the robot."""
+"""Every control of every page shows why it is disabled, also to observers. Risky commands need a held button. Silent
+sources are shown. In a real browser with a double of the robot."""
 
 import time
 from dataclasses import replace
@@ -19,7 +19,7 @@ FEEDBACK = {
         for name in ("yield", "limit")
     ],
 }  # fmt: skip
-# Every button that sends a command of the operator's, and what is said below it.
+# Every button that sends an operator's command, and the text below it.
 DISABLED = """
 return [...document.querySelectorAll('[aria-disabled=true]')].filter((one) => one.getClientRects().length)
   .map((one) => [one.getAttribute('aria-label') || one.labels?.[0]?.innerText || one.innerText,
@@ -38,7 +38,7 @@ OPERATORS = {
         "Object",
     },
     "Experiment": {"Begin the session"},
-    "Contact": {"Learn anew at rest", "Watch for contact", "Off"},
+    "Contact": {"Learn again at rest", "Watch for contact", "Off"},
     "Objects": {"Read the files again"},
     "Feedback": {"disable yield", "pause yield", "yield later", "limit earlier"},
     "Health": {"Complete calibration", "Forced calibration"},
@@ -72,7 +72,7 @@ def words_of(label):
     return " ".join(label.split())
 
 
-def test_who_watches_is_told_at_every_control_who_operates(desk):
+def test_every_control_shows_observers_who_operates(desk):
     with Browser() as other:
         other.open(desk.console.link())
         other.until("return document.getElementById('role').innerText.includes('you watch')", 60.0)
@@ -86,7 +86,7 @@ def test_who_watches_is_told_at_every_control_who_operates(desk):
             assert look(other)[0] == [], page
 
 
-def test_a_stop_shows_who_watches_its_cause_and_why_they_cannot_acknowledge_it(desk):
+def test_observers_see_cause_of_stop_and_why_they_cannot_acknowledge(desk):
     with Browser() as other:
         other.open(desk.console.link())
         desk.loop.call_soon_threadsafe(desk.console.desk.guard.stop, "the arm is blocked")
@@ -104,7 +104,7 @@ def test_a_stop_shows_who_watches_its_cause_and_why_they_cannot_acknowledge_it(d
     soon(lambda: not desk.console.desk.guard.unacknowledged)
 
 
-def test_what_is_not_possible_now_says_why_to_the_operator_in_every_tab(desk):
+def test_disabled_controls_show_the_operator_the_reason_in_every_tab(desk):
     page = desk.browser
     desk.robot.now = replace(desk.robot.now, manager_alive=False, detector_alive=False, database_alive=False)
     try:
@@ -137,13 +137,13 @@ def test_what_is_not_possible_now_says_why_to_the_operator_in_every_tab(desk):
     "tab, label, command",
     [
         ("Contact", "Watch for contact", "contact_arm"),
-        ("Contact", "Learn anew at rest", "contact_learn"),
+        ("Contact", "Learn again at rest", "contact_learn"),
         ("Objects", "Read the files again", "objects_reload"),
         ("Health", "Forced calibration", "calibrate"),
         ("Feedback", "disable", "feedback"),
     ],
 )
-def test_one_click_changes_no_threshold_and_opens_no_hand(desk, tab, label, command):
+def test_single_click_changes_no_threshold_and_opens_no_hand(desk, tab, label, command):
     page = desk.browser
     page.tab(tab)
     found = f"[...document.querySelectorAll('#page button')].find((one) => one.innerText === '{label}')"
@@ -169,7 +169,7 @@ def test_one_click_changes_no_threshold_and_opens_no_hand(desk, tab, label, comm
         ("contact", "Contact", "silent for 1.2 s"),
     ],
 )
-def test_a_row_of_what_is_silent_says_for_how_long(desk, source, row, words):
+def test_row_of_silent_source_shows_duration(desk, source, row, words):
     page = desk.browser
     shown = (
         "return [...document.querySelectorAll('#live dt')]"
@@ -184,14 +184,14 @@ def test_a_row_of_what_is_silent_says_for_how_long(desk, source, row, words):
     page.until(f"{shown}.includes('silent') === false", 3.0, row)
 
 
-def test_the_words_on_the_buttons_are_those_of_the_reasons(desk):
+def test_reasons_use_the_labels_of_the_buttons(desk):
     shown = desk.browser.js(
         "return [...document.querySelectorAll('[data-action]')].map((one) => [one.dataset.action, one.innerText])"
     )
     assert {name: words.split(" ", 1)[1] for name, words in shown} == BUTTONS
 
 
-def test_what_was_long_ago_says_when(desk):
+def test_old_values_show_their_age(desk):
     page = desk.browser
     contact = {**STATUS["contact"], "words": "contact by momentum, margin 2.2", "stamp": time.monotonic() - 12.0}
     desk.loop.call_soon_threadsafe(desk.console.documents.put, "status", {**STATUS, "contact": contact})

@@ -1,4 +1,4 @@
-"""Who may do what and when: roles, reasons, the list of commands, sessions; with a double of the robot."""
+"""Roles, reasons of refusals, the list of commands, sessions; with a double of the robot."""
 
 import time
 from dataclasses import replace
@@ -29,7 +29,7 @@ def test_everybody_stops_and_notes(desk):
     assert desk.backend.stops == ["a", "b"]
 
 
-def test_notes_and_the_next_object_are_told_to_ros_and_heard_from_there(desk):
+def test_notes_and_next_object_are_published_and_received(desk):
     assert ask(desk, "b", "note", text="hesitated")["success"]
     assert ask(desk, "a", "select_object", object_id="mug")["success"]
     assert desk.backend.told == [("note", "hesitated"), ("select_object", "mug")]
@@ -53,7 +53,7 @@ def test_notes_and_the_next_object_are_told_to_ros_and_heard_from_there(desk):
         ("objects_reload", {}),
     ],
 )
-def test_what_nobody_sees_at_once_is_held_down(desk, name, arguments):
+def test_changes_without_visible_effect_need_a_held_button(desk, name, arguments):
     """One click changes no feedback controller, also between trials."""
     assert "hold the button" in ask(desk, "a", name, **arguments)["message"] and not desk.backend.calls
     (answer,) = hold_for(desk, 1.0, what=(name, arguments))
@@ -77,7 +77,7 @@ def test_taking_over_is_announced_and_may_be_refused():
     assert roles.tick() and roles.operator == "b" and "b is the operator now" in said[-1]
 
 
-def test_two_who_want_to_operate_and_one_who_went_away():
+def test_two_browsers_want_to_operate_and_one_disconnects():
     clock = Clock()
     roles = Roles(lambda text, level: None, clock)
     for name in "abc":
@@ -94,8 +94,8 @@ def test_two_who_want_to_operate_and_one_who_went_away():
     assert not roles.tick() and roles.operator == "a"
 
 
-def test_the_role_of_an_operator_who_went_away_falls_free():
-    """Its browser was closed: whoever comes next operates, and who watches is told how to."""
+def test_role_of_absent_operator_becomes_free():
+    """Its browser was closed: the next browser operates, and observers see how to take over."""
     said, clock = [], Clock()
     roles = Roles(lambda text, level: said.append(text), clock)
     roles.connected("a")
@@ -138,8 +138,8 @@ def test_thresholds_do_not_change_under_way(desk):
         assert "under way" in ask(desk, "a", name, **arguments)["message"]
 
 
-def test_a_brain_that_is_silent_in_an_action_changes_no_threshold(desk):
-    """It may only be frozen, and go on."""
+def test_thresholds_stay_while_brain_is_silent_in_an_action(desk):
+    """The brain may only be frozen and continue later."""
     desk.backend.now = replace(desk.backend.now, in_hub=False, master_alive=False)
     for name, arguments in (("contact_arm", {"mode": "off"}), ("calibrate", {"mode": "fast"}), ("home", {})):
         assert "under way" in ask(desk, "a", name, **arguments)["message"]
@@ -164,12 +164,12 @@ def test_a_brain_that_is_silent_in_an_action_changes_no_threshold(desk):
         ("feedback", {"verb": "load", "name": "x"}),
     ],
 )
-def test_what_fits_no_schema_is_refused(name, arguments):
+def test_arguments_outside_the_schema_are_refused(name, arguments):
     with pytest.raises(BadCommand):
         judge(name, arguments)
 
 
-def test_an_action_of_a_user_may_be_asked_for_where_the_machine_takes_it_and_no_other_one(desk):
+def test_users_action_is_allowed_only_while_the_machine_accepts_it(desk):
     """A double of the robot that takes it now; a delivery goes along."""
     standing = desk.backend.standing()
     desk.backend.standing = lambda: replace(standing, actions=(*standing.actions, "polish"))

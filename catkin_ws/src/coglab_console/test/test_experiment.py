@@ -1,4 +1,4 @@
-"""The session of a console that was killed goes on in the next one; trials take what fits them; recorders are told."""
+"""The next console resumes the session of a killed one; trials accept only their actions; recorders get the names."""
 
 import itertools
 import time
@@ -54,7 +54,7 @@ def test_a_session_that_was_ended_or_is_old_does_not_go_on(tmp_path):
     later.experiment.begin("P08", ["a"], 1, "as_listed", 0)
 
 
-def test_a_file_that_cannot_be_read_again_is_told_and_the_console_begins(tmp_path):
+def test_damaged_session_file_is_reported_and_console_starts(tmp_path):
     begun(tmp_path)
     whole = (tmp_path / FILE).read_text()
     for text in (
@@ -71,8 +71,8 @@ def test_a_file_that_cannot_be_read_again_is_told_and_the_console_begins(tmp_pat
         assert event["level"] == "warning" and FILE in event["text"]
 
 
-def test_a_result_that_is_told_twice_counts_once(tmp_path):
-    """coglab/results is latched: a console that comes back hears the last one again."""
+def test_repeated_result_counts_once(tmp_path):
+    """coglab/results is latched: a restarted console receives the last result again."""
     desk = begun(tmp_path)
     result = {**ROW, "kind": RECEIVE, "outcome": "failed_empty"}
     desk.result(dict(result))
@@ -83,7 +83,7 @@ def test_a_result_that_is_told_twice_counts_once(tmp_path):
     assert "yet" in again.experiment.refusals()["trial_done"]
 
 
-def test_what_the_experimenter_says_of_a_trial_reaches_its_recording(tmp_path):
+def test_outcome_of_a_trial_reaches_its_recording(tmp_path):
     desk = begun(tmp_path)
     desk.experiment.trial_end("skipped")  # nothing was done in it, nothing was recorded
     desk.experiment.trial_begin()
@@ -102,7 +102,7 @@ def test_a_session_does_not_end_in_the_middle_of_a_trial(tmp_path):
     assert "closed" in session.end()
 
 
-def test_an_experiment_without_a_folder_begins(tmp_path):
+def test_experiment_starts_without_a_folder(tmp_path):
     session = Experiment(tmp_path / "gone", time.time, lambda text: None)
     assert session.resume() == ""
 
@@ -112,7 +112,7 @@ TIMES = itertools.count(10.0, 5.0)
 
 
 def results(desk, kind, outcome, held=""):
-    """The robot has done this, and its hand holds that."""
+    """Reports a result of the robot, and the object in its hand."""
     at = next(TIMES)
     desk.result({**ROW, "kind": kind, "outcome": outcome, "started": at, "ended": at + 1})
     desk.backend.now = replace(desk.backend.now, object_id=held, actions=(GIVE, "put") if held else (RECEIVE, "take"))
@@ -124,7 +124,7 @@ def opened(desk, *conditions):
 
 
 def test_a_trial_begins_with_the_hand_that_its_action_needs(desk):
-    """Also where a Latin square has Give before Receive: the hand is filled between the trials."""
+    """Also if a Latin square has Give before Receive: the hand is filled between the trials."""
     assert unprepared(order_of(["receive", "give"], 2, "latin_square", 1), held=False) == [1, 3]
     assert "before trial 1" in opened(desk, "give", "receive ball", "give slowly")["message"]
     refused = ask(desk, "a", "trial_begin")
@@ -152,7 +152,7 @@ def test_a_trial_takes_its_own_action_alone(desk):
     assert len(warned) == 1 and "Take" in warned[0]
 
 
-def test_only_what_has_succeeded_is_done(desk):
+def test_only_a_succeeded_trial_can_be_done(desk):
     desk.backend.now = replace(desk.backend.now, object_id="mug", actions=(GIVE, "put"))
     opened(desk, "give", "give slowly", "by hand")
     ask(desk, "a", "trial_begin")

@@ -1,4 +1,4 @@
-"""Events without a gap, states bounded: a browser that comes back misses nothing, one that never reads slows nobody."""
+"""Events without gaps, few queued states: a reconnecting browser misses no event; one that never reads slows none."""
 
 import asyncio
 import json
@@ -10,7 +10,7 @@ from coglab_console.web.fan_out import WINDOW, Client, Documents, to_json
 from console_double import running
 
 
-def test_events_are_numbered_and_what_is_lost_is_counted():
+def test_events_are_numbered_and_lost_ones_counted():
     log = EventLog(time.time, keep=10)
     for i in range(25):
         log.add("test", str(i))
@@ -37,8 +37,8 @@ def test_a_slow_client_gets_the_newest_state_and_every_event():
     assert client.states_dropped == 699
 
 
-def test_no_more_states_are_on_the_way_than_the_window_holds():
-    """What lies in the network's buffers is old when it comes: the next state goes when the last was taken."""
+def test_states_on_the_way_are_limited_by_the_window():
+    """States in the network's buffers become old, so the next state is sent after an acknowledgement."""
     log, documents = EventLog(time.time), Documents()
     client = Client("a", 0, documents, log)
     sent = []
@@ -58,7 +58,7 @@ def test_numbers_that_are_not_finite_become_null():
     assert to_json({"a": [float("nan"), 1.5], "b": float("inf")}) == '{"a":[null,1.5],"b":null}'
 
 
-def test_a_reconnect_has_no_gap(tmp_path):
+def test_reconnect_loses_no_event(tmp_path):
     async def read(ws, until):
         seen = []
         while not seen or seen[-1] < until:
@@ -86,7 +86,7 @@ def test_a_reconnect_has_no_gap(tmp_path):
 
 
 def deaf_browser(console, key):
-    """A WebSocket that shakes hands and then never reads; its buffer is small."""
+    """A WebSocket with a small buffer that never reads after its handshake."""
     deaf = socket.socket()
     deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
     deaf.connect(("127.0.0.1", console.port))

@@ -1,4 +1,4 @@
-"""Machines on this master as the page is told of them: the last transition with its reason, and what is missing."""
+"""State machines on this master as the page gets them: last transition, reason, and missing data."""
 
 import threading
 from types import SimpleNamespace
@@ -12,7 +12,7 @@ from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
 
 @pytest.fixture
 def told(monkeypatch):
-    """SmachGraphs without a master, and what it puts and says; its threads end with the test."""
+    """SmachGraphs without a master, with its documents and events; its threads end with the test."""
     over = threading.Event()
     monkeypatch.setattr(graph, "rospy", SimpleNamespace(is_shutdown=over.is_set, get_published_topics=lambda: []))
     found = SimpleNamespace(documents={}, said=[])
@@ -47,7 +47,7 @@ def test_a_transition_keeps_its_outcome_also_without_a_reason(told):
     assert (last(told)["outcome"], last(told)["reason"]) == ("failed", "no contact")
 
 
-def test_of_a_machine_that_tells_no_transitions_the_states_are_known(told):
+def test_states_are_known_without_published_transitions(told):
     structure(told)
     status(told, "A")
     status(told, "B")

@@ -1,4 +1,4 @@
-"""Keys and lists in a real browser: Space is STOP wherever the focus is; a choice is made, or taken back."""
+"""Keys and lists in a real browser: Space is STOP at any focus; a choice is made or restored."""
 
 import shutil
 import time
@@ -14,8 +14,8 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
 
-def test_a_choice_that_was_refused_says_why_and_is_taken_back(live):
-    """An observer's: the list of objects and the speed show what is, not what was wished."""
+def test_refused_choice_shows_reason_and_old_value(live):
+    """For an observer, the list of objects and the speed show the current value, not the wish."""
     objects = {"rows": [{"id": "ball", "name": "ball", "mass": 0.1, "text": ""}], "asked": True, "problems": []}
     live.loop.call_soon_threadsafe(live.console.documents.put, "objects", objects)
     with Browser() as page:

@@ -1,4 +1,4 @@
-"""The object of the next action: what was chosen, or what the trial of the session's order names, is in the request."""
+"""The request names the object of the next action: the chosen one, or that of the session's trial."""
 
 import time
 from dataclasses import replace
@@ -25,13 +25,13 @@ def stands(desk, held=""):
 
 
 def asked(desk, action, **more):
-    """What was asked of the machine."""
+    """The request to the machine."""
     answer = ask(desk, "a", "start", action=action, **more)
     assert answer["success"], answer
     return desk.backend.calls[-1][1]
 
 
-def test_what_is_chosen_while_the_hand_holds_another_is_asked_for_next(cell):
+def test_object_chosen_while_holding_another_is_requested_next(cell):
     stands(cell, "mug")
     assert ask(cell, "a", "select_object", object_id="ball")["success"]
     stands(cell, "mug")
@@ -41,20 +41,20 @@ def test_what_is_chosen_while_the_hand_holds_another_is_asked_for_next(cell):
     assert asked(cell, RECEIVE)["object_id"] == "ball"
 
 
-def test_what_was_in_the_hand_is_not_asked_for_again(cell):
+def test_given_object_is_not_requested_again(cell):
     stands(cell, "tea_box")
     stands(cell)
     assert asked(cell, RECEIVE)["object_id"] == ""
 
 
-def test_an_unknown_object_in_the_hand_is_named_by_the_choice(cell):
-    """After a restart nobody knows what the hand holds; the request says it."""
+def test_choice_names_an_unknown_object_in_the_hand(cell):
+    """After a restart the held object is unknown; the request names it."""
     stands(cell, "unknown")
     ask(cell, "a", "select_object", object_id="ball")
     assert asked(cell, GIVE)["object_id"] == "ball"
 
 
-def test_an_object_that_is_named_wins(cell):
+def test_object_named_in_the_request_has_priority(cell):
     ask(cell, "a", "select_object", object_id="ball")
     assert asked(cell, RECEIVE, object_id="mug")["object_id"] == "mug"
 
@@ -96,6 +96,6 @@ def test_a_trial_that_was_under_way_when_the_console_was_killed_names_its_object
     after = desk_in(tmp_path, lambda: time.time() + 1.0)
     after.connected("a")
     assert shown(after)["object"] == ""
-    # The database is asked a moment later.
+    # The database is read a moment later.
     stands(after)
     assert asked(after, RECEIVE)["object_id"] == "ball"

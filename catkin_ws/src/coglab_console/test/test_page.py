@@ -1,4 +1,4 @@
-"""The page in a real browser, a double in place of the robot: a dead connection, a slow computer, reasons, touch."""
+"""The page in a real browser with a double of the robot: dead connection, slow computer, reasons, touch."""
 
 import time
 
@@ -13,7 +13,7 @@ from page_double import IN_HAND, Desk, needs_browser
 pytestmark = needs_browser
 
 
-def test_a_connection_that_is_dead_but_open_is_given_up_and_no_event_is_lost(live):
+def test_dead_open_connection_is_replaced_without_losing_events(live):
     page = live.browser
     live.event("before")
     page.until("return coglab.events().some((e) => e.text === 'before')", 60.0)
@@ -42,7 +42,7 @@ def test_a_slow_page_shows_the_newest_state_and_every_event(live):
     assert sorted(ages)[2] < 1.0, ages
 
 
-def test_a_page_that_is_behind_says_by_how_much(live):
+def test_late_page_shows_its_delay(live):
     page = live.browser
     page.js("window.slow = 300")
     page.until("return /s behind/.test(document.getElementById('lost').textContent)", 60.0)
@@ -80,7 +80,7 @@ def test_a_click_on_a_disabled_button_says_why(live):
 
 
 def test_a_button_is_held_by_touch(live):
-    """As on a tablet: nothing comes of a short touch, something of a long one, nothing of one that slides away."""
+    """As on a tablet: a long touch starts the command; a short one, or one that slides off, does not."""
     page = live.browser
     live.loop.call_soon_threadsafe(live.console.desk.guard.stop, "a test")
     live.loop.call_soon_threadsafe(lambda: live.console.desk.guard.acknowledge(live.console.desk.guard.stops))
@@ -128,7 +128,7 @@ def test_a_tablet_has_stop_and_every_page_within_reach_of_a_finger(live):
         assert len(live.robot.stops) > before
 
 
-def test_a_computer_that_is_too_busy_is_said_on_every_page(live):
+def test_every_page_shows_an_overloaded_computer(live):
     page = live.browser
     live.put(busy="This computer is too busy", real_time_factor=0.5)
     page.until("return document.getElementById('busy').innerText.includes('too busy')", 60.0)
@@ -179,7 +179,7 @@ def test_diagnostics_are_a_tree_by_node_whose_branches_show_their_worst(live):
     page.tab("Live")
 
 
-def test_a_note_that_was_not_taken_stays_in_its_field_and_says_why(live):
+def test_refused_note_stays_in_its_field_with_the_reason(live):
     page = live.browser
     page.tab("Experiment")
     write = (
@@ -207,8 +207,8 @@ def test_without_graphviz_the_page_has_the_states_and_says_what_is_missing(live)
     assert "apt install graphviz" in words
 
 
-def test_the_way_to_the_active_state_ends_with_it_in_full(live):
-    """Where there is no room for all containers the outer ones give way."""
+def test_path_to_active_state_shows_its_name_in_full(live):
+    """Without room for all containers, the outer ones are left out."""
     leaf = "/M/exchange_human_to_robot/approach/arm_motion/wait_stop"
     picture = {**Layout("no-such-program").of({"/M": Container("/M", ("A",), ())}), "problem": "", "roots": ["/M"]}
     live.loop.call_soon_threadsafe(live.console.documents.put, "graph:/coglab", picture)
@@ -221,8 +221,8 @@ def test_the_way_to_the_active_state_ends_with_it_in_full(live):
 
 
 @pytest.mark.parametrize("promised", [False, True])
-def test_without_libjs_there_are_two_dimensions_and_a_sentence(tmp_path, promised):
-    """Also where a library was there when the console began, and half of it is not served."""
+def test_without_libjs_the_view_is_2d_with_a_message(tmp_path, promised):
+    """Also if a library existed when the console started but is only partly served."""
     live = Desk(tmp_path, {"three": promised, "charts": promised}, libraries=tmp_path)
     try:
         page = live.browser
@@ -238,8 +238,8 @@ def test_without_libjs_there_are_two_dimensions_and_a_sentence(tmp_path, promise
         live.close()
 
 
-def test_a_page_that_is_let_in_no_more_says_what_to_do_and_that_its_stop_went_nowhere(live):
-    """As after the console was killed and started anew, which knows no session of before."""
+def test_page_without_session_shows_what_to_do_and_that_stop_failed(live):
+    """As after a restart of the console, which does not know earlier sessions."""
     with Browser() as page:
         page.driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": IN_HAND})
         page.open(live.console.link())

@@ -1,4 +1,4 @@
-"""What is drawn: the graph by Graphviz and without it, the robot's kinematics, primitives and the path ahead, bytes."""
+"""Data of the drawings: graph with and without Graphviz, kinematics, primitives, path of the next motion, tf bytes."""
 
 import io
 import random
@@ -89,7 +89,7 @@ def test_the_document_of_the_robot():
         "<robot><link name='a'/><joint name='j' type='fixed'/></robot>",
     ],
 )
-def test_what_is_no_robot(text):
+def test_invalid_robot_descriptions_are_refused(text):
     with pytest.raises(ModelError):
         RobotModel(text)
 
@@ -153,7 +153,7 @@ MUG = {
 
 
 @pytest.mark.parametrize("name", sorted(path.stem for path in OBJECTS.glob("*.yaml")))
-def test_it_is_what_the_brain_asks_for(name):
+def test_predicted_goal_is_the_one_of_the_brain(name):
     """For every object of the database, and both roles: the goal that the state machines make."""
     from coglab_smach.kinematics.goals import delivery_goal, grasp_goal
 
@@ -175,7 +175,7 @@ def test_it_is_what_the_brain_asks_for(name):
     "entry",
     [{}, {"grasps": None}, {**MUG, "frame": None, "dmp": 3}, {**MUG, "grasps": {"side": {"pose": {"xyz": "x"}}}}],
 )
-def test_nobody_knows_where(entry):
+def test_unknown_goal_gives_no_path(entry):
     assert path_ahead.aim("take", entry, "human_hand") is None
 
 
@@ -224,7 +224,7 @@ def test_bytes_against_the_messages_own_decoding():
     assert found[2] == ("world", "child_2", 5.25, (2.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0))
 
 
-def test_bytes_that_are_none_are_refused():
+def test_invalid_bytes_are_refused():
     chance = random.Random(6)
     for size in (0, 3, 4, 20, 100):
         for _ in range(200):

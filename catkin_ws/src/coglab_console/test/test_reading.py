@@ -1,5 +1,5 @@
-"""Whoever looks can read all of it: the last event with its reason, what is waited for, why the robot stands still.
-What has no room is shown in full by focus and by the mouse. In a real browser with a double in place of the robot."""
+"""All texts can be read: last event with its reason, condition of a wait, cause of a standstill. Focus and mouse unfold
+texts that are cut off. In a real browser with a double of the robot."""
 
 import time
 
@@ -71,7 +71,7 @@ def stopped(live):
 
 
 @pytest.mark.parametrize("moment", [in_the_middle_of_a_reach, stopped])
-def test_nothing_is_cut_off_that_cannot_be_read_in_full(live, moment):
+def test_every_cut_off_text_can_be_unfolded(live, moment):
     """Least of all the reason of the last event: its first words stand in the column, without a press of any key."""
     page = live.browser
     reason = moment(live)
@@ -103,7 +103,7 @@ def test_a_tablet_shows_the_whole_column_also_when_it_is_turned(live):
         assert look(tablet)[0] == []
 
 
-def test_what_is_cut_off_unfolds_under_the_mouse_and_covers_nothing_that_is_pressed(live):
+def test_cut_off_text_unfolds_under_mouse_without_blocking_buttons(live):
     page = live.browser
     stopped(live)
     height = "return document.getElementById('log').getBoundingClientRect().height"
@@ -121,7 +121,7 @@ def test_what_is_cut_off_unfolds_under_the_mouse_and_covers_nothing_that_is_pres
     page.until(f"{height} === arguments[0]", 60.0, folded)
 
 
-def test_an_event_that_comes_while_one_reads_takes_the_focus_nowhere(live):
+def test_new_event_does_not_move_the_focus(live):
     page = live.browser
     stopped(live)
     page.until("return document.getElementById('log-place').tabIndex === 0", 60.0)

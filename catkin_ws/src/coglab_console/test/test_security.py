@@ -1,4 +1,4 @@
-"""Each row of the security table, and the limits: what is not allowed is refused in words and reaches no robot."""
+"""Each row of the security table, and the limits: forbidden requests are refused with a message and reach no robot."""
 
 import asyncio
 import json

@@ -1,4 +1,4 @@
-"""How the node begins: its port, the one console of a ROS master, the link that only its user can read."""
+"""Start of the node: its port, one console per ROS master, a link that only its user can read."""
 
 import asyncio
 import socket
@@ -28,14 +28,14 @@ def test_a_taken_default_port_gives_way_to_another():
     other.close()
 
 
-def test_a_taken_port_that_was_asked_for_is_refused_in_words():
+def test_taken_requested_port_is_refused_with_a_message():
     other = taken_port()
     with pytest.raises(StartError, match="choose another console_port"):
         bind("127.0.0.1", other.getsockname()[1], fixed=True)
     other.close()
 
 
-def test_an_address_that_is_not_this_computers_is_refused():
+def test_address_of_another_computer_is_refused():
     with pytest.raises(StartError, match="203.0.113.1"):
         bind("203.0.113.1", 0, fixed=True)
 
@@ -55,7 +55,7 @@ def test_one_console_for_each_master(tmp_path, monkeypatch):
     only_one(tmp_path)
 
 
-def test_the_link_is_its_users_alone(tmp_path):
+def test_only_the_user_can_read_the_link(tmp_path):
     said = []
     node = SimpleNamespace(
         address="127.0.0.1",
@@ -74,7 +74,7 @@ def test_the_link_is_its_users_alone(tmp_path):
     assert ConsoleNode.write_link(node).startswith("http://127.0.0.1:8790/?t=") and said
 
 
-def test_a_loop_that_has_ended_takes_nothing_more():
+def test_calls_after_the_end_of_the_loop_are_ignored():
     loop = asyncio.new_event_loop()
     loop.close()
     ConsoleNode.soon(SimpleNamespace(loop=loop), print)

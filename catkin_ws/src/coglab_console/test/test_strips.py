@@ -1,5 +1,5 @@
-"""What the strip charts show is what was sent: values, planned speed, limit, order of the fingers, phases, one axis;
-and no two series of a strip look alike but for their colour. In a real browser with a double in place of the robot."""
+"""The strip charts show the sent data: values, planned speed, limit, order of the fingers, phases, one axis. Series of
+a strip differ by more than colour. In a real browser with a double of the robot."""
 
 import time
 from pathlib import Path
@@ -54,7 +54,7 @@ def test_each_value_is_the_one_that_was_sent(desk):
     # The limit is that of the joints that count; one that is not watched limits nothing.
     desk.state = {**SENT, "watched": [False] * 4 + [True, True, False]}
     until_shown(desk, [SHOWN[0], [0.01, 0.02, 0.04, 0.2], *SHOWN[2:]])
-    # What is not known is no zero.
+    # Unknown values are not shown as zero.
     desk.state = {**SENT, "rate": [], "threshold": [], "watched": [], "fri": None, "answer": None, "current": []}
     until_shown(desk, [SHOWN[0], [None] * 4, [None] * 2, [None] * 5])
     desk.state = {}
@@ -109,7 +109,7 @@ def test_bars_are_the_phases_and_lie_on_the_axis_of_the_charts(desk):
     desk.state = {}
 
 
-def test_no_two_series_of_a_strip_are_told_by_their_colour_alone(desk):
+def test_series_of_a_strip_differ_by_more_than_colour(desk):
     page = desk.browser
     strips = page.js("return coglab.strips().map(({ series, drawn }) => [series, drawn])")
     legend = page.js(

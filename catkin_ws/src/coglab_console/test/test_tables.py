@@ -1,5 +1,4 @@
-"""Topics that become tables of the page: who changed which reference by how much, why a controller is paused, and what
-the recogniser believes."""
+"""Tables of the page from topics: corrections per controller, reasons of pauses, and the recogniser's estimate."""
 
 import math
 import time
@@ -66,7 +65,7 @@ def test_controllers_with_their_pauses_and_recognition_with_its_confidences(show
     }  # fmt: skip
 
 
-def test_a_computer_that_is_too_busy_is_said_beside_everything_else(shown):
+def test_overloaded_computer_is_reported_with_many_diagnostics(shown):
     table, documents = shown
 
     def tell(name, level, message):
@@ -83,7 +82,7 @@ def test_a_computer_that_is_too_busy_is_said_beside_everything_else(shown):
 
 
 def test_latency_and_answer_time_are_those_that_the_bridge_names(shown):
-    """The keys of lwr_fri_bridge/src/ros/bridge_diagnostics.cpp; another one is shown as no number."""
+    """The keys of lwr_fri_bridge/src/ros/bridge_diagnostics.cpp; other keys give no number."""
     table, _ = shown
 
     def tell(**values):

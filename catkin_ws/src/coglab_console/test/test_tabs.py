@@ -1,5 +1,5 @@
-"""What the pages Feedback, Primitives, Objects and Contact show is what was sent, in words and numbers; in a real
-browser with a double in place of the robot."""
+"""The pages Feedback, Primitives, Objects and Contact show the sent data in words and numbers; in a real browser with
+a double of the robot."""
 
 import time
 
@@ -49,9 +49,9 @@ def test_feedback_controllers_by_order_with_activity_pauses_and_who_changed_what
     assert page.js("return document.getElementById('feedback-profile').innerText") == "Profile: approach"
     assert page.js(TABLE, 1) == [["yield", "velocity", "0.0125", "0.034"], ["limit", "stiffness", "12.5", "0"]]
     assert "yield: force 3.25 N, offset 0.004 m" in page.js("return document.getElementById('page').innerText")
-    # Another order is another table, and nobody's correction is said to be nobody's.
+    # Another order gives another table, and a cycle without corrections is shown as such.
     live.put(feedback={"profile": "", "rows": [limit, yields]}, attribution={"rows": [], "inside": []})
-    page.until("return document.getElementById('page').innerText.includes('Nobody changed a reference.')", 60.0)
+    page.until("return document.getElementById('page').innerText.includes('No controller changed a reference.')", 60.0)
     assert [row[:2] for row in page.js(TABLE, 0)] == [["1", "limit"], ["2", "yield"]]
     assert page.js("return document.getElementById('feedback-profile').innerText") == "Profile: none"
     page.tab("Live")
@@ -102,10 +102,10 @@ def test_objects_with_what_the_database_has_against_a_file(live):
     assert page.js("return document.querySelector('#page pre').innerText").strip() == "id: mug"
     live.put(objects={"rows": rows, "asked": True, "problems": []})
     page.until(
-        "return document.getElementById('object-problems').innerText.includes('2 objects, every file fits')", 10.0
+        "return document.getElementById('object-problems').innerText.includes('2 objects, every file is valid')", 10.0
     )
     live.put(objects={"rows": [], "asked": False, "problems": []})
-    page.until("return document.getElementById('object-problems').innerText.includes('has not been asked')", 60.0)
+    page.until("return document.getElementById('object-problems').innerText.includes('was not read yet')", 60.0)
     page.tab("Live")
 
 
@@ -140,7 +140,7 @@ def test_contact_by_joint_against_its_threshold_and_learning(live):
     page.until(f"{words}.includes('Learning; leave the arm alone: 12 samples')", 60.0)
     page.until(f"{words}.includes('Armed for contact; waits until the arm stands still')", 60.0)
     button = page.js(
-        "return [...document.querySelectorAll('#page button')].find((b) => b.innerText === 'Learn anew at rest')"
+        "return [...document.querySelectorAll('#page button')].find((b) => b.innerText === 'Learn again at rest')"
     )
     press_and_hold(page, button, lambda: live.robot.calls == [("contact_learn", {})])
     live.state = {}

@@ -1,4 +1,4 @@
-"""What the node makes of the robot's messages for the page, without a ROS master."""
+"""Conversion of the robot's messages for the page, without a ROS master."""
 
 import io
 from pathlib import Path
@@ -30,7 +30,7 @@ URDF = Path(__file__).resolve().parents[2] / "lwr_description" / "urdf" / "lwr_i
 
 
 class Subscriber:
-    """One that is connected."""
+    """A connected subscriber."""
 
     def __init__(self, *_arguments, **_options):
         pass
@@ -41,7 +41,7 @@ class Subscriber:
 
 @pytest.fixture
 def seen(monkeypatch):
-    """A view, the documents that it puts and the events that it says."""
+    """A view with its documents and events."""
     documents, events = {}, []
     monkeypatch.setattr(ros_view.rospy, "Subscriber", Subscriber)
     monkeypatch.setattr(ros_view.rospy, "get_time", lambda: 100.0)
@@ -58,7 +58,7 @@ def seen(monkeypatch):
     "power, on", [(0x7F, True), (0xFF, True), (0xFFFF, True), (0x3F, False), (0x80, False), (0, False)]
 )
 def test_all_drives_are_on_where_each_joint_has_its_bit(seen, power, on):
-    """Further bits of the word say something else."""
+    """Further bits have other meanings."""
     view, _, _ = seen
     view._on_arm(LwrState(power=power))
     assert view.status()["arm"]["power"] is on
@@ -85,8 +85,8 @@ TOPICS = {
 
 
 @pytest.mark.parametrize("source", TOPICS)
-def test_what_has_fallen_silent_is_said_within_a_second(seen, monkeypatch, source):
-    """Connected, as a program that is frozen; the others go on."""
+def test_silent_source_is_reported_within_a_second(seen, monkeypatch, source):
+    """The source is still connected, like a frozen program; the others continue."""
     view, _, _ = seen
     clock = [1000.0]
     monkeypatch.setattr(ros_view.time, "monotonic", lambda: clock[0])
@@ -100,7 +100,7 @@ def test_what_has_fallen_silent_is_said_within_a_second(seen, monkeypatch, sourc
     assert list(view.frame()["silent"]) == [source] and view.frame()["silent"][source] > 1.0
 
 
-def test_nothing_of_an_arm_that_is_silent_is_shown_as_news(seen, monkeypatch):
+def test_values_of_a_silent_arm_are_not_shown_as_new(seen, monkeypatch):
     view, _, _ = seen
     clock = [1000.0]
     monkeypatch.setattr(ros_view.time, "monotonic", lambda: clock[0])
@@ -111,7 +111,7 @@ def test_nothing_of_an_arm_that_is_silent_is_shown_as_news(seen, monkeypatch):
     view._on_joints(JointState(name=["lwr_a1"], position=[0.1]))
     assert (view.frame()["fri"], view.frame()["answer"], view.frame()["live"]) == (1.0, 2.0, True)
     clock[0] += 1.0
-    # As from joint_state_publisher, which says the last positions of a silent arm again.
+    # As from joint_state_publisher, which repeats the last positions of a silent arm.
     view._on_joints(JointState(name=["lwr_a1"], position=[0.1]))
     frame = view.frame()
     assert (frame["fri"], frame["answer"], frame["speed"], frame["live"]) == (None, None, None, False)
@@ -141,7 +141,7 @@ def test_a_transition_belongs_to_the_phase_that_has_ended(seen):
         (ReasonCode.HELD, "warning"),
     ],
 )
-def test_a_motion_that_was_to_end_is_no_warning(seen, code, level):
+def test_requested_end_of_a_motion_is_not_a_warning(seen, code, level):
     """The brain cancels the reach when something touches the hand: that is how an exchange succeeds."""
     view, _, events = seen
     view._on_dmp(DmpFeedback(state="aborted", reason_code=code, reason="something touches the hand"))
@@ -150,7 +150,7 @@ def test_a_motion_that_was_to_end_is_no_warning(seen, code, level):
 
 
 def tf_of(*children, stamp=100.0):
-    """As it comes: nothing but its bytes."""
+    """A tf message as raw bytes."""
     frames = [TransformStamped(child_frame_id=child) for child in children]
     for frame in frames:
         frame.header.frame_id, frame.header.stamp = "world", Time(stamp)
@@ -161,7 +161,7 @@ def tf_of(*children, stamp=100.0):
 
 
 def test_the_picture_follows_its_frames_beside_a_motion_capture_system(seen):
-    """Hundreds of markers and of joints of other robots, told first and over and over."""
+    """Hundreds of markers, and of joints of other robots, are published first and repeatedly."""
     view, _, _ = seen
     view.entry = lambda: {"frame": "object_mug"}
     view.named |= {"object_mug"}
@@ -204,7 +204,7 @@ def test_a_path_of_a_controller_that_fell_silent_is_over(seen, monkeypatch):
     assert not view.path_runs()
 
 
-def test_what_is_no_path_is_not_drawn(seen):
+def test_invalid_path_is_not_drawn(seen):
     view, _, _ = seen
     elsewhere = path_of("x", (0.1, 0, 0.3), (0.4, 0, 0.3))
     elsewhere.header.frame_id = "somewhere"

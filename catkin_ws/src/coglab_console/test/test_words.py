@@ -1,4 +1,4 @@
-"""What an experimenter reads: no name of a state, an action, a command or a service; every phase has words."""
+"""The experimenter reads no names of states, actions, commands or services; every phase has words."""
 
 import pytest
 from coglab_console.desk import words

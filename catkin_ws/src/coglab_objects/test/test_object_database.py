@@ -1,4 +1,4 @@
-"""The object database: the sample objects are good, bad files are refused with file, line and field, the old
+"""The object database: the shipped objects are valid; invalid files are refused with file, line and field, and the old
 entry stays."""
 
 import os
@@ -30,7 +30,7 @@ def test_five_sample_objects_without_a_problem():
         (("mass: 0.31\n", ""), "mug.yaml:2: top level: 'mass' is a required property"),
         (("friction: 0.6", "friction: 0.6\nfrction: 0.6"), "'frction' was unexpected"),
         (("mode: cylindrical", "mode: claw"), "grasps.side.hand.mode: 'claw' is not one of"),
-        (("default_grasp: side", "default_grasp: top"), "default_grasp: 'top' is none of grasps: side"),
+        (("default_grasp: side", "default_grasp: top"), "default_grasp: 'top' is not among the grasps: side"),
         (("[0.5, 0.5, 0.5, 0.5]", "[0, 0, 0, 0]"), "a quaternion of zeros has no direction"),
         (("xyz: [0.0, -0.04, 0.07]", "xyz: [0.0, -40.0, 0.07]"), "more than 1 m away; lengths are in m"),
         (("axis: [0.0, 1.0, 0.0]", "axis: [0.0, 0.0, 0.0]"), "a direction must not be zero"),

@@ -1,4 +1,4 @@
-"""The database's node beside a parameter server that takes what XML-RPC takes: no file ends it or its timer."""
+"""The database's node with a parameter server that accepts only XML-RPC types: no file ends the node or its timer."""
 
 import importlib.util
 import shutil
@@ -78,7 +78,7 @@ def hostile(folder):
         (folder / f"{name}.yaml").write_text(good.replace("mass: 0.31", "mass: .nan") if text is None else text)
 
 
-def test_what_an_earlier_run_left_is_gone(make):
+def test_entries_of_an_earlier_run_are_removed(make):
     assert make().master.objects() == ["ball", "mug"]
 
 
@@ -106,7 +106,7 @@ def test_deleted_objects_leave_the_parameter_server_and_only_changes_go_there(ma
     assert started.master.calls == before
 
 
-def test_a_master_that_is_away_is_caught_up_with(make):
+def test_copy_is_updated_when_the_master_is_back(make):
     started = make()
     started.master.down = True
     (started.folder / "mug.yaml").unlink()
@@ -119,7 +119,7 @@ def test_a_master_that_is_away_is_caught_up_with(make):
     assert started.master.objects() == ["ball"]
 
 
-def test_an_unexpected_error_is_told_and_the_timer_goes_on(make, monkeypatch):
+def test_unexpected_error_is_logged_and_the_timer_continues(make, monkeypatch):
     started = make()
     monkeypatch.setattr(started.node.database, "changed", lambda: 1 / 0)
     started.node.on_timer()

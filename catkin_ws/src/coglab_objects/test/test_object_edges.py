@@ -1,4 +1,4 @@
-"""The object database at its edges: lengths that are just right, files that come, go or stay, a folder that is none."""
+"""Edge cases of the object database: lengths at the tolerance, added and removed files, a missing folder."""
 
 import os
 
@@ -14,13 +14,13 @@ TEXTS = {name: (objects_folder() / f"{name}.yaml").read_text() for name in ("mug
 
 
 def changed(name, before, after):
-    """An object of those that are shipped with one thing changed."""
+    """A shipped object with one change."""
     assert before in TEXTS[name]
     return TEXTS[name].replace(before, after)
 
 
 def refusal(text, name="mug"):
-    """What is said of a text, behind the file's name and line; empty if it is taken."""
+    """The error for a text, without file name and line; empty if the text is valid."""
     try:
         parse_object(text, f"{name}.yaml")
     except ObjectError as error:
@@ -48,7 +48,7 @@ def test_an_approach_without_an_axis_and_a_grasp_without_an_approach_are_taken()
     assert refusal(changed("mug", line, "")) == ""
 
 
-def test_a_folder_that_is_none_is_told_and_what_was_read_stays(tmp_path):
+def test_missing_folder_is_reported_and_old_entries_stay(tmp_path):
     folder = tmp_path / "objects"
     folder.mkdir()
     write(folder / "mug.yaml", TEXTS["mug"], 1)
@@ -62,7 +62,7 @@ def test_a_folder_that_is_none_is_told_and_what_was_read_stays(tmp_path):
     assert database.reload() == [] and database.problems == []
 
 
-def test_all_is_read_again_unless_only_what_has_changed_is_asked_for(tmp_path):
+def test_reload_reads_all_files_or_only_changed_ones(tmp_path):
     path = tmp_path / "mug.yaml"
     write(path, TEXTS["mug"], 1)
     database = ObjectDatabase(tmp_path)

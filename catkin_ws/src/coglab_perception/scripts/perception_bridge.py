@@ -1,9 +1,9 @@
 #!/usr/bin/python3
-"""The node /perception for somebody's tracker: passes its poses on as the frames of the perception contract.
+"""The node /perception for a real tracker: publishes its poses as the frames of the perception contract.
 
 Subscribes tf and the topics of the mapping file. Broadcasts human_hand, object_<id> and board in ``world``, stamped
 with the time of capture. Serves ~init_vision, ~locate_object, ~free_places. Poses that are too old, not finite, from
-the future, or in a frame that does not reach ``world`` are not passed on, and named once every 5 s.
+the future, or in a frame that does not reach ``world`` are dropped, with a warning at most every 5 s per frame.
 
 Parameters: perception/frames (mapping of frames.yaml); private: mapping (file, see config/perception_bridge.yaml).
 """
@@ -32,7 +32,7 @@ from coglab_py.pose import Pose
 from geometry_msgs.msg import PoseStamped
 from visualization_msgs.msg import Marker, MarkerArray
 
-TF_PERIOD = 0.01  # s between two looks at the tracker's tf frames
+TF_PERIOD = 0.01  # s between two reads of the tracker's tf frames
 AHEAD = 0.05  # s, largest difference of synchronised clocks
 DATABASE_WAIT = 60.0  # s
 QUIET = 5.0  # s between two warnings about the same frame
@@ -57,7 +57,7 @@ class BridgeNode:
         self.listener = TfListener(self.buffer, self.names.world)
         self.broadcaster = tf2_ros.TransformBroadcaster()
         self.static = tf2_ros.StaticTransformBroadcaster()
-        self._captured: dict[str, float] = {}  # s, by frame: newest capture that was passed on
+        self._captured: dict[str, float] = {}  # s, by frame: capture of the newest published pose
         self._tf_stamps: dict[str, float] = {}  # s, by frame: newest stamp of its tf frame
         self._warned: dict[str, float] = {}
         markers: dict[str, list[Source]] = {}
@@ -85,7 +85,7 @@ class BridgeNode:
         for source in self.mapping.sources:
             if source.frame not in frames | {self.names.human_hand, self.names.board}:
                 rospy.logwarn(
-                    f"{source.frame} of the mapping is of no object in the database; it has: {', '.join(known)}"
+                    f"{source.frame} of the mapping belongs to no object of the database; it has: {', '.join(known)}"
                 )
 
     # -- seeing ----------------------------------------------------------------------------------
@@ -95,7 +95,7 @@ class BridgeNode:
         self._take(source, message.header.frame_id, message.header.stamp, pose_of(message.pose))
 
     def on_markers(self, sources: list[Source], message: MarkerArray) -> None:
-        """Takes those of the markers that the mapping names."""
+        """Takes the markers that the mapping names."""
         found = {(marker.ns, marker.id): marker for marker in message.markers if marker.action == Marker.ADD}
         for source in sources:
             marker = found.get(source.marker)  # type: ignore[arg-type]
@@ -159,7 +159,7 @@ class BridgeNode:
         self.sights.add([sight])
 
     def _see_board(self, sight: Sight, broadcast: bool) -> None:
-        """The board stands still: it is broadcast when it is first seen, and when it has moved."""
+        """Broadcasts the board when it is first seen and when it has moved."""
         known = self.sights.board
         if known is None or max(known.frame.distance(sight.frame)) > BOARD_MOVED:
             self.sights.board = Board(sight.frame, self.mapping.slots)

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
-"""The node /person_points: where the person is, for the manager SafeDistance.
+"""The node /person_points: publishes the person's position, for the manager SafeDistance.
 
 Publishes person/<frame> (geometry_msgs/PoseStamped, in the base frame of the arm) for each tracked frame of the person
-in tf, with each new sight of the tracker, stamped with the time of capture. Parameters (private): frames (names; the
+in tf, at each new sight of the tracker, stamped with the time of capture. Parameters (private): frames (names; the
 default is the person's hand of the perception contract), base (frame of the arm's base, lwr_base_link).
 """
 
@@ -19,13 +19,13 @@ from coglab_py import parameters, steady
 from coglab_py.alone import init_node
 from geometry_msgs.msg import Point, PoseStamped
 
-NAME = re.compile("[A-Za-z][A-Za-z0-9_]*")  # a frame that is the name of a topic, too
-PERIOD = 0.01  # s between two looks at tf
+NAME = re.compile("[A-Za-z][A-Za-z0-9_]*")  # frames whose name can be part of a topic's name
+PERIOD = 0.01  # s between two reads of tf
 QUIET = 10.0  # s between two warnings about the same frame
 
 
 class PersonPointsNode:
-    """ROS interface between tf and the topics of the robot's file of signals."""
+    """Converts tf frames to the topics in the robot's signals file."""
 
     def __init__(self) -> None:
         names = FrameNames.from_mapping(
@@ -47,7 +47,7 @@ class PersonPointsNode:
         steady.SteadyTimer(PERIOD, self.look, "tf")
 
     def look(self) -> None:
-        """Publishes what is new in tf."""
+        """Publishes new transforms."""
         for frame, topic in self.points.items():
             try:
                 seen = self.buffer.lookup_transform(self.base, frame, rospy.Time(0))

@@ -3,8 +3,8 @@
 
 Usage: train_patterns.py -o patterns.json NAME=FILE.csv[,FILE.csv...] ...
 Each CSV holds one reach: a header line, then t,x,y,z[,...] in s and m (robot base frame), with at least 0.4 s of rest
-before the reach. A recording that goes less than 0.05 m, or faster than 5 m/s between two samples, is refused; --allow
-short and --allow jump take it all the same. Exit status: 0 well, 1 the recordings cannot be used, 2 usage.
+before the reach. A recording shorter than 0.05 m, or faster than 5 m/s between two samples, is refused unless --allow
+short or --allow jump is given. Exit status: 0 done, 1 the recordings cannot be used, 2 wrong usage.
 """
 
 import argparse
@@ -29,10 +29,14 @@ def read(path: str, allow: Sequence[str] = ()) -> tuple[np.ndarray, np.ndarray]:
     times, positions = data[:, 0], data[:, 1:4]
     far = np.linalg.norm(positions - positions[0], axis=1).max()
     if far < SHORTEST and "short" not in allow:
-        raise ValueError(f"{path}: goes {far:.3f} m, expected at least {SHORTEST} m; cut it anew, or --allow short")
+        raise ValueError(
+            f"{path}: the reach is {far:.3f} m long, expected at least {SHORTEST} m; cut it again, or use --allow short"
+        )
     fastest = (np.linalg.norm(np.diff(positions, axis=0), axis=1) / np.diff(times)).max()
     if fastest > FASTEST and "jump" not in allow:
-        raise ValueError(f"{path}: {fastest:.1f} m/s between two samples, expected {FASTEST} at most; or --allow jump")
+        raise ValueError(
+            f"{path}: {fastest:.1f} m/s between two samples, expected at most {FASTEST}; repair it, or use --allow jump"
+        )
     return times, positions
 
 

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The perception bridge with a tracker of its own frames and topics, which a bag plays."""
+"""The perception bridge with a tracker, played from a bag, that has its own frames and topics."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def stamped(kind, stamp, place, **fields):
 
 
 def write_bag(path):
-    """Two minutes of a tracker, as it was years ago."""
+    """Writes two minutes of a tracker with stamps of years ago."""
     with rosbag.Bag(path, "w") as bag:
         for i in range(3600):
             stamp = rospy.Time.from_sec(1.6e9 + i / 30.0)
@@ -89,7 +89,7 @@ class Bridge(unittest.TestCase):
         """Play the bag."""
         cls = type(self)
         command = ["rosbag", "play", "--quiet", str(self.bag)]
-        # A group of its own, because `rosbag play` starts another program.
+        # In its own process group, because `rosbag play` starts another program.
         cls.player = subprocess.Popen(command, stdin=subprocess.DEVNULL, start_new_session=True)
         answer = self.services["init_vision"](LIMIT)
         self.assertTrue(answer.success, answer.message)
@@ -124,12 +124,12 @@ class Bridge(unittest.TestCase):
         answer = self.services["free_places"]("mug", 10.0)
         self.assertEqual((answer.success, answer.message), (True, "A2"))
 
-    def test_d_poses_that_are_none_are_not_passed_on(self):
+    def test_d_invalid_poses_are_dropped(self):
         answer = self.services["locate_object"]("ball", 0.2)
         self.assertEqual((answer.success, answer.reason_code), (False, ReasonCode.OBJECT_NOT_SEEN))
         self.assertFalse(self.buffer.can_transform("world", "object_ball", rospy.Time(0)))
 
-    def test_e_a_tracker_that_stops_is_seen_no_more(self):
+    def test_e_stopped_tracker_has_no_frames_in_view(self):
         self.stop_playing()
         for each in ("mug", "human_hand"):
             self.assertTrue(wait_for(lambda e=each: not self.services["locate_object"](e, 0.0).success, LIMIT), each)

@@ -89,7 +89,7 @@ def place_of(kind: str, rest: np.ndarray, side: float, rng: np.random.Generator)
 
 
 def other_motion(kind: str, rng: np.random.Generator, begin: float = 1.5) -> Motion:
-    """One of a kind by somebody new, beginning at ``begin`` s, there and back."""
+    """A motion of a kind by a newly drawn person, beginning at ``begin`` s, there and back."""
     side = -1.0 if rng.random() < 0.1 else 1.0
     rest = START * [1.0, side, 1.0] + rng.normal(0.0, 0.02, 3)
     place = place_of(kind, rest, side, rng)

@@ -1,4 +1,4 @@
-"""The belief about offers and requests: early and settled, withdrawn and fallen objects, and sights that are none."""
+"""Belief in offers and requests: early and settled predictions, withdrawn and fallen objects, invalid sights."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def there(t: float) -> np.ndarray:
 
 
 def and_back(t: float, at: float = OVER + 0.6, way: float = 1.0) -> np.ndarray:
-    """The same, and from `at` on back."""
+    """The same reach, but the hand goes back from `at` on."""
     return there(t) + way * (START - END) * share((t - at) / TIME)
 
 
@@ -73,7 +73,7 @@ class Scene:
 
 
 def steps(beliefs: list[Belief]) -> list[float]:
-    """How far the predicted place goes from sight to sight, in standard deviations."""
+    """Change of the predicted place from sight to sight, in standard deviations."""
     return [
         float(np.linalg.norm(b.place - a.place)) / math.sqrt(np.trace(a.covariance))
         for a, b in zip(beliefs, beliefs[1:], strict=False)
@@ -158,7 +158,7 @@ def test_an_object_that_falls_is_no_offer(fall):
     assert scene.beliefs[-1].place is None
 
 
-def test_what_was_handed_over_is_no_request():
+def test_resting_hand_after_a_handover_is_not_a_request():
     scene = Scene(5).watch(there, carried(there), OVER + 0.3)
     scene.holds = True
     scene.watch(there, carried(there), OVER + 1.0, begin=OVER + 0.3)
@@ -192,7 +192,7 @@ def test_an_object_stays_where_it_is_in_a_hand_that_is_not_seen_for_a_while(unse
         assert max(np.linalg.norm(b.place - b.hand_place - IN_HAND) for b in after) < 0.03
 
 
-def test_an_object_that_is_taken_for_another_for_some_sights_is_still_offered():
+def test_briefly_confused_object_is_still_offered():
     class Swapped(Scene):
         def seen(self, name: str, place: np.ndarray) -> np.ndarray:
             seen = super().seen(name, place)
@@ -213,7 +213,7 @@ def test_a_frame_that_jumps_between_two_hands_is_no_offer(period):
     assert max(b.either for b in scene.beliefs) < LEVEL
 
 
-def test_sights_that_are_none_do_no_harm():
+def test_invalid_sights_are_ignored():
     clean, dirty = Scene(8), Scene(8)
     clean.watch(there, carried(there), ONSET + 0.5)
 
@@ -241,7 +241,7 @@ def test_sights_that_are_none_do_no_harm():
     assert dirty.filter.see_hand(500.0, END, 500.0).either < 0.6
 
 
-def test_nothing_is_believed_while_the_hand_rests_and_few_other_motions_are():
+def test_resting_hands_and_most_other_motions_are_no_offer():
     rest = Scene(9, True).watch(lambda t: START, None, 5.0)
     assert max(b.either for b in rest.beliefs) < LEVEL
     crossed = 0
@@ -284,9 +284,9 @@ def test_the_file_holds_the_defaults_and_faults_in_it_are_said():
             BeliefSettings.from_mapping(wrong)
 
 
-def test_the_predicted_place_does_not_go_to_and_fro():
-    """What follows it is an arm: each correction that is taken back costs it a change of speed. The same predictions,
-    but as they come, go at least twice as far in all."""
+def test_predicted_place_does_not_oscillate():
+    """The arm follows this place, so each reversed correction changes its speed. Without the filter the predictions
+    move at least twice as far in total."""
 
     def way(seed: int, **times: float) -> tuple[float, float]:
         scene = Scene(seed)

@@ -1,4 +1,4 @@
-"""Frame names: one file, and every fault in it is a sentence."""
+"""Frame names: the shipped file, and an error message for every fault in a file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The recogniser's node takes every sight once, whatever ROS time does. No roscore."""
+"""The recogniser's node processes every sight once, even if ROS time steps. No roscore."""
 
 import importlib.util
 import time
@@ -14,7 +14,7 @@ SCRIPT = Path(__file__).resolve().parents[1] / "scripts" / "motion_recogniser_no
 
 
 @pytest.mark.parametrize("step", [0.0, -3.0, -30.0, 60.0])
-def test_a_clock_that_is_set_costs_no_sight(monkeypatch, step):
+def test_no_sight_is_lost_when_the_clock_is_set(monkeypatch, step):
     spec = importlib.util.spec_from_file_location("node", SCRIPT)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

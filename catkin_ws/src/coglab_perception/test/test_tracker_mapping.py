@@ -78,5 +78,5 @@ def test_a_wrong_source_is_refused_with_file_line_and_field(tmp_path, source, na
         (Pose(np.zeros(3), np.array([0.0, 0.0, 0.0, math.inf])), False),
     ],
 )
-def test_poses_that_are_none_are_told_apart(pose, fine):
+def test_invalid_poses_are_detected(pose, fine):
     assert usable(pose) is fine

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
-"""check_person.py BEHAVIOUR PROFILE RECORDING WAY OBJECT SOURCE: whether the virtual person can use these settings.
+"""check_person.py BEHAVIOUR PROFILE RECORDING WAY OBJECT SOURCE: checks the settings of the virtual person.
 
 For launch files (<param command=...>): without it the launch would start a person that cannot run again and again.
-Prints "usable", or ends with 1 and one sentence per setting on the error output.
+Prints "usable", or writes one sentence per unusable setting to stderr and exits with 1.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def main(words: list[str]) -> int:
         return 2
     found = complaints(*words)
     for sentence in found:
-        print(f"the virtual person cannot begin: {sentence}", file=sys.stderr)
+        print(f"the virtual person cannot start: {sentence}", file=sys.stderr)
     if not found:
         sys.stdout.write("usable")
     return 1 if found else 0

@@ -29,7 +29,7 @@ ROD = "{type: cylinder, radius: 0.035, height: 0.2}"
 
 
 class Bridge(threading.Thread):
-    """Answers on a UDP port of its own and publishes it as the bridge does."""
+    """Answers on its own UDP port and publishes the port like the bridge."""
 
     def __init__(self, namespace: str = "") -> None:
         super().__init__(daemon=True)
@@ -212,7 +212,7 @@ class CellNode(unittest.TestCase):
         os.unlink(path)
 
     def test_91_a_simulation_that_diverges_ends_with_its_reason_and_status_1(self) -> None:
-        """Braked or not, the arm's last joints do not stand against 1000 Nm."""
+        """With or without brakes, the arm's last joints cannot resist 1000 Nm."""
         push = rospy.Publisher("/torn/push", Wrench, queue_size=1, latch=True)
         push.publish(Wrench(torque=Vector3(1000.0, 1000.0, 1000.0), force=Vector3(1000.0, 1000.0, 1000.0)))
         run = subprocess.run(

@@ -1,6 +1,6 @@
-"""A minimal PC side of FRI for tests, with its own reading of the bytes.
+"""A minimal PC side of FRI for tests, with its own decoder.
 
-The offsets are typed from the protocol tables and not taken from the C++ code, so that a wrong field there shows here.
+The offsets are typed from the protocol tables, not taken from the C++ code, so that tests find a wrong field there.
 """
 
 import struct
@@ -117,7 +117,7 @@ class Session:
         return parse(out) if out is not None else None
 
     def run(self, seconds: float, **kwargs) -> dict | None:
-        """So many simulated seconds."""
+        """Runs for this simulated time (s)."""
         fields = None
         for _ in range(max(1, round(seconds / self.cell.period))):
             fields = self.tick(**kwargs)

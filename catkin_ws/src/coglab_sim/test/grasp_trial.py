@@ -1,4 +1,4 @@
-"""One grasp of the plant: an object in the hand, shaken by the arm, and let go. For tests and the bench."""
+"""One grasp in the plant: the arm shakes an object in the hand, then the hand releases it. For tests and benchmarks."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,7 +26,7 @@ BOARD_TOP = np.array([0.45, -0.55, 0.05])
 
 
 def run(plant, seconds, dt=STEP, torque=None):
-    """So many seconds with constant torques of the motors; the state."""
+    """Runs for a time (s) with constant motor torques; returns the state."""
     for _ in range(round(seconds / dt)):
         plant.step(np.zeros(7) if torque is None else torque, dt)
     return plant.state()
@@ -57,8 +57,8 @@ def objects():
 
 @dataclass
 class Outcome:
-    """slip: m, way of the object in the hand while it is shaken; released: s after the command to open; lost: it left
-    the hand while it was shaken; forces: N, on phalanges and palm before the shaking."""
+    """slip: m, displacement of the object in the hand during the shaking; released: s after the command to open; lost:
+    the object left the hand during the shaking; forces: N, on phalanges and palm before it."""
 
     slip: float
     released: float
@@ -138,7 +138,7 @@ class GraspTrial:
         return slip, turn, self.plant.state()["held_by"] != "robot"
 
     def open(self, limit=1.0):
-        """Open and tell how long the hand went on holding, s; infinite if it never let go."""
+        """Open; returns the time (s) until the object is free, infinite if it stays."""
         for motor in range(1, 5):
             self.plant.command_motor(motor, 0.0)
         for step in range(int(limit / 0.01)):

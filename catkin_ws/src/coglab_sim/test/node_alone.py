@@ -20,7 +20,7 @@ def script(name):
 
 
 class Alone:
-    """What a node asks of ROS, answered here. ``parameters`` by the name that it is asked for."""
+    """Replaces ROS for a node. ``parameters``: values by the requested name."""
 
     def __init__(self, monkeypatch, **parameters):
         self.parameters = {name.replace("__", "/"): value for name, value in parameters.items()}
@@ -50,14 +50,14 @@ class Alone:
 
 
 class Publishing:
-    """In the place of a publisher."""
+    """Double of a publisher."""
 
     def __init__(self, messages):
         self.publish = messages.append
 
 
 class Sending:
-    """In the place of a broadcaster."""
+    """Double of a broadcaster."""
 
     def __init__(self, messages):
         self.sendTransform = messages.append

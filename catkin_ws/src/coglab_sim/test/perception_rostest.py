@@ -26,12 +26,12 @@ LIMIT_S = 60.0
 
 
 def pose(place):
-    """A pose without turn."""
+    """A pose without rotation."""
     return Pose(Point(*place), Quaternion(0, 0, 0, 1))
 
 
 class Cell(threading.Thread):
-    """Publishes a truth that stands still."""
+    """Publishes a constant true state."""
 
     def __init__(self):
         super().__init__(daemon=True)

@@ -1,4 +1,4 @@
-"""Object and robot hand around a virtual human, with the simplest contact there is: for tests of the person alone."""
+"""Object and robot hand around a virtual human, with the simplest contact, for tests of the person alone."""
 
 import numpy as np
 from coglab_msgs.msg import Say
@@ -30,7 +30,7 @@ class Stage:
         self.palms = []
 
     def object(self):
-        """Where it is: in the person's hand, or in the robot's once that has it and the person has let go."""
+        """Pose of the object: in the person's hand, or in the robot's hand after the person has released it."""
         sample = self.samples[-1] if self.samples else None
         frame = sample.frame if sample else Pose(self.human.rest, self.human.rest_turn.as_quat())
         if sample is not None and sample.grip < 0.3 and self.closed():
@@ -87,7 +87,7 @@ class Stage:
 
 
 def give(behaviour="normal", seed=1, profile="accustomed", seconds=18.0, **kw):
-    """A person who is asked to give."""
+    """Runs a person who gives."""
     changes = kw.pop("changes", {})
     fields = {"seed": seed, "behaviour": behaviour, "profile": profile, **changes}
     stage = Stage(Participant.from_mapping(fields), **kw).run(0.5)

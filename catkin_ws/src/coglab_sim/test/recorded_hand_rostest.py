@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""A recorded hand on ROS: the real cell puts the object into it as it was recorded, and both go as recorded; another
-object that is placed later is the one that the person then holds."""
+"""A recorded hand on ROS: the real cell puts the object into it at the recorded pose, and both follow the recording.
+The person then holds an object that is placed later."""
 
 import socket
 import subprocess
@@ -76,7 +76,7 @@ class RecordedHand(unittest.TestCase):
         cls.folder.cleanup()
 
     def held_as_recorded(self) -> float:
-        """m between where the object is in the person's hand and where it was recorded."""
+        """Distance (m) between actual and recorded position of the object in the person's hand."""
         now = self.truth[-1]
         in_hand = pose_of(now.human_hand).inverse() * pose_of(now.object)
         self.assertLess(abs((in_hand.rotation * IN_HAND.rotation.inv()).magnitude()), 0.05)

@@ -71,7 +71,7 @@ def test_losses_beyond_tolerance_end_mirrored_in_monitor_mode(how, seed):
         last = wire.cell.set_point.copy()
         answers += 1
     assert fell
-    # Where it stood is where it goes on from: the braked arm, at most its braking distance away.
+    # It continues from the pose where it stopped, at most its braking distance away.
     assert np.abs(wire.cell.set_point - last).max() < 0.02
     wire.cell.set_loss(0.0, 0.0)
     stood = wire.cell.position.copy()
@@ -100,7 +100,7 @@ def test_losses_beyond_tolerance_end_mirrored_in_monitor_mode(how, seed):
 
 @pytest.mark.parametrize("period", [0.001, 0.01])
 def test_the_measured_arm_keeps_the_speed_limits_of_the_table(period):
-    """To full speed and back, every joint: the servos pass what they are told, not what the table says."""
+    """Every joint to full speed and back: the servos exceed the commanded speed, but not the table's limit."""
     with open(LIMITS) as table:
         limit = np.array(yaml.safe_load(table)["default"]["velocity"])
     measured, true, sent = np.zeros(7), np.zeros(7), np.zeros(7)
@@ -137,7 +137,7 @@ def rubbish(random, good: bytes, old: list[bytes]) -> bytes:
     if kind == 3:
         return old[int(random.integers(0, len(old)))]
     data = bytearray(good)
-    if kind == 4:  # true length and header, but for a measurement that is gone; the rest at random
+    if kind == 4:  # correct length and header, but for an old measurement; the rest is random
         data[8:] = random.bytes(368)
         reflected = struct.unpack_from("<H", good, 2)[0] - int(random.integers(1, 60000))
         struct.pack_into("<H", data, 2, reflected & 0xFFFF)
@@ -148,7 +148,7 @@ def rubbish(random, good: bytes, old: list[bytes]) -> bytes:
 
 
 def test_rubbish_toward_the_controller():
-    """Bad datagrams beside a running motion: no leap of the set-point, all counted, command mode goes on."""
+    """Bad datagrams during a motion: no jump of the set-point, all counted, command mode continues."""
     rounds = 1_000_000 if LONG else 100_000
     wire = Wire(krc__period=0.001)
     wire.start()
@@ -184,7 +184,7 @@ def test_rubbish_toward_the_controller():
 @pytest.mark.parametrize("pause", [0.0, 0.1, 0.6])
 @pytest.mark.parametrize("convention", ["coglab", "centro_epiaggio", "stanford", "rtt_lwr"])
 def test_friopen_in_the_middle_of_a_motion(convention, pause):
-    """The operator starts the KRL program anew while the arm moves: it stands, mirrored, until an explicit start."""
+    """The operator restarts the KRL program while the arm moves: the arm stops, mirrored, until an explicit start."""
     wire = Wire({"krl_convention": convention}, krc__period=0.002, krc__convention=convention)
     wire.start()
     wire.velocity = np.array([0.4, 0, 0, 0, 0, 0.4, 0])
@@ -207,7 +207,7 @@ def test_friopen_in_the_middle_of_a_motion(convention, pause):
 
 
 def test_the_program_of_rcprg_opens_fri_again_on_request():
-    """FRM_INT[1] = 3 with the period in ms in FRM_INT[2], as its own PC stack asks."""
+    """FRM_INT[1] = 3 with the period (ms) in FRM_INT[2], as in requests of its own PC stack."""
     s = Session(URDF, krc__period=0.002, krc__convention="rcprg_tum")
     s.monitor()
     s.client.ints[0:2], s.client.bools = [3, 10], 1

@@ -1,4 +1,4 @@
-"""Pictures of the cell without a screen. Skipped where the camera was not built: ./coglab film builds it."""
+"""Pictures of the cell without a screen. Skipped if the camera is not built: ./coglab film builds it."""
 
 import numpy as np
 import pytest

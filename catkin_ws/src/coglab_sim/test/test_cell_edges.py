@@ -1,5 +1,5 @@
-"""The cell and its plant as a whole: losses, faults, loads and friction, with the figures that a client or a bench
-reads of them."""
+"""The cell and its plant as a whole: losses, faults, loads and friction, with the values that a client or a benchmark
+reads."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def test_losses_are_shares_of_each_way(session):
             s.cell.set_loss(*wrong)
 
 
-def test_a_load_that_nobody_knows_of_pulls_at_the_palm(session):
+def test_unknown_load_pulls_at_the_palm(session):
     s = session(**EXACT, arm__unknown_load=0.5)
     fields = s.monitor()
     jacobian = np.array(fields["jacobian"]).reshape(6, 7)
@@ -43,7 +43,7 @@ def test_a_load_that_nobody_knows_of_pulls_at_the_palm(session):
 
 
 def test_an_arm_that_moves_freely_feels_nothing_though_its_joints_rub(session):
-    """The sensors stand behind the gears: friction and the motors' own inertia are not in what they read."""
+    """The sensors are behind the gears, so they do not measure friction and the motors' inertia."""
     s = session(**EXACT)
     target = np.array(set_point(s.command()))
     worst, driven = 0.0, 0.0

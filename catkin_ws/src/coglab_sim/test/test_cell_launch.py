@@ -1,4 +1,4 @@
-"""A cell that cannot begin, or has ended for a reason, ends its launch in words: it is not started again for ever."""
+"""A cell that cannot start, or has ended, ends its launch with an error message and is not respawned."""
 
 import os
 import signal
@@ -15,7 +15,7 @@ PACKAGE = Path(rospkg.RosPack().get_path("coglab_sim"))
 
 
 def launched(*arguments):
-    """What a launch of the cell alone says until it ends by itself; a hang is a failure."""
+    """Output of a launch of the cell alone, until it ends by itself; a hang is a failure."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = str(free.getsockname()[1])
@@ -34,7 +34,7 @@ def resolve():
     return load_config_default([(str(PACKAGE / "launch" / "cell.launch"), [])], None, verbose=False)
 
 
-def test_the_cell_is_needed_and_never_started_again():
+def test_cell_is_required_and_never_respawned():
     config = resolve()
     assert config.params["/coglab_sim/cell/physics"].value == "usable"
     (cell,) = (node for node in config.nodes if node.name == "cell")
@@ -48,7 +48,7 @@ def test_the_cell_is_needed_and_never_started_again():
         ("hand_model: /nowhere/hand.yaml\n", None, "/nowhere/hand.yaml"),
     ],
 )
-def test_what_cannot_begin_ends_the_launch_with_a_sentence(tmp_path, yaml, argument, said):
+def test_unusable_setting_ends_the_launch_with_a_message(tmp_path, yaml, argument, said):
     config = tmp_path / "cell.yaml"
     config.write_text((PACKAGE / "config" / "cell.yaml").read_text() + yaml)
     output = launched(f"config:={config}", *([argument] if argument else []))

@@ -1,4 +1,4 @@
-"""Launched with a person who cannot begin, the launch ends with a sentence; nothing is started again for ever."""
+"""A launch with an unusable person ends with an error message; nothing is respawned."""
 
 import signal
 import socket
@@ -56,7 +56,7 @@ def test_a_recording_without_the_object_is_refused_before_anything_starts(tmp_pa
 
 
 @pytest.mark.parametrize("behaviour", [BEHAVIOURS[0], BEHAVIOURS[-1]])
-def test_what_can_be_used_is_taken(behaviour, tmp_path):
+def test_usable_settings_are_accepted(behaviour, tmp_path):
     write_reach(tmp_path / "a b.csv")
     config = resolve(f"behaviour:={behaviour}", f"recording:={tmp_path}/a b.csv", "recorded_object:=in_hand")
     assert config.params["/coglab_sim/virtual_human/behaviour"].value == behaviour

@@ -27,7 +27,7 @@ class Oracle:
             for kind in ("visual", "collision"):
                 for element in link.findall(kind):
                     link.remove(element)
-        # Nothing else may touch the numbers: no merging of bodies, no repair of inertias.
+        # The model must stay unchanged: no merging of bodies, no repair of inertias.
         options = ET.SubElement(robot, "mujoco")
         ET.SubElement(options, "compiler", fusestatic="false", balanceinertia="false")
         self.model = self.mujoco.MjModel.from_xml_string(ET.tostring(robot, encoding="unicode"))

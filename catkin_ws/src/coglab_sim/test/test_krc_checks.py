@@ -1,5 +1,5 @@
-"""What the controller refuses in a command, field by field: the edge that is still followed, what lies beyond, and the
-line of its message window."""
+"""Commands that the controller refuses, field by field: the largest accepted value, the next one, and the line of the
+message window."""
 
 import struct
 
@@ -24,7 +24,7 @@ def answered(s, field, values, flags=None):
 
 
 def followed(s, field, values):
-    """Whether command mode goes on with such an answer; else the newest line of the message window."""
+    """True if command mode continues with such an answer; else the newest line of the message window."""
     return answered(s, field, values)["state"] == COMMAND or s.texts()[-1]
 
 

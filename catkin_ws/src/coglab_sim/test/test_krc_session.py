@@ -188,7 +188,7 @@ def yields(before, after):
     return jacobian, np.array(after["position"]) - np.array(before["position"])
 
 
-def test_values_of_the_pc_count_while_it_gives_them(session):
+def test_values_of_the_pc_apply_while_it_sends_them(session):
     s = session(**QUIET)
     s.monitor()
     s.client.flags, s.client.stiffness = JOINT_IMPEDANCE, [500.0] * 7
@@ -208,7 +208,7 @@ def test_values_of_the_pc_count_while_it_gives_them(session):
 
 
 def test_a_moving_frame_is_followed_without_lag(session):
-    """The damper is told how fast the frame goes: 50 mm/s at 2000 N/m lag less than a millimetre."""
+    """The damper gets the frame's speed: at 50 mm/s and 2000 N/m the lag is below a millimetre."""
     s = session(**QUIET)
     frame = list(s.command(20)["commanded_frame"])
     begin = list(frame)

@@ -1,4 +1,4 @@
-"""The KRL programs: each convention asked exactly as its own PC stack asks (table of exchange arrays)."""
+"""The KRL programs: each convention with exactly the requests of its own PC stack (table of exchange arrays)."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def test_coglab_changes_strategy_by_leaving_command_mode(session):
     assert MONITOR in states and states[-1] == COMMAND and fields["control"] == 3
 
 
-def test_a_client_that_waits_for_each_datagram_hears_the_end(session):
+def test_client_that_waits_for_each_datagram_receives_the_end(session):
     """A common client: receive, answer, look whether the program has closed. It hangs where no datagram comes."""
     s = session(krc__convention="stanford")
     s.monitor()
@@ -60,7 +60,7 @@ def test_a_client_that_waits_for_each_datagram_hears_the_end(session):
 @pytest.mark.parametrize(
     "convention", ["coglab", "centro_epiaggio", "stanford", "rcprg_tum", "rtt_lwr", "openkc", "kuka_sample"]
 )
-def test_nothing_starts_unasked(session, convention):
+def test_nothing_starts_without_a_request(session, convention):
     s = session(krc__convention=convention)
     s.run(5.0)
     assert s.cell.fri_state == MONITOR
@@ -76,8 +76,8 @@ def until(s, condition, limit=20.0, **answers):
     raise AssertionError(f"not within {limit} s; {ints(s)}, {s.texts()[-3:]}")
 
 
-def test_coglab_a_request_that_was_left_over_is_none(session):
-    """By the run of the program before, which the operator has started anew."""
+def test_coglab_request_of_an_earlier_run_is_ignored(session):
+    """The request belongs to the run before the operator restarted the program."""
     s = session()
     s.monitor()
     s.client.ints[0:3] = [1, 10, 9]
@@ -95,7 +95,7 @@ def test_coglab_a_request_that_was_left_over_is_none(session):
     assert ints(s)[1:3] == (1, 0) and s.cell.fri_state == COMMAND
 
 
-def test_coglab_says_how_a_start_failed_and_waits_no_longer_than_it_says(session):
+def test_coglab_reports_failed_start_within_its_time_limit(session):
     s = session(krc__krl_drive_wait=1.0, krc__krl_quality_wait=2.0)
     s.monitor()
     s.cell.drive_error(2)

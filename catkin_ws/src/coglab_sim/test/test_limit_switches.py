@@ -1,4 +1,4 @@
-"""Limits while datagrams are lost, as the stand-in's software limit switches see them."""
+"""Limits under loss of datagrams, checked by the stand-in's software limit switches."""
 
 import random
 

@@ -64,7 +64,7 @@ def test_hand_and_object_are_broadcast_with_their_capture_time(monkeypatch):
     assert sorted(one.see(no_object)) == ["human_hand"]
 
 
-def test_a_clock_that_is_set_costs_no_sight(monkeypatch):
+def test_no_sight_is_lost_when_the_clock_is_set(monkeypatch):
     one = Perception(monkeypatch)
     one.see()
     one.ros.now, one.ros.boot = one.ros.now - 3.0, one.ros.boot + 3.0

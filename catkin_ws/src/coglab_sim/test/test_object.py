@@ -19,7 +19,7 @@ IN_HAND = np.array([-0.08, 0.0, -0.05])
 
 
 def scene(session, **parameters):
-    """Session in monitor mode and where the hand has to be so that the object stands 20 mm before the palm."""
+    """Session in monitor mode, and the position of the hand at which the object is 20 mm before the palm."""
     s = session(**parameters)
     s.monitor()
     palm = s.cell.truth()["robot_hand"]["position"]
@@ -54,7 +54,7 @@ def preshape(s):
 
 
 def close(s, hand, current=240.0, grip=1.0, seconds=1.6):
-    """Fingers close until the motors draw so much; the person holds on."""
+    """Fingers close until the motors reach a current; the person keeps holding."""
     s.cell.set_motors([1.0] * 5, CLOSED, [current] * 5)
     for _ in range(int(seconds / s.cell.period)):
         s.cell.set_human(hand, grip=grip)
@@ -83,8 +83,8 @@ def test_touch_is_felt_in_the_joint_torques(session):
     fields = parse(s.measurement)
     felt = np.array(fields["external_torque"]) - before
     assert np.abs(felt - truth["external_torque"]).max() < 0.01
-    # It is that force at a point of the hand: what is left after the force alone is a torque, and its lever is at most
-    # what the object may hang off the middle of the palm (15 mm, as above).
+    # The wrench is this force at a point of the hand. The remaining torque has a lever of at most the object's offset
+    # from the middle of the palm (15 mm, as above).
     jacobian = np.array(fields["jacobian"]).reshape(6, 7)[[0, 1, 2, 5, 4, 3]]
     rest = felt - jacobian[:3].T @ truth["palm_force"]
     assert np.abs(rest).max() < 0.15
@@ -117,7 +117,7 @@ def test_load_moves_from_person_to_robot(session):
     )
 
 
-def test_what_touches_the_hand_is_told_apart_from_the_object(session):
+def test_touch_of_the_hand_is_distinguished_from_the_object(session):
     """A person's hand on the robot's hand is a touch, and no force of the object."""
     s, _ = scene(session)
     s.cell.place("world", [0.3, 0.9, 0.5])  # it falls beside
@@ -156,9 +156,9 @@ def test_touch_within_a_period_is_not_lost():
 
 
 def test_fingers_folded_before_the_object_came_do_not_grasp(session):
-    """Ring and little lie in the palm, the thumb is open: what they meet is pushed, and nothing opposes them.
+    """Ring and little finger are closed, the thumb is open: they push the object, and nothing opposes them.
 
-    Who carries it is not asked: the person presses it on fingers whose friction (0.6 x 11 N) could bear all of it."""
+    The holder is not checked: the person presses the object on fingers whose friction (0.6 x 11 N) could carry it."""
     s, hand = scene(session)
     folded = [254 / 255, 5 / 255, 80 / 255, 80 / 255, 245 / 255]
     s.cell.set_motors([1.0] * 5, folded, [640.0] * 5)

@@ -1,4 +1,4 @@
-"""The physics of the cell against what mechanics says: falling, swinging, sliding, collisions; divergence."""
+"""The physics of the cell compared with mechanics: falling, swinging, sliding, collisions; divergence."""
 
 import xml.etree.ElementTree as ET
 
@@ -77,7 +77,7 @@ def test_friction_cone(share, slides):
     begin = plant.state()["object"][0]
     seconds = 0.5
     way = (run(plant, seconds)["object"][0] - begin)[0]
-    # The law of the cone, with the sliding that it asks for.
+    # Coulomb's law, with the sliding that follows from it.
     expected = 0.5 * G * (np.sin(angle) - BOX["friction"] * np.cos(angle)) * seconds**2 if slides else 0.0
     assert way == pytest.approx(expected, rel=0.1 if slides else None, abs=None if slides else 1.5e-3)
 
@@ -129,7 +129,7 @@ def test_the_arm_collides_with_everything(what):
 @pytest.mark.parametrize(
     "far, speed", [([1.4, 0, 0], [0, 0, 0]), ([50.0, 0, 0], [90.0, 0, 0]), ([0, 0, 0], [0, 90.0, 0])]
 )
-def test_a_hand_that_is_asked_for_more_than_an_arm_can_does_not_end_the_simulation(far, speed):
+def test_impossible_hand_motion_does_not_end_the_simulation(far, speed):
     plant = _cell.Plant(URDF, HOME, BOX, seed=3)
     here = np.array([1.0, 0.2, 0.4])
     plant.set_person(here)

@@ -1,5 +1,4 @@
-"""The plant at its edges: depths that are accepted, grips that begin and end, hands that nobody speaks for, brakes,
-blocks and pushes."""
+"""Edge cases of the plant: accepted depths, begin and end of grips, hands without messages, brakes, blocks, pushes."""
 
 import numpy as np
 import pytest
@@ -18,7 +17,7 @@ def still(thing=MUG, board=False, **parameters):
 
 
 def same(one, two):
-    """Whether two quaternions are the same rotation."""
+    """True if two quaternions are the same rotation."""
     return abs(np.dot(one, two)) == pytest.approx(1.0, abs=1e-9)
 
 
@@ -26,7 +25,7 @@ def same(one, two):
 
 
 @pytest.mark.parametrize("turn", [[0, 0, 0, 0.998], [0, 0, 0, 1.002], [0, 0, 0, np.nan]])
-def test_poses_that_are_none_are_refused(turn):
+def test_invalid_poses_are_refused(turn):
     plant = still()
     for call in (lambda: plant.place("world", [1.0, 0.0, 1.0], turn), lambda: plant.set_person([1.0, 0.0, 1.0], turn)):
         with pytest.raises(ValueError, match="a pose needs finite numbers and a quaternion x y z w of length 1"):
@@ -91,5 +90,5 @@ def test_a_hand_goes_on_for_50_ms_after_its_message_and_then_stands():
     run(plant, 0.03)
     plant.set_person(here + [0.012, 0.0, 0.0], velocity=[0.4, 0.0, 0.0])
     state = run(plant, 1.0)
-    # It was wanted 0.4 m/s x 50 ms farther than the last message said.
+    # It ends 0.4 m/s x 50 ms beyond the pose of the last message.
     assert state["person_hand"][0] == pytest.approx(here + [0.012 + 0.020, 0.0, 0.0], abs=6e-4)

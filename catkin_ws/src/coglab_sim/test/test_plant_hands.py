@@ -1,4 +1,4 @@
-"""What the robot's and the person's hand hold in the plant, and what not: contact and friction, a limited grip."""
+"""Objects that the robot's and the person's hand can hold in the plant, or not: contact, friction, limited grip."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def test_a_grasp_holds_under_shaking_and_lets_go(name):
 
 
 def test_a_grasp_without_friction_is_lost():
-    """The fingers close around a bottle that friction holds, and then it has none."""
+    """The fingers close around a bottle; then its friction is set to zero."""
     bottle = objects()["bottle"]
     with pytest.raises(ValueError, match="object 'bottle' cannot be placed in the robot's hand there"):
         GraspTrial({**bottle, "friction": 0.02}, "index up")
@@ -95,7 +95,7 @@ def test_motors_stop_at_contact_and_lock():
     motors = trial.plant.motors()
     for motor, limit in zip(motors[1:], (90.0, 90.0, 90.0, 180.0), strict=True):
         assert motor["locked"] and motor["current"] == 0.0 and 0.1 < motor["position"] < 0.9
-        # 240 counts are half of the limit; a gear that holds is pulled further by the fingers that close after it.
+        # 240 counts are half of the limit; fingers that close later pull a locked gear further.
         assert 0.7 * 0.5 * limit < motor["tension"] < 1.25 * 0.5 * limit
     alone = GraspTrial(objects()["mug"], "index up", grasped=False)
     where, turn = alone.before_palm()
@@ -129,7 +129,7 @@ WEIGHT = 0.31 * G
 
 
 def carried(grip_force, weight, seconds=1.5):
-    """A mug of ``weight`` N in a person's hand: the state after so long, or when it has fallen."""
+    """A mug of ``weight`` N in a person's hand: the state after a time, or when it has fallen."""
     plant = _cell.Plant(URDF, HOME, {**objects()["mug"], "mass": weight / G}, board=False)
     plant.set_brakes(True)
     plant.place("human_hand", [-0.08, 0.0, -0.05])
@@ -154,7 +154,7 @@ def test_a_persons_hold_lets_go_of_what_grip_and_friction_do_not_carry(grip_forc
 
 
 def test_the_hand_feels_what_its_own_grip_carries():
-    """The whole weight; nothing of a mug that lies on the floor; together with the robot its own part."""
+    """The whole weight; nothing if the mug lies on the floor; its own part if the robot holds, too."""
     assert carried(20.0, WEIGHT)["person_force"] == pytest.approx([0.0, 0.0, -WEIGHT], abs=0.01)
     trial = GraspTrial(objects()["mug"], "index up")
     plant, hand = trial.plant, trial.plant.state()["object"][0] + [0.08, 0.0, 0.05]
@@ -168,7 +168,7 @@ def test_the_hand_feels_what_its_own_grip_carries():
 
 
 def test_a_hand_does_not_feel_its_own_motion_as_a_load():
-    """Swung by 2 m/s^2 at 0.5 Hz; what the acceleration alone asks of the grip would be 0.6 N."""
+    """Swung with 2 m/s^2 at 0.5 Hz; the acceleration alone would need a grip of 0.6 N."""
     plant = _cell.Plant(URDF, HOME, objects()["mug"], board=False)
     plant.set_brakes(True)
     plant.place("human_hand", [-0.08, 0.0, -0.05])
@@ -184,7 +184,7 @@ def test_a_hand_does_not_feel_its_own_motion_as_a_load():
 
 
 def test_a_person_who_takes_carries_what_they_lift():
-    """A grip on what the robot holds takes no load by itself; the hand has to rise."""
+    """A grip on an object that the robot holds takes no load; the hand must rise."""
     trial = GraspTrial(objects()["mug"], "index up")
     trial.close()
     plant = trial.plant
@@ -201,7 +201,7 @@ def test_a_person_who_takes_carries_what_they_lift():
     assert shares[0] < 0.15 and shares[1] > 0.6
 
 
-def test_what_a_person_holds_turns_with_the_hand():
+def test_held_object_turns_with_the_persons_hand():
     """The grip acts at the object's center of mass, here 10 cm from its own origin, and knows how fast that moves."""
     plant, here, center = _cell.Plant(URDF, HOME, {**BOX, "center": [0, 0, 0.1]}), np.array([1.0, 0.3, 0.9]), 0.1
 

@@ -1,4 +1,4 @@
-"""What the plant refuses, with words: objects, poses, robot descriptions, tables of the hand, calls."""
+"""Refusals of the plant, with messages: objects, poses, robot descriptions, tables of the hand, calls."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""Robot descriptions and tables of the hand, field by field: what is expected of each, said with its file and place."""
+"""Robot descriptions and tables of the hand, field by field: errors name the file, the place and the expected value."""
 
 import re
 

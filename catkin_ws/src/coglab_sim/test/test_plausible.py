@@ -1,4 +1,4 @@
-"""What topics say of the cell, and cannot be true."""
+"""Implausible values on topics about the cell."""
 
 import numpy as np
 import pytest

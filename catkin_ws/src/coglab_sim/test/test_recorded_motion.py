@@ -1,4 +1,4 @@
-"""Recorded motion: CSV, npz and bag say the same; placing, time, waiting, ends; bad files are named."""
+"""Recorded motion: CSV, npz and bag give the same data; placing, time, waiting, ends; errors name bad files."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""A person whose hand goes as one was recorded: when it arrives and lets go, what is refused, and the three ways after
-the reach."""
+"""A person whose hand follows a recording: arrival, release, refused recordings, and the three variants after the
+reach."""
 
 from dataclasses import replace
 
@@ -74,7 +74,7 @@ def test_where_the_object_lies_in_the_hand():
     assert scene_of(plain, recorded(object_frame=None)) is plain
 
 
-def test_what_is_no_handover_is_refused():
+def test_recordings_without_a_handover_are_refused():
     with pytest.raises(RecordingError, match=r"r.csv: 'human_hand' moves 0.09\d m, a reach is at least 0.1 m long"):
         recorded(reach(way=0.096, speed=0.1))
     recorded(reach(way=0.11, speed=0.1))
@@ -115,7 +115,7 @@ def test_settings_of_a_recorded_hand(tmp_path):
 
 
 class Shown:
-    """A recorded person in virtual time, told directly what they perceive."""
+    """A recorded person in virtual time, with given percepts."""
 
     def __init__(self, way="wait", hand=None, **changes):
         self.hand = hand or recorded()
@@ -146,7 +146,7 @@ def test_it_begins_at_once_where_the_recording_begins():
     assert shown.human._velocity == pytest.approx([0.4, 0.0, 0.0]) and not shown.human._spin.any()
 
 
-def test_who_does_not_wait_holds_where_it_was_let_go():
+def test_no_wait_holds_the_object_at_the_recorded_release():
     shown = Shown("no_wait", hand=recorded(lets_go=1.5))
     assert shown.until("holding") == pytest.approx(shown.hand.released, abs=0.03) and shown.hand.released > 1.9
 
@@ -155,7 +155,7 @@ def test_who_does_not_wait_holds_where_it_was_let_go():
     "load, closure, closing, lets_go",
     [(0.69, 0.0, 0.0, True), (0.75, 0.0, 0.0, False), (1.0, 0.051, 0.0, False), (0.9, 0.049, 0.0, False)],
 )
-def test_who_leaves_lets_go_of_what_the_robot_has_and_takes_the_rest_away(load, closure, closing, lets_go):
+def test_leave_releases_a_held_object_and_takes_others_away(load, closure, closing, lets_go):
     shown = Shown("leave", release_share=0.3, release_time=0.2)
     while shown.t < shown.hand.arrived:
         shown.step()

@@ -1,4 +1,4 @@
-"""What a person perceives: late, noisy, above a threshold; the figures are those of the participant."""
+"""Perception of a person, with the participant's delays, noise and thresholds."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ BLIND = {"seen_noise": 0.0, "seen_turn": 0.0, "seen_speed": 0.0}
 
 
 class Steady:
-    """In the place of the generator: the same number for ever."""
+    """Double of the random generator: always returns the same number."""
 
     def __init__(self, value):
         self.value = value
@@ -36,7 +36,7 @@ def test_a_force_is_felt_as_it_was_until_its_change_is_noticed():
     assert feeling([0.05, -0.09, 0.11], **share) == [0.0, 0.0, 0.11]
 
 
-def test_what_is_felt_comes_later_by_its_own_delay():
+def test_touch_has_its_own_delay():
     felt = feeling([0.0, 0.0, 5.0, 5.0, 5.0, 5.0], feeling_delay=2 * STEP, felt_threshold=0.4)
     assert felt == [0.0, 0.0, 0.0, 0.0, 5.0, 5.0]
     load = np.array([1.0, 2.0, 3.0])

@@ -1,4 +1,4 @@
-"""What rviz is shown of the truth: frames, the person's body, the object in its shape, and how often."""
+"""True state in rviz: frames, the person's body, shape of the object, rate."""
 
 import numpy as np
 import pytest
@@ -70,7 +70,7 @@ def test_frames_of_the_truth_have_names_of_their_own(shown):
 
 
 @pytest.mark.parametrize("wrong", [float("nan"), 1e9])
-def test_what_cannot_be_true_is_not_shown(shown, wrong):
+def test_implausible_truth_is_not_shown(shown, wrong):
     message = truth()
     message.object.position.x = wrong
     assert shown.show(message) == ({}, {}) and "truth/cell ignored" in shown.ros.said[0]

@@ -1,4 +1,4 @@
-"""The virtual human against a robot's hand that is simply there: phases, timing, and what each misbehaviour does."""
+"""The virtual human with a simple robot hand: phases, timing, and the effect of each behaviour."""
 
 import dataclasses
 
@@ -23,8 +23,8 @@ def test_a_normal_giver_goes_through_all_phases(profile):
         assert stage.samples[-1].frame.position == pytest.approx(stage.human.rest, abs=0.01)
 
 
-def test_load_alone_lets_go_and_load_and_grip_together_do_with_less():
-    """The robot carries everything, or a tenth with a hand seen closed and heard to have it; or nothing is felt."""
+def test_load_alone_or_smaller_load_with_felt_grip_releases():
+    """The robot carries everything, or a tenth with a hand seen closed and 'I have it' heard; or nothing is felt."""
     whole = give(carries=1.0)
     together = give(carries=0.1, says=True)
     assert whole.samples[-1].grip == 0.0 and "releasing" in together.phases
@@ -33,15 +33,15 @@ def test_load_alone_lets_go_and_load_and_grip_together_do_with_less():
     assert p.feeling_delay + p.assurance - DT <= wait <= p.feeling_delay + p.assurance + 0.3
 
 
-def test_a_hand_that_closes_and_carries_nothing_gets_nothing():
-    """Nothing is felt to be gripped and nothing is said: load and grip are missing."""
+def test_hand_that_closes_without_carrying_gets_no_object():
+    """The person feels no grip and hears nothing: load and grip are missing."""
     stage = give(carries=0.0, seconds=12.0)
     assert min(s.grip for s in stage.samples) > 0.3
     assert stage.phases[-1] in ("holding", "releasing", "retreating")
 
 
 def test_an_object_is_pressed_again_into_an_open_hand_that_backs_away_but_not_for_ever():
-    """The palm stands 3 cm farther away from the moment on at which it was touched first."""
+    """From the first touch on, the palm is 3 cm farther away."""
     stage = Stage(closes=False)
     stage.human.hear(0.0, Say.READY_TO_RECEIVE)
     while stage.human.phase != "holding":
@@ -57,7 +57,7 @@ def test_an_object_is_pressed_again_into_an_open_hand_that_backs_away_but_not_fo
 
 
 WITHOUT = {f.name: f.default for f in dataclasses.fields(Participant) if f.name in HABITS}
-"""what nobody drawn has"""
+"""Values of drawn people, who have no habits."""
 
 
 def test_without_the_habit_an_object_is_pressed_once():
@@ -65,7 +65,7 @@ def test_without_the_habit_an_object_is_pressed_once():
     assert away.phases.count("placing") == 1 and away.samples[-1].grip == 1.0
 
 
-def test_trust_is_waited_for_and_some_do_not_wait():
+def test_giver_waits_for_trust_or_places_while_robot_moves():
     calm = give(changes={"trust": 0.8})
     hasty = give(changes={"trust": 0.1})
     assert calm.first("placing") - hasty.first("placing") == pytest.approx(0.7, abs=0.15)
@@ -221,13 +221,13 @@ def test_the_taker_goes_when_the_robots_hand_is_seen_to_open():
 
 
 def person(name, knows_weight=True):
-    """Who begins with that object; nobody misjudges a weight that was felt."""
+    """A person who begins with this object and knows its weight."""
     participant = dataclasses.replace(Participant.draw(3), weight_error=0.2)
     return VirtualHuman(participant, Scene.of(shipped(name)), knows_weight)
 
 
 @pytest.mark.parametrize("knows_weight", [True, False])
-def test_who_meets_another_object_is_as_who_began_with_it(knows_weight):
+def test_person_with_a_later_object_acts_as_if_started_with_it(knows_weight):
     human, fresh = person("mug"), person("bottle", knows_weight)
     human.step(0.0, WorldView())
     human.meets(Scene.of(shipped("bottle")), knows_weight)

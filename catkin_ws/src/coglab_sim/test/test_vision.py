@@ -1,4 +1,4 @@
-"""Perception's answers: fresh, within the time limit, with a sentence; and whose hand is the partner's."""
+"""Answers of perception: fresh, within the time limit, with a message; and the choice of the partner's hand."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_locate_gives_frame_sight_and_age():
 
 
 def test_the_calibration_shifts_the_board_like_everything_else():
-    """One error for the whole tracker: what lies on the board is seen to lie on it, 5 mm and 1 deg off together."""
+    """The whole tracker has one error: board and objects on it are seen with the same 5 mm and 1 deg."""
     quiet = {"position_noise": (0, 0, 0), "orientation_noise": 0.0, "latency": 0.0, "latency_sigma": 0.0}
     scene = Scene(perfect=False, **quiet, dropout_start=0.0, swap_probability=0.0, occlusion_distance=0.0)
     error = scene.vision.settings.calibration(1)
@@ -76,7 +76,7 @@ def test_locate_waits_for_a_sight_within_its_limit():
 
 
 @pytest.mark.parametrize("limit", [0.05, 0.0, -1.0, float("nan")])
-def test_what_is_not_seen_is_said_within_the_limit(limit):
+def test_unseen_object_is_reported_within_the_limit(limit):
     scene = Scene()
     scene.see()
     began = time.monotonic()
@@ -139,7 +139,7 @@ def test_a_stamp_ahead_of_the_clock_is_no_negative_age():
 
 
 @pytest.mark.parametrize("away, doubt", [(0.199, True), (0.201, False)])
-def test_of_two_people_nobody_is_the_partner_and_what_they_hold_is_nobodys(away, doubt):
+def test_two_people_have_no_partner_and_their_objects_no_owner(away, doubt):
     seen = Scene()
     held = Pose(NEAR.position + [0.0, 0.0, away])
     sights = seen.see({"one": NEAR, "two": Pose(np.array([2.0, 0.0, 0.4]))}, {"object_mug": held})
@@ -156,7 +156,7 @@ def test_of_two_people_nobody_is_the_partner_and_what_they_hold_is_nobodys(away,
 
 
 def hands(**distances):
-    """Hands so far from the robot."""
+    """Hands at given distances from the robot."""
     return {name: Pose(ROBOT.position + [away, 0.0, 0.0]) for name, away in distances.items()}
 
 
@@ -173,7 +173,7 @@ def test_a_choice_needs_the_margin_and_is_kept_within_it():
     assert PartnerChoice(0.25).choose(hands(a=0.25, b=0.5), ROBOT) == "a", "the margin itself is enough"
 
 
-def test_who_was_chosen_is_forgotten_when_nobody_can_be_told():
+def test_chosen_partner_is_reset_when_the_choice_is_unclear():
     choice = PartnerChoice(0.3)
     assert choice.choose(hands(a=0.9), ROBOT) == "a"
     assert choice.choose(hands(a=0.9, b=0.8), None) == "", "no robot to be near to"

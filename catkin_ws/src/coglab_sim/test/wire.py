@@ -75,7 +75,7 @@ BLOCKED_MOTIONS = {"A1 A2": [0.4, 0.2, 0, 0, 0, 0, 0], "with the wrist": [0.4, 0
 
 
 def speed_after_block(wire: Wire, mode: str, moving: str) -> float:
-    """Somebody holds the moving arm for 5 s and lets go: fastest joint in the 3 s after that, rad/s."""
+    """Largest joint speed (rad/s) in 3 s after somebody held the moving arm for 5 s."""
     wire.start(mode)
     wire.velocity = np.array(BLOCKED_MOTIONS[moving], dtype=float)
     wire.run(0.6)

@@ -26,7 +26,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         type=float,
         default=1.0,
         help="factor on the calibration times; 0 ends them at once, above 1.2 "
-        "the fast one outlasts the 2.0 s that published drivers wait",
+        "the fast one lasts longer than the 2.0 s that published drivers wait",
     )
     parser.add_argument("--greeting", action="store_true", help="start calibrated")
     parser.add_argument("--strict-force", action="store_true", help="leave a force read of motor 0 unanswered")
@@ -94,7 +94,7 @@ def main() -> int:
             physical=options.physical,
         )
         if options.contact and options.physical:
-            raise ValueError("--contact is for a hand without a cell: leave it or --physical away")
+            raise ValueError("--contact is for a hand without a cell: remove it or --physical")
         if options.contact:
             hand.set_contacts(options.contact, [options.stiffness] * 5)
     except ValueError as error:

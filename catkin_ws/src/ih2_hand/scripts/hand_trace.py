@@ -1,8 +1,8 @@
 #!/usr/bin/python3
-"""Every frame between host and hand in hex with its meaning.
+"""Prints every frame between host and hand in hex, with its meaning.
 
-Without arguments: the running hand node's frames (topic /ih2_hand/trace). With --hex: explain the
-given host-to-hand bytes, no ROS needed.
+Without arguments: the frames of the running hand node (topic /ih2_hand/trace). With --hex: the meaning of
+the given host-to-hand bytes; this needs no ROS.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""As much of goals, hand, node and master as the queue of goals sees of them."""
+"""Doubles of goals, hand, node and master for tests of the goal queue."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class Driver:
 
 
 class Owner:
-    """As much of the hand node as the goals see of it."""
+    """Double of the hand node."""
 
     port = "/dev/of_the_test"
 
@@ -123,7 +123,7 @@ class Server:
 
 
 class Master:
-    """What the queue has told rospy: warnings."""
+    """Records the queue's warnings."""
 
     def __init__(self) -> None:
         self.warnings: list[str] = []

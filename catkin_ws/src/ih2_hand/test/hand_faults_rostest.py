@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""What goes wrong between node and hand: pulled cables, silence, noise, a blocked motor."""
+"""Faults between node and hand: pulled cables, silence, noise, a blocked motor."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ GOALS = {"hand_open": (60,), "hand_close": (60,), "hand_preshape": ("cylindrical
 
 
 class HandFaults(unittest.TestCase):
-    """Each test begins with an open hand and an untroubled line."""
+    """Each test begins with an open hand and a line without faults."""
 
     @classmethod
     def setUpClass(cls) -> None:
@@ -31,7 +31,7 @@ class HandFaults(unittest.TestCase):
         self.assertTrue(self.hand.run("hand_open", 511).isOk)
 
     def begin(self, name: str) -> None:
-        """Have the action of that name on its way."""
+        """Start the action of that name."""
         # From the other end: the interrupted goal before this one may have left the fingers anywhere.
         if name == "hand_open":
             self.assertTrue(self.hand.run("hand_close", 511).isOk)

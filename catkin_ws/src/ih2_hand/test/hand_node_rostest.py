@@ -46,7 +46,7 @@ class HandNode(unittest.TestCase):
         quiet = [meaning for meaning in meanings if "Get" in meaning or "filler" in meaning]
         self.assertEqual(len(quiet), len(meanings), f"readings and StopALL only: {meanings}")
 
-    def test_b_preshape_before_calibration_is_honest(self) -> None:
+    def test_b_preshape_before_calibration_reports_the_reason(self) -> None:
         result = self.hand.run("hand_preshape", "cylindrical", "medium")
         self.assertFalse(result.isOk)
         self.assertIn("not calibrated", result.message)
@@ -84,7 +84,7 @@ class HandNode(unittest.TestCase):
         for position, target in zip(positions, (245, 5, 30, 50, 50), strict=True):
             self.assertLessEqual(abs(position - target), 4)
         codes: list[int] = []
-        # As told on the topic: actionlib's client leaves out what comes after the result, which has a topic of its own.
+        # From the topic: actionlib's client drops feedback that arrives after the result.
         told = rospy.Subscriber(
             "ih2_hand/hand_preshape_close/feedback",
             HandPreshapeCloseActionFeedback,
@@ -175,8 +175,8 @@ class HandNode(unittest.TestCase):
             self.assertTrue(client.wait_for_result(rospy.Duration(5.0)), name)
             goal = client.gh.comm_state_machine.action_goal.goal_id.id
             self.hand.wait(lambda goal=goal: told.get(goal) in ends, f"end of {name} on its topic")
-            # actionlib's client takes a status that left before a cancelled goal arrived, and does
-            # not list it yet, as the goal's loss; what the server has said of the goal counts.
+            # If a status was sent before a cancelled goal arrived, actionlib's client counts the
+            # goal as lost, so the test uses the server's status of the goal.
             self.assertIn(client.get_state(), (*ends, GoalStatus.LOST), name)
         for topic in topics:
             topic.unregister()

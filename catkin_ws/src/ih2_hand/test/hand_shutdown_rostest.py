@@ -21,7 +21,7 @@ LIMIT_S = 60.0
 
 
 class HandShutdown(unittest.TestCase):
-    """Each test starts processes of its own."""
+    """Each test starts its own processes."""
 
     def setUp(self) -> None:
         self.processes: list[subprocess.Popen] = []

@@ -1,9 +1,9 @@
-"""100 000 corrupted byte streams: no wrong value passes as right, and the driver never sticks.
+"""100 000 corrupted byte streams: no wrong value is accepted, and the driver never hangs.
 
 A stream is a handful of calls during which bytes anywhere, in either direction, are lost, doubled,
 flipped or preceded by a stray byte: one or two apart from each other, or a burst of neighbours. The
-truth is read from the emulated motors at every request, and most requests must be answered: who
-refuses everything says nothing wrong either. A value needs three equal readings, so one or two
+truth is read from the emulated motors at every request, and most requests must be answered,
+because a driver that refuses everything is never wrong either. A value needs three equal readings, so one or two
 corruptions cannot forge one. Three that forge the same lie can, and no driver can tell.
 """
 
@@ -145,7 +145,7 @@ class Campaign:
         self.read += 1
         if right:
             return
-        # Told apart to see where a wrong value comes from; a resynchronisation on the way excuses none.
+        # Counted separately to find the cause of a wrong value; a resynchronisation is no excuse for one.
         if counters.resynchronisations > resyncs:
             self.wrong_but_counted += 1
         else:

@@ -83,7 +83,7 @@ def test_one_lost_answer_does_not_keep_the_port_from_being_opened():
     assert driver.get_finger_status(0)["mode"] == "stop" and driver.counters.fillers == 0
 
 
-def test_a_port_on_which_nobody_answers_is_let_go():
+def test_port_without_answer_is_closed():
     link = link_that_loses(2)
     with pytest.raises(HandPortError, match="no hand answers on virtual"):
         opened(link)
@@ -103,10 +103,10 @@ def test_a_port_is_closed_with_its_block():
         link.pending()
 
 
-def test_bytes_that_nobody_asked_for_are_thrown_away_before_a_request(bench):
+def test_unrequested_bytes_are_flushed_before_a_request(bench):
     bench.link._input += b"\x55"
     assert bench.driver.get_finger_status(1)["raw"] == 0x08
-    assert bench.driver.counters.reasons == {"bytes nobody asked for": 1}
+    assert bench.driver.counters.reasons == {"bytes without a request": 1}
 
 
 # -- what is known of a hand at rest ---------------------------------------------------------------

@@ -10,7 +10,7 @@ from ih2_hand.wire_choices import WIRE
 
 
 class Raw:
-    """A hand spoken to in hex."""
+    """A hand with requests and answers in hex."""
 
     def __init__(self, **options):
         self.clock = SteppedClock()
@@ -162,7 +162,7 @@ def test_stored_preshape_is_used(raw):
 
 @pytest.mark.parametrize("late_s", [0.0, 0.05, 0.15, 0.3])
 @pytest.mark.parametrize("then", ["48 0A 14 1E 28 32 48", "44 02 1E", "4B 00"])
-def test_a_client_that_waits_two_seconds_for_the_calibration_is_heard(late_s, then):
+def test_command_two_seconds_after_calibration_start_is_executed(late_s, then):
     """As published drivers do. A busy machine may bring it the order late; the client waits from
     when it has written."""
     raw = Raw(greeting=False)

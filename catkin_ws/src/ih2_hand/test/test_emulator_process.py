@@ -1,4 +1,4 @@
-"""The emulator as a process of its own, without ROS."""
+"""The emulator in its own process, without ROS."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Movements followed to their end in virtual time, and what the core may import."""
+"""Movements followed to their end in virtual time, and the allowed imports of the core."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def grasp(bench, mode: str, level: str, is_current: bool = True):
     ],
 )
 @pytest.mark.parametrize("is_current", [True, False])
-def test_every_grasp_holds_what_it_meets(bench, mode, level, is_current):
+def test_every_grasp_holds_an_object(bench, mode, level, is_current):
     closing = CLOSING_MOTORS[mode]  # the others fold out of the way, past the object
     bench.hand.set_contacts([120 if motor in closing else 255 for motor in range(5)], [20] * 5)
     verdict = grasp(bench, mode, level, is_current)

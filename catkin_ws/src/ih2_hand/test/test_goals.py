@@ -1,4 +1,4 @@
-"""The queue of goals: at most one moves the fingers, each ends once, and who asked learns why."""
+"""The queue of goals: at most one moves the fingers, each ends once, and its client gets the reason."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ih2_hand.ros import goals
 
 
 class Desk:
-    """A queue whose entries are worked off here, one by one, on a clock of its own."""
+    """A queue whose entries the test processes one by one, with its own clock."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.now = 100.0
@@ -62,7 +62,7 @@ def desk(monkeypatch) -> Desk:
     return Desk(monkeypatch)
 
 
-def test_of_a_flood_of_goals_only_the_last_begins(desk):
+def test_only_the_last_of_many_goals_begins(desk):
     flood = [Handle() for _ in range(5)]
     for handle in flood:
         desk.queue._on_goal("hand_close", handle)
@@ -151,7 +151,7 @@ def test_silence_counts_from_the_last_status(desk):
     assert handle.ended[0] == "aborted" and "no hand_status for 1.5 s" in handle.ended[1]
 
 
-def test_a_time_in_which_nobody_looked_is_no_standstill(desk):
+def test_gap_between_polls_does_not_count_as_standstill(desk):
     """A busy computer: two polls that lie 1.4 s apart do not mean that a finger stood for 1.4 s."""
     desk.goal()
     for after in (1.0, 0.04, 1.4):

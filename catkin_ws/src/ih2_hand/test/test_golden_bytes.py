@@ -166,7 +166,7 @@ def test_v17_grasps(grasp, expected):
     assert line.frames[-1] == expected
 
 
-def test_preshape_can_be_left_to_the_hand():
+def test_preshape_can_be_omitted():
     driver, line = connect(send_preshape=False)
     driver.set_grasp_mode("cylindrical", "medium")
     assert line.frames == []

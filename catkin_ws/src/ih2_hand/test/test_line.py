@@ -1,4 +1,4 @@
-"""Requests and answers on a line without checksums: what is counted, what is believed, how long it takes."""
+"""Requests and answers on a line without checksums: counters, accepted values, durations."""
 
 from __future__ import annotations
 
@@ -175,7 +175,7 @@ def test_readings_that_contradict_each_other_twice_are_an_error(bench):
     assert bench.counted == (10, 1, 0, 0, 1)
 
 
-def test_what_was_read_across_a_slip_does_not_count(bench):
+def test_readings_before_a_resynchronisation_do_not_count(bench):
     # With the two readings before the slip, the first one after it would confirm 100.
     assert bench.value("64", "64", "64 64", "64", "65", "65", "65") == 101
     assert bench.counted == (7, 1, 0, 1, 0)

@@ -27,7 +27,7 @@ def test_a_port_that_fails_in_termios_while_it_is_opened_cannot_be_opened(monkey
         SerialTransport("/dev/null")
 
 
-def test_a_driver_that_cannot_begin_lets_go_of_the_port(monkeypatch):
+def test_failed_driver_start_closes_the_port(monkeypatch):
     link = Recorder()
     monkeypatch.setattr(HandLine, "resynchronise", raise_termios)
     with pytest.raises(termios.error):

@@ -1,4 +1,4 @@
-"""What is remembered of a hand between requests: calibration, preshape and grip."""
+"""State of a hand between requests: calibration, preshape and grip."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def undo_by_a_preshape_that_fails(memory):
         HandMemory.calibration_began,
     ],
 )
-def test_what_moves_the_fingers_otherwise_undoes_the_preshape(memory, undo):
+def test_other_finger_motions_undo_the_preshape(memory, undo):
     preshaped(memory)
     undo(memory)
     memory.calibrating = False
@@ -90,7 +90,7 @@ def test_no_goal_is_taken_during_a_calibration(memory):
 
 
 @pytest.mark.parametrize("name", ["hand_close", "hand_preshape_close", "hand_open", "hand_preshape"])
-def test_what_closes_and_is_broken_off_may_have_caught_something(memory, name):
+def test_interrupted_closing_counts_as_holding(memory, name):
     preshaped(memory)
     memory.holding = False
     memory.task_over(ask(memory, name, speed=100, mode="tridigit", level="low"), BROKEN_OFF)

@@ -1,4 +1,4 @@
-"""The emulator's bytes where the physics turns the motors: positions, currents and the stop at contact are its."""
+"""The emulator's bytes if the physics turns the motors and provides positions, currents and the stop at contact."""
 
 import pytest
 from ih2_hand.clock import SteppedClock

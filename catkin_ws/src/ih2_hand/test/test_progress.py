@@ -1,4 +1,4 @@
-"""When a task is done, stalled, blocked or not taken: motor status polls, typed by hand, against the verdicts."""
+"""Verdicts of tasks (done, stalled, blocked, not accepted) on hand-written polls of the motors."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def test_calibration_rules(words, state, reason):
         (GraspTask((1, 2, 3, 4), 10.0), "00", Reason.HAND_NOT_CALIBRATED),
     ],
 )
-def test_a_failure_says_to_programs_what_it_is(task, raw, reason):
+def test_failures_have_reason_codes(task, raw, reason):
     task.judge(poll(" ".join([raw] * 5), [9] * 5), 0.0)
     verdict = task.judge(poll(" ".join([raw] * 5), [9] * 5), 2.0)
     assert verdict.done and not verdict.ok and verdict.reason is reason, verdict
@@ -130,7 +130,7 @@ def test_a_failure_says_to_programs_what_it_is(task, raw, reason):
         (lambda: check_grasp("lateral", "low", "legacy"), Reason.NOT_SUPPORTED),
     ],
 )
-def test_a_refusal_says_to_programs_what_it_is(call, reason):
+def test_refusals_have_reason_codes(call, reason):
     with pytest.raises(RefusedError) as refusal:
         call()
     assert refusal.value.reason is reason
@@ -148,7 +148,7 @@ TARGETS = (110, 5, 160, 245, 245)
 
 
 def sent_preshape(is_sent: bool = True) -> tuple[PreshapeTask, list]:
-    """A preshape on its way, and what the driver was told."""
+    """A running preshape, and the calls of the driver."""
     told: list = []
     driver = SimpleNamespace(
         preshapes={"lateral": TARGETS},
@@ -191,7 +191,7 @@ def test_the_thumbs_abduction_takes_no_part_in_closing():
 
 
 @pytest.mark.parametrize("task", [OpenTask(511), CloseTask(511)])
-def test_a_command_has_half_a_second_to_be_taken(task):
+def test_command_must_take_effect_within_half_a_second(task):
     raws, positions = "00 00 00 00 00", [90] * 5
     assert not task.judge(poll(raws, positions), START_GRACE_S - 0.01).done
     verdict = task.judge(poll(raws, positions), START_GRACE_S)
@@ -222,7 +222,7 @@ def grasp(closing=(1, 2)) -> GraspTask:
     return task
 
 
-def test_a_grasp_that_does_not_begin_is_given_a_second():
+def test_grasp_must_begin_within_a_second():
     task = grasp()
     for elapsed in (0.0, BLOCKED_S - 0.01):
         assert task.judge(poll("50 40 40 50 50", [9] * 5), elapsed).text == "taking the preshape"

@@ -56,21 +56,21 @@ def test_what_an_answer_means_depends_on_the_request(request_hex, answer, meanin
     assert line.endswith(f" {meaning}") and line.startswith(answer.lower())
 
 
-def test_an_answer_in_two_pieces_is_told_when_it_is_whole():
+def test_answer_in_two_pieces_is_traced_when_complete():
     tracer = Tracer()
     said(tracer, ">", "49 02")
     assert "part of an answer" in said(tracer, "<", "03")[0]
     assert "current 980 counts" in said(tracer, "<", "D4")[0]
 
 
-def test_what_was_asked_before_a_resynchronisation_gets_no_answer_any_more():
+def test_requests_before_a_resynchronisation_expect_no_answer():
     tracer = Tracer()
     said(tracer, ">", "49 02")
     said(tracer, "<", "03")
     said(tracer, ">", "44 02")
     said(tracer, ">", "41 " * 13)
     assert "StopALL" in said(tracer, ">", "41")[0]
-    assert "nobody asked" in said(tracer, "<", "D4")[0]
+    assert "without a request" in said(tracer, "<", "D4")[0]
 
 
 def test_script_explains_hex():

@@ -44,7 +44,7 @@ def far():
     far.close()
 
 
-def test_what_is_there_is_read_at_once_with_what_was_not_expected(far):
+def test_available_bytes_are_read_at_once_including_unexpected_ones(far):
     assert far.port.last_byte is None and not far.port.pending()
     far.says(b"\x01\x02\x03")
     assert far.port.read(2, 5.0) == b"\x01\x02\x03" and far.port.last_byte == 3
@@ -52,7 +52,7 @@ def test_what_is_there_is_read_at_once_with_what_was_not_expected(far):
 
 
 @pytest.mark.parametrize(("there", "last"), [(b"", None), (b"\x07", 7)])
-def test_what_does_not_come_is_waited_for_no_longer_than_told(far, there, last):
+def test_read_of_missing_bytes_ends_at_its_time_limit(far, there, last):
     if there:
         far.says(there)
     begun = time.monotonic()
@@ -104,7 +104,7 @@ def test_a_port_may_be_closed_twice_and_is_then_lost(far):
         (OSError(errno.EIO, "x"), True, "port PORT cannot be opened .*check that it is the hand's serial device"),
     ],
 )
-def test_a_port_that_cannot_be_opened_is_told_with_what_to_do(monkeypatch, tmp_path, error, exists, words):
+def test_unopenable_port_error_says_what_to_do(monkeypatch, tmp_path, error, exists, words):
     port = tmp_path / "port"
     if exists:
         port.touch()

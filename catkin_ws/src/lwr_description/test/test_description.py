@@ -1,4 +1,4 @@
-"""The URDF and the joint limits table say the same, and both are what the published figures say."""
+"""The URDF and the joint limits table agree with each other and with the published values."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""The experimenter's console. `desk`, `web` and `scene` know no ROS; `ros` ties them to it; `browser` is for tests."""
+"""The experimenter's console. `desk`, `web`, `scene`: without ROS. `ros`: joins them to ROS. `browser`: for tests."""

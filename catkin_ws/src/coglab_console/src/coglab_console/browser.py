@@ -42,7 +42,7 @@ class Browser:
         service = webdriver.chrome.service.Service("/usr/bin/chromedriver")
         self.driver = webdriver.Chrome(service=service, options=options)
         self.driver.set_script_timeout(20)
-        # With Tab past its last control the page would lose the focus to the browser itself, and look otherwise.
+        # Without this, Tab after the last control gives the focus to the browser itself, and the page looks different.
         self.driver.execute_cdp_cmd("Emulation.setFocusEmulationEnabled", {"enabled": True})
         self._touch = touch
         self.resize(size)
@@ -57,7 +57,7 @@ class Browser:
             shutil.rmtree(self._profile, ignore_errors=True)
 
     def resize(self, size: tuple[int, int]) -> None:
-        """Gives the page itself this width and height in pixels, whatever the window's frame takes."""
+        """Gives the page itself this width and height in pixels, without the window's frame."""
         self.driver.execute_cdp_cmd(
             "Emulation.setDeviceMetricsOverride",
             {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": self._touch},

@@ -28,7 +28,7 @@ class ObjectError(ValueError):
     """An object file is invalid: file, line if known, field, and the expected value."""
 
 
-_chosen: list[Path] = []  # by objects_in, the innermost one last
+_chosen: list[Path] = []  # folders of objects_in, innermost last
 
 
 def objects_folder() -> Path:
@@ -38,7 +38,7 @@ def objects_folder() -> Path:
 
 @contextmanager
 def objects_in(folder: Path) -> Iterator[None]:
-    """Within this block the objects of this process are those of ``folder``: those of a simulated World made in it."""
+    """Within this block the process, and each simulated World made in it, uses the objects of ``folder``."""
     _chosen.append(folder)
     try:
         yield
@@ -77,7 +77,7 @@ def _inconsistency(entry: dict[str, Any], dialect: str) -> tuple[Field, str] | N
         return ("size",), f"{solid[0]} is {solid[1]}, got {size}; size is the box around the shape, m"
     for kind, default in (("grasps", "default_grasp"), ("deliveries", "default_delivery")):
         if entry[default] not in entry[kind]:
-            return (default,), f"'{entry[default]}' is none of {kind}: {', '.join(entry[kind])}"
+            return (default,), f"'{entry[default]}' is not among the {kind}: {', '.join(entry[kind])}"
         for name, item in entry[kind].items():
             try:
                 pose = Pose.from_dict(item["pose"])

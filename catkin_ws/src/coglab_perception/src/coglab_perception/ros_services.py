@@ -27,7 +27,7 @@ LONGEST_WAIT = 10.0  # s, longest time limit of a service
 
 
 class Queries(Protocol):
-    """What answers the services. Each method returns within its time limit or raises NotSeen."""
+    """Backend of the services. Each method returns within its time limit or raises NotSeen."""
 
     def init_vision(self, timeout: float) -> str:
         """Waits until the tracker works; returns a message."""
@@ -42,7 +42,7 @@ class Queries(Protocol):
 class PerceptionServices:
     """Serves ~init_vision, ~locate_object and ~free_places, and makes the transforms. Stamps are times of capture.
 
-    ``queries``: the answers. ``stamps``: between their clock, the steady one, and ROS time.
+    ``queries``: backend. ``stamps``: converts its clock, the steady one, to ROS time.
     """
 
     def __init__(self, names: FrameNames, queries: Queries, stamps: Stamps) -> None:

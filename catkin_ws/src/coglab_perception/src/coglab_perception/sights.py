@@ -1,4 +1,4 @@
-"""What perception has seen, and the queries of the perception contract. No ROS.
+"""Newest sights of perception, and the queries of the perception contract. No ROS.
 
 Each query returns within its time limit. A refusal is a sentence that lists the frames in view and says what to do.
 """
@@ -59,7 +59,7 @@ class Sights:
     """Newest sight of each frame. Thread-safe.
 
     ``clock``: returns the time (s), also of sights; it never goes back. ``board``: pose and slots; None until it is
-    seen. ``doubt(frame)``: why a sight of this frame must not be used, or empty. ``silence``: end of the sentences
+    seen. ``doubt(frame)``: reason not to use a sight of this frame, or empty. ``silence``: end of the sentences
     about a tracker that delivers nothing.
     """
 
@@ -99,7 +99,7 @@ class Sights:
     # -- queries ---------------------------------------------------------------------------------
 
     def wait_until_it_works(self, timeout: float, what: str) -> None:
-        """Waits until the tracker delivers. NotSeen: it does not. ``what``: what is not visible then."""
+        """Waits until the tracker delivers. Raises NotSeen. ``what``: name of the missing thing for the message."""
         limit = bounded(timeout)
         with self.changed:
             if self.changed.wait_for(self.works, limit):

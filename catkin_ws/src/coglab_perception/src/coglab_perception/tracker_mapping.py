@@ -1,4 +1,4 @@
-"""The mapping file of the perception bridge: how the poses of a tracker become the frames of the contract. No ROS.
+"""The mapping file of the perception bridge, from poses of a tracker to the frames of the contract. No ROS.
 
 ``config/perception_bridge.yaml`` is a commented example.
 """
@@ -57,7 +57,7 @@ MARKER_KEY = tuple[str, int]  # namespace and id of a marker
 
 @dataclass(frozen=True)
 class Source:
-    """Where one frame comes from: a tf frame, a topic of poses, or a marker of a topic of markers."""
+    """Source of one frame: a tf frame, a topic of poses, or a marker of a topic of markers."""
 
     frame: str
     """frame of the perception contract"""
@@ -68,7 +68,7 @@ class Source:
     offset: Pose = field(default_factory=Pose)
     """pose of the contract's frame in the tracker's frame: palm in the markers of the hand, object in its marker"""
     largest_age: float = 0.2
-    """s; an older pose is not passed on"""
+    """s; older poses are dropped"""
 
     @property
     def is_there(self) -> bool:
@@ -83,7 +83,7 @@ class TrackerMapping:
     sources: tuple[Source, ...]
     slots: dict[str, np.ndarray]
     by_arrival: bool = False
-    """True: the tracker's stamps are of another clock; a pose was captured ``latency`` before it arrived"""
+    """True: the tracker's stamps are by another clock; the capture is ``latency`` before the arrival"""
     latency: float = 0.0
 
     @staticmethod
@@ -122,7 +122,7 @@ def _source(document: Document, names: FrameNames, frame: str, age: float) -> So
 
     if not (names.is_tracked(frame) or frame == names.board):
         known = f"{names.human_hand}, {names.board}, {names.object.replace('{id}', '<id>')}"
-        raise refuse(f"no frame of the perception contract; expected one of {known}")
+        raise refuse(f"not a frame of the perception contract; expected one of {known}")
     by_marker, by_pose = "id" in value or "namespace" in value, value.get("type") == "PoseStamped"
     if ("tf" in value) == ("topic" in value):
         raise refuse("expected one source: tf (a frame), or topic and type")

@@ -7,7 +7,7 @@ import smach
 
 
 class Says(smach.State):
-    """Returns the outcomes given, one per run, the last one from then on."""
+    """Returns the given outcomes, one per run; then always the last one."""
 
     def __init__(self, *outcomes, registered=None, **keys):
         super().__init__(outcomes=registered or [o for o in outcomes if o], **keys)
@@ -26,7 +26,7 @@ class Says(smach.State):
 
 
 class Ignores(Says):
-    """Asks `machine` to end during its own run, and returns without serving."""
+    """Requests `machine` to end during its own run, and returns without serving the request."""
 
     machine = None
 
@@ -61,7 +61,7 @@ class Serves(Says):
 
 
 class Raises(smach.State):
-    """Raises what it is given."""
+    """Raises the given exception."""
 
     def __init__(self, error):
         super().__init__(outcomes=["done"])
@@ -113,7 +113,7 @@ def in_thread(function):
 
 
 def wait_for(condition, limit=60.0):
-    """Whether `condition()` becomes true within `limit` s."""
+    """True if `condition()` becomes true within `limit` s."""
     end = time.monotonic() + limit
     while time.monotonic() < end:
         if condition():

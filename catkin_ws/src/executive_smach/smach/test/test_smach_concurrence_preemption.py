@@ -129,7 +129,7 @@ except KeyboardInterrupt:
     print("INTERRUPTED", both.is_running(), flush=True)
 """
     env = {**os.environ, "PYTHONPATH": os.pathsep.join([p for p in sys.path if p])}
-    # Whoever runs the tests in the background hands on that Ctrl-C is ignored.
+    # A shell that runs the tests in the background makes its processes ignore Ctrl-C.
     command = ["env", "--default-signal=INT", sys.executable, "-c", code]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=env)
     try:
@@ -142,7 +142,7 @@ except KeyboardInterrupt:
         process.wait()
 
 
-def test_too_few_threads_is_an_error_and_nothing_runs(monkeypatch):
+def test_missing_threads_are_an_error_and_nothing_runs(monkeypatch):
     children = {"A": Says("done"), "B": Says("done")}
     both = concurrence(children=children)
     real, count = threading.Thread.start, []

@@ -130,7 +130,7 @@ def test_another_thread_cannot_add_to_an_open_container_better():
     assert isinstance(other.error, smach.InvalidStateError) and list(sm.get_children()) == ["A"]
 
 
-def test_what_is_no_state_is_refused_with_words():
+def test_non_states_are_refused_with_a_message():
     with smach.StateMachine(["done"]):
         for wrong in (None, "state", lambda ud: "done", Says):
             with pytest.raises(smach.InvalidStateError, match="'A'"):

@@ -65,7 +65,7 @@ def test_an_ignored_request_ends_the_iteration_and_is_cleared():
 
 
 @pytest.mark.parametrize("outcomes, wanted", [(["preempted"], "preempted"), (["x"], "exhausted")])
-def test_a_loop_outcome_cut_short_is_no_foreign_outcome_better(outcomes, wanted):
+def test_preempted_loop_outcome_is_not_returned_better(outcomes, wanted):
     state = Ignores("go")
     each = iterator(state, range(5), outcomes, loop_outcomes=["go"])
     state.machine = each
@@ -106,7 +106,7 @@ def test_a_child_that_raises():
         ({"final_outcome_map": {"bad": "nowhere"}}, "nowhere"),
     ],
 )
-def test_outcomes_that_nobody_has_are_found_better(contained, named):
+def test_unknown_outcomes_are_found_better(contained, named):
     state = Says("ok", registered=["ok", "bad"])
     iterator(state, loop_outcomes=["ok"], final_outcome_map={"bad": "failed"}).check_consistency()
     with pytest.raises(smach.InvalidTransitionError, match=rf"\['{named}'\]"):

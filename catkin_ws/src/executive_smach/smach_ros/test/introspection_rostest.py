@@ -62,7 +62,7 @@ class Viewer:
 
 
 class Gate(smach.State):
-    """Waits until it is let through."""
+    """Waits until the test opens it."""
 
     def __init__(self):
         super().__init__(["done", "failed"])

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""An action server for the tests: what it does with a goal is the number in the goal."""
+"""An action server for the tests: the number in the goal selects its behaviour."""
 
 import sys
 import threading

@@ -1,7 +1,5 @@
 #!/usr/bin/python3
-"""A node with one machine of the kind named; prints READY, and at its end OUTCOME and what came
-out.
-"""
+"""A node with one machine of the given kind; prints READY, and at its end OUTCOME and the outcome."""
 
 import sys
 import threading
@@ -16,7 +14,7 @@ from std_srvs.srv import Trigger
 
 
 class Polls(smach.State):
-    """Runs until asked to end; does not look at rospy."""
+    """Runs until a request to end; does not check rospy."""
 
     def __init__(self):
         super().__init__(["done", "preempted"])

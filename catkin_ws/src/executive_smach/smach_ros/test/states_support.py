@@ -1,4 +1,4 @@
-"""What the tests of states share."""
+"""Common parts of the tests of states."""
 
 import threading
 import time

@@ -42,7 +42,7 @@ class Topic:
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_no_viewer_gets_a_beat_before_its_window_exists_and_all_get_theirs(seed, monkeypatch):
+def test_new_viewers_get_their_first_heartbeat_after_a_delay(seed, monkeypatch):
     draw = random.Random(seed)
     comes = sorted(draw.uniform(0.0, 30.0) for _ in range(draw.choice((2, 3, 40))))
     topic, server = Topic(), IntrospectionServer("/server", smach.StateMachine(["end"]), "/SM_ROOT")

@@ -23,7 +23,7 @@ from smach_ros.plain_data import InvalidDataError, decode, encode, to_plain
         ("SmachContainerInitialStatusCmd", "45f8cf31fc29b829db77f23001f788d6"),
     ],
 )
-def test_messages_are_those_of_other_viewers(name, md5):
+def test_messages_match_those_of_other_viewers(name, md5):
     assert getattr(smach_msgs.msg, name)._md5sum == md5
 
 
@@ -89,7 +89,7 @@ def test_numpy():
     assert shown["i"] == 3 and shown["f"] == 0.5 and isinstance(shown["a"], str)
 
 
-def test_a_read_only_view_shows_what_is_behind():
+def test_read_only_view_is_encoded_as_its_object():
     ud = smach.UserData()
     ud.f = Odd()
     assert "Odd" in to_plain(smach.Remapper(ud, ["f"]).f)

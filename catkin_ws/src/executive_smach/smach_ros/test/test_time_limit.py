@@ -61,7 +61,7 @@ def test_the_first_clock_message_is_no_passed_time(clocks):
     assert limit.expired()
 
 
-def test_a_clock_that_was_silent_or_went_back_takes_nothing_off(clocks):
+def test_silent_or_reset_clock_does_not_shorten_the_limit(clocks):
     rospy.rostime._set_rostime(rospy.Time(100))
     limit = TimeLimit(20.0)
     clocks.wait(16.0)  # the first second may be a late message

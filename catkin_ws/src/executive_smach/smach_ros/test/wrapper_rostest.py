@@ -55,7 +55,7 @@ class TestWrapper(unittest.TestCase):
         wrapper.run_server()
         client = actionlib.SimpleActionClient(name, TestAction)
         self.assertTrue(client.wait_for_server(rospy.Duration(LIMIT)))
-        # The client has seen the server, but the server may not know the client yet: what is said to nobody is lost.
+        # The client has seen the server, but the server may not know the client yet and would lose messages to it.
         server = wrapper._action_server.action_server
         self.assertTrue(wait_for(lambda: server.feedback_pub.get_num_connections() > 0))
         self.assertTrue(wait_for(lambda: server.result_pub.get_num_connections() > 0))
@@ -104,7 +104,7 @@ class TestWrapper(unittest.TestCase):
         machine = smach.StateMachine(["succeeded", "aborted", "preempted"], ["n"], ["m", "result"])
         got = []
 
-        # Feedback and result travel apart, and a client that has its result hears no feedback any more.
+        # Feedback and result have separate topics, and a client ignores feedback after its result.
         def heard(ud):
             wait_for(lambda: got)
             return "succeeded"
@@ -137,7 +137,7 @@ class TestWrapper(unittest.TestCase):
         self.assertEqual(self.send(client, 1), (GoalStatus.SUCCEEDED, 6))
 
     def test_wrapper_a_fresh_result_is_there_to_be_filled_in(self):
-        """As the machines of others do it: the result is an input and an output key."""
+        """As in machines of other authors: the result is an input and an output key."""
 
         def fill(ud):
             seen.append(ud.action_result.result)

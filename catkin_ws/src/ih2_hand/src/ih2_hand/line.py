@@ -122,7 +122,7 @@ class HandLine:
         """Return an answer of exactly `length` bytes, after at most one resynchronisation and one retry."""
         with self.lock:
             if self.transport.pending():
-                self._flush("bytes nobody asked for")
+                self._flush("bytes without a request")
             for attempt in (1, 2):
                 self.counters.requests += 1
                 self.send(frame)

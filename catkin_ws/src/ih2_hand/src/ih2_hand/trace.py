@@ -109,6 +109,6 @@ class Tracer:
             answer, self._answer = self._answer[:length], self._answer[length:]
             lines.append((answer, describe_answer(self._asked.pop(0), answer)))
         if self._answer:
-            lines.append((self._answer, "nobody asked for this"))
+            lines.append((self._answer, "bytes without a request"))
             self._answer = b""
         return lines

@@ -1,1 +1,1 @@
-"""What the console does without ROS and without a web library: commands, who may, why not, sessions, events."""
+"""The console's logic without ROS and web library: commands, operator, reasons of refusals, sessions, events."""

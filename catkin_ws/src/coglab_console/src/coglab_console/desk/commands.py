@@ -48,12 +48,12 @@ class Command:
 
 _ALL = (
     Command("stop", "brakes and holds the arm, ends the action", {}, operator=False),
-    Command("note", "writes a note with the time of now", {"text": _TEXT}, ("text",), operator=False),
+    Command("note", "writes a note with the current time", {"text": _TEXT}, ("text",), operator=False),
     Command("take_over", "makes you the operator", {}, operator=False),
     Command("keep", "keeps you the operator when another browser takes over", {}),
-    Command("invite", "gives a link for one more browser", {}),
-    Command("parameters", "gives the ROS parameters", {}, operator=False),
-    Command("acknowledge", "says that the cause of the stop of this number was read",
+    Command("invite", "makes a link for one more browser", {}),
+    Command("parameters", "returns the ROS parameters", {}, operator=False),
+    Command("acknowledge", "confirms that the cause of the stop with this number was read",
             {"stop": {"type": "integer", "minimum": 0}}, ("stop",)),
     Command("start", "starts an action of the state machine",
             {"action": _ACTION, "object_id": _OBJECT, "delivery": _ACTION}, ("action",), motion=True),
@@ -75,12 +75,12 @@ _ALL = (
     Command("trial_begin", "begins the next trial of the order", {}),
     Command("trial_end", "ends the trial", {"outcome": {"enum": ["done", "failed", "repeat", "skipped"]}},
             ("outcome",)),
-    Command("answer", "writes answers to a questionnaire of the study that is run live", {
+    Command("answer", "writes answers to a questionnaire of the live study", {
         "questionnaire": _NAME,
         "answers": {"type": "object", "minProperties": 1, "maxProperties": 200,
                     "additionalProperties": {"type": "number"}},
     }, ("questionnaire", "answers"), operator=False),
-    Command("preview", "shows the path of a primitive toward the goal of the next action; empty: no longer",
+    Command("preview", "shows the path of a primitive toward the goal of the next action; empty: ends the preview",
             {"primitive": {"type": "string", "pattern": r"^[A-Za-z0-9_.-]{0,64}\Z"}}, ("primitive",), operator=False),
     Command("contact_learn", "learns the noise of the torques from 5 s at rest", {}),
     Command("contact_arm", "arms the contact detector, to try it", {
@@ -97,7 +97,7 @@ _ALL = (
         "names": {"type": "array", "minItems": 1, "maxItems": 64, "items": _NAME}}, ("names",)),
 )  # fmt: skip
 COMMANDS = {command.name: command for command in _ALL}
-# 2.0 is no integer here: range() and the like do not take a float.
+# 2.0 is not an integer here, because range() does not accept a float.
 _TYPES = jsonschema.Draft7Validator.TYPE_CHECKER.redefine(
     "integer", lambda _, value: isinstance(value, int) and not isinstance(value, bool)
 )
@@ -113,7 +113,7 @@ def judge(name: Any, arguments: Any) -> Command:
     try:
         error = jsonschema.exceptions.best_match(_VALIDATORS[name].iter_errors(arguments))
     except RecursionError:
-        raise BadCommand(f"{name}: lists within lists, too many to be looked at") from None
+        raise BadCommand(f"{name}: lists are nested too deeply") from None
     if error is not None:
         where = ".".join(str(part) for part in error.absolute_path)
         raise BadCommand(f"{name}{': ' + where if where else ''}: {error.message[:200]}")

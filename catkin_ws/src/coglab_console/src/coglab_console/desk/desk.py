@@ -21,7 +21,7 @@ from .words import plain
 
 UNKNOWN = "unknown"  # the brain's name of an object that was in the hand before the brain started
 NOTICE = 3.0  # s between the announcement of a new operator and the change
-ABSENCE = 10.0  # s without a connection after which nobody operates; longer than a page takes to load again
+ABSENCE = 10.0  # s without a connection after which the operator loses the role; longer than reloading a page
 
 
 class Answer(dict):
@@ -79,7 +79,7 @@ class Roles:
             self._absent_since = self._now()
         if name == self.claimant:
             self.claimant = ""
-            self._say(f"{name} went away and does not take over any more", "info")
+            self._say(f"{name} disconnected and no longer takes over", "info")
 
     def take_over(self, name: str) -> str:
         """The browser `name` requests to be the operator. Returns the answer in words."""
@@ -96,7 +96,7 @@ class Roles:
                 f"{name} takes over from {self.operator} in {NOTICE:.0f} s, unless {self.operator} keeps the control",
                 "warning",
             )
-        return f"{self.operator} was told; you are the operator in {NOTICE:.0f} s unless they keep the control"
+        return f"{self.operator} was informed; you are the operator in {NOTICE:.0f} s unless they keep the control"
 
     def keep(self, name: str) -> str:
         """The operator refuses to hand over. Returns the answer in words."""
@@ -159,10 +159,10 @@ class Desk:
         self._begun: dict[str, tuple[str, dict]] = {}
         """By browser: the command that has begun and whose button is still held."""
 
-    # --- from the browsers ------------------------------------------------------------------------------------
+    # --- calls of the browsers ------------------------------------------------------------------------------------
 
     def stop(self, who: str) -> Answer:
-        """STOP: from anybody, any number of times."""
+        """Executes STOP, from any browser, any number of times."""
         self.backend.stop(who)
         self.guard.stop(f"{who} pressed STOP")
         if self.backend.standing().under_way:
@@ -171,7 +171,7 @@ class Desk:
         return Answer(True, "STOP was sent to the arm and to the brain", {"stop": self.guard.stops})
 
     async def command(self, who: str, name: Any, arguments: Any) -> Answer:
-        """One command of the list by the browser `who`."""
+        """Executes a command of the list for the browser `who`."""
         refusal = self._refusal(who, name, arguments)
         if refusal:
             return Answer(False, refusal)
@@ -182,8 +182,8 @@ class Desk:
         return await self._perform(who, name, arguments)
 
     async def held(self, who: str, name: Any, arguments: Any) -> Answer | None:
-        """One message of a held button; None while nothing has come of it."""
-        # What was begun may be the reason why it cannot be asked again; the button is still down.
+        """Processes one message of a held button. Returns None until its command was executed."""
+        # The begun action may be a reason to refuse the same command again, while the button is still down.
         if who in self._begun and self._begun[who] == (name, arguments):
             return None
         refusal = self._refusal(who, name, arguments)
@@ -197,14 +197,14 @@ class Desk:
         return await self._perform(who, name, arguments)
 
     def released(self, who: str, lost: bool = False) -> None:
-        """The held button went up; `lost`: the connection of its browser went away, which everybody is told."""
+        """The button was released. `lost`: its browser lost the connection, which becomes an event."""
         self._begun.pop(who, None)
         button = self._held.pop(who, None)
         what = button.unfinished() if button is not None and lost else None
         if what is not None:
             name, arguments = what
             words = words_of(name, dict(arguments))
-            self.events.add("command", f"{who} went away with the button of {words} held: nothing was begun", "warning")
+            self.events.add("command", f"{who} disconnected while holding {words}: nothing was begun", "warning")
 
     def connected(self, who: str) -> None:
         """A browser's first connection."""
@@ -217,14 +217,14 @@ class Desk:
         self.roles.disconnected(who)
         self.tick()
 
-    # --- from the robot ---------------------------------------------------------------------------------------
+    # --- calls of the robot ---------------------------------------------------------------------------------------
 
     def result(self, row: dict) -> None:
         """An action of the state machine has ended."""
         self.experiment.result(row)
 
     def told(self, name: str, text: str, who: str) -> None:
-        """A note, or the object of the next action, told by another node; what does not fit is an event."""
+        """Takes a note, or the object of the next action, from another node. An invalid one becomes a warning event."""
         arguments = {"text": text} if name == "note" else {"object_id": text}
         try:
             judge(name, arguments)
@@ -238,13 +238,13 @@ class Desk:
         self.tick()
 
     def observe(self, stopped: bool, cause: str, standstills: int = 0) -> None:
-        """Whether the arm or the machine stands after a stop, why, and how often it has come to stand."""
+        """Takes whether the arm or the machine stands after a stop, the cause, and the number of standstills so far."""
         if self.guard.observe(stopped, cause, standstills):
-            self.events.add("stop", f"stopped: {cause or 'no reason was told'}", "fault")
+            self.events.add("stop", f"stopped: {cause or 'no reason given'}", "fault")
             self.tick()
 
     def tick(self) -> None:
-        """Several times a second: what every browser is shown of all this."""
+        """Call this several times a second: updates the roles and the document `desk` of every browser."""
         self.roles.tick()
         now = self.backend.standing()
         self._follow_trial(now)
@@ -269,7 +269,7 @@ class Desk:
     # --- inside -----------------------------------------------------------------------------------------------
 
     def _refusal(self, who: str, name: Any, arguments: Any) -> str:
-        """Why this is not done; empty if it is."""
+        """Reason to refuse a command; empty if it is allowed."""
         try:
             command = judge(name, arguments)
         except BadCommand as error:
@@ -295,7 +295,7 @@ class Desk:
             stops = self.guard.stops
             answer = await self.backend.call(name, arguments)
             answer["message"] = plain(answer["message"])
-            if answer["success"] and name in ("start", "home"):  # fingers that calibrate are no motion of the arm
+            if answer["success"] and name in ("start", "home"):  # a calibration moves only the fingers
                 self.guard.moved(stops)
         if name not in ("parameters", "note", "select_object", "preview"):
             told = f"{who}: {words_of(name, arguments)}: {answer['message']}"
@@ -304,12 +304,12 @@ class Desk:
         return answer
 
     def _meant(self, action: str) -> str:
-        """The object of a request that names none."""
+        """Object of a request that names none: the held one to give it, otherwise the selected one."""
         held = self.backend.standing().object_id
         return held if action in GIVES and held not in ("", UNKNOWN) else self.object_id
 
     def _follow_trial(self, now: Standing) -> None:
-        """The first object that the condition of a trial names is that of its requests, until another one is chosen."""
+        """Selects the first object that the condition of a new trial names."""
         trial = self.experiment.begun()
         if trial == self._trial or (trial[0] and not now.objects):
             return
@@ -332,13 +332,13 @@ class Desk:
         return f"object {object_id or 'none'}"
 
     def _own(self, who: str, name: str, given: dict) -> Answer | None:
-        """Commands that the robot has no part in; None for the others."""
+        """Executes the commands that do not need the robot. Returns None for the others."""
         session = self.experiment
         if name == "note":
             self.backend.tell("note", given["text"])
             return Answer(True, self._note(who, given["text"]))
         if name == "acknowledge":
-            # Which one it was, and why it stood, is in the answer and so in the event.
+            # The answer, and thereby the event, contains number and cause of the stop.
             refusal = self.guard.acknowledge(given["stop"])
             told = f"acknowledged stop {self.guard.stops} ({self.guard.cause}); the first motion needs a held button"
             return Answer(not refusal, refusal or told)
@@ -347,7 +347,7 @@ class Desk:
         if name == "keep":
             return Answer(True, self.roles.keep(who))
         if name == "invite":
-            return Answer(True, "a link for one more browser, to be used once", self._invite())
+            return Answer(True, "a link for one more browser, valid once", self._invite())
         if name == "select_object":
             self.backend.tell("select_object", given["object_id"])
             return Answer(True, self._select(who, given["object_id"]))

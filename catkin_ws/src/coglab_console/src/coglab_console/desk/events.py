@@ -12,8 +12,8 @@ LONGEST = 600  # characters of one event
 
 
 class EventLog:
-    """Thread-safe. An event is {seq, stamp (s since 1970), level, source, phase, text}; `phase` is what the
-    robot was doing, in words; empty if that is unknown."""
+    """Thread-safe. An event is {seq, stamp (s since 1970), level, source, phase, text}; `phase`: activity
+    of the robot in words; empty if unknown."""
 
     def __init__(self, now: Callable[[], float], keep: int = KEPT) -> None:
         self._now = now

@@ -1,8 +1,8 @@
 """A session with one participant: conditions, order of trials, notes.
 
-What is done in it is recorded by coglab_tools' recorder, handover by handover: each `trial.yaml` has the participant,
-condition, study and session of its trial, and the notes. The only file of the console is `session.json`, the state of
-the open session, with which a console that was killed goes on. Use pseudonyms for participants, never names.
+The recorder of coglab_tools records each handover: its `trial.yaml` has participant, condition, study and session of
+the trial, and the notes. The console itself writes only `session.json`, the state of the open session, from which a
+restarted console continues. Use pseudonyms for participants, never names.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _KEPT = (
     "_results",
     "_last_result",
 )
-"""attributes that session.json keeps"""
+"""Attributes that session.json contains."""
 
 
 class ExperimentError(Exception):
@@ -112,7 +112,7 @@ class Experiment:
             if not 0 <= found["position"] <= len(found["trials"]):
                 raise ValueError(f"position is {found['position']}")
         except (OSError, ValueError, KeyError, TypeError) as error:
-            self._warn(f"no session goes on, {self._path} is not whole: {error}; remove it")
+            self._warn(f"the session is not resumed, {self._path} is damaged: {error}; remove it")
             return ""
         for name in _KEPT:
             setattr(self, name, found[name])
@@ -295,6 +295,6 @@ class Experiment:
             os.replace(part, self._path)
         except OSError as error:
             self._warn(
-                f"{self._path} cannot be written ({error.strerror}); free the disk: a new console would not know the "
-                "session, which goes on here"
+                f"{self._path} cannot be written ({error.strerror}); the session goes on, but a "
+                "restarted console would not know it: free space on the disk"
             )

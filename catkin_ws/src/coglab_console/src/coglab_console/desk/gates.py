@@ -60,9 +60,7 @@ class MotionGuard:
         """Text of the page about the newest stop."""
         if not self.lifted:
             return self.cause
-        return (
-            f"This stop is over, it was lifted without this page: {without_advice(self.cause) or 'no reason was told'}"
-        )
+        return f"This stop is over, it was lifted without this page: {without_advice(self.cause) or 'no reason given'}"
 
     def observe(self, stopped: bool, cause: str, standstills: int = 0) -> bool:
         """Call this several times a second. `stopped`: the robot stands after a stop or fault; `standstills`: see
@@ -87,7 +85,7 @@ class MotionGuard:
         An acknowledgement of an old stop is refused: it must not lift a newer one."""
         if stop != self.stops:
             return (
-                f"expected an answer to stop {self.stops}, the newest ({self.cause or 'no reason was told'}), "
+                f"expected an answer to stop {self.stops}, the newest ({self.cause or 'no reason given'}), "
                 f"got one to stop {stop}; read its cause, then acknowledge it"
             )
         self.unacknowledged = False
@@ -100,7 +98,7 @@ class MotionGuard:
     def guarded(self, name: str, arguments: dict) -> bool:
         """True if this command needs a held button now.
 
-        Calibrations that open the hand whatever it holds always need it, and so do the commands of SECOND_THOUGHT.
+        Calibrations that open the hand even with an object always need it, and so do the commands of SECOND_THOUGHT.
         Switching the contact detector off never does."""
         if name == "calibrate" and (arguments.get("force") or arguments.get("mode") == "complete"):
             return True
@@ -110,8 +108,8 @@ class MotionGuard:
 
 
 class Standstills:
-    """Counts how often the robot has come to stand after a stop or a fault. It gets every message, so
-    that a short stop counts, too."""
+    """Counts the standstills of the robot after a stop or a fault. It gets every message, so that a short stop counts,
+    too."""
 
     def __init__(self) -> None:
         self.count = 0
@@ -215,7 +213,7 @@ def _home_reason(now: Standing) -> str:
         return _leads_on(now)
     if now.motion_allowed:
         return ""
-    short = re.split(r":|;| because ", now.arm_reason)[0] or "no reason told"
+    short = re.split(r":|;| because ", now.arm_reason)[0] or "no reason given"
     return f"the arm may not move: {short if len(short) <= LONGEST else short[: LONGEST - 1] + '…'}"
 
 

@@ -1,5 +1,5 @@
-"""What an experimenter reads in place of names of states, actions and commands. What is waited for, and how long still,
-the brain tells itself (MasterState)."""
+"""Words for the experimenter instead of names of states, actions and commands. The brain itself publishes the
+condition of a wait and the time left (MasterState)."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ PHASES = {
     "take": "takes from the board",
     "put": "puts on the board",
 }
-IN_ACTION = {  # where the same state means something else in another action
+IN_ACTION = {  # words of a state that depend on the action
     ("exchange_human_to_robot", "set_dmp_goal"): "waits until it is offered",
     ("exchange_robot_to_human", "set_dmp_goal"): "waits for the person's hand",
     ("exchange_human_to_robot", "wait_stop"): "reaches and receives",
@@ -86,7 +86,7 @@ SUPERVISOR = {
     "stopping": "stopping",
     "stopped": "stopped",
 }
-"""What the arm's interface is in"""
+"""States of the arm's interface."""
 OUTCOMES = {
     "succeeded": "done",
     "failed": "failed",
@@ -95,7 +95,7 @@ OUTCOMES = {
     "preempted": "broken off",
     "refused": "refused",
 }
-_LONG = sorted((name for name in PHASES if "_" in name), reverse=True)  # short ones are words of the language
+_LONG = sorted((name for name in PHASES if "_" in name), reverse=True)  # names without "_" are ordinary words
 _NAMES = re.compile(rf"(?<![\w/])'?({'|'.join(_LONG)})'?(?![\w/])")
 _PRESSED = re.compile(r"(press|or) (initialise|reset|take|put)\b")
 _TYPED = re.compile(r"type: (\./coglab start \w+(?: or \./coglab start \w+)*)")
@@ -119,37 +119,37 @@ def button(name: str) -> str:
 
 
 def action_of(state: str) -> str:
-    """Words on the button of the action that the path of a state belongs to; empty where it belongs to none."""
+    """Words on the button of the action in the path of a state; empty if there is none."""
     return next((BUTTONS[label] for label in state.split("/") if label in BUTTONS), "")
 
 
 def supervisor(name: str) -> str:
-    """What the arm's interface is in, in words."""
+    """Words for a state of the arm's interface."""
     return SUPERVISOR.get(name, name)
 
 
 def outcome(name: str) -> str:
-    """Words for how a state ended, or for an action of the journal."""
+    """Words for the outcome of a state, or for an action of the journal."""
     words = OUTCOMES.get(name) or BUTTONS.get(name) or PHASES.get(name)
     return words or name.replace("_", " ")
 
 
 def plain(sentence: str) -> str:
-    """A sentence of the brain or of the arm as the page says it: words for states and actions, and the button to press
-    in place of the command to type."""
+    """A sentence of the brain or of the arm for the page: words for states and actions, and the button to press instead
+    of the command to type."""
     pressed = _TYPED.sub(lambda found: "press " + found[1].replace("./coglab start ", ""), _CALLED.sub("", sentence))
     pressed = _PRESSED.sub(lambda found: f"{found[1]} {BUTTONS[found[2]]}", pressed)
     return _NAMES.sub(lambda found: BUTTONS.get(found[1]) or f"'{PHASES[found[1]]}'", pressed)
 
 
 def without_advice(sentence: str) -> str:
-    """The sentence of `plain` without what to press."""
+    """The sentence of `plain` without its advice."""
     return _ADVICE.sub("", sentence)
 
 
 def transition(path: str, before: str, how: str, after: str, reason: str = "") -> str:
-    """One transition of the state machine as a sentence: its reason first, where it has one. An event says besides in
-    which phase it was, so that a state that is done is not named again."""
+    """One transition of the state machine as a sentence, which begins with the reason if there is one. A state that
+    succeeded is not named, because the event has its phase."""
     ended, now = phase(f"{path}/{before}"), phase(f"{path}/{after}")
     if after in OUTCOMES or (how == after and how not in BUTTONS) or now == ended:
         step = f"{ended}: {outcome(how)}"
@@ -172,7 +172,7 @@ def command(name: str, arguments: Mapping[str, Any]) -> str:
         return "Acknowledge"
     elif name == "answer":
         words = "Questionnaire"
-        given.pop("answers", None)  # what a participant answered is nobody else's business
+        given.pop("answers", None)  # the answers of a participant are confidential
     else:
         words = COMMANDS.get(name) or button(name)
     rest = (" ".join(map(str, value)) if isinstance(value, list) else str(value) for value in given.values() if value)

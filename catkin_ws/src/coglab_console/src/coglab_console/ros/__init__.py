@@ -1,1 +1,1 @@
-"""The robot as ROS tells it, commands and STOP as ROS takes them, and the node."""
+"""The ROS side of the console: state of the robot, commands, STOP, and the node."""

@@ -82,7 +82,7 @@ class RosBackend:
         self._marks.put(names)
 
     def _write_marks(self) -> None:
-        """The master may take its time, and the desk does not wait for it."""
+        """Writes the names to the master in its own thread, so that the desk does not wait for the master."""
         while not rospy.is_shutdown():
             names = self._marks.get()
             try:
@@ -152,10 +152,10 @@ class RosBackend:
         while time.monotonic() < end:
             now = self._view.hand
             if self._view.hand_number > number and now.calibrating:
-                return Answer(True, f"{now.message}; the hand tells how it ends")
+                return Answer(True, f"{now.message}; the event log shows its end")
             if self._view.hand_number > number and now.event_code == ReasonCode.HAND_REFUSED:
                 refused = now.message
-                # The same words may be those of an earlier request.
+                # An equal message may belong to an earlier request.
                 if refused != before.message:
                     break
             time.sleep(0.02)
@@ -249,8 +249,8 @@ class StopPath:
     """STOP goes three ways at once. None waits for another, for the ROS master, or for the event loop.
 
     `hold` on the topic lwr/ros_events, `hold` by the service lwr/command, and the service coglab/stop. The topic uses a
-    connection that stands already. A thread asks the master once a second for the addresses of the services, so that a
-    master that no longer answers is not needed when it counts.
+    connection that stands already. A thread requests the addresses of the services once a second,
+    so that STOP does not need the master.
 
     Call `press` from any thread; `say(text, level)` gets the outcomes."""
 
@@ -288,7 +288,7 @@ class StopPath:
             took = 1000 * (time.monotonic() - began)
             self._say(f"STOP, {name}: {plain(answer.message)} ({took:.0f} ms)", "info" if answer.success else "fault")
         except Exception as error:
-            self._say(f"STOP: the {name} cannot be asked ({error}); if the arm moves, use the red button", "fault")
+            self._say(f"STOP: the {name} cannot be reached ({error}); if the arm moves, use the red button", "fault")
         finally:
             watch.cancel()
             self._waiting.release()

@@ -1,4 +1,4 @@
-"""Every state machine on this master, from the topics of smach introspection. Nothing that they carry is unpickled."""
+"""Every state machine on this master, from the topics of smach introspection. Their pickled data is never read."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from ..scene.graph_layout import Container, Layout, roots
 
 STRUCTURE, STATUS = "/smach/container_structure", "/smach/container_status"
 MAIN = "/coglab"
-MAX_MACHINES = 12  # besides that one
+MAX_MACHINES = 12  # besides MAIN
 MAX_CONTAINERS = 120
-SILENCE = 10.0  # s without a word (heartbeats come every 2 s) after which a machine is taken to be gone
+SILENCE = 10.0  # s without a message after which a machine counts as gone; heartbeats come every 2 s
 
 
 class Machine:
@@ -27,14 +27,14 @@ class Machine:
         self.containers: dict[str, Container] = {}
         self.active: dict[str, list[str]] = {}
         self.last: dict[str, Any] = {}
-        self.tells = False  # whether its transitions are told, with outcome and reason, which introspection has not
+        self.tells = False  # True if it publishes transitions with outcome and reason, which introspection lacks
         self.heard = time.monotonic()
         self.dirty = True
         self.subscribers: list[rospy.Subscriber] = []
 
 
 class SmachGraphs:
-    """`put(name, value)` gets documents `graph:<machine>`, `active` and `machines`; called from threads of its own."""
+    """`put(name, value)` gets documents `graph:<machine>`, `active` and `machines`; called from its own threads."""
 
     def __init__(self, put: Callable[[str, Any], None], say: Callable[[str, str], None]) -> None:
         self._put, self._say = put, say
@@ -58,7 +58,7 @@ class SmachGraphs:
         while not rospy.is_shutdown():
             try:
                 topics = rospy.get_published_topics()
-            except Exception:  # the master is away: what is known stays
+            except Exception:  # no master: keep the known machines
                 topics = []
             for topic, kind in topics:
                 if topic.endswith(STRUCTURE) and kind == "smach_msgs/SmachContainerStructure":

@@ -1,7 +1,7 @@
-"""Files and services that change seldom: objects, configuration of the machines, primitives, recordings and
-questionnaires; and the path ahead.
+"""Data of files and services that change seldom (objects, configuration of the machines, primitives, recordings and
+questionnaires), and the path of the next motion.
 
-Each in a thread that may wait for the ROS master without anybody else waiting.
+Both have their own thread, because they may wait for the ROS master.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from ..scene.primitives import document as library_document
 from .recordings import Recordings
 from .view import RosView
 
-PERIOD = 5.0  # s between two looks at files and at the object database
-PATH_PERIOD = 0.5  # s, between two looks at the path of the next motion
+PERIOD = 5.0  # s between two reads of the files and the object database
+PATH_PERIOD = 0.5  # s between two predictions of the next motion's path
 PREDICT = "controller_manager/dmp/predict_dmp"
 MAX_OBJECTS = 100
 MAX_FILE = 1_000_000  # bytes of a configuration
 
 
 def lookup(values: Mapping[str, Any], name: str) -> Any:
-    """`a.b.c` in nested mappings; None if it is not there."""
+    """Value of `a.b.c` in nested mappings; None if it is missing."""
     node: Any = values
     for part in name.split("."):
         if not isinstance(node, Mapping) or part not in node:
@@ -43,7 +43,7 @@ def lookup(values: Mapping[str, Any], name: str) -> Any:
 
 
 class Knowledge:
-    """`selected()` is the object of the next action."""
+    """Sets the documents of these data. `selected()` returns the object of the next action."""
 
     def __init__(
         self,
@@ -71,12 +71,12 @@ class Knowledge:
         threading.Thread(target=self._paths, name="path_ahead", daemon=True).start()
 
     def _entry(self) -> dict:
-        """Of the object in the hand, or of the next action, or that which the machine takes where none is named."""
+        """Entry of the held object, of the next action's object, or of the machine's default object."""
         name = self._view.machine.object_id or self._selected() or str(self._config.get("default_object", ""))
         return self._entries.get(name, {})
 
     def read_again(self) -> None:
-        """After the object database has read its files, or a questionnaire was filled in."""
+        """Call this after the object database read its files, or after a questionnaire was filled in."""
         self._now.set()
 
     def _look(self) -> None:
@@ -91,7 +91,7 @@ class Knowledge:
                 try:
                     work()
                     self._told.pop(name, None)
-                except Exception as error:  # a service or file that is not there now: the old content stays
+                except Exception as error:  # a service or file is missing now: keep the old content
                     if self._told.get(name) != str(error):
                         self._told[name] = str(error)
                         self._say(f"{name}: {error}", "warning")
@@ -119,7 +119,7 @@ class Knowledge:
         self._show_objects([problem[:400] for problem in listed.problems[:MAX_OBJECTS]])
 
     def _show_objects(self, problems: list[str] | None) -> None:
-        """`problems` in the database's words; None: it is not there to be asked."""
+        """Sets the document. `problems`: texts of the database; None: the database does not run."""
         self._asked = problems is not None
         rows = [
             {
@@ -167,7 +167,7 @@ class Knowledge:
             time.sleep(PATH_PERIOD)
             try:
                 found = None if self._view.path_runs() else self._path()
-                if not self._view.path_runs():  # it may have begun meanwhile
+                if not self._view.path_runs():  # a motion may have begun meanwhile
                     self._put("path", found)
             except Exception as error:  # nothing that comes from outside ends this thread
                 if self._told.get("path") != str(error):
@@ -175,7 +175,7 @@ class Knowledge:
                     self._say(f"the path ahead cannot be drawn: {type(error).__name__}: {error}", "warning")
 
     def _path(self) -> dict | None:
-        """Of the next motion; the view shows that of the one under way."""
+        """Document of the next motion's path. The view sets that of a running motion."""
         view = self._view
         actions = [
             action
@@ -186,7 +186,7 @@ class Knowledge:
         if not actions and leaf_parent and leaf_parent[0] in path_ahead.ROLES:
             actions = leaf_parent  # the action has begun, the reach has not
         if view.preview:
-            actions = [*actions, "exchange_human_to_robot"]  # where nothing may begin now, the reach for the object
+            actions = [*actions, "exchange_human_to_robot"]  # if no action is possible now: the reach for the object
         wanted = path_ahead.aim(actions[0], view.entry(), view.hand_frame) if actions else None
         if wanted is None:
             return None
@@ -199,7 +199,7 @@ class Knowledge:
         return view.shown("ahead", answer.path) if answer.success else path_ahead.refused(answer.message)
 
     def _predict(self, fields: dict) -> PredictDmpResponse | None:
-        """None where the controller is not there to be asked."""
+        """Requests the predicted path; None if the controller does not run."""
         request = PredictDmpRequest(**fields)
         request.goal_offset = Point(*fields["goal_offset"])
         request.target_orientation = Quaternion(*fields["target_orientation"])
@@ -213,6 +213,6 @@ class Knowledge:
             return None
 
     def _pace(self) -> float:
-        """By which the machines slow the primitives of an exchange down."""
+        """Factor by which the machines lengthen the primitives of an exchange."""
         ratio = lookup(self._config, "handover.reach_ratio")
         return float(ratio) if isinstance(ratio, (int, float)) and ratio > 0 else 1.0

@@ -65,7 +65,7 @@ class LiveStudy:
 
     def __init__(self) -> None:
         self.name = ""
-        """of the study; empty: none was live at the last document()"""
+        """Name of the study; empty: no study was live at the last document()."""
         self._study: Any = None
         self._read = (Path(), 0)
 
@@ -84,20 +84,20 @@ class LiveStudy:
             return {**head, "problem": str(error), "questionnaires": []}
 
     def answer(self, questionnaire: str, answers: dict[str, float]) -> str:
-        """Write answers of the participant under this condition, all or none. Returns a sentence. CommandError: why
-        they cannot be written."""
+        """Writes answers of the participant under this condition, all or none. Returns a sentence. CommandError if they
+        cannot be written."""
         from coglab_tools.command import CheckFailed
         from coglab_tools.study.questionnaires import AnswerRow, add_answers
 
         named = self._named()
         if not named.get("study_folder"):
-            raise CheckFailed("no study is run live: ./coglab study run FOLDER --live")
+            raise CheckFailed("no study is live: ./coglab study run FOLDER --live")
         study = self._load(named)
         one = next((each for each in study.questionnaires if each.name == questionnaire), None)
         if one is None:
             raise CheckFailed(f"{study.name} has no questionnaire '{questionnaire}'")
         for item, value in answers.items():
-            sentence = one.problem(float(value)) if item in one.items else f"it is no item of {one.title}"
+            sentence = one.problem(float(value)) if item in one.items else f"it is not an item of {one.title}"
             if sentence:
                 raise CheckFailed(f"{item}: {sentence}")
         head = self._head(named)
@@ -137,7 +137,7 @@ class LiveStudy:
         return str(named.get("participant", "")), int(named.get("block", 1)), str(named.get("condition", ""))
 
     def _load(self, named: dict[str, Any]) -> Any:
-        """The study, read again where its file has changed."""
+        """The study. Reads it again if its file changed."""
         from coglab_tools.study.plan import FILE, load
 
         file = Path(str(named["study_folder"])) / FILE

@@ -3,7 +3,7 @@
 Two consoles of one master would show two operators, and a node of the same name would end the first. A lock in ROS_HOME
 prevents a second one; it is free as soon as its process has ended. A parameter of the master holds the address and the
 process number of the console, for consoles of another ROS_HOME or computer. The parameter outlives a console that was
-killed, so a new console asks that process whether it still runs.
+killed, so a new console checks that this process still runs.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ def exposure(address: str) -> str:
     """Warning about an address that other computers reach; empty for loopback."""
     if address in ("127.0.0.1", "localhost"):
         return ""
-    return f"the console listens on {address}: whoever gets the link can move the robot, and nothing is encrypted"
+    return f"the console listens on {address}: anybody with the link can move the robot, and nothing is encrypted"
 
 
 def versions() -> dict[str, str]:

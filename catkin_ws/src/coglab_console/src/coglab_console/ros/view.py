@@ -66,7 +66,7 @@ def _name(data: bytes, at: int) -> tuple[str, int]:
 
 
 def transforms(data: bytes) -> Iterator[tuple[str, str, float, tuple[float, ...]]]:
-    """Frames of a tf2_msgs/TFMessage: parent, child, stamp (s), pose (x, y, z, qx, qy, qz, qw). BadBytes if it is none.
+    """Frames of a tf2_msgs/TFMessage: parent, child, stamp (s), pose (x, y, z, qx, qy, qz, qw). Raises BadBytes.
 
     Reading the bytes takes a tenth of the time of a whole decoding, and these messages come often."""
     try:
@@ -83,7 +83,7 @@ def transforms(data: bytes) -> Iterator[tuple[str, str, float, tuple[float, ...]
 
 
 class Sources:
-    """When each source was heard last. Called from any thread; `now` in s of the steady clock."""
+    """Time of the last message of each source. Called from any thread; `now` in s of the steady clock."""
 
     def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
         self._now = now
@@ -146,7 +146,7 @@ class RosView:
         self.files_changed: Callable[[], None] = lambda: None
         self.study = LiveStudy()
         self.preview = ""
-        """primitive whose path is shown instead of the next motion's; empty: none"""
+        """Primitive whose path is shown instead of the next motion's; empty: none."""
         self.named = frozenset({self.hand_frame, self._board_frame, GOAL_FRAME})
         """Frames that the picture may show. Knowledge adds those of the objects."""
         self._moving = frozenset(model.moving()) if model else None
@@ -451,6 +451,6 @@ class RosView:
         self._ended(f"motion {message.ptp_id}", message)
 
     def _ended(self, what: str, message: DmpFeedback | UnfinishedPtp) -> None:
-        """A motion that ended before its goal."""
+        """Adds an event about a motion that ended before its goal."""
         level = "info" if message.reason_code in ASKED_FOR else "warning"
         self._say("controller", f"{what} ended before its goal: {message.reason}", level)

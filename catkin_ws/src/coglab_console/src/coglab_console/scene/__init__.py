@@ -1,1 +1,1 @@
-"""What is drawn: the robot, the path ahead, primitives, graphs of state machines."""
+"""Data for the drawings: robot, path of the next motion, primitives, graphs of state machines."""

@@ -1,7 +1,7 @@
-"""Lays the graph of a state machine out with Graphviz, once per structure; without Graphviz as rows of boxes.
+"""Lays out the graph of a state machine with Graphviz, once per structure; without Graphviz as rows of boxes.
 
-Input are the containers as smach introspection tells them: path -> children and edges. Output, for the page, in points
-with y downward: {"size": [w, h], "boxes": containers, "nodes": states, "edges": transitions, "problem": why plain}.
+Input: containers of smach introspection, path -> children and edges. Output for the page, in points with y downward:
+{"size": [w, h], "boxes": containers, "nodes": states, "edges": transitions, "problem": reason if there are no edges}.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Container:
 
 
 def _quoted(text: str) -> str:
-    """A label for dot; what it would take for an escape is replaced."""
+    """A quoted label for dot. Quotes, backslashes and unprintable characters become `?`."""
     return '"' + "".join(c if c.isprintable() and c not in '"\\' else "?" for c in text) + '"'
 
 
@@ -37,25 +37,25 @@ def _label(text: str) -> str:
 
 
 def structure_key(containers: dict[str, Container]) -> str:
-    """The same for the same structure, whatever the order in which it was told."""
+    """Hash of a structure, independent of the order of its containers."""
     text = json.dumps([[c.path, c.children, c.edges] for _, c in sorted(containers.items())])
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def roots(containers: dict[str, Container]) -> list[str]:
-    """Containers that lie in no other one."""
+    """Containers that are not inside another one."""
     return sorted(path for path in containers if path.rsplit("/", 1)[0] not in containers)
 
 
 class Layout:
-    """Remembers what it laid out last. `dot`: program; one that is missing is told in `problem`."""
+    """Keeps its last layouts. `dot`: name of the program; `problem` reports a missing one."""
 
     def __init__(self, dot: str = "dot") -> None:
         self._dot = dot
         self._known: dict[str, dict] = {}
 
     def of(self, containers: dict[str, Container]) -> dict:
-        """The picture of these containers. May take a while: not for the event loop."""
+        """The layout of these containers. Takes up to TIME_LIMIT, so do not call it in the event loop."""
         key = structure_key(containers)
         if key not in self._known:
             if len(self._known) > 16:
@@ -89,13 +89,13 @@ class Layout:
 
 
 def _paths(containers: dict[str, Container]) -> list[str]:
-    """Every container and state: their places in this list are their names in dot's text."""
+    """Paths of every container and state. Their indices in this list are their names in dot's text."""
     states = [f"{c.path}/{child}" for c in containers.values() for child in c.children]
     return list(dict.fromkeys([*containers, *states]))
 
 
 def _leaf_of(path: str, containers: dict[str, Container]) -> str:
-    """A state inside a container, however deep: edges end at states, and are cut at the container's border."""
+    """A state inside a container, at any depth. dot's edges join states and are cut at the container's border."""
     while path in containers and containers[path].children:
         path = f"{path}/{containers[path].children[0]}"
     return path
@@ -134,7 +134,7 @@ def _write_container(path: str, containers: dict[str, Container], number: dict[s
 
 
 def _read(drawn: dict, paths: list[str]) -> dict:
-    """What dot -Tjson printed, y turned downward."""
+    """Converts the output of dot -Tjson, with y downward."""
     _, _, width, height = (float(word) for word in drawn["bb"].split(","))
     boxes, nodes, edges = [], [], []
     for item in drawn.get("objects", []):
@@ -179,7 +179,7 @@ def _point(text: str, height: float) -> list[float]:
 
 
 def _rows(containers: dict[str, Container], problem: str) -> dict[str, Any]:
-    """A row of boxes per container, nested ones below; legible, but no edges."""
+    """Layout without edges: a row of boxes per container, nested containers below."""
     boxes: list[dict[str, Any]] = []
     nodes: list[dict[str, Any]] = []
     y, widest = 8.0, 100.0

@@ -1,5 +1,5 @@
-"""The path that the arm is going to take, as the controllers predict it: of the motion under way, and of what the next
-action would ask for. A picture for people; nothing in control reads it. Lengths m."""
+"""The predicted path of the arm, from the controllers: of the running motion, or of the next action's motion. A picture
+for people; nothing in control reads it. Lengths m."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ UNSEEN = re.compile(r"goal frame '(?:object_(\w+)|human_hand)' is not known")
 
 
 def aim(action: str, entry: Mapping[str, Any], hand_frame: str) -> dict[str, Any] | None:
-    """Fields of predict_dmp for the reach of this action, as the brain would ask for it; None if nobody knows.
+    """Fields of predict_dmp for the reach of this action, as the brain would request it; None if the entry lacks them.
 
-    `entry`: of the object database; `hand_frame`: tf2 frame of the person's hand.
+    `entry`: entry of the object database; `hand_frame`: tf2 frame of the person's hand.
     """
     try:
         role = ROLES[action]
@@ -55,9 +55,9 @@ def drawn_back(palm: Pose, approach: Mapping[str, Any]) -> Pose:
 
 
 def document(kind: str, path: Any, base: np.ndarray) -> dict:
-    """For the page: kind `ahead` or `running`, points in the world, and when the hand is there (s from `stamp`).
+    """Document for the page: kind `ahead` or `running`, points in the world, and their times (s after `stamp`).
 
-    `path`: coglab_msgs/PredictedPath with poses; `base`: 4 x 4, its frame in the world.
+    `path`: coglab_msgs/PredictedPath with poses; `base`: 4 x 4, pose of its frame in the world.
     """
     places = np.array([(pose.position.x, pose.position.y, pose.position.z) for pose in path.poses])
     points = np.round(places @ base[:3, :3].T + base[:3, 3], 4).tolist()
@@ -72,7 +72,7 @@ def document(kind: str, path: Any, base: np.ndarray) -> dict:
 
 
 def refused(reason: str) -> dict:
-    """For the page: the next motion would be refused. Frames that are not known are told as what is not seen."""
+    """Document for the page: the next motion would be refused. An unknown goal frame is shown as an unseen thing."""
     unknown = UNSEEN.match(reason)
     words = f"{unknown[1] or 'the hand of the person'} is not seen" if unknown else reason.split(";")[0][:LONGEST]
     return {"kind": "refused", "reason": words, "points": []}

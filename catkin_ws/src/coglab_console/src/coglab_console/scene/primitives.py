@@ -1,7 +1,7 @@
-"""Primitives of a library file, for plots and for the path that the arm is going to take.
+"""Primitives of a library file, for plots.
 
-Reads the XML that dmp/load_dmps reads, and integrates eq. (1)-(5) of D4.10 for a goal that stands still, numerically:
-a picture of the motion, not the motion.
+Reads the XML of dmp/load_dmps and integrates eq. (1)-(5) of D4.10 numerically for a goal at rest. The result is a
+picture, not the executed motion.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from scipy.spatial.transform import Rotation
 
 MAX_FILE = 4_000_000  # bytes
 STEPS = 200
-BEYOND = 1.6  # how far to integrate, in durations
+BEYOND = 1.6  # durations, longest integration
 NEAR = 0.004  # m from the goal at which a path is over
 SHORTEST = 1e-3  # m, a shorter line has no direction
 
 
 class LibraryError(Exception):
-    """The file cannot be shown; the sentence names it."""
+    """The file cannot be shown. The message names it and the reason."""
 
 
 @dataclass(frozen=True)
 class Primitive:
-    """What eq. (1)-(5) need; weights (n, 3) in m, relative to the start."""
+    """Parameters of eq. (1)-(5). weights: (n, 3) in m, relative to the start."""
 
     name: str
     description: str
@@ -84,7 +84,7 @@ def _logistic(x: float) -> float:
 
 
 def shape_map(mapping: str, demonstrated: np.ndarray, line: np.ndarray) -> np.ndarray:
-    """What becomes of the learnt shape when the line from start to goal is another one, (3, 3)."""
+    """Matrix (3, 3) that maps the learnt shape to another line from start to goal."""
     before, after = np.linalg.norm(demonstrated), np.linalg.norm(line)
     if mapping == "none" or before < SHORTEST:
         return np.eye(3)
@@ -108,7 +108,7 @@ def _turn_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     if sine < 1e-9:
         if cosine > 0.0:
             return np.eye(3)
-        axis = np.cross(a, [1.0, 0.0, 0.0] if abs(a[0]) < 0.9 else [0.0, 1.0, 0.0])  # any turn by half will do
+        axis = np.cross(a, [1.0, 0.0, 0.0] if abs(a[0]) < 0.9 else [0.0, 1.0, 0.0])  # any axis at a right angle to a
     angle = float(np.arctan2(sine, cosine))
     turn: np.ndarray = Rotation.from_rotvec(angle * axis / np.linalg.norm(axis)).as_matrix()
     return turn
@@ -154,7 +154,7 @@ def _primitive(element: ElementTree.Element) -> Primitive:
 
 
 def load_library(path: Path) -> dict[str, Primitive]:
-    """All primitives of a file by name. LibraryError names file and primitive."""
+    """Returns the primitives of a file by name. The message of a LibraryError names file and primitive."""
     try:
         if path.stat().st_size > MAX_FILE:
             raise LibraryError(f"{path} has more than {MAX_FILE} bytes")
@@ -171,7 +171,7 @@ def load_library(path: Path) -> dict[str, Primitive]:
 
 
 def document(library: dict[str, Primitive]) -> list[dict]:
-    """For the page: each primitive as demonstrated, time (s), distance along x, y, z (m) and speed (m/s)."""
+    """Document for the page: each primitive as demonstrated, with time (s), position x, y, z (m) and speed (m/s)."""
     rows = []
     for one in library.values():
         times, points = one.roll_out(one.start, one.goal)

@@ -1,4 +1,4 @@
-"""The robot for the page: links with their plain shapes and the joints between them, from its URDF; and the kinematics.
+"""Model of the robot for the page, from its URDF: links with simple shapes, joints, and the kinematics.
 
 Lengths m, angles rad. A transform is a 4 x 4 array; a pose for the page is [x, y, z, qx, qy, qz, qw].
 """
@@ -17,7 +17,7 @@ SHAPES = {"box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius
 
 
 class ModelError(Exception):
-    """The description cannot be shown; the sentence says why."""
+    """The description cannot be shown. The message gives the reason."""
 
 
 def _numbers(text: str | None, default: str) -> list[float]:
@@ -25,7 +25,7 @@ def _numbers(text: str | None, default: str) -> list[float]:
 
 
 def transform(xyz: Sequence[float] | np.ndarray, turn: Rotation | None = None) -> np.ndarray:
-    """4 x 4 from a place and a rotation (none: not turned)."""
+    """4 x 4 transform from a position and a rotation (None: no rotation)."""
     found = np.eye(4)
     found[:3, 3] = xyz
     if turn is not None:
@@ -65,7 +65,7 @@ def _child(element: ElementTree.Element, tag: str) -> dict[str, str]:
 
 
 class RobotModel:
-    """Links, shapes and joints of one URDF. ModelError if it is none."""
+    """Links, shapes and joints of one URDF. Raises ModelError for an invalid one."""
 
     def __init__(self, urdf: str) -> None:
         if len(urdf) > MAX_URDF:
@@ -75,7 +75,7 @@ class RobotModel:
             self.joints = [self._joint(element) for element in root.findall("joint")]
             self.shapes = {link.get("name", ""): self._shapes(link) for link in root.findall("link")}
         except (ElementTree.ParseError, ValueError, AttributeError, KeyError) as error:
-            raise ModelError(f"robot_description is no URDF that can be shown: {error}") from error
+            raise ModelError(f"robot_description is not a usable URDF: {error}") from error
         children = {joint.child for joint in self.joints}
         roots = [name for name in self.shapes if name not in children]
         if len(roots) != 1:
@@ -112,7 +112,7 @@ class RobotModel:
         return [joint.name for joint in self.joints if joint.kind in ("revolute", "continuous", "prismatic")]
 
     def place(self, link: str, positions: dict[str, float]) -> np.ndarray:
-        """Transform of a link in the root; joints that are not named stand at 0."""
+        """Transform of a link in the root frame; joints without a position are at 0."""
         found = np.eye(4)
         while link != self.root:
             joint = self._by_child[link]
@@ -129,13 +129,13 @@ class RobotModel:
         return np.eye(4)
 
     def document(self) -> dict:
-        """For the page: joints in an order in which each parent comes first, and shapes by link."""
+        """Document for the page: joints, each after its parent, and shapes by link."""
         ordered, known = [], {self.root}
         waiting = list(self.joints)
         while waiting:
             ready = [joint for joint in waiting if joint.parent in known]
             if not ready:
-                raise ModelError(f"joint {waiting[0].name} hangs on nothing")
+                raise ModelError(f"joint {waiting[0].name} is not connected to the root link")
             ordered += ready
             known |= {joint.child for joint in ready}
             waiting = [joint for joint in waiting if joint.child not in known]

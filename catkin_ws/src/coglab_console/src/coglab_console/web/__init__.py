@@ -1,1 +1,1 @@
-"""The web server: who may speak to it, what goes to each browser, which files are served."""
+"""The web server: access, messages to the browsers, and served files."""

@@ -1,8 +1,8 @@
 """Access to the console: one-time tokens, sessions, and the lists of hosts and origins. Needs no web library.
 
-A browser comes once with a token that the terminal printed (/?t=TOKEN) and gets a session, which its cookie carries.
-Every request must name a host of the list (against DNS rebinding); one that changes something, and the WebSocket,
-must also come from an origin of the list and, a POST, carry a header that a foreign page cannot set.
+A browser opens the printed link with a token (/?t=TOKEN) once and gets a session, stored in its cookie.
+Every request must name a host of the list (against DNS rebinding). The WebSocket and requests that change something
+must also come from an origin of the list. A POST must also have a header that a foreign page cannot set.
 
 A program without a browser gets a key for a token (POST /api/session) and sends it as `Authorization: Bearer KEY`. No
 page can make a browser send that, so neither origin nor header is required; an origin that is sent must be listed.
@@ -79,16 +79,16 @@ class Access:
         self._sessions: dict[str, Session] = {}
         self._count = 0
         self.refused = TokenBucket(200.0, 200.0, now)
-        """of requests without a session: more than these are answered with 429"""
+        """Limit of requests without a session; further ones get status 429."""
 
     def new_token(self) -> str:
-        """A token that makes one session; at most eight wait, older ones end."""
+        """A new token for one session. At most eight unused tokens are valid; older ones expire."""
         token = secrets.token_urlsafe(24)
         self._tokens = [*self._tokens[-7:], token]
         return token
 
     def redeem(self, token: str, program: bool = False) -> Session | None:
-        """The session for a token, once."""
+        """The session for an unused token, else None."""
         given = token.encode(errors="replace")
         spent = next((known for known in self._tokens if hmac.compare_digest(known.encode(), given)), None)
         if spent is None:
@@ -103,7 +103,7 @@ class Access:
         if len(self._sessions) >= MAX_SESSIONS:
             idle = [one for one in self._sessions.values() if not one.sockets]
             if not idle:
-                raise Denied(503, f"{MAX_SESSIONS} browsers are connected; close one of them, then ask for a new link")
+                raise Denied(503, f"{MAX_SESSIONS} browsers are connected; close one of them, then request a new link")
             del self._sessions[min(idle, key=lambda one: one.seen).key]
         self._count += 1
         limits = TokenBucket(40.0, 120.0, self._now), TokenBucket(50.0, 50.0, self._now)
@@ -113,32 +113,30 @@ class Access:
         return session
 
     def sessions(self) -> list[Session]:
-        """All of them."""
+        """All sessions."""
         return list(self._sessions.values())
 
     def check_host(self, headers: Mapping[str, str]) -> None:
-        """Every request."""
+        """Checks the header Host of every request. Raises Denied."""
         host = headers.get("Host", "")
         if host not in self.hosts:
-            raise Denied(
-                403, f"host '{host[:80]}' is not served; this console answers to {', '.join(sorted(self.hosts))}"
-            )
+            raise Denied(403, f"host '{host[:80]}' is not served; this console serves {', '.join(sorted(self.hosts))}")
 
     def check_origin(self, headers: Mapping[str, str]) -> None:
-        """What changes something, and the WebSocket."""
+        """Checks the origin of a WebSocket or of a request that changes something. Raises Denied."""
         origin = headers.get("Origin")
         if origin not in self.origins:
             came = f"'{origin[:80]}'" if origin else "none"
-            raise Denied(403, f"origin {came} may not ask for this; expected the console's own page")
+            raise Denied(403, f"origin {came} is not allowed here; expected the console's own page")
 
     def check_csrf(self, headers: Mapping[str, str]) -> None:
-        """A POST."""
+        """Checks the header that every POST of a browser needs. Raises Denied."""
         if headers.get(CSRF_HEADER) != "1":
             raise Denied(403, f"the header {CSRF_HEADER}: 1 is missing; only the console's own page sends it")
 
     @staticmethod
     def bearer_of(headers: Mapping[str, str]) -> str | None:
-        """What a program says that it is; None for a browser, which says nothing."""
+        """The Bearer key of a program; None for a browser, which sends none."""
         words = headers.get("Authorization")
         if words is None:
             return None
@@ -148,7 +146,7 @@ class Access:
         return key.strip()[:100]
 
     def session_of(self, key: str | None, program: bool = False) -> Session:
-        """The session of a cookie, or of a program's key."""
+        """The session of a cookie, or of a program's key. Raises Denied."""
         session = self._sessions.get(key or "")
         if session is None or session.program != program:
             if program:

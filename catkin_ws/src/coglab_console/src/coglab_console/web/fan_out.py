@@ -81,13 +81,13 @@ class Client:
         self.states_dropped = 0
 
     def state(self, number: int, text: str) -> None:
-        """The newest state takes the place of one that was not sent yet. `number` grows."""
+        """Queues the newest state in place of an unsent one. `number` increases."""
         self.states_dropped += self._state is not None
         self._state = (number, text)
         self._wake.set()
 
     def seen(self, number: object) -> bool:
-        """The browser has taken this state, and all before it. False where that one was not on the way."""
+        """The browser acknowledges this state and all before it. Returns False if this state was not on the way."""
         if isinstance(number, bool) or not isinstance(number, int) or number not in self._on_the_way:
             return False
         while self._on_the_way and self._on_the_way[0] <= number:
@@ -96,7 +96,7 @@ class Client:
         return True
 
     def behind(self) -> bool:
-        """Whether so many states are on the way that nothing more is sent."""
+        """True if so many states are on the way that nothing more is sent."""
         return len(self._on_the_way) >= WINDOW
 
     def wake(self) -> None:
@@ -104,7 +104,7 @@ class Client:
         self._wake.set()
 
     def take(self) -> list[str]:
-        """All that is to be sent now, oldest first; nothing while the browser is behind."""
+        """Returns the texts to send now, oldest first; none while the browser is behind."""
         if self.behind():
             return []
         texts = list(self._documents.newer(self._versions))
@@ -123,7 +123,7 @@ class Client:
         return texts
 
     async def serve(self, send: Callable[[str], Awaitable[None]], limit: float) -> None:
-        """Sends until cancelled; TimeoutError if one message was not taken, or no state seen, within `limit` s."""
+        """Sends until cancelled. TimeoutError if the browser takes no message or acknowledges no state in `limit` s."""
         loop = asyncio.get_running_loop()
         while True:
             await self._wake.wait()
@@ -131,6 +131,6 @@ class Client:
             if not self.behind():
                 self._behind_since = loop.time()
             elif loop.time() - self._behind_since > limit:
-                raise TimeoutError(f"no state was seen for {limit:.0f} s")
+                raise TimeoutError(f"no state was acknowledged for {limit:.0f} s")
             for text in self.take():
                 await asyncio.wait_for(send(text), limit)

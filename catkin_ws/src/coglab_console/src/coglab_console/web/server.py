@@ -91,7 +91,7 @@ class ConsoleServer:
             client.wake()
 
     def publish_state(self, state: dict) -> None:
-        """The newest state to everybody, numbered, and when it left: `at`, ms of the console's steady clock."""
+        """Sends the newest state to every browser, with number `n` and time `at` (ms, the console's steady clock)."""
         if self.clients:
             self._number += 1
             now = round(1000 * asyncio.get_running_loop().time())
@@ -112,11 +112,11 @@ class ConsoleServer:
             words = REFUSALS.get(error.status, error.reason)
             response = web.json_response(Answer(False, words), status=error.status)
         except Exception as error:
-            # A connection that is a WebSocket by now takes no answer to its request any more.
+            # A connection that became a WebSocket accepts no HTTP response.
             if isinstance(error, ConnectionError) or request.path == "/ws":
                 raise
             _LOG.exception("%s %s", request.method, request.path)
-            words = f"the console has failed at this ({type(error).__name__}); its log has more"
+            words = f"internal error of the console ({type(error).__name__}); see its log"
             response = web.json_response(Answer(False, words), status=500)
         if not response.prepared:
             response.headers.update(HEADERS)
@@ -188,7 +188,7 @@ class ConsoleServer:
         return self._session(request)
 
     def _from_here(self, request: web.Request) -> bool:
-        """Refuses what comes from a foreign page. True for a program, which names no origin."""
+        """Refuses requests of a foreign page. Returns True for a program, which need not send an origin."""
         program = "Authorization" in request.headers
         if not program or "Origin" in request.headers:
             self.access.check_origin(request.headers)
@@ -210,7 +210,7 @@ class ConsoleServer:
         return web.json_response(self._press(session))
 
     def _press(self, session: Session) -> Answer:
-        if not session.stops.take():  # far more often than a person presses: the stop before was sent
+        if not session.stops.take():  # no person presses so often; an earlier STOP was sent
             return Answer(True, "STOP was sent a moment ago")
         return self.desk.stop(session.name)
 
@@ -245,7 +245,7 @@ class ConsoleServer:
         return socket
 
     async def _hello(self, socket: web.WebSocketResponse) -> int:
-        """The number of the newest event that the browser has; 0 where it does not say so properly."""
+        """Number of the newest event that the browser has; 0 if it sends none or an invalid one."""
         try:
             message = await socket.receive(timeout=HELLO_LIMIT)
             hello = parsed(message.data) if message.type is WSMsgType.TEXT else {}
@@ -264,7 +264,7 @@ class ConsoleServer:
             self.clients.discard(client)
             transport = socket._req.transport if socket._req is not None else None
             if transport is not None and not socket.closed:
-                transport.abort()  # it does not read: a closing handshake would wait for it, too
+                transport.abort()  # the browser does not read, so a closing handshake would hang, too
 
     async def _listen(self, socket: web.WebSocketResponse, session: Session, client: Client) -> None:
         bad = 0
@@ -278,7 +278,7 @@ class ConsoleServer:
                 await asyncio.wait_for(socket.send_str(to_json({"t": "refused", "message": told})), SEND_LIMIT)
 
     def _frame(self, message: WSMessage, session: Session, client: Client, socket: web.WebSocketResponse) -> str:
-        """One frame of the browser; what is wrong with it, or an empty string."""
+        """Processes one frame of the browser. Returns an error text, or an empty string."""
         try:
             if message.type is not WSMsgType.TEXT:
                 raise ValueError("expected text")
@@ -294,7 +294,7 @@ class ConsoleServer:
         elif not session.requests.take():
             return "too many frames; wait a second"
         elif kind == "seen":
-            pass  # told twice, or of a state that went to another connection
+            pass  # acknowledged before, or a state of another connection
         elif kind == "hold":
             task = asyncio.create_task(self._hold(frame, session, socket))
             self._tasks.add(task)
@@ -302,7 +302,7 @@ class ConsoleServer:
         elif kind == "release":
             self.desk.released(session.name)
         else:
-            return f"a frame of kind '{str(kind)[:20]}' means nothing; there are: seen, stop, hold, release"
+            return f"a frame of kind '{str(kind)[:20]}' is unknown; there are: seen, stop, hold, release"
         return ""
 
     async def _hold(self, frame: dict, session: Session, socket: web.WebSocketResponse) -> None:

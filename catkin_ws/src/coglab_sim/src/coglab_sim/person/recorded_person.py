@@ -46,8 +46,8 @@ class RecordedHand:
         for name in (HAND, object_frame):
             if name is not None and name not in names:
                 raise RecordingError(
-                    f"{file}: a handover needs the frame '{name}', the recording has {', '.join(names)}; rename what "
-                    f"is meant, or say `object: in_hand` for a hand that was recorded without its object"
+                    f"{file}: a handover needs the frame '{name}', the recording has {', '.join(names)}; rename a "
+                    f"frame, or set `object: in_hand` for a hand that was recorded without its object"
                 )
         self.playback = playback
         self.end = float(playback.recording.duration)

@@ -122,7 +122,7 @@ class VirtualHuman:
         """Sets the task 'give <object>', 'receive <object>' or 'rest' for the next step. ValueError for others."""
         task = text.split()[0] if text.split() else "rest"
         if task not in ("give", "receive", "rest"):
-            raise ValueError(f"a person can be asked to give, receive or rest, not '{text}'")
+            raise ValueError(f"the task of a person must be give, receive or rest, got '{text}'")
         self._pending = task
 
     def hear(self, t: float, code: int) -> None:

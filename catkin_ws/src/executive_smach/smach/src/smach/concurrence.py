@@ -263,7 +263,9 @@ class Concurrence(Container):
                 self._child_outcomes[label] = outcome
                 if self._take_back(label, state) and label in self._told:
                     self._ignored.add(label)
-                    smach.logwarn(f"concurrent state '{label}' was asked to end early and has not served the request")
+                    smach.logwarn(
+                        f"concurrent state '{label}' was requested to end early but did not serve the request"
+                    )
             self.call_transition_cbs()
             if error is None and self._child_termination_cb and not self._abandoned:
                 stop, error = self._ask_termination_cb(label)

@@ -317,7 +317,7 @@ def _copy(source: Any, target: Any, keys: Iterable[str], what: str) -> None:
         if key in source:
             target[key] = source[key]
         else:
-            smach.logwarn(f"{what}: user data key {key!r} is not there; present: {', '.join(source.keys()) or 'none'}")
+            smach.logwarn(f"{what}: user data key {key!r} is missing; present: {', '.join(source.keys()) or 'none'}")
 
 
 def _stack_text() -> str:

@@ -182,8 +182,8 @@ class Iterator(Container):
                 break
             except Exception:
                 smach.logerr(
-                    f"the items of the iterator over '{self._label}' ended with an error, taken as "
-                    "exhausted:"
+                    f"the items of the iterator over '{self._label}' ended with an error; they count "
+                    "as exhausted:"
                     f"\n{traceback.format_exc()}"
                 )
                 break
@@ -208,7 +208,7 @@ class Iterator(Container):
             return iter(self._items() if callable(self._items) else self._items)
         except Exception as error:
             raise InvalidUserCodeError(
-                f"the items of the iterator over '{self._label}' could not be had: "
+                f"the items of the iterator over '{self._label}' could not be obtained: "
                 f"{type(error).__name__}: {error}\n{traceback.format_exc()}"
             ) from error
 

@@ -51,8 +51,8 @@ class Sequence(StateMachine):
             smach.logerr(
                 f"state {label!r} lacks the sequence's connector outcome "
                 f"{sequence._connector_outcome!r} (it "
-                f"has {list(state.get_registered_outcomes())}): what follows it is reached only by "
-                "transitions"
+                f"has {list(state.get_registered_outcomes())}): only its transitions lead to "
+                "other states"
             )
         if previous is not None:
             edges = sequence._transitions[previous]

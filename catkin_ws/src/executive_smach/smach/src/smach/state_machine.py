@@ -148,7 +148,7 @@ class StateMachine(Container):
         """
         smach.logdebug(f"initial state set to {list(initial_states)}")
         if len(initial_states) > 1:
-            smach.logwarn(f"a state machine begins with one state; of {list(initial_states)} the first is taken")
+            smach.logwarn(f"a state machine begins with one state; it uses the first of {list(initial_states)}")
         if len(initial_states) > 0:
             self._initial_state_label = initial_states[0]
         if userdata is not None:
@@ -185,7 +185,7 @@ class StateMachine(Container):
         for outcome, label, target in self.get_internal_edges():
             if target is None and outcome not in self._outcomes:
                 faults.append(
-                    f"outcome {outcome!r} of state {label!r} has no transition and is no outcome of the machine"
+                    f"outcome {outcome!r} of state {label!r} has no transition and is not an outcome of the machine"
                 )
             elif target is not None and target not in self._states and target not in self._outcomes:
                 faults.append(

@@ -222,7 +222,7 @@ class SimpleActionState(smach.State):
                 return False
             if self._server_is_there():
                 if lost_at and handle.get_comm_state() == CommState.WAITING_FOR_GOAL_ACK:
-                    smach.logerr(f"{name}: the server came back without having acknowledged the goal; goal given up")
+                    smach.logerr(f"{name}: the server was reconnected but never acknowledged the goal; goal given up")
                     handle.cancel()
                     return False
                 lost_at = None

@@ -96,7 +96,7 @@ class EmulatedHand:
         return self._calibration_end is None and self._all_off()
 
     def _all_off(self) -> bool:
-        for motor in self.motors:  # a loop, because this is asked 200 times per second
+        for motor in self.motors:  # a loop, because this runs 200 times per second
             if motor.mode != "stop":
                 return False
         return True

@@ -195,7 +195,7 @@ class HandNode(HandMemory):
             raise HandPortError(f"parameter {name} cannot be read ({error}): is the ROS master there?") from error
         if not port:
             raise HandPortError(
-                f"parameter {rospy.resolve_name(name)} is not set: start what publishes the hand's port there"
+                f"parameter {rospy.resolve_name(name)} is not set: start the node that sets it, e.g. hand_emulator"
             )
         return port
 
@@ -281,7 +281,7 @@ class HandNode(HandMemory):
         return self.task_for(name, goal, self.connected_driver())
 
     def task_ended(self, task: Task, verdict: Verdict) -> None:
-        """Store what the finished task shows about preshape and grip, and publish it."""
+        """Store preshape and grip as shown by the finished task, and publish them."""
         self.task_over(task, verdict)
         self._event = (verdict.reason, f"{task.name}: {verdict.text}")
         self._tell_again()  # before the result, so that the client finds the grip published
