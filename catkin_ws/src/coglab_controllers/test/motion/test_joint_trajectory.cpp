@@ -214,10 +214,10 @@ TEST_F(Following, APointAtTheStartIsWhereTheArmIs) {
   const TrajectoryRequest there = through({home(0.005)});
   ASSERT_TRUE(controller->follow(there).success);
   EXPECT_TRUE(runToEnd().executed);
-  expectRefused(through({home(0.04)}), TrajectoryError::InvalidGoal, "too short to make up");
+  expectRefused(through({home(0.04)}), TrajectoryError::InvalidGoal, "too short for a larger");
   TrajectoryRequest quick = through({home(0.045), home(0.045)});
   quick.points[1].time = 0.1;
-  expectRefused(quick, TrajectoryError::InvalidGoal, "too short to make up");
+  expectRefused(quick, TrajectoryError::InvalidGoal, "too short for a larger");
   quick.points[1].time = 1.0;
   ASSERT_TRUE(controller->follow(quick).success);
   EXPECT_TRUE(runToEnd().executed);

@@ -72,7 +72,7 @@ TargetVerdict judgeTarget(const TargetMessage& message, const TargetPermission& 
   verdict.command.motion_epoch = permission.epoch;
   if (message.epoch.empty()) {
     if (verdict.command.stamp_ns < permission.since_ns)
-      return refuse(TargetFault::Epoch, "made before motion was allowed; ask for the motion anew");
+      return refuse(TargetFault::Epoch, "made before motion was allowed; request the motion again");
     return verdict;
   }
   std::uint32_t epoch = 0;
@@ -85,7 +85,7 @@ TargetVerdict judgeTarget(const TargetMessage& message, const TargetPermission& 
   if (epoch != permission.epoch) {
     return refuse(TargetFault::Epoch, "made in motion_epoch " + message.epoch + ", now it is " +
                                           std::to_string(permission.epoch) +
-                                          "; ask for the motion anew");
+                                          "; request the motion again");
   }
   return verdict;
 }
