@@ -88,7 +88,7 @@ TEST_F(CycleLimits, TheTimeBetweenJointStatesIsAboveZeroAndATenthOfASecondAtMost
   EXPECT_EQ(fine.dt, 0.1);
 }
 
-TEST_F(CycleLimits, SilenceIsToldAfterATenthAndEndsAMotionAfterHalfASecond) {
+TEST_F(CycleLimits, SilenceIsReportedAfterATenthAndEndsAMotionAfterHalfASecond) {
   begin();
   move();
   ControlCycle& cycle = robot->manager->cycle();
@@ -144,7 +144,7 @@ TEST_F(CycleLimits, ACancelOfAControllerThatIsNotActiveEndsNothingLater) {
   EXPECT_EQ(report().motion, MotionState::Running);
 }
 
-TEST(FirstJointState, IsNoStopOfTheRobotAndTheSecondMayBe) {
+TEST(FirstJointState, IsNeverAStopOfTheRobotButTheSecondCanBe) {
   const VirtualRobot plain;
   ctrl_more::Logger logger;
   ManagerSettings settings =

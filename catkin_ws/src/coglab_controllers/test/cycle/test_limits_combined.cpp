@@ -77,7 +77,7 @@ void expectNoFault(DelayedRobot& robot) {
   }
 }
 
-TEST(LimitsCombined, WhatIsAcceptedNearTheEndsOfTheRangesIsReachedOnAStraightWay) {
+TEST(LimitsCombined, TargetsNearTheEndsOfTheRangesAreReachedOnAStraightPath) {
   for (const bool narrowed : {false, true}) {
     DelayedRobot robot("{" + kShipped +
                        (narrowed ? ", lower_joint_pos_limit: [-2.5, -1.8, -2.5, -1.7, -2.5, -1.6, "
@@ -162,7 +162,7 @@ TEST(LimitsCombined, ParametersNarrowTheTableAndNeverWidenIt) {
   }
 }
 
-TEST(LimitsCombined, ReachedIsSaidByTheArmAndNotByItsSetPoint) {
+TEST(LimitsCombined, TheMeasuredArmAndNotTheSetPointDecidesReached) {
   for (const std::string active : {"ptp", "dmp"}) {
     VirtualRobot robot;
     robot.loadBoth(active);
@@ -195,7 +195,7 @@ TEST(LimitsCombined, ReachedIsSaidByTheArmAndNotByItsSetPoint) {
   }
 }
 
-TEST(LimitsCombined, ReachesUnderPushesNearTheEndsOfTheRangesComeToNoFault) {
+TEST(LimitsCombined, PushedReachesNearTheEndsOfTheRangesCauseNoFault) {
   DelayedRobot robot("{" + kShipped + "}");
   robot.loadBoth("ptp");
   std::mt19937 random(12);

@@ -62,7 +62,7 @@ TEST(GoalLimits, AFrameIsFollowedUpToItsJumpAndItsAge) {
   EXPECT_EQ(gate.update(kSecond + 1030 * kMs, sight(1.1, kSecond + 1030 * kMs)), State::Fresh);
 }
 
-TEST(GoalLimits, ThreeFramesThatAgreeWithinFiftyMillimetresAreBelieved) {
+TEST(GoalLimits, ThreeFramesThatAgreeWithinFiftyMillimetresAreAccepted) {
   for (const double apart : {0.049, 0.051}) {
     GoalLimits gate = begun(0.0);
     for (int i = 0; i < 3; ++i) {
@@ -100,7 +100,7 @@ TEST(GoalLimits, WithoutALimitAGoalStaysValidOrIsNeverLost) {
   EXPECT_EQ(gate.update(1000 * kSecond, sight(1.0, kSecond)), State::Old);
 }
 
-TEST(GoalLimits, UntilAMotionBeginsThreeFramesAreNeededWhereverTheyAre) {
+TEST(GoalLimits, BeforeAMotionThreeAgreeingFramesAreNeededAnywhere) {
   GoalLimits gate;
   EXPECT_EQ(gate.state(), State::Unsettled);
   for (int i = 1; i <= 3; ++i) {
@@ -147,7 +147,7 @@ TEST(GoalFilter, MeetsASteadyRampWithoutLag) {
   EXPECT_LT((filter.velocity() - speed).norm(), 1e-6);
 }
 
-TEST(GoalFilter, AHandThatComesFastIsNotLed) {
+TEST(GoalFilter, AFastHandGivesLittleGoalVelocity) {
   const double slow = ledBeyond(0.15, 0.4, false);
   EXPECT_GT(slow, 0.005);  // the price of no lag behind a goal that goes on
   // It would be five times as far beyond a hand that is five times as fast, and stops.
@@ -160,7 +160,7 @@ TEST(GoalFilter, AHandThatComesFastIsNotLed) {
   }
 }
 
-TEST(GoalFilter, AChangeOfAPredictionIsNotLed) {
+TEST(GoalFilter, AChangeOfAPredictionGivesNoGoalVelocity) {
   EXPECT_GT(ledBeyond(0.05, 0.4, false), 0.002);
   EXPECT_LT(ledBeyond(0.05, 0.4, true), 0.0005);
   // What is predicted may move, too.
@@ -186,7 +186,7 @@ TEST(GoalFilter, IsExactForAnyCycleTime) {
   }
 }
 
-TEST(GoalFilter, AFarGoalPullsNoHarder) {
+TEST(GoalFilter, SpeedIsBoundedForAFarGoal) {
   GoalFilter filter;
   filter.begin(pose(Vector3::Zero()));
   double fastest = 0.0;
@@ -238,7 +238,7 @@ std::pair<double, double> noiseOf(double noise, double correlation, Goal goal, i
   return {least, largest};
 }
 
-TEST(GoalFilter, TellsNoiseFromTheMotionOfAPerson) {
+TEST(GoalFilter, DistinguishesNoiseFromTheMotionOfAPerson) {
   const auto reach = [](double t) { return Vector3(0.5 * minimumJerk(t), 0, 0); };
   const auto still = [](double) { return Vector3(0.5, 0, 0); };
   const auto steady = [](double t) { return Vector3(0.5, 0.1 * t, 0); };
@@ -294,7 +294,7 @@ TEST(OrientationCurve, ATurnFromRestFollowsTheMinimumJerkProfile) {
   }
 }
 
-TEST(OrientationCurve, ATargetMayTurnOnTowardAWholeTurn) {
+TEST(OrientationCurve, ATargetMayKeepTurningTowardAWholeTurn) {
   OrientationCurve curve;
   curve.start(Quaternion::Identity(), Vector3::Zero(), expRotation(Vector3(0, 0, 3.0)), 1.0);
   for (double angle = 3.0; angle < 6.2; angle += 0.01) {

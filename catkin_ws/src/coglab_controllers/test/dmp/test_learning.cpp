@@ -119,7 +119,7 @@ TEST(Learning, WorksWithEverySupportedSizeAndWeight) {
   }
 }
 
-TEST(Learning, RefusesWhatCannotBeLearnt) {
+TEST(Learning, RefusesUnusableDemonstrations) {
   const Trajectory good = minimumJerkReach(Vector3::Zero(), Vector3(0.5, 0, 0), 1.2);
   EXPECT_THROW(learn("none", {}), std::invalid_argument);
   EXPECT_THROW(learn("bad id!", {good}), std::invalid_argument);
@@ -164,7 +164,7 @@ TEST(Learning, ADemonstrationThatComesBackToItsStartIsNotMappedToAnother) {
   EXPECT_LT((mapped.goal - least).norm(), 1e-12);
 }
 
-TEST(Learning, AnEndInMotionIsNotHeldBack) {
+TEST(Learning, ADemonstrationThatEndsInMotionKeepsItsSpeed) {
   Trajectory cut = minimumJerkReach(Vector3::Zero(), Vector3(0.5, 0.0, 0.0), 1.2);
   cut.times.resize(145);
   cut.positions.conservativeResize(3, 145);

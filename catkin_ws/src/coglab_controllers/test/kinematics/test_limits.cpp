@@ -99,7 +99,7 @@ TEST(Guard, AJointNeverReachesItsStopAtFullSpeed) {
   }
 }
 
-TEST(Guard, AJointAtItsStopThatAsksForNextToNothingDoesNotStopTheArm) {
+TEST(Guard, AJointAtItsStopWithAVerySmallRequestDoesNotStopTheArm) {
   GuardParameters p = armLimits();
   p.workspace = everywhere();
   Guard guard(p, robot());
@@ -120,7 +120,7 @@ TEST(Guard, AJointAtItsStopThatAsksForNextToNothingDoesNotStopTheArm) {
   EXPECT_EQ(result.scale, 0.0);
 }
 
-TEST(Guard, AnswersNanWithStandstill) {
+TEST(Guard, ANanRequestGivesStandstill) {
   Guard guard(armLimits(), robot());
   JointVector q = JointVector::Zero(), request = JointVector::Constant(0.1);
   request[2] = std::nan("");
@@ -166,7 +166,7 @@ TEST(Guard, KeepsTheHandInTheWorkspaceAndTheArmFromStretching) {
   EXPECT_GT(inside, 50);
 }
 
-TEST(Guard, LetsPassWhatLeadsBackInside) {
+TEST(Guard, AllowsMotionBackInside) {
   GuardParameters p = armLimits();
   p.workspace.box_max.z() = 0.5;  // the stretched arm is far above
   p.workspace.max_stretch = 1.0;

@@ -46,7 +46,7 @@ class Nothing : public Motion<> {
   MotionState state() const override { return MotionState::Reached; }
 };
 
-TEST(AbiOfMotions, HasTheSizeOfEveryClassThatCrosses) {
+TEST(AbiOfMotions, ContainsTheSizeOfEverySharedClass) {
   EXPECT_TRUE((hasSizesOf<MotionController, MotionSetup, CycleInput, References, MotionRequest,
                           RobotSample, RobotSetup, Reason>(motionAbi())));
   EXPECT_TRUE(

@@ -43,7 +43,7 @@ int brakingCycles(const VirtualRobot& robot) {
   return static_cast<int>(std::ceil(longest / robot.period - 1e-9));
 }
 
-TEST(Cancel, EndsTheMotionAndItsQueueAndSaysWhy) {
+TEST(Cancel, EndsTheMotionAndItsQueueWithAReason) {
   VirtualRobot robot;
   robot.loadBoth("ptp");
   robot.followWithinLimits();
@@ -161,7 +161,7 @@ TEST(Cancel, AMotionThatHasNotBegunIsEndedToo) {
   EXPECT_EQ(ends[0].reason.code(), ReasonCode::Cancelled);
 }
 
-TEST(Cancel, WorksWhileTheArmMayNotMoveAndNamesAControllerThatMovesItInstead) {
+TEST(Cancel, WorksWhileMotionIsBlockedAndNamesAnotherMovingController) {
   VirtualRobot robot;
   robot.loadBoth("ptp");
   CancelAnswer answer;
@@ -184,7 +184,7 @@ TEST(Cancel, WorksWhileTheArmMayNotMoveAndNamesAControllerThatMovesItInstead) {
   EXPECT_EQ(answer.code, ReasonCode::UnknownName);
 }
 
-TEST(Cancel, AnytimeItStandsWithinTheBrakingTimeAndNothingMovesAfterwards) {
+TEST(Cancel, TheArmStandsWithinTheBrakingTimeAndDoesNotMoveAfterwards) {
   std::mt19937 random(3);
   const auto uniform = [&random](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random);
@@ -264,7 +264,7 @@ bool moves(ControllerManager& manager) {
   return false;
 }
 
-TEST(Cancel, OnTheRealClockAnswersWhenTheArmStandsOrAtItsTimeLimit) {
+TEST(Cancel, OnTheRealClockReturnsAtRestOrAtItsTimeLimit) {
   coglab_rt::ArmMailboxes mailboxes;
   const coglab_rt::JointLimits limits =
       coglab_rt::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");

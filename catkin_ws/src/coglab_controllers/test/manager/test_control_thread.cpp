@@ -123,7 +123,7 @@ class ControlThreadTest : public ::testing::Test {
   std::unique_ptr<ControlThread> thread;
 };
 
-TEST_F(ControlThreadTest, TimeGoesOnWhileMeasurementsAreLost) {
+TEST_F(ControlThreadTest, TimeContinuesWhileMeasurementsAreLost) {
   start();
   int cycles = 0;
   for (int i = 0; i < 50; ++i) {
@@ -143,7 +143,7 @@ TEST_F(ControlThreadTest, NoCycleIsLongerThanTheTimeAfterWhichAMeasurementIsTooO
   EXPECT_EQ(passed_ns, std::llround(1e9 * longest) + 5'000'000);
 }
 
-TEST_F(ControlThreadTest, ASlowerCycleThanTheArmsTakesEachThirdOfItsMeasurements) {
+TEST_F(ControlThreadTest, ASlowerCycleUsesEveryThirdMeasurement) {
   options.idle_period = 0.5;
   start();
   robot.period_ns = 2'000'000;  // 2.5 of them are a control cycle of 5 ms
@@ -162,7 +162,7 @@ TEST_F(ControlThreadTest, ASlowerCycleThanTheArmsTakesEachThirdOfItsMeasurements
   }
 }
 
-TEST_F(ControlThreadTest, AMeasurementIsTakenOnceAndSilenceWakesNobody) {
+TEST_F(ControlThreadTest, AMeasurementIsUsedOnceAndSilenceWakesNoThread) {
   options.idle_period = 0.5;
   start();
   const int before = robot.cycles_run;
@@ -179,7 +179,7 @@ TEST_F(ControlThreadTest, AMeasurementIsTakenOnceAndSilenceWakesNobody) {
   EXPECT_EQ(robot.cycles_run, before + 1);
 }
 
-TEST_F(ControlThreadTest, AMeasurementWhoseWakingWasLostIsFoundAfterTheIdlePeriod) {
+TEST_F(ControlThreadTest, AMeasurementWithoutAWakeUpIsFoundAfterTheIdlePeriod) {
   start();
   const int before = robot.cycles_run;
   robot.publish(*manager, 1);
@@ -252,7 +252,7 @@ TEST(ControlCycle, AJointIsSlowedBeforeItsStopWhereTheArmOrItsSetPointIsFurther)
   }
 }
 
-TEST(ControlCycle, ABorderThatAllowsLessAndLessSpeedEndsAMotion) {
+TEST(ControlCycle, ABorderThatReducesTheSpeedToZeroEndsAMotion) {
   PushedRobot robot("workspace: {box_max: [0.7, 1.2, 1.6]}");
   const ChainState home = robot.manager->settings().robot->chain.evaluate(kHome);
   robot.push->velocity = 0.2 * home.jacobian.row(0).transpose().normalized();
@@ -267,7 +267,7 @@ TEST(ControlCycle, ABorderThatAllowsLessAndLessSpeedEndsAMotion) {
   EXPECT_NEAR(stands, 0.5, 0.1);
 }
 
-TEST(ControlCycle, AMotionIsAllowedWithAJointStateOfAnArmThatFollowsAndElseOnlyAdopted) {
+TEST(ControlCycle, MotionIsAllowedOnlyWithAUsableJointStateOfAnEnabledArm) {
   PushedRobot robot;
   robot.push->doing = MotionState::Idle;
   RobotSample held = robot.sample, broken = robot.sample;

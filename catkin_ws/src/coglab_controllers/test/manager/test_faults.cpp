@@ -13,7 +13,7 @@
 namespace coglab_controllers {
 namespace {
 
-TEST(Faults, AnExceptionOfAClassThatOnlyThePluginHasIsToldAndLeavesNothing) {
+TEST(Faults, AnExceptionClassOfThePluginIsReportedAndNothingStaysLoaded) {
   VirtualRobot robot("{" + kTypes + "}");
   for (int round = 0; round < 3; ++round) {
     const Answer answer = robot.manager->load("odd", "test/Throwing");
@@ -25,7 +25,7 @@ TEST(Faults, AnExceptionOfAClassThatOnlyThePluginHasIsToldAndLeavesNothing) {
   EXPECT_TRUE(ids.empty());
 }
 
-TEST(Faults, WhatCannotBeAttachedIsNotLoadedAndItsIdStaysFree) {
+TEST(Faults, AControllerWhoseAttachFailsIsNotLoadedAndItsIdStaysFree) {
   VirtualRobot robot;
   int attached = 0;
   const auto attach = [&](MotionController&, const MotionMaker&) {
@@ -167,7 +167,7 @@ class Slow : public ctrl_more::FeedbackController {
   }
 };
 
-TEST(Faults, TheTimeOfASlowFeedbackControllerIsNotChargedToTheMotionController) {
+TEST(Faults, TheTimeOfASlowFeedbackControllerDoesNotCountForTheMotionController) {
   const coglab_rt::JointLimits limits =
       coglab_rt::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
   ctrl_more::Logger logger;
@@ -247,7 +247,7 @@ struct ScriptedRobot : VirtualRobot {
   Scripted* script = nullptr;
 };
 
-TEST(Faults, AControllerThatThrowsWhereItIsEndedIsEndedAllTheSame) {
+TEST(Faults, AControllerThatThrowsWhenEndedIsStillEnded) {
   ScriptedRobot robot;
   robot.script->throws = "abort";
   robot.switchTo("script");

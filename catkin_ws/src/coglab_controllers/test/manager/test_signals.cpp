@@ -150,7 +150,7 @@ TEST(SignalFile, TopicsAreComparedByTheirFullNames) {
   EXPECT_EQ(refused(rules), "signals.yaml:2: topic imu: no name");
 }
 
-TEST(SignalFile, OutputsOfWhatThereIsNotRefuseTheWholeFile) {
+TEST(SignalFile, AnOutputOfAnUnknownSourceRefusesTheWholeFile) {
   const auto said = [](const std::string& value) {
     const std::string file = fileOf(
         "outputs.yaml",

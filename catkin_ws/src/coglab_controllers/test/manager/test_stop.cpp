@@ -154,7 +154,7 @@ TEST_F(Stop, ACancelBringsTheArmToRestUntilTheNextMotion) {
 
 // The pose that is held is corrected again and again: a correction that was counted twice made the
 // hand drift as long as somebody pushed it.
-TEST_F(Stop, AHandThatIsPushedYieldsOnceWhereItHolds) {
+TEST_F(Stop, APushedHoldingHandYieldsWithoutDrifting) {
   use("dmp_compliant");
   robot.push = Vector3(20.0, 0.0, 0.0);  // 5 N of it are the dead band: 0.075 m on the spring
   robot.beginReach();

@@ -75,7 +75,7 @@ TEST(Unload, WhileACancelWaitsForIt) {
   EXPECT_FALSE(answer.was_running);
 }
 
-TEST(Unload, AgainAndAgainWhileTheCycleRunsAndOthersAsk) {
+TEST(Unload, RepeatedlyWhileTheCycleRunsAndOtherRequestsArrive) {
   VirtualRobot robot("", 0.005, false);
   std::atomic<bool> stop{false};
   std::thread control([&] {
@@ -178,7 +178,7 @@ class Lingering : public MotionController {
   Reason none_;
 };
 
-TEST(Unload, NeitherTheControllerThatStillRunsNorTheOneThatIsOrderedGoes) {
+TEST(Unload, RefusesBothTheRunningAndTheRequestedController) {
   VirtualRobot robot("", 0.005, false);
   ControllerManager& manager = *robot.manager;
   std::atomic<bool> stop{false};

@@ -61,7 +61,7 @@ class HoldTest : public ::testing::Test {
   Hold hold;
 };
 
-TEST_F(HoldTest, TheSlowestBrakesAsItCanAndTheOthersAreThreeCyclesAhead) {
+TEST_F(HoldTest, TheSlowestJointBrakesAloneAndTheOthersAreThreeCyclesAhead) {
   // They need 0.3, 0.2, 0.25, 0.235 and 0.2 s: the third one nearly as long as the first.
   const JointVector from = joints(0.4, 0.2, 0.3, 0.27, -0.2);
   const JointVector others = joints(0.0, 0.2, 0.0, 0.27, -0.2);
@@ -88,7 +88,7 @@ TEST_F(HoldTest, AJointThatStillSpeedsUpIsBrakedFirst) {
   expectAsked(joints(0, -0.1), from, joints(-0.5, 0.5));  // these brake already
 }
 
-TEST_F(HoldTest, ItStandsBelowOneMilliradianPerSecondAndThenRemembers) {
+TEST_F(HoldTest, BelowOneMilliradianPerSecondItLatchesThePosture) {
   const JointVector second = kHome + joints(0.1, 0, -0.1), third = kHome + joints(0.2, 0);
   hold.begin();
   asked(joints(0, 0.00101));

@@ -224,7 +224,7 @@ TEST_F(Following, APointAtTheStartIsWhereTheArmIs) {
   EXPECT_LE(steepest, 10.0 + 1e-6);
 }
 
-TEST_F(Following, WhatCannotBeFollowedIsRefusedBeforeAnythingMoves) {
+TEST_F(Following, AnInvalidTrajectoryIsRefusedBeforeTheArmMoves) {
   using Error = TrajectoryError;
   const double nan = std::nan("");
   const auto goal = [this](const auto& change) {

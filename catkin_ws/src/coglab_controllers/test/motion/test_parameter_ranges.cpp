@@ -110,7 +110,7 @@ TEST(ParameterRanges, OfPointToPoint) {
   }
 }
 
-TEST(ParameterRanges, OfLoopGainsHangOnTheCycle) {
+TEST(ParameterRanges, OfLoopGainsDependOnTheCycle) {
   // At most half a gain per cycle; and 200 and 100 where the cycle is quick.
   for (const auto& [cycle, pose, joints] :
        {std::tuple(0.02, 25.0, 25.0), std::tuple(0.002, 200.0, 100.0)}) {

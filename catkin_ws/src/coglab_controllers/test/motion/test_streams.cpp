@@ -131,7 +131,7 @@ TEST_F(Stream, RandomPosesKeepEveryLimit) {
   }
 }
 
-TEST_F(Stream, WhatIsNoPoseIsRefused) {
+TEST_F(Stream, InvalidPosesAreRefused) {
   use("coglab/PoseStream");
   const Answer answer = stream->send({0.5, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0});
   EXPECT_EQ(answer.code, ReasonCode::InvalidArgument);
@@ -253,7 +253,7 @@ TEST(StreamGains, TheGainOfTheRotationIsThatOfTheAxisToo) {
   EXPECT_LT(tilt(), 0.01);
 }
 
-TEST_F(Stream, WhatIsNoCommandIsRefusedAndTheArmGoesOn) {
+TEST_F(Stream, InvalidCommandsAreRefusedAndTheArmContinues) {
   use("coglab/TwistStream");
   follow({0.0, 0.0, 0.1, 0.0, 0.0, 0.0});
   for (const double bad : {std::nan(""), std::numeric_limits<double>::infinity()}) {
@@ -267,7 +267,7 @@ TEST_F(Stream, WhatIsNoCommandIsRefusedAndTheArmGoesOn) {
   EXPECT_GT(arm.handVelocity().z(), 0.0);
 }
 
-TEST_F(Stream, ACancelClosesItUntilItIsOpenedAnew) {
+TEST_F(Stream, ACancelClosesItUntilItIsReopened) {
   use("coglab/TwistStream");
   for (int i = 0; i < 5; ++i) follow({0.0, 0.0, 0.1, 0.0, 0.0, 0.0});
   arm.manager->askCancel("stream", "enough");

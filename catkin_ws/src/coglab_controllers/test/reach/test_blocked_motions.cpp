@@ -26,7 +26,7 @@ double follow(VirtualRobot& robot, const Vector3& goal, double limit) {
 
 class Reaches : public ::testing::TestWithParam<int> {};
 
-TEST_P(Reaches, EndByThemselvesAndNameWhatBlocksThem) {
+TEST_P(Reaches, EndByThemselvesWithTheBlockingLimit) {
   const char* primitives[] = {"reach_human", "reach_human_high", "give_human", "take_board",
                               "put_board"};
   std::mt19937 random(static_cast<unsigned>(GetParam()));
@@ -111,7 +111,7 @@ TEST(BlockedMotion, ASlowOrPausedMotionIsNotOne) {
 }
 
 /// The arm stands fully stretched when the goal comes to where the hand is: that is its end.
-TEST(BlockedMotion, EndsWellWhereTheGoalComesToTheHand) {
+TEST(BlockedMotion, SucceedsIfTheGoalMovesToTheHand) {
   VirtualRobot robot;
   robot.loadBoth();
   Vector3 goal(0.21, 0.61, 0.92);

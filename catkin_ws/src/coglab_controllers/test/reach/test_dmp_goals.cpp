@@ -59,7 +59,7 @@ double wentBack(const std::string& frame) {
   return back;
 }
 
-TEST(DmpController, APredictedGoalIsNotLed) {
+TEST(DmpController, APredictedGoalGivesNoGoalVelocity) {
   const double seen = wentBack("human_hand"), predicted = wentBack("human_hand_ahead");
   EXPECT_GT(seen, predicted + 0.001);
   EXPECT_LT(predicted, 0.002);
@@ -89,7 +89,7 @@ std::pair<ReasonCode, double> reachAfter(const GoalBounds& limits,
   return {robot.manager->report().reason.code(), largest};
 }
 
-TEST(DmpController, NothingIsChased) {
+TEST(DmpController, AGoalThatRetreatsLeavesOrFallsEndsTheMotion) {
   const GoalBounds limits{Vector3(0.5, -0.3, 0.1), Vector3(0.9, 0.3, 0.8), 0.10, 0.08};
   const auto back = [](double t) { return Vector3(0.3 * std::min(t, 1.0), 0, 0); };
   const auto aside = [](double t) { return Vector3(0, 0.5 * std::min(t, 1.0), 0); };
@@ -117,7 +117,7 @@ TEST(DmpController, NothingIsChased) {
   EXPECT_NEAR(far, 0.3, 1e-9);
 }
 
-TEST(DmpController, AGoalOutsideItsRegionFromTheBeginningIsWaitedFor) {
+TEST(DmpController, AGoalThatStartsOutsideItsRegionIsAllowed) {
   const GoalBounds far{Vector3(0.5, 0.1, 0.1), Vector3(0.9, 0.5, 0.8), 0, 0};
   EXPECT_EQ(reachAfter(far, [](double) { return Vector3::Zero(); }).first, ReasonCode::None);
 }
@@ -188,7 +188,7 @@ struct Unseen : VirtualRobot {
   }
 };
 
-TEST(DmpController, AnOldGoalAndALostOneSpeakOfTheClockOnlyIfItIsTheCause) {
+TEST(DmpController, ReasonsMentionTheClockOnlyIfItIsTheCause) {
   for (const bool ahead : {false, true}) {
     Unseen robot;
     robot.begin(kGoal);

@@ -125,7 +125,7 @@ TEST(DmpRequests, BadSwitchesLeaveTheRunningMotionAsItIs) {
   }
 }
 
-TEST(DmpRequests, ASwitchLooksNeitherAtAStartNorAtAFrame) {
+TEST(DmpRequests, ASwitchIgnoresStartAndFrame) {
   VirtualRobot robot;
   robot.loadBoth();
   robot.see("human_hand", kGoal);

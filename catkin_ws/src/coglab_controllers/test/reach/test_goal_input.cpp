@@ -70,7 +70,7 @@ TEST_F(Feed, AFrameIsAGoalUpToItsAgeAndAsFarAheadAsClocksDiffer) {
   }
 }
 
-TEST_F(Feed, WhatIsMissingIsSaidWithWhy) {
+TEST_F(Feed, AMissingGoalIsReportedWithTheCause) {
   EXPECT_EQ(first("cup").code, ReasonCode::UnknownName);
   frames.late_frame = "cup";
   frames.late = 3.5;
@@ -195,7 +195,7 @@ struct Table : ::testing::Test {
   DmpRequest request = robot.reach();
 };
 
-TEST_F(Table, AReachEndsWhereTheFrameSaysAndTellsItInBothFrames) {
+TEST_F(Table, AReachEndsAtTheGoalAndReportsItInBothFrames) {
   const Quaternion before = robot.hand().orientation;
   const Vector3 from = robot.hand().position;
   ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(request)));
@@ -304,7 +304,7 @@ TEST(FrameGoal, AStepBackOfTheClockStartsAnew) {
 }
 
 /// While a motion runs, each sight is judged as the first one was.
-TEST(FrameGoal, ASightThatIsNoPoseIsNotFollowed) {
+TEST(FrameGoal, AnInvalidGoalPoseIsNotFollowed) {
   VirtualRobot robot;
   robot.loadBoth();
   DmpRequest request = robot.reach();

@@ -175,7 +175,7 @@ TEST_F(Motion, WithoutAProcessItEndsWithWhatToDo) {
   EXPECT_NE(arm.reason().find("./coglab controller run"), std::string::npos) << arm.reason();
 }
 
-TEST_F(Motion, StrangersAreRefusedInWords) {
+TEST_F(Motion, OtherProgramsAreRefusedWithAReason) {
   const std::string address = addressOf("python");
   const auto refusal = [&](const std::string& hello) {
     return std::string(Connection(address, hello).text);

@@ -127,7 +127,7 @@ TEST_F(GoalPath, AFrameFromTheFutureIsRefusedAndTheTrackerIsFollowedOn) {
   }
 }
 
-TEST_F(GoalPath, StampsFromTheFutureAloneAreNoGoalAndTheReasonSaysSo) {
+TEST_F(GoalPath, OnlyStampsFromTheFutureGiveNoGoalWithAReason) {
   begin();
   const std::uint64_t before = listener_.refused();
   for (int frame = 0; frame < 20; ++frame) {

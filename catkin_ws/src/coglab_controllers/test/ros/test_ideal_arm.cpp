@@ -88,7 +88,7 @@ TEST(IdealArm, StandsUntilStartAndFollowsThen) {
   EXPECT_EQ(arm.sample.commanded_position, arm.sample.position);
 }
 
-TEST(IdealArm, WhatWasComputedBeforeThePermissionDoesNotCount) {
+TEST(IdealArm, CommandsFromBeforeThePermissionAreIgnored) {
   Arm arm;
   arm.send(Vector7::Constant(0.5));
   arm.ask("start");
@@ -152,7 +152,7 @@ TEST(IdealArm, StopBrakesAndNeedsStart) {
   EXPECT_EQ(view.state, IdealArmState::Monitor);
 }
 
-TEST(IdealArm, BrakesWhenCommandsEndAndIgnoresWhatIsNotFinite) {
+TEST(IdealArm, BrakesWhenCommandsEndAndIgnoresNonFiniteOnes) {
   Arm arm;
   arm.ask("start");
   arm.drive(100, Vector7::Constant(0.3));

@@ -134,7 +134,7 @@ void expectArrived(const Found& found, const Case& c, double speed) {
   EXPECT_GE(found.least_room, 0.0) << where();
 }
 
-TEST(LimitsUnderLoss, WithoutLossesOrWithSingleOnesTheBridgeCutsNothingAndTheWayIsStraight) {
+TEST(LimitsUnderLoss, WithoutBurstsTheBridgeCutsNothingAndThePathIsStraight) {
   unsigned seed = 0;
   for (const double period : kPeriods) {
     for (const double speed : kSpeeds) {
@@ -149,7 +149,7 @@ TEST(LimitsUnderLoss, WithoutLossesOrWithSingleOnesTheBridgeCutsNothingAndTheWay
   }
 }
 
-TEST(LimitsUnderLoss, BurstsAtHalfTheSpeedOrAtShortPeriodsLeaveTheBridgeNothingToCut) {
+TEST(LimitsUnderLoss, BurstsAtHalfSpeedOrShortPeriodsMakeTheBridgeCutNothing) {
   unsigned seed = 100;
   for (const double period : kPeriods) {
     for (const double speed : kSpeeds) {

@@ -170,7 +170,7 @@ TEST(Touch, ForcesOfAFingerAreTheSumOverItsPhalanges) {
   EXPECT_FALSE(without.robot().find(ctrl_more::RobotSource::Measured, "touch").valid());
 }
 
-TEST(Touch, BadMessagesAreRefusedWithWords) {
+TEST(Touch, BadMessagesAreRefusedWithAReason) {
   FeedbackStage stage(*setup("{tactile: true}"), 0.005, true);
   const auto refusal = [&](const coglab_msgs::FingertipForces& message) -> std::string {
     try {

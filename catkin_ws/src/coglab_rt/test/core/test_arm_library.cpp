@@ -35,7 +35,7 @@ TEST(ArmLibrary, AnArmOfALibraryMeasures) {
   EXPECT_GE(sample.sequence, 3U);
 }
 
-TEST(ArmLibrary, WhatCannotBeUsedIsRefusedInWords) {
+TEST(ArmLibrary, UnusableLibrariesAreRefusedWithAReason) {
   for (const auto& [file, words] :
        {std::pair<std::string, std::string>{library("none"), "has no arm; write COGLAB_ARM"},
         {library("other_version"), "was made for interface 999 of an arm, expected 1; compile"},

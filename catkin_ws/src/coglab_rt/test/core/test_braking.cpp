@@ -99,7 +99,7 @@ TEST(Braking, NoPositionLimitIsCrossedFromAnyState) {
 
 /// One axis that was led by an answer and brakes from then on; losses within the budget, drawn or
 /// as early as they can be.
-TEST(Braking, TheReserveCoversWhateverTheBudgetLoses) {
+TEST(Braking, TheReserveCoversAllLossesInTheBudget) {
   using B = LossBudget;
   std::mt19937 random(23);
   std::uniform_real_distribution<double> part(-1.0, 1.0);

@@ -104,7 +104,7 @@ TEST_F(Edges, ValuesInDegreesAreRefused) {
   }
 }
 
-TEST_F(Edges, AFileMayBeWiderThanTheRobotOnlyIfItSaysSo) {
+TEST_F(Edges, AFileMayBeWiderThanTheRobotOnlyIfItDeclaresThis) {
   const std::string own = path_ + "_own";
   std::ofstream(own) << kTable;
   const auto wider = [&](const std::string& text) {
@@ -131,7 +131,7 @@ TEST_F(Edges, AFileMayBeWiderThanTheRobotOnlyIfItSaysSo) {
   std::remove(own.c_str());
 }
 
-TEST_F(Edges, AProfileOverridesWhatItNamesAndNoMore) {
+TEST_F(Edges, AProfileOverridesOnlyItsOwnValues) {
   const std::string slow = kTable + "slow:\n  velocity: [0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.2]\n";
   const JointLimits limits = load(slow, "slow");
   EXPECT_EQ(limits.velocity[0], 0.1);

@@ -90,7 +90,7 @@ struct Watched {
   }
 };
 
-TEST(Mailbox, TheWriterNeverTouchesWhatTheReaderReads) {
+TEST(Mailbox, TheWriterNeverWritesTheSlotBeingRead) {
   TripleBuffer<Watched> buffer;
   int last = 0;
   const std::function<void()> write_thrice = [&] {

@@ -17,7 +17,7 @@ namespace {
 /// Lies in the stack of every thread of this program, as do those of the libraries of a node.
 thread_local volatile char of_the_thread[96 * 1024];
 
-TEST(BoundedThread, WhatThreadLocalVariablesTakeOfTheStackIsNotTouched) {
+TEST(BoundedThread, StackOfThreadLocalVariablesIsNotTouched) {
   bool ran = false;
   BoundedThread thread;
   thread.start("narrow", 128 * 1024, [&ran] { ran = of_the_thread[0] == 0; });
@@ -95,7 +95,7 @@ TEST(BoundedThread, TheLowerHalfOfTheStackIsNotTouched) {
 }
 
 /// In a thread of its own, which takes the priority with it: granted or not, what it says is so.
-TEST(RealTime, ThePriorityThatIsGrantedIsTheOneAskedFor) {
+TEST(RealTime, TheGrantedPriorityIsTheRequestedOne) {
   BoundedThread thread;
   thread.start("priority", 0, [] {
     const std::string refused = enterRealTime(7);
@@ -109,7 +109,7 @@ TEST(RealTime, ThePriorityThatIsGrantedIsTheOneAskedFor) {
 }
 
 /// In a process of its own, which alone is locked: granted or not, what it says is so.
-TEST(RealTime, MemoryIsLockedOrItIsSaidThatItIsNot) {
+TEST(RealTime, MemoryIsLockedOrAWarningIsReturned) {
   const pid_t child = fork();
   ASSERT_GE(child, 0);
   if (child == 0) {

@@ -56,7 +56,7 @@ TEST_F(Loggers, ALevelDecidesAtOnceWhatIsLogged) {
   EXPECT_TRUE(logged(warn));
 }
 
-TEST_F(Loggers, WhatIsNoLoggerOrNoLevelChangesNothing) {
+TEST_F(Loggers, AnUnknownLoggerOrLevelChangesNothing) {
   const auto before = levels();
   EXPECT_FALSE(set("ros", "loud"));
   EXPECT_FALSE(set("ros", ""));

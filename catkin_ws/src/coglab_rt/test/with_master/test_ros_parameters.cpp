@@ -90,7 +90,7 @@ TEST_F(RosParameters, BothEndsOfARangeBelongToIt) {
   EXPECT_THROW(readNumber(node_, "missing", 3.0, -0.5, 2.5), std::invalid_argument);
 }
 
-TEST_F(RosParameters, ATreeHasEveryTypeThatYamlCanSay) {
+TEST_F(RosParameters, ATreeHasEveryTypeThatYamlSupports) {
   node_.setParam("flag", true);
   node_.setParam("count", -3);
   node_.setParam("half", 0.5);

@@ -37,7 +37,7 @@ std::pair<int, std::uint16_t> loopbackSocket() {
 
 }  // namespace
 
-TEST(FriSocket, SendsReceivesAndSaysWhatIsTooLong) {
+TEST(FriSocket, SendsReceivesAndReportsTooLongDatagrams) {
   const auto soon = [] { return std::chrono::steady_clock::now() + std::chrono::seconds(5); };
   const auto [taken, port] = loopbackSocket();
   close(taken);
@@ -105,7 +105,7 @@ TEST(RealTimeCell, TheFactorScalesTimeAndAFloodDoesNotStopIt) {
 
 /// The latency told is time of the cell, whatever the factor. Every answer is held for a share of
 /// the period of the cell, so that no less than that can be told; a busy computer adds to it.
-TEST(RealTimeCell, TheLatencyOfAnswersIsToldInTimeOfTheCell) {
+TEST(RealTimeCell, TheLatencyOfAnswersIsMeasuredInTimeOfTheCell) {
   constexpr double kPeriod = 0.1;
   const auto told_at = [](double factor, double held) {
     const auto [fd, port] = loopbackSocket();
@@ -152,7 +152,7 @@ TEST(RealTimeCell, TheLatencyOfAnswersIsToldInTimeOfTheCell) {
 
 /// A computer that is too busy answers three periods late: where simulated time may stand, no
 /// answer is lost.
-TEST(RealTimeCell, LateAnswersAreWaitedForWhereTimeMayStand) {
+TEST(RealTimeCell, SimulatedTimeWaitsForLateAnswers) {
   const auto [fd, port] = loopbackSocket();
   const timeval limit{5, 0};
   setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
@@ -229,7 +229,7 @@ TEST(RealTimeCell, ARequestThatTimedOutIsWithdrawn) {
 }
 
 /// A real robot controller has a computer of its own, which no program on the PC delays.
-TEST(RealTimeCell, ItsThreadIsRealTimeWhereThatIsGrantedAndTheFactorAllowsIt) {
+TEST(RealTimeCell, ItsThreadIsRealTimeIfGrantedAndTheFactorAllowsIt) {
   CellConfig config;
   config.urdf = URDF;
   for (const auto& [factor, priority] : {std::pair{1.0, 60}, {1.0, 0}, {2.0, 60}}) {

@@ -227,7 +227,7 @@ TEST(RealTimeCell, LeavesRecordsMessagesAndASnapshot) {
   EXPECT_EQ(snapshot.refused_hand, "");
 }
 
-TEST(RealTimeCell, TakesItsInputsAndSaysWhyAHandIsNotThere) {
+TEST(RealTimeCell, UsesItsInputsAndReportsWhyAHandIsRefused) {
   Running running;
   RealTimeCell& cell = running.cell;
   MotorCommands commands;

@@ -117,7 +117,7 @@ Pose at(const Vector3d& position, const Vector3d& turn = Vector3d::Zero()) {
 
 }  // namespace
 
-TEST(HoldSpring, WhatAnotherHoldsIsTakenWithoutItsWeight) {
+TEST(HoldSpring, AnObjectHeldByAnotherIsTakenWithoutItsWeight) {
   HoldSpring hold;
   hold.engageAt(Pose{});
   hold.engage(at({1, 0, 0}), at({0, 0, 0}));

@@ -79,7 +79,7 @@ TEST_F(PlantCheck, ConstraintsThatAreLeftOut) {
 }
 
 /// Speeds that nothing in this cell has: m/s and rad/s of what is free, rad/s of a joint.
-TEST_F(PlantCheck, SpeedsThatNothingHereHas) {
+TEST_F(PlantCheck, ImplausibleSpeeds) {
   const Model& model = plant_.model();
   const struct {
     int at;

@@ -52,7 +52,7 @@ TEST(Settings, NumbersHaveTheirCountAndRange) {
   EXPECT_FALSE(values.set("ends", Numbers{}));
 }
 
-TEST(ControllerFiles, GiveWhatTheyName) {
+TEST(ControllerFiles, SetTheNamedValues) {
   const ControllerConfig config = readControllerConfig(
       declared(), ConfigNode::fromText("type: X\nkp: [0, 2]\nmode: slow\nends: [1, 2]\n", "f"));
   EXPECT_EQ(config.settings.text("mode"), "slow");

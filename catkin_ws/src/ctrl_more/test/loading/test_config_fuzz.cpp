@@ -227,7 +227,7 @@ long filesAskedFor() {
 /// Every file is written, and loaded as list, as gains of a controller that runs, and as the
 /// configuration of a new one; a third of them is meant for each, and half of them differ from a
 /// good one by one word. What runs is looked at after each load.
-TEST_F(ConfigFuzz, ListAndGainAndConfigurationFilesNeverBreakWhatRuns) {
+TEST_F(ConfigFuzz, DamagedFilesNeverAffectRunningControllers) {
   const long files = filesAskedFor();
   ASSERT_GE(files, 1200) << "CTRL_MORE_FUZZ_FILES";
   long mistyped = 0;

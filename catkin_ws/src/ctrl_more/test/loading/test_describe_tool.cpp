@@ -70,7 +70,7 @@ TEST_F(DescribeTool, OnlyTheCheckFailsForEmptyFields) {
   EXPECT_EQ(run("config " + kGood, true).status, 0);
 }
 
-TEST_F(DescribeTool, WhatCannotBeLoadedIsSaidAndOne) {
+TEST_F(DescribeTool, ALoadErrorIsPrintedWithStatusOne) {
   const Result missing = run("page /nowhere/libx.so", true);
   EXPECT_EQ(missing.status, 1);
   EXPECT_TRUE(contains(missing.said, "there is no library /nowhere/libx.so")) << missing.said;

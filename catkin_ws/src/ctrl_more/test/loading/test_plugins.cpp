@@ -80,7 +80,7 @@ TEST_F(Plugins, PapersExampleFileIsRefusedWithLineAndSuggestion) {
   EXPECT_EQ(rig.control.getZMP()[0], 1.0) << "what was loaded keeps running";
 }
 
-TEST_F(Plugins, BadLibrariesAreRefusedInWords) {
+TEST_F(Plugins, BadLibrariesAreRefusedWithAReason) {
   expectRefused("loadControllers: [A]\nA: {libPath: libmissing.so}\n",
                 {"list.yaml:2", "libPath", "libmissing.so", "tried"});
   expectRefused("loadControllers: [A]\nA: {libPath: libnone.so}\n", {"registers no controller"});
@@ -100,7 +100,7 @@ TEST_F(Plugins, BadLibrariesAreRefusedInWords) {
 }
 
 // What a library throws lives in it, and must be dealt with before it is closed.
-TEST_F(Plugins, WhateverALibraryThrowsRefusesTheWholeListInWords) {
+TEST_F(Plugins, AnyExceptionOfALibraryRefusesTheWholeList) {
   const std::string own = "an error of its own", strange = "not a std::exception";
   for (const auto& thrown :
        std::vector<std::pair<std::string, std::string>>{{"InMaker", own},
@@ -132,7 +132,7 @@ TEST_F(Plugins, WhateverALibraryThrowsRefusesTheWholeListInWords) {
   }
 }
 
-TEST_F(Plugins, WhatALibraryThrowsWhileLoadedIsAFaultOrARefusal) {
+TEST_F(Plugins, AnExceptionOfALoadedLibraryIsAFaultOrARefusal) {
   ASSERT_TRUE(load("loadControllers: [update, judge]\n"
                    "update: {libPath: libstrangers.so, type: InUpdate, enabled: true}\n"
                    "judge: {libPath: libstrangers.so, type: InJudge}\n")
@@ -347,7 +347,7 @@ struct HarmfulLibraries : TwoBuilds {
   }
 };
 
-TEST_F(HarmfulLibraries, AreRefusedAndBlockNobody) {
+TEST_F(HarmfulLibraries, AreRefusedAndBlockNoOtherThread) {
   const std::string opened = "while it was opened", described = "'StaticObject' was made";
   for (const auto& [fault, parts] : std::map<std::string, std::vector<std::string>>{
            {"open_throw", {"no such camera"}},
@@ -364,7 +364,7 @@ TEST_F(HarmfulLibraries, AreRefusedAndBlockNobody) {
   unsetenv("CTRL_MORE_TEST_FAULT");
 }
 
-TEST_F(HarmfulLibraries, InitializeThatHangsBlocksNoQuestionAndIsNamedToOtherChanges) {
+TEST_F(HarmfulLibraries, AHangingInitializeBlocksNoQueryAndIsReportedToOtherChanges) {
   within20s([this] {
     ASSERT_TRUE(load("loadControllers: [Good]\nGood: {libPath: libgood.so}\n").ok());
     std::promise<void> hangs;
@@ -394,7 +394,7 @@ TEST_F(HarmfulLibraries, CutShortIsRefused) {
   }
 }
 
-TEST_F(HarmfulLibraries, OverwrittenWhileLoadedRunsAsItWasAndIsLoadedAnew) {
+TEST_F(HarmfulLibraries, OverwrittenWhileLoadedKeepsRunningAndCanBeReloaded) {
   within20s([this] {
     build("good");
     fail(loadIt().text());

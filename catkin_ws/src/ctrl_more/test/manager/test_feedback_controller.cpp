@@ -114,7 +114,7 @@ TEST(FeedbackControllerTest, InitializeIsCalledOnceAndMayRefuse) {
   EXPECT_FALSE(rig.manager->has("b"));
 }
 
-TEST(FeedbackControllerTest, AskingForWhatIsNotDeclaredIsRefused) {
+TEST(FeedbackControllerTest, RequestingAnUndeclaredSignalIsRefused) {
   Rig rig;
   for (int what = 0; what < 5; ++what) {
     auto c = adder("pose", "ee", 0.1);

@@ -61,7 +61,7 @@ TEST_F(Isolation, Exception) {
   expectFault(FaultKind::Exception, "sensor gone");
 }
 
-TEST_F(Isolation, ExceptionThatIsNone) {
+TEST_F(Isolation, ExceptionNotDerivedFromStdException) {
   build([](TestController&, ModifiedControlStates&) { throw 42; });
   expectFault(FaultKind::Exception, "not a std::exception");
 }
@@ -93,7 +93,7 @@ TEST_F(Isolation, EmptyPermission) {
   expectFault(FaultKind::Exception, "permission");
 }
 
-TEST_F(Isolation, SomeoneElsesPermission) {
+TEST_F(Isolation, PermissionOfAnotherController) {
   TestController* other = rig.add(adder("joint", "Velocity", 0.0), "other");
   build([other](TestController&, ModifiedControlStates& m) { m[other->out][0] = 9.0; });
   expectFault(FaultKind::Exception, "permission");

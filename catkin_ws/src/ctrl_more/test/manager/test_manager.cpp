@@ -180,7 +180,7 @@ TEST(ManagerTest, WithoutAClockCyclesAreCountedAndTimeIsThatOfTheStates) {
   EXPECT_EQ(rig.manager->lastCycle().cycle, 3u);
 }
 
-TEST(ManagerTest, StatesOfAnotherLayoutAreNotTouchedAndSaidSo) {
+TEST(ManagerTest, StatesOfAnotherLayoutAreUnchangedAndReported) {
   Rig rig;
   auto sink = std::make_shared<ListSink>();
   rig.logger.addSink(sink);

@@ -47,7 +47,7 @@ TEST(BridgeFaults, AMeasuredPositionTheArmCannotHaveReachedIsRefused) {
 
 /// What we sent is known, so a set-point that cannot follow from it is no true one, after a loss
 /// either.
-TEST(BridgeFaults, ASetPointThatCannotFollowFromWhatWasSentIsRefused) {
+TEST(BridgeFaults, ASetPointThatDoesNotFollowFromTheAnswersIsRefused) {
   for (const bool after_a_loss : {false, true}) {
     for (const float shift : {0.02F, -0.02F, 0.002F, -0.002F}) {
       Cell cell(0.001);

@@ -31,7 +31,7 @@ TEST(Bridge, StrategyChangesInMonitorModeOnly) {
 }
 
 /// Flags of the answer stay those of the entry, whatever is asked for in command mode.
-TEST(Bridge, FlagsStayInCommandModeWhateverIsAsked) {
+TEST(Bridge, FlagsStayInCommandModeForEveryRequest) {
   for (const char* mode : {"position", "joint_impedance", "cartesian_impedance"}) {
     Cell cell;
     cell.run(2);
@@ -140,7 +140,7 @@ TEST(Bridge, RefusesLimitsOutOfRangeByName) {
 
 /// Who plans motions keeps the margin of the table: a bridge that kept more would stop what was
 /// accepted.
-TEST(Bridge, KeepsNoWiderMarginThanTheTableSays) {
+TEST(Bridge, KeepsNoWiderMarginThanTheTable) {
   BridgeConfig config = defaultConfig();
   for (const double margin : {config.limits.position_margin, 0.5 * config.limits.position_margin}) {
     config.position_margin = margin;

@@ -71,7 +71,7 @@ TEST(Requests, AStopDoesNotWaitForRestForever) {
 }
 
 /// Silence counts from the last datagram: 0.25 s, or five cycles where they are longer.
-TEST(Requests, SilenceIsToldAfterItsTimeLimit) {
+TEST(Requests, SilenceIsReportedAfterItsTimeLimit) {
   for (const double period : {0.005, 0.1}) {
     Cell cell(period);
     cell.run(3);
@@ -102,7 +102,7 @@ std::vector<StateView> toldBy(Bridge& bridge) {
   return told;
 }
 
-TEST(BridgeView, StatesAreToldOnceEachFromTheBeginningOn) {
+TEST(BridgeView, EachStateIsReportedOnceFromTheStart) {
   Cell cell;
   std::vector<StateView> told = toldBy(cell.bridge);
   ASSERT_EQ(told.size(), 1U);
@@ -128,7 +128,7 @@ TEST(BridgeView, StatesAreToldOnceEachFromTheBeginningOn) {
 
 /// A bridge that meets a controller in command mode speaks its strategy, for the flags may not
 /// change there.
-TEST(BridgeView, TheFlagsOfACommandModeThatWasFoundAreItsStrategys) {
+TEST(BridgeView, AnExistingCommandModeGetsTheFlagsOfItsStrategy) {
   for (const auto& [control, flags] :
        {std::pair{fri::ControlStrategy::JointImpedance, 0x0035U},
         std::pair{fri::ControlStrategy::CartesianImpedance, 0x3500U}}) {
@@ -151,7 +151,7 @@ TEST(BridgeView, TheFlagsOfACommandModeThatWasFoundAreItsStrategys) {
 }
 
 /// Age of a command on both sides of its limit, and at long periods of two and a half cycles.
-TEST(BridgeView, ACommandOfTheFutureOrOfLongPeriodsCountsWithinItsLimit) {
+TEST(BridgeView, CommandAgeLimitsForFutureStampsAndLongPeriods) {
   const auto follows = [](double period, double age) {
     Cell cell(period);
     cell.start();

@@ -16,7 +16,7 @@ using test::runEvent;
 
 /// A sample of the campaign that bench/loss_campaign.cpp runs in whole; with COGLAB_LONG more of
 /// it.
-TEST(Losses, NoSetPointLeavesItsBoundsWhateverIsLost) {
+TEST(Losses, NoSetPointLeavesItsBoundsUnderAnyLoss) {
   const unsigned seeds = std::getenv("COGLAB_LONG") != nullptr ? 200 : 2;
   for (const double period : {0.001, 0.002, 0.005, 0.010, 0.020}) {
     for (const double share : {0.0, 0.01, 0.05, 0.10}) {
@@ -64,7 +64,7 @@ TEST(Losses, TheWorstPatternOfTheBudgetKeepsTheBounds) {
 
 /// Braking goes on where the answer that the controller saw last has left it: the losses cost their
 /// own way and nothing more.
-TEST(Losses, BrakingDoesNotBeginAnewAfterALoss) {
+TEST(Losses, BrakingDoesNotRestartAfterALoss) {
   for (const double period : {0.001, 0.005, 0.020}) {
     double angle[2];
     int lost = 0;
@@ -94,7 +94,7 @@ TEST(Losses, BrakingDoesNotBeginAnewAfterALoss) {
 }
 
 /// Where the controller stood, the set-point starts from rest; where it went on, at its speed.
-TEST(Losses, AfterAGapTheSetPointGoesOnAsTheControllerDid) {
+TEST(Losses, AfterAGapTheSetPointContinuesThatOfTheController) {
   for (const bool extrapolates : {true, false}) {
     for (const int gap : {1, 2, 5}) {
       for (const bool measurements : {false, true}) {
@@ -145,7 +145,7 @@ TEST(Losses, TheCartesianSetPointDoesNotDriftFromTheFrame) {
 /// Where the controller has taken the frame by itself in a gap, the next answer goes on from there
 /// and does not leap back onto the way of the answers before. So after lost answers alone, too,
 /// where no measurement is missing.
-TEST(Losses, AfterAGapTheCartesianFrameGoesOnFromTheOneThatIsReported) {
+TEST(Losses, AfterAGapTheCartesianFrameContinuesTheReportedOne) {
   for (const int gap : {1, 3, 5}) {
     for (const char* const lost : {"measurements", "answers", "either in turn"}) {
       Cell cell(0.005);
@@ -171,7 +171,7 @@ TEST(Losses, AfterAGapTheCartesianFrameGoesOnFromTheOneThatIsReported) {
 }
 
 /// The controller's counter begins anew at full speed: the set-point brakes from what was sent.
-TEST(Losses, ARestartedCounterBrakesFromWhatWasSent) {
+TEST(Losses, ARestartedCounterBrakesFromTheLastAnswer) {
   for (const double period : {0.005, 0.020}) {
     Cell cell(period);
     cell.robot.moveOwn(Vector7::Constant(-1.0));

@@ -113,7 +113,7 @@ TEST(OpenKc, AStartIsTheStrategysCommandAndThenFriStart) {
   }
 }
 
-TEST(OpenKc, AStopIsFriStopAndOtherPhasesAskForNothing) {
+TEST(OpenKc, AStopIsFriStopAndOtherPhasesRequestNothing) {
   using Shown = std::pair<int, int>;
   OpenKc pc;
   pc.request.phase = KrlPhase::Stop;

@@ -124,7 +124,7 @@ TEST_F(FriThreadTest, StopsAtOnceWithoutDatagrams) {
   stopper.join();
 }
 
-TEST_F(FriThreadTest, APortInUseIsSaid) {
+TEST_F(FriThreadTest, APortInUseIsReported) {
   FriThreadOptions same = options();
   same.port = fri.port();
   Bridge other(test::defaultConfig());
@@ -175,7 +175,7 @@ int answersWithoutRights() {
   return peer.receive(c) ? 0 : 14;
 }
 
-TEST(FriThreadRights, WithoutThemItWarnsAndRunsOn) {
+TEST(FriThreadRights, WithoutRightsItWarnsAndContinues) {
   const pid_t child = fork();
   if (child == 0) _exit(answersWithoutRights());
   int status = 0;
@@ -215,7 +215,7 @@ BridgeConfig patient() {
 }
 
 /// Of several that wait only the newest is answered: the controller has given up the others.
-TEST(FriThreadRules, TheNewestOfThoseThatWaitIsAnswered) {
+TEST(FriThreadRules, OnlyTheNewestWaitingDatagramIsAnswered) {
   Bridge bridge(patient());
   std::atomic<bool> held{false}, waits{false};
   std::atomic<int> idle{0};
@@ -252,7 +252,7 @@ TEST(FriThreadRules, TheNewestOfThoseThatWaitIsAnswered) {
 
 /// Each of the controller's datagrams that waits behind another is a cycle of lateness; those of
 /// somebody else are none. Four cycles of it are what costs command mode here.
-TEST(FriThreadRules, WhatWaitsForTheThreadIsItsLateness) {
+TEST(FriThreadRules, WaitingDatagramsCountAsLatenessOfTheThread) {
   Bridge bridge(patient());
   std::atomic<bool> held{false}, waits{false};
   std::atomic<int> served{0};

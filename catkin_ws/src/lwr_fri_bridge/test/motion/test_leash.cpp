@@ -171,7 +171,7 @@ TEST(LeashEdges, OnlyMotionAwayFromTheArmTrips) {
 
 /// Home is where the arm was at the trip, however it is pushed afterwards; it lets go within 1 mrad
 /// of it when the outward motion is not asked for any more.
-TEST(LeashEdges, LetsGoAtHomeWithoutTheOldRequest) {
+TEST(LeashEdges, ReleasesAtHomeWithoutTheOldRequest) {
   for (const double sign : {-1.0, 1.0}) {
     Tied tied;
     const Vector7 arm = unit(1, -sign * 0.06), outward = unit(1, sign * 0.2);

@@ -89,7 +89,7 @@ TEST(Configurator, AStartEndsWithCommandModeAndPower) {
   EXPECT_EQ(desk.codeAt(1.3), OutcomeCode::Pending);
 }
 
-TEST(Configurator, CommandModeIsAskedForWithGoodQualityOnly) {
+TEST(Configurator, CommandModeIsRequestedOnlyWithGoodQuality) {
   for (const Quality quality : {Quality::Unacceptable, Quality::Bad}) {
     Desk desk;
     desk.m.quality = static_cast<std::uint16_t>(quality);
@@ -102,7 +102,7 @@ TEST(Configurator, CommandModeIsAskedForWithGoodQualityOnly) {
   }
 }
 
-TEST(Configurator, AStartIsGivenUpAfterItsTimeLimit) {
+TEST(Configurator, AStartIsCancelledAfterItsTimeLimit) {
   Desk desk;
   desk.start();
   desk.at(0.005);
@@ -209,7 +209,7 @@ TEST(Configurator, AStopIsGivenUpAfterItsTimeLimits) {
   }
 }
 
-TEST(Configurator, AFallBackWithdrawsWhatWouldBringCommandModeBack) {
+TEST(Configurator, AFallBackWithdrawsTheRequestForCommandMode) {
   Desk desk(KrlConvention::Stanford);
   desk.start();
   desk.at(0.005);

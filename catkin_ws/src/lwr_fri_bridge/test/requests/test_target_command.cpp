@@ -24,7 +24,7 @@ struct Message {
   }
 };
 
-TEST(TargetCommand, CarriesTheAgeAndTheEpochOfWhereItWasMade) {
+TEST(TargetCommand, KeepsTheAgeAndEpochOfItsSource) {
   Message m;
   m.epoch = "7";
   const TargetVerdict verdict = m.judge();
@@ -35,7 +35,7 @@ TEST(TargetCommand, CarriesTheAgeAndTheEpochOfWhereItWasMade) {
 }
 
 /// Held and released while the message was on its way: by its epoch, or by its stamp without one.
-TEST(TargetCommand, WhatWasMadeBeforeThePermissionMovesNothing) {
+TEST(TargetCommand, CommandsFromBeforeThePermissionMoveNothing) {
   Message m;
   m.epoch = "6";
   EXPECT_EQ(m.judge().fault, TargetFault::Epoch);
@@ -47,7 +47,7 @@ TEST(TargetCommand, WhatWasMadeBeforeThePermissionMovesNothing) {
   EXPECT_EQ(m.judge(7, kNow - 6 * kMs).fault, TargetFault::None);
 }
 
-TEST(TargetCommand, ExtremeStampsAreRefusedAndSaid) {
+TEST(TargetCommand, ExtremeStampsAreRefusedWithAReason) {
   Message m;
   m.stamped = false;
   EXPECT_EQ(m.judge().fault, TargetFault::Stamp);

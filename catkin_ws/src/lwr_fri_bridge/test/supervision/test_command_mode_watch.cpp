@@ -74,7 +74,7 @@ TEST(CommandModeWatch, RestIsHalfASecondOfCommandedAndMeasuredStandstill) {
   EXPECT_FALSE(watch.judge(leftByItself()).at_rest);  // from the motion on
 }
 
-TEST(CommandModeWatch, WhatIsCertainComesBeforeWhatIsLikely) {
+TEST(CommandModeWatch, CertainCausesComeBeforeLikelyOnes) {
   CommandModeWatch watch;
   watch.late(1.0);
   watch.tick(0.005, 9, 0.0, 0.0);

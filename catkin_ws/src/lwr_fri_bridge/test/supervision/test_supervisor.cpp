@@ -55,7 +55,7 @@ TEST(Supervisor, ReasonsCountInTheirOrder) {
 }
 
 /// What is lost while started needs a start; a leash does not.
-TEST(Supervisor, WhatIsLostNeedsAStartAndIsCounted) {
+TEST(Supervisor, ALossNeedsAStartAndIsCounted) {
   struct Row {
     bool SupervisorInput::*what;
     bool value;
