@@ -1,5 +1,5 @@
-// The control cycle at its limits: which joint states count, when silence, a border and a slow
-// clock act, what stands, and what it tells.
+// Limits of the control cycle: valid joint states; effects of silence, a border and a slow clock;
+// standstill; reports.
 #include <cmath>
 #include <limits>
 

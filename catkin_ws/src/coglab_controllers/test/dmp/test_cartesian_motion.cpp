@@ -1,4 +1,4 @@
-// The whole Cartesian motion: goals that move, tremble or leave, its end, switches, slow arrivals.
+// The whole Cartesian motion: moving, noisy and leaving goals, its end, switches, slow arrivals.
 #include <algorithm>
 #include <utility>
 #include <vector>

@@ -1,5 +1,4 @@
-// What becomes of a goal before eq. (1): which frames are believed, where it may go, how it is
-// filtered, and the orientation curve.
+// Processing of a goal before eq. (1): accepted frames, bounds, filter, and the orientation curve.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -72,7 +71,7 @@ TEST(GoalLimits, ThreeFramesThatAgreeWithinFiftyMillimetresAreAccepted) {
       EXPECT_EQ(gate.update(t, sight(0.5 + apart * i, t)), expected) << "a frame counts once";
     }
   }
-  // A frame near the goal between them begins the count anew.
+  // A frame near the goal between them restarts the count.
   GoalLimits gate = begun(0.0);
   const double places[] = {0.5, 0.5, 0.0, 0.5, 0.5};
   for (int i = 0; i < 5; ++i) gate.update(kSecond + i, sight(places[i], kSecond + i + 1));
@@ -106,7 +105,7 @@ TEST(GoalLimits, BeforeAMotionThreeAgreeingFramesAreNeededAnywhere) {
   for (int i = 1; i <= 3; ++i) {
     EXPECT_EQ(gate.update(i * kMs, sight(0.0, i * kMs)), i < 3 ? State::Unsettled : State::Fresh);
   }
-  GoalLimits still;  // a static frame, here at the origin, is believed at once
+  GoalLimits still;  // a static frame, here at the origin, is accepted at once
   GoalObservation turned = sight(0.0, 0);
   turned.stamp_ns = kSecond;
   EXPECT_EQ(still.update(kSecond, turned), State::Fresh);
@@ -118,8 +117,7 @@ TEST(GoalLimits, BeforeAMotionThreeAgreeingFramesAreNeededAnywhere) {
   EXPECT_NEAR(still.age(), 0.1, 1e-9);
 }
 
-/// How far the estimate is beyond a goal that goes along x with `speed` for `time` s and then
-/// rests.
+/// Overshoot of the estimate for a goal that moves along x with `speed` for `time` s, then rests.
 double ledBeyond(double speed, double time, bool predicted) {
   GoalFilter filter;
   filter.begin(pose(Vector3::Zero()));
@@ -150,7 +148,7 @@ TEST(GoalFilter, MeetsASteadyRampWithoutLag) {
 TEST(GoalFilter, AFastHandGivesLittleGoalVelocity) {
   const double slow = ledBeyond(0.15, 0.4, false);
   EXPECT_GT(slow, 0.005);  // the price of no lag behind a goal that goes on
-  // It would be five times as far beyond a hand that is five times as fast, and stops.
+  // Without the bound, five times the speed would give five times the overshoot.
   EXPECT_LT(ledBeyond(0.75, 0.4, false), 2.5 * slow);
   GoalFilter filter;
   filter.begin(pose(Vector3::Zero()));
@@ -163,7 +161,7 @@ TEST(GoalFilter, AFastHandGivesLittleGoalVelocity) {
 TEST(GoalFilter, AChangeOfAPredictionGivesNoGoalVelocity) {
   EXPECT_GT(ledBeyond(0.05, 0.4, false), 0.002);
   EXPECT_LT(ledBeyond(0.05, 0.4, true), 0.0005);
-  // What is predicted may move, too.
+  // A predicted goal may also move.
   GoalFilter filter;
   filter.begin(pose(Vector3::Zero()));
   for (int i = 1; i <= 400; ++i)

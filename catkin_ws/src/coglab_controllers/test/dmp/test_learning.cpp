@@ -9,7 +9,7 @@ using namespace coglab_controllers::test;
 
 namespace {
 
-// Takes demonstrations that are no reaches, too.
+// Also accepts demonstrations that are not reaches.
 const LearningOptions kAny = [] {
   LearningOptions options;
   options.allow = {"short", "brief", "jump", "moving", "noisy"};
@@ -146,7 +146,7 @@ TEST(Learning, RefusesUnusableDemonstrations) {
 }
 
 TEST(Learning, ADemonstrationThatComesBackToItsStartIsNotMappedToAnother) {
-  // Less than a millimetre is no line that could be turned to the one of another demonstration.
+  // A line shorter than a millimetre has no direction and cannot be mapped.
   LearningOptions options;
   options.mapping = ShapeMapping::Similarity;
   const Vector3 here = Vector3::Zero(), there(0.0, 2.0, 0.0), way(0.5, 0.0, 0.0);

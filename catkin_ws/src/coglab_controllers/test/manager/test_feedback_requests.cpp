@@ -1,4 +1,4 @@
-// What a request to the feedback controllers may carry, as FeedbackSelect.srv says.
+// Valid fields of a request to the feedback controllers, by FeedbackSelect.srv.
 #include <gtest/gtest.h>
 
 #include "coglab_controllers/manager/feedback_requests.hpp"

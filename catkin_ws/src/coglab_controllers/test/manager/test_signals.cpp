@@ -1,4 +1,4 @@
-// The file of signals, and their way into the control cycle.
+// The file of signals, and their path into the control cycle.
 #include <algorithm>
 #include <cmath>
 #include <fstream>
@@ -218,7 +218,7 @@ TEST(SignalInputs, MessagesThatCannotBeUsedAreRefused) {
   EXPECT_EQ(robot.stamp(imu), ctrl_more::kNeverWritten) << "absent after its largest age";
 }
 
-// Many trackers publish a quaternion of zeros for an orientation that they do not know.
+// Many trackers publish a quaternion of zeros for an unknown orientation.
 TEST(SignalInputs, OrientationsThatAreNoUnitQuaternionsAreRefused) {
   constexpr std::int64_t kNow = 10'000'000'000;
   ctrl_more::RobotStates robot;

@@ -1,4 +1,4 @@
-// Controllers are unloaded, and none is active: nothing is left, and nothing moves.
+// Controllers are unloaded, or none is active: nothing stays loaded, and the arm does not move.
 #include <atomic>
 #include <chrono>
 #include <memory>
@@ -97,7 +97,7 @@ TEST(Unload, RepeatedlyWhileTheCycleRunsAndOtherRequestsArrive) {
   for (int i = 0; i < 40; ++i) {
     EXPECT_TRUE(VirtualRobot::ok(manager.load("other", "coglab/PtpController")));
     Answer answer;
-    // The others keep it busy for as long as the computer does not let this thread run.
+    // The other threads keep it busy while this thread is not scheduled.
     const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
     while (std::chrono::steady_clock::now() < end) {
       answer = manager.unload("other");
@@ -157,7 +157,7 @@ TEST(Deactivate, ClearsAFault) {
   EXPECT_TRUE(VirtualRobot::ok(robot.manager->unload("odd")));
 }
 
-/// Stays in start() for as long as it is told to.
+/// Stays in start() until the test releases it.
 class Lingering : public MotionController {
  public:
   static inline std::atomic<bool> lingers{false};

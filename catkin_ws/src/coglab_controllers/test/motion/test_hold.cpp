@@ -1,5 +1,4 @@
-// The hold cycle by cycle: joints that brake together, from which speed on, and when the arm
-// stands.
+// The hold cycle by cycle: joints that brake together, their speeds, and standstill.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -14,8 +13,8 @@
 namespace coglab_controllers {
 namespace {
 
-/// A robot of which every joint brakes with at most 2 rad/s^2 and 20 rad/s^3: from a speed v of 0.2
-/// rad/s or more it needs v / 2 + 0.1 s.
+/// A robot whose joints brake with at most 2 rad/s^2 and 20 rad/s^3. From a speed v >= 0.2 rad/s
+/// this takes v / 2 + 0.1 s.
 RobotSetup evenRobot() {
   const std::string description = DESCRIPTION_DIR;
   RobotSetup setup =
@@ -40,7 +39,7 @@ class HoldTest : public ::testing::Test {
     input.robot.commanded_position = kHome;
     input.dt = 0.005;
   }
-  /// The joint velocity that the hold asks for while the arm is told to go on with this one.
+  /// The joint velocity that the hold requests at this commanded velocity.
   JointVector asked(const JointVector& velocity, const JointVector& acceleration = joints(0, 0)) {
     input.robot.commanded_velocity = velocity;
     input.robot.commanded_acceleration = acceleration;

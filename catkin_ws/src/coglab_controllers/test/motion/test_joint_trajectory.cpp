@@ -161,7 +161,7 @@ TEST_F(Following, AJointThatLeavesThePathEndsIt) {
   request.path_tolerance = {{controller->jointNames()[6], 0.05, 0.0, 0.0}};
   ASSERT_TRUE(controller->follow(request).success);
   arm.run(0.3);
-  arm.interpolator.reset();  // somebody pushes the last joint away
+  arm.interpolator.reset();  // a person pushes the last joint away
   arm.sample.position[6] += 0.1;
   arm.tick();
   const EndedMotion end = runToEnd();

@@ -1,4 +1,4 @@
-// What every motion gets from the runner: queue, replacement, arrival, abort, stand-still.
+// Functions of the runner for every motion: queue, replacement, arrival, abort, standstill.
 #include <limits>
 #include <utility>
 
@@ -9,7 +9,7 @@
 namespace coglab_controllers {
 namespace {
 
-/// Turns one joint with a constant speed for a time; misbehaves as told.
+/// Turns one joint with a constant speed for a time; misbehaves on request.
 class Turn : public Motion<> {
  public:
   static inline int stops = 0;

@@ -1,5 +1,5 @@
-// The path ahead: a roll-out is the motion that is driven, before it begins and while it runs; and
-// where that motion ends, rests and is switched.
+// Predicted paths: a roll-out equals the executed motion, before it begins and while it runs, also
+// at its end, at rest and after a switch.
 #include "coglab_controllers/dmp/cartesian_motion.hpp"
 #include "virtual_robot.hpp"
 

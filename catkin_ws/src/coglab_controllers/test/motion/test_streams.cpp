@@ -1,4 +1,4 @@
-// Streams of velocities: what they follow, how they stop, and that no command breaks a limit.
+// Streams of velocities: following, stopping, and limits under any command.
 #include <limits>
 #include <random>
 
@@ -246,7 +246,7 @@ TEST(StreamGains, TheGainOfTheRotationIsThatOfTheAxisToo) {
     return std::acos(std::min(1.0, axis.dot(home.orientation * Vector3::UnitZ())));
   };
   tilt();
-  arm.sample.position[5] += 0.1;  // somebody pushes the hand
+  arm.sample.position[5] += 0.1;  // a person pushes the hand
   arm.sample.commanded_position = arm.sample.position;
   EXPECT_GT(tilt(), 0.05);
   ASSERT_TRUE(stream.tunables()->set({{"rot_clik_gain", 10.0}}).success);

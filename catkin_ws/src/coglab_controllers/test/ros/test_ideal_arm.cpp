@@ -1,4 +1,4 @@
-/// The ideal arm in lockstep: what permits a motion, what ends one, and the limits at all times.
+/// The ideal arm in lockstep: permission and end of a motion, and the limits at all times.
 #include <gtest/gtest.h>
 
 #include <cmath>

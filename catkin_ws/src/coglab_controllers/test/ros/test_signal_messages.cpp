@@ -43,7 +43,7 @@ SignalFile rows(const std::string& in) {
   return readSignals(ctrl_more::ConfigNode::fromText("in:\n" + in, "signals.yaml"));
 }
 
-/// Takes a message into a stage with these rows, and returns the numbers of a signal.
+/// Passes a message to a stage with these rows, and returns the numbers of a signal.
 template <typename Message>
 Eigen::VectorXd taken(const std::string& in, const Message& message, const std::string& key) {
   FeedbackStage stage(*setup("{}"), 0.005, true);

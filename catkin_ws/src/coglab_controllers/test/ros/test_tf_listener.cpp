@@ -1,5 +1,4 @@
-// Which transforms come into the buffer, by a clock that the test sets, and what a goal source
-// makes of them.
+// Transforms that the buffer accepts with a clock set by the test, and the goals made from them.
 #include <cmath>
 #include <string>
 

@@ -90,7 +90,7 @@ TEST_F(AdmittanceTest, OffsetAndVelocityAreBounded) {
   EXPECT_EQ(rig.manager->status("c").faults, 0u);
 }
 
-TEST_F(AdmittanceTest, YieldsInTheDirectionOfAStrongPush) {
+TEST_F(AdmittanceTest, UnderAStrongPushPositionAndVelocityAgree) {
   ASSERT_TRUE(rig.load("ee_admittance", "mass: 0.5\nmax_offset: 0.4\nmax_velocity: 0.25\n"));
   double last = 0.2;
   for (int i = 0; i < 200; ++i) {

@@ -50,7 +50,7 @@ SetPointHistory moved(int joint, double step) {
   return history;
 }
 
-TEST(SetPointHistory, MonitorModeIsNotChecked) {
+TEST(SetPointHistory, UncommandedSetPointsAreNotChecked) {
   const SetPointHistory history = moved(0, 0.01);
   const MeasurementDatagram off = reported(unit(0, 1.0));
   ASSERT_FALSE(history.explains(off));
