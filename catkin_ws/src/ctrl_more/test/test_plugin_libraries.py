@@ -1,4 +1,4 @@
-"""The shipped controller libraries export nothing of their own, and unload without a trace."""
+"""The shipped controller libraries export no symbols of their own, and unload completely."""
 
 from __future__ import annotations
 
