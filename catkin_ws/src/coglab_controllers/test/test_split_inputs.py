@@ -38,7 +38,7 @@ class Arm:
         rospy.Subscriber("controller_manager/ptp/finished_ptp", FinishedPtp, lambda m: self.finished.append(m.ptp_id))
 
     def send(self, change: Callable[[JointState], object] = lambda m: None, later: float = 0.0) -> rospy.Time:
-        """Publishes one joint state with changes and a stamp `ahead` of now. Returns its stamp."""
+        """Publishes one joint state with changes and a stamp `later` s after now. Returns its stamp."""
         time.sleep(PERIOD)
         message = JointState(name=list(JOINTS), position=list(self.position), velocity=[0.0] * 7, effort=[0.0] * 7)
         message.header.stamp = rospy.Time.now() + rospy.Duration(later)

@@ -1,4 +1,4 @@
-/// An arm from a library: made and run, or refused in words.
+/// An arm from a library: made and run, or refused with a reason.
 #include <gtest/gtest.h>
 
 #include <atomic>

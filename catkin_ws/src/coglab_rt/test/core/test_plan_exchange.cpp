@@ -1,4 +1,4 @@
-/// Plans on their way to the control cycle: what becomes of each, and who frees it.
+/// Plans for the control cycle: their outcomes, and when they are freed.
 #include <gtest/gtest.h>
 
 #include <atomic>

@@ -25,7 +25,7 @@ TEST(BoundedThread, StackOfThreadLocalVariablesIsNotTouched) {
   EXPECT_TRUE(ran);
 }
 
-/// The pages that a body uses first are there before it runs: no page fault comes later.
+/// The pages that a body uses first are mapped before it runs, so no page fault occurs later.
 TEST(BoundedThread, TheStackBelowTheBodyIsTouchedBeforeItRuns) {
   constexpr std::size_t kStack = 4096 * 1024;  // no stack that the C library keeps from before
   std::size_t present = 0, looked_at = 0;
@@ -94,7 +94,7 @@ TEST(BoundedThread, TheLowerHalfOfTheStackIsNotTouched) {
   EXPECT_EQ(present, 0U);
 }
 
-/// In a thread of its own, which takes the priority with it: granted or not, what it says is so.
+/// In a separate thread, because the priority ends with it. The result must report the true state.
 TEST(RealTime, TheGrantedPriorityIsTheRequestedOne) {
   BoundedThread thread;
   thread.start("priority", 0, [] {
@@ -108,7 +108,7 @@ TEST(RealTime, TheGrantedPriorityIsTheRequestedOne) {
   thread.join();
 }
 
-/// In a process of its own, which alone is locked: granted or not, what it says is so.
+/// In a separate process, because its memory is locked. The result must report the true state.
 TEST(RealTime, MemoryIsLockedOrAWarningIsReturned) {
   const pid_t child = fork();
   ASSERT_GE(child, 0);

@@ -74,7 +74,7 @@ class OwnMaster : public ::testing::Environment {
   pid_t master_ = -1;
 };
 
-/// What `main` of such a program does.
+/// Body of `main` of such a program.
 inline int runWithOwnMaster(int count, char** words, const char* node) {
   ::testing::InitGoogleTest(&count, words);
   ::testing::AddGlobalTestEnvironment(new OwnMaster(node));

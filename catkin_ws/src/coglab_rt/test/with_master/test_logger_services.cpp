@@ -1,5 +1,5 @@
-/// The services ~get_loggers and ~set_logger_level: which loggers and levels there are, what a
-/// level does, what is refused and how often that is said.
+/// The services ~get_loggers and ~set_logger_level: loggers and levels, effect of a level, refused
+/// requests and how often they are logged.
 #include <gtest/gtest.h>
 
 #include <map>

@@ -1,5 +1,5 @@
-/// What is read of the parameter server: values of each type, ranges and their borders, trees, the
-/// table of joint limits; and what is said of a value that does not fit.
+/// Reading from the parameter server: values of each type, ranges and their ends, trees, the table
+/// of joint limits, and the messages for invalid values.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -21,7 +21,7 @@
 namespace coglab_rt {
 namespace {
 
-/// The sentence of what `read` throws; empty if it throws nothing.
+/// Message of the exception of `read`; empty if it throws none.
 template <typename Error = std::invalid_argument>
 std::string refusal(const std::function<void()>& read) {
   try {

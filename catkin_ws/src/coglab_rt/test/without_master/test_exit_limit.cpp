@@ -1,4 +1,4 @@
-/// A process whose goodbye is not answered: when it ends, with which status and which words.
+/// A process that unregisters without an answer: time of its end, status and message.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -14,7 +14,7 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds kLong{60'000};  // nothing here lasts so long
 
-/// A goodbye that nobody answers.
+/// An unregistration without an answer.
 void waitForever(milliseconds limit) {
   endProcessWithin(limit);
   for (;;) std::this_thread::sleep_for(kLong);

@@ -103,8 +103,8 @@ TEST(RealTimeCell, TheFactorScalesTimeAndAFloodDoesNotStopIt) {
   EXPECT_THROW(RealTimeCell(config, "127.0.0.1", 1, 0.001), std::invalid_argument);
 }
 
-/// The latency told is time of the cell, whatever the factor. Every answer is held for a share of
-/// the period of the cell, so that no less than that can be told; a busy computer adds to it.
+/// The reported latency is in time of the cell, for any factor. Every answer is held for a share of
+/// the cell's period, which is the smallest possible latency; a busy computer adds to it.
 TEST(RealTimeCell, TheLatencyOfAnswersIsMeasuredInTimeOfTheCell) {
   constexpr double kPeriod = 0.1;
   const auto told_at = [](double factor, double held) {
@@ -150,8 +150,7 @@ TEST(RealTimeCell, TheLatencyOfAnswersIsMeasuredInTimeOfTheCell) {
   }
 }
 
-/// A computer that is too busy answers three periods late: where simulated time may stand, no
-/// answer is lost.
+/// A busy computer answers three periods late. If simulated time may wait, no answer is lost.
 TEST(RealTimeCell, SimulatedTimeWaitsForLateAnswers) {
   const auto [fd, port] = loopbackSocket();
   const timeval limit{5, 0};
@@ -197,7 +196,7 @@ TEST(Cell, LateStandInDoesNotBlameThePc) {
   EXPECT_EQ(cell.controller().statistics().missCounter(), counted);
 }
 
-/// A request that was given up never acts, and leaves nothing behind that uses what is gone.
+/// A request that timed out is never executed and does not use freed memory.
 TEST(RealTimeCell, ARequestThatTimedOutIsWithdrawn) {
   CellConfig config;
   config.urdf = URDF;
@@ -228,7 +227,7 @@ TEST(RealTimeCell, ARequestThatTimedOutIsWithdrawn) {
   EXPECT_EQ(done, 0);
 }
 
-/// A real robot controller has a computer of its own, which no program on the PC delays.
+/// A real robot controller is a separate computer that no program on the PC delays.
 TEST(RealTimeCell, ItsThreadIsRealTimeIfGrantedAndTheFactorAllowsIt) {
   CellConfig config;
   config.urdf = URDF;

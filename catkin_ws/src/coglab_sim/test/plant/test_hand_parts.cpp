@@ -1,5 +1,5 @@
-/// The parts of the plant that compute by themselves: the motors of the hand, the hold of a free
-/// body, distances and inertias of objects, the hand's table.
+/// Independent parts of the plant: the motors of the hand, the hold of a free body, distances and
+/// inertias of objects, the hand's table.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,4 +1,4 @@
-/// Objects by themselves: distances from their surface, inertias, and how deep solids overlap.
+/// Objects: distances from their surface, inertias, and depths of overlaps.
 #include <gtest/gtest.h>
 
 #include <array>

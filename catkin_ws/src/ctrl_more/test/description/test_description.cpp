@@ -1,5 +1,5 @@
-// What a declaration must agree with before its controller is taken: in itself, and with the
-// signals that are there.
+// Checks of a declaration before its controller is loaded: consistency in itself and with the
+// existing signals.
 #include "ctrl_more/docs/documentation.hpp"
 #include "ctrl_more/feedback_controller.hpp"
 #include "ctrl_more/loading/controller_instance.hpp"
@@ -46,7 +46,7 @@ TEST(Declaration, EachErrorHasOneSentence) {
   }
 }
 
-// What happens to a controller that asks for a signal by `ask`.
+// Result for a controller that requests a signal by `ask`.
 Status loaded(Rig& rig, const Way& way, const std::function<void(ctrl_more::Setup&)>& ask) {
   auto c = std::make_unique<TestController>();
   way(c->description);

@@ -1,5 +1,5 @@
-// Settings and gains against their declaration: names, counts, ranges with their ends, and what
-// stays as it was.
+// Settings and gains against their declaration: names, counts, ranges with their ends, and values
+// that stay unchanged.
 #include <fstream>
 
 #include "ctrl_more/description/configuration.hpp"

@@ -1,4 +1,4 @@
-// The tool that writes pages and configurations, by its exit status and what it prints.
+// The tool that writes pages and configurations: exit status and output.
 #include <array>
 #include <cstdio>
 #include <cstdlib>
@@ -21,7 +21,7 @@ struct Result {
   std::string said;
 };
 
-// Runs the tool; `also_errors`: what it prints there is part of what it said.
+// Runs the tool and returns its output; `also_errors` includes the error output.
 Result run(const std::string& arguments, bool also_errors) {
   const std::string command = kTool + " " + arguments + (also_errors ? " 2>&1" : " 2>/dev/null");
   Result result;

@@ -99,7 +99,7 @@ TEST_F(Plugins, BadLibrariesAreRefusedWithAReason) {
   EXPECT_TRUE(load("loadControllers: [A]\nA: {libPath: libtwo.so, type: Second}\n").ok());
 }
 
-// What a library throws lives in it, and must be dealt with before it is closed.
+// An exception of a library has its code there and must be handled before the library is closed.
 TEST_F(Plugins, AnyExceptionOfALibraryRefusesTheWholeList) {
   const std::string own = "an error of its own", strange = "not a std::exception";
   for (const auto& thrown :
@@ -301,7 +301,7 @@ TEST_F(TwoBuilds, OldCodeIsNeverLoadedUnderTheNameOfTheNew) {
   EXPECT_EQ(runOnce(), 10.0);
 }
 
-// What static objects of a library cannot do twice, the loader has to remember.
+// Static objects of a library run only once, so the loader must store their registrations.
 TEST_F(TwoBuilds, LibraryThatStaysInMemoryIsLoadedAgain) {
   build("resident");
   for (int i = 0; i < 3; ++i) {
@@ -318,7 +318,7 @@ TEST_F(TwoBuilds, LibraryThatStaysInMemoryIsLoadedAgain) {
   EXPECT_TRUE(contains(report.text(), "start the program again"));
 }
 
-// In a process of its own, because a fault of the loader would end or block the tests.
+// In a separate process, because a fault of the loader would end or block the tests.
 struct HarmfulLibraries : TwoBuilds {
   // Refused with all parts in the sentence, and another thread can load a good library afterwards.
   void refused(const std::vector<std::string>& parts) {

@@ -134,7 +134,7 @@ TEST_F(CentralModuleTest, StatesThatDoNotFitAreRefused) {
   EXPECT_FALSE(module.update(RobotStates(&logger), &six));
 }
 
-/// Writes down the cycles it is given.
+/// Records its cycles.
 struct Watcher : Manager {
   std::string name_ = "watcher";
   std::vector<Cycle>* cycles;

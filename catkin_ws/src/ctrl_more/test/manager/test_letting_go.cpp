@@ -97,7 +97,8 @@ TEST(LettingGoTest, CorrectionOfAPauseFadesWhenItResumesWithoutItsSensor) {
   }
 }
 
-// For a host whose arm is told to stop: it must stand, whatever a controller or a pause would hold.
+// For a host that stops its arm: the arm must stand, even if a controller or a pause holds a
+// correction.
 TEST(LettingGoTest, LetGoRemovesCorrectionsAndThenBlendsInNewOnes) {
   Rig rig(0.1);
   TestController* raw = rig.add(adder("pose", "ee", 1.0), "c");

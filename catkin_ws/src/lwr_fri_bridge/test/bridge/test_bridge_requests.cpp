@@ -1,4 +1,4 @@
-/// Requests to the bridge, and what it shows of itself to other threads.
+/// Requests to the bridge, and its state for other threads.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -54,7 +54,7 @@ TEST(Requests, TheFirstOfAFullQueueAreServed) {
     EXPECT_EQ(bridge.outcome(ticket).code, OutcomeCode::Done) << ticket;
 }
 
-/// The arm has three seconds to come to rest, then monitor mode is asked for all the same.
+/// The arm has three seconds to come to rest; then monitor mode is requested anyway.
 TEST(Requests, AStopDoesNotWaitForRestForever) {
   BridgeConfig config = defaultConfig();
   config.limits.acceleration.setConstant(0.05);
@@ -126,8 +126,8 @@ TEST(BridgeView, EachStateIsReportedOnceFromTheStart) {
   EXPECT_EQ(told[0].supervisor, SupervisorState::Holding);
 }
 
-/// A bridge that meets a controller in command mode speaks its strategy, for the flags may not
-/// change there.
+/// A bridge that starts with a controller in command mode uses the controller's strategy, because
+/// the flags may not change there.
 TEST(BridgeView, AnExistingCommandModeGetsTheFlagsOfItsStrategy) {
   for (const auto& [control, flags] :
        {std::pair{fri::ControlStrategy::JointImpedance, 0x0035U},
@@ -173,7 +173,7 @@ TEST(BridgeView, CommandAgeLimitsForFutureStampsAndLongPeriods) {
   EXPECT_FALSE(follows(0.1, 0.251));
 }
 
-/// Quality and drive errors leave command mode in force: no cause of a loss is told for them.
+/// Quality and drive errors do not end command mode, so they report no cause of a loss.
 TEST(BridgeView, PoorQualityIsNoLossOfCommandMode) {
   Cell cell;
   cell.start();

@@ -1,4 +1,4 @@
-/// What a controller can have made of the answers that it saw: judged and taken over after a gap.
+/// Set-points that a controller can have after a gap: check and take-over.
 #include <gtest/gtest.h>
 
 #include <cmath>

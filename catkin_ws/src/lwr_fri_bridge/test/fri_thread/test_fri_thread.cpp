@@ -112,7 +112,7 @@ TEST_F(FriThreadTest, SilenceIsDisconnection) {
   EXPECT_EQ(outcome.code, OutcomeCode::Disconnected);
 }
 
-/// The receive has a time-out: nobody has to send something to let the thread end.
+/// The receive has a time-out, so the thread can end without a datagram.
 TEST_F(FriThreadTest, StopsAtOnceWithoutDatagrams) {
   std::atomic<bool> stopped{false};
   std::thread stopper([&] {
@@ -154,7 +154,7 @@ TEST_F(FriThreadTest, ARestartedThreadIsFoundWhereItWas) {
   EXPECT_GT(third.port(), 0);
 }
 
-/// In a process without any right to priority or locked memory: 0 if it warned and answers anyway.
+/// In a process without rights to priority or locked memory: 0 if it warned and still answers.
 int answersWithoutRights() {
   if (geteuid() == 0 && setresuid(65534, 65534, 65534) != 0) return 10;
   rlimit none{0, 0};
@@ -214,7 +214,7 @@ BridgeConfig patient() {
   return config;
 }
 
-/// Of several that wait only the newest is answered: the controller has given up the others.
+/// Of several waiting datagrams only the newest is answered; the controller gave up the others.
 TEST(FriThreadRules, OnlyTheNewestWaitingDatagramIsAnswered) {
   Bridge bridge(patient());
   std::atomic<bool> held{false}, waits{false};
@@ -250,8 +250,8 @@ TEST(FriThreadRules, OnlyTheNewestWaitingDatagramIsAnswered) {
   EXPECT_EQ(bridge.snapshot().session.rejected(), 0U);  // they were not even looked at
 }
 
-/// Each of the controller's datagrams that waits behind another is a cycle of lateness; those of
-/// somebody else are none. Four cycles of it are what costs command mode here.
+/// Each waiting datagram of the controller behind another one is a cycle of lateness; those of
+/// other senders are not. Here four cycles of lateness end command mode.
 TEST(FriThreadRules, WaitingDatagramsCountAsLatenessOfTheThread) {
   Bridge bridge(patient());
   std::atomic<bool> held{false}, waits{false};

@@ -1,5 +1,5 @@
-/// The configurator in virtual time: what it asks of the KRL program, when it gives up, and what an
-/// outcome tells.
+/// The configurator in virtual time: its requests to the KRL program, its time limits and its
+/// outcomes.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -14,7 +14,7 @@ using fri::FriState;
 using fri::KrlConvention;
 using fri::Quality;
 
-/// A configurator and what it sees: our own program in monitor mode, quality OK, all drives on.
+/// A configurator and its observations: our own program in monitor mode, quality OK, all drives on.
 struct Desk {
   explicit Desk(KrlConvention convention = KrlConvention::Coglab)
       : configurator(convention, 4, ConfiguratorLimits()) {
@@ -258,7 +258,7 @@ TEST(Configurator, TheFlagOfAProgramThatOnlyWorksIsWatchedForHalfASecond) {
   EXPECT_EQ(desk.codeAt(2.0), OutcomeCode::Pending);
 }
 
-/// A program that was asked for a start may be just about to enter command mode.
+/// A program with a start request may be about to enter command mode.
 TEST(Configurator, AStopAfterAnUnfinishedStartWaitsUntilMonitorModeLasts) {
   Desk desk;
   desk.start();

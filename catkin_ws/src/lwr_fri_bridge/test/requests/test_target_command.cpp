@@ -1,4 +1,4 @@
-/// Messages on target_joint_states: what moves the arm, and what age, stamp, epoch and form refuse.
+/// Messages on target_joint_states: valid ones, and refusals by age, stamp, epoch and form.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -34,7 +34,7 @@ TEST(TargetCommand, KeepsTheAgeAndEpochOfItsSource) {
   EXPECT_DOUBLE_EQ(verdict.command.velocity[6], 0.7);
 }
 
-/// Held and released while the message was on its way: by its epoch, or by its stamp without one.
+/// Hold and reset during the transport of a message: detected by its epoch, else by its stamp.
 TEST(TargetCommand, CommandsFromBeforeThePermissionMoveNothing) {
   Message m;
   m.epoch = "6";
