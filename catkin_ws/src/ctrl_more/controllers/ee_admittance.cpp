@@ -9,7 +9,8 @@
 
 namespace ctrl_more {
 
-/// Lets an end-effector yield to a hand that pushes or pulls it, in addition to the current motion.
+/// Makes an end-effector yield to a hand that pushes or pulls it, in addition to the current
+/// motion.
 class EeAdmittance : public FeedbackController {
  public:
   Description describe() const override;
@@ -62,8 +63,8 @@ void bound(Offset offset, Velocity velocity, double limit) {
   if (outward > 0.0) velocity -= outward * direction;
 }
 
-/// Bound for a length that was `before`: where the limit has been set below it, it comes back to
-/// the limit with a time constant, and not at once.
+/// Bound for a length of the value `before`. If the limit was reduced below it, the bound returns
+/// to the limit with a time constant instead of at once.
 double eased(double limit, double before, double dt) noexcept {
   constexpr double kReturn = 0.3;  // s
   return limit + std::max(0.0, before - limit) * std::max(0.0, 1.0 - dt / kReturn);

@@ -38,7 +38,7 @@ std::string sorted(const TargetMessage& message, Vector7& velocity) {
 
 std::string wrongStamp(const TargetMessage& message, const TargetPermission& permission) {
   if (!message.stamped) {
-    return "header.stamp is zero; stamp each message with the time it was made (rostopic pub -s "
+    return "header.stamp is zero; stamp each message with its creation time (rostopic pub -s "
            "with 'header: auto')";
   }
   if (message.age_ns > permission.longest_ns) {
@@ -47,7 +47,7 @@ std::string wrongStamp(const TargetMessage& message, const TargetPermission& per
            "computers synchronised?";
   }
   if (message.age_ns < -kFutureAllowance_ns) {
-    return "stamped " + seconds(-message.age_ns) + " ahead of this computer's clock, at most " +
+    return "stamped " + seconds(-message.age_ns) + " ahead of this computer's clock; at most " +
            seconds(kFutureAllowance_ns) +
            " is taken; are the clocks of both computers synchronised?";
   }
