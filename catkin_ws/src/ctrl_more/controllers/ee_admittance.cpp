@@ -114,8 +114,8 @@ Description EeAdmittance::describe() const {
       "closes its loop on the pose follows.";
   d.when =
       "While a person may touch the arm: guiding, waiting, approaching. Switch it off before "
-      "contact detection by force is armed: a yielding hand hides the contact it should feel. "
-      "With stiffness 0 the hand stays where it is led.";
+      "contact detection by force is armed: a yielding hand hides the contact. "
+      "With stiffness 0 the hand stays where a person moves it.";
   d.limitations =
       "A stiff contact with little virtual mass can oscillate: raise `mass` and `damping`. It is "
       "no safety function. Rotation yields only with `axes: all`.";
@@ -124,8 +124,8 @@ Description EeAdmittance::describe() const {
       "\\dot p' = \\dot p + \\dot x";
   d.source = "Mass-spring-damper admittance, discretised exactly for a force held over a cycle.";
   d.information =
-      "Below the dead band, from rest, the references keep their bits. Offset and velocity are "
-      "bounded as balls; at the bound the outward velocity is taken away.";
+      "Below the dead band, from rest, the references stay bit-identical. Offset and velocity are "
+      "bounded in norm; at the bound the outward velocity is removed.";
   d.measured("wrench")
       .keyFrom("wrench")
       .size(6)

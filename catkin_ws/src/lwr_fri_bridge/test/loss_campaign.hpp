@@ -134,7 +134,7 @@ class LossRun {
   }
 
   /// A hold of the fifth joint at full speed, far from its limits, on a controller that
-  /// extrapolates. One that stands begins anew after each loss: full speed is not what it has.
+  /// extrapolates. A controller that stands restarts after each loss and is not at full speed.
   Stop stop() {
     const double full = bridge_.config().limits.velocity[4];
     Vector7 wanted = Vector7::Zero();

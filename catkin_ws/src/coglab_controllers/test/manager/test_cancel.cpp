@@ -226,7 +226,7 @@ TEST(Cancel, TheArmStandsWithinTheBrakingTimeAndDoesNotMoveAfterwards) {
   EXPECT_GT(ended, 60);
 }
 
-// An arm on the real clock, until it shall stop; while it is blind nobody hears of it.
+// An arm on the real clock until `stop`. While it is blind it sends no measurements.
 void runArm(ControllerManager& manager, ControlThread& thread, coglab_rt::ArmMailboxes& mailboxes,
             const coglab_rt::JointLimits& limits, const std::atomic<bool>& stop,
             const std::atomic<bool>& blind) {

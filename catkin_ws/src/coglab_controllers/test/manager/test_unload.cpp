@@ -26,7 +26,7 @@ TEST(Unload, GoesWithItsServicesAndItsIdIsFreeAgain) {
   ASSERT_TRUE(VirtualRobot::ok(manager.unload("dmp", [&](std::shared_ptr<const LoadedMotion> it) {
     watched = it;
     seen = it->id;
-    EXPECT_EQ(manager.motion("dmp"), nullptr);  // nobody finds it any more
+    EXPECT_EQ(manager.motion("dmp"), nullptr);  // it can no longer be found
     EXPECT_FALSE(manager.load("dmp", "coglab/DmpController").success);
   })));
   EXPECT_EQ(seen, "dmp");

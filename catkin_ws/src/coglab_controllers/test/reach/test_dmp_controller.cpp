@@ -222,8 +222,8 @@ TEST(DmpController, AfterTheEndTheRemainingDistanceIsThatToTheGoalThatWasLatched
   }
   EXPECT_NEAR(progress.remaining_distance, (progress.goal.position - robot.hand().position).norm(),
               1e-3);
-  // A hand that is pushed away while the motion stands is told as away by as much: the first joint,
-  // whose axis is vertical through the base, turned, moves it along a chord.
+  // If the standing hand is pushed away, the reported distance is that of the push: the first
+  // joint, whose axis is vertical through the base, turned, moves it along a chord.
   constexpr double kTurn = 0.1;
   const double chord = 2.0 * kGoal.head<2>().norm() * std::sin(kTurn / 2.0);
   robot.sample.position[0] += kTurn;

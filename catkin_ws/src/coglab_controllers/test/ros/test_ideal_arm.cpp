@@ -221,7 +221,7 @@ TEST(IdealArm, LimitsHoldByDifferentiation) {
 TEST(IdealArm, ATickAllocatesNothing) {
   Arm arm;
   counting = true;
-  int* volatile kept = new int(3);  // a compiler may leave out what nobody sees
+  int* volatile kept = new int(3);  // volatile, so that the compiler does not remove it
   delete kept;
   counting = false;
   EXPECT_EQ(allocations, 1U) << "the counter does not count";

@@ -47,7 +47,7 @@ class OwnMaster : public ::testing::Environment {
       ASSERT_LT(waited, kMasterLimit) << "no ROS master on port " << port;
       usleep(50'000);
     }
-    ros::start();  // and so no node handle that a test lets go ends the node
+    ros::start();  // so that the node does not end with a test's last node handle
   }
 
   void TearDown() override {

@@ -86,7 +86,7 @@ TEST_F(RosParameters, BothEndsOfARangeBelongToIt) {
     node_.setParam("x", value);
     EXPECT_THROW(readNumber(node_, "x", 1.0, -0.5, 2.5), std::invalid_argument) << value;
   }
-  // A default is judged like a value that somebody set.
+  // A default is checked like a set value.
   EXPECT_THROW(readNumber(node_, "missing", 3.0, -0.5, 2.5), std::invalid_argument);
 }
 

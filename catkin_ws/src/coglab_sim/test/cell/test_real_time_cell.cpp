@@ -68,7 +68,7 @@ TEST(FriSocket, SendsReceivesAndReportsTooLongDatagrams) {
   }
 }
 
-/// No faster than real time times the factor; nobody has to answer, and a flood of datagrams stops
+/// No faster than real time times the factor; no answer is needed, and a flood of datagrams stops
 /// nothing. A busy computer may lose periods.
 TEST(RealTimeCell, TheFactorScalesTimeAndAFloodDoesNotStopIt) {
   for (const double factor : {0.5, 1.0, 4.0}) {

@@ -62,7 +62,7 @@ TEST(Bridge, AnswersWithHeaderAndFlags) {
 TEST(Bridge, FollowsVelocitiesAfterStartOnly) {
   Cell cell;
   cell.run(3);
-  cell.robot.state = fri::FriState::Command;  // nobody asked
+  cell.robot.state = fri::FriState::Command;  // without a request
   const Vector7 before = cell.robot.setPoint();
   cell.runDriven(100, Vector7::Constant(0.2));
   EXPECT_TRUE(cell.robot.setPoint().isApprox(before, 1e-6));

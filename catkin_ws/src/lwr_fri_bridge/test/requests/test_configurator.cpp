@@ -198,7 +198,7 @@ TEST(Configurator, AStopIsGivenUpAfterItsTimeLimits) {
   desk.stop();
   EXPECT_EQ(desk.codeAt(2.0), OutcomeCode::Pending);
   EXPECT_EQ(desk.codeAt(2.001), OutcomeCode::NotLeft);
-  // Silence: whatever was seen last, nobody knows what the controller does.
+  // Silence: the controller's state is unknown, also if the last one was good.
   for (const FriState state : {FriState::Monitor, FriState::Command}) {
     Desk silent;
     silent.m.state = static_cast<std::uint16_t>(state);
