@@ -10,7 +10,7 @@
 namespace coglab_contact {
 namespace {
 
-constexpr double kJolt = 0.02;          // rad, largest motion when somebody pushes a resting arm
+constexpr double kJolt = 0.02;          // rad, largest motion when a person pushes a resting arm
 constexpr double kGravity = 9.81;       // m/s^2
 constexpr double kMadToSigma = 1.4826;  // standard deviation over median absolute deviation
 constexpr double kLargest = 1e4;        // Nm, rad, rad/s: no arm has more

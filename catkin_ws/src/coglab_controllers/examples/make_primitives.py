@@ -1,10 +1,10 @@
 #!/usr/bin/python3
-"""Learns the primitives of config/primitives.xml from drawn demonstrations and writes the file.
+"""Learns the primitives of config/primitives.xml from synthetic demonstrations and writes the file.
 
 Usage: make_primitives.py [FILE]
 
-The motions are made of minimum-jerk pieces (Flash and Hogan 1985): people react sooner to such a hand than to a
-trapezoidal one (Huber et al. 2008).
+The motions consist of minimum-jerk pieces (Flash and Hogan 1985): people react earlier to such a hand than to one with
+a trapezoidal speed (Huber et al. 2008).
 """
 
 import sys

@@ -5,7 +5,7 @@
     rosservice call /lwr/command start
     python3 standard_client.py
 
-A planner does the first half, a joystick the second. Nothing of CogLab is imported.
+A planner would send the first part, a joystick the second. The program imports no module of CogLab.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Client:
         return dict(zip(state.name, state.position, strict=False))
 
     def goal(self, waypoints: list[tuple[float, dict[str, float]]]) -> FollowJointTrajectoryGoal:
-        """A goal through waypoints: (s from the start, {joint: rad}); joints that are left out stay where they are."""
+        """A goal through waypoints: (s from the start, {joint: rad}); omitted joints do not move."""
         now = self.joints()
         goal = FollowJointTrajectoryGoal()
         goal.trajectory.joint_names = sorted(now)
@@ -67,7 +67,7 @@ class Client:
 
 
 def main() -> None:
-    """Turns the wrist to and fro, then moves the palm up by 5 cm."""
+    """Turns the wrist back and forth, then moves the palm up by 5 cm."""
     rospy.init_node("standard_client")
     client = Client()
     wrist = client.joints()["lwr_a6"]

@@ -1,4 +1,4 @@
-"""Fixtures that tests of the cores share."""
+"""Common fixtures for the tests of the cores."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 /// @file
-/// What the tests of the cores share: the robot, random inputs, drawn demonstrations.
+/// Common parts of the tests of the cores: the robot, random inputs, random demonstrations.
 #pragma once
 
 #include <fstream>

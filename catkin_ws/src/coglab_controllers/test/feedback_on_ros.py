@@ -1,4 +1,4 @@
-"""What the feedback controllers of a running robot offer by ROS; TopicGoal is the robot."""
+"""ROS interface of the feedback controllers of a running robot."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from rosgraph_msgs.msg import Log
 
 
 class FeedbackOnRos(unittest.TestCase):
-    """Services, status, state and log; whoever inherits brings the robot."""
+    """Services, status, state and log. The derived class provides the robot."""
 
     robot: Robot
     feedback: list[FeedbackStatus]
@@ -58,7 +58,7 @@ class FeedbackOnRos(unittest.TestCase):
         self.assertFalse(call(name + "enable", FeedbackSelect, ["nobody"], "").success)
 
     def test_5b_feedback_controllers_are_loaded_watched_and_unloaded(self) -> None:
-        """One is added to a running robot, shows its inside and its corrections, and goes again."""
+        """A controller is loaded on a running robot, publishes its state and corrections, and is unloaded."""
         name = "controller_manager/feedback/"
         call, shown = self.robot.call, []
         rospy.Subscriber(name + "state", FeedbackState, shown.append)
@@ -110,7 +110,7 @@ class FeedbackOnRos(unittest.TestCase):
         self.assertFalse(call(name + "unload", FeedbackSelect, ["ee_admittance"], "").success, "part of a profile")
 
     def test_5c_a_request_outside_what_the_srv_file_says_is_refused_whole(self) -> None:
-        """Each refusal says what came and what was expected, and changes nothing."""
+        """Each refusal contains the received and the expected value, and changes nothing."""
         name, call = "controller_manager/feedback/", self.robot.call
         odd = ("\x1b[2J", "a\0b", " ", "\N{RIGHT-TO-LEFT OVERRIDE}x", "x" * 201)
         requests = [
@@ -138,7 +138,7 @@ class FeedbackOnRos(unittest.TestCase):
         wait_until(lambda: not any(c.paused for c in self.feedback[-1].controllers), "nothing paused")
 
     def say_on_rosout(self, controller: str) -> None:
-        """A controller that holds at a bound says so, with its name, place in the source, cycle and numbers."""
+        """A controller at a bound logs this with its name, source location, cycle and numbers."""
         told: list[Log] = []
         rospy.Subscriber("/rosout", Log, told.append)
         gains = [FeedbackGain("max_offset", [0.0])]

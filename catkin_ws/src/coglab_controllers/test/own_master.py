@@ -1,4 +1,4 @@
-"""What tests of nodes share that are no rostests: a ROS master, and where the nodes are."""
+"""Common parts of tests of nodes without rostest: a ROS master and the paths of the nodes."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Over ROS: a motion of one's own is loaded by its type, started, watched and cancelled; unload, and no controller."""
+"""Over ROS: a user's motion is loaded by its type, started, watched and cancelled; unloading; no active controller."""
 
 from __future__ import annotations
 

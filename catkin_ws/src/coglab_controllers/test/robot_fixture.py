@@ -1,4 +1,4 @@
-"""What the rostests of this package share: the robot's services, a tf2 goal, and bounded waits."""
+"""Common parts of the rostests of this package: the robot's services, a tf2 goal, and bounded waits."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ LIMIT = 60.0  # s, for all that is waited for: nothing is red because the comput
 
 
 def wait_until(condition: Callable[[], bool], what: str) -> None:
-    """Polls a condition on the steady clock; fails with what was waited for."""
+    """Polls a condition on the steady clock; fails with the description `what`."""
     end = time.monotonic() + LIMIT
     while not condition():
         if time.monotonic() > end:
@@ -66,7 +66,7 @@ def wait_until(condition: Callable[[], bool], what: str) -> None:
 
 
 def robot_processes() -> list[int]:
-    """Process ids of the nodes that the arm hangs on: one, or two with split:=true; none while one has ended."""
+    """Process ids of the nodes that move the arm: one, or two with split:=true; none if one has ended."""
     master = rospy.get_master()
     nodes = {node for _, who in master.getSystemState()[2][2] for node in who}
     own = sorted(nodes & {"/robot", "/lwr", "/controller_manager"})
@@ -77,7 +77,7 @@ def robot_processes() -> list[int]:
 
 
 def runs(pid: int) -> bool:
-    """Whether a process has not ended; one that only waits to be reaped has."""
+    """Whether a process has not ended. A zombie process has ended."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
@@ -85,7 +85,7 @@ def runs(pid: int) -> bool:
 
 
 def end_all(pids: list[int]) -> None:
-    """Asks processes to end, as roslaunch does, and waits until they have."""
+    """Signals processes to end, as roslaunch does, and waits until they have ended."""
     for pid in pids:
         os.kill(pid, signal.SIGINT)
     wait_until(lambda: not any(runs(pid) for pid in pids), f"end of {pids} after SIGINT")
@@ -93,7 +93,7 @@ def end_all(pids: list[int]) -> None:
 
 @contextmanager
 def frozen_master() -> Iterator[None]:
-    """The ROS master of this test takes calls and does not answer; rostest runs it in its own process."""
+    """The ROS master of this test accepts calls and does not answer; rostest runs it in its own process."""
     pid = rospy.get_master().getPid()[2]
     assert any(name in Path(f"/proc/{pid}/cmdline").read_bytes() for name in (b"rosmaster", b"rostest"))
     os.kill(pid, signal.SIGSTOP)
@@ -104,7 +104,7 @@ def frozen_master() -> Iterator[None]:
 
 
 class Robot:
-    """The robot as its users see it."""
+    """The robot's interface for users."""
 
     def __init__(self) -> None:
         self.joints: JointState | None = None
@@ -148,7 +148,7 @@ class Robot:
             time.sleep(1.0 / 30.0)
 
     def see_hand(self, position: tuple[float, float, float] | None) -> None:
-        """Where perception sees the human hand from now on; None: not at all."""
+        """Sets the position at which perception sees the human hand; None: not at all."""
         self._goal = position
 
     @staticmethod
@@ -170,7 +170,7 @@ class Robot:
         return self.call("controller_manager/ptp/add_ptp", AddPtp, position, velocity or [], [])
 
     def cancel(self, controller: str, reason: str = "") -> CancelMotionResponse:
-        """Ends the motion of a controller; answers when the arm stands."""
+        """Ends the motion of a controller; returns when the arm stands."""
         return self.call(f"controller_manager/{controller}/cancel", CancelMotion, 0.0, reason)
 
     def start(self) -> None:

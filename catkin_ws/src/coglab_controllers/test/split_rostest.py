@@ -109,7 +109,7 @@ class Split(unittest.TestCase):
         self.assertFalse(again.was_running)
 
     def test_6_foreign_target_velocities_are_refused_with_the_reason(self) -> None:
-        """Who else publishes target_joint_states while a controller is active moves nothing."""
+        """While a controller is active, another publisher of target_joint_states moves nothing."""
         robot = self.robot
         robot.go(HOME)
         told: list[str] = []
@@ -168,7 +168,7 @@ class Split(unittest.TestCase):
         end_all(pids)
 
     def test_7_a_frozen_manager_moves_nothing_after_hold_and_reset(self) -> None:
-        """In mid-motion the manager freezes; hold and reset pass without it; then it goes on with what it has."""
+        """The manager freezes during a motion. After hold and reset without it, it continues with its old state."""
         robot = self.robot
         robot.go(HOME)
         target = [angle + 0.8 if joint == 6 else angle for joint, angle in enumerate(HOME)]

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Over ROS: examples/standard_client.py, which knows standard messages alone, drives trajectories and twists."""
+"""Over ROS: examples/standard_client.py, which uses only standard messages, sends trajectories and twists."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Who may move the arm of /robot over target_joint_states: others while no controller is active, nobody else after."""
+"""Who may move the arm of /robot over target_joint_states: other nodes, but only while no controller is active."""
 
 from __future__ import annotations
 

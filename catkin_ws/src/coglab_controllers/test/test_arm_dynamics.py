@@ -17,7 +17,7 @@ ZERO, ONE = np.zeros(7), np.ones(7)
 
 
 class Links:
-    """Masses of the URDF and where they are, by its text alone; joints that are not named stand at zero."""
+    """Masses of the URDF and their positions, from its text only; joints that are not given are at zero."""
 
     def __init__(self, text: str) -> None:
         self.root = ElementTree.fromstring(text)

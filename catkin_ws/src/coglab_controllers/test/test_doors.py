@@ -1,4 +1,4 @@
-"""The doors inside this package: who may include whom; and one shape of a request on its whole way."""
+"""Allowed includes between the parts of this package, and equal fields of a request in all its forms."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ INCLUDE = re.compile(r'#include "coglab_controllers/(\w+)/')
 
 
 def includes() -> dict[str, set[str]]:
-    """Doors that each door includes, from headers and sources."""
+    """Parts that each part includes, from headers and sources."""
     found: dict[str, set[str]] = {}
     for root in (PACKAGE / "include" / "coglab_controllers", PACKAGE / "src"):
         for path in sorted(root.rglob("*.[hc]pp")):
@@ -85,7 +85,7 @@ def test_a_request_for_a_motion_of_ones_own_has_one_shape() -> None:
 
 
 def files_and_includes(folder: str) -> dict[Path, list[str]]:
-    """What each C++ file below a folder includes, by its path in the package."""
+    """Includes of each C++ file below a folder, by its path in the package."""
     found = {
         path.relative_to(PACKAGE): re.findall(
             r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', path.read_text(encoding="utf-8"), re.MULTILINE

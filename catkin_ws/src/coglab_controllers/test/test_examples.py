@@ -1,4 +1,4 @@
-"""The primitives of the package are those that the script makes."""
+"""The primitives of the package equal those from the script."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def loaded() -> cc.Library:
 
 
 def test_the_packages_primitives_are_those_that_are_made(tmp_path: Path) -> None:
-    """With a file and without: the same, as the package has it; and what is said of each."""
+    """With and without a file name the output equals the package's file; each primitive is reported."""
     script = str(EXAMPLES / "make_primitives.py")
     for arguments, file in (([], "primitives.xml"), (["mine.xml"], "mine.xml")):
         command = [sys.executable, script, *arguments]

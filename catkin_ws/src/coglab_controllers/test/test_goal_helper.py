@@ -1,4 +1,4 @@
-"""The goal helper on ROS: which frames it passes on, where, how often, and what its parameters may be."""
+"""The goal helper on ROS: published frames, place and rate of the goals, and ranges of the parameters."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ TOPIC = "/controller_manager/dmp/dmp_goal"
 
 
 class Tracker:
-    """Tells frames, and hears the goals that come of them."""
+    """Publishes frames and receives the resulting goals."""
 
     def __init__(self, topic: str) -> None:
         self.goals: list[DmpGoal] = []

@@ -1,4 +1,4 @@
-"""The ideal arm and the manager on ROS, in one process: topics, services, states and ends as docs/reference.md says."""
+"""The ideal arm and the manager on ROS, in one process: topics, services, states and shutdown of docs/reference.md."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ PERIOD = 0.01  # s
 
 
 def parameters(master: rosgraph.Master) -> None:
-    """An arm with a start of its own, two controllers that load by themselves, and one that stalls."""
+    """An arm with its own start posture, two controllers loaded at the start, and one that stalls."""
     master.setParam("/robot_description", (SOURCES / "lwr_description" / "urdf" / "lwr_ih2.urdf").read_text())
     arm = {"arm": "ideal", "rt_priority": 0, "ideal_period": PERIOD, "start_position": START, "joint_states_rate": 50.0}
     master.setParam("/lwr", arm)
@@ -70,7 +70,7 @@ def parameters(master: rosgraph.Master) -> None:
 
 
 class Robot:
-    """What the node tells, as it comes."""
+    """The messages of the node, in order of arrival."""
 
     def __init__(self) -> None:
         self.joints: list[JointState] = []
@@ -104,7 +104,7 @@ class Robot:
         return self.call("controller_manager/" + name, kind, *arguments)
 
     def until(self, condition: Callable[[LwrState, ControllerStatus], bool], what: str) -> None:
-        """Waits for the newest state and status to be so."""
+        """Waits until the newest state and status satisfy a condition."""
         wait_until(lambda: condition(self.states[-1], self.statuses[-1]), what)
 
     def started(self) -> None:

@@ -52,7 +52,7 @@ def line(count: int = 9, step: float = 0.1, way: float = 0.5) -> tuple[np.ndarra
 
 
 def test_a_demonstration_that_is_slow_at_its_start_begins_at_rest() -> None:
-    """Slower than a tenth of its mean speed over a twentieth of its samples: what else there is, is noise."""
+    """Slower than a tenth of its mean speed over a twentieth of its samples: such a speed is noise."""
     u = np.linspace(0.0, 1.0, 241)
     jerk = u**3 * (10 - 15 * u + 6 * u**2)
     for share, rests in ((0.06, True), (0.09, False), (0.3, False)):

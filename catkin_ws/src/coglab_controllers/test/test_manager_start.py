@@ -1,4 +1,4 @@
-"""The controller manager as a node of its own: where model, feedback file and priority come from, and how it ends."""
+"""The controller manager as a separate node: sources of model, feedback file and priority, and its shutdown."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ def clean(master: rosgraph.Master) -> None:
 
 
 def refused() -> str:
-    """What a start that fails says; it ends with 1."""
+    """Output of a failed start, which ends with status 1."""
     ended = subprocess.run([node_path("controller_manager_node")], capture_output=True, text=True, timeout=60)
     assert ended.returncode == 1, ended.stderr[-2000:]
     return ended.stderr
 
 
 def started(master: rosgraph.Master, end: signal.Signals = signal.SIGINT) -> str:
-    """What a start that succeeds says; the node is then asked to end, and ends with 0."""
+    """Output of a successful start; the node is then ended by a signal, with status 0."""
     node = subprocess.Popen(
         [node_path("controller_manager_node")], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
     )

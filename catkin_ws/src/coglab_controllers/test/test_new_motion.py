@@ -1,4 +1,4 @@
-"""A motion from the template: made, built in a workspace of its own, tested, and the simulated arm moves."""
+"""A motion from the template: made, built in a separate workspace, tested, and executed by the simulated arm."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LONGEST = 90.0  # s, from `controller new --motion` until the arm has moved, whe
 
 
 def run(*command: str | Path) -> str:
-    """Runs a command with a time limit; its output, which is shown if it fails."""
+    """Runs a command with a time limit. Returns its output, which is shown if it fails."""
     done = subprocess.run(
         [str(part) for part in command], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=400
     )
@@ -26,7 +26,7 @@ def run(*command: str | Path) -> str:
 
 
 def in_workspace(workspace: Path, *command: str | Path) -> str:
-    """The same with the environment of that workspace, over the one that is sourced."""
+    """The same with the environment of that workspace on top of the sourced one."""
     words = " ".join(str(part) for part in command)
     return run("bash", "-c", f". {workspace}/devel/setup.bash && exec {words}")
 

@@ -1,4 +1,4 @@
-"""The Python module over the cores: shapes, errors, agreement with numpy, golden files and the package's primitives."""
+"""The Python module of the cores: shapes, errors, agreement with numpy, golden files and the package's primitives."""
 
 from __future__ import annotations
 

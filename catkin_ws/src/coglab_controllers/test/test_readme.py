@@ -1,4 +1,4 @@
-"""The blocks of the package's README run as they stand."""
+"""The code blocks of the package's README run unchanged."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A start of /robot that fails is told at once, by what is wrong, and ends the process; its FRI thread, too."""
+"""A failed start of /robot is reported at once with its cause, and ends the process and its FRI thread."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def master() -> Iterator[rosgraph.Master]:
 
 
 def failed_start(master: rosgraph.Master, **parameters: object) -> tuple[float, list[str]]:
-    """s that a start took which has to fail, and its lines; parameters with __ for /."""
+    """Duration (s) and output lines of a start that must fail; in parameter names __ means /."""
     master.setParam("/lwr", {"rt_priority": 0, "lock_memory": False})
     master.setParam("/controller_manager", {"cycle_time": 0.005})
     for name, value in parameters.items():

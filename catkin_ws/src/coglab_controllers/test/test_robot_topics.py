@@ -1,5 +1,5 @@
-"""split:=true without an arm's interface: what comes on the manager's inputs beside the true values, with extreme
-stamps, sizes and numbers, ends nothing, moves nothing and stops no motion."""
+"""split:=true without an arm's interface: messages with extreme stamps, sizes and numbers beside the true ones
+do not end the manager, move the arm or stop a motion."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ EXTREME_STAMPS = ((0, 0), (0, 1), (1, 0), (2**32 - 1, 999_999_999), (2**32 - 1, 
 
 
 class TopicArm:
-    """An arm that follows target_joint_states at once, and tells where it is."""
+    """An arm that follows target_joint_states at once, and publishes its position."""
 
     def __init__(self) -> None:
         self.position = list(HOME)
@@ -74,7 +74,7 @@ class TopicArm:
 
 
 class Intruder:
-    """Puts what nobody expects beside what the arm tells."""
+    """Sends unexpected messages beside those of the arm."""
 
     def __init__(self, arm: TopicArm, seed: int) -> None:
         self.arm, self.random = arm, random.Random(seed)
@@ -104,7 +104,7 @@ class Intruder:
         return stamp
 
     def bad_joints(self) -> JointState:
-        """Something that can be no joint state of this arm: an odd stamp, a size that does not fit, or no number."""
+        """A message that is no valid joint state of this arm: extreme stamp, wrong size, or NaN."""
         message = JointState(name=list(JOINTS), position=[0.05] * 7, velocity=[9.0] * 7, effort=[9.0] * 7)
         message.header.stamp = rospy.Time.now()
         kind = self.random.randrange(4)
@@ -187,7 +187,7 @@ def test_a_motion_beside_it_reaches_its_end_all_the_limits(system):
 
 
 def test_a_start_that_fails_says_why_and_ends_with_1(system):
-    """As every program here whose settings cannot be used; roslaunch shows the number."""
+    """Like every program of this project with invalid settings; roslaunch shows the status."""
     command = [node_path("controller_manager_node"), "__name:=another_manager", "_arm_namespace:=7"]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert ended.returncode == 1, ended.stderr

@@ -15,7 +15,7 @@ LIBRARIES = ["-lorocos-kdl", "-lkdl_parser", "-ltinyxml2", "-lyaml-cpp", "-lpthr
 
 
 def sources() -> list[Path]:
-    """The cores of manager and plug-ins with what they stand on; no ROS."""
+    """Sources of manager, plug-ins and their dependencies, without ROS."""
     own = [
         p
         for p in sorted((PACKAGE / "src").rglob("*.cpp"))
@@ -25,13 +25,13 @@ def sources() -> list[Path]:
 
 
 def compiled(command: list[str]) -> None:
-    """Runs the compiler; fails with what it said."""
+    """Runs the compiler; fails with its output."""
     built = subprocess.run(command, capture_output=True, text=True, timeout=600)
     assert built.returncode == 0, built.stderr[-3000:]
 
 
 def run(command: list[str], limit: float) -> None:
-    """Runs an instrumented program; fails with what the sanitizer found."""
+    """Runs an instrumented program; fails with the sanitizer's report."""
     result = subprocess.run(
         ["setarch", os.uname().machine, "-R", *command],
         env=dict(

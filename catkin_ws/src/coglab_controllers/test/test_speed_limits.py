@@ -1,4 +1,4 @@
-"""Cartesian speed limits as the arm keeps them: the whole robot in virtual time, speeds of the simulated arm itself."""
+"""Cartesian speed limits, checked on the simulated arm of the whole robot in virtual time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""split:=true, joint state by joint state: each one that counts is answered once, what cannot count is not answered."""
+"""split:=true, joint state by joint state: each valid one is answered once, an invalid one is not answered."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ PERIOD = 0.02  # s between two joint states, at least
 
 
 class Arm:
-    """An arm that says where it is when it is asked to, and does what comes back."""
+    """An arm that publishes its position on request, and follows the answer."""
 
     def __init__(self) -> None:
         self.position = list(HOME)
@@ -38,7 +38,7 @@ class Arm:
         rospy.Subscriber("controller_manager/ptp/finished_ptp", FinishedPtp, lambda m: self.finished.append(m.ptp_id))
 
     def send(self, change: Callable[[JointState], object] = lambda m: None, later: float = 0.0) -> rospy.Time:
-        """One joint state, changed as told, with a stamp that much ahead of now; its stamp."""
+        """Publishes one joint state with changes and a stamp `later` s after now. Returns its stamp."""
         time.sleep(PERIOD)
         message = JointState(name=list(JOINTS), position=list(self.position), velocity=[0.0] * 7, effort=[0.0] * 7)
         message.header.stamp = rospy.Time.now() + rospy.Duration(later)
@@ -56,11 +56,11 @@ class Arm:
         return self.heard[-1]
 
     def until(self, condition: Callable[[], bool], what: str) -> None:
-        """Goes on telling joint states until something is so."""
+        """Publishes joint states until a condition is true."""
         wait_until(lambda: condition() or self.send() is None, what)
 
     def allow(self, epoch: int, code: int = 0) -> None:
-        """Motion is allowed, or with a code: not."""
+        """Publishes that motion is allowed; with a code, that it is blocked."""
         self.state.publish(LwrState(motion_allowed=code == 0, reason_code=code, motion_epoch=epoch))
         self.until(lambda: bool(self.heard) and self.heard[-1].header.frame_id == str(epoch), f"epoch {epoch}")
 
@@ -157,7 +157,7 @@ def test_why_the_arm_may_not_move_comes_through(arm: Arm, told: int, shown: int)
 
 
 def test_joints_are_known_by_their_names_in_any_order_beside_others(arm: Arm) -> None:
-    """Speeds and torques that are missing count as zero, and what other joints say counts for nothing."""
+    """Missing speeds and torques count as zero, and values of other joints are ignored."""
 
     def shuffled(m: JointState) -> None:
         m.name, m.position = ["finger", *m.name[::-1]], [9.0, *m.position[::-1]]

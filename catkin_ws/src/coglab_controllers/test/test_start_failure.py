@@ -106,7 +106,7 @@ def master() -> Iterator[None]:
 def test_nothing_runs_on_over_what_is_freed(
     robot_node: Path, master: None, space: str, name: str, value: float
 ) -> None:
-    """A parameter that is judged late is out of range while a controller sends at 1 kHz."""
+    """A parameter that is checked late is out of range while a controller sends at 1 kHz."""
     import rosgraph
     from udp_controller import UdpController
 

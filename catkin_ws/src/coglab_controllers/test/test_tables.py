@@ -1,4 +1,4 @@
-"""Tables 4, 5 and 6 of D4.10 letter for letter: what they print comes first, what is ours is appended."""
+"""Tables 4, 5 and 6 of D4.10: the printed fields come first and unchanged; additional fields follow."""
 
 from __future__ import annotations
 

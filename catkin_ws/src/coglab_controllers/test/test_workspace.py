@@ -1,4 +1,4 @@
-"""What the workspace allows, and where it moves a goal that it does not allow."""
+"""Allowed positions of the workspace, and the projection of goals outside it."""
 
 from __future__ import annotations
 

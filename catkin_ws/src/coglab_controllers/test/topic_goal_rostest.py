@@ -247,7 +247,7 @@ class TopicGoal(FeedbackOnRos):
         wait_until(lambda: robot.feedback.state == "running", "running, toward the goal that replaced the old one")
 
     def test_9_a_frozen_master_ends_no_reach_and_keeps_no_node_from_ending(self) -> None:
-        """Of the topic, and of a frame of tf2, whose goals age: seen they are followed, unseen they are lost."""
+        """With goals from the topic and from a tf2 frame: they are followed while new, and lost when too old."""
         robot, pids = self.robot, robot_processes()
         self.assertTrue(pids)
         robot.switch("ptp")

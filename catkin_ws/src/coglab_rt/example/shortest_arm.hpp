@@ -1,6 +1,5 @@
 /// @file
-/// The shortest back end: an arm that stands where its commanded velocities lead. No limits, no
-/// ROS.
+/// The shortest back end: an arm that follows its commanded velocities exactly. No limits, no ROS.
 #pragma once
 
 #include <atomic>

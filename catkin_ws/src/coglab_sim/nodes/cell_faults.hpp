@@ -10,7 +10,7 @@ namespace coglab_sim {
 
 /// Makes a fault now. A lasting fault is undone after `duration` s of simulated time (0: it stays).
 ///
-///   block               1: somebody holds the arm in place, 0: lets go
+///   block               1: a person holds the arm in place, 0: releases it
 ///   packet_loss         share 0..1 of datagrams lost, in each direction
 ///   lose_packets        number of successive periods lost, in both directions
 ///   silence             the controller sends nothing for `value` s

@@ -31,8 +31,8 @@ struct CellCamera {
     return py::array_t<std::uint8_t>({camera.height(), camera.width(), 3}, pixels.data());
   }
 
-  /// Puts arm, fingers and object where a recording had them. Only pictures are right afterwards:
-  /// neither forces nor the robot controller follow.
+  /// Sets arm, fingers and object to a recorded state. Only pictures are valid afterwards: forces
+  /// and the robot controller do not follow.
   void pose(const Vector7& arm, const std::array<double, 5>& fingers, const Pose& object) {
     auto& model = cell.cell().plant().model();
     mjModel* m = model.get();

@@ -20,11 +20,10 @@ PYBIND11_MODULE(_cell, m) {
            "Takes the 376 bytes that answer the last measurement (None: no answer), advances one "
            "FRI period and returns "
            "the next measurement, 916 bytes, or None if nothing is sent.")
-      .def("truth", &PyCell::truth,
-           "What really happens in the cell; nothing in control may read it.")
+      .def("truth", &PyCell::truth, "True state of the cell; control code must not read it.")
       .def(
           "view", &PyCell::view,
-          "The part of truth() that people and trackers see and feel: (position and rotation of "
+          "The part of truth() that people and trackers can observe: (position and rotation of "
           "the "
           "robot's hand, closure of its fingers, position and rotation of the object, force on the "
           "person's hand, position and rotation of the person's hand).")
@@ -60,7 +59,7 @@ PYBIND11_MODULE(_cell, m) {
           "The controller's message window: (time, text), newest last.")
       .def_property_readonly(
           "limit_switches", [](const PyCell& c) { return c.cell().controller().limitSwitches(); },
-          "How often a set-point in command mode lay beyond a software limit switch.")
+          "Number of set-points in command mode beyond a software limit switch.")
       .def_property_readonly("rejections",
                              [](const PyCell& c) {
                                const auto& r = c.cell().controller().rejections();
@@ -79,7 +78,7 @@ PYBIND11_MODULE(_cell, m) {
                              latency);
           },
           py::arg("data"), py::arg("latency") = 0.0,
-          "Hands over one datagram before the next step().")
+          "Passes one datagram to the controller before the next step().")
       .def(
           "set_human",
           [](PyCell& c, const Vector3d& position, const Eigen::Vector4d& rotation,
@@ -108,7 +107,7 @@ PYBIND11_MODULE(_cell, m) {
           "the tension stands for), tension (N), moving, locked.")
       .def(
           "motor_states", [](const PyCell& c) { return motorTuples(c.cell().plant()); },
-          "The same as tuples (position, current, effort, moving, locked), for callers in a hurry.")
+          "The same as tuples (position, current, effort, moving, locked), which are faster.")
       .def_property_readonly(
           "touch_total",
           [](const PyCell& c) {
@@ -154,14 +153,14 @@ PYBIND11_MODULE(_cell, m) {
           "human_hand, robot_hand or world; pose in that frame.")
       .def(
           "block", [](PyCell& c, bool on) { c.cell().setBlock(on); },
-          "Holds the arm where it is, or lets go.")
+          "Blocks the arm at its position, or releases it.")
       .def(
           "set_loss",
           [](PyCell& c, double to_pc, double from_pc) { c.cell().setLoss(to_pc, from_pc); },
           py::arg("to_pc"), py::arg("from_pc"))
       .def(
           "lose_next", [](PyCell& c, int packets) { c.cell().loseNext(packets); },
-          "Loses the next packets both ways.")
+          "Loses the next packets in both directions.")
       .def("enabling_switch",
            [](PyCell& c, bool pressed) { c.cell().controller().setEnablingSwitch(pressed); })
       .def(
@@ -170,7 +169,7 @@ PYBIND11_MODULE(_cell, m) {
           py::arg("joint"), py::arg("on") = true)
       .def(
           "silence", [](PyCell& c, double duration) { c.cell().controller().setSilent(duration); },
-          "The controller sends nothing for so long, s.")
+          "The controller sends nothing for this time, s.")
       .def("leave_command_mode",
            [](PyCell& c, const std::string& why) { c.cell().controller().leaveCommandMode(why); })
       .def(
@@ -179,7 +178,7 @@ PYBIND11_MODULE(_cell, m) {
             c.cell().controller().restartProgram(period, pause);
           },
           py::arg("period"), py::arg("pause") = 0.5,
-          "The operator starts the KRL program anew, with another FRI period, s.")
+          "The operator restarts the KRL program with another FRI period, s.")
       .def("acknowledge", [](PyCell& c) { c.cell().controller().acknowledge(); });
 
   definePlant(m);

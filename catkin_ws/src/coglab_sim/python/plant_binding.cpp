@@ -118,7 +118,7 @@ void definePlant(py::module_& m) {
             }
           },
           py::arg("target"), py::arg("speed") = Vector7(Vector7::Zero()), py::arg("steps") = 1,
-          "Steps of 1 ms with a position servo that knows the arm: rad, rad/s.")
+          "Steps of 1 ms with a position servo that uses the exact model: rad, rad/s.")
       .def(
           "set_person",
           [](Plant& plant, const Vector3d& position, const Eigen::Vector4d& rotation,

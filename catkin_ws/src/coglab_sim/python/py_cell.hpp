@@ -118,7 +118,7 @@ class PyCell {
     return result;
   }
 
-  /// What people and trackers see and feel of the truth, without a dictionary.
+  /// The part of the truth that people and trackers can observe, without a dictionary.
   py::tuple view() const {
     const CellTruth t = cell_.truth();
     const auto rotation = [](const Pose& pose) { return Eigen::Vector4d(pose.rotation.coeffs()); };
@@ -127,7 +127,7 @@ class PyCell {
                           t.human_hand.position, rotation(t.human_hand));
   }
 
-  /// What decides about a handover, without a dictionary.
+  /// The part of the truth that decides about a handover, without a dictionary.
   py::tuple handover() const {
     const CellTruth t = cell_.truth();
     return py::make_tuple(t.held_by, t.dropped, t.touch_force.norm());

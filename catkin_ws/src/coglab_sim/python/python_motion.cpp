@@ -36,8 +36,8 @@ Eigen::Matrix<double, 6, 1> joined(const Vector3& first, const Vector3& second) 
   return both;
 }
 
-/// A Python exception as "file.py:12: ValueError: text". The place is the last one of the user:
-/// frames of coglab.control are left out.
+/// A Python exception as "file.py:12: ValueError: text". The place is the last one in the user's
+/// code: frames of coglab.control are omitted.
 std::string inWords(const py::error_already_set& error) {
   const auto name = error.type().attr("__name__").cast<std::string>();
   const auto text = py::str(error.value()).cast<std::string>();

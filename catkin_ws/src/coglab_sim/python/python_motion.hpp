@@ -13,17 +13,15 @@ namespace coglab_sim::python {
 
 /// Calls these methods of a Python object, all within tick(), which holds Python's lock:
 ///
-/// | method                                                    | returns | |
-/// --------------------------------------------------------- | --------------------------------- |
-/// | `arguments()`                                             | [(name, unit, default, low,
-/// high)]| | `start(values, joints, joint_velocity, position, orientation, twist)` | nothing | |
-/// `reference(time, next, joints)` | None (the arm brakes and stands), (joints, joint_velocity) or
-/// | |                                 | (position, orientation, twist) | | `done()` | true when
-/// the reference has ended |
+/// - `arguments()`: returns [(name, unit, default, low, high)]
+/// - `start(values, joints, joint_velocity, position, orientation, twist)`
+/// - `reference(time, next, joints)`: returns None (the arm brakes and stands), or
+///   (joints, joint_velocity), or (position, orientation, twist)
+/// - `done()`: returns true when the reference has ended
 ///
 /// Sizes and units as in coglab.control.Motion. An exception, a wrong size, a number that is not
-/// finite and a first reference away from the set-point end the motion: the arm brakes. error()
-/// then has the whole Python message.
+/// finite, or a first reference away from the set-point ends the motion: the arm brakes. error()
+/// then returns the whole Python message.
 class PythonMotion : public coglab_controllers::Motion<> {
  public:
   explicit PythonMotion(pybind11::object steps) : steps_(std::move(steps)) {}

@@ -198,7 +198,7 @@ PYBIND11_MODULE(_virtual, m) {
       "quaternions x y z w.";
   py::module_::import("coglab_sim._cell");  // registers the type of LockstepRobot.cell
 
-  py::class_<coglab_controllers::CancelOrder>(m, "CancelOrder", "A cancel on its way.");
+  py::class_<coglab_controllers::CancelOrder>(m, "CancelOrder", "A cancel in progress.");
 
   py::class_<Robot>(
       m, "LockstepRobot",
@@ -222,13 +222,13 @@ PYBIND11_MODULE(_virtual, m) {
             const auto ticks = std::llround(seconds / robot.cell().period());
             for (long long i = 0; i < ticks; ++i) robot.tick();
           },
-          py::arg("seconds"), "So many seconds of simulated time.")
+          py::arg("seconds"), "Advances this number of simulated seconds.")
       .def_property_readonly("now", &Robot::now, "s")
       .def_property_readonly(
           "cell", [](Robot& robot) { return std::make_unique<PyCell>(robot.cell()); },
           py::keep_alive<0, 1>(), "The coglab_sim._cell.Cell inside; do not call its step().")
       .def_property("frozen", &Robot::frozen, &Robot::setFrozen,
-                    "Whether the process of bridge and manager stands still; the cell goes on.")
+                    "True stops bridge and manager, like SIGSTOP; the cell continues.")
       .def("report", &reportOf, "The control cycle's newest report.")
       .def_property_readonly(
           "connected", [](const Robot& robot) { return robot.report().robot.cycle_time > 0.0; },
@@ -474,7 +474,8 @@ PYBIND11_MODULE(_virtual, m) {
                                robot.nowNs() - static_cast<std::int64_t>(std::llround(1e9 * age)));
           },
           py::arg("frame"), py::arg("position"), py::arg("rotation") = Eigen::Vector4d(0, 0, 0, 1),
-          py::arg("age") = 0.0, "Where perception sees a frame in the world, captured `age` s ago.")
+          py::arg("age") = 0.0,
+          "Sets the pose at which perception saw a frame in the world `age` s ago.")
       .def(
           "set_fixed_frame",
           [](Robot& robot, const std::string& frame, const Vector3d& position,
@@ -482,7 +483,7 @@ PYBIND11_MODULE(_virtual, m) {
             robot.frames().setFixed(frame, makePose(position, rotation));
           },
           py::arg("frame"), py::arg("position"), py::arg("rotation") = Eigen::Vector4d(0, 0, 0, 1),
-          "A frame that does not move: in each tick it counts as captured at that moment.")
+          "Sets a frame that does not move: in each tick it counts as captured then.")
       .def("forget_frame",
            [](Robot& robot, const std::string& frame) { robot.frames().forget(frame); });
 }

@@ -43,13 +43,13 @@ Description Attitude::describe() const {
   d.summary = "Keeps the orientation of a body that carries an IMU at its reference.";
   d.use =
       "Write the IMU into `measuredData` under the key of the setting `imu`, in the order that "
-      "`imu_layout` names; say with `mount` how the IMU sits on the body; choose with `target` "
+      "`imu_layout` names. Set in `mount` how the IMU is mounted on the body, and in `target` "
       "which reference orientation is corrected: the pelvis, or the orientation of the pose "
       "`pose`. The same library serves any robot: only this file differs.";
   d.when =
       "While standing, walking or carrying, when the measured orientation of the body differs "
-      "from the reference because of compliance or pushes. Not while the body is meant to fall "
-      "free of its reference, for example during a get-up motion.";
+      "from the reference because of compliance or pushes. Not while the body must leave its "
+      "reference, for example during a get-up motion.";
   d.limitations =
       "Corrects orientation only, one body per instance. Trusts the IMU's orientation: a drifting "
       "yaw is followed unless the gains about the body's z axis are zero. With a plant that "

@@ -9,7 +9,8 @@
 
 namespace ctrl_more {
 
-/// Lets an end-effector yield to a hand that pushes or pulls it, in addition to the current motion.
+/// Makes an end-effector yield to a hand that pushes or pulls it, in addition to the current
+/// motion.
 class EeAdmittance : public FeedbackController {
  public:
   Description describe() const override;
@@ -62,8 +63,8 @@ void bound(Offset offset, Velocity velocity, double limit) {
   if (outward > 0.0) velocity -= outward * direction;
 }
 
-/// Bound for a length that was `before`: where the limit has been set below it, it comes back to
-/// the limit with a time constant, and not at once.
+/// Bound for a length of the value `before`. If the limit was reduced below it, the bound returns
+/// to the limit with a time constant instead of at once.
 double eased(double limit, double before, double dt) noexcept {
   constexpr double kReturn = 0.3;  // s
   return limit + std::max(0.0, before - limit) * std::max(0.0, 1.0 - dt / kReturn);
@@ -113,8 +114,8 @@ Description EeAdmittance::describe() const {
       "closes its loop on the pose follows.";
   d.when =
       "While a person may touch the arm: guiding, waiting, approaching. Switch it off before "
-      "contact detection by force is armed: a yielding hand hides the contact it should feel. "
-      "With stiffness 0 the hand stays where it is led.";
+      "contact detection by force is armed: a yielding hand hides the contact. "
+      "With stiffness 0 the hand stays where a person moves it.";
   d.limitations =
       "A stiff contact with little virtual mass can oscillate: raise `mass` and `damping`. It is "
       "no safety function. Rotation yields only with `axes: all`.";
@@ -123,8 +124,8 @@ Description EeAdmittance::describe() const {
       "\\dot p' = \\dot p + \\dot x";
   d.source = "Mass-spring-damper admittance, discretised exactly for a force held over a cycle.";
   d.information =
-      "Below the dead band, from rest, the references keep their bits. Offset and velocity are "
-      "bounded as balls; at the bound the outward velocity is taken away.";
+      "Below the dead band, from rest, the references stay bit-identical. Offset and velocity are "
+      "bounded in norm; at the bound the outward velocity is removed.";
   d.measured("wrench")
       .keyFrom("wrench")
       .size(6)

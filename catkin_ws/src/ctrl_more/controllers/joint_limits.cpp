@@ -43,7 +43,7 @@ Description JointLimits::describe() const {
   d.when = "Always, with every motion controller whose output is a joint velocity.";
   d.limitations =
       "Bounds each joint alone, so near an end the direction of the motion changes. It never "
-      "drives a joint back by itself. The host's own guard stays the last word on limits.";
+      "drives a joint back by itself. The host's own guard remains the final limit.";
   d.law =
       "\\rho < \\rho_i:\\quad \\dot q_{toward} \\le \\xi \\, \\max(0, \\rho - \\rho_s) / "
       "(\\rho_i - \\rho_s)";

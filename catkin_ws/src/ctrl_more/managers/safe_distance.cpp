@@ -12,9 +12,9 @@
 
 namespace ctrl_more {
 
-/// Slows the robot down while a person is near, until it stands: speed and separation monitoring of
-/// ISO/TS 15066:2016, 5.5.4. It is no safety function: neither the tracker nor this program is
-/// rated.
+/// Slows the robot while a person is near, down to standstill: speed and separation monitoring of
+/// ISO/TS 15066:2016, 5.5.4. It is not a safety function: neither the tracker nor this program is
+/// safety-rated.
 ///
 /// The robot may move while the distance d to the person is at least the protective separation
 /// distance (formula 1 there)

@@ -1,4 +1,4 @@
-"""Libraries that come, throw what only they know, and go, under AddressSanitizer (a campaign: COGLAB_LONG=1)."""
+"""Loads, exceptions of library classes, and unloads under AddressSanitizer (a campaign: COGLAB_LONG=1)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The plants of the Python examples move as their equations say."""
+"""The plants of the Python examples move by their equations."""
 
 from __future__ import annotations
 

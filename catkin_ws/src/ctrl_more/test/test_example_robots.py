@@ -1,4 +1,4 @@
-"""The three robots of the Python examples do with feedback what they cannot do without it."""
+"""The three robots of the Python examples succeed with feedback and fail without it."""
 
 from __future__ import annotations
 

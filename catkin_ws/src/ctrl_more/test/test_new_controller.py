@@ -1,4 +1,4 @@
-"""The template compiles, is tested and documented from the first minute."""
+"""The template compiles, passes its test and has documentation."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SCRIPT = PACKAGE / "scripts" / "new_controller.py"
 
 
 def run(*command: str | Path, **options) -> subprocess.CompletedProcess:
-    """Runs a command with a time limit and keeps what it says."""
+    """Runs a command with a time limit and returns its output."""
     return subprocess.run([str(part) for part in command], capture_output=True, text=True, timeout=300, **options)
 
 

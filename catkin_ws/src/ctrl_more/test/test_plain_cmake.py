@@ -1,4 +1,4 @@
-"""ctrl_more alone: configured, built and installed by plain CMake, and used from there by strangers.
+"""ctrl_more alone: configured, built and installed by plain CMake, and used from there by other projects.
 
 No catkin and no workspace is in the environment of these tests.
 """
@@ -112,7 +112,7 @@ def test_template_builds_runs_and_is_documented_from_the_prefix(prefix: Path, tm
 
 
 def failed_configure(folder: Path) -> str:
-    """What CMake says where no ctrl_more is."""
+    """Output of CMake without ctrl_more."""
     result = subprocess.run(
         ["cmake", "-S", folder, "-B", folder / "elsewhere"],
         capture_output=True,

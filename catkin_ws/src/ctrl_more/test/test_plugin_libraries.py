@@ -1,4 +1,4 @@
-"""The shipped controller libraries export nothing of their own, and unload without a trace."""
+"""The shipped controller libraries export no symbols of their own, and unload completely."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def workspace_lib() -> Path:
 @pytest.mark.skipif(shutil.which("nm") is None, reason="nm (binutils) is not installed")
 @pytest.mark.parametrize("controller", CONTROLLERS)
 def test_symbols_are_hidden(controller: str) -> None:
-    # A plug-in registers itself by a static object when it is loaded: nobody looks a symbol up.
+    # A plug-in registers itself by a static object when it is loaded, so no symbol is looked up.
     library = workspace_lib() / f"libctrl_more_{controller}.so"
     listed = subprocess.run(
         ["nm", "-DC", "--defined-only", str(library)],

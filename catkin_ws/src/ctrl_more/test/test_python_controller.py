@@ -1,4 +1,4 @@
-"""Feedback controllers in Python load, act, fault and blend as those in C++ do."""
+"""Feedback controllers in Python load, act, fault and blend like those in C++."""
 
 from __future__ import annotations
 

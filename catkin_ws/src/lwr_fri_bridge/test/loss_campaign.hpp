@@ -1,6 +1,6 @@
 /// @file
-/// Losses of datagrams in both directions, and what the set-points of a controller must keep
-/// whatever is lost. Tests run a sample of it, bench/loss_campaign.cpp the whole.
+/// Losses of datagrams in both directions, and the limits that a controller's set-points must keep
+/// under any loss. Tests run a sample of it, bench/loss_campaign.cpp all of it.
 #pragma once
 
 #include <algorithm>
@@ -60,7 +60,7 @@ struct LossCase {
   bool clean_first = false;
 };
 
-/// The worst of what a controller's set-points did in a run, over all joints.
+/// Largest violations by a controller's set-points in a run, over all joints.
 struct SetPointExtremes {
   double beyond = -1e9;       ///< rad beyond the bound (limit less margin), negative: inside
   double speed = 0.0;         ///< rad/s beyond the speed limit
@@ -134,7 +134,7 @@ class LossRun {
   }
 
   /// A hold of the fifth joint at full speed, far from its limits, on a controller that
-  /// extrapolates. One that stands begins anew after each loss: full speed is not what it has.
+  /// extrapolates. A controller that stands restarts after each loss and is not at full speed.
   Stop stop() {
     const double full = bridge_.config().limits.velocity[4];
     Vector7 wanted = Vector7::Zero();
@@ -174,7 +174,7 @@ class LossRun {
       extremes_.beyond = std::max({extremes_.beyond, q[i] - (limits.upper_position[i] - margin),
                                    limits.lower_position[i] + margin - q[i]});
       extremes_.speed = std::max(extremes_.speed, std::abs(v[i]) - limits.velocity[i] - noise);
-      // Where a controller stands by itself, that is its doing.
+      // Ignore a stop that the controller makes by itself.
       if (answered || robot_.extrapolates) {
         const double change = std::abs(v[i] - last_velocity_[i]) - 2.0 * noise;
         extremes_.acceleration =

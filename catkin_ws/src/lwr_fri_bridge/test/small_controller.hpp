@@ -1,6 +1,6 @@
 /// @file
-/// A robot controller just large enough for the tests of this package: keeps the set-point, goes on
-/// with the last step or stands where an answer is lost, runs our own KRL convention. Independent
+/// A minimal robot controller for the tests of this package. It keeps the set-point, continues with
+/// the last step or stands if an answer is lost, and runs our own KRL convention. It is independent
 /// of coglab_sim, which tests the bridge as a whole.
 #pragma once
 
@@ -89,7 +89,7 @@ class SmallController {
   Vector7 setPoint() const { return own_ + offset_; }
   std::int64_t now() const { return now_ns_; }
   double period() const { return period_; }
-  /// It is not run for so many seconds.
+  /// Does not run for this time, s.
   void wait(double seconds) { now_ns_ += static_cast<std::int64_t>(std::llround(seconds * 1e9)); }
   void moveOwn(const Vector7& own) { own_ = own; }
   void setMeasured(const Vector7& measured) { measured_ = measured; }
@@ -108,7 +108,7 @@ class SmallController {
   double clock_offset = 0.0;  ///< s, of its time stamps
   bool obeys = true;          ///< whether the KRL program runs
   bool blocked = false;       ///< something holds the arm
-  bool extrapolates = true;  ///< goes on with the last step where an answer is lost; else it stands
+  bool extrapolates = true;   ///< continues with the last step if an answer is lost; else it stands
   fri::CommandDatagram answer{};
 
  private:

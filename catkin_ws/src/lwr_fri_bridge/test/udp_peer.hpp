@@ -55,7 +55,7 @@ class Peer {
   sockaddr_in to_{};
 };
 
-/// Whether a condition comes within 5 s.
+/// Returns true if a condition becomes true within 5 s.
 inline bool eventually(const std::function<bool()>& condition) {
   for (int i = 0; i < 500 && !condition(); ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(10));

@@ -43,16 +43,16 @@ class RestTorque {
 
  private:
   std::optional<Joints> before_motion_, here_, left_;
-  std::optional<Joints> travelled_;  // rad, travel since the last rest; none: at rest
+  std::optional<Joints> travelled_;  // rad, distance since the last rest; none: at rest
 };
 
-/// What the detector has to watch: a request of the service `arm`.
+/// Request of the service `arm`: the event to detect.
 struct Request {
   std::string mode;         ///< contact, load or release
   double now = 0.0;         ///< s
   double timeout = 0.0;     ///< s
-  double k = 0.0;           ///< standard deviations; 0: that of the settings
-  std::vector<int> joints;  ///< 1..7; empty: those that are sensitive
+  double k = 0.0;           ///< threshold in standard deviations; 0: that of the settings
+  std::vector<int> joints;  ///< 1..7; empty: the sensitive joints
   double mass = 0.0;        ///< kg
   double load_share = 0.0;  ///< 0: that of the settings
   /// The arm carries an object. After each motion its torque differs, so the offset against the
@@ -67,8 +67,9 @@ class ContactDetector {
  public:
   ContactDetector(const DetectorSettings& settings, JacobianAt jacobian);
 
-  /// Uses these settings from the next sample on; what is armed keeps its k and its share of the
-  /// load. `cutoff`, `window` and `learn_samples` stay as they were: what was learnt hangs on them.
+  /// Uses these settings from the next sample on. An armed request keeps its k and load share.
+  /// `cutoff`, `window` and `learn_samples` do not change, because the learnt noise depends on
+  /// them.
   void tune(const DetectorSettings& settings);
 
   /// Watches as soon as the arm stands still.
@@ -108,7 +109,7 @@ class ContactDetector {
     std::vector<int> joints;
     double mass = 0.0, load_share = 0.0;
     bool carries = false;
-    std::optional<Joints> baseline, before;  // before: baseline before somebody jolted the arm
+    std::optional<Joints> baseline, before;  // before: baseline before a jolt of the arm
     std::vector<int> watched;
     Joints threshold = Joints::Zero();  // Nm
     int over = 0;

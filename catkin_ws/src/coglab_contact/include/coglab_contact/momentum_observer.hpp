@@ -67,7 +67,7 @@ class MomentumObserver {
   /// @throws std::invalid_argument for an invalid mass.
   void setPayload(double mass, const Vector3& centre);
 
-  /// Processes one sample: s, rad, Nm. Nothing until enough consecutive samples have come.
+  /// Processes one sample: s, rad, Nm. None until enough consecutive samples have arrived.
   /// @param made  the robot's own time (s) of the measurement, if known; then the stamp, which is
   ///              late on a busy computer, is not used.
   std::optional<Residual> feed(double stamp, const Joints& position, const Joints& torque,
@@ -78,7 +78,7 @@ class MomentumObserver {
   double lag = 0.0;     ///< s by which the torques lag behind the positions of the same sample
 
  private:
-  /// What the last sample left.
+  /// State after the last sample.
   struct Past {
     std::optional<double> stamp, made;
     double grid = 0.0, step = 0.0;

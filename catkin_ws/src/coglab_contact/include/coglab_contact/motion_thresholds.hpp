@@ -49,8 +49,8 @@ struct PalmForce {
 /// The force on the palm that explains joint torques (Nm) with these standard deviations (Nm).
 PalmForce explained(const Joints& torque, const Joints& deviation, const PalmJacobian& jacobian);
 
-/// The force (N, base frame) on the palm that explains joint torques (Nm) best. A direction that
-/// the joints feel less than a twentieth as much as the clearest one counts as not felt.
+/// The force (N, base frame) on the palm that explains joint torques (Nm) best. Directions whose
+/// effect on the joints is below a twentieth of the largest are ignored.
 Vector3 forceOnPalm(const PalmJacobian& jacobian, const Joints& torque);
 
 /// Learnt values; see coglab_contact.motion_thresholds.Thresholds.
@@ -75,8 +75,8 @@ class ChangeOfResidual {
   /// Deletes the past.
   void reset();
 
-  /// Processes one residual with the payload `load` (kg) and the palm's Jacobian there. Nothing
-  /// until there is a reference mean.
+  /// Processes one residual with the payload `load` (kg) and the palm's Jacobian there. None until
+  /// there is a reference mean.
   std::optional<Change> feed(const Residual& residual, double load, const PalmJacobian& jacobian);
 
   /// Nm, mean of the samples between 0.1 and 0.25 s ago: fewer samples than for the change.

@@ -16,8 +16,8 @@ using PalmJacobian = Eigen::Matrix<double, 3, 7>;
 /// Converts joint positions (rad) to the palm's Jacobian.
 using JacobianAt = std::function<PalmJacobian(const Joints&)>;
 
-/// s, averaging time of what is measured at rest, at any sample period: a push of this length is
-/// not forgotten.
+/// s, averaging time of measurements at rest, at any sample period. A push of this length still
+/// counts.
 constexpr double kRemembered = 0.25;
 
 }  // namespace coglab_contact

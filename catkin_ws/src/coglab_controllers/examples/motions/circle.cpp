@@ -1,5 +1,4 @@
-// The hand draws one circle in the plane across its pointing direction and comes back to where it
-// began.
+// The hand moves along one circle in the plane perpendicular to its pointing direction.
 #include <cmath>
 
 #include "coglab_controllers/motion/custom_motion_controller.hpp"

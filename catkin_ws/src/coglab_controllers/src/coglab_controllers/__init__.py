@@ -2,7 +2,7 @@
 
 Units are SI, quaternions are ``x y z w``, joints are in wire order (lwr_a1 lwr_a2 lwr_e1 lwr_a3 lwr_a4 lwr_a5
 lwr_a6). Arrays are numpy arrays of float64. Wrong input raises ``ValueError`` (or ``LibraryError``, a
-``ValueError``) that says what was expected and what came.
+``ValueError``) with the expected and the received value.
 """
 
 from pkgutil import extend_path

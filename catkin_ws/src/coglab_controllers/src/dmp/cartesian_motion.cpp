@@ -10,27 +10,28 @@
 namespace coglab_controllers {
 namespace {
 
-// Below this the set-point is put to rest at the latched goal (m/s and m); far less than an encoder
+// Below both (m/s and m) the set-point is set to rest at the latched goal. Far below an encoder
 // step.
 constexpr double kRestSpeed = 1e-4, kRestDistance = 1e-4;
 
-// Share of the motion after which the goal is drawn back less and less.
+// Share of the motion after which the shift of the goal by the approach decreases.
 constexpr double kApproachBegins = 0.5;
 
-// Share of the approach by which the goal is drawn back: from 1 to 0 as minimum-jerk motions go.
+// Share of the approach by which the goal is shifted back: from 1 to 0 along a minimum-jerk curve.
 double drawnBack(double progress) noexcept {
   const double p = std::clamp((progress - kApproachBegins) / (1.0 - kApproachBegins), 0.0, 1.0);
   return 1.0 - p * p * p * (10.0 + p * (6.0 * p - 15.0));
 }
 
-// Of a roll-out.
-constexpr double kStep = 0.01;     // s of the motion's own time; longer in a long motion, so
-constexpr double kSteps = 400.0;   // that a duration costs so many steps at most
-constexpr double kThere = 1e-3;    // m from the goal at which a motion that has ended is drawn to
-constexpr double kLongest = 3.0;   // durations after which a motion is left as it is
-constexpr double kShortest = 2.0;  // s, the least time to come to rest
+// Parameters of a roll-out.
+constexpr double kStep = 0.01;    // s of motion time; longer for long motions, so that
+constexpr double kSteps = 400.0;  // a duration takes at most this many steps
+constexpr double kThere =
+    1e-3;  // m, distance from the goal at which the roll-out of an ended motion stops
+constexpr double kLongest = 3.0;   // durations, longest roll-out
+constexpr double kShortest = 2.0;  // s, shortest time limit
 
-/// Every n-th entry, so that at most kPathPoints steps are left, and the last one.
+/// Every n-th entry, so that at most kPathPoints steps remain, and the last one.
 TimedPath thinned(const TimedPath& path) {
   const std::size_t count = path.times.size();
   if (count <= kPathPoints + 1) return path;
@@ -99,8 +100,7 @@ void CartesianMotion::switchTo(const DmpPlan& plan, const Pose& goal) noexcept {
   settled_ = false;
 }
 
-/// By how much the clock has to be slowed for the set-point to come to the goal no faster than it
-/// may.
+/// Clock rate at which the set-point keeps its arrival speed near the goal.
 double CartesianMotion::arrivalRate(const Vector3& goal) const noexcept {
   if (arrival_speed_ <= 0.0) return 1.0;
   const double way = std::max(0.0, (dmp_.state().position - goal).norm() - kSlowWay);
@@ -121,7 +121,7 @@ const CartesianReference& CartesianMotion::step(double dt, const Pose& goal, dou
   if (phase_ == Phase::Ended) {
     arrival_rate_ = arrivalRate(goal_);
   } else {
-    // g and g' at the beginning of the cycle go into eq. (1); the filter then follows to its end.
+    // Eq. (1) uses g and g' at the beginning of the cycle. The filter then advances to its end.
     goal_ = filter_.enabled() ? filter_.position() : goal.position;
     goal_velocity = filter_.velocity();
     arrival_rate_ = arrivalRate(goal_);
@@ -144,7 +144,7 @@ const CartesianReference& CartesianMotion::step(double dt, const Pose& goal, dou
   orientation_ = orientation.normalized();
   remaining_distance_ = (goal.position - state.position).norm();
 
-  // Seen on the clock of the motion: a motion that is slowed to a standstill has not ended.
+  // Speeds per motion time: a motion that is slowed to a standstill has not ended.
   const double clock = std::max(rate * arrival_rate_, 1e-3);
   const double turning =
       reference_.orientation_control ? reference_.angular_velocity.norm() / clock : 0.0;
@@ -156,7 +156,7 @@ const CartesianReference& CartesianMotion::step(double dt, const Pose& goal, dou
   return reference_;
 }
 
-/// Latches the goal when the motion has arrived, and follows one again that goes away for good.
+/// Latches the goal when the motion has arrived. Follows it again if it leaves its ball.
 CartesianMotion::Event CartesianMotion::watchEnd(double dt, double speed, double turning,
                                                  const Vector3& received) noexcept {
   if (phase_ != Phase::Ended) {

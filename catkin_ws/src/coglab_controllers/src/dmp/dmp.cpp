@@ -9,16 +9,16 @@ namespace coglab_controllers {
 namespace {
 
 // Longest sub-step of the integration, as a share of the fastest time constant of the linear part
-// and of the distance in time of two basis functions: the error of a whole motion is then some
-// micrometres at most, whatever the cycle time.
+// and of the time between two basis functions. The error of a whole motion is then at most a few
+// micrometres for any cycle time.
 constexpr double kPoleShare = 0.1, kBasisShare = 0.5;
 
 // Basis functions are summed up in packets of this size.
 constexpr int kPacket = 4;
-// Exponent below which a basis function is less than the rounding of the sum.
+// Exponent below which a basis function is smaller than the rounding of the sum.
 constexpr double kNegligible = -40.0;
 
-// Phase of a motion that has ended: nothing is left of its shape.
+// Phase of an ended motion: its shape has no effect any more.
 constexpr double kEndPhase = 1e-6;
 
 }  // namespace
@@ -42,7 +42,7 @@ Dmp::Dmp(const Primitive& primitive) : Dmp() {
   shape_.centres.head(count) = primitive.centres;
   shape_.widths.head(count) = primitive.widths;
   shape_.weights.topRows(count) = primitive.weights.transpose();
-  // Whole packets: the spare ones are so far away that their share is zero.
+  // Whole packets: the spare basis functions are so far away that their share is zero.
   shape_.count = (count + kPacket - 1) / kPacket * kPacket;
   for (int i = count; i < shape_.count; ++i) {
     shape_.centres[i] = 100.0;
@@ -50,7 +50,7 @@ Dmp::Dmp(const Primitive& primitive) : Dmp() {
   }
 }
 
-/// Turns and scales the learnt shape from the demonstration's start-goal line to this one.
+/// Rotates and scales the learnt shape from the demonstrated start-goal line to the present one.
 void Dmp::mapShape(const Vector3& goal) noexcept {
   shape_map_ = shapeMap(shape_.mapping, shape_.demonstrated_line, goal - start_);
 }
@@ -104,8 +104,7 @@ const DmpState& Dmp::step(double dt, const Vector3& goal, const Vector3& goal_ve
                           double rate) noexcept {
   const double total = dt * rate;
   if (!(total > 0.0)) return state_;
-  // Seen from a slowed clock the goal moves faster; a clock that nearly stands does not run after
-  // it.
+  // In motion time of a slowed clock the goal moves faster. The factor is at most 10.
   const Vector3 goal_rate = goal_velocity / std::max(rate, 0.1);
   const double pole = tau_ / std::max(std::sqrt(stiffness()), 0.5 * damping());
   const double longest = std::min(kPoleShare * pole, kBasisShare * tau_ / shape_.count);

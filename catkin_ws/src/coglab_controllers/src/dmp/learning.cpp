@@ -13,11 +13,11 @@ namespace {
 
 // Integration steps per duration.
 constexpr int kGridSteps = 600;
-// How long after its end a motion must stay at the goal, in durations, and what that weighs against
-// the motion itself.
+// Time for which a motion must stay at the goal after its end, in durations, and the weight of this
+// part relative to the motion.
 constexpr double kHoldShare = 0.3, kHoldWeight = 0.3;
-// A demonstration rests at an end where it is slower than this share of its mean speed, over this
-// share of its samples: what noise there is must not be learnt as a start in motion.
+// A demonstration is at rest at an end if it is slower than this share of its mean speed, over this
+// share of its samples. Noise must not be learnt as a start velocity.
 constexpr double kRestingSpeed = 0.1, kRestingWindow = 0.05;
 
 // One demonstration, prepared: time from its start, the goal is its last point.
@@ -29,9 +29,8 @@ struct Example {
   bool starts_at_rest, ends_at_rest;
 };
 
-// Response of the linear system to everything it is linear in, column by column:
-// the basis functions, the goal (times w), the start (times 1 - w and as initial position), the
-// start velocity.
+// Response of the linear system to each of its inputs, one column each: the basis functions, the
+// goal (times w), the start (times 1 - w and as initial position), the start velocity.
 class Responses {
  public:
   Responses(const Primitive& primitive, double duration)
@@ -121,7 +120,7 @@ Example prepare(const Trajectory& trajectory) {
   return example;
 }
 
-// Whether the faults of this name are refused. Throws for one that is.
+// Throws for a fault unless its name is allowed.
 class Faults {
  public:
   explicit Faults(const std::vector<std::string>& allow) : allow_(allow) {
@@ -136,14 +135,14 @@ class Faults {
               const std::string& expected) const {
     if (std::find(allow_.begin(), allow_.end(), name) != allow_.end()) return;
     throw std::invalid_argument(name + ": " + what + " " + std::to_string(value) + ", expected " +
-                                expected + "; cut or record it anew, or allow '" + name + "'");
+                                expected + "; cut it, record it again, or allow '" + name + "'");
   }
 
  private:
   const std::vector<std::string>& allow_;
 };
 
-// Noise of the positions, m, from fourth differences, which a smooth path hardly has.
+// Noise of the positions, m, from fourth differences, which are small for a smooth path.
 double noiseOf(const Eigen::Matrix3Xd& p) {
   const Eigen::Index n = p.cols() - 4;
   const Eigen::Matrix3Xd fourth = p.leftCols(n) - 4.0 * p.middleCols(1, n) +
@@ -152,7 +151,7 @@ double noiseOf(const Eigen::Matrix3Xd& p) {
   return std::sqrt(fourth.squaredNorm() / (70.0 * static_cast<double>(n)));
 }
 
-// Refuses a demonstration that no person would call one reach: see DemonstrationLimits.
+// Refuses a demonstration that is not one reach; see DemonstrationLimits.
 void checkReach(const Example& example, const Faults& faults) {
   using Limits = DemonstrationLimits;
   const Eigen::Matrix3Xd& p = example.positions;
@@ -190,7 +189,7 @@ void checkReach(const Example& example, const Faults& faults) {
     faults.refuse("noisy", "its noise (m) is", noise, "at most 2 % of the way it goes");
 }
 
-// Mapped and shifted so that start and goal are those of the reference.
+// Maps and shifts the example so that its start and goal are those of the reference.
 void alignTo(const Example& reference, ShapeMapping mapping, Example& example) {
   const auto line = [](const Example& e) -> Vector3 {
     return e.positions.rightCols<1>() - e.positions.leftCols<1>();
@@ -257,8 +256,8 @@ Primitive withoutWeights(const std::string& id, const std::vector<Example>& exam
   return primitive;
 }
 
-// Least squares. Unknowns: the weights, and the start velocity of each demonstration. A column of
-// zeros, for one that starts at rest, gives zero.
+// Least squares. Unknowns: the weights, and the start velocity of each demonstration. For a
+// demonstration from rest this column is zero and gives zero.
 class Equations {
  public:
   Equations(const Primitive& primitive, const std::vector<Example>& examples)
@@ -285,7 +284,7 @@ class Equations {
   }
 
  private:
-  static constexpr int kHolds = kGridSteps / 10;  // rows that ask a motion to stay at its goal
+  static constexpr int kHolds = kGridSteps / 10;  // rows that require a motion to stay at its goal
 
   void add(const Example& example, Eigen::Index velocity_column, const Responses& responses) {
     const Eigen::RowVector3d start = example.positions.leftCols<1>().transpose();

@@ -10,8 +10,7 @@ namespace coglab_controllers {
 void OrientationCurve::start(const Quaternion& start, const Vector3& angular_velocity,
                              const Quaternion& target, double duration) noexcept {
   start_ = start.normalized();
-  // Equal first two segments: rotational velocity as given, no rotational acceleration at the
-  // beginning.
+  // Two equal first segments give the given rotational velocity and zero acceleration at the start.
   lead_ = start_.conjugate() * angular_velocity * (duration / 5.0);
   turn_.setZero();
   setTarget(target);
@@ -20,7 +19,7 @@ void OrientationCurve::start(const Quaternion& start, const Vector3& angular_vel
 void OrientationCurve::setTarget(const Quaternion& target) noexcept {
   const Quaternion after_lead = start_ * expRotation(2.0 * lead_);
   Vector3 turn = logRotation((after_lead.conjugate() * target.normalized()).normalized());
-  // Beyond half a turn the logarithm flips to the other way round: keep to the branch nearest to
+  // Beyond half a turn the logarithm changes to the opposite direction. Keep the branch nearest to
   // the present one.
   const double angle = turn.norm();
   if (angle > 1e-9 && turn_.squaredNorm() > 0.0) {
@@ -33,7 +32,7 @@ void OrientationCurve::setTarget(const Quaternion& target) noexcept {
 Quaternion OrientationCurve::at(double progress) const noexcept {
   const double u = std::clamp(progress, 0.0, 1.0), r = 1.0 - u;
   const double r2 = r * r, r3 = r2 * r, u2 = u * u;
-  // Cumulative Bernstein sums of degree five: how far each control segment has been gone through.
+  // Cumulative Bernstein sums of degree five: progress along each control segment.
   const double first = 1.0 - r3 * r2;
   const double second = first - 5.0 * u * r2 * r2;
   const double third = second - 10.0 * u2 * r3;

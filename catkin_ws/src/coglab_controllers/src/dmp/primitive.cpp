@@ -61,8 +61,8 @@ Matrix3 shapeMap(ShapeMapping mapping, const Vector3& demonstrated, const Vector
   if (mapping == ShapeMapping::Similarity || flat_from < kShortestLine || flat_to < kShortestLine) {
     return scale * shortestTurn(demonstrated, line).toRotationMatrix();
   }
-  // Level part turned about the vertical; heights scaled, and tilted along the way so that the end
-  // fits.
+  // Rotates the level part about the vertical, scales heights, and tilts along the line so that the
+  // end fits.
   const Vector3 ahead_from = level_from / flat_from, ahead_to = level_to / flat_to;
   const Vector3 up = Vector3::UnitZ();
   return flat_to / flat_from *

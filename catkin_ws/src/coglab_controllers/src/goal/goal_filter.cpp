@@ -34,20 +34,19 @@ void validate(const GoalFilterParameters& p) {
           "goal max angle innovation", "0 to 3.1 rad", p.max_angle_innovation);
 }
 
-// The time constant goes from one value to the other within about this time, s: g = p + 3 T g' must
-// not step.
+// s, time for a change of the time constant T, so that g = p + 3 T g' makes no step.
 constexpr double kChange = 0.3;
 
 constexpr double kNoiseMemory = 0.35;  // s
 // The speed of the noise that counts as full noise.
 constexpr double kFullNoise = 0.03;        // m/s
 constexpr double kFullTurningNoise = 0.3;  // rad/s
-// What a primitive with the usual stiffness lets pass of noise that wanders: mean square speed over
-// squared steps per second, 1/s.
+// Noise that passes a primitive with the usual stiffness: mean square speed over squared steps per
+// second, 1/s.
 constexpr double kPassed = 5.0;
 
-/// The part of an estimated rate that is more than noise of about `noisy`: nothing well below it,
-/// all of it well above, and smooth between.
+/// The part of an estimated rate that exceeds noise of about `noisy`: zero well below it, the whole
+/// rate well above it, and smooth between.
 Vector3 beyondNoise(const Vector3& rate, double noisy) {
   if (noisy <= 0.0) return rate;
   const double square = rate.squaredNorm() / (noisy * noisy);
@@ -69,10 +68,10 @@ void GoalFilter::Track::rest(double constant) noexcept {
   velocity.setZero();
 }
 
-/// One step towards an input that stays `error` away from the present value; returns the change of
-/// the value.
+/// One step towards a constant input at the distance `error`. Returns the change of the value.
 Vector3 GoalFilter::Track::advance(const Vector3& error, double dt) noexcept {
-  // d(t) = (c0 + c1 t + c2 t^2) exp(-t/T) is the way still to go, with d, d', d'' given at t = 0.
+  // The remaining distance is d(t) = (c0 + c1 t + c2 t^2) exp(-t/T), with d, d', d'' given at t =
+  // 0.
   const double k = 1.0 / time_constant, decay = std::exp(-k * dt);
   const Vector3 c0 = error;
   const Vector3 c1 = k * c0 - rate;
@@ -89,12 +88,13 @@ void GoalFilter::Track::wait(double dt) noexcept {
   if (noise_power > 0.0) noise_power *= std::exp(-dt / kNoiseMemory);
 }
 
-/// One cycle with a new frame, `step` away from the one before (m, or rad as a rotation vector).
+/// One cycle with a new frame at the distance `step` from the last one (m, or rotation vector,
+/// rad).
 void GoalFilter::Track::see(double dt, const Vector3& step, double full) noexcept {
   wait(dt);
   if (++steps >= 3) {
-    // Steps that are noise alone make a difference of six times their mean square. A goal that
-    // jumps is no noise: one frame cannot count for more than full noise.
+    // Steps of pure noise have second differences of six times their mean square. A jump of the
+    // goal is not noise, so one frame counts at most as full noise.
     const double square = (step - 2.0 * last_step + step_before).squaredNorm() / 6.0;
     noise_power += std::min(square / kNoiseMemory, full * full / kPassed);
   }
@@ -102,8 +102,8 @@ void GoalFilter::Track::see(double dt, const Vector3& step, double full) noexcep
   last_step = step;
 }
 
-/// About the speed that the noise gives to a set-point that follows the goal (root of the mean
-/// square), as a share of `full`, at most 1.
+/// Estimated speed (root mean square) that the noise causes in a set-point that follows the goal,
+/// as a share of `full`, at most 1.
 double GoalFilter::Track::noise(double full) const noexcept {
   return std::min(1.0, std::sqrt(kPassed * noise_power) / full);
 }

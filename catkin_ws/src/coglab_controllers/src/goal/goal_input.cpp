@@ -8,7 +8,7 @@ namespace coglab_controllers {
 
 namespace {
 
-/// What to add to a sentence about a goal whose newest frame was refused.
+/// Addition to a message about a goal whose newest frame was refused.
 std::string aheadNote(double ahead) {
   if (ahead <= 0.0) return "";
   return "; its newest frame is stamped " + std::to_string(ahead) +
@@ -100,14 +100,14 @@ void GoalInput::follow(const std::string& frame, const GoalObservation& first) {
   const std::lock_guard<std::mutex> lock(mutex_);
   request_number_ = first.request;
   owner_ = frame;
-  polled_ = frame.empty() ? topic_goal_ : first;  // a dmp_goal may have come meanwhile
+  polled_ = frame.empty() ? topic_goal_ : first;  // a dmp_goal may have arrived meanwhile
   polled_.request = request_number_;
   ahead_ = 0.0;
   newest_.write(polled_);
 }
 
-/// The stamp of the last goal lies ahead of the clock by which this one is stamped. It did not when
-/// it came, so that clock was set back.
+/// True if the stamp of the last goal is ahead of the clock of the present stamps. It was not ahead
+/// when it arrived, so that clock was set back.
 bool GoalInput::clockSteppedBack(const GoalObservation& newest, std::int64_t now) const {
   const std::int64_t later = topic_goal_.frame_ns - newest.frame_ns;
   return later + (newest.stamp_ns - now) > kClockTolerance_ns;
@@ -168,7 +168,7 @@ void GoalInput::poll() {
     ahead_ = 1e-9 * static_cast<double>(ahead);
     return;
   }
-  // Told apart by their own stamps: what those map to differs from one poll to the next.
+  // Compare the received stamps, because their conversions differ from one poll to the next.
   if (goal.frame_ns != 0 && !goal.isLaterThan(polled_)) return;
   goal.request = request_number_;
   polled_ = goal;

@@ -24,13 +24,14 @@ using coglab_rt::RobotSample;
 
 namespace {
 
-constexpr double kServeLimit = 1.0;  // s within which a tick takes a request
-constexpr double kBrakeLimit = 3.0;  // s within which the arm stands after `stop`
-constexpr int kLateTicks = 20;       // so many periods behind, the arm's clock starts anew
+constexpr double kServeLimit = 1.0;  // s within which a tick must process a request
+constexpr double kBrakeLimit = 3.0;  // s within which the arm must stand after `stop`
+constexpr int kLateTicks = 20;       // periods of delay after which the arm's clock restarts
 constexpr std::uint16_t kAllPower = 0x7F;
-constexpr std::int64_t kStatePeriodNs = 250'000'000;  // between two states without a change
+constexpr std::int64_t kStatePeriodNs =
+    250'000'000;  // longest time between two publications of the state
 
-/// Waits until the condition holds; false if it did not within the limit.
+/// Waits until the condition is true. Returns false after the time limit.
 template <typename Condition>
 bool waitFor(double limit, const Condition& condition) {
   const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(limit);
@@ -94,7 +95,7 @@ void IdealArmRos::start(Wake wake) {
     spinner_ = std::make_unique<ros::AsyncSpinner>(2, &queue_);
     spinner_->start();
   } catch (...) {
-    shutdown();  // nothing may run on behind the caller's back, who frees what it uses
+    shutdown();  // no thread may continue, because the caller frees the memory that it uses
     throw;
   }
   waitFor(kServeLimit, [this] { return scheduled_.load(); });
@@ -156,7 +157,7 @@ void IdealArmRos::publishLoop() {
       copy(sample.velocity, joint_message_.velocity);
       copy(sample.torque, joint_message_.effort);
       joint_states_.publish(joint_message_);
-      // Told again after a while: who looks on knows from it that the node is not silent.
+      // Published again after a while, which shows that the node is alive.
       const std::int64_t now = coglab_rt::steadyNow();
       if (now - told_ns >= kStatePeriodNs || !sameState(view, last)) {
         publishState(view);
@@ -173,7 +174,7 @@ void IdealArmRos::publishState(const IdealArmView& view) {
   coglab_msgs::LwrState& message = state_message_;
   message.header.stamp = ros::Time::now();
   message.supervisor = nameOf(view.state);
-  // What a robot controller in good order would report.
+  // The report of a robot controller without faults.
   message.fri_state = view.state == IdealArmState::Monitor ? "MON" : "CMD";
   message.quality = "PERFECT";
   message.control_mode = "POSITION";

@@ -42,13 +42,13 @@ void AxisTask::evaluate(const ChainState& state, const JointVector&,
   if (!reference.orientation_control) return;
   const Vector3 now = state.tool.orientation * axis_;
   const Vector3 wanted = reference.pose.orientation * axis_;
-  // Two directions across the axis: the rotation about it is free.
+  // Two directions perpendicular to the axis: the rotation about it is free.
   Eigen::Matrix<double, 2, 3> across;
   across.row(0) = now.unitOrthogonal().transpose();
   across.row(1) = now.cross(across.row(0).transpose()).transpose();
   const Vector3 normal = now.cross(wanted);
   const double sine = normal.norm(), angle = std::atan2(sine, now.dot(wanted));
-  // Exactly opposite: every direction across the axis is a shortest way.
+  // Exactly opposite: every perpendicular direction is a shortest way.
   const Vector3 turn = sine > 1e-9   ? Vector3(angle / sine * normal)
                        : angle > 1.0 ? Vector3(angle * across.row(0).transpose())
                                      : normal;

@@ -11,8 +11,8 @@
 namespace coglab_controllers {
 namespace {
 
-// Share of a joint's acceleration limit that the closed loop of each task may count on for braking:
-// the reference and the other task need theirs.
+// Share of a joint's acceleration limit that the closed loop of each task may use for braking. The
+// reference and the other task need the rest.
 constexpr double kBrakingShare = 0.5;
 
 using Projector = Eigen::Matrix<double, kMaxJoints, kMaxJoints>;
@@ -38,7 +38,7 @@ double largestShare(const JointVector& first, const JointVector& second,
     high = std::min(high, std::max(a, b));
   }
   if (low <= high) return high;
-  // The worst ratio is convex in a: golden section would do, thirds are simpler.
+  // The worst ratio is convex in a: search by thirds.
   low = 0.0;
   high = 1.0;
   for (int i = 0; i < 40; ++i) {
@@ -53,8 +53,8 @@ double largestShare(const JointVector& first, const JointVector& second,
   return 0.5 * (low + high);
 }
 
-// Joint velocity of the second task inside the null space of the first, eq. (11). `gain` gives the
-// gain of the closed loop for the joint motion that would take the error away.
+// Joint velocity of the second task inside the null space of the first, eq. (11). `gain` returns
+// the gain of the closed loop for the joint motion that would remove the error.
 template <int Rows, typename Gain>
 JointVector secondShare(const TaskConstraint& task, const JointVector& first,
                         const Projector& null_space, double threshold, Gain&& gain,
@@ -70,7 +70,7 @@ JointVector secondShare(const TaskConstraint& task, const JointVector& first,
   const Eigen::Matrix<double, kMaxJoints, Rows> pseudo_inverse = svd.pseudoInverse(inverse);
   const Eigen::Matrix<double, Rows, 1> residual = task.velocity.head<Rows>() - jacobian * first;
   const JointVector way = pseudo_inverse * task.error.head<Rows>();
-  // The projection once more removes what rounding has left outside the null space.
+  // The second projection removes the rounding error outside the null space.
   return null_space * (pseudo_inverse * residual + gain(way) * way);
 }
 
@@ -99,7 +99,7 @@ TwoTaskIk::TwoTaskIk(const IkParameters& parameters)
     require(("jerk_limit" + index).c_str(), parameters.jerk_limit[i], 1e-3, kInfinity);
     const double acceleration = parameters.acceleration_limit[i];
     braking_[i] = kBrakingShare * acceleration;
-    // As in Guard::speedToStop(): limited jerk costs about so much time.
+    // As in Guard::speedToStop(): approximate delay because of the limited jerk.
     lag_[i] = std::isfinite(acceleration)
                   ? parameters.reaction_time + 1.5 * acceleration / parameters.jerk_limit[i]
                   : 0.0;

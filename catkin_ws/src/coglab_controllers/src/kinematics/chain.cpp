@@ -21,7 +21,7 @@ Matrix3 toEigen(const KDL::Rotation& rotation) {
 
 Vector3 toEigen(const KDL::Vector& vector) { return Vector3(vector.x(), vector.y(), vector.z()); }
 
-// A rotation that takes z to the given unit axis, so that every joint turns about its own z.
+// A rotation that turns z to the given unit axis, so that every joint turns about its own z.
 Matrix3 zTo(const Vector3& axis) { return shortestTurn(Vector3::UnitZ(), axis).toRotationMatrix(); }
 
 }  // namespace
@@ -62,7 +62,7 @@ Chain::Chain(const std::string& urdf, const std::string& base_link, const std::s
     const Vector3 origin = toEigen(joint.JointOrigin());
     const Matrix3 to_axis = zTo(toEigen(joint.JointAxis()).normalized());
     links_[joints_] = {rotation * to_axis, translation + rotation * origin};
-    // What follows the joint at angle zero, seen from the frame whose z is the joint's axis.
+    // The rotation behind the joint at angle zero, in the frame whose z is the joint's axis.
     rotation = to_axis.transpose() * toEigen(zero.M);
     translation = to_axis.transpose() * (toEigen(zero.p) - origin);
     joint_names_.push_back(joint.getName());

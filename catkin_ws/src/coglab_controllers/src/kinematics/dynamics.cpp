@@ -13,9 +13,10 @@
 namespace coglab_controllers {
 namespace {
 
-constexpr double kTurn = 1e-4;  // rad, by which the fastest joint turns for the derivative of M
+constexpr double kTurn = 1e-4;  // rad, step of the fastest joint for the derivative of M
 
-/// Inertia of all that hangs on a segment's end with its joints at zero, in the frame of that end.
+/// Inertia of all bodies behind a segment's end with their joints at zero, in the frame of that
+/// end.
 KDL::RigidBodyInertia hangingOn(const KDL::TreeElement& element,
                                 const std::set<std::string>& without) {
   KDL::RigidBodyInertia sum = KDL::RigidBodyInertia::Zero();
@@ -27,7 +28,7 @@ KDL::RigidBodyInertia hangingOn(const KDL::TreeElement& element,
   return sum;
 }
 
-/// The chain, each segment with what hangs on it beside the chain.
+/// The chain; each segment includes the bodies attached to it beside the chain.
 KDL::Chain chainWithBranches(const std::string& urdf, const std::string& base,
                              const std::string& tip) {
   KDL::Tree tree;

@@ -8,20 +8,20 @@
 namespace coglab_controllers {
 namespace {
 
-// A joint at its stop whose outward speed is below this share of the fastest joint's, or below this
-// speed (rad/s), is stopped alone: it must not stop the arm, and turns the motion by no more than
-// the share.
+// A joint at its stop is stopped alone if its outward speed is below this share of the fastest
+// joint's speed, or below this speed (rad/s). The direction of the motion changes at most by the
+// share.
 constexpr double kNegligibleShare = 1e-3, kNegligibleSpeed = 1e-5;
 
-// Kept back of a Cartesian speed limit, m/s, at most this share: joints that follow their target
-// velocities with different lags, and the arm behind its servos, add so much for a moment.
+// m/s, margin to a Cartesian speed limit, and the largest margin as a share of the limit. Joints
+// follow their target velocities with different lags, and servos overshoot briefly.
 constexpr double kSpeedMargin = 0.035, kLargestMargin = 0.15;
 
 double bound(double speed_limit) noexcept {
   return speed_limit - std::min(kSpeedMargin, kLargestMargin * speed_limit);
 }
 
-// Speed v with which one can still stop within `room`: v^2 / (2 a) + v * lag = room.
+// Speed v from which a stop within `room` is possible: v^2 / (2 a) + v * lag = room.
 double stoppingSpeed(double room, double acceleration, double lag) noexcept {
   if (room <= 0.0) return 0.0;
   return acceleration * (std::sqrt(lag * lag + 2.0 * room / acceleration) - lag);
@@ -79,8 +79,8 @@ Guard::Guard(const GuardParameters& parameters, const Chain& chain)
 
 double Guard::speedToStop(int joint, double room) const noexcept {
   const double a = parameters_.acceleration[joint];
-  // Braking with limited jerk needs v a / (2 j) more room than v^2 / (2 a), and an arm that still
-  // speeds up takes another a / j to turn its acceleration round; for small speeds both are on the
+  // Braking with limited jerk needs v a / (2 j) more distance than v^2 / (2 a). An arm that still
+  // accelerates needs another a / j to reverse its acceleration. For small speeds both are on the
   // safe side.
   const double lag = 1.5 * a / parameters_.jerk[joint] + parameters_.reaction_time + lost_time_;
   return stoppingSpeed(room - parameters_.position_margin - rounding_, a, lag);
@@ -119,7 +119,7 @@ void Guard::limit(const ChainState& state, const JointVector& q, const JointVect
       bind(speed, allowed, GuardReason::JointPosition, i, WorkspaceBorder::None);
     }
   }
-  // 0 of a parameter: no limit of its own.
+  // A parameter of 0 is no limit.
   const auto lower = [this](double own) {
     return own > 0.0 ? std::min(own, speed_limit_) : speed_limit_;
   };
@@ -134,7 +134,7 @@ void Guard::limit(const ChainState& state, const JointVector& q, const JointVect
   std::array<Workspace::Margin, Workspace::kBorders> margins;
   workspace_.margins(chain_, state, request, margins);
   for (const Workspace::Margin& margin : margins) {
-    // A rate that is only rounding does not hold up a motion along the border.
+    // A rounding error must not stop a motion along the border.
     if (margin.rate > -1e-6) continue;
     const double allowed = stoppingSpeed(margin.distance, parameters_.workspace_deceleration,
                                          parameters_.reaction_time);

@@ -95,7 +95,7 @@ Vector3 Workspace::project(const Vector3& point) const noexcept {
   const Vector3& centre = parameters_.base_centre;
   const double radius = parameters_.base_radius;
   if ((result - centre).norm() >= radius) return result;
-  // Out of the sphere; where that leads out of the box, along the border and out again.
+  // Out of the sphere. If that leaves the box, then along its border and out of the sphere again.
   Vector3 out = result - centre;
   if (out.norm() < 1e-9) out = Vector3::UnitX();
   for (int i = 0; i < 20; ++i) {

@@ -8,13 +8,13 @@ namespace coglab_controllers {
 
 namespace {
 
-constexpr double kFastest = 1000.0;  // m/s: no limit, and a number that may be published
+constexpr double kFastest = 1000.0;  // m/s, means no limit; finite, so that it can be published
 
 bool moving(MotionState state) {
   return state == MotionState::Running || state == MotionState::Holding;
 }
 
-/// The arm follows its set-point with a delay; of the two, the one further on its way counts.
+/// The arm follows its set-point with a delay. Returns the position further along the motion.
 JointVector furthest(const RobotSample& sample, const JointVector& velocity) {
   return (velocity.array() > 0.0)
       .select(sample.position.cwiseMax(sample.commanded_position),
@@ -35,8 +35,9 @@ Reason voidReason(const RequestStamp& stamp, const CycleInput& input) noexcept {
     return Reason(ReasonCode::Cancelled, "cancelled before the motion began");
   }
   if (stamp.motion_epoch != input.robot.motion_epoch) {
-    return Reason(ReasonCode::TooLate,
-                  "the robot stopped following motions after this one was asked for; ask anew");
+    return Reason(
+        ReasonCode::TooLate,
+        "the robot stopped following motions after this request; request the motion again");
   }
   return Reason();
 }
@@ -81,8 +82,7 @@ ControlCycle::ControlCycle(std::shared_ptr<const RobotSetup> robot, FeedbackStag
   input_.dt = settings_.cycle_time;
 }
 
-/// Runs a plug-in's code; what it throws ends here. Catching costs nothing until something is
-/// thrown.
+/// Runs code of a plug-in and catches its exceptions.
 template <typename Call>
 bool ControlCycle::guarded(const char* what, Call&& call) noexcept {
   in_plugin_.store(true, std::memory_order_relaxed);
@@ -107,7 +107,7 @@ void ControlCycle::fault(const Reason& reason) noexcept {
   fault_ = true;
   fault_reason_ = reason;
   ++report_.faults;
-  // Its state may be anything now; it is told to give up, and what it does then no longer counts.
+  // Its state is unknown now. It is aborted, and its output is ignored from now on.
   guarded("abort", [this] { motion_->abort(fault_reason_); });
 }
 
@@ -129,7 +129,7 @@ void ControlCycle::adopt() noexcept {
     overruns_in_row_ = 0;
     cancelled_ = false;
     watched_ = -1;
-    // Cancels of the time when it was not the active one have nothing to end.
+    // Discard cancels from the time when it was not active.
     Reason old;
     if (cancel_ != nullptr && cancel_->take(old)) cancel_->confirm(false);
     if (motion_ != nullptr) guarded("start", [this] { motion_->start(input_); });
@@ -222,8 +222,8 @@ void ControlCycle::compute(JointVector& velocity) noexcept {
   references.states.view<kMaxJoints>(references.joint_velocity).setZero();
   references.states.view<1>(references.speed_limit)[0] = kFastest;
   if (motion_ == nullptr || fault_) return;
-  // Only the time of the motion controller itself is charged to it; feedback controllers between
-  // its two parts have their own limits.
+  // Only the time of the motion controller itself counts. Feedback controllers between its two
+  // parts have their own limits.
   const bool timed = settings_.overrun_time > 0.0;
   std::int64_t taken_ns = 0;
   const auto charged = [&](const char* what, auto&& call) {
@@ -258,7 +258,7 @@ void ControlCycle::run(const RobotSample& sample, double dt, VelocityCommand& ou
   if (fine) {
     input_.robot = sample;
     input_.dt = dt;
-    // The velocity of this cycle acts until its end: the Jacobian of its middle leads there.
+    // The velocity acts until the end of this cycle, so use the Jacobian at its middle.
     robot_->chain.evaluate(sample.position, sample.commanded_velocity, dt, input_.chain);
   }
   input_.motion_allowed = fine && sample.block == MotionBlock::None;
@@ -300,7 +300,7 @@ void ControlCycle::run(const RobotSample& sample, double dt, VelocityCommand& ou
 }
 
 bool ControlCycle::stands(const RobotSample& sample, const JointVector& velocity) noexcept {
-  // What the last cycle asked for may not have reached the set-point yet.
+  // The velocity of the last cycle may not have reached the set-point yet.
   const bool before = asked_still_;
   asked_still_ = velocity.isZero(0.0);
   return before && asked_still_ && sample.commanded_velocity.isZero(0.0) &&

@@ -45,11 +45,11 @@ void ControlThread::stop() {
 }
 
 void ControlThread::wake(bool answered) noexcept {
-  if (!answered) return;  // silence: the thread's own time-out runs idle cycles
+  if (!answered) return;  // without measurements the time-out of the thread runs idle cycles
   if (++since_wake_ < periods_.load(std::memory_order_relaxed)) return;
   since_wake_ = 0;
   int waiting = 0;
-  if (sem_getvalue(&semaphore_, &waiting) == 0 && waiting > 0) return;  // it has not come round yet
+  if (sem_getvalue(&semaphore_, &waiting) == 0 && waiting > 0) return;  // it has not run since
   sem_post(&semaphore_);
 }
 
@@ -81,8 +81,8 @@ void ControlThread::once(bool woken) {
   const double period = sample.cycle_time > 0.0 ? sample.cycle_time : target;
   periods_.store(std::max(1, static_cast<int>(std::ceil(target / period - 1e-6))),
                  std::memory_order_relaxed);
-  // By the controller's counter, because the arm moves on while measurements are lost. The first
-  // one counts as one cycle.
+  // From the controller's counter, because the arm moves while measurements are lost. The first
+  // measurement counts as one cycle.
   const double passed_time = 1e-9 * static_cast<double>(sample.controller_ns - last_controller_ns_);
   const double dt = last_sequence_ == 0 ? target : passed_time;
   last_sequence_ = sample.sequence;

@@ -32,8 +32,8 @@ bool validId(const std::string& id) {
   });
 }
 
-/// Path of the file of signals that a file of controllers or managers names; empty: none. What is
-/// wrong with that file is reported when it is loaded.
+/// Path of the file of signals named in a file of controllers or managers; empty: none. Errors in
+/// that file are reported when it is loaded.
 std::string signalsOf(const std::string& user, const ctrl_more::SearchPath& files) {
   std::string path;
   std::optional<ctrl_more::ConfigNode> file;
@@ -75,7 +75,7 @@ ManagerSettings readManagerSettings(const YAML::Node& node, const std::string& u
       const std::string package = entry.first.as<std::string>();
       if (entry.second.IsScalar()) {
         settings.types[package] = entry.second.as<std::string>();
-      } else {  // a slash in a ROS parameter's name makes a block of it
+      } else {  // a ROS parameter with a slash in its name is a block
         for (const auto& inner : entry.second) {
           settings.types[package + "/" + inner.first.as<std::string>()] =
               inner.second.as<std::string>();
@@ -101,8 +101,8 @@ ControllerManager::ControllerManager(ManagerSettings settings)
   loadSignals();
   loadManagers();
   checkOutputs(own_rows);
-  cycle_.idle(
-      now_ns());  // the stores are frozen here, which allocates, and not in the first real cycle
+  cycle_.idle(now_ns());  // freezes the stores here, because this allocates, and not in the first
+                          // real cycle
   if (!outputs_.empty()) feedback_.recordReferences();
 }
 
@@ -120,7 +120,7 @@ void ControllerManager::loadManagers() {
       report({std::string("only feedback controllers run, no other manager: ") + error.what()});
     }
   }
-  // A list of the central module's file counts instead.
+  // The list of the central module's file has priority.
   if (settings_.feedback_file.empty() || !feedback_.central().feedbackList().empty()) return;
   report(feedback_.manager().load(settings_.feedback_file).errors);
 }
@@ -162,7 +162,7 @@ void ControllerManager::checkOutputs(std::size_t own_rows) {
   }
 }
 
-/// Refuses an output of a controller, state or reference that there is not.
+/// Refuses an output of an unknown controller, state or reference.
 void ControllerManager::checkOutput(const SignalOutput& row) {
   const ctrl_more::FeedbackControllersManager& feedback = feedback_.manager();
   const auto require = [&row](const std::string& what, const std::string& name,
@@ -216,7 +216,7 @@ std::int64_t ControllerManager::now_ns() const {
 
 std::function<void()> ControllerManager::cycleWait() const {
   if (!settings_.lockstep) return {};
-  // Nobody else runs the cycle: the caller's thread adopts, between two cycles.
+  // In lockstep no other thread runs the cycle, so the caller's thread adopts between two cycles.
   ControllerManager* const self = const_cast<ControllerManager*>(this);
   return [self] { self->cycle_.idle(self->now_ns()); };
 }
@@ -234,7 +234,7 @@ std::string ControllerManager::loadedMotions() const {
   return joined(ids);
 }
 
-// Other requests do not wait for it: a plug-in's code and the ROS master may take seconds.
+// Other requests do not wait for it, because code of a plug-in and the ROS master may take seconds.
 Answer ControllerManager::load(const std::string& id, const std::string& type,
                                const Attach& attach) {
   std::shared_ptr<void> claimed;
@@ -300,8 +300,8 @@ std::shared_ptr<void> ControllerManager::claim(const std::string& id) {
           }};
 }
 
-/// The library that the parameter `types` names, else lib<package>.so of a type <package>/<class>
-/// if there is one; empty: none.
+/// The library of a type from the parameter `types`, else an existing lib<package>.so for a type
+/// <package>/<class>; empty: none.
 std::string ControllerManager::libraryOf(const std::string& type) const {
   const auto place = settings_.types.find(type);
   if (place != settings_.types.end()) return place->second;
@@ -319,7 +319,7 @@ std::string ControllerManager::libraryOf(const std::string& type) const {
 Answer ControllerManager::loadMotion(const std::string& id, const std::string& type,
                                      const Attach& attach) {
   const std::string what = "controller '" + id + "' of type '" + type + "' was not loaded: ";
-  // Outlives what is thrown below: the type of an exception may live in the library.
+  // Outlives the exceptions below, because their types may belong to the library.
   auto loaded = std::make_shared<LoadedMotion>();
   try {
     loaded->id = id;
@@ -347,7 +347,7 @@ Answer ControllerManager::loadMotion(const std::string& id, const std::string& t
     return Answer::invalid(what + error.what());
   } catch (...) {
     return Answer::refusal(ReasonCode::ControllerFault,
-                           what + "its code threw something that is no std::exception");
+                           what + "its code threw an exception not derived from std::exception");
   }
 }
 
@@ -403,7 +403,7 @@ Answer ControllerManager::unload(const std::string& id, const Detach& detach) {
           ReasonCode::UnknownName,
           "controller_id '" + id + "' is not loaded; loaded: " + loadedMotions());
     }
-    // As ordered, and as the cycle last told: a switch may not have come into effect yet.
+    // Check the requested and the reported one, because a switch may not be in effect yet.
     if (id == active_id_ || id == now.active.c_str()) {
       return Answer::refusal(ReasonCode::Busy,
                              "'" + id +
@@ -412,9 +412,9 @@ Answer ControllerManager::unload(const std::string& id, const Detach& detach) {
     }
     gone = *found;
     motions_.erase(found);
-    loading_.insert(id);  // the id is free again when all of it is gone
+    loading_.insert(id);  // the id stays reserved until the controller is destroyed
   }
-  // Requests that are under way end first, and they may need the lock.
+  // Running requests end first, and they may need the lock.
   if (detach) detach(gone);
   gone.reset();
   const std::lock_guard<std::mutex> lock(table_);
@@ -422,8 +422,8 @@ Answer ControllerManager::unload(const std::string& id, const Detach& detach) {
   return {};
 }
 
-/// What a switch to this controller runs; refused if it cannot, with a note if there is nothing to
-/// do.
+/// Fills the plan for a switch to this controller. Refused if that is not possible; with a note if
+/// no switch is needed.
 Answer ControllerManager::planSwitch(const std::string& id, CyclePlan& plan, std::string& type) {
   const std::lock_guard<std::mutex> lock(table_);
   type.clear();
@@ -454,7 +454,7 @@ Answer ControllerManager::switchTo(const std::string& id, std::string& type) {
   auto plan = std::make_unique<CyclePlan>();
   const Answer planned = planSwitch(id, *plan, type);
   if (!planned.success || !planned.message.empty()) return planned;
-  // The profile of its name is prepared here and begins in the cycle that switches.
+  // The profile of the same name is prepared here and begins in the cycle of the switch.
   ctrl_more::FeedbackControllersManager& feedback = feedback_.manager();
   std::string note;
   ctrl_more::Status prepared;
@@ -544,7 +544,7 @@ std::string ControllerManager::notAdopted(PlanOutcome outcome) const {
          "; the request was withdrawn and has no effect";
 }
 
-// ---- requests of motions: whether one is welcome, and how one is cancelled
+// ---- requests for motions and cancels
 
 Answer ControllerManager::motionWelcome(const std::string& controller_id,
                                         const CycleReport& now) const {
@@ -560,7 +560,7 @@ Answer ControllerManager::motionWelcome(const std::string& controller_id,
     return Answer::refusal(ReasonCode::ControllerFault, "controller '" + controller_id +
                                                             "' is at fault: " + now.reason.str() +
                                                             "; call switch_controller with '" +
-                                                            controller_id + "' to start it afresh");
+                                                            controller_id + "' to restart it");
   }
   if (now.samples == 0) {
     return Answer::refusal(ReasonCode::StaleJointState,
@@ -587,7 +587,7 @@ MotionRequest ControllerManager::beginRequest(const std::string& controller_id) 
   {
     const std::lock_guard<std::mutex> lock(table_);
     if (const LoadedMotion* motion = find(controller_id)) {
-      // Before the wait for the lock: a cancel that comes meanwhile makes this request void.
+      // Before the wait for the lock: a cancel during the wait makes this request void.
       request.stamp.cancels = motion->cancel->newest();
     }
   }
@@ -621,12 +621,12 @@ bool ControllerManager::cancelEnded(const CancelOrder& order, CancelAnswer& answ
         Answer::refusal(ReasonCode::UnknownName, "controller_id '" + order.id + "' is not loaded");
     return true;
   }
-  // Asked before the report is read, which is then that of the cycle before the one that served it,
-  // or newer: if the arm stands by that, it stands.
+  // Read before the report. The report is then at most one cycle older than the cycle that served
+  // the cancel, so its state of rest is valid.
   const bool served = order.cancel->served(order.number);
   const CycleReport now = report();
   const bool active = order.id == now.active.c_str();
-  // The cycle that was under way when the cancel came may not have seen it.
+  // A cycle that was running when the cancel arrived may not have processed it.
   if (active ? !served : now.cycles < order.cycles + 2) return false;
   answer.was_running = order.cancel->endedMotion(order.number);
   if (!answer.was_running) answer.message = "no motion of '" + order.id + "' was running";

@@ -14,8 +14,8 @@ using ctrl_more::ControllerStatus;
 using ctrl_more::PauseCause;
 using ctrl_more::Status;
 
-// Reads the character that begins at `place` and moves on; false if the bytes are no UTF-8, which
-// longer forms than needed, surrogates and numbers above 0x10ffff are not either.
+// Reads the character at `place` and advances. False if the bytes are not UTF-8; overlong forms,
+// surrogates and numbers above 0x10ffff are not UTF-8 either.
 bool readCharacter(const std::string& text, std::size_t& place, std::uint32_t& character) {
   const auto byte = [&](std::size_t i) { return static_cast<std::uint8_t>(text[i]); };
   const std::uint8_t first = byte(place++);
@@ -34,8 +34,8 @@ bool readCharacter(const std::string& text, std::size_t& place, std::uint32_t& c
   return shortest && character <= 0x10ffff && !(character >= 0xd800 && character <= 0xdfff);
 }
 
-// Control characters, breaks of lines and paragraphs, marks that turn the writing direction: what
-// changes how the rest of a line is shown.
+// Characters that change the display of the rest of a line: control characters, breaks of lines and
+// paragraphs, marks of writing direction.
 bool steersTheDisplay(std::uint32_t c) {
   return c < 0x20 || (c >= 0x7f && c < 0xa0) || c == 0x61c || c == 0x200e || c == 0x200f ||
          (c >= 0x2028 && c <= 0x202e) || (c >= 0x2066 && c <= 0x2069);
@@ -53,7 +53,7 @@ Status badReason(const std::string& what) {
 
 bool fits(const ControllerStatus& controller, const std::string& reason) {
   for (std::size_t i = 0; i < controller.reasons.size(); ++i) {
-    // A fault stands there in words; it is withdrawn by the word alone.
+    // A fault is listed with its text, but is withdrawn by the reason "fault".
     if (controller.causes[i] == PauseCause::Fault ? reason == "fault"
                                                   : reason == controller.reasons[i]) {
       return true;

@@ -8,9 +8,9 @@ namespace coglab_controllers {
 
 namespace {
 
-constexpr double kFarthest = 10.0;  // m, of the workspace; a number in mm is larger
+constexpr double kFarthest = 10.0;  // m, largest workspace coordinate; detects numbers in mm
 
-/// Limits count for the joints of the chain in their order. @throws std::runtime_error otherwise
+/// Checks that the table has the joints of the chain in the same order. @throws std::runtime_error
 void requireJointsOf(const Chain& chain, const coglab_rt::JointLimits& table) {
   const std::vector<std::string>& names = chain.jointNames();
   for (std::size_t joint = 0; joint < names.size(); ++joint) {

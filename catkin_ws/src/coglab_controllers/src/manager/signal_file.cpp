@@ -115,7 +115,7 @@ SignalPick pickOf(const ConfigNode& node, const std::string& text, const SignalT
   return pick;
 }
 
-/// Number of doubles of a pick; 0 if only the message knows.
+/// Number of doubles of a pick; 0 if it depends on the message.
 std::size_t sizeOf(const SignalPick& pick, const SignalField& field) {
   if (!pick.parts.empty()) return pick.parts.size();
   if (!pick.joints.empty()) return pick.joints.size();
@@ -126,7 +126,7 @@ void readFields(const ConfigNode& row, SignalInput& input) {
   const ConfigNode& node = required(row, "field");
   std::vector<std::string> fields;
   if (node.kind() == ConfigNode::Kind::List) {
-    // [position[a, b], velocity] is YAML's list in a list; one text is clearer.
+    // YAML parses [position[a, b], velocity] as a list in a list; split the text instead.
     for (const ConfigNode& item : node.items()) fields.push_back(item.text("an element of field"));
   } else {
     fields.push_back(node.text("field"));

@@ -15,7 +15,7 @@ bool hasQuaternion(const SignalField& field) {
   return field.name == "orientation" || field.name == "pose";
 }
 
-/// Copies the numbers of one pick to the end of `values`. Returns what the message lacks.
+/// Appends the numbers of one pick to `values`. Returns the error; empty: none.
 std::string gather(const SignalPick& pick, const SignalField& field, const SignalMessage& message,
                    std::vector<double>& values) {
   const SignalMessage::Field& given = message.fields[pick.field];
@@ -110,7 +110,7 @@ SignalPost SignalInputs::post(std::size_t index, const SignalMessage& message,
             "arrival`"};
   }
   const std::int64_t before = box.newest.load(std::memory_order_relaxed);
-  // Also where a stamp converts to a time before the clock's beginning.
+  // Also refuses a stamp that converts to a time before the start of the clock.
   if (stamp < 0 || stamp <= before || now_ns - stamp > nanoseconds(row.max_age)) {
     return {SignalRefusal::Past,
             stamp < 0 || now_ns - stamp > nanoseconds(row.max_age)

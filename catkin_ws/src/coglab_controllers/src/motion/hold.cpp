@@ -8,14 +8,14 @@
 namespace coglab_controllers {
 
 namespace {
-constexpr double kStill = 1e-3;     // rad/s: slower than this the arm counts as standing
-constexpr double kTogether = 0.02;  // rad/s: slower than this each joint brakes as it can
-// Share of its speed that the slowest joint has left when each goes on to brake as it can: none is
-// to stand later than that one.
+constexpr double kStill = 1e-3;     // rad/s, speed below which the arm counts as standing
+constexpr double kTogether = 0.02;  // rad/s, speed below which each joint brakes alone
+// Share of its initial speed at which the slowest joint and then all others brake alone. No joint
+// may stop later than the slowest one.
 constexpr double kSlow = 0.3;
-// Share of the slowest joint's time from which a joint brakes as it can, too.
+// A joint that needs at least this share of the slowest joint's time also brakes alone.
 constexpr double kAsSlow = 0.8;
-// Share of its limit from which an acceleration counts as one.
+// Share of its limit above which an acceleration is not neglected.
 constexpr double kSpeedingUp = 0.02;
 }  // namespace
 
@@ -51,7 +51,7 @@ void StartBlend::advance(double dt) noexcept {
 JointVector Hold::braked(const RobotSample& robot, const coglab_rt::JointLimits& limits) noexcept {
   const auto velocity = robot.commanded_velocity.array();
   if (begins_) {
-    // A joint that still speeds up must not be held up in taking that back.
+    // A joint that still accelerates must be free to reduce its acceleration.
     const auto speeding = robot.commanded_acceleration.array() * velocity.sign();
     if ((speeding > kSpeedingUp * limits.acceleration.array()).any()) return JointVector::Zero();
     begins_ = false;
@@ -67,7 +67,7 @@ JointVector Hold::braked(const RobotSample& robot, const coglab_rt::JointLimits&
     share_ = 1.0;
   }
   if (std::abs(from_[slowest_]) < kTogether || share_ < kSlow) return JointVector::Zero();
-  // Three cycles ahead, as the slowest joint goes on: the others are not to stand later than it.
+  // Three cycles ahead of the slowest joint, so that the others do not stop later than it.
   const double now = std::clamp(velocity[slowest_] / from_[slowest_], 0.0, 1.0);
   const JointVector wanted = std::clamp(now - 3.0 * (share_ - now), 0.0, 1.0) * from_;
   share_ = now;

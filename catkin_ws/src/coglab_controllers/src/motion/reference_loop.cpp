@@ -8,7 +8,7 @@ namespace coglab_controllers {
 
 using Space = MotionReference::Space;
 
-// m/s: a hand that limits have kept from its set-point comes back beside a person.
+// m/s, return speed of a hand that limits kept from its set-point; a person may be near.
 constexpr double kCorrectionSpeed = 0.3;
 
 Reason Arrival::handStuck(double away) noexcept {
@@ -16,7 +16,8 @@ Reason Arrival::handStuck(double away) noexcept {
          << away << " m are left; is the arm blocked?";
 }
 
-// The second task of `second_task`; none for the orientation, which TwoTaskIk has itself.
+// Makes the second task of the parameter `second_task`; null for the orientation, which TwoTaskIk
+// contains.
 void ReferenceLoop::configureSecondTask(const Parameters& parameters, double largest_gain) {
   const std::string task =
       parameters.choice("second_task", "orientation", {"orientation", "axis", "posture", "none"});
@@ -90,13 +91,13 @@ void ReferenceLoop::write(const CycleInput& input, const MotionReference& refere
                           References& references) noexcept {
   const Space before = reference_.space;
   reference_ = reference;
-  // Corrections end at once when the arm is to rest, and it may be moved by hand until it no longer
-  // is: in both cases it holds where it is then.
+  // Corrections end at once when the arm must rest. While it rests it may be moved by hand. In both
+  // cases it holds its position at that time.
   const bool anew = input.resting != resting_;
   resting_ = input.resting;
   if (reference.space == Space::Rest) {
     if (before != Space::Rest || anew) hold_.begin();
-    // A correction that ends in this cycle is part of where the arm rests.
+    // A correction that ends in this cycle is part of the rest position.
     if (anew && input.resting) correction_ = {};
     hold_.computeReference(input, *robot_, correction_, references);
     pose_ = references.states.view<7>(references.pose);
@@ -106,7 +107,7 @@ void ReferenceLoop::write(const CycleInput& input, const MotionReference& refere
   if (reference.space == Space::Joint) {
     references.states.view<kMaxJoints>(references.joint_position) = reference.joint_position;
     references.states.view<kMaxJoints>(references.joint_velocity) = reference.joint_velocity;
-    // The pose where the tool is, for feedback controllers that look at it.
+    // The present pose of the tool, for feedback controllers that use it.
     writePose(references, input.chain.tool);
     references.states.view<6>(references.twist).setZero();
   } else {
@@ -129,7 +130,7 @@ void ReferenceLoop::beginBlend(const CycleInput& input) noexcept {
                rotationBetween(measured.orientation, reference.orientation), JointVector::Zero());
 }
 
-/// Fades to gains that were changed.
+/// Fades to changed gains.
 void ReferenceLoop::takeGains(double dt) noexcept {
   if (joint_gain_ != nullptr) gain_ = joint_gain_->step(dt);
   if (position_gain_ == nullptr) return;

@@ -1,4 +1,4 @@
-// Requests of the DMP plug-in: checked here, outside the cycle, and turned into plans.
+// Requests of the DMP plug-in: checked outside the cycle and converted to plans.
 #include "coglab_controllers/plugins/dmp_controller.hpp"
 
 #include <algorithm>
@@ -14,7 +14,7 @@ namespace coglab_controllers {
 namespace {
 
 constexpr double kFastestStart = 2.0;  // m/s
-constexpr double kOnBorder = 1e-3;     // m that a path may be outside of the workspace
+constexpr double kOnBorder = 1e-3;     // m, largest distance of a path outside the workspace
 
 std::string text(const Vector3& v) {
   std::ostringstream out;
@@ -132,13 +132,13 @@ Answer DmpController::predict(const DmpRequest& request, PredictedPath& path) {
   return checked.success ? rollOutPlan(plan, true, path) : checked;
 }
 
-/// The path of a plan from where the arm is commanded to be; refused if it leaves the workspace.
+/// The path of a plan from the commanded position; refused if it leaves the workspace.
 Answer DmpController::rollOutPlan(const DmpPlan& plan, bool at_rest, PredictedPath& path) {
   CycleInput input;
   input.robot = setup().host->robotSnapshot();
   if (input.robot.sequence == 0) {
     return Answer::refusal(ReasonCode::RobotDisconnected,
-                           "no joint state has come yet; is the arm there?");
+                           "no joint state from the arm yet; start the robot's interface first");
   }
   const ChainState arm = setup().robot->chain.evaluate(input.robot.commanded_position);
   SetPoint from;
@@ -158,7 +158,7 @@ Answer DmpController::rollOutPlan(const DmpPlan& plan, bool at_rest, PredictedPa
   return checked;
 }
 
-/// Why a demonstration is too small for this way; empty: it is not.
+/// Reason if the demonstration is too short for this distance, or empty.
 Reason DmpController::scaledTooFar(const DmpPlan& plan, const Vector3& start,
                                    const Vector3& goal) const {
   const double shown = plan.dmp.demonstratedLine().norm(), way = (goal - start).norm();
@@ -169,7 +169,8 @@ Reason DmpController::scaledTooFar(const DmpPlan& plan, const Vector3& start,
          << " times (max_scale); choose another primitive";
 }
 
-/// A path may come in from outside, but not go out; near its end the motion ends well at a border.
+/// A path may enter the workspace but not leave it. Near its end a violation is accepted, because
+/// the motion then stops at the border.
 Answer DmpController::checkPath(const DmpPlan& plan, const Vector3& hand,
                                 const TimedPath& path) const {
   const Workspace& workspace = setup().robot->workspace;
@@ -193,7 +194,7 @@ Answer DmpController::checkPath(const DmpPlan& plan, const Vector3& hand,
   return {};
 }
 
-/// Checks a request and builds the plan of it.
+/// Checks a request and builds its plan.
 Answer DmpController::makePlan(const DmpRequest& request, bool execute, DmpPlan& plan) {
   try {
     const std::lock_guard<std::mutex> lock(library_mutex_);
@@ -229,7 +230,7 @@ Answer DmpController::makePlan(const DmpRequest& request, bool execute, DmpPlan&
   return checked;
 }
 
-/// Whether the goal is where the hand can be, and a given start where it is.
+/// Checks that the hand can be at the goal, and that a given start is near the hand.
 Answer DmpController::checkReach(const DmpPlan& plan) const {
   const Workspace& workspace = setup().robot->workspace;
   const Pose& to_base = plan.base_from_dmp;

@@ -9,9 +9,9 @@ namespace coglab_controllers {
 
 namespace {
 
-// After the end the loop is opened once the hand is this close (m) and turned this close (rad), or
-// after kRestTime (s), slowly, in kFadeTime (s): a hand that still turns then would leave its place
-// if each joint braked by itself.
+// After the end the loop opens when the errors are below kRestError (m) and kRestAngle (rad), or
+// after kRestTime (s). It opens slowly, in kFadeTime (s): if each joint of a turning hand braked
+// alone, the hand would leave its place.
 constexpr double kRestError = 3e-4;
 constexpr double kRestAngle = 3e-3;
 constexpr double kRestTime = 0.5;
@@ -63,7 +63,7 @@ void DmpCycle::configure(MotionConfiguration& configuration) {
   arrive_distance_ = parameters.number("arrive_distance", arrive_distance_, 1e-4, 0.5);
   arrival_.configure(parameters);
   frame_limits_ = readGoalLimits(parameters);
-  // A goal on dmp_goal is meant as it is, also when it is far from the last one.
+  // A goal on dmp_goal is followed even if it is far from the last one.
   topic_limits_ = frame_limits_;
   topic_limits_.max_age = parameters.number("goal_timeout", 0.0, 0.0, 3600.0);
   topic_limits_.max_jump = std::numeric_limits<double>::infinity();
@@ -95,7 +95,7 @@ void DmpCycle::start(const MotionStart<DmpPlan>& start) {
   stage_ = DmpStage::Travel;
 }
 
-/// switch_dmp: the goal, its owner and the approach are kept.
+/// switch_dmp: goal, goal frame and approach stay unchanged.
 void DmpCycle::substitute(const DmpPlan& plan) {
   plan_.primitive = plan.primitive;
   plan_.base_from_dmp = plan.base_from_dmp;
@@ -107,8 +107,7 @@ void DmpCycle::substitute(const DmpPlan& plan) {
 }
 
 void DmpCycle::execute(const MotionStart<DmpPlan>& start) {
-  // Where the motion begins: on the set-point of the motion it replaces, else on the commanded
-  // state.
+  // The motion begins at the set-point of the motion that it replaces, else at the commanded state.
   plan_ = start.request;
   const Quaternion& turn = dmp_from_base_.orientation;
   Pose pose = dmp_from_base_ * start.from.pose;
@@ -188,8 +187,7 @@ void DmpCycle::watchGoal(const CycleInput& input) {
   const Pose wanted = plan_.handAt(limits_.goal());
   goal_ = inWorkspace(wanted, projected_);
   const Vector3 hand = (dmp_from_base_ * input.chain.tool).position;
-  // After the end the motion stands at the goal it latched; newer sights differ from it by their
-  // noise.
+  // After the end the motion stays at the latched goal; newer observations differ by noise.
   const bool travels = stage_ == DmpStage::Travel;
   remaining_distance_ = ((travels ? wanted.position : motion_.goal()) - hand).norm();
   const Reason away = limits_.checkBounds(input.dt);
@@ -205,7 +203,7 @@ void DmpCycle::judgeGoal() {
   const double ahead = goals_.ahead();
   reason_.clear();
   switch (limits_.state()) {
-    case GoalLimits::State::Unsettled:  // never of a motion, which begins with a goal
+    case GoalLimits::State::Unsettled:  // impossible here: a motion begins with a goal
     case GoalLimits::State::Fresh:
       if (projected_) {
         reason_ = Reason(ReasonCode::GoalOutsideWorkspace, "the goal is outside the workspace (")
@@ -256,7 +254,7 @@ void DmpCycle::computeReference(const MotionCycle& cycle, MotionReference& refer
   if (loopClosed()) write(reference, cycle.input.dt);
 }
 
-/// Whether the hand stands at the goal, so that the arm can be left standing.
+/// Checks whether the hand stands at the goal, so that the loop can open.
 void DmpCycle::comeToRest(const IkResult& last) {
   const bool there = last.position_error.norm() < kRestError &&
                      last.rotation_error.norm() < kRestAngle && reference_.velocity.norm() < 1e-6;
@@ -277,7 +275,7 @@ void DmpCycle::followEnd(const MotionCycle& cycle) {
       break;
   }
   if (stage_ != DmpStage::Arrive) return;
-  // The set-point is at the goal; the motion has reached it when the hand, as measured, is too.
+  // The set-point is at the goal. The motion ends when the measured hand is there too.
   const double away = cycle.last.position_error.norm();
   switch (arrival_.update(cycle.input.dt, away, arrive_distance_)) {
     case Arrival::State::Waiting:
@@ -306,7 +304,7 @@ void DmpCycle::write(MotionReference& reference, double dt) {
   reference.share = std::clamp(1.0 - (since_reached_ - kRestTime) / kFadeTime, 0.0, 1.0);
 }
 
-// ---- what it tells
+// ---- reports
 // -------------------------------------------------------------------------------
 
 DmpProgress DmpCycle::progress(std::int64_t stamp_ns, MotionState state,

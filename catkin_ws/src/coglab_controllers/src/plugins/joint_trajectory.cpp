@@ -11,21 +11,21 @@ namespace coglab_controllers {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kJoinTime = 0.5;     // s in which a difference at the start fades
-constexpr double kJoinShare = 0.2;    // of the arm's acceleration that this may take
-constexpr double kLatest = 1.0;       // s after its stamp that a trajectory may begin
-constexpr double kEarliest = 0.05;    // s before its stamp: two clocks differ by so much
-constexpr double kLongest = 3600.0;   // s
-constexpr double kErased = -1.0;      // a tolerance that the client takes away
-constexpr double kCheckStep = 0.005;  // s between the states that are checked
+constexpr double kJoinTime = 0.5;    // s, time in which a difference at the start fades out
+constexpr double kJoinShare = 0.2;   // share of the arm's acceleration for this fade
+constexpr double kLatest = 1.0;      // s, latest begin of a trajectory after its stamp
+constexpr double kEarliest = 0.05;   // s, earliest begin before its stamp: difference of two clocks
+constexpr double kLongest = 3600.0;  // s
+constexpr double kErased = -1.0;     // value with which a client removes a tolerance
+constexpr double kCheckStep = 0.005;  // s between checked states
 constexpr double kMostChecks = 20000.0;
-constexpr int kLeastChecks = 4;      // between two points, so that none are too close to be checked
-constexpr double kRest = 1e-3;       // rad/s: a last point slower than this is at rest
-constexpr double kRounding = 1.001;  // planners come this close to a limit
+constexpr int kLeastChecks = 4;             // smallest number of checks between two points
+constexpr double kRest = 1e-3;              // rad/s, speed below which the last point is at rest
+constexpr double kRounding = 1.001;         // tolerance for planners that use a limit exactly
 constexpr double kAccelerationSlack = 1.2;  // the arm's interpolator smooths short peaks
 
-/// Appends a number with six decimals, which show an error just beyond a tolerance, without zeros
-/// at their end. Control thread.
+/// Appends a number with six decimals (to show an error just beyond a tolerance), without trailing
+/// zeros. Control thread.
 void append(Reason& reason, double value) noexcept {
   std::uint64_t millionths = static_cast<std::uint64_t>(std::min(value, 1e9) * 1e6 + 0.5);
   reason << millionths / 1000000;
@@ -41,7 +41,7 @@ void append(Reason& reason, double value) noexcept {
 /// The motion in the control cycle.
 class TrajectoryMotion : public Motion<TrajectoryPlan> {
  public:
-  /// Number of the newest trajectory that began: the cycle no longer looks at those before it.
+  /// Number of the newest trajectory that began. The cycle no longer uses earlier ones.
   std::atomic<std::uint64_t> begun{0};
 
   void configure(MotionConfiguration& configuration) override {
@@ -81,13 +81,13 @@ class TrajectoryMotion : public Motion<TrajectoryPlan> {
 
   MotionState state() const override { return state_; }
   const Reason& reason() const override { return reason_; }
-  /// A limit blocks the motion: it has ended well if the arm is where it was to go.
+  /// Called if a limit blocks the motion. The motion has succeeded if the arm is at its goal.
   bool endIfThere(const CycleInput& input) override {
     const JointVector end = trajectory_->spline.at(kInfinity).position;
     return there_ ||
            ((end - input.robot.position).array().abs() <= trajectory_->goal.position.array()).all();
   }
-  /// True if the trajectory and the arm have come to the end.
+  /// True if the trajectory and the arm have reached the end.
   bool there() const { return there_; }
   const TrajectoryProgress& progress() const { return progress_; }
 
@@ -102,7 +102,7 @@ class TrajectoryMotion : public Motion<TrajectoryPlan> {
     return point;
   }
 
-  /// The joint that is furthest beyond a tolerance; -1: none.
+  /// The joint with the largest violation of a tolerance; -1: none.
   int beyond(const TrajectoryTolerance& tolerance, bool& speed) const noexcept {
     const JointPoint &desired = progress_.desired, &actual = progress_.actual;
     int joint = -1;
@@ -161,7 +161,7 @@ RunnerPolicy trajectoryPolicy() {
   return policy;
 }
 
-/// A sentence that is put together while the request is read, and thrown to end the reading.
+/// Error message of a request; thrown to end the reading.
 struct Refused {
   TrajectoryError error;
   ReasonCode code;
@@ -185,7 +185,7 @@ template <typename... Parts>
   refuse(TrajectoryError::InvalidGoal, ReasonCode::OutOfRange, parts...);
 }
 
-/// Reads a goal against a robot. Throws Refused.
+/// Reads a goal and checks it for a robot. Throws Refused.
 class Reader {
  public:
   Reader(const RobotSetup& robot, const TrajectoryRequest& request)
@@ -202,7 +202,7 @@ class Reader {
     if (request_.age > kLatest) {
       refuse(TrajectoryError::OldHeaderTimestamp, ReasonCode::TooLate, "the trajectory is ",
              request_.age, " s old by its stamp; allowed: ", kLatest,
-             " s; send it anew, or with stamp 0 to begin at once");
+             " s; send it again, or with stamp 0 to begin at once");
     }
   }
 
@@ -243,7 +243,7 @@ class Reader {
       numbers(k, "positions", point.positions, true, one.position);
       numbers(k, "velocities", point.velocities, velocities(), one.velocity);
       numbers(k, "accelerations", point.accelerations, accelerations(), one.acceleration);
-      // Before speeds, which are too high where a position is too far.
+      // Before the speeds, because a position too far away causes a speed that is too high.
       if (one.time > 0.0) checkPosition(one);
       read.push_back(one);
     }
@@ -257,7 +257,7 @@ class Reader {
     return read;
   }
 
-  /// Lets the path begin at the arm's set-point.
+  /// Makes the path begin at the arm's set-point.
   /// @param start, goal start_tolerance and goal_tolerance, rad
   void join(std::vector<JointPoint>& points, const RobotSample& now, double start,
             double goal) const {
@@ -284,15 +284,15 @@ class Reader {
     }
   }
 
-  /// A trajectory that begins later: the way to its first point is checked when it begins.
+  /// For a trajectory that begins later: the way to its first point is checked at its begin.
   void leaveStartOpen(std::vector<JointPoint>& points) const {
     if (!velocities()) JointSpline::estimateVelocities(points);
   }
 
-  /// Every state on the way against limits and workspace.
+  /// Checks all states of the path against limits and workspace.
   void checkWay(const std::vector<JointPoint>& points) const {
     const double step = std::max(kCheckStep, points.back().time / kMostChecks);
-    bool inside = false;  // has been, of the workspace: a path may lead into it
+    bool inside = false;  // true once the path was inside the workspace; it may begin outside
     for (std::size_t k = 1; k < points.size(); ++k) {
       const JointPoint &from = points[k - 1], &to = points[k];
       const double length = to.time - from.time;
@@ -323,7 +323,7 @@ class Reader {
     return read;
   }
 
-  /// s after the end of the trajectory in which the arm comes within its goal tolerance.
+  /// s, time after the end of the trajectory for the arm to come within its goal tolerance.
   double readGoalTime(double fallback) const {
     const double given = request_.goal_time_tolerance;
     if (!(given >= 0.0 && given <= kLongest)) {
@@ -336,7 +336,7 @@ class Reader {
   bool quintic() const { return accelerations(); }
 
  private:
-  /// The arm is where the trajectory begins, or so near that the difference can fade on the way.
+  /// Checks that the arm is at the start of the trajectory, or close enough to fade the difference.
   void checkStart(const JointVector& away, double duration, double start, double goal) const {
     const double time = std::min(kJoinTime, duration);
     for (int i = 0; i < robot_.chain.joints(); ++i) {
@@ -346,13 +346,14 @@ class Reader {
       if (std::abs(away[i]) <= most) continue;
       outOfRange("the trajectory begins ", std::abs(away[i]), " rad from where joint ", name(i),
                  " is; allowed: ", most,
-                 most < start ? " rad, because the trajectory is too short to make up for more; "
-                                "give it a time to go there"
-                              : " rad (start_tolerance); plan again from there");
+                 most < start
+                     ? " rad, because the trajectory is too short for a larger difference; "
+                       "give it a time to go there"
+                     : " rad (start_tolerance); plan again from there");
     }
   }
 
-  /// @param inside of the workspace, before this state and then with it
+  /// @param inside in: the path was inside the workspace before this state; out: also with it
   void checkState(const JointPoint& point, bool last, bool& inside) const {
     const coglab_rt::JointLimits& limits = robot_.limits;
     if (point.time > 0.0) checkPosition(point);
@@ -403,7 +404,7 @@ class Reader {
     refuse(TrajectoryError::InvalidJoints, ReasonCode::UnknownName, parts...);
   }
 
-  /// @param wanted false: the first point has none, and so has this one
+  /// @param wanted false: the first point has no such numbers, so this one must have none
   void numbers(std::size_t k, const char* field, const std::vector<double>& values, bool wanted,
                JointVector& out) const {
     const std::size_t size = wanted ? order_.size() : 0;

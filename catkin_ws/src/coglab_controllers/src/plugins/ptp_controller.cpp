@@ -10,7 +10,7 @@ namespace coglab_controllers {
 
 namespace {
 
-/// Reads seven numbers within limits; refused if something is wrong with them.
+/// Reads seven numbers and checks them against limits.
 Answer readJoints(const std::vector<double>& values, const char* field,
                   const std::vector<std::string>& names, const JointVector& least,
                   const JointVector& most, const char* unit, JointVector& out) {
@@ -107,8 +107,8 @@ Answer PtpController::readTarget(const PtpRequest& request, PtpTarget& target) c
   const coglab_rt::JointLimits& limits = setup().robot->limits;
   const Chain& chain = setup().robot->chain;
   const std::vector<std::string>& names = chain.jointNames();
-  // The guard lets nothing beyond its margin; a target on that border would be reached only where
-  // no noise of measurement crosses it.
+  // The guard stops at its margin. With measurement noise a target on that border might not be
+  // reached.
   const JointVector margin =
       JointVector::Constant(setup().robot->guard.position_margin + tolerance_);
   const JointVector least = JointVector::Constant(1e-4);

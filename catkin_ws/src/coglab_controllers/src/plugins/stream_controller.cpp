@@ -18,13 +18,13 @@ Vector shortened(const Vector& vector, double most) {
   return length > most ? Vector(vector * (most / length)) : vector;
 }
 
-constexpr double kClocks = 0.05;  // s that the clocks of two computers may differ
+constexpr double kClocks = 0.05;  // s, largest difference of two computers' clocks
 
 double readTimeout(const Parameters& parameters) {
   return parameters.number("command_timeout", 0.1, 0.005, 10.0);
 }
 
-/// What all streams share: the newest command, its age, and rest while there is none.
+/// Base of all streams: the newest command, its age, and rest without a command.
 class StreamMotion : public Motion<StreamRequest> {
  public:
   StreamMailbox mailbox;
@@ -41,7 +41,7 @@ class StreamMotion : public Motion<StreamRequest> {
 
   void start(const MotionStart<StreamRequest>& start) override {
     opened_ns_ = start.request.opened_ns;
-    resting_ = false;  // the arm may move: go on from there
+    resting_ = false;  // the arm may still move: continue from its state
     restart(start.from);
   }
 
@@ -65,14 +65,14 @@ class StreamMotion : public Motion<StreamRequest> {
     static const Reason none;
     return resting_ ? waiting_ : none;
   }
-  /// A limit that blocks the arm does not close the stream: the next command may lead away from it.
+  /// A limit that blocks the arm does not close the stream, because the next command may move away.
   bool endIfThere(const CycleInput&) override { return true; }
 
  protected:
   virtual void configureStream(const Parameters& parameters) = 0;
   /// Declares gains that may change at run time.
   virtual void declareGains(MotionConfiguration& /*configuration*/) {}
-  /// The reference goes on from here.
+  /// The reference continues from this state.
   virtual void restart(const SetPoint& from) = 0;
   /// @param dt s of motion time until the next cycle
   virtual void follow(const MotionCycle& cycle, const StreamCommand& command, double dt,
@@ -105,12 +105,12 @@ class StreamMotion : public Motion<StreamRequest> {
   ChainState commanded_;  // kinematics at the commanded joints
 };
 
-/// What twists and poses share: speeds, accelerations, and the leash to the commanded arm.
+/// Base for twists and poses: speeds, accelerations, and the leash to the commanded arm.
 class ToolMotion : public StreamMotion {
  protected:
   void configureStream(const Parameters& parameters) override {
     max_speed_ = parameters.number("max_speed", 0.8, 0.01, 5.0);
-    // Below the guard's limit, which would slow the turning too.
+    // Below the guard's limit, which would also slow the rotation.
     const double hand = robot_->guard.hand_speed;
     if (hand > 0.0) max_speed_ = std::min(max_speed_, 0.8 * hand);
     max_turning_ = parameters.number("max_turning", 3.0, 0.01, 20.0);
@@ -125,7 +125,7 @@ class ToolMotion : public StreamMotion {
     turning_ = from.angular_velocity;
   }
 
-  /// Goes on toward this twist in the base frame.
+  /// Changes the velocity toward this twist in the base frame.
   void steer(const CycleInput& input, const Vector3& linear, const Vector3& angular, double dt,
              MotionReference& reference) {
     const Vector3 way = shortened(linear, max_speed_) - velocity_;
@@ -184,8 +184,8 @@ class PoseMotion : public ToolMotion {
           dt, reference);
   }
 
-  /// Velocity for a way (m or rad): by the gain near its end, and from further away one from which
-  /// half of the acceleration is enough to stop there.
+  /// Velocity for a remaining way (m or rad): gain times the way, but at most the speed from which
+  /// half of the acceleration stops the arm within the way.
   static Vector3 toward(const Vector3& way, double gain, double acceleration) {
     return shortened(Vector3(gain * way), std::sqrt(acceleration * way.norm()));
   }
@@ -229,16 +229,17 @@ class JointMotion : public StreamMotion {
   }
 
  private:
-  /// Largest speed (rad/s) toward a stop so far away (rad): the joint brakes before its margin.
+  /// Largest speed (rad/s) toward a stop at this distance (rad). The joint brakes before its
+  /// margin.
   double towards(double distance, int joint) const {
     return coglab_rt::brakingSpeed(distance - robot_->limits.position_margin - kReserve,
                                    0.5 * max_acceleration_[joint], robot_->limits.jerk[joint],
                                    delay_);
   }
 
-  // The guard of the cycle keeps a distance of its own, and slows all joints there.
+  // Added to the distance of the guard, which would slow all joints.
   static constexpr double kReserve = 0.01;  // rad
-  static constexpr double kDelay = 0.05;    // s, besides what a robot needs to hear of a stop
+  static constexpr double kDelay = 0.05;    // s, added to the robot's own stop delay
 
   JointVector max_velocity_ = JointVector::Ones(), max_acceleration_ = JointVector::Ones();
   double leash_ = 0.05, delay_ = kDelay;

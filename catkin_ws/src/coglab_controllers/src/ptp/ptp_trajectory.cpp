@@ -9,7 +9,7 @@
 namespace coglab_controllers {
 namespace {
 
-// Way of a ramp that goes from `velocity` to `cruise`, holds it so that all takes `duration`, and
+// Distance of a ramp of length `duration` that changes from `velocity` to `cruise`, holds it, and
 // brakes to rest.
 double wayOf(double velocity, double cruise, double acceleration, double duration) {
   const double up = std::abs(cruise - velocity) / acceleration,
@@ -43,7 +43,7 @@ PtpTrajectory::PtpTrajectory(const JointVector& position, const JointVector& vel
   }
   const bool from_rest = velocity.head(joints).isZero(0.0);
   if (from_rest) {
-    // One profile for the way along a straight line, scaled to each joint.
+    // One profile along a straight line, scaled to each joint.
     double speed = std::numeric_limits<double>::infinity(), acceleration = speed;
     for (int i = 0; i < joints; ++i) {
       const double distance = std::abs(target[i] - position[i]);
@@ -82,10 +82,10 @@ PtpTrajectory::PtpTrajectory(const JointVector& position, const JointVector& vel
 PtpTrajectory::Ramp PtpTrajectory::fastest(double distance, double velocity, double max_velocity,
                                            double max_acceleration) {
   const double a = max_acceleration;
-  // Braking at once ends here; the target beyond it decides in which direction to accelerate.
+  // End of braking at once. Accelerate in the direction from there to the target.
   const double stop = 0.5 * velocity * std::abs(velocity) / a;
   const double direction = distance >= stop ? 1.0 : -1.0;
-  // Highest speed of a ramp without cruise: 2 p^2 = v^2 + 2 a d, all seen in that direction.
+  // Highest speed of a ramp without cruise: 2 p^2 = v^2 + 2 a d, all along that direction.
   const double v = direction * velocity, d = direction * distance;
   const double peak = std::sqrt(std::max(0.0, 0.5 * v * v + a * d));
   const double cruise = std::min(peak, max_velocity);
@@ -102,8 +102,7 @@ PtpTrajectory::Ramp PtpTrajectory::fastest(double distance, double velocity, dou
 
 PtpTrajectory::Ramp PtpTrajectory::stretched(double distance, double velocity, double acceleration,
                                              double duration) {
-  // The way grows with the cruising speed as long as there is time to cruise, so bisection finds
-  // the one that fits.
+  // The distance increases with the cruising speed, so bisection finds the right speed.
   double low = 0.5 * (velocity - acceleration * duration),
          high = 0.5 * (velocity + acceleration * duration);
   for (int i = 0; i < 200 && high - low > 0.0; ++i) {
@@ -143,7 +142,7 @@ void PtpTrajectory::at(double t, PtpPoint& point) const noexcept {
           ramp.start + 0.5 * first * (ramp.velocity + ramp.cruise) + (t - first) * ramp.cruise;
       point.velocity[i] = ramp.cruise;
     } else if (t < second + ramp.brake_time) {
-      // From the end backwards, so that the motion ends exactly at the target.
+      // Computed backwards from the end, so that the motion ends exactly at the target.
       const double left = second + ramp.brake_time - t;
       point.position[i] = target_[i] + 0.5 * down * left * left;
       point.velocity[i] = -down * left;

@@ -68,7 +68,7 @@ void bindIk(py::module_& module) {
       .def_readonly("rotation_rejected", &IkResult::rotation_rejected);
 
   py::class_<PostureTask>(module, "PostureTask",
-                          "Second task that draws the joints towards a posture.")
+                          "Second task that moves the joints towards a posture.")
       .def(py::init<const JointVector&, double>(), py::arg("posture"), py::arg("gain") = 1.0);
 
   const IkParameters standard;
@@ -99,9 +99,10 @@ void bindIk(py::module_& module) {
            py::arg("acceleration_limit") = standard.acceleration_limit,
            py::arg("jerk_limit") = standard.jerk_limit,
            py::arg("correction_speed") = standard.correction_speed,
-           "With the limits of acceleration (7,) and jerk (7,) errors are answered only by speeds "
-           "from which each joint can brake, and those of the position by no more than "
-           "correction_speed (m/s).")
+           "Limits of acceleration (7,) and jerk (7,) bound the speed that corrects an error, so "
+           "that "
+           "each joint can brake in time. correction_speed (m/s) bounds the correction of "
+           "position errors.")
       .def(
           "solve",
           [](const TwoTaskIk& ik, const Chain& chain, const JointVector& q,

@@ -6,7 +6,7 @@
 namespace coglab_controllers::python {
 namespace {
 
-// Positions come as rows, one per time, as numpy users write them.
+// One row per time, as usual in numpy.
 using Points = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
 
 Trajectory toTrajectory(const Eigen::VectorXd& times, const Points& positions) {
@@ -35,7 +35,7 @@ void bindPrimitive(py::module_& module) {
       .def("__call__", &GoalWeight::operator(), py::arg("s"), "w(s) at phase s.");
 
   py::class_<Primitive>(module, "Primitive",
-                        "A learnt motion primitive: everything eq. (1)-(5) need.")
+                        "A learnt motion primitive: all parameters of eq. (1)-(5).")
       .def(py::init<>())
       .def_readwrite("id", &Primitive::id)
       .def_readwrite("description", &Primitive::description)
@@ -58,7 +58,7 @@ void bindPrimitive(py::module_& module) {
           "w_i, m, (N, 3)")
       .def(
           "validate", [](const Primitive& p) { validate(p); },
-          "Raises ValueError naming the field that is wrong.")
+          "Raises ValueError with the name of the invalid field.")
       .def(
           "moving_point", [](const Primitive& p, double s) { return Dmp(p).movingPoint(s); },
           py::arg("s"), "phi(s) of eq. (5), m, (3,)");
@@ -115,7 +115,7 @@ void bindStepping(py::module_& module) {
             dmp.switchTo(Dmp(primitive), requireFinite(goal, "goal"), ratio);
           },
           py::arg("primitive"), py::arg("goal"), py::arg("ratio") = 1.0,
-          "Another primitive in mid-motion; phase, position and velocity are kept.")
+          "Changes the primitive during a motion; phase, position and velocity are kept.")
       .def(
           "set_ratio",
           [](Dmp& dmp, double ratio) {

@@ -64,7 +64,7 @@ void bindWorkspace(py::module_& module) {
       .def_readwrite("base_radius", &WorkspaceParameters::base_radius)
       .def_readwrite("max_stretch", &WorkspaceParameters::max_stretch);
 
-  py::class_<Workspace>(module, "Workspace", "Where the hand may be.")
+  py::class_<Workspace>(module, "Workspace", "Allowed positions of the hand.")
       .def(py::init<const WorkspaceParameters&>(), py::arg("parameters") = standard)
       .def("contains", &Workspace::contains, py::arg("point"))
       .def(
@@ -84,7 +84,7 @@ void bindGuard(py::module_& module) {
       .def_property_readonly("border", [](const GuardResult& r) { return describe(r.border); });
 
   py::class_<Guard>(module, "Guard",
-                    "Scales joint velocities into all limits, keeping their direction.")
+                    "Scales joint velocities to satisfy all limits; their direction is kept.")
       .def(py::init([](const Chain& chain, const JointLimits& limits,
                        const WorkspaceParameters& workspace, double hand_speed, double elbow_speed,
                        double position_margin, double reaction_time) {
@@ -118,7 +118,7 @@ void bindGuard(py::module_& module) {
       .def("speed_to_stop", &Guard::speedToStop, py::arg("joint"), py::arg("room"));
 
   py::class_<PhaseGovernor>(module, "PhaseGovernor",
-                            "Slows the clock of a motion so that the reference waits.")
+                            "Slows the clock of a motion so that the reference waits for the arm.")
       .def(py::init<double, double>(), py::arg("rise") = 2.0, py::arg("fall") = 10.0)
       .def("update", &PhaseGovernor::update, py::arg("dt"), py::arg("speed_scale"),
            py::arg("limit_scale"))

@@ -22,7 +22,7 @@ DmpPlan toPlan(const Primitive& primitive, double ratio, bool orientation_contro
 
 void bindCartesianMotion(py::module_& module) {
   py::class_<CartesianReference>(module, "CartesianReference",
-                                 "What a motion asks of the inverse kinematics.")
+                                 "Reference of a motion for the inverse kinematics.")
       .def(py::init([](const Vector3& position, const QuaternionArray& orientation,
                        const Vector3& velocity, const Vector3& angular_velocity,
                        bool orientation_control) {
@@ -147,7 +147,7 @@ void bindGoals(py::module_& module) {
 
   py::class_<GoalLimits>(
       module, "GoalLimits",
-      "When a goal that moves ends the motion: left its region, went back, fell.")
+      "Bounds of a moving goal: the motion ends if it leaves its region, retreats or falls.")
       .def(py::init([](const Vector3& region_low, const Vector3& region_high, double retreat,
                        double drop, const Vector3& hand, const Vector3& goal) {
              const GoalBounds bounds{region_low, region_high, retreat, drop};
@@ -167,7 +167,7 @@ void bindGoals(py::module_& module) {
             return py::make_tuple(static_cast<int>(reason.number()), reason.str());
           },
           py::arg("dt"), py::arg("goal"),
-          "Returns (ReasonCode, sentence); (0, '') while it may go on.");
+          "Returns (ReasonCode, sentence); (0, '') while the motion may continue.");
 }
 
 void bindOrientationCurve(py::module_& module) {

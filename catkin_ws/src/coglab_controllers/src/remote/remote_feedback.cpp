@@ -1,5 +1,5 @@
 // A feedback controller whose law runs in a Python process. It shifts and turns the reference of
-// the hand by what the process sends, within bounds, and fades that out when nothing comes.
+// the hand by the received correction, within bounds. Without answers the correction fades out.
 #include <cmath>
 #include <memory>
 
@@ -55,15 +55,15 @@ ctrl_more::Description RemoteFeedback::describe() const {
   using ctrl_more::ControlContainer;
   ctrl_more::Description d;
   d.type = "RemoteFeedback";
-  d.summary = "Shifts and turns the hand's reference by what a Python process computes.";
+  d.summary = "Shifts and turns the hand's reference by a correction from a Python process.";
   d.use = "Load it, then run a Python controller in a second terminal: ./coglab controller run.";
-  d.when = "To try a law in Python on the running robot. A law that is done belongs into C++.";
+  d.when = "To try a control law in Python on the running robot. Write the final law in C++.";
   d.limitations =
-      "Python gets the signals below and corrects the hand's pose; other corrections are not "
-      "passed on. The answer to a cycle acts one cycle later.";
+      "Python receives the signals below and can correct only the hand's pose. The answer to a "
+      "cycle acts one cycle later.";
   d.law = "p' = p + c, R' = \\exp(r) R; \\|\\dot c\\| and \\|c\\| bounded";
   d.source = "The Python process.";
-  d.information = "Without a process, or when it is late, the correction fades to zero.";
+  d.information = "If there is no process or it is late, the correction fades to zero.";
   for (const char* name : {"joint_position", "joint_velocity", "joint_torque", "external_torque"})
     d.measured(name).size(7).in("rad, rad/s or Nm").frameOf("joints").about("passed to Python");
   d.measured("wrench").size(6).in("N, Nm").frameOf("base").about("passed to Python");
@@ -85,8 +85,11 @@ ctrl_more::Description RemoteFeedback::describe() const {
   d.gain("fade_time", 0.5)
       .range(0.02, 10.0)
       .in("s")
-      .about("a correction is gone within this time when nothing comes");
-  d.gain("max_age", 0.03).range(0.001, 0.5).in("s").about("an older answer fades");
+      .about("without answers a correction fades to zero within this time");
+  d.gain("max_age", 0.03)
+      .range(0.001, 0.5)
+      .in("s")
+      .about("largest age of an answer; after it the correction fades");
   d.addStates({"offset_x", "offset_y", "offset_z"}, "m", "shift that is applied");
   d.addStates({"turn_x", "turn_y", "turn_z"}, "rad", "turn that is applied");
   d.state("late").in("1").about("cycles without an answer in time");
@@ -95,7 +98,7 @@ ctrl_more::Description RemoteFeedback::describe() const {
 
 std::string RemoteFeedback::judgeGains(const ctrl_more::GainValues& gains) const {
   const auto value = [&gains](const char* name) { return gains.scalar(gains.find(name)); };
-  // Only so does fading within fade_time keep to the rates.
+  // Otherwise fading within fade_time would exceed the rates.
   if (value("max_offset") > value("rate") * value("fade_time"))
     return "max_offset is larger than rate * fade_time; make fade_time or rate larger";
   if (value("max_angle") > value("turning_rate") * value("fade_time"))
@@ -121,7 +124,7 @@ void RemoteFeedback::initialize(ctrl_more::Setup& setup) {
   slot_ = std::make_unique<RemoteSlot>(getName(), RemoteKind::Feedback);
 }
 
-/// Takes the newest answer, if it belongs to this run and is usable.
+/// Uses the newest answer if it belongs to this run and is valid.
 void RemoteFeedback::take(std::int64_t now_ns) noexcept {
   RemoteAnswer answer;
   if (!slot_->read(answer) || answer.run != question_.run) return;

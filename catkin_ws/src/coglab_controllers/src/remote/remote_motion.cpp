@@ -1,5 +1,5 @@
-// The arm follows a motion that a Python process computes (package coglab, coglab.control). What
-// comes is bounded; when nothing comes the arm brakes, and the motion ends with a reason.
+// The arm follows a motion from a Python process (package coglab, coglab.control) within bounds.
+// Without answers the arm brakes, and the motion ends with a reason.
 #include <cmath>
 #include <memory>
 
@@ -12,8 +12,8 @@ namespace {
 
 /// Parameters: `max_speed`, `max_acceleration` (shares of the joints' limits), `hand_speed` (m/s),
 /// `hand_acceleration` (m/s^2), `hand_turning` (rad/s), `hand_turning_acceleration` (rad/s^2),
-/// `max_age` (s): an older answer is no longer continued, the arm brakes; `silent_time` (s): so
-/// long without an answer ends the motion.
+/// `max_age` (s): largest age of an answer, after which the arm brakes; `silent_time` (s): time
+/// without an answer after which the motion ends.
 class RemoteMotion : public Motion<> {
  public:
   void configure(MotionConfiguration& configuration) override {
@@ -58,8 +58,7 @@ class RemoteMotion : public Motion<> {
     const CycleInput& input = cycle.input;
     const std::int64_t heard = answered_ ? answer_.stamp_ns : begun_ns_;
     const double age = 1e-9 * static_cast<double>(input.robot.stamp_ns - heard);
-    // Until the first answer the motion's time stands still, so that the motion begins at its
-    // start.
+    // Motion time stands still until the first answer, so that the motion begins at its start.
     if (!answered_) offset_ = cycle.time;
     if (state_ == MotionState::Running) judge(age);
     if (state_ == MotionState::Running) ask(cycle, age > 2.5 * input.dt);
@@ -84,7 +83,7 @@ class RemoteMotion : public Motion<> {
     Eigen::Map<Eigen::Matrix<double, 7, 1>>{place} << pose.position, pose.orientation.coeffs();
   }
 
-  /// Takes the newest answer, if it belongs to this motion and is usable.
+  /// Uses the newest answer if it belongs to this motion and is valid.
   void take(const CycleInput& input) noexcept {
     RemoteAnswer answer;
     if (!slot_->read(answer) || answer.run != question_.run || done()) return;
@@ -104,7 +103,7 @@ class RemoteMotion : public Motion<> {
     answered_ = true;
   }
 
-  /// Finite, of a known kind, a unit quaternion, and within any reach.
+  /// Checks an answer: finite, of a known kind, a unit quaternion, within any reach.
   static bool usable(const RemoteAnswer& answer) noexcept {
     if (!std::isfinite(answer.time)) return false;
     for (const double value : answer.values) {
@@ -125,8 +124,7 @@ class RemoteMotion : public Motion<> {
   RemoteAnswerKind kind() const noexcept { return static_cast<RemoteAnswerKind>(answer_.kind); }
   bool done() const noexcept { return answered_ && answer_.done != 0; }
 
-  /// The followers begin where the reference is: at the set-point of the start, or where the arm
-  /// is commanded.
+  /// The followers begin at the reference: the set-point of the start, or the commanded state.
   void begin(const CycleInput& input) noexcept {
     const bool first = !answered_;
     joints_.begin(input.robot.commanded_position, input.robot.commanded_velocity);
@@ -140,11 +138,11 @@ class RemoteMotion : public Motion<> {
     if (done()) return;
     if (!slot_->connected()) {
       give(Reason(ReasonCode::ControllerFault,
-                  "the Python process has ended or let go; the arm brakes"));
+                  "the Python process has ended or disconnected; the arm brakes"));
     } else if (age > silent_time_) {
       give(Reason(ReasonCode::ControllerFault, "the Python process sent nothing usable for ")
            << static_cast<std::uint64_t>(1e3 * age)
-           << " ms (silent_time); it hangs, is stopped, or is too slow: the arm brakes");
+           << " ms (silent_time); it hangs, is stopped or is too slow. The arm brakes");
     }
   }
 
@@ -171,9 +169,9 @@ class RemoteMotion : public Motion<> {
     const double scale = cycle.input.time_scale;
     const bool ends = done();
     const bool brakes = kind() == RemoteAnswerKind::Rest || (!ends && age > max_age_);
-    // Where the reference is by now: the answer belongs to an earlier moment.
+    // The present reference, extrapolated because the answer belongs to an earlier time.
     const double since = ends ? 0.0 : std::max(0.0, cycle.time - offset_ - answer_.time);
-    double left = 0.0;  // until it stands at its end
+    double left = 0.0;  // rad or m, distance to its end
     if (kind() == RemoteAnswerKind::Joints || kind() == RemoteAnswerKind::Rest) {
       const Eigen::Map<const JointVector> at(answer_.values);
       const Eigen::Map<const JointVector> speed(answer_.values + 7);

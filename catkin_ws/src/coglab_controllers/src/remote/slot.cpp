@@ -20,7 +20,7 @@ namespace coglab_controllers {
 
 namespace {
 
-constexpr int kGreetingTime_ms = 1000;  // a process that connects and says nothing is let go
+constexpr int kGreetingTime_ms = 1000;  // after it a process that sends no greeting is disconnected
 
 std::string failed(const std::string& address, const char* what) {
   return "slot " + address + ": " + what + " failed: " + std::strerror(errno);
@@ -97,10 +97,10 @@ void RemoteSlot::clear() noexcept {
   }
 }
 
-/// The thread: waits for processes, and for the end of the one that holds the slot.
+/// Body of the thread: waits for processes, and for the end of the one that holds the slot.
 void RemoteSlot::serve() {
   while (true) {
-    // Nothing is expected from the client but its end; poll() leaves out a negative number.
+    // Only the end of the client is expected. poll() ignores a negative descriptor.
     pollfd files[] = {{end_, POLLIN, 0}, {listener_, POLLIN, 0}, {client_, POLLRDHUP, 0}};
     if (::poll(files, 3, -1) < 0 && errno != EINTR) return;
     if (files[0].revents != 0) return;
@@ -112,7 +112,7 @@ void RemoteSlot::serve() {
     if (files[1].revents == 0) continue;
     const int connection = ::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
     if (connection < 0) {
-      // Out of files, for example: not in a loop at full speed.
+      // For example no free descriptor: pause, so that the loop does not run at full speed.
       pollfd pause{end_, POLLIN, 0};
       ::poll(&pause, 1, 100);
       continue;
@@ -141,7 +141,7 @@ void RemoteSlot::greet(int connection) {
   owner_.store(who.pid > 0 ? who.pid : -1, std::memory_order_release);
 }
 
-/// Why a process is refused; empty if it is welcome.
+/// Returns why a process is refused; empty: accepted.
 std::string RemoteSlot::judge(const std::string& hello, unsigned user) const {
   if (user != ::getuid())
     return "the robot runs as user " + std::to_string(::getuid()) + ", the process as user " +
@@ -165,7 +165,7 @@ std::string RemoteSlot::judge(const std::string& hello, unsigned user) const {
                : "this slot is for a feedback controller; the file has a motion";
   if (connected())
     return "process " + std::to_string(owner()) +
-           " holds this slot and lives; end it first, or use another slot";
+           " holds this slot and is running; end it first, or use another slot";
   return "";
 }
 

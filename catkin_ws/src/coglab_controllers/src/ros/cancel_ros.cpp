@@ -14,7 +14,7 @@ constexpr bool same(ReasonCode ours, std::uint16_t theirs) {
   return static_cast<std::uint16_t>(ours) == theirs;
 }
 
-// The core is free of ROS and keeps the numbers of the message a second time.
+// The core is independent of ROS and has its own copy of the numbers of the message.
 static_assert(same(ReasonCode::None, Code::NONE));
 static_assert(same(ReasonCode::InvalidArgument, Code::INVALID_ARGUMENT));
 static_assert(same(ReasonCode::OutOfRange, Code::OUT_OF_RANGE));

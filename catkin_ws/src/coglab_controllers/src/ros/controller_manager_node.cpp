@@ -1,4 +1,4 @@
-// The controller manager as a node of its own (split:=true), over joint_states and
+// The controller manager as a separate node (split:=true), with the topics joint_states and
 // target_joint_states.
 #include <algorithm>
 #include <atomic>
@@ -44,7 +44,7 @@ int main(int argc, char** argv) {
     std::atomic<coglab_controllers::ManagerRos*> ready{nullptr};
     coglab_controllers::ManagerRos::Options options;
     options.publish_target = false;
-    // Both may run on one computer, and the answers to the robot come first.
+    // Both may run on one computer, and the answers to the robot have priority.
     options.highest_priority =
         std::max(0, coglab_rt::readParameter(robot, "rt_priority", 80, "a whole number") - 1);
     options.thread.after_cycle = [&](const coglab_controllers::VelocityCommand& command) {

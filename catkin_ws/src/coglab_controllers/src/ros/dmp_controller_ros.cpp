@@ -37,7 +37,7 @@ void write(const Vector3& v, Point& point) {
   point.z = v.z();
 }
 
-/// What execute_dmp, predict_dmp and switch_dmp have in common.
+/// Common fields of execute_dmp, predict_dmp and switch_dmp.
 template <typename Request>
 DmpRequest readRequest(const Request& request) {
   DmpRequest result;
@@ -50,7 +50,7 @@ DmpRequest readRequest(const Request& request) {
   return result;
 }
 
-/// All of execute_dmp, or of predict_dmp, which has the same fields.
+/// All fields of execute_dmp or predict_dmp (the same ones).
 template <typename Request>
 DmpRequest readWhole(const Request& request) {
   DmpRequest result = readRequest(request);
@@ -87,7 +87,7 @@ class DmpControllerRos : public MotionControllerRos {
     services_[2] = node_.advertiseService("switch_dmp", &DmpControllerRos::onSwitch, this);
     services_[3] = node_.advertiseService("predict_dmp", &DmpControllerRos::onPredict, this);
     path_.attach(node_, controller_->dmpFrame());
-    bool debug = false;  // the first reading asks the master; all others must not
+    bool debug = false;  // only the first reading may contact the master
     node_.getParamCached("enable_ik_debug", debug);
   }
 
@@ -97,7 +97,7 @@ class DmpControllerRos : public MotionControllerRos {
     publishDebug();
     publishFeedback();
     path_.spin(*controller_, moving());
-    // Once a second: the parameter may be changed while running. The master tells of a change.
+    // Once a second, because the parameter may change at run time. The master reports a change.
     if (++calls_ % 200 == 0) {
       bool debug = controller_->ikDebug();
       if (node_.getParamCached("enable_ik_debug", debug)) controller_->setIkDebug(debug);
@@ -130,7 +130,7 @@ class DmpControllerRos : public MotionControllerRos {
     return reply("execute_dmp", controller_->execute(asked), response);
   }
 
-  /// Somebody looks ahead again and again: a refusal is no news for the log.
+  /// Predictions may be requested often, so refusals are not logged.
   bool onPredict(PredictDmp::Request& request, PredictDmp::Response& response) {
     PredictedPath path;
     const Answer answer = controller_->predict(readWhole(request), path);
@@ -226,7 +226,7 @@ class DmpControllerRos : public MotionControllerRos {
     }
   }
 
-  /// The goal as a tf2 frame, 33 times a second while a motion runs: what rviz and recorders show.
+  /// Broadcasts the goal as a tf2 frame for rviz and recordings, at 33 Hz while a motion runs.
   void broadcastGoal() {
     const std::string& frame = controller_->goalTfFrame();
     if (!moving() || frame.empty() || progress_.stamp_ns == 0 || calls_ - last_goal_ < 6) return;

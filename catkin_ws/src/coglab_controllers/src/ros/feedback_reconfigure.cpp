@@ -6,9 +6,9 @@
 namespace coglab_controllers {
 namespace {
 
-constexpr double kUnbounded = 1e6;  // instead of infinity, which no slider has
+constexpr double kUnbounded = 1e6;  // replaces infinity, which a slider cannot show
 
-/// Name of an element of a gain, as clients in Python need it.
+/// Name of an element of a gain, a valid Python identifier.
 std::string nameOf(const ctrl_more::GainSpec& gain, int element) {
   return gain.size == 1 ? gain.name : gain.name + "_" + std::to_string(element);
 }

@@ -47,7 +47,7 @@ std::uint16_t codeOf(ctrl_more::PauseCause cause) {
   return Code::UNEXPECTED;
 }
 
-/// A refusal that is this node's own.
+/// A refusal by this node.
 template <typename Response>
 bool refuse(Response& response, std::uint16_t code, const std::string& message) {
   response.success = false;
@@ -203,7 +203,7 @@ bool FeedbackRos::onSetGains(coglab_msgs::SetGains::Request& request,
 
 bool FeedbackRos::onLoad(coglab_msgs::LoadFeedback::Request& request,
                          coglab_msgs::LoadFeedback::Response& response) {
-  // Without the lock of requests: a plug-in's code may take seconds.
+  // Without the lock of requests, because code of a plug-in may take seconds.
   const std::shared_ptr<void> claimed = manager_.claim(request.name);
   if (!claimed) {
     return refuse(response, Code::BUSY,
@@ -257,7 +257,7 @@ bool FeedbackRos::onDescribe(coglab_msgs::DescribeController::Request& request,
     response.success = false;
   } catch (...) {
     response.text =
-        "describe() of '" + request.name + "' threw something that is no std::exception";
+        "describe() of '" + request.name + "' threw an exception not derived from std::exception";
     response.reason_code = Code::CONTROLLER_FAULT;
     response.success = false;
   }

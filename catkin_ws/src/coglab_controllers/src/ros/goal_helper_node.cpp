@@ -1,4 +1,4 @@
-// The tf2 helper of D4.10: any frame, with an offset, to dmp_goal in dmp_frame_name.
+// The tf2 helper of D4.10: publishes any frame, with an offset, on dmp_goal in dmp_frame_name.
 #include <cstdint>
 #include <cstdio>
 #include <exception>
@@ -19,10 +19,10 @@ namespace coglab_controllers {
 
 constexpr std::int64_t kStaticPeriod_ns = 1'000'000'000;
 
-/// Publishes the position of a frame whenever a new transform has come, stamped with its time of
-/// capture. The DMP plug-in takes a goal on dmp_goal as it is, so only goals are published that a
-/// motion would believe (GoalLimits): nothing from the future, old, or far from the frames before
-/// it, and at first nothing until frames agree. A static frame is published once a second.
+/// Publishes the position of a frame for each new transform, stamped with its time of capture. The
+/// DMP plug-in does not check goals from dmp_goal, so this node publishes only goals that pass
+/// GoalLimits: not from the future, not old, not far from the frames before, and none until the
+/// first frames agree. A static frame is published once a second.
 class GoalHelper {
  public:
   /// @param node of the topic's name, which is relative to it  @param own the node's parameters
@@ -84,7 +84,7 @@ class GoalHelper {
         goal.clock_steps != published_goal_.clock_steps) {
       return false;
     }
-    // A static frame has no stamp: it is published again and again, as captured now.
+    // A static frame has no stamp: it is published repeatedly, as captured now.
     return goal.frame_ns != 0 || now - published_ns_ < kStaticPeriod_ns;
   }
 
@@ -105,7 +105,7 @@ class GoalHelper {
   TfGoalSource source_{buffer_, listener_};
   GoalLimits limits_;
   GoalObservation published_goal_;
-  std::int64_t published_ns_ = 0;  // when; 0: none was
+  std::int64_t published_ns_ = 0;  // time of the last publication; 0: none
   ros::Publisher goal_;
   std::string frame_, dmp_frame_;
   Vector3 offset_ = Vector3::Zero();
@@ -121,7 +121,7 @@ int main(int argc, char** argv) {
     coglab_rt::LoggerServices logger_services;
     coglab_controllers::GoalHelper(ros::NodeHandle(), ros::NodeHandle("~")).run();
   } catch (const std::exception& error) {
-    // ROS ended with the node's last handle, and its log would print nothing any more.
+    // ROS ended with the node's last handle, so its log no longer prints.
     std::fprintf(stderr, "goal_helper_node: %s\n", error.what());
     return 1;
   }

@@ -1,4 +1,4 @@
-// ROS side of joint trajectories: the action that MoveIt and other planners send them to.
+// ROS side of joint trajectories: the action used by MoveIt and other planners.
 #include <map>
 #include <mutex>
 #include <optional>
@@ -25,7 +25,7 @@ constexpr std::size_t kLargest = 4'000'000;  // bytes of a goal; 10000 full poin
 
 constexpr bool same(TrajectoryError ours, int theirs) { return static_cast<int>(ours) == theirs; }
 
-// The core is free of ROS and keeps the numbers of the action a second time.
+// The core is independent of ROS and has its own copy of the numbers of the action.
 static_assert(same(TrajectoryError::None, Result::SUCCESSFUL));
 static_assert(same(TrajectoryError::InvalidGoal, Result::INVALID_GOAL));
 static_assert(same(TrajectoryError::InvalidJoints, Result::INVALID_JOINTS));
@@ -72,11 +72,11 @@ void write(const JointPoint& from, std::size_t joints, trajectory_msgs::JointTra
 }  // namespace
 
 /// Action `<id>/follow_joint_trajectory`; topic `<id>/state` at 50 Hz while the arm follows. A goal
-/// takes the arm if no other motion has it. A newer goal takes the place of the older one.
+/// makes its controller active if no other motion is running. A newer goal replaces the older one.
 ///
-/// A goal whose stamp is ahead is accepted and waits. What runs goes on until then. A cancel by its
-/// client and a newer goal end the wait. It does not begin after a cancel of a motion, a stop of
-/// the robot or a switch to another controller.
+/// A goal with a stamp in the future is accepted and waits; the running motion continues. A cancel
+/// by its client and a newer goal end the wait. The goal does not begin after a cancel of a motion,
+/// a stop of the robot or a switch to another controller.
 class JointTrajectoryRos : public MotionControllerRos {
  public:
   void attach(MotionController& controller, const ros::NodeHandle& node,
@@ -118,7 +118,7 @@ class JointTrajectoryRos : public MotionControllerRos {
     bool called = false;
   };
 
-  /// Begins the trajectory that waits, in a thread of the services.
+  /// Begins the waiting trajectory in a thread of the services.
   class Due : public ros::CallbackInterface {
    public:
     explicit Due(JointTrajectoryRos& side) : side_(side) {}
@@ -236,7 +236,7 @@ class JointTrajectoryRos : public MotionControllerRos {
 
   void cancelMotion() { cancel_("the client of the trajectory cancelled it"); }
 
-  /// Ends the goals whose motions have ended. A motion may end before its goal is noted.
+  /// Ends the goals whose motions have ended. A motion may end before its goal is stored.
   void settle() {
     for (auto end = ends_.begin(); end != ends_.end();) {
       const auto goal = goals_.find(end->id);
@@ -291,10 +291,10 @@ class JointTrajectoryRos : public MotionControllerRos {
   std::function<Answer()> take_arm_;
   std::function<void(const std::string&)> cancel_;
   ros::Publisher state_;
-  std::mutex order_;  // goals are taken one after another
+  std::mutex order_;  // goals are processed one after another
   std::mutex goals_mutex_;
-  std::map<int, Server::GoalHandle> goals_;  // by the id of the motion; those that run
-  std::vector<EndedMotion> ends_;            // of motions whose goal is not noted yet
+  std::map<int, Server::GoalHandle> goals_;  // running goals by the id of their motion
+  std::vector<EndedMotion> ends_;            // of motions whose goal is not stored yet
   std::optional<Waiting> waiting_;           // begins at the time of its stamp
   ros::CallbackQueueInterface* queue_ = nullptr;
   std::uint64_t calls_ = 0;

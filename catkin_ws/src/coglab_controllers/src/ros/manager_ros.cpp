@@ -16,10 +16,10 @@ namespace coglab_controllers {
 
 namespace {
 constexpr auto kPublishPeriod = std::chrono::milliseconds(5);
-constexpr double kStallTime = 0.25;  // s without a cycle that count as a stall
+constexpr double kStallTime = 0.25;  // s without a cycle that counts as a stall
 constexpr auto kDetachTime = std::chrono::seconds(2);
-// s after which the status is told again though nothing has changed but numbers in a sentence: who
-// looks on knows from it that the node is not silent.
+// s after which the status is published again if only numbers in a sentence have changed. It shows
+// that the node is alive.
 constexpr double kTellPeriod = 0.25;
 
 /// An exception here would end the process that moves the arm.
@@ -30,7 +30,7 @@ void guarded(const char* what, const Function& function) {
   } catch (const std::exception& error) {
     ROS_ERROR_THROTTLE(1.0, "%s: %s", what, error.what());
   } catch (...) {
-    ROS_ERROR_THROTTLE(1.0, "%s: an exception that is no std::exception", what);
+    ROS_ERROR_THROTTLE(1.0, "%s: an exception not derived from std::exception", what);
   }
 }
 }  // namespace
@@ -85,7 +85,7 @@ void ManagerRos::start() {
   try {
     signals_ = std::make_unique<SignalTopics>(node_, *manager_);
   } catch (const std::exception& error) {
-    ROS_ERROR("the robot runs without signals from topics: %s; name other topics", error.what());
+    ROS_ERROR("the robot runs without signals from topics: %s; use other topics", error.what());
   }
   diagnostics_ = std::make_unique<diagnostic_updater::Updater>(node_);
   diagnostics_->setHardwareID("none");
@@ -104,7 +104,7 @@ void ManagerRos::shutdown() {
   queue_.disable();
   if (spinner_) spinner_->stop();
   thread_->stop();
-  // What follows asks the ROS master, which may not answer: every thread of ours has ended.
+  // The rest contacts the ROS master, which may not answer. All threads of this node have ended.
   tf_listener_->stop();
   for (ros::ServiceServer& service : services_) service.shutdown();
   speed_.shutdown();
@@ -166,7 +166,7 @@ Answer ManagerRos::load(const std::string& id, const std::string& type) {
   return answer;
 }
 
-/// Ends the services and topics of a controller that is unloaded.
+/// Ends the services and topics of an unloaded controller.
 void ManagerRos::detach(const std::string& id, std::shared_ptr<const LoadedMotion> motion) {
   cancel_->withdraw(id);
   std::shared_ptr<Side> side;
@@ -179,7 +179,7 @@ void ManagerRos::detach(const std::string& id, std::shared_ptr<const LoadedMotio
     sides_.erase(found);
   }
   side->motion = std::move(motion);
-  // The loops may be in it. What takes longer frees it there.
+  // The loops may be using it. After the time limit the last user frees it.
   const auto end = std::chrono::steady_clock::now() + kDetachTime;
   while (side.use_count() > 1 && std::chrono::steady_clock::now() < end) {
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -275,8 +275,8 @@ std::vector<std::shared_ptr<ManagerRos::Side>> ManagerRos::sides() {
   return sides_;
 }
 
-// A thread of its own: what hinders publication (a full pipe behind the log, a plug-in's own ROS
-// side) must not take the goal from a motion.
+// A separate thread, so that delays of publication (a full log pipe, the ROS side of a plug-in) do
+// not delay the goal of a motion.
 void ManagerRos::goalLoop() {
   pthread_setname_np(pthread_self(), "goals");
   auto next = std::chrono::steady_clock::now();

@@ -93,8 +93,8 @@ bool ReconfigureServer::onSet(dynamic_reconfigure::Reconfigure::Request& request
   } else {
     answer = write_(changed);
   }
-  // A client of this protocol reads the values in force from the answer and from the topic; it has
-  // no field for a sentence, and the usual one shows no error of the service.
+  // Clients of this protocol read the present values from the response and the topic. There is no
+  // field for an error message, and the usual client does not show a failed call.
   if (!answer.success) {
     ROS_WARN("%s/set_parameters refused: %s; nothing changed", node_.getNamespace().c_str(),
              answer.message.c_str());

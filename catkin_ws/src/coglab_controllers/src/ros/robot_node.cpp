@@ -29,7 +29,7 @@ namespace {
 volatile std::sig_atomic_t asked_to_end = 0;
 void onSignal(int) { asked_to_end = 1; }
 
-/// The back ends by name, or that of a library. @throws std::exception naming a parameter
+/// Makes a back end by its name or library. @throws std::exception naming a parameter
 std::unique_ptr<coglab_rt::ArmPort> makeArm(const ros::NodeHandle& lwr, const std::string& name) {
   if (name == "fri") return std::make_unique<lwr_fri_bridge::BridgeRos>(lwr, true);
   if (name == "ideal") return std::make_unique<coglab_controllers::IdealArmRos>(lwr);
@@ -68,8 +68,8 @@ int main(int argc, char** argv) {
     options.highest_priority = arm->highestPriority();
     coglab_controllers::ManagerRos manager(ros::NodeHandle("controller_manager"), arm->mailboxes(),
                                            options);
-    // However this scope ends: the arm brakes while the control thread still runs, and the arm's
-    // thread, which wakes the control thread, ends before the manager goes.
+    // At every exit from this scope the arm brakes while the control thread still runs, and the
+    // arm's thread, which wakes the control thread, ends before the manager is destroyed.
     const std::shared_ptr<void> ends_first(nullptr, [&arm](void*) { arm->shutdown(); });
     control.store(&manager.controlThread(), std::memory_order_release);
     manager.start();

@@ -45,7 +45,7 @@ RobotTopics::RobotTopics(const ros::NodeHandle& node, const coglab_rt::JointLimi
 void RobotTopics::onJoints(const sensor_msgs::JointState& joints) {
   const std::int64_t stamp = coglab_rt::toSteady(joints.header.stamp);
   const std::int64_t ahead = -coglab_rt::ageOf(joints.header.stamp);
-  // One stamp from the future would make all that follow look old.
+  // After a stamp from the future all later ones would seem old.
   if (stamp <= last_stamp_ns_ || ahead > coglab_rt::kFutureAllowance_ns ||
       !inOrder(joints.name, joints.position, sample_.position)) {
     ROS_WARN_THROTTLE(
@@ -63,7 +63,7 @@ void RobotTopics::onJoints(const sensor_msgs::JointState& joints) {
     sample_.cycle_time =
         sample_.cycle_time > 0.0 ? 0.98 * sample_.cycle_time + 0.02 * passed : passed;
   }
-  // The interface in the other process may be one that loses packets.
+  // The interface in the other process may lose packets.
   sample_.stop_delay = coglab_rt::lostTime(sample_.cycle_time);
   last_stamp_ns_ = stamp;
   ++sample_.sequence;
@@ -100,8 +100,8 @@ void RobotTopics::onWrench(const geometry_msgs::WrenchStamped& wrench) {
 
 void RobotTopics::send(const VelocityCommand& command) {
   sent_.write(command);
-  // Age and permission of the joint state that the velocity was computed from: a message that was
-  // late, or made before a hold, is known by them.
+  // Stamp and epoch of the joint state behind the velocity. They identify a message that is late or
+  // from before a hold.
   target_message_.header.stamp = coglab_rt::toRos(command.stamp_ns);
   target_message_.header.frame_id = std::to_string(command.motion_epoch);
   for (int joint = 0; joint < 7; ++joint) {

@@ -15,7 +15,7 @@ namespace coglab_controllers {
 
 namespace {
 
-// Where the model and the limits of the arm come from unless parameters name others.
+// Default package of the model and the limits of the arm.
 constexpr const char* kDescription = "lwr_description";
 
 std::string readFile(const std::string& path) {
@@ -26,8 +26,8 @@ std::string readFile(const std::string& path) {
   return text.str();
 }
 
-/// `package://name/path` as a path; other names below this package's config folder, `.yaml` if they
-/// have no suffix.
+/// Path of `package://name/path`. Other names are below this package's config folder, with `.yaml`
+/// if they have no suffix.
 std::string resolve(const std::string& name) {
   const std::string scheme = "package://";
   if (name.rfind(scheme, 0) == 0) {
@@ -68,7 +68,7 @@ ManagerSettings readManagerSettings(const ros::NodeHandle& node) {
   settings.feedback_file = resolve(settings.feedback_file);
   settings.central_file = resolve(settings.central_file);
   settings.signals_file = resolve(settings.signals_file);
-  // Controllers of which only the ROS side has a library; a program without ROS links them.
+  // Only the ROS sides of these controllers are in a library; programs without ROS link them.
   for (const char* stream :
        {"coglab/TwistStream", "coglab/PoseStream", "coglab/JointVelocityStream"})
     settings.types.emplace(stream, "libcoglab_streams.so");

@@ -20,7 +20,7 @@ constexpr double kForgotten = 10.0;    // s after which the same refusal is logg
 
 double seconds(std::int64_t nanoseconds) { return 1e-9 * static_cast<double>(nanoseconds); }
 
-/// A correction: the difference, of orientations the rotation from the left.
+/// A correction: the difference, or for orientations the left rotation.
 std::vector<double> changeOf(const ctrl_more::Attribution& change, ctrl_more::SignalKind kind) {
   std::vector<double> values(change.after);
   const std::size_t quaternion = kind == ctrl_more::SignalKind::Vector ? values.size()
@@ -50,8 +50,8 @@ bool isBelow(const std::string& topic, const std::string& space) {
   return topic.rfind(space + "/", 0) == 0;
 }
 
-/// Types of the topics that nodes publish or subscribe to now, by the ROS master; none if it does
-/// not answer. The master also knows the types of topics that nobody has any more.
+/// Types of the topics with a publisher or subscriber now, from the ROS master; empty if it does
+/// not answer. The master also keeps the types of topics without any node.
 std::map<std::string, std::string> typesInUse() {
   XmlRpc::XmlRpcValue request, response, types, state;
   std::map<std::string, std::string> used;
@@ -176,7 +176,7 @@ std::string SignalTopics::nameOf(const Row& row) const {
   return std::string(ctrl_more::nameOf(input.source)) + "/" + input.key;
 }
 
-/// A signal has one writer: the node that was there first, until it is silent.
+/// A signal has one writer: the first node, until it is silent.
 bool SignalTopics::isWriter(Topic& topic, const std::string& node) {
   const std::int64_t now = steadyNow();
   const bool silent = seconds(now - topic.heard_ns) > std::max(kOtherWriter, topic.max_age);
@@ -187,7 +187,7 @@ bool SignalTopics::isWriter(Topic& topic, const std::string& node) {
     return true;
   }
   if (!topic.two_writers) {
-    ROS_WARN("%s has two writers: those of %s are taken, those of %s are ignored",
+    ROS_WARN("%s has two publishers: messages of %s are used, those of %s are ignored",
              topic.subscriber.getTopic().c_str(), topic.writer.c_str(), node.c_str());
   }
   topic.two_writers = true;

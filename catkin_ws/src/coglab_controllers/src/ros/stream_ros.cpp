@@ -15,12 +15,12 @@
 namespace coglab_controllers {
 
 namespace {
-constexpr double kOldestFrame = 1.0;  // s, of a frame in which commands are given
+constexpr double kOldestFrame = 1.0;  // s, largest age of a command's frame
 }
 
-/// Service `<id>/start_motion` opens the stream, and takes the arm if no other motion has it;
-/// `<id>/cancel` closes it. One publisher at a time: it keeps the stream until it pauses for
-/// `command_timeout`.
+/// Service `<id>/start_motion` opens the stream, and activates the controller if no other motion is
+/// running; `<id>/cancel` closes it. One publisher at a time: it keeps the stream until it pauses
+/// for `command_timeout`.
 class StreamRos : public MotionControllerRos {
  public:
   ~StreamRos() override {
@@ -60,7 +60,7 @@ class StreamRos : public MotionControllerRos {
 
   bool isTool(const std::string& frame) const { return frame == tool_frame_; }
 
-  /// Pose of a frame in the base frame; false: `why` says what is wrong with it.
+  /// Pose of a frame in the base frame. On false, `why` contains the error.
   bool inBase(const std::string& frame, Pose& pose, std::string& why) {
     if (frame.empty() || frame == controller_->baseFrame()) return true;
     GoalObservation seen;

@@ -9,7 +9,8 @@ namespace coglab_controllers {
 
 namespace {
 
-constexpr std::size_t kNamesKept = 256;  // of refused frames: names are anybody's
+constexpr std::size_t kNamesKept =
+    256;  // of refused frames; bounded, because any node can send names
 
 bool isFinite(const geometry_msgs::Transform& transform) {
   const auto& t = transform.translation;
@@ -20,7 +21,7 @@ bool isFinite(const geometry_msgs::Transform& transform) {
   return true;
 }
 
-/// tf2 takes frame names with and without a leading slash for the same.
+/// Removes a leading slash: tf2 treats both forms as the same name.
 std::string bare(const std::string& frame) {
   return !frame.empty() && frame[0] == '/' ? frame.substr(1) : frame;
 }
@@ -72,9 +73,9 @@ void TfListener::receive(const tf2_msgs::TFMessage& message, const std::string& 
 
 void TfListener::putStatic(const geometry_msgs::TransformStamped& transform,
                            const std::string& publisher) {
-  // A frame that has been seen to move keeps a history by stamps, and a static transform would join
-  // it: one stamp from the future locks out all that come after it. Without a stamp it is too old
-  // for any history, and as valid as ever for a frame that has none.
+  // A moving frame has a history by stamps. A static transform with a stamp would join it, and a
+  // stamp from the future would block all later ones. Without a stamp the transform is too old for
+  // a history, and still valid for a static frame.
   geometry_msgs::TransformStamped unstamped = transform;
   unstamped.header.stamp = ros::Time();
   if (buffer_.setTransform(unstamped, publisher, true)) return;
@@ -93,7 +94,7 @@ bool TfListener::acceptable(const geometry_msgs::TransformStamped& transform,
                       frame.c_str(), publisher.c_str());
     return false;
   }
-  if (is_static) return true;  // valid at any time, whatever its stamp says
+  if (is_static) return true;  // valid at any time; its stamp does not matter
   const std::int64_t ahead =
       coglab_rt::nanoseconds(transform.header.stamp) - coglab_rt::nanoseconds(ros::Time::now());
   const bool future = ahead > kClockTolerance_ns;

@@ -1,5 +1,5 @@
-// The control cycle runs free while services are called: no allocation, no lock, no system call in
-// it, ever.
+// The control cycle runs freely while services are called. It makes no allocation, lock or system
+// call.
 #include <dlfcn.h>
 #include <pthread.h>
 #include <unistd.h>
@@ -32,7 +32,7 @@ void* __libc_realloc(void*, std::size_t);
 void* __libc_memalign(std::size_t, std::size_t);
 void __libc_free(void*);
 
-// Everything in the process allocates through these.
+// All allocations of the process use these functions.
 void* malloc(std::size_t size) {
   if (counting) ++allocations;
   return __libc_malloc(size);
@@ -129,7 +129,7 @@ struct Counted {
   std::atomic<bool> system_calls{false};
 };
 
-// Runs cycles, as fast as they go, on an arm that follows at once.
+// Runs cycles as fast as possible on an arm that follows at once.
 void runCycles(ControllerManager& manager, const std::atomic<bool>& stop, Counted& counted) {
   RobotSample sample;
   sample.position = kHome;
@@ -156,7 +156,7 @@ void runCycles(ControllerManager& manager, const std::atomic<bool>& stop, Counte
   }
 }
 
-// Everything that services, goals and publishers ask of the manager meanwhile.
+// All requests of services, goals and publishers to the manager during the cycles.
 struct Requests {
   ControllerManager& manager;
   FrameTable& frames;

@@ -1,5 +1,5 @@
-// The control cycle at its limits: which joint states count, when silence, a border and a slow
-// clock act, what stands, and what it tells.
+// Limits of the control cycle: valid joint states; effects of silence, a border and a slow clock;
+// standstill; reports.
 #include <cmath>
 #include <limits>
 
@@ -88,7 +88,7 @@ TEST_F(CycleLimits, TheTimeBetweenJointStatesIsAboveZeroAndATenthOfASecondAtMost
   EXPECT_EQ(fine.dt, 0.1);
 }
 
-TEST_F(CycleLimits, SilenceIsToldAfterATenthAndEndsAMotionAfterHalfASecond) {
+TEST_F(CycleLimits, SilenceIsReportedAfterATenthAndEndsAMotionAfterHalfASecond) {
   begin();
   move();
   ControlCycle& cycle = robot->manager->cycle();
@@ -144,7 +144,7 @@ TEST_F(CycleLimits, ACancelOfAControllerThatIsNotActiveEndsNothingLater) {
   EXPECT_EQ(report().motion, MotionState::Running);
 }
 
-TEST(FirstJointState, IsNoStopOfTheRobotAndTheSecondMayBe) {
+TEST(FirstJointState, IsNeverAStopOfTheRobotButTheSecondCanBe) {
   const VirtualRobot plain;
   ctrl_more::Logger logger;
   ManagerSettings settings =

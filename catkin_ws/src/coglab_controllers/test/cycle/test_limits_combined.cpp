@@ -1,5 +1,5 @@
 // The shipped feedback list, guard, limits and interpolator together: motions near the ends of the
-// joints' ranges keep to their path, arrive, and come to no fault.
+// joint ranges stay on their path, arrive and cause no fault.
 #include <random>
 
 #include "coglab_rt/braking.hpp"
@@ -10,8 +10,8 @@ namespace {
 
 const std::string kShipped = "feedback_file: " PACKAGE_DIR "/../ctrl_more/config/feedback.yaml";
 
-/// The arm follows its set-point with a delay, measures with noise, and the bridge has its own
-/// bound on the way to a limit.
+/// The arm follows its set-point with a delay and measures with noise. The bridge bounds the speed
+/// toward a limit.
 class DelayedRobot : public VirtualRobot {
  public:
   explicit DelayedRobot(const std::string& parameters)
@@ -57,7 +57,7 @@ double uniform(std::mt19937& random, double low, double high) {
   return std::uniform_real_distribution<double>(low, high)(random);
 }
 
-/// Whether the hand stays in the workspace, with some room, on the straight way in joint space.
+/// True if the hand stays well inside the workspace on the straight path in joint space.
 bool staysInside(const RobotSetup& robot, const JointVector& from, const JointVector& to) {
   std::array<Workspace::Margin, Workspace::kBorders> margins;
   for (int i = 50; i >= 0; --i) {
@@ -77,7 +77,7 @@ void expectNoFault(DelayedRobot& robot) {
   }
 }
 
-TEST(LimitsCombined, WhatIsAcceptedNearTheEndsOfTheRangesIsReachedOnAStraightWay) {
+TEST(LimitsCombined, TargetsNearTheEndsOfTheRangesAreReachedOnAStraightPath) {
   for (const bool narrowed : {false, true}) {
     DelayedRobot robot("{" + kShipped +
                        (narrowed ? ", lower_joint_pos_limit: [-2.5, -1.8, -2.5, -1.7, -2.5, -1.6, "
@@ -136,8 +136,8 @@ TEST(LimitsCombined, WhatIsAcceptedNearTheEndsOfTheRangesIsReachedOnAStraightWay
   }
 }
 
-/// The guard plans with the table or with less: a margin below the arm interface's would let pass
-/// what that one stops, a wider range what the arm cannot do.
+/// The guard may only narrow the table. With a smaller margin it would pass motions that the arm's
+/// interface stops; with a wider range, motions that the arm cannot do.
 TEST(LimitsCombined, ParametersNarrowTheTableAndNeverWidenIt) {
   const auto refusal = [](const std::string& parameters) {
     try {
@@ -162,7 +162,7 @@ TEST(LimitsCombined, ParametersNarrowTheTableAndNeverWidenIt) {
   }
 }
 
-TEST(LimitsCombined, ReachedIsSaidByTheArmAndNotByItsSetPoint) {
+TEST(LimitsCombined, TheMeasuredArmAndNotTheSetPointDecidesReached) {
   for (const std::string active : {"ptp", "dmp"}) {
     VirtualRobot robot;
     robot.loadBoth(active);
@@ -184,7 +184,7 @@ TEST(LimitsCombined, ReachedIsSaidByTheArmAndNotByItsSetPoint) {
                       .cwiseMin(stuck + JointVector::Constant(0.05))
                       .cwiseMax(stuck - JointVector::Constant(0.05));
       if (i < 150) stuck = commanded = robot.sample.position;
-      robot.sample.position = stuck;  // something blocks the arm in the middle of its way
+      robot.sample.position = stuck;  // the arm is blocked in the middle of its path
       robot.sample.velocity.setZero();
       robot.sample.commanded_position = commanded;
       ASSERT_NE(robot.state(), MotionState::Reached) << active;
@@ -195,7 +195,7 @@ TEST(LimitsCombined, ReachedIsSaidByTheArmAndNotByItsSetPoint) {
   }
 }
 
-TEST(LimitsCombined, ReachesUnderPushesNearTheEndsOfTheRangesComeToNoFault) {
+TEST(LimitsCombined, PushedReachesNearTheEndsOfTheRangesCauseNoFault) {
   DelayedRobot robot("{" + kShipped + "}");
   robot.loadBoth("ptp");
   std::mt19937 random(12);

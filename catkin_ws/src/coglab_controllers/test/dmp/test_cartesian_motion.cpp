@@ -1,4 +1,4 @@
-// The whole Cartesian motion: goals that move, tremble or leave, its end, switches, slow arrivals.
+// The whole Cartesian motion: moving, noisy and leaving goals, its end, switches, slow arrivals.
 #include <algorithm>
 #include <utility>
 #include <vector>
@@ -57,7 +57,7 @@ class Sights {
   Vector3 error_ = Vector3::Zero(), seen_ = Vector3::Zero();
 };
 
-TEST(CartesianMotion, ANoisyGoalIsReachedNearlyAsSoonAsAStillOne) {
+TEST(CartesianMotion, ANoisyGoalTakesLittleLongerThanAStillOne) {
   const Vector3 goal(0.51, 0, 0);
   const auto still = [&goal](double) { return goal; };
   const auto end_of = [&](Sights sights) {
@@ -82,7 +82,7 @@ TEST(CartesianMotion, ANoisyGoalIsReachedNearlyAsSoonAsAStillOne) {
   }
 }
 
-TEST(CartesianMotion, AMovingNoisyGoalIsNotTakenForReached) {
+TEST(CartesianMotion, AMovingNoisyGoalDoesNotCountAsReached) {
   // 0.15 m/s is faster than any noise lets pass: such a motion goes on as long as the goal does.
   for (int seed = 1; seed <= 20; ++seed) {
     Sights sights(seed, 0.002, 0.5);
@@ -253,7 +253,7 @@ TEST(CartesianMotion, ItsVelocitiesLeadToItsPoses) {
   }
 }
 
-TEST(CartesianMotion, AGoalIsDrawnBackUntilTheMiddleAndThenLessAsAMinimumJerkMotionGoes) {
+TEST(CartesianMotion, TheApproachShiftsTheGoalFullyUntilTheMiddleThenLessByMinimumJerk) {
   const DmpPlan plan = reachPlan();
   const Vector3 goal(0.5, 0.1, 0), approach(0.0, 0.0, -0.1);
   CartesianMotion motion;
@@ -304,7 +304,7 @@ SlowArrival arrive(double arrival_speed, double aside = 0.0) {
   return found;
 }
 
-TEST(CartesianMotion, ArrivesSlowlyWhereItIsAskedTo) {
+TEST(CartesianMotion, ArrivesAtTheRequestedSpeed) {
   const SlowArrival slow = arrive(0.05), plain = arrive(0.0);
   EXPECT_GT(plain.near, 0.10);  // else there is nothing to slow down
   EXPECT_LT(slow.near, 0.055);

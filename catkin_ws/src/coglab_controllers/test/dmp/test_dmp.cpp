@@ -208,7 +208,7 @@ TEST(Dmp, AMappedShapeReachesAGoalInAnotherDirectionWithoutADetour) {
   }
 }
 
-TEST(ShapeMap, UprightTurnsWhatIsLevelAndScalesHeights) {
+TEST(ShapeMap, UprightTurnsTheLevelPartAndScalesHeights) {
   Random random(16);
   const Vector3 x = Vector3::UnitX(), y = Vector3::UnitY(), up = Vector3::UnitZ();
   for (int k = 0; k < 2000; ++k) {

@@ -1,5 +1,4 @@
-// What becomes of a goal before eq. (1): which frames are believed, where it may go, how it is
-// filtered, and the orientation curve.
+// Processing of a goal before eq. (1): accepted frames, bounds, filter, and the orientation curve.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -62,7 +61,7 @@ TEST(GoalLimits, AFrameIsFollowedUpToItsJumpAndItsAge) {
   EXPECT_EQ(gate.update(kSecond + 1030 * kMs, sight(1.1, kSecond + 1030 * kMs)), State::Fresh);
 }
 
-TEST(GoalLimits, ThreeFramesThatAgreeWithinFiftyMillimetresAreBelieved) {
+TEST(GoalLimits, ThreeFramesThatAgreeWithinFiftyMillimetresAreAccepted) {
   for (const double apart : {0.049, 0.051}) {
     GoalLimits gate = begun(0.0);
     for (int i = 0; i < 3; ++i) {
@@ -72,7 +71,7 @@ TEST(GoalLimits, ThreeFramesThatAgreeWithinFiftyMillimetresAreBelieved) {
       EXPECT_EQ(gate.update(t, sight(0.5 + apart * i, t)), expected) << "a frame counts once";
     }
   }
-  // A frame near the goal between them begins the count anew.
+  // A frame near the goal between them restarts the count.
   GoalLimits gate = begun(0.0);
   const double places[] = {0.5, 0.5, 0.0, 0.5, 0.5};
   for (int i = 0; i < 5; ++i) gate.update(kSecond + i, sight(places[i], kSecond + i + 1));
@@ -100,13 +99,13 @@ TEST(GoalLimits, WithoutALimitAGoalStaysValidOrIsNeverLost) {
   EXPECT_EQ(gate.update(1000 * kSecond, sight(1.0, kSecond)), State::Old);
 }
 
-TEST(GoalLimits, UntilAMotionBeginsThreeFramesAreNeededWhereverTheyAre) {
+TEST(GoalLimits, BeforeAMotionThreeAgreeingFramesAreNeededAnywhere) {
   GoalLimits gate;
   EXPECT_EQ(gate.state(), State::Unsettled);
   for (int i = 1; i <= 3; ++i) {
     EXPECT_EQ(gate.update(i * kMs, sight(0.0, i * kMs)), i < 3 ? State::Unsettled : State::Fresh);
   }
-  GoalLimits still;  // a static frame, here at the origin, is believed at once
+  GoalLimits still;  // a static frame, here at the origin, is accepted at once
   GoalObservation turned = sight(0.0, 0);
   turned.stamp_ns = kSecond;
   EXPECT_EQ(still.update(kSecond, turned), State::Fresh);
@@ -118,8 +117,7 @@ TEST(GoalLimits, UntilAMotionBeginsThreeFramesAreNeededWhereverTheyAre) {
   EXPECT_NEAR(still.age(), 0.1, 1e-9);
 }
 
-/// How far the estimate is beyond a goal that goes along x with `speed` for `time` s and then
-/// rests.
+/// Overshoot of the estimate for a goal that moves along x with `speed` for `time` s, then rests.
 double ledBeyond(double speed, double time, bool predicted) {
   GoalFilter filter;
   filter.begin(pose(Vector3::Zero()));
@@ -147,10 +145,10 @@ TEST(GoalFilter, MeetsASteadyRampWithoutLag) {
   EXPECT_LT((filter.velocity() - speed).norm(), 1e-6);
 }
 
-TEST(GoalFilter, AHandThatComesFastIsNotLed) {
+TEST(GoalFilter, AFastHandGivesLittleGoalVelocity) {
   const double slow = ledBeyond(0.15, 0.4, false);
   EXPECT_GT(slow, 0.005);  // the price of no lag behind a goal that goes on
-  // It would be five times as far beyond a hand that is five times as fast, and stops.
+  // Without the bound, five times the speed would give five times the overshoot.
   EXPECT_LT(ledBeyond(0.75, 0.4, false), 2.5 * slow);
   GoalFilter filter;
   filter.begin(pose(Vector3::Zero()));
@@ -160,10 +158,10 @@ TEST(GoalFilter, AHandThatComesFastIsNotLed) {
   }
 }
 
-TEST(GoalFilter, AChangeOfAPredictionIsNotLed) {
+TEST(GoalFilter, AChangeOfAPredictionGivesNoGoalVelocity) {
   EXPECT_GT(ledBeyond(0.05, 0.4, false), 0.002);
   EXPECT_LT(ledBeyond(0.05, 0.4, true), 0.0005);
-  // What is predicted may move, too.
+  // A predicted goal may also move.
   GoalFilter filter;
   filter.begin(pose(Vector3::Zero()));
   for (int i = 1; i <= 400; ++i)
@@ -186,7 +184,7 @@ TEST(GoalFilter, IsExactForAnyCycleTime) {
   }
 }
 
-TEST(GoalFilter, AFarGoalPullsNoHarder) {
+TEST(GoalFilter, SpeedIsBoundedForAFarGoal) {
   GoalFilter filter;
   filter.begin(pose(Vector3::Zero()));
   double fastest = 0.0;
@@ -238,7 +236,7 @@ std::pair<double, double> noiseOf(double noise, double correlation, Goal goal, i
   return {least, largest};
 }
 
-TEST(GoalFilter, TellsNoiseFromTheMotionOfAPerson) {
+TEST(GoalFilter, DistinguishesNoiseFromTheMotionOfAPerson) {
   const auto reach = [](double t) { return Vector3(0.5 * minimumJerk(t), 0, 0); };
   const auto still = [](double) { return Vector3(0.5, 0, 0); };
   const auto steady = [](double t) { return Vector3(0.5, 0.1 * t, 0); };
@@ -294,7 +292,7 @@ TEST(OrientationCurve, ATurnFromRestFollowsTheMinimumJerkProfile) {
   }
 }
 
-TEST(OrientationCurve, ATargetMayTurnOnTowardAWholeTurn) {
+TEST(OrientationCurve, ATargetMayKeepTurningTowardAWholeTurn) {
   OrientationCurve curve;
   curve.start(Quaternion::Identity(), Vector3::Zero(), expRotation(Vector3(0, 0, 3.0)), 1.0);
   for (double angle = 3.0; angle < 6.2; angle += 0.01) {

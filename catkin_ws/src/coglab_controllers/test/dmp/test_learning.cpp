@@ -9,7 +9,7 @@ using namespace coglab_controllers::test;
 
 namespace {
 
-// Takes demonstrations that are no reaches, too.
+// Also accepts demonstrations that are not reaches.
 const LearningOptions kAny = [] {
   LearningOptions options;
   options.allow = {"short", "brief", "jump", "moving", "noisy"};
@@ -119,7 +119,7 @@ TEST(Learning, WorksWithEverySupportedSizeAndWeight) {
   }
 }
 
-TEST(Learning, RefusesWhatCannotBeLearnt) {
+TEST(Learning, RefusesUnusableDemonstrations) {
   const Trajectory good = minimumJerkReach(Vector3::Zero(), Vector3(0.5, 0, 0), 1.2);
   EXPECT_THROW(learn("none", {}), std::invalid_argument);
   EXPECT_THROW(learn("bad id!", {good}), std::invalid_argument);
@@ -146,7 +146,7 @@ TEST(Learning, RefusesWhatCannotBeLearnt) {
 }
 
 TEST(Learning, ADemonstrationThatComesBackToItsStartIsNotMappedToAnother) {
-  // Less than a millimetre is no line that could be turned to the one of another demonstration.
+  // A line shorter than a millimetre has no direction and cannot be mapped.
   LearningOptions options;
   options.mapping = ShapeMapping::Similarity;
   const Vector3 here = Vector3::Zero(), there(0.0, 2.0, 0.0), way(0.5, 0.0, 0.0);
@@ -164,7 +164,7 @@ TEST(Learning, ADemonstrationThatComesBackToItsStartIsNotMappedToAnother) {
   EXPECT_LT((mapped.goal - least).norm(), 1e-12);
 }
 
-TEST(Learning, AnEndInMotionIsNotHeldBack) {
+TEST(Learning, ADemonstrationThatEndsInMotionKeepsItsSpeed) {
   Trajectory cut = minimumJerkReach(Vector3::Zero(), Vector3(0.5, 0.0, 0.0), 1.2);
   cut.times.resize(145);
   cut.positions.conservativeResize(3, 145);

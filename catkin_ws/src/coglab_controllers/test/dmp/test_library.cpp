@@ -1,4 +1,4 @@
-// Library files: round trip, learning on load, all or nothing, refusal of everything malformed.
+// Library files: round trip, learning on load, all or nothing, refusal of malformed files.
 #include <gtest/gtest.h>
 
 #include <sys/stat.h>
@@ -125,7 +125,7 @@ TEST(Library, LearnsTrajectoriesWhenRead) {
   EXPECT_NEAR(path(0, 1), 0.25, 0.002);
 }
 
-/// The golden files are derived apart, from the equations in numpy (golden/make_golden.py).
+/// golden/make_golden.py computes the golden files independently, from the equations in numpy.
 TEST(Library, GoldenFilesMeanTheSameAsInPython) {
   const std::string folder = std::string(COGLAB_PACKAGE_DIR) + "/test/golden/";
   Library weights, learnt;

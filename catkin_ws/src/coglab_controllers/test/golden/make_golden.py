@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Rewrites the golden files from demonstrations.xml: the library as weights, and the motion of each primitive.
 
-Derived from the equations alone, in numpy: nothing of what is tested is imported. Eq. (1) and (2) of D4.10 are, in
+Computed only from the equations, in numpy: it imports none of the tested code. Eq. (1) and (2) of D4.10 are, in
 units of the duration and with D = 2 sqrt(K), a critically damped spring under a force that depends on the phase alone,
 
     x'' + 2 k x' + k^2 x = f(s),   k = sqrt(K),   f(s) = (1 - w(s)) K (M phi(s) + x0) + w(s) K g,   s = exp(-alpha t)
@@ -10,7 +10,7 @@ whose solution is a convolution, here done by Gauss-Legendre quadrature:
 
     x(t) = exp(-k t) ((1 + k t) x0 + t v0) + integral_0^t (t - u) exp(-k (t - u)) f(u) du
 
-Only for a change of format or law that is meant; the tests of both languages read what this writes.
+Run it only after an intended change of format or law. The tests of both languages read its output.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ REST_SPEED, REST_WINDOW = 0.1, 0.05
 
 @dataclass
 class Primitive:
-    """What stands in the library about one primitive; lengths in m, times in s."""
+    """The entry of one primitive in the library; lengths in m, times in s."""
 
     id: str
     description: str
@@ -135,7 +135,7 @@ def convolve(primitive: Primitive, force, times: np.ndarray) -> np.ndarray:
 
 
 def free(primitive: Primitive, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What is left at the times (in durations) of x0 and of v0."""
+    """Contributions of x0 and of v0 at the times (in durations)."""
     k = np.sqrt(primitive.stiffness)
     return np.exp(-k * times) * (1.0 + k * times), np.exp(-k * times) * times
 
@@ -202,7 +202,7 @@ def shape_map(mapping: str, demonstrated: np.ndarray, line: np.ndarray) -> np.nd
 
 
 def motion(primitive: Primitive, goal: np.ndarray, ratio: float, times: np.ndarray) -> np.ndarray:
-    """Positions at the times (s) of a motion from the primitive's start, at rest, to a goal that stands still."""
+    """Positions at the times (s) of a motion from the primitive's start, at rest, to a fixed goal."""
     at = times / (ratio * primitive.duration)
     shape = shape_map(primitive.mapping, primitive.goal - primitive.start, goal - primitive.start)
 
@@ -215,7 +215,7 @@ def motion(primitive: Primitive, goal: np.ndarray, ratio: float, times: np.ndarr
 
 
 def words(values) -> str:
-    """Numbers as they stand in a file: 12 digits are more than two ways of computing them agree on."""
+    """Numbers as text with 12 digits, more than two methods of computation agree on."""
     return " ".join(f"{float(value) if abs(value) > 1e-12 else 0.0:.12g}" for value in np.atleast_1d(values))
 
 

@@ -127,7 +127,7 @@ TEST(TwoTaskIk, DropsTheSecondTaskNearASingularity) {
   EXPECT_LT((state.jacobian.topRows<3>() * result.velocity - reference.velocity).norm(), 1e-9);
 }
 
-TEST(TwoTaskIk, AStretchedArmAsksForFiniteSpeeds) {
+TEST(TwoTaskIk, AStretchedArmGetsFiniteSpeeds) {
   const TwoTaskIk ik;
   for (const double bend : {0.0, 1e-9, 1e-6, 1e-4, 1e-3, 0.01}) {
     JointVector q = JointVector::Zero();
@@ -143,7 +143,7 @@ TEST(TwoTaskIk, AStretchedArmAsksForFiniteSpeeds) {
   }
 }
 
-TEST(TwoTaskIk, OrientationIsLeftFreeWhenAskedTo) {
+TEST(TwoTaskIk, OrientationIsFreeOnRequest) {
   const TwoTaskIk ik;
   const JointVector q = Random(5).posture(0.5);
   const ChainState state = robot().evaluate(q);
@@ -211,7 +211,7 @@ TEST(TwoTaskIk, OneAxisOfTheHandIsASecondTaskToo) {
   EXPECT_GT(turned_about_it, judged / 2) << "the rotation about the axis has to stay free";
 }
 
-TEST(TwoTaskIk, WithoutASecondTaskTheHandGoesStraightAndTurnsAsItLikes) {
+TEST(TwoTaskIk, WithoutASecondTaskTheHandMovesStraightAndTurnsFreely) {
   const TwoTaskIk ik(unlimited());
   Random random(13);
   const ChainState state = robot().evaluate(random.posture(0.5));
@@ -250,7 +250,7 @@ TEST(TwoTaskIk, AnArmOfSixJointsKeepsTheSeventhStill) {
   }
 }
 
-TEST(TwoTaskIk, AnswersErrorsOnlyWithSpeedsTheJointsCanBrakeFrom) {
+TEST(TwoTaskIk, CorrectsErrorsOnlyWithSpeedsTheJointsCanBrakeFrom) {
   Random random(8);
   IkParameters parameters = unlimited();
   parameters.acceleration_limit.setConstant(10.0);
@@ -286,7 +286,7 @@ TEST(TwoTaskIk, AnswersErrorsOnlyWithSpeedsTheJointsCanBrakeFrom) {
   EXPECT_LT(least, 0.5);
 }
 
-TEST(TwoTaskIk, TakesAnErrorOfThePositionAwayNoFasterThanItMay) {
+TEST(TwoTaskIk, CorrectsAPositionErrorWithinItsLargestSpeed) {
   Random random(9);
   IkParameters parameters = unlimited();
   parameters.correction_speed = 0.3;

@@ -122,7 +122,7 @@ TEST(Chain, TheJacobianOfTheMiddleLeadsToTheEndOfTheCycle) {
   }
 }
 
-TEST(Chain, SaysWhatIsWrongWithAUrdf) {
+TEST(Chain, ReportsErrorsOfAUrdf) {
   const std::string urdf = robotUrdf();
   EXPECT_THROW(Chain("not xml", "a", "b"), std::invalid_argument);
   EXPECT_THROW(Chain(urdf, "lwr_base_link", "nowhere"), std::invalid_argument);

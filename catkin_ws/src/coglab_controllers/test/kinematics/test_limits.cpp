@@ -47,7 +47,7 @@ TEST(Guard, ScalesTheWholeVectorAndKeepsEveryLimit) {
     guard.limit(state, q, request, result);
     ASSERT_GE(result.scale, 0.0);
     ASSERT_LE(result.scale, 1.0);
-    // The direction is kept, but for joints at their stop that asked for next to nothing.
+    // The direction is kept, except for joints at their stop with a very small request.
     const double next_to_nothing =
         std::max(1e-3 * request.lpNorm<Eigen::Infinity>(), 1e-5) * result.scale;
     ASSERT_LE((result.velocity - result.scale * request).lpNorm<Eigen::Infinity>(),
@@ -99,7 +99,7 @@ TEST(Guard, AJointNeverReachesItsStopAtFullSpeed) {
   }
 }
 
-TEST(Guard, AJointAtItsStopThatAsksForNextToNothingDoesNotStopTheArm) {
+TEST(Guard, AJointAtItsStopWithAVerySmallRequestDoesNotStopTheArm) {
   GuardParameters p = armLimits();
   p.workspace = everywhere();
   Guard guard(p, robot());
@@ -120,7 +120,7 @@ TEST(Guard, AJointAtItsStopThatAsksForNextToNothingDoesNotStopTheArm) {
   EXPECT_EQ(result.scale, 0.0);
 }
 
-TEST(Guard, AnswersNanWithStandstill) {
+TEST(Guard, ANanRequestGivesStandstill) {
   Guard guard(armLimits(), robot());
   JointVector q = JointVector::Zero(), request = JointVector::Constant(0.1);
   request[2] = std::nan("");
@@ -166,7 +166,7 @@ TEST(Guard, KeepsTheHandInTheWorkspaceAndTheArmFromStretching) {
   EXPECT_GT(inside, 50);
 }
 
-TEST(Guard, LetsPassWhatLeadsBackInside) {
+TEST(Guard, AllowsMotionBackInside) {
   GuardParameters p = armLimits();
   p.workspace.box_max.z() = 0.5;  // the stretched arm is far above
   p.workspace.max_stretch = 1.0;
@@ -260,7 +260,7 @@ TEST(PhaseGovernor, FollowsTheSpeedScaleWithoutSteps) {
 }
 
 TEST(PhaseGovernor, WaitsForAnArmThatIsLimited) {
-  // The limits let pass a speed of 0.4 of what the motion asks at rate 1.
+  // The limits allow 0.4 of the motion's speed at rate 1.
   PhaseGovernor governor;
   double scale = 1.0;
   for (int i = 0; i < 400; ++i) {

@@ -123,7 +123,7 @@ TEST(PtpTrajectory, OneJointIsTimeOptimal) {
   }
 }
 
-TEST(PtpTrajectory, AMotionToWhereItIsTakesNoTime) {
+TEST(PtpTrajectory, AMotionToThePresentPostureTakesNoTime) {
   const JointVector q = Random(5).joints(1.0), zero = JointVector::Zero(),
                     one = JointVector::Ones();
   const PtpTrajectory trajectory(q, zero, q, one, one);
@@ -133,7 +133,7 @@ TEST(PtpTrajectory, AMotionToWhereItIsTakesNoTime) {
   EXPECT_EQ(point.position, q);
 }
 
-TEST(PtpTrajectory, SaysWhichJointIsWrong) {
+TEST(PtpTrajectory, ReportsTheInvalidJoint) {
   const JointVector zero = JointVector::Zero(), one = JointVector::Ones();
   JointVector bad = one;
   bad[4] = std::nan("");
@@ -152,7 +152,7 @@ TEST(PtpTrajectory, SaysWhichJointIsWrong) {
   EXPECT_NE(message(zero, zero, one, one, one, 9).find("joints"), std::string::npos);
 }
 
-TEST(PtpTrajectory, AWayThatIsOnlyRoundingTakesNoTime) {
+TEST(PtpTrajectory, ADistanceOfOnlyRoundingTakesNoTime) {
   const JointVector q = Random(6).joints(0.5), zero = JointVector::Zero(),
                     one = JointVector::Ones();
   const JointVector target = q + JointVector::Constant(1e-13);

@@ -1,4 +1,4 @@
-// What libraries of motion controllers and motions must have in common with the program.
+// ABI numbers that libraries of motion controllers and motions must share with the program.
 #include <algorithm>
 #include <stdexcept>
 #include <vector>
@@ -12,7 +12,7 @@ namespace {
 
 using ctrl_more::Abi;
 
-/// Whether these numbers have the size of each of these classes.
+/// True if the ABI numbers contain the size of each of these classes.
 template <typename... Crossing>
 testing::AssertionResult hasSizesOf(const Abi& abi) {
   std::vector<std::size_t> kept(abi.sizes.begin(), abi.sizes.end());
@@ -24,7 +24,7 @@ testing::AssertionResult hasSizesOf(const Abi& abi) {
   return testing::AssertionSuccess();
 }
 
-/// These numbers, each of them once another.
+/// Copies of these numbers, each with one number changed.
 std::vector<Abi> othersThan(const Abi& abi) {
   std::vector<Abi> others(4, abi);
   ++others[0].interface;
@@ -46,7 +46,7 @@ class Nothing : public Motion<> {
   MotionState state() const override { return MotionState::Reached; }
 };
 
-TEST(AbiOfMotions, HasTheSizeOfEveryClassThatCrosses) {
+TEST(AbiOfMotions, ContainsTheSizeOfEverySharedClass) {
   EXPECT_TRUE((hasSizesOf<MotionController, MotionSetup, CycleInput, References, MotionRequest,
                           RobotSample, RobotSetup, Reason>(motionAbi())));
   EXPECT_TRUE(
@@ -65,7 +65,7 @@ TEST(AbiOfMotions, AControllerOfAnotherBuildIsRefused) {
   }
 }
 
-/// A class derived from Motion<> touches more than a controller does.
+/// A class derived from Motion<> uses more classes than a controller.
 TEST(AbiOfMotions, AMotionOfAnotherBuildIsRefused) {
   std::unique_ptr<MotionController> own(CustomMotionController::make(std::make_unique<Nothing>()));
   EXPECT_NE(own, nullptr);

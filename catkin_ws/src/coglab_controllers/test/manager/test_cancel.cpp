@@ -1,5 +1,4 @@
-// A motion is ended from outside: brakes within the limits, ends what waits, and nothing starts
-// later.
+// A cancel brakes within the limits, ends the queue, and no motion starts later.
 #include <atomic>
 #include <chrono>
 #include <random>
@@ -30,7 +29,7 @@ int finish(VirtualRobot& robot, const CancelOrder& order, CancelAnswer& answer, 
   return -1;
 }
 
-/// Cycles that braking from the set-point's present state takes at best.
+/// Smallest number of cycles for braking from the set-point's present state.
 int brakingCycles(const VirtualRobot& robot) {
   double longest = 0.0;
   for (int joint = 0; joint < kMaxJoints; ++joint) {
@@ -43,7 +42,7 @@ int brakingCycles(const VirtualRobot& robot) {
   return static_cast<int>(std::ceil(longest / robot.period - 1e-9));
 }
 
-TEST(Cancel, EndsTheMotionAndItsQueueAndSaysWhy) {
+TEST(Cancel, EndsTheMotionAndItsQueueWithAReason) {
   VirtualRobot robot;
   robot.loadBoth("ptp");
   robot.followWithinLimits();
@@ -74,7 +73,7 @@ TEST(Cancel, EndsTheMotionAndItsQueueAndSaysWhy) {
   const JointVector stood = robot.sample.position;
   for (int i = 0; i < 200; ++i) robot.tick();
   EXPECT_EQ(robot.sample.position, stood);
-  // What comes after a cancel is executed.
+  // A request after a cancel is executed.
   const MotionAnswer next = robot.ptp().add({kThere, {}, {}});
   ASSERT_EQ(next.status, MotionAnswer::kStarted) << next.message;
   for (int i = 0; i < 2000 && robot.state() != MotionState::Reached; ++i) robot.tick();
@@ -123,7 +122,7 @@ TEST(Cancel, ARequestThatWasMadeBeforeItNeverMovesTheArm) {
     robot.followWithinLimits();
     robot.see("human_hand", kGoal);
     const JointVector stood = robot.sample.position;
-    // Another request is under way; this one waits for its turn when the cancel comes.
+    // Another request is running; this one is waiting when the cancel arrives.
     auto lock = robot.manager->lockRequests();
     std::atomic<int> code{-1};
     std::thread request([&] {
@@ -161,7 +160,7 @@ TEST(Cancel, AMotionThatHasNotBegunIsEndedToo) {
   EXPECT_EQ(ends[0].reason.code(), ReasonCode::Cancelled);
 }
 
-TEST(Cancel, WorksWhileTheArmMayNotMoveAndNamesAControllerThatMovesItInstead) {
+TEST(Cancel, WorksWhileMotionIsBlockedAndNamesAnotherMovingController) {
   VirtualRobot robot;
   robot.loadBoth("ptp");
   CancelAnswer answer;
@@ -184,7 +183,7 @@ TEST(Cancel, WorksWhileTheArmMayNotMoveAndNamesAControllerThatMovesItInstead) {
   EXPECT_EQ(answer.code, ReasonCode::UnknownName);
 }
 
-TEST(Cancel, AnytimeItStandsWithinTheBrakingTimeAndNothingMovesAfterwards) {
+TEST(Cancel, TheArmStandsWithinTheBrakingTimeAndDoesNotMoveAfterwards) {
   std::mt19937 random(3);
   const auto uniform = [&random](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random);
@@ -212,7 +211,7 @@ TEST(Cancel, AnytimeItStandsWithinTheBrakingTimeAndNothingMovesAfterwards) {
       robot.tick();
     }
     const CancelOrder order = robot.manager->askCancel(id, "");
-    robot.tick();  // this cycle takes it; what the one before asked for still acts
+    robot.tick();  // this cycle adopts it; the velocity of the last cycle still acts
     const int best = brakingCycles(robot);
     CancelAnswer answer;
     const int cycles = finish(robot, order, answer);
@@ -227,7 +226,7 @@ TEST(Cancel, AnytimeItStandsWithinTheBrakingTimeAndNothingMovesAfterwards) {
   EXPECT_GT(ended, 60);
 }
 
-// An arm on the real clock, until it shall stop; while it is blind nobody hears of it.
+// An arm on the real clock until `stop`. While it is blind it sends no measurements.
 void runArm(ControllerManager& manager, ControlThread& thread, coglab_rt::ArmMailboxes& mailboxes,
             const coglab_rt::JointLimits& limits, const std::atomic<bool>& stop,
             const std::atomic<bool>& blind) {
@@ -264,7 +263,7 @@ bool moves(ControllerManager& manager) {
   return false;
 }
 
-TEST(Cancel, OnTheRealClockAnswersWhenTheArmStandsOrAtItsTimeLimit) {
+TEST(Cancel, OnTheRealClockReturnsAtRestOrAtItsTimeLimit) {
   coglab_rt::ArmMailboxes mailboxes;
   const coglab_rt::JointLimits limits =
       coglab_rt::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
@@ -296,7 +295,7 @@ TEST(Cancel, OnTheRealClockAnswersWhenTheArmStandsOrAtItsTimeLimit) {
 
   ASSERT_EQ(ptp.add({kThere, {}, {}}).status, MotionAnswer::kStarted);
   ASSERT_TRUE(moves(manager));
-  blind = true;  // measurements stop, so nobody knows whether the arm stands
+  blind = true;  // measurements stop, so it is unknown whether the arm stands
   std::this_thread::sleep_for(std::chrono::milliseconds(20));
   const CancelAnswer bad = manager.cancel("ptp", 0.2, "test");
   EXPECT_FALSE(bad.success);

@@ -1,5 +1,5 @@
-// The control thread's time, which goes on with the controller's counter while measurements are
-// lost; and what its cycle makes of a controller that goes on pushing.
+// Time of the control thread, which follows the controller's counter while measurements are lost;
+// and the cycle with a controller that keeps pushing against a limit.
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -17,7 +17,7 @@
 namespace coglab_controllers {
 namespace {
 
-std::atomic<int> extra_ms{0};  // that Timer takes
+std::atomic<int> extra_ms{0};  // additional duration of Timer
 
 /// Adds up the dt of its cycles.
 class Timer : public ctrl_more::FeedbackController {
@@ -53,7 +53,7 @@ class Robot {
     sample_.commanded_position = sample_.position;
     sample_.block = coglab_rt::MotionBlock::None;
   }
-  /// A measurement `cycles` of the controller after the last one, of which nobody is told.
+  /// A measurement `cycles` of the controller after the last one, without a wake-up.
   void publish(ControllerManager& manager, int cycles) {
     ++sample_.sequence;
     sample_.cycle_time = 1e-9 * static_cast<double>(period_ns);
@@ -61,7 +61,7 @@ class Robot {
     sample_.stamp_ns = manager.now_ns();
     mailboxes_.publishSample(sample_);
   }
-  /// The same, and the thread is woken. Whether a control cycle followed.
+  /// The same with a wake-up. Returns true if a control cycle followed.
   bool measure(ControllerManager& manager, ControlThread& thread, int cycles) {
     const int before = cycles_run;
     publish(manager, cycles);
@@ -91,7 +91,7 @@ class ControlThreadTest : public ::testing::Test {
         manager->feedback().addController(std::make_unique<Timer>(passed_ns), "timer", entry).ok());
     ASSERT_TRUE(manager->feedback().setProfile("dmp", {"timer"}).ok());
   }
-  /// Starts the thread and a controller: from then on the time of the cycles is added up.
+  /// Starts the thread and a controller, which adds up the time of the cycles.
   void start() {
     thread = std::make_unique<ControlThread>(manager->cycle(), mailboxes, options);
     thread->start();
@@ -123,7 +123,7 @@ class ControlThreadTest : public ::testing::Test {
   std::unique_ptr<ControlThread> thread;
 };
 
-TEST_F(ControlThreadTest, TimeGoesOnWhileMeasurementsAreLost) {
+TEST_F(ControlThreadTest, TimeContinuesWhileMeasurementsAreLost) {
   start();
   int cycles = 0;
   for (int i = 0; i < 50; ++i) {
@@ -143,7 +143,7 @@ TEST_F(ControlThreadTest, NoCycleIsLongerThanTheTimeAfterWhichAMeasurementIsTooO
   EXPECT_EQ(passed_ns, std::llround(1e9 * longest) + 5'000'000);
 }
 
-TEST_F(ControlThreadTest, ASlowerCycleThanTheArmsTakesEachThirdOfItsMeasurements) {
+TEST_F(ControlThreadTest, ASlowerCycleUsesEveryThirdMeasurement) {
   options.idle_period = 0.5;
   start();
   robot.period_ns = 2'000'000;  // 2.5 of them are a control cycle of 5 ms
@@ -162,7 +162,7 @@ TEST_F(ControlThreadTest, ASlowerCycleThanTheArmsTakesEachThirdOfItsMeasurements
   }
 }
 
-TEST_F(ControlThreadTest, AMeasurementIsTakenOnceAndSilenceWakesNobody) {
+TEST_F(ControlThreadTest, AMeasurementIsUsedOnceAndSilenceWakesNoThread) {
   options.idle_period = 0.5;
   start();
   const int before = robot.cycles_run;
@@ -179,7 +179,7 @@ TEST_F(ControlThreadTest, AMeasurementIsTakenOnceAndSilenceWakesNobody) {
   EXPECT_EQ(robot.cycles_run, before + 1);
 }
 
-TEST_F(ControlThreadTest, AMeasurementWhoseWakingWasLostIsFoundAfterTheIdlePeriod) {
+TEST_F(ControlThreadTest, AMeasurementWithoutAWakeUpIsFoundAfterTheIdlePeriod) {
   start();
   const int before = robot.cycles_run;
   robot.publish(*manager, 1);
@@ -189,7 +189,7 @@ TEST_F(ControlThreadTest, AMeasurementWhoseWakingWasLostIsFoundAfterTheIdlePerio
   EXPECT_EQ(passed_ns, 5'000'000);
 }
 
-/// A controller that asks for one velocity, whatever the arm does.
+/// A controller that always requests the same velocity.
 class Pushing : public MotionController {
  public:
   void configure(const MotionSetup&) override {}
@@ -216,7 +216,7 @@ class Pushing : public MotionController {
   int computed = 0;
 };
 
-/// A robot with one of them in charge.
+/// A robot on which it is active.
 struct PushedRobot : VirtualRobot {
   explicit PushedRobot(const std::string& parameters = "") : VirtualRobot(parameters) {
     EXPECT_TRUE(ok(manager->load("push", "test/Pushing")));
@@ -252,7 +252,7 @@ TEST(ControlCycle, AJointIsSlowedBeforeItsStopWhereTheArmOrItsSetPointIsFurther)
   }
 }
 
-TEST(ControlCycle, ABorderThatAllowsLessAndLessSpeedEndsAMotion) {
+TEST(ControlCycle, ABorderThatReducesTheSpeedToZeroEndsAMotion) {
   PushedRobot robot("workspace: {box_max: [0.7, 1.2, 1.6]}");
   const ChainState home = robot.manager->settings().robot->chain.evaluate(kHome);
   robot.push->velocity = 0.2 * home.jacobian.row(0).transpose().normalized();
@@ -267,7 +267,7 @@ TEST(ControlCycle, ABorderThatAllowsLessAndLessSpeedEndsAMotion) {
   EXPECT_NEAR(stands, 0.5, 0.1);
 }
 
-TEST(ControlCycle, AMotionIsAllowedWithAJointStateOfAnArmThatFollowsAndElseOnlyAdopted) {
+TEST(ControlCycle, MotionIsAllowedOnlyWithAUsableJointStateOfAnEnabledArm) {
   PushedRobot robot;
   robot.push->doing = MotionState::Idle;
   RobotSample held = robot.sample, broken = robot.sample;

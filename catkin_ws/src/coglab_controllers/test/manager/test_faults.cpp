@@ -1,4 +1,4 @@
-// Plug-ins that throw, give no numbers or take too long: told, and nobody else suffers.
+// Plug-ins that throw, return NaN or take too long: they are reported and affect no others.
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -13,7 +13,7 @@
 namespace coglab_controllers {
 namespace {
 
-TEST(Faults, AnExceptionOfAClassThatOnlyThePluginHasIsToldAndLeavesNothing) {
+TEST(Faults, AnExceptionClassOfThePluginIsReportedAndNothingStaysLoaded) {
   VirtualRobot robot("{" + kTypes + "}");
   for (int round = 0; round < 3; ++round) {
     const Answer answer = robot.manager->load("odd", "test/Throwing");
@@ -25,7 +25,7 @@ TEST(Faults, AnExceptionOfAClassThatOnlyThePluginHasIsToldAndLeavesNothing) {
   EXPECT_TRUE(ids.empty());
 }
 
-TEST(Faults, WhatCannotBeAttachedIsNotLoadedAndItsIdStaysFree) {
+TEST(Faults, AControllerWhoseAttachFailsIsNotLoadedAndItsIdStaysFree) {
   VirtualRobot robot;
   int attached = 0;
   const auto attach = [&](MotionController&, const MotionMaker&) {
@@ -80,9 +80,9 @@ INSTANTIATE_TEST_SUITE_P(Faults, Fault,
                                            std::make_pair("throw_int", "threw"),
                                            std::make_pair("nan", "not finite")));
 
-/// Runs a controller that spins for 20 ms, where 15 are allowed, in each cycle but the fifth and
-/// the tenth, and compares what is told of it. False if the machine itself delayed one of these
-/// two: the row of slow cycles is longer then, and the rest cannot be judged.
+/// Runs a controller that takes 20 ms (15 allowed) in each cycle except the fifth and the tenth,
+/// and checks the reports. False if the machine delayed one of these two: then the series of slow
+/// cycles is longer, and the rest cannot be checked.
 bool overrunsWereJudged() {
   const coglab_rt::JointLimits limits =
       coglab_rt::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
@@ -167,7 +167,7 @@ class Slow : public ctrl_more::FeedbackController {
   }
 };
 
-TEST(Faults, TheTimeOfASlowFeedbackControllerIsNotChargedToTheMotionController) {
+TEST(Faults, TheTimeOfASlowFeedbackControllerDoesNotCountForTheMotionController) {
   const coglab_rt::JointLimits limits =
       coglab_rt::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
   ctrl_more::Logger logger;
@@ -205,7 +205,7 @@ TEST(Faults, TheTimeOfASlowFeedbackControllerIsNotChargedToTheMotionController) 
   EXPECT_GT(command.velocity.norm(), 0.0);
 }
 
-/// Does what a test tells it to, and writes down what the cycle calls.
+/// Follows the script of a test and records the calls of the cycle.
 class Scripted : public MotionController {
  public:
   void configure(const MotionSetup&) override {}
@@ -238,7 +238,7 @@ class Scripted : public MotionController {
   }
 };
 
-/// A robot with one of them, which is not the active controller yet.
+/// A robot on which it is loaded but not active yet.
 struct ScriptedRobot : VirtualRobot {
   ScriptedRobot() {
     EXPECT_TRUE(ok(manager->load("script", "test/Scripted")));
@@ -247,7 +247,7 @@ struct ScriptedRobot : VirtualRobot {
   Scripted* script = nullptr;
 };
 
-TEST(Faults, AControllerThatThrowsWhereItIsEndedIsEndedAllTheSame) {
+TEST(Faults, AControllerThatThrowsWhenEndedIsStillEnded) {
   ScriptedRobot robot;
   robot.script->throws = "abort";
   robot.switchTo("script");

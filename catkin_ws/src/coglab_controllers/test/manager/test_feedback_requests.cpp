@@ -1,4 +1,4 @@
-// What a request to the feedback controllers may carry, as FeedbackSelect.srv says.
+// Valid fields of a request to the feedback controllers, by FeedbackSelect.srv.
 #include <gtest/gtest.h>
 
 #include "coglab_controllers/manager/feedback_requests.hpp"
@@ -29,7 +29,7 @@ TEST(FeedbackRequests, AnyPrintableTextIsAReason) {
   EXPECT_TRUE(judgeReason(std::string(kLongestReason, 'x')).ok());
 }
 
-TEST(FeedbackRequests, WhatCannotBeShownAsItIsIsRefusedWithoutBeingShown) {
+TEST(FeedbackRequests, AnUnprintableReasonIsRefusedAndNotPrinted) {
   const std::vector<std::string> wrong = {
       std::string(1, '\0'),
       std::string("a\0b", 3),
@@ -60,14 +60,14 @@ TEST(FeedbackRequests, WhatCannotBeShownAsItIsIsRefusedWithoutBeingShown) {
   }
 }
 
-TEST(FeedbackRequests, AnEmptyNameIsNotAllOfThem) {
+TEST(FeedbackRequests, AnEmptyNameDoesNotMeanAllControllers) {
   EXPECT_TRUE(judgeNames({}).ok());
   EXPECT_TRUE(judgeNames({"a", "a", "b"}).ok()) << "a name given twice counts once";
   EXPECT_EQ(judgeNames({""}).cause(), Cause::InvalidArgument);
   EXPECT_NE(judgeNames({"a", ""}).message().find("names[1]"), std::string::npos);
 }
 
-TEST(FeedbackRequests, OnlyAReasonThatIsThereIsWithdrawn) {
+TEST(FeedbackRequests, OnlyAPresentReasonCanBeWithdrawn) {
   const std::vector<ControllerStatus> loaded = {
       controller("a", {"lunch"}), controller("b", {}), controller("c", {"lunch", "user"}),
       controller("d", {"fault: it threw"}, PauseCause::Fault)};

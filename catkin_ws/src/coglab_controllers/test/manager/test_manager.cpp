@@ -15,7 +15,7 @@ namespace coglab_controllers {
 namespace {
 
 const Vector3 kGoal(0.80, 0.0, 0.45);
-TEST(Manager, RefusesBadPluginsAndKeepsWhatIsThere) {
+TEST(Manager, RefusesBadPluginsAndKeepsTheLoadedOnes) {
   VirtualRobot robot("{" + kTypes + "}");
   robot.loadBoth("ptp");
   ControllerManager& manager = *robot.manager;

@@ -1,4 +1,4 @@
-// The file of signals, and their way into the control cycle.
+// The file of signals, and their path into the control cycle.
 #include <algorithm>
 #include <cmath>
 #include <fstream>
@@ -150,7 +150,7 @@ TEST(SignalFile, TopicsAreComparedByTheirFullNames) {
   EXPECT_EQ(refused(rules), "signals.yaml:2: topic imu: no name");
 }
 
-TEST(SignalFile, OutputsOfWhatThereIsNotRefuseTheWholeFile) {
+TEST(SignalFile, AnOutputOfAnUnknownSourceRefusesTheWholeFile) {
   const auto said = [](const std::string& value) {
     const std::string file = fileOf(
         "outputs.yaml",
@@ -218,7 +218,7 @@ TEST(SignalInputs, MessagesThatCannotBeUsedAreRefused) {
   EXPECT_EQ(robot.stamp(imu), ctrl_more::kNeverWritten) << "absent after its largest age";
 }
 
-// Many trackers publish a quaternion of zeros for an orientation that they do not know.
+// Many trackers publish a quaternion of zeros for an unknown orientation.
 TEST(SignalInputs, OrientationsThatAreNoUnitQuaternionsAreRefused) {
   constexpr std::int64_t kNow = 10'000'000'000;
   ctrl_more::RobotStates robot;

@@ -1,5 +1,5 @@
-// Feedback controllers when the arm is told to stop: STOP, reset and cancel with the shipped list
-// for the sensors in the palm.
+// Feedback controllers during STOP, reset and cancel, with the shipped list for the sensors in the
+// palm.
 #include <algorithm>
 #include <random>
 #include <vector>
@@ -10,9 +10,9 @@
 namespace coglab_controllers {
 namespace {
 
-constexpr double kTilt = 0.06;  // rad, by which the IMU is mounted wrong
+constexpr double kTilt = 0.06;  // rad, mounting error of the IMU
 
-/// The arm with the shipped list. Its IMU is tilted and noisy, and somebody may push the palm.
+/// The arm with the shipped list. Its IMU is tilted and noisy, and a person may push the palm.
 class PalmRobot : public VirtualRobot {
  public:
   PalmRobot()
@@ -152,9 +152,9 @@ TEST_F(Stop, ACancelBringsTheArmToRestUntilTheNextMotion) {
   EXPECT_EQ(robot.activity("attitude"), ctrl_more::Activity::Running);
 }
 
-// The pose that is held is corrected again and again: a correction that was counted twice made the
-// hand drift as long as somebody pushed it.
-TEST_F(Stop, AHandThatIsPushedYieldsOnceWhereItHolds) {
+// The held pose is corrected in every cycle. If a correction counted twice, the hand would drift
+// while a person pushes it.
+TEST_F(Stop, APushedHoldingHandYieldsWithoutDrifting) {
   use("dmp_compliant");
   robot.push = Vector3(20.0, 0.0, 0.0);  // 5 N of it are the dead band: 0.075 m on the spring
   robot.beginReach();
@@ -171,7 +171,7 @@ TEST_F(Stop, AHandThatIsPushedYieldsOnceWhereItHolds) {
   EXPECT_LT((robot.hand().position - stood).norm(), 0.01);
 }
 
-// A stopped arm may be led by hand; then it holds where it was led to.
+// A stopped arm may be guided by hand. It then holds its new position.
 TEST_F(Stop, AnArmThatWasMovedWhileItWasStoppedStaysThere) {
   robot.block(MotionBlock::Held);
   robot.run(0.1);

@@ -1,4 +1,4 @@
-// Controllers are unloaded, and none is active: nothing is left, and nothing moves.
+// Controllers are unloaded, or none is active: nothing stays loaded, and the arm does not move.
 #include <atomic>
 #include <chrono>
 #include <memory>
@@ -26,7 +26,7 @@ TEST(Unload, GoesWithItsServicesAndItsIdIsFreeAgain) {
   ASSERT_TRUE(VirtualRobot::ok(manager.unload("dmp", [&](std::shared_ptr<const LoadedMotion> it) {
     watched = it;
     seen = it->id;
-    EXPECT_EQ(manager.motion("dmp"), nullptr);  // nobody finds it any more
+    EXPECT_EQ(manager.motion("dmp"), nullptr);  // it can no longer be found
     EXPECT_FALSE(manager.load("dmp", "coglab/DmpController").success);
   })));
   EXPECT_EQ(seen, "dmp");
@@ -75,7 +75,7 @@ TEST(Unload, WhileACancelWaitsForIt) {
   EXPECT_FALSE(answer.was_running);
 }
 
-TEST(Unload, AgainAndAgainWhileTheCycleRunsAndOthersAsk) {
+TEST(Unload, RepeatedlyWhileTheCycleRunsAndOtherRequestsArrive) {
   VirtualRobot robot("", 0.005, false);
   std::atomic<bool> stop{false};
   std::thread control([&] {
@@ -97,7 +97,7 @@ TEST(Unload, AgainAndAgainWhileTheCycleRunsAndOthersAsk) {
   for (int i = 0; i < 40; ++i) {
     EXPECT_TRUE(VirtualRobot::ok(manager.load("other", "coglab/PtpController")));
     Answer answer;
-    // The others keep it busy for as long as the computer does not let this thread run.
+    // The other threads keep it busy while this thread is not scheduled.
     const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
     while (std::chrono::steady_clock::now() < end) {
       answer = manager.unload("other");
@@ -157,7 +157,7 @@ TEST(Deactivate, ClearsAFault) {
   EXPECT_TRUE(VirtualRobot::ok(robot.manager->unload("odd")));
 }
 
-/// Stays in start() for as long as it is told to.
+/// Stays in start() until the test releases it.
 class Lingering : public MotionController {
  public:
   static inline std::atomic<bool> lingers{false};
@@ -178,7 +178,7 @@ class Lingering : public MotionController {
   Reason none_;
 };
 
-TEST(Unload, NeitherTheControllerThatStillRunsNorTheOneThatIsOrderedGoes) {
+TEST(Unload, RefusesBothTheRunningAndTheRequestedController) {
   VirtualRobot robot("", 0.005, false);
   ControllerManager& manager = *robot.manager;
   std::atomic<bool> stop{false};

@@ -1,5 +1,4 @@
-// The hold cycle by cycle: joints that brake together, from which speed on, and when the arm
-// stands.
+// The hold cycle by cycle: joints that brake together, their speeds, and standstill.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -14,8 +13,8 @@
 namespace coglab_controllers {
 namespace {
 
-/// A robot of which every joint brakes with at most 2 rad/s^2 and 20 rad/s^3: from a speed v of 0.2
-/// rad/s or more it needs v / 2 + 0.1 s.
+/// A robot whose joints brake with at most 2 rad/s^2 and 20 rad/s^3. From a speed v >= 0.2 rad/s
+/// this takes v / 2 + 0.1 s.
 RobotSetup evenRobot() {
   const std::string description = DESCRIPTION_DIR;
   RobotSetup setup =
@@ -40,7 +39,7 @@ class HoldTest : public ::testing::Test {
     input.robot.commanded_position = kHome;
     input.dt = 0.005;
   }
-  /// The joint velocity that the hold asks for while the arm is told to go on with this one.
+  /// The joint velocity that the hold requests at this commanded velocity.
   JointVector asked(const JointVector& velocity, const JointVector& acceleration = joints(0, 0)) {
     input.robot.commanded_velocity = velocity;
     input.robot.commanded_acceleration = acceleration;
@@ -61,7 +60,7 @@ class HoldTest : public ::testing::Test {
   Hold hold;
 };
 
-TEST_F(HoldTest, TheSlowestBrakesAsItCanAndTheOthersAreThreeCyclesAhead) {
+TEST_F(HoldTest, TheSlowestJointBrakesAloneAndTheOthersAreThreeCyclesAhead) {
   // They need 0.3, 0.2, 0.25, 0.235 and 0.2 s: the third one nearly as long as the first.
   const JointVector from = joints(0.4, 0.2, 0.3, 0.27, -0.2);
   const JointVector others = joints(0.0, 0.2, 0.0, 0.27, -0.2);
@@ -88,7 +87,7 @@ TEST_F(HoldTest, AJointThatStillSpeedsUpIsBrakedFirst) {
   expectAsked(joints(0, -0.1), from, joints(-0.5, 0.5));  // these brake already
 }
 
-TEST_F(HoldTest, ItStandsBelowOneMilliradianPerSecondAndThenRemembers) {
+TEST_F(HoldTest, BelowOneMilliradianPerSecondItLatchesThePosture) {
   const JointVector second = kHome + joints(0.1, 0, -0.1), third = kHome + joints(0.2, 0);
   hold.begin();
   asked(joints(0, 0.00101));

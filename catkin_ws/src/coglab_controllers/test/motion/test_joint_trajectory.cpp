@@ -161,7 +161,7 @@ TEST_F(Following, AJointThatLeavesThePathEndsIt) {
   request.path_tolerance = {{controller->jointNames()[6], 0.05, 0.0, 0.0}};
   ASSERT_TRUE(controller->follow(request).success);
   arm.run(0.3);
-  arm.interpolator.reset();  // somebody pushes the last joint away
+  arm.interpolator.reset();  // a person pushes the last joint away
   arm.sample.position[6] += 0.1;
   arm.tick();
   const EndedMotion end = runToEnd();
@@ -214,17 +214,17 @@ TEST_F(Following, APointAtTheStartIsWhereTheArmIs) {
   const TrajectoryRequest there = through({home(0.005)});
   ASSERT_TRUE(controller->follow(there).success);
   EXPECT_TRUE(runToEnd().executed);
-  expectRefused(through({home(0.04)}), TrajectoryError::InvalidGoal, "too short to make up");
+  expectRefused(through({home(0.04)}), TrajectoryError::InvalidGoal, "too short for a larger");
   TrajectoryRequest quick = through({home(0.045), home(0.045)});
   quick.points[1].time = 0.1;
-  expectRefused(quick, TrajectoryError::InvalidGoal, "too short to make up");
+  expectRefused(quick, TrajectoryError::InvalidGoal, "too short for a larger");
   quick.points[1].time = 1.0;
   ASSERT_TRUE(controller->follow(quick).success);
   EXPECT_TRUE(runToEnd().executed);
   EXPECT_LE(steepest, 10.0 + 1e-6);
 }
 
-TEST_F(Following, WhatCannotBeFollowedIsRefusedBeforeAnythingMoves) {
+TEST_F(Following, AnInvalidTrajectoryIsRefusedBeforeTheArmMoves) {
   using Error = TrajectoryError;
   const double nan = std::nan("");
   const auto goal = [this](const auto& change) {

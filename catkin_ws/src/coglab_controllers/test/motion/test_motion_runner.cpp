@@ -1,4 +1,4 @@
-// What every motion gets from the runner: queue, replacement, arrival, abort, stand-still.
+// Functions of the runner for every motion: queue, replacement, arrival, abort, standstill.
 #include <limits>
 #include <utility>
 
@@ -9,7 +9,7 @@
 namespace coglab_controllers {
 namespace {
 
-/// Turns one joint with a constant speed for a time; misbehaves as told.
+/// Turns one joint with a constant speed for a time; misbehaves on request.
 class Turn : public Motion<> {
  public:
   static inline int stops = 0;
@@ -113,7 +113,7 @@ TEST_F(Runner, ANewMotionTakesThePlaceOfTheOneUnderWayWithoutAStepOfTheSetPoint)
   }
 }
 
-TEST_F(Runner, AnAbortEndsWhatRunsAndWaitsAndTheArmStands) {
+TEST_F(Runner, AnAbortEndsTheMotionAndTheQueueAndTheArmStands) {
   arm.followWithinLimits();
   Turn::stops = 0;
   ask(0.3, 5.0, true);
@@ -132,7 +132,7 @@ TEST_F(Runner, AnAbortEndsWhatRunsAndWaitsAndTheArmStands) {
   EXPECT_EQ(ask(0.1, 1.0, true).status, MotionAnswer::kStarted);  // and on it goes
 }
 
-TEST_F(Runner, AMotionThatIsReplacedBeforeItBeganIsToldToo) {
+TEST_F(Runner, AMotionReplacedBeforeItsStartIsAlsoReported) {
   EXPECT_EQ(ask(0.2, 1.0, false).id, 0);
   EXPECT_EQ(ask(0.2, 1.0, true).status, MotionAnswer::kQueued);
   EXPECT_EQ(ask(-0.2, 1.0, false).id, 2);
@@ -145,7 +145,7 @@ TEST_F(Runner, AMotionThatIsReplacedBeforeItBeganIsToldToo) {
   ASSERT_EQ(ends().size(), 1u);
 }
 
-TEST_F(Runner, ASwitchAwayLeavesWhatWasReachedBehind) {
+TEST_F(Runner, AfterASwitchAReachedMotionBecomesIdle) {
   ask(0.1, 0.2, false);
   arm.run(1.0);
   ASSERT_EQ(arm.state(), MotionState::Reached);

@@ -1,5 +1,5 @@
-// Parameters of the manager and the plug-ins: each range of docs/reference.md at both ends and just
-// beyond, with the words of its refusal.
+// Parameters of the manager and the plug-ins: both ends of each range of docs/reference.md, and
+// values just beyond with the error message.
 #include <cmath>
 #include <fstream>
 #include <sstream>
@@ -21,7 +21,7 @@ std::string text(double value) {
   return out.str();
 }
 
-/// What a load of the plug-in says; empty if it is taken.
+/// Error message of loading the plug-in; empty if it is accepted.
 std::string loading(const std::string& id, const std::string& parameters) {
   VirtualRobot robot(parameters);
   const Answer answer =
@@ -29,7 +29,7 @@ std::string loading(const std::string& id, const std::string& parameters) {
   return answer.success ? "" : answer.message;
 }
 
-/// What a start of the manager says; empty if it is taken.
+/// Error message of starting the manager; empty if it is accepted.
 std::string starting(const std::string& parameters) {
   try {
     VirtualRobot robot(parameters);
@@ -39,7 +39,7 @@ std::string starting(const std::string& parameters) {
   return "";
 }
 
-/// Both ends are taken, and what is a little beyond them is refused with the range in words.
+/// Both ends are accepted. Values just beyond them are refused with the range in the message.
 template <typename Says>
 void expectRange(const Range& range, const std::string& where, Says&& says) {
   std::ostringstream words;
@@ -110,7 +110,7 @@ TEST(ParameterRanges, OfPointToPoint) {
   }
 }
 
-TEST(ParameterRanges, OfLoopGainsHangOnTheCycle) {
+TEST(ParameterRanges, OfLoopGainsDependOnTheCycle) {
   // At most half a gain per cycle; and 200 and 100 where the cycle is quick.
   for (const auto& [cycle, pose, joints] :
        {std::tuple(0.02, 25.0, 25.0), std::tuple(0.002, 200.0, 100.0)}) {

@@ -1,5 +1,5 @@
-// The path ahead: a roll-out is the motion that is driven, before it begins and while it runs; and
-// where that motion ends, rests and is switched.
+// Predicted paths: a roll-out equals the executed motion, before it begins and while it runs, also
+// at its end, at rest and after a switch.
 #include "coglab_controllers/dmp/cartesian_motion.hpp"
 #include "virtual_robot.hpp"
 
@@ -58,7 +58,7 @@ double drive(VirtualRobot& robot, const PredictedPath& path, const Vector3* goal
   return worst;
 }
 
-TEST(RollOut, IsTheMotionThatIsDriven) {
+TEST(RollOut, EqualsTheExecutedMotion) {
   Library library;
   library.load(std::string(PACKAGE_DIR) + "/config/primitives.xml");
   const double dt = 0.01;  // as the roll-out has it, so that both are the same numbers
@@ -130,7 +130,7 @@ DmpPlan reachPlan(double ratio = 1.0) {
 
 const Pose kStart{Vector3(0.4, 0.1, 0.3), Quaternion::Identity()};
 
-TEST(CartesianMotion, TurnsOnAsFastAsItDidWhenItBeginsAndWhenItIsSwitched) {
+TEST(CartesianMotion, KeepsItsAngularVelocityAtTheStartAndAtASwitch) {
   const Vector3 turning(0.2, -0.3, 0.4);
   const Pose goal{kGoal, Quaternion(Eigen::AngleAxisd(1.1, Vector3(0.6, 0.0, 0.8)))};
   for (const double rate : {1.0, 0.15}) {
@@ -146,7 +146,7 @@ TEST(CartesianMotion, TurnsOnAsFastAsItDidWhenItBeginsAndWhenItIsSwitched) {
   }
 }
 
-TEST(PredictedPath, BeforeAReachIsThatOfTheReachAndBeginsNothing) {
+TEST(PredictedPath, BeforeAReachEqualsThePathOfTheReachAndStartsNoMotion) {
   VirtualRobot robot;
   robot.loadBoth("ptp");  // the controller need not be the active one
   DmpRequest request = robot.reach();

@@ -87,8 +87,7 @@ TEST(PtpController, AMotionThatRacesAHoldIsNeitherReportedAsExecutedNorMadeAfter
     during(robot, [&] { first = robot.ptp().add({kThere, {}, {}}); });
     for (int i = 0; i < 2000 && robot.state() != MotionState::Reached; ++i) robot.tick();
     ASSERT_EQ(executed(robot.ptp()), std::vector<int>{first.id});
-    // The request is checked while the arm may move, and taken over by the first cycle that sees
-    // the hold.
+    // The request is checked while the arm may move, and adopted by the first cycle with the hold.
     std::thread request([&] { second = robot.ptp().add({{0, 0, 0, 1, 0, 0, 0}, {}, {}}); });
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
     robot.sample.block = MotionBlock::Held;
@@ -133,9 +132,9 @@ void whole(VirtualRobot& robot) {
   }
 }
 
-/// A motion is refused for its target alone. Geometry says what has to come of the others: one
-/// whose way keeps clear of every border ends on its target, one whose way leaves the workspace is
-/// given up; within 10 mm of a border, where the guard slows it down, it may be either.
+/// A motion is refused only for its target. The geometry of its path determines the result: a path
+/// away from all borders reaches its target; a path that leaves the workspace aborts. Within 10 mm
+/// of a border, where the guard slows the arm, both are possible.
 TEST(PtpController, RandomMotionsEndExactly) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> share(-0.6, 0.6);

@@ -1,4 +1,4 @@
-// Streams of velocities: what they follow, how they stop, and that no command breaks a limit.
+// Streams of velocities: following, stopping, and limits under any command.
 #include <limits>
 #include <random>
 
@@ -131,7 +131,7 @@ TEST_F(Stream, RandomPosesKeepEveryLimit) {
   }
 }
 
-TEST_F(Stream, WhatIsNoPoseIsRefused) {
+TEST_F(Stream, InvalidPosesAreRefused) {
   use("coglab/PoseStream");
   const Answer answer = stream->send({0.5, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0});
   EXPECT_EQ(answer.code, ReasonCode::InvalidArgument);
@@ -246,14 +246,14 @@ TEST(StreamGains, TheGainOfTheRotationIsThatOfTheAxisToo) {
     return std::acos(std::min(1.0, axis.dot(home.orientation * Vector3::UnitZ())));
   };
   tilt();
-  arm.sample.position[5] += 0.1;  // somebody pushes the hand
+  arm.sample.position[5] += 0.1;  // a person pushes the hand
   arm.sample.commanded_position = arm.sample.position;
   EXPECT_GT(tilt(), 0.05);
   ASSERT_TRUE(stream.tunables()->set({{"rot_clik_gain", 10.0}}).success);
   EXPECT_LT(tilt(), 0.01);
 }
 
-TEST_F(Stream, WhatIsNoCommandIsRefusedAndTheArmGoesOn) {
+TEST_F(Stream, InvalidCommandsAreRefusedAndTheArmContinues) {
   use("coglab/TwistStream");
   follow({0.0, 0.0, 0.1, 0.0, 0.0, 0.0});
   for (const double bad : {std::nan(""), std::numeric_limits<double>::infinity()}) {
@@ -267,7 +267,7 @@ TEST_F(Stream, WhatIsNoCommandIsRefusedAndTheArmGoesOn) {
   EXPECT_GT(arm.handVelocity().z(), 0.0);
 }
 
-TEST_F(Stream, ACancelClosesItUntilItIsOpenedAnew) {
+TEST_F(Stream, ACancelClosesItUntilItIsReopened) {
   use("coglab/TwistStream");
   for (int i = 0; i < 5; ++i) follow({0.0, 0.0, 0.1, 0.0, 0.0, 0.0});
   arm.manager->askCancel("stream", "enough");

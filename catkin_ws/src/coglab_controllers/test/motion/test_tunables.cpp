@@ -40,7 +40,7 @@ TEST(Tunables, ChangesOfTheDefaultSpeedCountForTheNextMotion) {
 }
 
 /// Each gain jumps between the ends of its range every 40 cycles, while the goal of a DMP motion
-/// moves and the arm lags behind: no joint is told to accelerate beyond its limit.
+/// moves and the arm lags behind. No joint is commanded to accelerate beyond its limit.
 void expectNoSteps(const std::string& parameters, const std::vector<std::string>& expected) {
   VirtualRobot probe(parameters);
   probe.loadBoth("dmp");

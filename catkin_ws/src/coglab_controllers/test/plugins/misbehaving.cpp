@@ -12,8 +12,9 @@ namespace {
 
 using namespace coglab_controllers;
 
-/// Moves slowly, and does what its parameter `fault` says after `after` cycles: throw, throw_int,
-/// nan, slow or stall. `slow` is quick again in every `rest_every`-th cycle, `rests` times.
+/// Moves slowly. After `after` cycles it makes the fault of its parameter `fault`: throw,
+/// throw_int, nan, slow or stall. `slow` is quick again in every `rest_every`-th cycle, `rests`
+/// times.
 class Misbehaving : public MotionController {
  public:
   void configure(const MotionSetup& setup) override {

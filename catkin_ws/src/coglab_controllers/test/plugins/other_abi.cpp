@@ -1,4 +1,4 @@
-// A library that says it was compiled with other headers.
+// A library that reports other headers than the program's.
 #include "coglab_controllers/manager/plugin_registry.hpp"
 
 namespace {

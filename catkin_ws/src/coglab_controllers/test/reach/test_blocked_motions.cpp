@@ -1,5 +1,5 @@
-// Motions that a joint's stop or a border of the workspace keeps from going on: they end by
-// themselves, and the reason names what was in the way.
+// Motions that a joint's stop or a border of the workspace blocks. They end by themselves, and the
+// reason contains the limit.
 #include <random>
 
 #include "virtual_robot.hpp"
@@ -26,7 +26,7 @@ double follow(VirtualRobot& robot, const Vector3& goal, double limit) {
 
 class Reaches : public ::testing::TestWithParam<int> {};
 
-TEST_P(Reaches, EndByThemselvesAndNameWhatBlocksThem) {
+TEST_P(Reaches, EndByThemselvesWithTheBlockingLimit) {
   const char* primitives[] = {"reach_human", "reach_human_high", "give_human", "take_board",
                               "put_board"};
   std::mt19937 random(static_cast<unsigned>(GetParam()));
@@ -79,7 +79,7 @@ TEST(BlockedMotion, APathThatLeavesTheWorkspaceIsRefusedBeforeTheArmMoves) {
   EXPECT_EQ(robot.state(), MotionState::Idle);
 }
 
-/// A goal on the border, or beyond it, is gone to: the path ends there and does not lead on.
+/// A goal on the border or just beyond it is approached: the path ends there.
 TEST(BlockedMotion, AGoalAtTheBorderIsReached) {
   for (const double outside : {0.0, 0.1}) {
     VirtualRobot robot("workspace: {box_max: [0.75, 1.2, 1.6]}");
@@ -93,7 +93,7 @@ TEST(BlockedMotion, AGoalAtTheBorderIsReached) {
   }
 }
 
-/// Slow, paused, or along a border: as long as it goes on it is not blocked.
+/// A slow or paused motion, or one along a border, is not blocked while it makes progress.
 TEST(BlockedMotion, ASlowOrPausedMotionIsNotOne) {
   VirtualRobot robot("workspace: {box_max: [0.755, 1.2, 1.6]}");
   robot.loadBoth();
@@ -110,8 +110,8 @@ TEST(BlockedMotion, ASlowOrPausedMotionIsNotOne) {
   EXPECT_EQ(robot.state(), MotionState::Reached) << robot.reason();
 }
 
-/// The arm stands fully stretched when the goal comes to where the hand is: that is its end.
-TEST(BlockedMotion, EndsWellWhereTheGoalComesToTheHand) {
+/// The arm is fully stretched when the goal moves to the hand. This ends the motion.
+TEST(BlockedMotion, SucceedsIfTheGoalMovesToTheHand) {
   VirtualRobot robot;
   robot.loadBoth();
   Vector3 goal(0.21, 0.61, 0.92);

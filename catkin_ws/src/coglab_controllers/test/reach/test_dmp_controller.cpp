@@ -28,7 +28,7 @@ TEST(DmpController, ReachesTheGoalFrameAndRestsExactlyStill) {
   EXPECT_EQ(robot.command.velocity, JointVector::Zero().eval());
 }
 
-/// A hand that somebody holds for a while, in the middle of its way, does not leap when it is free.
+/// A hand that a person holds for a while during a motion does not leap when it is released.
 TEST(DmpController, AHandThatWasHeldComesBackGently) {
   double chase[2];
   for (const bool shipped : {false, true}) {
@@ -110,7 +110,7 @@ TEST(DmpController, SwitchKeepsPhasePositionAndVelocityOfTheSetPointExactly) {
     EXPECT_EQ(dmp.state().phase, before.phase);
     EXPECT_LT((dmp.state().position - before.position).norm(), 1e-9);
     EXPECT_LT((dmp.state().velocity - before.velocity).norm(), 1e-9);
-    // And with the clock running, each set-point is where the velocity of the one before led.
+    // With the clock running, each set-point follows from the previous one and its velocity.
     IkDebugRecord record, last;
     while (robot.dmp().readIkDebug(record)) {
     }
@@ -222,8 +222,8 @@ TEST(DmpController, AfterTheEndTheRemainingDistanceIsThatToTheGoalThatWasLatched
   }
   EXPECT_NEAR(progress.remaining_distance, (progress.goal.position - robot.hand().position).norm(),
               1e-3);
-  // A hand that is pushed away while the motion stands is told as away by as much: the first joint,
-  // whose axis is vertical through the base, turned, moves it along a chord.
+  // If the standing hand is pushed away, the reported distance is that of the push: the first
+  // joint, whose axis is vertical through the base, turned, moves it along a chord.
   constexpr double kTurn = 0.1;
   const double chord = 2.0 * kGoal.head<2>().norm() * std::sin(kTurn / 2.0);
   robot.sample.position[0] += kTurn;

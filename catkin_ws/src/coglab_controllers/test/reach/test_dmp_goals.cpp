@@ -37,8 +37,8 @@ TEST(DmpController, FollowsAgainOnlyWhenTheGoalLeavesItsBall) {
   EXPECT_LT((robot.hand().position - moved).norm(), 2e-3);
 }
 
-/// m that the hand is beyond its goal at most, and has to come back: the frame tells late and bit
-/// by bit that the goal is 30 mm farther than it had told.
+/// Largest overshoot of the hand, m. The frame corrects its goal late and in small steps, by 30 mm
+/// in total.
 double wentBack(const std::string& frame) {
   VirtualRobot robot("dmp: {predicted_goals: _ahead}");
   robot.loadBoth();
@@ -59,7 +59,7 @@ double wentBack(const std::string& frame) {
   return back;
 }
 
-TEST(DmpController, APredictedGoalIsNotLed) {
+TEST(DmpController, APredictedGoalGivesNoGoalVelocity) {
   const double seen = wentBack("human_hand"), predicted = wentBack("human_hand_ahead");
   EXPECT_GT(seen, predicted + 0.001);
   EXPECT_LT(predicted, 0.002);
@@ -67,8 +67,8 @@ TEST(DmpController, APredictedGoalIsNotLed) {
   EXPECT_GT(wentBack("hand_ahead_of_us"), predicted + 0.001) << "but has to be its end";
 }
 
-/// A reach toward a goal that goes `way(t)` from kGoal, 0.5 s after the start; how it ended, and
-/// the largest distance from kGoal that the goal had by then.
+/// A reach toward a goal that moves by `way(t)` from kGoal, 0.5 s after the start. Returns the
+/// reason of its end and the largest distance of the goal from kGoal until then.
 std::pair<ReasonCode, double> reachAfter(const GoalBounds& limits,
                                          const std::function<Vector3(double)>& way) {
   VirtualRobot robot;
@@ -89,7 +89,7 @@ std::pair<ReasonCode, double> reachAfter(const GoalBounds& limits,
   return {robot.manager->report().reason.code(), largest};
 }
 
-TEST(DmpController, NothingIsChased) {
+TEST(DmpController, AGoalThatRetreatsLeavesOrFallsEndsTheMotion) {
   const GoalBounds limits{Vector3(0.5, -0.3, 0.1), Vector3(0.9, 0.3, 0.8), 0.10, 0.08};
   const auto back = [](double t) { return Vector3(0.3 * std::min(t, 1.0), 0, 0); };
   const auto aside = [](double t) { return Vector3(0, 0.5 * std::min(t, 1.0), 0); };
@@ -117,7 +117,7 @@ TEST(DmpController, NothingIsChased) {
   EXPECT_NEAR(far, 0.3, 1e-9);
 }
 
-TEST(DmpController, AGoalOutsideItsRegionFromTheBeginningIsWaitedFor) {
+TEST(DmpController, AGoalThatStartsOutsideItsRegionIsAllowed) {
   const GoalBounds far{Vector3(0.5, 0.1, 0.1), Vector3(0.9, 0.5, 0.8), 0, 0};
   EXPECT_EQ(reachAfter(far, [](double) { return Vector3::Zero(); }).first, ReasonCode::None);
 }
@@ -164,8 +164,8 @@ TEST(DmpController, GoalThatLeavesTheWorkspaceIsProjected) {
   EXPECT_GT(robot.hand().position.x(), 0.74);
 }
 
-/// A reach of an arm that stands, as its clock does, toward a goal that was seen when it began, and
-/// after that not at all or stamped 0.2 s ahead of the clock.
+/// A reach with a stopped clock toward a goal that was observed at its start, and later not at all
+/// or with a stamp 0.2 s ahead of the clock.
 struct Unseen : VirtualRobot {
   explicit Unseen(const std::string& parameters = "") : VirtualRobot(parameters) {
     loadBoth();
@@ -188,7 +188,7 @@ struct Unseen : VirtualRobot {
   }
 };
 
-TEST(DmpController, AnOldGoalAndALostOneSpeakOfTheClockOnlyIfItIsTheCause) {
+TEST(DmpController, ReasonsMentionTheClockOnlyIfItIsTheCause) {
   for (const bool ahead : {false, true}) {
     Unseen robot;
     robot.begin(kGoal);

@@ -1,4 +1,4 @@
-// Requests of the DMP plug-in that are refused: why, and that the running motion does not notice.
+// Refused requests of the DMP plug-in: the reasons, and no effect on the running motion.
 #include <cmath>
 #include <functional>
 
@@ -9,7 +9,7 @@ namespace {
 
 const Vector3 kGoal(0.80, 0.0, 0.45);
 
-// A motion under way, beside a twin that nothing disturbs.
+// A running motion, and an undisturbed copy of it.
 class DmpRefusals : public ::testing::Test {
  protected:
   DmpRefusals() {
@@ -125,7 +125,7 @@ TEST(DmpRequests, BadSwitchesLeaveTheRunningMotionAsItIs) {
   }
 }
 
-TEST(DmpRequests, ASwitchLooksNeitherAtAStartNorAtAFrame) {
+TEST(DmpRequests, ASwitchIgnoresStartAndFrame) {
   VirtualRobot robot;
   robot.loadBoth();
   robot.see("human_hand", kGoal);

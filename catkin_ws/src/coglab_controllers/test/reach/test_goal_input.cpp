@@ -11,7 +11,7 @@ namespace {
 const Vector3 kGoal(0.80, 0.0, 0.45);
 constexpr std::int64_t kMs = 1'000'000, kSecond = 1000 * kMs, kNow = 5000 * kMs;
 
-/// A host of which the feed asks the time alone.
+/// A host that provides only the time.
 class Clock : public MotionHost {
  public:
   MotionRequest beginRequest(const std::string&) override { return {}; }
@@ -23,7 +23,7 @@ class Clock : public MotionHost {
   std::int64_t now = kNow;
 };
 
-/// Frames that say how far their newest transform was ahead, too.
+/// Frames that also report the lead of their newest transform.
 class Frames : public FrameTable {
  public:
   bool lookup(const std::string& reference, const std::string& frame, GoalObservation& observation,
@@ -70,7 +70,7 @@ TEST_F(Feed, AFrameIsAGoalUpToItsAgeAndAsFarAheadAsClocksDiffer) {
   }
 }
 
-TEST_F(Feed, WhatIsMissingIsSaidWithWhy) {
+TEST_F(Feed, AMissingGoalIsReportedWithTheCause) {
   EXPECT_EQ(first("cup").code, ReasonCode::UnknownName);
   frames.late_frame = "cup";
   frames.late = 3.5;
@@ -168,7 +168,7 @@ TEST_F(Feed, OneOwnerAtATimeIsFollowed) {
   EXPECT_EQ(newest().position.x(), 0.9) << "the topic owns the goal now";
 }
 
-/// The robot with a frame of its own for goals and primitives, turned and away from its base.
+/// The robot with a separate frame for goals and primitives, rotated and shifted from its base.
 struct Table : ::testing::Test {
   Table() {
     robot.loadBoth();
@@ -195,7 +195,7 @@ struct Table : ::testing::Test {
   DmpRequest request = robot.reach();
 };
 
-TEST_F(Table, AReachEndsWhereTheFrameSaysAndTellsItInBothFrames) {
+TEST_F(Table, AReachEndsAtTheGoalAndReportsItInBothFrames) {
   const Quaternion before = robot.hand().orientation;
   const Vector3 from = robot.hand().position;
   ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(request)));
@@ -262,7 +262,7 @@ TEST_F(Table, TheWorkspaceIsThatOfTheBaseAndTheTopicHasTheFrame) {
   EXPECT_NE(lost.message.find("'table' (dmp_frame_name) is not known"), std::string::npos);
 }
 
-/// A hand that never stands quite still is left standing after half a second, within 0.3 s more.
+/// If the hand never rests completely, the loop opens after half a second, within another 0.3 s.
 TEST(Settling, TheLoopIsOpenedSlowlyWhereTheHandDoesNotComeToRest) {
   VirtualRobot robot;
   robot.loadBoth();
@@ -303,8 +303,8 @@ TEST(FrameGoal, AStepBackOfTheClockStartsAnew) {
   }
 }
 
-/// While a motion runs, each sight is judged as the first one was.
-TEST(FrameGoal, ASightThatIsNoPoseIsNotFollowed) {
+/// While a motion runs, each observation is checked like the first one.
+TEST(FrameGoal, AnInvalidGoalPoseIsNotFollowed) {
   VirtualRobot robot;
   robot.loadBoth();
   DmpRequest request = robot.reach();

@@ -1,5 +1,4 @@
-// Requests of motions and of the manager at the ends of what they may ask, and the words of the
-// answers that people read.
+// Requests for motions and to the manager at the ends of their ranges, and the messages for people.
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -21,7 +20,7 @@ std::vector<double> posture(int joint = 0, double angle = kHome[0]) {
 
 struct Requests : ::testing::Test {
   Requests() { robot.loadBoth(); }
-  /// What predict_dmp says, which checks as execute_dmp does and begins nothing.
+  /// Message of predict_dmp, which has the checks of execute_dmp and starts no motion.
   template <typename Change>
   Answer ask(Change&& change) {
     robot.see("human_hand", kGoal);

@@ -1,5 +1,5 @@
-// Slots with a real second process, which is stopped and killed at random moments. The arm is
-// virtual; time passes only between two cycles.
+// Slots with a real second process that is stopped and killed at random times. The arm is virtual;
+// time advances only between two cycles.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -112,7 +112,7 @@ struct Motion : ::testing::Test {
   }
 };
 
-// The sixth joint swings with 0.3 rad, back where it has come far.
+// The sixth joint swings with 0.3 rad and reverses at its ends.
 void swing(const RemoteQuestion& question, RemoteAnswer& answer) {
   answer.kind = static_cast<std::int64_t>(RemoteAnswerKind::Joints);
   for (int i = 0; i < 7; ++i) answer.values[i] = question.from_joints[i];
@@ -175,7 +175,7 @@ TEST_F(Motion, WithoutAProcessItEndsWithWhatToDo) {
   EXPECT_NE(arm.reason().find("./coglab controller run"), std::string::npos) << arm.reason();
 }
 
-TEST_F(Motion, StrangersAreRefusedInWords) {
+TEST_F(Motion, OtherProgramsAreRefusedWithAReason) {
   const std::string address = addressOf("python");
   const auto refusal = [&](const std::string& hello) {
     return std::string(Connection(address, hello).text);
@@ -187,7 +187,7 @@ TEST_F(Motion, StrangersAreRefusedInWords) {
   EXPECT_STREQ(first.text, "welcome");
   EXPECT_NE(refusal(helloOf(RemoteKind::Motion)).find("process " + std::to_string(::getpid())),
             std::string::npos);
-  // Nobody can shorten the memory under the cycle.
+  // No process can shorten the memory that the cycle uses.
   EXPECT_NE(::ftruncate(first.memory, 0), 0);
 }
 
@@ -284,7 +284,7 @@ TEST_F(Feedback, AStoppedArmStandsAndTheCorrectionComesBackAfterReset) {
   EXPECT_LT(fastest, 0.4) << "its rate of 0.2 m/s, and the blending";
 }
 
-/// Well at first, then what no correction is: a wrong kind, NaN, and numbers beyond any reach.
+/// Valid at first, then invalid corrections: a wrong kind, NaN, and numbers beyond any reach.
 void spoilt(const RemoteQuestion& question, RemoteAnswer& answer) {
   shift(question, answer);
   if (answers() < 40) return;

@@ -13,7 +13,7 @@
 namespace coglab_controllers {
 namespace {
 
-TEST(SharedRecord, NoHalfWrittenAnswerIsBelieved) {
+TEST(SharedRecord, NoHalfWrittenAnswerIsAccepted) {
   auto record = std::make_unique<SharedRecord<RemoteAnswer>>();
   std::atomic<bool> ended{false};
   std::thread writer([&] {

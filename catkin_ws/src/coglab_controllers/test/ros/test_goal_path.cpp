@@ -1,5 +1,5 @@
-// The whole way of a goal from tf to the arm, with the two clocks of this computer as they are: no
-// stamp fits another one exactly.
+// The whole path of a goal from tf to the arm, with the two real clocks of this computer: their
+// stamps never agree exactly.
 #include <cmath>
 #include <random>
 #include <thread>
@@ -81,8 +81,8 @@ class GoalPath : public ::testing::Test {
   VirtualRobot robot_;
 };
 
-/// Two clocks are never read at once: what a stamp maps to differs from one poll to the next, here
-/// always a little to the later.
+/// Two clocks are never read at the same time, so the conversion of a stamp changes with each poll,
+/// here always to a slightly later time.
 TEST_F(GoalPath, OneFrameCountsOnceHoweverFarApartTheClocksAreRead) {
   std::int64_t apart = 0;
   TfGoalSource drifting(buffer_, listener_, [&apart] { return steadyNow() + (apart += 2000); });
@@ -127,7 +127,7 @@ TEST_F(GoalPath, AFrameFromTheFutureIsRefusedAndTheTrackerIsFollowedOn) {
   }
 }
 
-TEST_F(GoalPath, StampsFromTheFutureAloneAreNoGoalAndTheReasonSaysSo) {
+TEST_F(GoalPath, OnlyStampsFromTheFutureGiveNoGoalWithAReason) {
   begin();
   const std::uint64_t before = listener_.refused();
   for (int frame = 0; frame < 20; ++frame) {

@@ -1,4 +1,4 @@
-/// The ideal arm in lockstep: what permits a motion, what ends one, and the limits at all times.
+/// The ideal arm in lockstep: permission and end of a motion, and the limits at all times.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -88,7 +88,7 @@ TEST(IdealArm, StandsUntilStartAndFollowsThen) {
   EXPECT_EQ(arm.sample.commanded_position, arm.sample.position);
 }
 
-TEST(IdealArm, WhatWasComputedBeforeThePermissionDoesNotCount) {
+TEST(IdealArm, CommandsFromBeforeThePermissionAreIgnored) {
   Arm arm;
   arm.send(Vector7::Constant(0.5));
   arm.ask("start");
@@ -152,7 +152,7 @@ TEST(IdealArm, StopBrakesAndNeedsStart) {
   EXPECT_EQ(view.state, IdealArmState::Monitor);
 }
 
-TEST(IdealArm, BrakesWhenCommandsEndAndIgnoresWhatIsNotFinite) {
+TEST(IdealArm, BrakesWhenCommandsEndAndIgnoresNonFiniteOnes) {
   Arm arm;
   arm.ask("start");
   arm.drive(100, Vector7::Constant(0.3));
@@ -221,7 +221,7 @@ TEST(IdealArm, LimitsHoldByDifferentiation) {
 TEST(IdealArm, ATickAllocatesNothing) {
   Arm arm;
   counting = true;
-  int* volatile kept = new int(3);  // a compiler may leave out what nobody sees
+  int* volatile kept = new int(3);  // volatile, so that the compiler does not remove it
   delete kept;
   counting = false;
   EXPECT_EQ(allocations, 1U) << "the counter does not count";

@@ -1,5 +1,5 @@
-// The manager's cycle in front of the bridge while datagrams get lost: what
-// docs/limits_under_loss.md says of the two guards, one behind the other.
+// The manager's cycle and the bridge while datagrams are lost: checks the statements of
+// docs/limits_under_loss.md about the two guards.
 #include <random>
 #include <sstream>
 
@@ -20,7 +20,7 @@ struct Case {
 };
 
 /// Manager, bridge and robot controller, in the order of the robot: a measurement, its answer, and
-/// the manager's cycle on what that measurement told.
+/// the manager's cycle with that measurement.
 class BridgedRobot : public VirtualRobot {
  public:
   BridgedRobot(const Case& c, unsigned seed)
@@ -69,7 +69,7 @@ class BridgedRobot : public VirtualRobot {
   JointVector last_set_point_ = kHome;
 };
 
-/// What became of the motions of one case.
+/// Results of the motions of one case.
 struct Found {
   unsigned long cuts = 0;   // cycles in which the bridge cut a joint's velocity
   double off_path = 0.0;    // rad
@@ -77,7 +77,7 @@ struct Found {
   int near = 0, motions = 0, reached = 0;
 };
 
-/// To and fro between the home posture and postures some of whose joints end at their limits.
+/// Moves between the home posture and postures with some joints at their limits.
 Found motions(const Case& c, double speed, unsigned seed, int count) {
   BridgedRobot robot(c, seed);
   EXPECT_TRUE(robot.started);
@@ -134,7 +134,7 @@ void expectArrived(const Found& found, const Case& c, double speed) {
   EXPECT_GE(found.least_room, 0.0) << where();
 }
 
-TEST(LimitsUnderLoss, WithoutLossesOrWithSingleOnesTheBridgeCutsNothingAndTheWayIsStraight) {
+TEST(LimitsUnderLoss, WithoutBurstsTheBridgeCutsNothingAndThePathIsStraight) {
   unsigned seed = 0;
   for (const double period : kPeriods) {
     for (const double speed : kSpeeds) {
@@ -149,7 +149,7 @@ TEST(LimitsUnderLoss, WithoutLossesOrWithSingleOnesTheBridgeCutsNothingAndTheWay
   }
 }
 
-TEST(LimitsUnderLoss, BurstsAtHalfTheSpeedOrAtShortPeriodsLeaveTheBridgeNothingToCut) {
+TEST(LimitsUnderLoss, BurstsAtHalfSpeedOrShortPeriodsMakeTheBridgeCutNothing) {
   unsigned seed = 100;
   for (const double period : kPeriods) {
     for (const double speed : kSpeeds) {
@@ -162,8 +162,8 @@ TEST(LimitsUnderLoss, BurstsAtHalfTheSpeedOrAtShortPeriodsLeaveTheBridgeNothingT
   }
 }
 
-/// Here the manager alone does not keep enough: the bridge cuts, for some cycles, and the limits
-/// hold by that.
+/// Here the distance of the manager is not sufficient. The bridge cuts the motion for some cycles,
+/// and so the limits hold.
 TEST(LimitsUnderLoss, BurstsAtFullSpeedAndLongPeriodsAreCutForSomeCyclesAndTheLimitsHold) {
   unsigned long cuts = 0;
   int all = 0;

@@ -43,7 +43,7 @@ SignalFile rows(const std::string& in) {
   return readSignals(ctrl_more::ConfigNode::fromText("in:\n" + in, "signals.yaml"));
 }
 
-/// Takes a message into a stage with these rows, and returns the numbers of a signal.
+/// Passes a message to a stage with these rows, and returns the numbers of a signal.
 template <typename Message>
 Eigen::VectorXd taken(const std::string& in, const Message& message, const std::string& key) {
   FeedbackStage stage(*setup("{}"), 0.005, true);
@@ -170,7 +170,7 @@ TEST(Touch, ForcesOfAFingerAreTheSumOverItsPhalanges) {
   EXPECT_FALSE(without.robot().find(ctrl_more::RobotSource::Measured, "touch").valid());
 }
 
-TEST(Touch, BadMessagesAreRefusedWithWords) {
+TEST(Touch, BadMessagesAreRefusedWithAReason) {
   FeedbackStage stage(*setup("{tactile: true}"), 0.005, true);
   const auto refusal = [&](const coglab_msgs::FingertipForces& message) -> std::string {
     try {

@@ -1,5 +1,4 @@
-// Which transforms come into the buffer, by a clock that the test sets, and what a goal source
-// makes of them.
+// Transforms that the buffer accepts with a clock set by the test, and the goals made from them.
 #include <cmath>
 #include <string>
 
@@ -83,7 +82,7 @@ TEST_F(Listener, AStaticTransformHasNoStampAndJoinsNoHistory) {
   EXPECT_NE(goal.frame_ns, 0);
 }
 
-TEST_F(Listener, AClockThatGoesBackByMoreThanClocksDifferForgetsAll) {
+TEST_F(Listener, AClockThatStepsBackClearsTheBuffer) {
   receive(seen("cup", 0));
   set(now_ns - 50 * kMs);
   receive(seen("cup", 0));
@@ -111,7 +110,7 @@ TEST_F(Listener, AGoalHasThePoseTheStampAndTheAgeOfItsTransform) {
   EXPECT_FALSE(known("nowhere"));
 }
 
-TEST_F(Listener, GoodTransformsBesideARefusedOneOfTheSameMessageAreTaken) {
+TEST_F(Listener, GoodTransformsBesideARefusedOneAreAccepted) {
   tf2_msgs::TFMessage message;
   for (const char* frame : {"cup", "plate", "spoon"}) message.transforms.push_back(seen(frame, 0));
   message.transforms[1].transform.translation.z = std::nan("");

@@ -46,7 +46,7 @@ inline std::unique_ptr<ArmPort> loadArm(const std::string& library) {
   };
   // Runs code of the library: it may throw anything.
   const auto guarded = [&refuse](const auto& run) -> decltype(run()) {
-    std::string why = "something that is no std::exception was thrown";
+    std::string why = "an exception not derived from std::exception was thrown";
     try {
       return run();
     } catch (const std::exception& error) {
@@ -54,7 +54,7 @@ inline std::unique_ptr<ArmPort> loadArm(const std::string& library) {
     } catch (...) {
     }
     refuse("its arm could not be made: " + why +
-           "; mend that, or the constructor of the arm, and start again");
+           "; correct the cause or the constructor of the arm, and start again");
     return nullptr;
   };
   // Through a pointer: constructors of static objects can throw, which the declaration of dlopen()

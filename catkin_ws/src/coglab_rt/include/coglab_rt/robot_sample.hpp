@@ -45,9 +45,10 @@ inline const char* describe(MotionBlock block) {
     case MotionBlock::Held:
       return "hold is latched; send reset";
     case MotionBlock::Stopping:
-      return "stop was asked for";
+      return "stop was requested";
     case MotionBlock::Leashed:
-      return "the set-point ran ahead of the arm, something blocks it; ask for the motion anew";
+      return "the set-point was too far ahead of the arm, which is blocked; request the motion "
+             "again";
     case MotionBlock::PoorQuality:
       return "the robot controller judged the connection unacceptable: answers were missing or "
              "late; look at answer rate and latency on /diagnostics, relieve this computer or its "

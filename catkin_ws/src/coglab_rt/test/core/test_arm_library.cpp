@@ -1,4 +1,4 @@
-/// An arm from a library: made and run, or refused in words.
+/// An arm from a library: made and run, or refused with a reason.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -35,11 +35,12 @@ TEST(ArmLibrary, AnArmOfALibraryMeasures) {
   EXPECT_GE(sample.sequence, 3U);
 }
 
-TEST(ArmLibrary, WhatCannotBeUsedIsRefusedInWords) {
+TEST(ArmLibrary, UnusableLibrariesAreRefusedWithAReason) {
   for (const auto& [file, words] :
        {std::pair<std::string, std::string>{library("none"), "has no arm; write COGLAB_ARM"},
         {library("other_version"), "was made for interface 999 of an arm, expected 1; compile"},
-        {library("throwing"), "its arm could not be made: no cable is plugged in; mend that"},
+        {library("throwing"),
+         "its arm could not be made: no cable is plugged in; correct the cause"},
         {"/nowhere/libmy_arm.so", "cannot be opened: /nowhere/libmy_arm.so"},
         {__FILE__, "cannot be opened"}}) {
     const std::string said = refusal(file);

@@ -1,5 +1,5 @@
-/// Braking distance and the bound it puts on velocities: no position limit is crossed from any
-/// state that can be braked at all.
+/// Braking distance and the resulting bound on velocities: no position limit is crossed from any
+/// state in which braking is still possible.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -97,9 +97,9 @@ TEST(Braking, NoPositionLimitIsCrossedFromAnyState) {
   EXPECT_GT(at_border, 10000);
 }
 
-/// One axis that was led by an answer and brakes from then on; losses within the budget, drawn or
-/// as early as they can be.
-TEST(Braking, TheReserveCoversWhateverTheBudgetLoses) {
+/// One axis that follows an answer and then brakes; losses within the budget, random or as early as
+/// possible.
+TEST(Braking, TheReserveCoversAllLossesInTheBudget) {
   using B = LossBudget;
   std::mt19937 random(23);
   std::uniform_real_distribution<double> part(-1.0, 1.0);
@@ -146,8 +146,8 @@ TEST(Braking, TheReserveCoversWhateverTheBudgetLoses) {
   EXPECT_LT(tightest, 1e-9);  // nothing is given away where the losses come first
 }
 
-/// What BrakingGuard lets pass where braking at once may pass a bound: no step is longer towards
-/// the bound than the same step of the stop.
+/// BrakingGuard in states where braking at once may exceed a bound: no step towards the bound is
+/// longer than the same step of the stop.
 TEST(Braking, TurningAwayGoesNoFartherThanBraking) {
   std::mt19937 random(29);
   std::uniform_real_distribution<double> part(-1.0, 1.0);

@@ -1,4 +1,4 @@
-/// The table of joint limits: what is read, the edges of its values, and what is refused.
+/// The table of joint limits: its values, their ranges, and refused tables.
 #include <gtest/gtest.h>
 
 #include <unistd.h>
@@ -40,7 +40,7 @@ class Edges : public ::testing::Test {
     std::ofstream(path_) << text;
     return loadJointLimits(path_, profile);
   }
-  /// What is said, behind the name of the file; empty if it is read.
+  /// Error message after the file name; empty if the table is read.
   std::string error(const std::string& text, const std::string& profile = "default") const {
     try {
       load(text, profile);
@@ -104,7 +104,7 @@ TEST_F(Edges, ValuesInDegreesAreRefused) {
   }
 }
 
-TEST_F(Edges, AFileMayBeWiderThanTheRobotOnlyIfItSaysSo) {
+TEST_F(Edges, AFileMayBeWiderThanTheRobotOnlyIfItDeclaresThis) {
   const std::string own = path_ + "_own";
   std::ofstream(own) << kTable;
   const auto wider = [&](const std::string& text) {
@@ -131,7 +131,7 @@ TEST_F(Edges, AFileMayBeWiderThanTheRobotOnlyIfItSaysSo) {
   std::remove(own.c_str());
 }
 
-TEST_F(Edges, AProfileOverridesWhatItNamesAndNoMore) {
+TEST_F(Edges, AProfileOverridesOnlyItsOwnValues) {
   const std::string slow = kTable + "slow:\n  velocity: [0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.2]\n";
   const JointLimits limits = load(slow, "slow");
   EXPECT_EQ(limits.velocity[0], 0.1);

@@ -11,7 +11,7 @@
 namespace coglab_rt {
 namespace {
 
-/// Every value that is read was written as a whole, and none comes before an older one.
+/// Every value that is read is complete, and values arrive in order.
 TEST(Mailbox, AReaderSeesWholeValuesInOrder) {
   constexpr std::uint64_t kValues = 300'000;
   ArmMailboxes mailboxes;
@@ -47,7 +47,7 @@ TEST(Mailbox, AReaderSeesWholeValuesInOrder) {
   EXPECT_GT(seen, 0U);
 }
 
-/// A queue loses nothing and changes no order, and says so when it is full.
+/// A queue keeps all entries in order, and reports when it is full.
 TEST(Mailbox, AQueueKeepsEverythingInOrder) {
   constexpr int kValues = 200'000;
   EventRing<int, 64> queue;
@@ -90,7 +90,7 @@ struct Watched {
   }
 };
 
-TEST(Mailbox, TheWriterNeverTouchesWhatTheReaderReads) {
+TEST(Mailbox, TheWriterNeverWritesTheSlotBeingRead) {
   TripleBuffer<Watched> buffer;
   int last = 0;
   const std::function<void()> write_thrice = [&] {

@@ -1,4 +1,4 @@
-/// Plans on their way to the control cycle: what becomes of each, and who frees it.
+/// Plans for the control cycle: their outcomes, and when they are freed.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -24,7 +24,7 @@ struct Plan {
   int answer = 0;
 };
 
-TEST(PlanExchange, APlanThatNobodyTakesIsWithdrawnAndHasNoEffect) {
+TEST(PlanExchange, AnUntakenPlanIsWithdrawnAndHasNoEffect) {
   PlanExchange<Plan> plans;
   EXPECT_EQ(plans.offer(std::make_unique<Plan>(1), 0.01), PlanOutcome::Withdrawn);
   EXPECT_EQ(plans.take(), nullptr);

@@ -19,7 +19,7 @@ bool within(double seconds, const Condition& condition) {
   return true;
 }
 
-TEST(ShortestArm, FollowsWhatIsCommandedAndStandsWhenCommandsEnd) {
+TEST(ShortestArm, FollowsCommandsAndStandsWhenTheyEnd) {
   ShortestArm arm;
   std::atomic<int> woken{0};
   std::atomic<bool> commanding{true};

@@ -17,7 +17,7 @@ namespace {
 /// Lies in the stack of every thread of this program, as do those of the libraries of a node.
 thread_local volatile char of_the_thread[96 * 1024];
 
-TEST(BoundedThread, WhatThreadLocalVariablesTakeOfTheStackIsNotTouched) {
+TEST(BoundedThread, StackOfThreadLocalVariablesIsNotTouched) {
   bool ran = false;
   BoundedThread thread;
   thread.start("narrow", 128 * 1024, [&ran] { ran = of_the_thread[0] == 0; });
@@ -25,7 +25,7 @@ TEST(BoundedThread, WhatThreadLocalVariablesTakeOfTheStackIsNotTouched) {
   EXPECT_TRUE(ran);
 }
 
-/// The pages that a body uses first are there before it runs: no page fault comes later.
+/// The pages that a body uses first are mapped before it runs, so no page fault occurs later.
 TEST(BoundedThread, TheStackBelowTheBodyIsTouchedBeforeItRuns) {
   constexpr std::size_t kStack = 4096 * 1024;  // no stack that the C library keeps from before
   std::size_t present = 0, looked_at = 0;
@@ -94,8 +94,8 @@ TEST(BoundedThread, TheLowerHalfOfTheStackIsNotTouched) {
   EXPECT_EQ(present, 0U);
 }
 
-/// In a thread of its own, which takes the priority with it: granted or not, what it says is so.
-TEST(RealTime, ThePriorityThatIsGrantedIsTheOneAskedFor) {
+/// In a separate thread, because the priority ends with it. The result must report the true state.
+TEST(RealTime, TheGrantedPriorityIsTheRequestedOne) {
   BoundedThread thread;
   thread.start("priority", 0, [] {
     const std::string refused = enterRealTime(7);
@@ -108,8 +108,8 @@ TEST(RealTime, ThePriorityThatIsGrantedIsTheOneAskedFor) {
   thread.join();
 }
 
-/// In a process of its own, which alone is locked: granted or not, what it says is so.
-TEST(RealTime, MemoryIsLockedOrItIsSaidThatItIsNot) {
+/// In a separate process, because its memory is locked. The result must report the true state.
+TEST(RealTime, MemoryIsLockedOrAWarningIsReturned) {
   const pid_t child = fork();
   ASSERT_GE(child, 0);
   if (child == 0) {

@@ -47,7 +47,7 @@ class OwnMaster : public ::testing::Environment {
       ASSERT_LT(waited, kMasterLimit) << "no ROS master on port " << port;
       usleep(50'000);
     }
-    ros::start();  // and so no node handle that a test lets go ends the node
+    ros::start();  // so that the node does not end with a test's last node handle
   }
 
   void TearDown() override {
@@ -74,7 +74,7 @@ class OwnMaster : public ::testing::Environment {
   pid_t master_ = -1;
 };
 
-/// What `main` of such a program does.
+/// Body of `main` of such a program.
 inline int runWithOwnMaster(int count, char** words, const char* node) {
   ::testing::InitGoogleTest(&count, words);
   ::testing::AddGlobalTestEnvironment(new OwnMaster(node));

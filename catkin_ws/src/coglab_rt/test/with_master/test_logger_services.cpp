@@ -1,5 +1,5 @@
-/// The services ~get_loggers and ~set_logger_level: which loggers and levels there are, what a
-/// level does, what is refused and how often that is said.
+/// The services ~get_loggers and ~set_logger_level: loggers and levels, effect of a level, refused
+/// requests and how often they are logged.
 #include <gtest/gtest.h>
 
 #include <map>
@@ -56,7 +56,7 @@ TEST_F(Loggers, ALevelDecidesAtOnceWhatIsLogged) {
   EXPECT_TRUE(logged(warn));
 }
 
-TEST_F(Loggers, WhatIsNoLoggerOrNoLevelChangesNothing) {
+TEST_F(Loggers, AnUnknownLoggerOrLevelChangesNothing) {
   const auto before = levels();
   EXPECT_FALSE(set("ros", "loud"));
   EXPECT_FALSE(set("ros", ""));

@@ -1,5 +1,5 @@
-/// What is read of the parameter server: values of each type, ranges and their borders, trees, the
-/// table of joint limits; and what is said of a value that does not fit.
+/// Reading from the parameter server: values of each type, ranges and their ends, trees, the table
+/// of joint limits, and the messages for invalid values.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -21,7 +21,7 @@
 namespace coglab_rt {
 namespace {
 
-/// The sentence of what `read` throws; empty if it throws nothing.
+/// Message of the exception of `read`; empty if it throws none.
 template <typename Error = std::invalid_argument>
 std::string refusal(const std::function<void()>& read) {
   try {
@@ -86,11 +86,11 @@ TEST_F(RosParameters, BothEndsOfARangeBelongToIt) {
     node_.setParam("x", value);
     EXPECT_THROW(readNumber(node_, "x", 1.0, -0.5, 2.5), std::invalid_argument) << value;
   }
-  // A default is judged like a value that somebody set.
+  // A default is checked like a set value.
   EXPECT_THROW(readNumber(node_, "missing", 3.0, -0.5, 2.5), std::invalid_argument);
 }
 
-TEST_F(RosParameters, ATreeHasEveryTypeThatYamlCanSay) {
+TEST_F(RosParameters, ATreeHasEveryTypeThatYamlSupports) {
   node_.setParam("flag", true);
   node_.setParam("count", -3);
   node_.setParam("half", 0.5);

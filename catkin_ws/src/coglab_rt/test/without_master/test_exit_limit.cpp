@@ -1,4 +1,4 @@
-/// A process whose goodbye is not answered: when it ends, with which status and which words.
+/// A process that unregisters without an answer: time of its end, status and message.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -14,7 +14,7 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds kLong{60'000};  // nothing here lasts so long
 
-/// A goodbye that nobody answers.
+/// An unregistration without an answer.
 void waitForever(milliseconds limit) {
   endProcessWithin(limit);
   for (;;) std::this_thread::sleep_for(kLong);
@@ -26,7 +26,7 @@ class ExitLimit : public ::testing::Test {
   void SetUp() override { ::testing::FLAGS_gtest_death_test_style = "threadsafe"; }
 };
 
-TEST_F(ExitLimit, EndsAsAfterAGoodbyeThatWasAnsweredAndSaysWhy) {
+TEST_F(ExitLimit, EndsWithStatusZeroAndAMessage) {
   EXPECT_EXIT(waitForever(milliseconds(50)), ::testing::ExitedWithCode(0),
               "the ROS master does not answer: ended without unregistering\n$");
 }
@@ -37,7 +37,7 @@ TEST_F(ExitLimit, NotBeforeItsTime) {
   EXPECT_GE(std::chrono::steady_clock::now() - begin, milliseconds(400));
 }
 
-TEST_F(ExitLimit, AProcessThatEndsBeforeKeepsItsStatusAndSaysNothing) {
+TEST_F(ExitLimit, AProcessThatEndsBeforeKeepsItsStatusWithoutAMessage) {
   const auto end_at_once = [] {
     endProcessWithin(kLong);
     std::_Exit(7);

@@ -80,7 +80,7 @@ class Cell {
   double period() const { return controller_.parameters().period; }
   CellTruth truth() const;
   MotorStates motors() const;
-  /// What IMU and wrench sensor in the palm measured at the end of the last period.
+  /// Measurement of IMU and wrench sensor in the palm at the end of the last period.
   const PalmReading& palmSensors() const { return palm_sensors_.reading(); }
   /// Contact forces on the robot's hand, means over the last period.
   const plant::Touch& touch() const { return touch_; }

@@ -1,6 +1,6 @@
 /// @file
-/// Compares an arm with its joint limits, one FRI period after the other. Nothing is differentiated
-/// but the commands, and the true joints get no tolerance.
+/// Compares an arm with its joint limits in each FRI period. Only the commands are differentiated,
+/// and the true joints get no tolerance.
 #pragma once
 
 #include <string>
@@ -25,11 +25,11 @@ class LimitWatch {
   /// @throws std::runtime_error as loadJointLimits() does.
   explicit LimitWatch(const std::string& limits_file);
 
-  /// The true joints after a period: positions (rad) and the largest speed of each in any physics
-  /// step of the period (rad/s).
+  /// Checks the true joints after a period: positions (rad) and the largest speed of each in any
+  /// physics step of the period (rad/s).
   void lookAtArm(const Vector7& position, const Vector7& fastest);
-  /// The commanded positions (rad) of a period of `period` s. `follows`: the arm may move by them;
-  /// otherwise their speed does not count.
+  /// Checks the commanded positions (rad) of a period of `period` s. `follows` false: the arm does
+  /// not follow them, so their speed does not count.
   void lookAtCommand(const Vector7& position, bool follows, double period);
 
   const Outside& outside() const { return outside_; }

@@ -28,9 +28,9 @@ class PalmSensors {
  public:
   PalmSensors(const PalmNoise& noise, std::uint64_t seed);
 
-  /// Takes one physics step of `dt` s into account.
+  /// Adds one physics step of `dt` s.
   void observe(const plant::Plant& plant, double dt);
-  /// Makes a reading of the steps since the last one.
+  /// Makes a reading from the steps since the last one.
   void read();
   const PalmReading& reading() const { return reading_; }
 

@@ -67,7 +67,7 @@ class LockstepRobot {
   double now() const { return 1e-9 * static_cast<double>(now_ns_); }  ///< s
   std::int64_t nowNs() const { return now_ns_; }
 
-  /// True stops bridge and manager, like SIGSTOP on their process. The cell goes on without
+  /// True stops bridge and manager, like SIGSTOP on their process. The cell continues without
   /// answers.
   void setFrozen(bool frozen) { frozen_ = frozen; }
   bool frozen() const { return frozen_; }
@@ -76,7 +76,7 @@ class LockstepRobot {
   /// of the palm post theirs in every tick, on the topics of cell_node.
   /// @param numbers of each field, by its name
   /// @param age s since the measurement
-  /// @return why a row refuses it; empty: taken
+  /// @return why a row refuses it; empty: accepted
   /// @throws std::invalid_argument if no row has this topic, or its type no such field
   std::string postSignal(const std::string& topic,
                          const std::map<std::string, std::vector<double>>& numbers, double age,
@@ -84,7 +84,7 @@ class LockstepRobot {
 
   /// The control cycle's report after the newest tick.
   const coglab_controllers::CycleReport& report() const { return report_; }
-  /// Whether commands and true joints kept their limits in every tick so far.
+  /// Violations of limits by commands and true joints so far.
   const LimitWatch& limits() const { return limits_; }
 
   Cell& cell() { return cell_; }
@@ -94,10 +94,10 @@ class LockstepRobot {
 
   /// Loads a controller; a DMP controller gets the frame table as goal source.
   coglab_controllers::Answer load(const std::string& id, const std::string& type);
-  /// Loads a motion of the caller's, as controller of that id and of a type that no library has.
+  /// Loads a motion of the caller as a controller with this id, and a type that no library has.
   coglab_controllers::Answer add(const std::string& id, const std::string& type,
                                  std::unique_ptr<coglab_controllers::Motion<>> motion);
-  /// The controller of a motion of add(). @throws std::invalid_argument if there is none
+  /// The controller of a motion from add(). @throws std::invalid_argument if there is none
   coglab_controllers::CustomMotionController& motion(const std::string& id);
   /// The controller of that id. @throws std::invalid_argument if there is none of that type.
   coglab_controllers::DmpController& dmp(const std::string& id = "dmp");

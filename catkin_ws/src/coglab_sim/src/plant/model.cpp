@@ -13,8 +13,8 @@ namespace {
 }
 void dropWarning(const char*) {}  // the plant reads warnings from mjData
 
-/// While it lives, this thread reads and writes numbers with a decimal point, as URDF and MJCF have
-/// them, in a program whose locale has decimal commas.
+/// While this object exists, the thread reads and writes numbers with a decimal point (as in URDF
+/// and MJCF), even if the locale of the program has decimal commas.
 class DecimalPoint {
  public:
   DecimalPoint() : made_(newlocale(LC_ALL_MASK, "C", nullptr)), before_(uselocale(made_)) {}

@@ -1,5 +1,4 @@
-/// The small parts of the cell by themselves: its pace, random numbers, geometry, statistics,
-/// torque sensors.
+/// The small parts of the cell: pace, random numbers, geometry, statistics, torque sensors.
 #include <gtest/gtest.h>
 
 #include <array>

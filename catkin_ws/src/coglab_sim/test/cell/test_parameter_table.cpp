@@ -1,4 +1,4 @@
-/// The table of parameters: every row by what it says of itself.
+/// The table of parameters: every row is checked with its own range and type.
 #include <gtest/gtest.h>
 
 #include <cmath>

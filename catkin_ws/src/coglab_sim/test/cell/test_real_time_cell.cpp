@@ -37,7 +37,7 @@ std::pair<int, std::uint16_t> loopbackSocket() {
 
 }  // namespace
 
-TEST(FriSocket, SendsReceivesAndSaysWhatIsTooLong) {
+TEST(FriSocket, SendsReceivesAndReportsTooLongDatagrams) {
   const auto soon = [] { return std::chrono::steady_clock::now() + std::chrono::seconds(5); };
   const auto [taken, port] = loopbackSocket();
   close(taken);
@@ -68,7 +68,7 @@ TEST(FriSocket, SendsReceivesAndSaysWhatIsTooLong) {
   }
 }
 
-/// No faster than real time times the factor; nobody has to answer, and a flood of datagrams stops
+/// No faster than real time times the factor; no answer is needed, and a flood of datagrams stops
 /// nothing. A busy computer may lose periods.
 TEST(RealTimeCell, TheFactorScalesTimeAndAFloodDoesNotStopIt) {
   for (const double factor : {0.5, 1.0, 4.0}) {
@@ -103,9 +103,9 @@ TEST(RealTimeCell, TheFactorScalesTimeAndAFloodDoesNotStopIt) {
   EXPECT_THROW(RealTimeCell(config, "127.0.0.1", 1, 0.001), std::invalid_argument);
 }
 
-/// The latency told is time of the cell, whatever the factor. Every answer is held for a share of
-/// the period of the cell, so that no less than that can be told; a busy computer adds to it.
-TEST(RealTimeCell, TheLatencyOfAnswersIsToldInTimeOfTheCell) {
+/// The reported latency is in time of the cell, for any factor. Every answer is held for a share of
+/// the cell's period, which is the smallest possible latency; a busy computer adds to it.
+TEST(RealTimeCell, TheLatencyOfAnswersIsMeasuredInTimeOfTheCell) {
   constexpr double kPeriod = 0.1;
   const auto told_at = [](double factor, double held) {
     const auto [fd, port] = loopbackSocket();
@@ -150,9 +150,8 @@ TEST(RealTimeCell, TheLatencyOfAnswersIsToldInTimeOfTheCell) {
   }
 }
 
-/// A computer that is too busy answers three periods late: where simulated time may stand, no
-/// answer is lost.
-TEST(RealTimeCell, LateAnswersAreWaitedForWhereTimeMayStand) {
+/// A busy computer answers three periods late. If simulated time may wait, no answer is lost.
+TEST(RealTimeCell, SimulatedTimeWaitsForLateAnswers) {
   const auto [fd, port] = loopbackSocket();
   const timeval limit{5, 0};
   setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
@@ -197,7 +196,7 @@ TEST(Cell, LateStandInDoesNotBlameThePc) {
   EXPECT_EQ(cell.controller().statistics().missCounter(), counted);
 }
 
-/// A request that was given up never acts, and leaves nothing behind that uses what is gone.
+/// A request that timed out is never executed and does not use freed memory.
 TEST(RealTimeCell, ARequestThatTimedOutIsWithdrawn) {
   CellConfig config;
   config.urdf = URDF;
@@ -228,8 +227,8 @@ TEST(RealTimeCell, ARequestThatTimedOutIsWithdrawn) {
   EXPECT_EQ(done, 0);
 }
 
-/// A real robot controller has a computer of its own, which no program on the PC delays.
-TEST(RealTimeCell, ItsThreadIsRealTimeWhereThatIsGrantedAndTheFactorAllowsIt) {
+/// A real robot controller is a separate computer that no program on the PC delays.
+TEST(RealTimeCell, ItsThreadIsRealTimeIfGrantedAndTheFactorAllowsIt) {
   CellConfig config;
   config.urdf = URDF;
   for (const auto& [factor, priority] : {std::pair{1.0, 60}, {1.0, 0}, {2.0, 60}}) {

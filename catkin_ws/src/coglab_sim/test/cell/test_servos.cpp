@@ -95,7 +95,7 @@ TEST(Servos, AWrongModelShowsInTheEstimateAndIsDrawnByTheSeed) {
   EXPECT_GT((estimates[0] - estimates[2]).norm(), 0.01);
 }
 
-TEST(Servos, ImpedanceYieldsAsItsStiffnessSays) {
+TEST(Servos, ImpedanceYieldsByItsStiffness) {
   Arm arm;
   ServoCommand command = holding();
   command.strategy = fri::ControlStrategy::CartesianImpedance;

@@ -1,5 +1,5 @@
-/// What the node of the cell is made of, without a master: messages from and to the cell's types,
-/// faults by name, and what the cell's thread leaves for others.
+/// Parts of the cell's node, without a master: messages from and to the cell's types, faults by
+/// name, and data of the cell's thread for other threads.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -45,7 +45,7 @@ std::string refusalOf(const coglab_msgs::MotorCommands& message) {
   return "";
 }
 
-/// A cell whose thread goes twenty times as fast as real time, where nobody listens.
+/// A cell whose thread runs twenty times as fast as real time, without a peer.
 struct Running {
   Running() : cell(config(), "127.0.0.1", 9, 20.0) { cell.start(); }
   ~Running() { cell.stop(); }
@@ -227,7 +227,7 @@ TEST(RealTimeCell, LeavesRecordsMessagesAndASnapshot) {
   EXPECT_EQ(snapshot.refused_hand, "");
 }
 
-TEST(RealTimeCell, TakesItsInputsAndSaysWhyAHandIsNotThere) {
+TEST(RealTimeCell, UsesItsInputsAndReportsWhyAHandIsRefused) {
   Running running;
   RealTimeCell& cell = running.cell;
   MotorCommands commands;

@@ -1,5 +1,5 @@
-/// The parts of the plant that compute by themselves: the motors of the hand, the hold of a free
-/// body, distances and inertias of objects, the hand's table.
+/// Independent parts of the plant: the motors of the hand, the hold of a free body, distances and
+/// inertias of objects, the hand's table.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -117,7 +117,7 @@ Pose at(const Vector3d& position, const Vector3d& turn = Vector3d::Zero()) {
 
 }  // namespace
 
-TEST(HoldSpring, WhatAnotherHoldsIsTakenWithoutItsWeight) {
+TEST(HoldSpring, AnObjectHeldByAnotherIsTakenWithoutItsWeight) {
   HoldSpring hold;
   hold.engageAt(Pose{});
   hold.engage(at({1, 0, 0}), at({0, 0, 0}));

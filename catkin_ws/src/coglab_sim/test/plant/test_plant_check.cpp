@@ -1,5 +1,5 @@
-/// What ends a simulation of the plant: a number that is none, and what MuJoCo leaves out for want
-/// of room. Each by itself, in words.
+/// Conditions that end a simulation of the plant: NaN, and contacts or constraints that MuJoCo
+/// leaves out for lack of room; each with its message.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -34,7 +34,7 @@ class PlantCheck : public ::testing::Test {
     return config;
   }
 
-  /// What a run of `steps` ends with; empty if it does not end.
+  /// Error message that ends a run of `steps`; empty if it does not end.
   std::string endOf(int steps) {
     try {
       for (int i = 0; i < steps; ++i) plant_.step(Vector7::Zero());
@@ -78,8 +78,8 @@ TEST_F(PlantCheck, ConstraintsThatAreLeftOut) {
   EXPECT_NE(endOf(2).find(": more than 2 constraints at a time;"), std::string::npos);
 }
 
-/// Speeds that nothing in this cell has: m/s and rad/s of what is free, rad/s of a joint.
-TEST_F(PlantCheck, SpeedsThatNothingHereHas) {
+/// Speeds that no body of this cell can have: m/s and rad/s of free bodies, rad/s of a joint.
+TEST_F(PlantCheck, ImplausibleSpeeds) {
   const Model& model = plant_.model();
   const struct {
     int at;

@@ -1,4 +1,4 @@
-/// Objects by themselves: distances from their surface, inertias, and how deep solids overlap.
+/// Objects: distances from their surface, inertias, and depths of overlaps.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -81,7 +81,7 @@ double depthOf(const std::string& one, const std::string& two, const std::string
 
 }  // namespace
 
-TEST(Overlaps, SolidsWhoseMiddlesCoincideStandInEachOtherAsDeepAsTheSmallerIsThick) {
+TEST(Overlaps, CoincidentSolidsOverlapByTheThicknessOfTheSmallerOne) {
   const std::string sphere = "type=\"sphere\" size=\"0.1\"",
                     box = "type=\"box\" size=\"0.1 0.2 0.3\"",
                     capsule = "type=\"capsule\" size=\"0.1 0.2\"",

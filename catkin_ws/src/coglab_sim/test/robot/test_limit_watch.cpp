@@ -16,7 +16,7 @@ constexpr double kPeriod = 0.005;  // s
 
 Vector7 unit(int joint) { return Vector7::Unit(joint); }
 
-TEST(LimitWatch, CountsATrueJointThatMovesTooFastWhateverWasCommanded) {
+TEST(LimitWatch, CountsATrueJointThatMovesTooFastForAnyCommand) {
   LimitWatch limits(LIMITS_FILE);
   // As published: the KRC's file rsidef7.dat, the same in the robot description.
   Vector7 fastest;

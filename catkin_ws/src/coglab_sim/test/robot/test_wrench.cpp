@@ -21,7 +21,7 @@ struct Felt {
   Eigen::VectorXd wire, topic, feedback;
 };
 
-/// A known force and torque on the palm, in base axes, in a posture; what each place makes of it.
+/// A known force and torque on the palm (base axes) in a posture, and its value at each place.
 Felt pushed(const Vector7& posture, const Vector6& push) {
   CellConfig config;
   config.urdf = URDF;

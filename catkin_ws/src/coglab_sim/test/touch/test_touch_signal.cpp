@@ -31,7 +31,7 @@ std::shared_ptr<const coglab_controllers::RobotSetup> tactileSetup() {
 
 }  // namespace
 
-TEST(TouchSignal, IsWhatThePlantFeels) {
+TEST(TouchSignal, EqualsTheContactForcesOfThePlant) {
   plant::Plant plant = grasp();
   plant.setBrakes(true);
   const double shape[] = {245.0, 5.0, 30.0, 50.0, 50.0};

@@ -47,19 +47,19 @@ Description CompliantStabiliser::describe() const {
   d.summary = "Lets the centre-of-mass reference yield to pushes and come back.";
   d.use =
       "With `force_source: zmp` write the estimated ZMP into `estimatedData` `zmp`; the horizontal "
-      "force is then inferred from its distance to where the ZMP belongs: the ZMP reference, and "
-      "the distance that the robot has yielded already. With `force_source: force` "
+      "force is then inferred from its distance to the ZMP reference plus the distance that the "
+      "robot has already yielded. With `force_source: force` "
       "write the net horizontal contact force into `measuredData` `contactForce`.";
   d.when =
-      "For a robot that stands or walks and should give way softly when it is pushed. Not "
+      "For a robot that stands or walks and should yield softly when it is pushed. Not "
       "together with another controller that moves the centre of mass by the same error.";
   d.limitations =
       "Horizontal directions only; no stepping: beyond `max_offset` it pushes back like a wall. "
       "The force from the ZMP is that of a pendulum of constant height whose centre of mass "
       "follows "
-      "its reference; what the robot's own mass takes to accelerate is not told from a push, so a "
+      "its reference. The force that accelerates the robot's own mass counts as a push, so a "
       "quick push meets M + m instead of M. A robot that follows much later than `force_filter` "
-      "needs a longer one.";
+      "needs a longer filter.";
   d.law =
       "M \\ddot x + D \\dot x + K x = f,\\quad \\tau \\dot f + f = m g (p_{meas} - p_{ref} - x) / "
       "h "

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Fixed arm: the hand gives way at a wall (EeAdmittance), and the elbow stops before its end (JointLimits).
+"""Fixed arm: the hand yields at a wall (EeAdmittance), and the elbow stops before its limit (JointLimits).
 
 The reference leads the hand 7 cm into the wall, and then so far back that the elbow would leave its range.
     fixed_arm.py [--plot FILE]

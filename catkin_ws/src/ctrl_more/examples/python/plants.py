@@ -1,6 +1,6 @@
 """Three small robots to try feedback controllers on: a fixed arm, a biped and a wheeled base.
 
-Each plant needs numpy alone. `step()` moves it by one cycle. Its properties have the sizes and units
+Each plant needs only numpy. `step()` moves it by one cycle. Its properties have the sizes and units
 that the controllers of this package declare for their signals, so a program copies them into
 `RobotStates` unchanged.
 """

@@ -16,7 +16,7 @@
 
 namespace ctrl_more {
 
-/// Makes a manager that lies in a library, from its block of the central module's file. May throw.
+/// Makes a manager of a library from its block in the central module's file. May throw.
 using ManagerLibraryMaker = std::unique_ptr<Manager> (*)(const std::string& name,
                                                          const ConfigNode& block,
                                                          RobotStates& robot, ControlStates& control,
@@ -97,12 +97,12 @@ class CentralModule {
   struct Host {
     RobotStates& robot;                ///< must outlive the module
     ControlStates& control;            ///< must outlive the module
-    ManagerOptions feedback;           ///< of the Feedback manager, where the file is silent
+    ManagerOptions feedback;           ///< of the Feedback manager, unless given in the file
     std::vector<std::string> folders;  ///< searched for libraries of managers
   };
 
-  /// As above, on a robot. `joints` and `period` may be left out; other values than the robot's are
-  /// refused, and so is a file without a Feedback manager.
+  /// As above, on a robot. `joints` and `period` may be omitted. Values that differ from the
+  /// robot's are refused, and so is a file without a Feedback manager.
   CentralModule(const ConfigNode& config, const std::string& base, const Host& host,
                 Logger* logger = nullptr);
   ~CentralModule();
@@ -112,7 +112,7 @@ class CentralModule {
   RobotStates& robotStates() { return *robot_; }
   /// The shared control states. The user reads them after update().
   ControlStates& controlStates() { return *control_; }
-  /// List file of the feedback manager as the file names it; empty: none.
+  /// List file of the feedback manager, as written in the file; empty: none.
   const std::string& feedbackList() const { return feedback_list_; }
   /// The feedback manager; throws std::logic_error if the file lists none.
   FeedbackControllersManager& feedbackControllers();

@@ -267,10 +267,10 @@ class FeedbackControllersManager : public Manager, public ControllerOwner {
   void beginCycle(const Cycle& cycle) noexcept override;
   /// Adopts the plan of prepare(), if any. Call it between beginCycle() and the first stage.
   void adoptPrepared() noexcept;
-  /// While `let_go`, no controller runs and every correction is gone at once, held ones too. A
-  /// controller that is enabled begins anew after that: reset(), then its correction is blended in.
-  /// For a host whose set-point stays where it is in this cycle, so that the end of a correction
-  /// moves nothing. Call it between beginCycle() and the first stage.
+  /// While `let_go` is true, no controller runs, and all corrections are zero at once, also held
+  /// ones. Afterwards each enabled controller restarts: reset(), then its correction is blended in.
+  /// For a host whose set-point does not move in this cycle, so that the end of a correction causes
+  /// no motion. Call it between beginCycle() and the first stage.
   void letGo(bool let_go) noexcept;
   /// Snapshots the references as `original`, then runs the controllers of the stage in order.
   /// Both stores must be those of the constructor, or copies of them.

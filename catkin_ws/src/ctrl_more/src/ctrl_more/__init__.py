@@ -2,7 +2,7 @@
 
 Every method has a Python name (`set_measured_data`) and its name in the paper (`setMeasuredData`). Arrays are
 numpy arrays of float64, units are SI, quaternions are `x y z w`. A refused request raises `Refused`, a
-`ValueError` whose text says what was expected, what came and what to do; it has changed nothing. Records of the
+`ValueError` with the expected and the received value and what to do; it has changed nothing. Records of the
 C++ loggers go to `logging`, below the name `ctrl_more`.
 
     robot, control = RobotStates(), ControlStates(joints=7)

@@ -1,4 +1,4 @@
-"""`python3 -m ctrl_more list|check|page|run FILE`: what a list file loads, and what its controllers do.
+"""`python3 -m ctrl_more list|check|page|run FILE`: shows, checks, documents and runs the controllers of a list file.
 
 FILE may also be a Python file with a controller: `my_module.py`, or `my_module.py:MyController`.
 """
@@ -203,7 +203,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main() -> int:
-    """Run a command: 0 it is well, 1 something is wrong with the file, 2 wrong usage."""
+    """Run a command. Returns 0: success, 1: error in the file, 2: wrong usage."""
     arguments = parser().parse_args()
     try:
         code = int(arguments.function(arguments))

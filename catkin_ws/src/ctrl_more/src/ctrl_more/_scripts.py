@@ -1,4 +1,4 @@
-"""Finds the class that a list file names as `type: module:Class`, and judges it before a manager takes it."""
+"""Finds the class of a list file's `type: module:Class`, and checks it before a manager loads it."""
 
 from __future__ import annotations
 

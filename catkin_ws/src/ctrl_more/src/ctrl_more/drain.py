@@ -14,7 +14,7 @@ LEVELS = {"debug": logging.DEBUG, "info": logging.INFO, "warning": logging.WARNI
 def to_logging(logger: Logger, name: str = "ctrl_more", period: float = 0.05) -> None:
     """Drain `logger` into `logging.getLogger(name.source)` every `period` seconds.
 
-    A thread of its own does it, so a control cycle never waits for Python's handlers. The rest is
+    A separate thread does this, so a control cycle never waits for Python's handlers. The rest is
     written when the program ends; `logger.drain()` writes it at once.
     """
 

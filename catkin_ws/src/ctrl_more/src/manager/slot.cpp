@@ -202,7 +202,7 @@ void Slot::run(StageRun& run) noexcept {
   }
 }
 
-// Ends its correction at once. If it is wanted, it begins anew when it may.
+// Ends its correction at once. If the controller is still enabled, it restarts after letGo().
 void Slot::letGo(const StageRun& run) noexcept {
   let_go_ = true;
   reset_pending_ = true;
@@ -310,8 +310,8 @@ void Slot::runStopped(StageRun& run) noexcept {
   if (run.timed) run.boundary_ns = coglab_rt::steadyNow();
 }
 
-// The step from the last correction to the controller's first one fades. What the controller adds
-// later counts at once: pose and velocity stay consistent, and it keeps its own limits.
+// Fades the step from the last correction to the controller's first one. Later changes act at once,
+// so pose and velocity stay consistent, and the controller keeps its own limits.
 void Slot::blendIn(double* data) noexcept {
   for (const WrittenSignal& w : guard_.written()) {
     double* const c = now_.data() + w.local;

@@ -11,7 +11,7 @@ namespace {
 
 using Gains = std::map<std::string, std::vector<double>>;
 
-// Made by the Python file _scripts.py, which finds the module and judges the class.
+// Made by the Python file _scripts.py, which finds the module and checks the class.
 std::unique_ptr<FeedbackController> makeFromFile(const std::string& type,
                                                  const std::string& folder) {
   py::gil_scoped_acquire locked;

@@ -5,8 +5,7 @@
 namespace ctrl_more::python {
 namespace {
 
-/// Gives each record to a Python function. Only drain() calls it, so no cycle ever waits for
-/// Python.
+/// Passes each record to a Python function. Only drain() calls it, so no cycle waits for Python.
 class FunctionSink : public LogSink {
  public:
   explicit FunctionSink(py::object function) : function_(std::move(function)) {}

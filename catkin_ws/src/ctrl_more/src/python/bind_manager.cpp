@@ -10,7 +10,7 @@ namespace {
 
 using Feedback = FeedbackControllersManager;
 
-/// A manager whose cycle Python runs. It knows its stores, so that no others are given to it.
+/// A manager whose cycle Python runs. It stores its states, to refuse others.
 class OwnManager : public Feedback {
  public:
   OwnManager(RobotStates& robot_states, ControlStates& control_states,

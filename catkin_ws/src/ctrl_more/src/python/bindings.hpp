@@ -76,7 +76,7 @@ LogLevel toLevel(const std::string& text);
 /// The last line of a Python error and its place: `file.py:12: ValueError: text`.
 std::string shortText(py::error_already_set& error);
 
-/// The logger of objects that are made without one: it goes to Python's `logging`.
+/// Default logger of objects; it writes to Python's `logging`.
 Logger& pythonLogger();
 inline Logger* orPython(Logger* logger) { return logger ? logger : &pythonLogger(); }
 

@@ -15,7 +15,7 @@ auto guarded(Call&& call) -> decltype(call()) {
   try {
     return call();
   } catch (py::error_already_set& error) {
-    // Ctrl-C is not the controller's fault alone: the program must see it as well.
+    // Ctrl-C is not only a fault of the controller: the program must receive it too.
     const std::string text = shortText(error);  // runs Python, which would take the interrupt
     if (error.matches(PyExc_KeyboardInterrupt)) PyErr_SetInterrupt();
     throw std::runtime_error(text);
@@ -116,7 +116,7 @@ void Body::openViews(const RobotStates& robot, const ControlStates& original,
     using Store = std::remove_const_t<std::remove_reference_t<decltype(store)>>;
     object = py::cast(View());
     view = object.cast<View*>();
-    // Finds the Python object of this store, if there is one: it keeps the numbers.
+    // Finds an existing Python object of this store, because it owns the numbers.
     view->owner = py::cast(const_cast<Store*>(&store), py::return_value_policy::reference);
     last = &store;
   };

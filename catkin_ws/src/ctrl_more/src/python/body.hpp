@@ -12,8 +12,8 @@ namespace ctrl_more::python {
 
 class Body;
 
-/// The base class ctrl_more.FeedbackController as Python sees it. Its body is what a manager runs:
-/// it belongs to this object until a manager takes it, and then keeps this object alive.
+/// Python's base class ctrl_more.FeedbackController. A manager runs its body. This object owns the
+/// body until a manager takes it; the body then keeps this object alive.
 class Script {
  public:
   Script();

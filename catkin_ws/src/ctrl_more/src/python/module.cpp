@@ -123,11 +123,11 @@ PYBIND11_MODULE(_core, module) {
   using namespace ctrl_more;
   using namespace ctrl_more::python;
   module.doc() = "The library ctrl_more, as it runs in the robot's control cycle.";
-  refusedClass() = py::reinterpret_steal<py::object>(
-      PyErr_NewExceptionWithDoc("ctrl_more.Refused",
-                                "A request that was refused. Its text says what was expected, what "
-                                "came and what to do; nothing has changed.",
-                                PyExc_ValueError, nullptr));
+  refusedClass() = py::reinterpret_steal<py::object>(PyErr_NewExceptionWithDoc(
+      "ctrl_more.Refused",
+      "A refused request. Its text contains the expected and the received "
+      "value and what to do; nothing has changed.",
+      PyExc_ValueError, nullptr));
   module.attr("Refused") = refusedClass();
   // The text of a compiled function is no attribute that Python may set; pybind11 replaces it in
   // the same way when it adds an overload, and frees it at the end.

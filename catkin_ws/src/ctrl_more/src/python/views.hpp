@@ -1,6 +1,6 @@
 /// @file
-/// What a Python controller sees of the stores during its update(). Arrays lie on the memory of the
-/// stores and are made once; they are kept from cycle to cycle, as long as the stores do not move.
+/// Views of the stores for a Python controller during its update(). Arrays use the memory of the
+/// stores. They are made once and kept as long as the stores do not move.
 #pragma once
 
 #include <string>
@@ -10,16 +10,16 @@
 
 namespace ctrl_more::python {
 
-/// Arrays by the first number that they show.
+/// Arrays by the address of their first number.
 class Arrays {
  public:
-  /// The array on `size` numbers from `data` on.
+  /// The array of `size` numbers that begins at `data`.
   py::array& on(const double* data, int size, const py::handle& owner, bool writable) {
     const auto found = arrays_.find(data);
     if (found != arrays_.end() && found->second.size() == size) return found->second;
     return arrays_[data] = arrayOn(data, size, owner, writable);
   }
-  /// Lets all of them be written, or none.
+  /// Makes all of them writable or read-only.
   void setAllWritable(bool writable) {
     for (auto& entry : arrays_) setWritable(entry.second, writable);
   }
@@ -28,7 +28,7 @@ class Arrays {
   std::unordered_map<const double*, py::array> arrays_;
 };
 
-/// A store that Python may use only while `now` is set: during update().
+/// A store that Python may use only during update(), while `now` is set.
 template <typename Store>
 class During {
  public:
@@ -88,14 +88,14 @@ class ModifiedView : public During<ModifiedControlStates> {
   /// Replaces a signal.
   void set(const Modify<>& handle, const py::object& value) {
     auto numbers = states()[handle];
-    // `modified[handle] += x` has written already, and gives back the same array.
+    // `modified[handle] += x` has already written, and assigns the same array.
     if (py::isinstance<py::array>(value)) {
       const auto array = py::reinterpret_borrow<py::array>(value);
       if (array.data() == numbers.data() && array.size() == numbers.size()) return;
     }
     numbers = toVector(value, "a value of modified");
   }
-  /// Opens or closes the written arrays.
+  /// Makes the arrays of modified signals writable or read-only.
   void setAllWritable(bool writable) { written_.setAllWritable(writable); }
 
  private:

@@ -1,4 +1,4 @@
-// Loads an installed controller by its type alone, runs it, and prints what it did.
+// Loads an installed controller by its type, runs it, and prints its effect.
 #include <iostream>
 
 #include "ctrl_more/feedback_controllers_manager.hpp"

@@ -90,7 +90,7 @@ TEST_F(AdmittanceTest, OffsetAndVelocityAreBounded) {
   EXPECT_EQ(rig.manager->status("c").faults, 0u);
 }
 
-TEST_F(AdmittanceTest, HoweverStrongAPushItYieldsWithIt) {
+TEST_F(AdmittanceTest, UnderAStrongPushPositionAndVelocityAgree) {
   ASSERT_TRUE(rig.load("ee_admittance", "mass: 0.5\nmax_offset: 0.4\nmax_velocity: 0.25\n"));
   double last = 0.2;
   for (int i = 0; i < 200; ++i) {
@@ -120,7 +120,7 @@ TEST_F(AdmittanceTest, ToolFrameAndRotation) {
   EXPECT_LT((turned - Eigen::Vector3d(0, 0.1, 0)).norm(), 1e-9);
 }
 
-TEST_F(AdmittanceTest, WrenchOfTheToolTurnsWithWhatHasYielded) {
+TEST_F(AdmittanceTest, WrenchOfTheToolTurnsWithTheYieldedRotation) {
   ASSERT_TRUE(rig.load("ee_admittance",
                        "wrench_frame: tool\naxes: all\nforce_dead_band: 0\ntorque_dead_band: 0\n"
                        "stiffness: 100\nrotary_stiffness: 4\nmax_velocity: 2\n"));
@@ -135,7 +135,7 @@ TEST_F(AdmittanceTest, WrenchOfTheToolTurnsWithWhatHasYielded) {
 }
 
 // The profile of a handover: compliant while approaching, off before contact is armed.
-TEST(Handover, CompliantInTheApproachAndGoneBeforeContactIsArmed) {
+TEST(Handover, CompliantInTheApproachAndOffBeforeContactIsArmed) {
   setenv("CTRL_MORE_PATH", CTRL_MORE_PLUGIN_DIR, 1);
   Rig rig(0.2);
   const LoadReport report = rig.manager->load(CTRL_MORE_SOURCE_DIR "/config/feedback.yaml", true);

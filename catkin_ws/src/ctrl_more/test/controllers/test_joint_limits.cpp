@@ -76,7 +76,7 @@ TEST_F(JointLimitsTest, WrongConfigurationsAreRefused) {
   EXPECT_FALSE(rig.manager->pause("c")) << "a safety controller";
 }
 
-TEST(JointLimitsOfAnyRobot, HaveAsManyJointsAsItsFileSays) {
+TEST(JointLimitsOfAnyRobot, HaveTheNumberOfJointsInItsFile) {
   Logger logger;
   RobotStates robot(&logger);
   ControlStates control(0, 0.005, &logger);

@@ -101,7 +101,7 @@ TEST_F(ArmDistanceTest, TheNearestPointOfThePersonAndOfTheWholeArmCount) {
   EXPECT_NEAR(limit(module), allowed, 1e-12) << "the hand is out of sight, the head is seen";
 }
 
-TEST_F(ArmDistanceTest, WhoMayTouchComesToThePalmOfASlowArmAndToNoOtherPlace) {
+TEST_F(ArmDistanceTest, ATouchingHandIsAllowedOnlyAtThePalmOfASlowArm) {
   CentralModule module =
       make(", person: [hand, head], touch: [hand], touch_speed: 0.25, robot_radius: 0.1");
   const Eigen::Vector3d away(0.0, 5.0, 0.0), palm(0.65, 0.0, 0.0);

@@ -1,4 +1,4 @@
-// One attitude library, unchanged, on three robots by three configuration files: the paper's claim
+// One unchanged attitude library on three robots with three configuration files: the paper's claim
 // (section VI-A) in closed loop, to 1e-12 after the change of frame.
 #include <fstream>
 #include <iterator>
@@ -34,7 +34,7 @@ std::string bytesOfLibrary() {
   return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
 }
 
-// What a robot's IMU says, in its own world and on its own mount.
+// Measurement of a robot's IMU, in its own world and with its own mount.
 Eigen::VectorXd sensorData(const Robot& robot, const Body& body, std::string& key) {
   const Eigen::Quaterniond imu = robot.world.conjugate() * body.orientation * robot.mount;
   const Eigen::Vector3d gyro = (body.orientation * robot.mount).conjugate() * body.rate;
@@ -79,7 +79,7 @@ std::vector<Robot> threeRobots() {
            expOf({0.2, 0.5, -0.7})}};
 }
 
-// The way of a body that the library corrects on this robot.
+// Trajectory of a body whose orientation the library corrects on this robot.
 void follow(const Robot& robot, std::vector<Eigen::Quaterniond>& path) {
   ControllerRig rig;
   rig.control.declare(ControlContainer::TaskSpaceReferencePose, "wrist", 7);

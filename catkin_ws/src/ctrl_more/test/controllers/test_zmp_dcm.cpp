@@ -24,7 +24,7 @@ double dcmAfter(double k, double height, double e0, int cycles, ControllerRig& r
   return xi;
 }
 
-TEST(ZmpDcmTest, ErrorDecaysAsTheClosedFormSays) {
+TEST(ZmpDcmTest, ErrorDecaysByTheClosedForm) {
   ControllerRig rig;
   const double k = 20, height = 0.8, w = std::sqrt(9.80665 / height);
   const int n = 100;

@@ -1,5 +1,5 @@
-// What a declaration must agree with before its controller is taken: in itself, and with the
-// signals that are there.
+// Checks of a declaration before its controller is loaded: consistency in itself and with the
+// existing signals.
 #include "ctrl_more/docs/documentation.hpp"
 #include "ctrl_more/feedback_controller.hpp"
 #include "ctrl_more/loading/controller_instance.hpp"
@@ -18,7 +18,7 @@ std::vector<std::string> faultsOf(const Way& way, Stage stage = Stage::Task) {
   return d.faults();
 }
 
-TEST(Declaration, WhatIsWrongHasOneSentenceEach) {
+TEST(Declaration, EachErrorHasOneSentence) {
   const std::vector<std::pair<Way, std::string>> wrong = {
       {[](Description& d) { d.type = ""; }, "no type"},
       {[](Description& d) { d.gain("", 1.0); }, "has no name"},
@@ -46,7 +46,7 @@ TEST(Declaration, WhatIsWrongHasOneSentenceEach) {
   }
 }
 
-// What happens to a controller that asks for a signal by `ask`.
+// Result for a controller that requests a signal by `ask`.
 Status loaded(Rig& rig, const Way& way, const std::function<void(ctrl_more::Setup&)>& ask) {
   auto c = std::make_unique<TestController>();
   way(c->description);
@@ -54,7 +54,7 @@ Status loaded(Rig& rig, const Way& way, const std::function<void(ctrl_more::Setu
   return rig.manager->addController(std::move(c), "c");
 }
 
-TEST(Signals, GetTheSizeThatIsThereIfItIsAllowed) {
+TEST(Signals, UseTheExistingSizeIfItIsAllowed) {
   const Way two = [](Description& d) { d.measured("imu").size(9).size(10); };
   const auto read = [](ctrl_more::Setup& setup) { setup.read("imu"); };
   for (const int size : {7, 9, 10}) {
@@ -74,7 +74,7 @@ TEST(Signals, GetTheSizeThatIsThereIfItIsAllowed) {
   EXPECT_EQ(rig.robot.find(RobotSource::Measured, "imu").size(), 10);
 }
 
-TEST(Signals, AnySizeThatIsThereIsTakenWhereNoneIsDeclared) {
+TEST(Signals, UseAnyExistingSizeIfNoneIsDeclared) {
   Rig rig;
   rig.control.declare(ControlContainer::OtherReference, "horizon", 4);
   const Status status = loaded(
@@ -89,7 +89,7 @@ FeedbackController* makeOne() {
   return one.release();
 }
 
-TEST(LinkedTypes, AreMadeByNameAndWhatIsMadeMustBeIt) {
+TEST(LinkedTypes, AreMadeByNameAndMustHaveTheDescribedType) {
   const PrototypeRegistration nothing("Nothing", &makeNothing), one("TestController", &makeOne),
       other("Other", &makeOne);
   EXPECT_NE(makeController("", "TestController").controller, nullptr);

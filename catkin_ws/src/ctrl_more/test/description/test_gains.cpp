@@ -62,7 +62,7 @@ TEST_F(WithGain, RefusedFilesLeaveTheOldGains) {
   EXPECT_FALSE(rig.manager->setGains("c", {{"kp", {1, 2}}}));
 }
 
-TEST_F(WithGain, TheControllerIsToldBeforeEachUpdateWhoseGainsDiffer) {
+TEST_F(WithGain, GainsChangedIsCalledBeforeEachUpdateWithNewGains) {
   double last = c->scalar(c->gain_handle);
   int told = c->gains_changes, changed = 0;
   c->on_write = [&](TestController& self, ModifiedControlStates&) {
@@ -86,7 +86,7 @@ TEST_F(WithGain, TheControllerIsToldBeforeEachUpdateWhoseGainsDiffer) {
   EXPECT_EQ(changed, 40) << "refused";
 }
 
-TEST_F(WithGain, TheInstanceAsksAndTellsItsManager) {
+TEST_F(WithGain, TheInstanceForwardsToItsManager) {
   ASSERT_TRUE(c->setGains({{"kp", {4.0}}}));
   EXPECT_EQ(rig.manager->getGains("c").all().at("kp"), std::vector<double>{4.0});
   EXPECT_EQ(c->getGains().at("kp"), std::vector<double>{4.0}) << "as requested, not as blended";
@@ -98,7 +98,7 @@ TEST_F(WithGain, TheInstanceAsksAndTellsItsManager) {
   EXPECT_EQ(rig.twist()[0], 2.0);
 }
 
-TEST_F(WithGain, NoFileIsNotTheFileItWasLoadedFrom) {
+TEST_F(WithGain, AnEmptyFileNameDoesNotMeanItsOwnFile) {
   auto made = adder("vel", "ee", 0.0);
   made->description.gain("kp", 1.0).range(0, 10).in("1").about("x");
   ControllerEntry entry;

@@ -1,5 +1,5 @@
-// Settings and gains against their declaration: names, counts, ranges with their ends, and what
-// stays as it was.
+// Settings and gains against their declaration: names, counts, ranges with their ends, and values
+// that stay unchanged.
 #include <fstream>
 
 #include "ctrl_more/description/configuration.hpp"
@@ -52,7 +52,7 @@ TEST(Settings, NumbersHaveTheirCountAndRange) {
   EXPECT_FALSE(values.set("ends", Numbers{}));
 }
 
-TEST(ControllerFiles, GiveWhatTheyName) {
+TEST(ControllerFiles, SetTheNamedValues) {
   const ControllerConfig config = readControllerConfig(
       declared(), ConfigNode::fromText("type: X\nkp: [0, 2]\nmode: slow\nends: [1, 2]\n", "f"));
   EXPECT_EQ(config.settings.text("mode"), "slow");

@@ -1,4 +1,4 @@
-// What a library and the program that loads it must have in common.
+// ABI numbers that a library and the program that loads it must share.
 #include <algorithm>
 
 #include "ctrl_more/feedback_controller.hpp"
@@ -9,7 +9,7 @@ namespace {
 
 FeedbackController* makeNothing() { return nullptr; }
 
-// One number that differs is enough, whichever it is, and the refusal shows both sides.
+// One different number is sufficient for a refusal, which shows both sides.
 TEST(AbiOfControllers, AnyOtherNumberIsRefused) {
   std::vector<Abi> others(4, thisAbi());
   ++others[0].interface;

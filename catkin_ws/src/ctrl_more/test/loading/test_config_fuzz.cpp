@@ -1,5 +1,5 @@
-// Whatever a file contains, it is taken wholly or refused with a sentence, as a list, as gains and
-// as a configuration, and the controller that runs keeps running.
+// Any file is either accepted completely or refused with a message, as a list, as gains and as a
+// configuration. The running controller continues.
 #include <array>
 #include <cctype>
 #include <cstdio>
@@ -51,7 +51,7 @@ std::string mutate(const std::string& seed, std::mt19937& random) {
   return text;
 }
 
-/// One word or number of a file replaced by another that could stand there: what a person mistypes.
+/// Replaces one word or number of a file by another plausible one, like a typing error.
 std::string mistype(const std::string& seed, std::mt19937& random) {
   static const std::string kWords[] = {"0",    "1",    "2",     "0.5",     "-0.1", "2.001", "1e-3",
                                        "true", "fast", "slow",  "running", "Good", "kp",    "mode",
@@ -87,7 +87,7 @@ const std::string kList =
 
 enum Way { kAsList, kAsGains, kAsConfiguration, kWays };
 
-/// What a load that is refused must leave as it was.
+/// State that a refused load must not change.
 struct Snapshot {
   std::vector<std::string> names, order, profiles;
   GainValues gains;
@@ -106,13 +106,13 @@ struct Snapshot {
   }
 };
 
-/// One controller that runs, and files that are loaded beside it in every way.
+/// A running controller, and files that are loaded in every way.
 class ConfigFuzz : public ::testing::Test {
  protected:
   void SetUp() override {
     rig_.logger.setLevel(LogLevel::Error);
     running_ = rig_.add(configurable(), "running");
-    // In memory where that can be written: a hundred thousand files are hard on a disk.
+    // In memory if possible, because a hundred thousand files would wear a disk.
     folder_ = access("/dev/shm", W_OK) == 0 ? "/dev/shm" : ::testing::TempDir();
     folder_ += "/ctrl_more_fuzz_XXXXXX";
     ASSERT_NE(mkdtemp(&folder_[0]), nullptr) << folder_;
@@ -121,7 +121,7 @@ class ConfigFuzz : public ::testing::Test {
   }
   void TearDown() override { std::filesystem::remove_all(folder_); }
 
-  /// Writes a file and loads it in each way, first in the one that it is meant for.
+  /// Writes a file and loads it in each way, first in the intended one.
   void loadInEveryWay(const std::string& text, Way own) {
     {
       std::ofstream out(file_, std::ios::binary);
@@ -163,7 +163,7 @@ class ConfigFuzz : public ::testing::Test {
   long looks_ = 0;
 
  private:
-  /// Loads the file; empty if it was taken, else the sentence.
+  /// Loads the file. Returns the error message; empty if it was accepted.
   std::string load(Way way) {
     if (way == kAsList) {
       const LoadReport report = rig_.manager->load(file_);
@@ -185,7 +185,7 @@ class ConfigFuzz : public ::testing::Test {
     return status ? "" : status.message();
   }
 
-  /// What ran before goes on: one update more, and its correction.
+  /// Checks that the running controller continues: one more update, and its correction.
   void look(Way way) {
     const int updates = running_->updates;
     rig_.step();
@@ -194,7 +194,7 @@ class ConfigFuzz : public ::testing::Test {
     ++looks_;
   }
 
-  /// What was taken goes again, so that the next file finds everything as this one did.
+  /// Removes the loaded controllers, so that the next file finds the same state.
   void unloadTheRest() {
     const std::vector<std::string> names = rig_.manager->getControllersNames();
     if (names.size() == 1) return;
@@ -218,7 +218,7 @@ class ConfigFuzz : public ::testing::Test {
   std::string folder_, file_;
 };
 
-/// As many as the environment asks for; the bench asks for more than the tests take.
+/// Number of files from the environment; the bench sets more than the default of the tests.
 long filesAskedFor() {
   const char* const asked = std::getenv("CTRL_MORE_FUZZ_FILES");
   return asked == nullptr ? 12000 : std::atol(asked);
@@ -227,7 +227,7 @@ long filesAskedFor() {
 /// Every file is written, and loaded as list, as gains of a controller that runs, and as the
 /// configuration of a new one; a third of them is meant for each, and half of them differ from a
 /// good one by one word. What runs is looked at after each load.
-TEST_F(ConfigFuzz, ListAndGainAndConfigurationFilesNeverBreakWhatRuns) {
+TEST_F(ConfigFuzz, DamagedFilesNeverAffectRunningControllers) {
   const long files = filesAskedFor();
   ASSERT_GE(files, 1200) << "CTRL_MORE_FUZZ_FILES";
   long mistyped = 0;

@@ -1,4 +1,4 @@
-// The tool that writes pages and configurations, by its exit status and what it prints.
+// The tool that writes pages and configurations: exit status and output.
 #include <array>
 #include <cstdio>
 #include <cstdlib>
@@ -21,7 +21,7 @@ struct Result {
   std::string said;
 };
 
-// Runs the tool; `also_errors`: what it prints there is part of what it said.
+// Runs the tool and returns its output; `also_errors` includes the error output.
 Result run(const std::string& arguments, bool also_errors) {
   const std::string command = kTool + " " + arguments + (also_errors ? " 2>&1" : " 2>/dev/null");
   Result result;
@@ -70,7 +70,7 @@ TEST_F(DescribeTool, OnlyTheCheckFailsForEmptyFields) {
   EXPECT_EQ(run("config " + kGood, true).status, 0);
 }
 
-TEST_F(DescribeTool, WhatCannotBeLoadedIsSaidAndOne) {
+TEST_F(DescribeTool, ALoadErrorIsPrintedWithStatusOne) {
   const Result missing = run("page /nowhere/libx.so", true);
   EXPECT_EQ(missing.status, 1);
   EXPECT_TRUE(contains(missing.said, "there is no library /nowhere/libx.so")) << missing.said;

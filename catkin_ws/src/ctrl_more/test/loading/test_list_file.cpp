@@ -1,4 +1,4 @@
-// What a list file may say of each controller, and what a refused one leaves behind: nothing.
+// Options of each controller in a list file. A refused file leaves nothing loaded.
 #include <fstream>
 
 #include "test_support.hpp"

@@ -80,7 +80,7 @@ TEST_F(Plugins, PapersExampleFileIsRefusedWithLineAndSuggestion) {
   EXPECT_EQ(rig.control.getZMP()[0], 1.0) << "what was loaded keeps running";
 }
 
-TEST_F(Plugins, BadLibrariesAreRefusedInWords) {
+TEST_F(Plugins, BadLibrariesAreRefusedWithAReason) {
   expectRefused("loadControllers: [A]\nA: {libPath: libmissing.so}\n",
                 {"list.yaml:2", "libPath", "libmissing.so", "tried"});
   expectRefused("loadControllers: [A]\nA: {libPath: libnone.so}\n", {"registers no controller"});
@@ -99,8 +99,8 @@ TEST_F(Plugins, BadLibrariesAreRefusedInWords) {
   EXPECT_TRUE(load("loadControllers: [A]\nA: {libPath: libtwo.so, type: Second}\n").ok());
 }
 
-// What a library throws lives in it, and must be dealt with before it is closed.
-TEST_F(Plugins, WhateverALibraryThrowsRefusesTheWholeListInWords) {
+// An exception of a library has its code there and must be handled before the library is closed.
+TEST_F(Plugins, AnyExceptionOfALibraryRefusesTheWholeList) {
   const std::string own = "an error of its own", strange = "not a std::exception";
   for (const auto& thrown :
        std::vector<std::pair<std::string, std::string>>{{"InMaker", own},
@@ -132,7 +132,7 @@ TEST_F(Plugins, WhateverALibraryThrowsRefusesTheWholeListInWords) {
   }
 }
 
-TEST_F(Plugins, WhatALibraryThrowsWhileLoadedIsAFaultOrARefusal) {
+TEST_F(Plugins, AnExceptionOfALoadedLibraryIsAFaultOrARefusal) {
   ASSERT_TRUE(load("loadControllers: [update, judge]\n"
                    "update: {libPath: libstrangers.so, type: InUpdate, enabled: true}\n"
                    "judge: {libPath: libstrangers.so, type: InJudge}\n")
@@ -301,7 +301,7 @@ TEST_F(TwoBuilds, OldCodeIsNeverLoadedUnderTheNameOfTheNew) {
   EXPECT_EQ(runOnce(), 10.0);
 }
 
-// What static objects of a library cannot do twice, the loader has to remember.
+// Static objects of a library run only once, so the loader must store their registrations.
 TEST_F(TwoBuilds, LibraryThatStaysInMemoryIsLoadedAgain) {
   build("resident");
   for (int i = 0; i < 3; ++i) {
@@ -318,7 +318,7 @@ TEST_F(TwoBuilds, LibraryThatStaysInMemoryIsLoadedAgain) {
   EXPECT_TRUE(contains(report.text(), "start the program again"));
 }
 
-// In a process of its own, because a fault of the loader would end or block the tests.
+// In a separate process, because a fault of the loader would end or block the tests.
 struct HarmfulLibraries : TwoBuilds {
   // Refused with all parts in the sentence, and another thread can load a good library afterwards.
   void refused(const std::vector<std::string>& parts) {
@@ -347,7 +347,7 @@ struct HarmfulLibraries : TwoBuilds {
   }
 };
 
-TEST_F(HarmfulLibraries, AreRefusedAndBlockNobody) {
+TEST_F(HarmfulLibraries, AreRefusedAndBlockNoOtherThread) {
   const std::string opened = "while it was opened", described = "'StaticObject' was made";
   for (const auto& [fault, parts] : std::map<std::string, std::vector<std::string>>{
            {"open_throw", {"no such camera"}},
@@ -364,7 +364,7 @@ TEST_F(HarmfulLibraries, AreRefusedAndBlockNobody) {
   unsetenv("CTRL_MORE_TEST_FAULT");
 }
 
-TEST_F(HarmfulLibraries, InitializeThatHangsBlocksNoQuestionAndIsNamedToOtherChanges) {
+TEST_F(HarmfulLibraries, AHangingInitializeBlocksNoQueryAndIsReportedToOtherChanges) {
   within20s([this] {
     ASSERT_TRUE(load("loadControllers: [Good]\nGood: {libPath: libgood.so}\n").ok());
     std::promise<void> hangs;
@@ -394,7 +394,7 @@ TEST_F(HarmfulLibraries, CutShortIsRefused) {
   }
 }
 
-TEST_F(HarmfulLibraries, OverwrittenWhileLoadedRunsAsItWasAndIsLoadedAnew) {
+TEST_F(HarmfulLibraries, OverwrittenWhileLoadedKeepsRunningAndCanBeReloaded) {
   within20s([this] {
     build("good");
     fail(loadIt().text());

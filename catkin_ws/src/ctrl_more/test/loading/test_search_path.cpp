@@ -1,4 +1,4 @@
-// Where files and libraries are looked for, and in which order.
+// Search places of files and libraries, and their order.
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -11,7 +11,7 @@ namespace fs = std::filesystem;
 namespace ctrl_more {
 namespace {
 
-// Folders of its own, and variables of the environment that are as before afterwards.
+// Temporary folders, and environment variables that are restored afterwards.
 struct SearchPaths : ::testing::Test {
   fs::path root = fs::path(::testing::TempDir()) / "ctrl_more_search_path";
   std::vector<std::pair<std::string, std::string>> before;

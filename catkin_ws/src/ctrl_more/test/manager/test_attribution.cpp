@@ -3,7 +3,7 @@
 namespace ctrl_more {
 namespace {
 
-TEST(AttributionTest, AttributionNamesWhoChangedWhatByHowMuch) {
+TEST(AttributionTest, AttributionContainsControllerSignalAndChange) {
   Rig rig;
   rig.add(adder("pose", "ee", 1.0), "a");
   rig.add(adder("pose", "ee", -0.25), "b");
@@ -28,7 +28,7 @@ TEST(AttributionTest, AttributionNamesWhoChangedWhatByHowMuch) {
   EXPECT_NEAR(list[2].angle, 0.3, 1e-12);
 }
 
-TEST(AttributionTest, AttributionIsOfTheLastCycleHoweverOftenItIsAsked) {
+TEST(AttributionTest, RepeatedAttributionIsThatOfTheLastCycle) {
   Rig rig;
   double amount = 0.0;
   auto c = adder("pose", "ee", 0.0);

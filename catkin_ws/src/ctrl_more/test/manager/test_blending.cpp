@@ -68,7 +68,7 @@ TEST_F(Blending, PausedPoseHoldsItsDifferenceAndPausedVelocityFades) {
   EXPECT_EQ(rig.twist()[0], 1.0);
 }
 
-TEST_F(Blending, DisablingAHeldOneLetsItGo) {
+TEST_F(Blending, DisablingReleasesAHeldCorrection) {
   rig.manager->enable();
   rig.step(30);
   rig.manager->pause();
@@ -78,7 +78,7 @@ TEST_F(Blending, DisablingAHeldOneLetsItGo) {
   EXPECT_EQ(rig.pose()[0], 0.0);
 }
 
-TEST_F(Blending, ChangingOneMindInTheMiddleIsBumpless) {
+TEST_F(Blending, ReversingDuringABlendIsBumpless) {
   std::mt19937 random(7);
   rig.step();
   for (int i = 0; i < 300; ++i) {

@@ -85,7 +85,7 @@ TEST_F(BySignal, ProfilesEnableExactlyTheirControllersAtOneBoundary) {
   EXPECT_EQ(rig.manager->getProfiles().size(), 3u);
 }
 
-TEST_F(BySignal, MotionSwitchResetsWhoWantsIt) {
+TEST_F(BySignal, MotionSwitchResetsControllersWithResetPolicy) {
   rig.step();
   const int before = force->resets;
   const int held = limits->resets;
@@ -114,7 +114,7 @@ TEST_F(BySignal, KeyAndFullNameAreTheSameReason) {
   }
 }
 
-TEST_F(BySignal, SafetyControllersAreLeftAloneHoweverTheyAreMeant) {
+TEST_F(BySignal, SafetyControllersAreSkippedInEveryFormOfRequest) {
   using Kind = Change::Kind;
   using Who = Change::Who;
   const std::vector<std::function<Status()>> ways = {
@@ -151,7 +151,7 @@ TEST_F(BySignal, ReasonsHaveAName) {
   EXPECT_TRUE(rig.manager->apply(Change().pause("force", "faulty")));
 }
 
-TEST_F(BySignal, AppliedProfilesAreSwitchesOfMotionUnlessSaidOtherwise) {
+TEST_F(BySignal, AppliedProfilesCountAsMotionSwitchesByDefault) {
   ASSERT_TRUE(rig.manager->setProfile("all", {"force", "vision", "limits"}));
   rig.step();
   const int before = force->resets;

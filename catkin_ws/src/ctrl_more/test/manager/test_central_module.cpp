@@ -94,7 +94,7 @@ TEST_F(CentralModuleTest, UserCodeOfThePaper) {
   EXPECT_LT((pelvis - expOf(expected).toRotationMatrix()).norm(), 1e-12);
 }
 
-TEST_F(CentralModuleTest, ExampleProgramSaysTheSame) {
+TEST_F(CentralModuleTest, ExampleProgramPrintsTheSame) {
   ASSERT_EQ(access(CTRL_MORE_EXAMPLE, X_OK), 0) << "build " CTRL_MORE_EXAMPLE ", which is tested";
   const std::string command =
       CTRL_MORE_EXAMPLE " " CTRL_MORE_SOURCE_DIR "/examples/central.yaml 2>/dev/null";
@@ -134,7 +134,7 @@ TEST_F(CentralModuleTest, StatesThatDoNotFitAreRefused) {
   EXPECT_FALSE(module.update(RobotStates(&logger), &six));
 }
 
-/// Writes down the cycles it is given.
+/// Records its cycles.
 struct Watcher : Manager {
   std::string name_ = "watcher";
   std::vector<Cycle>* cycles;

@@ -114,7 +114,7 @@ TEST(FeedbackControllerTest, InitializeIsCalledOnceAndMayRefuse) {
   EXPECT_FALSE(rig.manager->has("b"));
 }
 
-TEST(FeedbackControllerTest, AskingForWhatIsNotDeclaredIsRefused) {
+TEST(FeedbackControllerTest, RequestingAnUndeclaredSignalIsRefused) {
   Rig rig;
   for (int what = 0; what < 5; ++what) {
     auto c = adder("pose", "ee", 0.1);
@@ -238,7 +238,7 @@ constexpr bool kShifts<T, std::void_t<decltype(std::declval<T&>() << 1.0)>> = tr
 template <typename T>
 constexpr bool kLvalue = (std::decay_t<T>::Flags & Eigen::LvalueBit) != 0;
 
-/// What Eigen would write without looking at sizes is not there, or is constant.
+/// Eigen's unchecked ways of writing do not compile or have no effect.
 TEST(Handles, NothingElseOfEigenWrites) {
   using Three = Numbers<3>;
   static_assert(kShifts<Eigen::Vector3d> && !kShifts<Three> && !kShifts<Numbers<>>);

@@ -5,7 +5,7 @@
 namespace ctrl_more {
 namespace {
 
-// a adds 1, bad does what the test says, z adds 10: whatever bad does, a and z must count.
+// a adds 1, bad runs the test's function, z adds 10. a and z must work for every fault of bad.
 struct Isolation : ::testing::Test {
   Rig rig;
   TestController* bad = nullptr;
@@ -61,7 +61,7 @@ TEST_F(Isolation, Exception) {
   expectFault(FaultKind::Exception, "sensor gone");
 }
 
-TEST_F(Isolation, ExceptionThatIsNone) {
+TEST_F(Isolation, ExceptionNotDerivedFromStdException) {
   build([](TestController&, ModifiedControlStates&) { throw 42; });
   expectFault(FaultKind::Exception, "not a std::exception");
 }
@@ -93,7 +93,7 @@ TEST_F(Isolation, EmptyPermission) {
   expectFault(FaultKind::Exception, "permission");
 }
 
-TEST_F(Isolation, SomeoneElsesPermission) {
+TEST_F(Isolation, PermissionOfAnotherController) {
   TestController* other = rig.add(adder("joint", "Velocity", 0.0), "other");
   build([other](TestController&, ModifiedControlStates& m) { m[other->out][0] = 9.0; });
   expectFault(FaultKind::Exception, "permission");
@@ -160,7 +160,7 @@ const Spoilt kSignals[] = {{ControlContainer::TaskSpaceReferencePose, "ee", 7, t
                            {ControlContainer::JointSpaceReference, "Velocity", 7, false},
                            {ControlContainer::OtherReference, "samples", 11, false}};
 
-// What a controller that spoils one number is faulted for.
+// Kind of fault of a controller that damages one number.
 FaultKind spoil(const Spoilt& signal, int index, double value, bool first_is_good = false) {
   Rig rig(0.0, false, false);  // as on a robot: not in the test mode
   rig.control.declare(ControlContainer::OtherReference, "samples", 11, "1", "none");

@@ -97,8 +97,9 @@ TEST(LettingGoTest, CorrectionOfAPauseFadesWhenItResumesWithoutItsSensor) {
   }
 }
 
-// For a host whose arm is told to stop: it must stand, whatever a controller or a pause would hold.
-TEST(LettingGoTest, AHostThatLetsGoHasNoCorrectionAndThenANewOne) {
+// For a host that stops its arm: the arm must stand, even if a controller or a pause holds a
+// correction.
+TEST(LettingGoTest, LetGoRemovesCorrectionsAndThenBlendsInNewOnes) {
   Rig rig(0.1);
   TestController* raw = rig.add(adder("pose", "ee", 1.0), "c");
   rig.add(adder("vel", "ee", 1.0), "paused");
@@ -205,7 +206,7 @@ TEST_F(Waiting, OtherRequestsDoNotProlongTheFade) {
   EXPECT_EQ(rig.manager->status("c").activity, Activity::Waiting) << "for as long as it takes";
 }
 
-TEST_F(Waiting, PausedMeanwhileItEndsOff) {
+TEST_F(Waiting, PausedWhileWaitingItEndsOff) {
   rig.manager->pause("c");
   rig.step();
   EXPECT_EQ(rig.manager->status("c").activity, Activity::Stopping);

@@ -1,4 +1,4 @@
-// Where the declared bounds of a correction begin, and for which signals they hold.
+// Exact limits of the declared bounds of a correction, and the signals to which they apply.
 #include "test_support.hpp"
 
 namespace ctrl_more {
@@ -55,7 +55,7 @@ TEST_F(TwoSignals, AfterAPauseTheRateIsNotJudgedOnce) {
   EXPECT_EQ(faultAfter(5.0), FaultKind::CorrectionRate);
 }
 
-// What is only read is neither attributed nor open to writes behind the back.
+// A signal that is only read has no attribution and cannot be written.
 TEST(Limits, ReadSignalsAreNotTheControllersOwn) {
   Rig rig;
   bool behind = false;

@@ -5,7 +5,7 @@ namespace {
 
 using Names = std::vector<std::string>;
 
-// A controller that writes down in which order it runs.
+// A controller that records its place in the execution order.
 std::unique_ptr<TestController> recorder(std::vector<std::string>* log) {
   auto c = adder("pose", "ee", 0.0);
   c->on_write = [log](TestController& self, ModifiedControlStates&) {
@@ -180,7 +180,7 @@ TEST(ManagerTest, WithoutAClockCyclesAreCountedAndTimeIsThatOfTheStates) {
   EXPECT_EQ(rig.manager->lastCycle().cycle, 3u);
 }
 
-TEST(ManagerTest, StatesOfAnotherLayoutAreNotTouchedAndSaidSo) {
+TEST(ManagerTest, StatesOfAnotherLayoutAreUnchangedAndReported) {
   Rig rig;
   auto sink = std::make_shared<ListSink>();
   rig.logger.addSink(sink);

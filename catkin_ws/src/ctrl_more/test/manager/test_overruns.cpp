@@ -5,7 +5,7 @@
 namespace ctrl_more {
 namespace {
 
-// Slow when told so; the clock is the real one, so only "much too slow" is asked for.
+// Slow on request. The clock is real, so the test uses only "much too slow".
 std::unique_ptr<TestController> slow(const bool* now) {
   auto c = adder("pose", "ee", 0.0);
   c->on_update = [now](TestController& self, const Cycle& cycle, const RobotStates&,

@@ -1,4 +1,4 @@
-// Every request happens as a whole or not at all, wherever memory runs out and whatever is thrown.
+// Every request succeeds completely or changes nothing, at each point where memory can run out.
 #include <cstdlib>
 #include <new>
 #include <sstream>
@@ -55,7 +55,7 @@ struct Crowd : Rig {
     return add(std::move(controller), name, enabled);
   }
 
-  // All that can be asked, and what a cycle does.
+  // All queries, and the effect of a cycle.
   std::string everything() {
     std::ostringstream text;
     for (const std::string& name : manager->getControllersNames()) text << name << ' ';
@@ -77,8 +77,8 @@ struct Crowd : Rig {
 
 using Request = std::function<bool(Crowd&)>;
 
-// Runs a request with each of its allocations failing in turn. What failed must have changed
-// nothing, the cycle goes on, and the same request works afterwards.
+// Runs a request with each of its allocations failing in turn. A failed request must change
+// nothing; the cycle continues, and the same request works afterwards.
 void failAtEachAllocation(const std::string& what, bool frozen, const Request& prepare,
                           const Request& request) {
   std::string wanted;

@@ -1,6 +1,6 @@
 #include "plugin.hpp"
 
-// Registers a name that good.cpp registers too.
+// Registers the same name as good.cpp.
 class Again : public ctrl_more_test::Plugin {
  public:
   Again() : Plugin("Good") {}

@@ -1,6 +1,6 @@
 #include "plugin.hpp"
 
-// Says that it was compiled for other headers.
+// Reports other headers than the program's.
 namespace {
 
 class OtherAbi : public ctrl_more_test::Plugin {

@@ -4,7 +4,7 @@
 
 namespace ctrl_more_test {
 
-/// The least a plug-in can be.
+/// A minimal plug-in.
 class Plugin : public ctrl_more::FeedbackController {
  public:
   explicit Plugin(std::string type) : type_(std::move(type)) {}

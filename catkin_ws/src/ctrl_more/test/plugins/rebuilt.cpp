@@ -1,6 +1,6 @@
 #include "plugin.hpp"
 
-// What the author of Good built next.
+// A later build of Good.
 class Rebuilt : public ctrl_more_test::Plugin {
  public:
   Rebuilt() : Plugin("Good") {}

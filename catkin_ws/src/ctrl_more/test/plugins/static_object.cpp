@@ -7,7 +7,7 @@
 
 #include "plugin.hpp"
 
-// Does what CTRL_MORE_TEST_FAULT says: in the constructor of a static object, or in describe().
+// Makes the fault of CTRL_MORE_TEST_FAULT in the constructor of a static object or in describe().
 static void fault(const std::string& where) {
   const char* const wanted = std::getenv("CTRL_MORE_TEST_FAULT");
   const std::string what = wanted ? wanted : "";

@@ -2,8 +2,8 @@
 
 #include "plugin.hpp"
 
-// Controllers that throw what only this library knows, at each place where a manager calls them
-// before they run.
+// Controllers that throw an exception class of this library, at each place where a manager calls
+// them before they run.
 namespace {
 
 // Its vtable, and so its text, is gone once the library is.

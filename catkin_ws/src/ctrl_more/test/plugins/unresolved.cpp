@@ -1,6 +1,6 @@
 #include "plugin.hpp"
 
-// Needs a function that nobody has.
+// Needs a function that does not exist.
 void missingFunction();
 class Unresolved : public ctrl_more_test::Plugin {
  public:

@@ -1,5 +1,5 @@
-// Counts what a control cycle must not do, by standing before the C library: the functions here
-// are found before those of libc and libpthread, count, and pass on.
+// Counts calls that a control cycle must not make. These functions replace those of libc and
+// libpthread: they count, then call the original.
 #include "forbidden_calls.hpp"
 
 #include <dlfcn.h>

@@ -4,7 +4,7 @@
 
 namespace forbidden {
 
-/// What this thread did since start(): allocations, locks, and calls that enter the kernel.
+/// Counts of this thread since start(): allocations, locks, and calls that enter the kernel.
 struct Counts {
   std::uint64_t allocations = 0;
   std::uint64_t locks = 0;
@@ -14,7 +14,7 @@ struct Counts {
 
 /// Starts counting in this thread.
 void start();
-/// Stops counting in this thread and returns what was counted.
+/// Stops counting in this thread and returns the counts.
 Counts stop();
 
 }  // namespace forbidden

@@ -1,5 +1,5 @@
 // The control cycle neither allocates nor locks nor enters the kernel: 10^5 free-running cycles
-// with 100 controllers, while another thread publishes plans, reorders, reloads gains and asks.
+// with 100 controllers, while another thread publishes plans, reorders, reloads gains and queries.
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -57,7 +57,7 @@ std::unique_ptr<TestController> typical(std::atomic<bool>* throw_now) {
   return c;
 }
 
-// What another thread asks for while the cycles run.
+// Requests of another thread while the cycles run.
 Status change(FeedbackControllersManager& manager, int kind, const std::string& name,
               const std::string& gains, std::mt19937& random) {
   switch (kind) {
@@ -83,7 +83,7 @@ Status change(FeedbackControllersManager& manager, int kind, const std::string& 
   }
 }
 
-// Cycles as fast as they go; what was forbidden among it all.
+// Runs cycles as fast as possible. Returns the counts of forbidden calls.
 forbidden::Counts cycleWhile(const std::atomic<bool>& run, std::atomic<std::uint64_t>& cycles,
                              Rig& rig) {
   const RobotSignal imu = rig.robot.find(RobotSource::Measured, "imu");
@@ -165,8 +165,8 @@ TEST(Realtime, NothingForbiddenIn100000CyclesWith10000PlanChanges) {
   EXPECT_GE(faults, 1u) << "a fault was among them";
 }
 
-// The kernel's own word: in strict seccomp mode any system call but read, write and exit kills
-// the process. So does reading the clock, which strict mode forbids too: not timed, no records.
+// Check by the kernel: in strict seccomp mode any system call except read, write and exit kills the
+// process. Reading the clock is forbidden too, so the cycles are not timed and log no records.
 TEST(Realtime, CyclesRunWhereSystemCallsKill) {
   Rig rig(0.05, false, true);
   rig.logger.setLevel(LogLevel::Error);

@@ -11,7 +11,7 @@ struct ControlStatesTest : ::testing::Test {
   Eigen::VectorXd pose = vectorOf({1, 2, 3, 0, 0, 0, 1});
 };
 
-TEST_F(ControlStatesTest, EveryContainerGoesRound) {
+TEST_F(ControlStatesTest, EveryContainerReturnsItsValues) {
   const Eigen::VectorXd six = vectorOf({1, 2, 3, 4, 5, 6});
   const Eigen::VectorXd seven = vectorOf({1, 2, 3, 4, 5, 6, 7});
   const Eigen::Vector3d three(1, 2, 3);
@@ -51,7 +51,7 @@ TEST_F(ControlStatesTest, EveryContainerGoesRound) {
   EXPECT_EQ(out3, three);
 }
 
-TEST_F(ControlStatesTest, MissingKeyIsFalseAndLeavesTheOutputAlone) {
+TEST_F(ControlStatesTest, MissingKeyIsFalseAndTheOutputStays) {
   Eigen::VectorXd out = vectorOf({5});
   EXPECT_FALSE(control.getTaskSpaceReferencePose("ee", out));
   EXPECT_FALSE(control.getTaskSpaceReferenceVel("ee", out));

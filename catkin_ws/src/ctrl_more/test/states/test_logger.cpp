@@ -102,7 +102,7 @@ std::vector<std::string> linesOf(Logger& logger) {
   return sink->lines;
 }
 
-TEST(LoggerTest, NumbersGoWhereTheTextSaysSo) {
+TEST(LoggerTest, NumbersReplaceTheirPlaceholders) {
   Logger logger;
   const LogSource source(&logger, "a");
   source.write(LogLevel::Info, "", 0, "{} {} {} {}", 1, 2.5, -3, 1e9);

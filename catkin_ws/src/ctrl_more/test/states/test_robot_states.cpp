@@ -27,7 +27,7 @@ TEST_F(RobotStatesTest, KeepsDataAndStampOfBothMaps) {
   EXPECT_EQ(robot.newestStamp(), 43);
 }
 
-TEST_F(RobotStatesTest, WrongSizeIsRefusedAndNamesKeyExpectedGotAndWho) {
+TEST_F(RobotStatesTest, WrongSizeIsRefusedWithKeySizesAndCaller) {
   robot.setMeasuredData("imu", vectorOf({1, 2, 3, 4, 5, 6, 7, 8, 9}), 0);
   const Status status = robot.setMeasuredData("imu", vectorOf({1, 2, 3}), 1, "driver");
   ASSERT_FALSE(status);
@@ -41,7 +41,7 @@ TEST_F(RobotStatesTest, WrongSizeIsRefusedAndNamesKeyExpectedGotAndWho) {
   EXPECT_TRUE(sink->contains("WARN"));
 }
 
-TEST_F(RobotStatesTest, MissingKeyIsAnErrorAndLeavesTheValueAlone) {
+TEST_F(RobotStatesTest, MissingKeyIsAnErrorAndTheValueStays) {
   robot.setMeasuredData("imu", vectorOf({1}), 0);
   Eigen::VectorXd value = vectorOf({7, 7});
   std::int64_t stamp = 5;

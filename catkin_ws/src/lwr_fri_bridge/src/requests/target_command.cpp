@@ -38,7 +38,7 @@ std::string sorted(const TargetMessage& message, Vector7& velocity) {
 
 std::string wrongStamp(const TargetMessage& message, const TargetPermission& permission) {
   if (!message.stamped) {
-    return "header.stamp is zero; stamp each message with the time it was made (rostopic pub -s "
+    return "header.stamp is zero; stamp each message with its creation time (rostopic pub -s "
            "with 'header: auto')";
   }
   if (message.age_ns > permission.longest_ns) {
@@ -47,7 +47,7 @@ std::string wrongStamp(const TargetMessage& message, const TargetPermission& per
            "computers synchronised?";
   }
   if (message.age_ns < -kFutureAllowance_ns) {
-    return "stamped " + seconds(-message.age_ns) + " ahead of this computer's clock, at most " +
+    return "stamped " + seconds(-message.age_ns) + " ahead of this computer's clock; at most " +
            seconds(kFutureAllowance_ns) +
            " is taken; are the clocks of both computers synchronised?";
   }
@@ -72,7 +72,7 @@ TargetVerdict judgeTarget(const TargetMessage& message, const TargetPermission& 
   verdict.command.motion_epoch = permission.epoch;
   if (message.epoch.empty()) {
     if (verdict.command.stamp_ns < permission.since_ns)
-      return refuse(TargetFault::Epoch, "made before motion was allowed; ask for the motion anew");
+      return refuse(TargetFault::Epoch, "made before motion was allowed; request the motion again");
     return verdict;
   }
   std::uint32_t epoch = 0;
@@ -85,7 +85,7 @@ TargetVerdict judgeTarget(const TargetMessage& message, const TargetPermission& 
   if (epoch != permission.epoch) {
     return refuse(TargetFault::Epoch, "made in motion_epoch " + message.epoch + ", now it is " +
                                           std::to_string(permission.epoch) +
-                                          "; ask for the motion anew");
+                                          "; request the motion again");
   }
   return verdict;
 }

@@ -37,9 +37,9 @@ std::string describe(const CommandModeLoss& loss) {
     case LossCause::PowerLost:
       return "the drives lost their power (enabling switch, emergency stop)";
     case LossCause::BeganAnew:
-      return "the robot controller began anew";
+      return "the robot controller restarted";
     case LossCause::LeftByController:
-      return "the robot controller left command mode by itself; its messages say why";
+      return "the robot controller left command mode by itself; read its messages on the pendant";
   }
   return {};
 }

@@ -62,7 +62,7 @@ TEST(Bridge, AnswersWithHeaderAndFlags) {
 TEST(Bridge, FollowsVelocitiesAfterStartOnly) {
   Cell cell;
   cell.run(3);
-  cell.robot.state = fri::FriState::Command;  // nobody asked
+  cell.robot.state = fri::FriState::Command;  // without a request
   const Vector7 before = cell.robot.setPoint();
   cell.runDriven(100, Vector7::Constant(0.2));
   EXPECT_TRUE(cell.robot.setPoint().isApprox(before, 1e-6));
@@ -98,7 +98,7 @@ TEST(Bridge, HoldBrakesLatchesAndNeedsReset) {
   EXPECT_NEAR(cell.bridge.snapshot().sample.commanded_velocity[0], 0.5, 1e-9);
 }
 
-TEST(Bridge, CommandsBeforeThePermissionDoNotCount) {
+TEST(Bridge, CommandsBeforeThePermissionAreIgnored) {
   Cell cell;
   cell.run(3);
   RobotSample sample;
@@ -111,7 +111,7 @@ TEST(Bridge, CommandsBeforeThePermissionDoNotCount) {
   EXPECT_GE(cell.bridge.snapshot().counters.commands_old_epoch, 1U);
 }
 
-TEST(Bridge, StopBrakesThenAsksForMonitorMode) {
+TEST(Bridge, StopBrakesThenRequestsMonitorMode) {
   Cell cell;
   cell.start();
   const Vector7 velocity = Vector7::Constant(1.0);

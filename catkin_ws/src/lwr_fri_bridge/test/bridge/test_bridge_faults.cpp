@@ -1,5 +1,4 @@
-/// Datagrams that cannot be true, power, quality and drive errors, and what the bridge sees of
-/// losses.
+/// Implausible datagrams; power, quality and drive errors; observed losses.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -13,7 +12,7 @@ using test::Cell;
 using test::drive;
 using test::runEvent;
 
-/// One cycle whose measurement is changed on the way; whether it was answered.
+/// One cycle with a modified measurement. Returns true if it was answered.
 template <typename Change>
 bool cycleWith(Cell& cell, Change change) {
   fri::MeasurementDatagram m = cell.robot.measure();
@@ -45,9 +44,9 @@ TEST(BridgeFaults, AMeasuredPositionTheArmCannotHaveReachedIsRefused) {
   }
 }
 
-/// What we sent is known, so a set-point that cannot follow from it is no true one, after a loss
-/// either.
-TEST(BridgeFaults, ASetPointThatCannotFollowFromWhatWasSentIsRefused) {
+/// The sent answers are known, so a set-point that cannot follow from them is false, also after a
+/// loss.
+TEST(BridgeFaults, ASetPointThatDoesNotFollowFromTheAnswersIsRefused) {
   for (const bool after_a_loss : {false, true}) {
     for (const float shift : {0.02F, -0.02F, 0.002F, -0.002F}) {
       Cell cell(0.001);
@@ -82,8 +81,8 @@ TEST(BridgeFaults, HigherBitsOfPowerAreNotDrives) {
   EXPECT_EQ(cell.bridge.snapshot().sample.block, MotionBlock::NoPower);
 }
 
-/// Quality UNACCEPTABLE or a drive error with full power: brakes, says why and what to do, also
-/// after it has gone, and needs a start.
+/// Quality UNACCEPTABLE or a drive error with full power: the arm brakes. The reason and the remedy
+/// stay, also after the cause has ended, until a start.
 TEST(BridgeFaults, PoorQualityAndDriveErrorsStopTheMotion) {
   for (const MotionBlock expected : {MotionBlock::PoorQuality, MotionBlock::DriveError}) {
     Cell cell;
@@ -119,7 +118,7 @@ TEST(BridgeFaults, PoorQualityAndDriveErrorsStopTheMotion) {
   }
 }
 
-/// Hold and reset that arrive together: the motion that ran has ended, the arm has stood.
+/// Hold and reset that arrive together: the running motion ends, and the arm comes to rest.
 TEST(BridgeFaults, AHoldBrakesEvenIfItIsResetAtOnce) {
   Cell cell;
   cell.start();

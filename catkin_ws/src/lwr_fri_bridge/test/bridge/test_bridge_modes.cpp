@@ -30,8 +30,8 @@ TEST(Bridge, StrategyChangesInMonitorModeOnly) {
   EXPECT_EQ(cell.robot.answer.flags, 0x0035U);
 }
 
-/// Flags of the answer stay those of the entry, whatever is asked for in command mode.
-TEST(Bridge, FlagsStayInCommandModeWhateverIsAsked) {
+/// Flags of the answer stay those of the entry for every request in command mode.
+TEST(Bridge, FlagsStayInCommandModeForEveryRequest) {
   for (const char* mode : {"position", "joint_impedance", "cartesian_impedance"}) {
     Cell cell;
     cell.run(2);
@@ -96,7 +96,7 @@ TEST(Bridge, EveryStrategyFollows) {
   }
 }
 
-/// A person leads the arm; at the end of the mode nothing may pull it back.
+/// A person guides the arm. At the end of the mode nothing may pull it back.
 TEST(Bridge, SetPointFollowsAnArmThatIsLedByHand) {
   Cell cell;
   cell.run(2);
@@ -138,9 +138,8 @@ TEST(Bridge, RefusesLimitsOutOfRangeByName) {
   }
 }
 
-/// Who plans motions keeps the margin of the table: a bridge that kept more would stop what was
-/// accepted.
-TEST(Bridge, KeepsNoWiderMarginThanTheTableSays) {
+/// Planners keep the margin of the table. A bridge with a wider margin would stop accepted motions.
+TEST(Bridge, KeepsNoWiderMarginThanTheTable) {
   BridgeConfig config = defaultConfig();
   for (const double margin : {config.limits.position_margin, 0.5 * config.limits.position_margin}) {
     config.position_margin = margin;

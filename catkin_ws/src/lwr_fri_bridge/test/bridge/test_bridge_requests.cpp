@@ -1,4 +1,4 @@
-/// Requests to the bridge, and what it shows of itself to other threads.
+/// Requests to the bridge, and its state for other threads.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -54,7 +54,7 @@ TEST(Requests, TheFirstOfAFullQueueAreServed) {
     EXPECT_EQ(bridge.outcome(ticket).code, OutcomeCode::Done) << ticket;
 }
 
-/// The arm has three seconds to come to rest, then monitor mode is asked for all the same.
+/// The arm has three seconds to come to rest; then monitor mode is requested anyway.
 TEST(Requests, AStopDoesNotWaitForRestForever) {
   BridgeConfig config = defaultConfig();
   config.limits.acceleration.setConstant(0.05);
@@ -71,7 +71,7 @@ TEST(Requests, AStopDoesNotWaitForRestForever) {
 }
 
 /// Silence counts from the last datagram: 0.25 s, or five cycles where they are longer.
-TEST(Requests, SilenceIsToldAfterItsTimeLimit) {
+TEST(Requests, SilenceIsReportedAfterItsTimeLimit) {
   for (const double period : {0.005, 0.1}) {
     Cell cell(period);
     cell.run(3);
@@ -102,7 +102,7 @@ std::vector<StateView> toldBy(Bridge& bridge) {
   return told;
 }
 
-TEST(BridgeView, StatesAreToldOnceEachFromTheBeginningOn) {
+TEST(BridgeView, EachStateIsReportedOnceFromTheStart) {
   Cell cell;
   std::vector<StateView> told = toldBy(cell.bridge);
   ASSERT_EQ(told.size(), 1U);
@@ -126,9 +126,9 @@ TEST(BridgeView, StatesAreToldOnceEachFromTheBeginningOn) {
   EXPECT_EQ(told[0].supervisor, SupervisorState::Holding);
 }
 
-/// A bridge that meets a controller in command mode speaks its strategy, for the flags may not
-/// change there.
-TEST(BridgeView, TheFlagsOfACommandModeThatWasFoundAreItsStrategys) {
+/// A bridge that starts with a controller in command mode uses the controller's strategy, because
+/// the flags may not change there.
+TEST(BridgeView, AnExistingCommandModeGetsTheFlagsOfItsStrategy) {
   for (const auto& [control, flags] :
        {std::pair{fri::ControlStrategy::JointImpedance, 0x0035U},
         std::pair{fri::ControlStrategy::CartesianImpedance, 0x3500U}}) {
@@ -151,7 +151,7 @@ TEST(BridgeView, TheFlagsOfACommandModeThatWasFoundAreItsStrategys) {
 }
 
 /// Age of a command on both sides of its limit, and at long periods of two and a half cycles.
-TEST(BridgeView, ACommandOfTheFutureOrOfLongPeriodsCountsWithinItsLimit) {
+TEST(BridgeView, CommandAgeLimitsForFutureStampsAndLongPeriods) {
   const auto follows = [](double period, double age) {
     Cell cell(period);
     cell.start();
@@ -173,7 +173,7 @@ TEST(BridgeView, ACommandOfTheFutureOrOfLongPeriodsCountsWithinItsLimit) {
   EXPECT_FALSE(follows(0.1, 0.251));
 }
 
-/// Quality and drive errors leave command mode in force: no cause of a loss is told for them.
+/// Quality and drive errors do not end command mode, so they report no cause of a loss.
 TEST(BridgeView, PoorQualityIsNoLossOfCommandMode) {
   Cell cell;
   cell.start();

@@ -1,5 +1,5 @@
-/// Why command mode was lost, and when it may be entered again without asking: bridge and small
-/// controller in lockstep, the restart as BridgeRos drives it.
+/// Causes of a loss of command mode, and automatic restarts: bridge and small controller in
+/// lockstep, with the restart logic of BridgeRos.
 #include <gtest/gtest.h>
 
 #include "bridge_cell.hpp"
@@ -12,11 +12,11 @@ using test::Cell;
 
 constexpr double kPeriod = 0.005;
 
-/// The bridge, and above it what decides about a restart.
+/// The bridge, and the decision about a restart.
 struct Watched : Cell {
   Watched() : Cell(kPeriod) { bridge.setControllerHere(true); }
 
-  /// Cycles with the restart's eyes open. Returns how often it asked for a start.
+  /// Runs cycles with the restart logic. Returns the number of requested starts.
   int watch(int cycles) {
     int asked = 0;
     for (int i = 0; i < cycles; ++i) {

@@ -16,7 +16,7 @@ using test::runEvent;
 
 /// A sample of the campaign that bench/loss_campaign.cpp runs in whole; with COGLAB_LONG more of
 /// it.
-TEST(Losses, NoSetPointLeavesItsBoundsWhateverIsLost) {
+TEST(Losses, NoSetPointLeavesItsBoundsUnderAnyLoss) {
   const unsigned seeds = std::getenv("COGLAB_LONG") != nullptr ? 200 : 2;
   for (const double period : {0.001, 0.002, 0.005, 0.010, 0.020}) {
     for (const double share : {0.0, 0.01, 0.05, 0.10}) {
@@ -62,9 +62,9 @@ TEST(Losses, TheWorstPatternOfTheBudgetKeepsTheBounds) {
   }
 }
 
-/// Braking goes on where the answer that the controller saw last has left it: the losses cost their
-/// own way and nothing more.
-TEST(Losses, BrakingDoesNotBeginAnewAfterALoss) {
+/// Braking continues from the last answer that the controller received. Losses add only their own
+/// displacement.
+TEST(Losses, BrakingDoesNotRestartAfterALoss) {
   for (const double period : {0.001, 0.005, 0.020}) {
     double angle[2];
     int lost = 0;
@@ -93,8 +93,8 @@ TEST(Losses, BrakingDoesNotBeginAnewAfterALoss) {
   }
 }
 
-/// Where the controller stood, the set-point starts from rest; where it went on, at its speed.
-TEST(Losses, AfterAGapTheSetPointGoesOnAsTheControllerDid) {
+/// If the controller stood, the set-point starts from rest; if it continued, at its speed.
+TEST(Losses, AfterAGapTheSetPointContinuesThatOfTheController) {
   for (const bool extrapolates : {true, false}) {
     for (const int gap : {1, 2, 5}) {
       for (const bool measurements : {false, true}) {
@@ -119,9 +119,9 @@ TEST(Losses, AfterAGapTheSetPointGoesOnAsTheControllerDid) {
   }
 }
 
-/// In Cartesian impedance mode the frame tells what the controller did, for the joint set-point
-/// that it reports is the arm's. Joint 1 turns about the vertical, so its angle is the frame's:
-/// what was lost must not add up between them.
+/// In Cartesian impedance mode only the frame shows the controller's set-point, because the
+/// reported joint set-point is that of the arm. Joint 1 turns about the vertical, so its angle
+/// equals that of the frame. Losses must not accumulate a difference between them.
 TEST(Losses, TheCartesianSetPointDoesNotDriftFromTheFrame) {
   Cell cell(0.005);
   cell.run(3);
@@ -142,10 +142,9 @@ TEST(Losses, TheCartesianSetPointDoesNotDriftFromTheFrame) {
   EXPECT_NEAR(commanded, turned, 1e-3);
 }
 
-/// Where the controller has taken the frame by itself in a gap, the next answer goes on from there
-/// and does not leap back onto the way of the answers before. So after lost answers alone, too,
-/// where no measurement is missing.
-TEST(Losses, AfterAGapTheCartesianFrameGoesOnFromTheOneThatIsReported) {
+/// If the controller moved the frame by itself in a gap, the next answer continues from there and
+/// does not jump back to the path of earlier answers. The same holds if only answers were lost.
+TEST(Losses, AfterAGapTheCartesianFrameContinuesTheReportedOne) {
   for (const int gap : {1, 3, 5}) {
     for (const char* const lost : {"measurements", "answers", "either in turn"}) {
       Cell cell(0.005);
@@ -170,8 +169,8 @@ TEST(Losses, AfterAGapTheCartesianFrameGoesOnFromTheOneThatIsReported) {
   }
 }
 
-/// The controller's counter begins anew at full speed: the set-point brakes from what was sent.
-TEST(Losses, ARestartedCounterBrakesFromWhatWasSent) {
+/// The controller's counter restarts at full speed: the set-point brakes from the last answer.
+TEST(Losses, ARestartedCounterBrakesFromTheLastAnswer) {
   for (const double period : {0.005, 0.020}) {
     Cell cell(period);
     cell.robot.moveOwn(Vector7::Constant(-1.0));
@@ -194,7 +193,7 @@ TEST(Losses, ARestartedCounterBrakesFromWhatWasSent) {
   }
 }
 
-/// The controllers' time goes on while measurements are lost.
+/// The controller's time continues while measurements are lost.
 TEST(Losses, TimeCountsTheLostCycles) {
   Cell cell(0.005);
   cell.start();

@@ -1,5 +1,4 @@
-/// What each KRL convention writes and reads, field by field, in every phase and for every
-/// strategy.
+/// Fields that each KRL convention writes and reads, in every phase and for every strategy.
 #include <gtest/gtest.h>
 
 #include <utility>
@@ -113,7 +112,7 @@ TEST(OpenKc, AStartIsTheStrategysCommandAndThenFriStart) {
   }
 }
 
-TEST(OpenKc, AStopIsFriStopAndOtherPhasesAskForNothing) {
+TEST(OpenKc, AStopIsFriStopAndOtherPhasesRequestNothing) {
   using Shown = std::pair<int, int>;
   OpenKc pc;
   pc.request.phase = KrlPhase::Stop;

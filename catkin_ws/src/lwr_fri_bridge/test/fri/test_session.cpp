@@ -98,7 +98,7 @@ TEST(Session, ThePeriodChangesInMonitorModeOnly) {
   EXPECT_EQ(session.counters().implausible, 1U);
 }
 
-/// What is rejected leaves the measurement as it was: state and joints do not leap to zero.
+/// A rejected datagram does not change the measurement: state and joints do not jump to zero.
 TEST(Session, ARejectedDatagramLeavesTheMeasurement) {
   Session session(false);
   SmallController robot(0.005);
@@ -147,7 +147,7 @@ std::size_t badDatagram(std::mt19937& random, const std::deque<Bytes>& past,
                      : 917 + static_cast<std::size_t>(dice(100));
 }
 
-/// A million bad datagrams between good ones while the arm moves: no crash, all counted, no leap in
+/// A million bad datagrams between good ones while the arm moves: no crash, all counted, no jump in
 /// the answers.
 TEST(Session, AMillionBadDatagramsMakeNoLeap) {
   const double period = 0.001;

@@ -1,4 +1,4 @@
-/// The edges of what an FRI session takes for true: periods, angles, leaps, gaps and restarts.
+/// Limits of the plausibility checks of an FRI session: periods, angles, jumps, gaps and restarts.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -10,7 +10,7 @@
 namespace lwr_fri_bridge::fri {
 namespace {
 
-/// A session in which one datagram of monitor mode was taken.
+/// A session that has accepted one datagram in monitor mode.
 struct Line {
   explicit Line(double period, bool lenient = false) : session(lenient), robot(period) {
     m = robot.measure();

@@ -1,4 +1,4 @@
-/// What a controller can have made of the answers that it saw: judged and taken over after a gap.
+/// Set-points that a controller can have after a gap: check and take-over.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -50,7 +50,7 @@ SetPointHistory moved(int joint, double step) {
   return history;
 }
 
-TEST(SetPointHistory, WhatIsNotCommandedIsNotJudged) {
+TEST(SetPointHistory, UncommandedSetPointsAreNotChecked) {
   const SetPointHistory history = moved(0, 0.01);
   const MeasurementDatagram off = reported(unit(0, 1.0));
   ASSERT_FALSE(history.explains(off));

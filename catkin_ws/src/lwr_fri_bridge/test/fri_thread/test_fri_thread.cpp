@@ -112,7 +112,7 @@ TEST_F(FriThreadTest, SilenceIsDisconnection) {
   EXPECT_EQ(outcome.code, OutcomeCode::Disconnected);
 }
 
-/// The receive has a time-out: nobody has to send something to let the thread end.
+/// The receive has a time-out, so the thread can end without a datagram.
 TEST_F(FriThreadTest, StopsAtOnceWithoutDatagrams) {
   std::atomic<bool> stopped{false};
   std::thread stopper([&] {
@@ -124,7 +124,7 @@ TEST_F(FriThreadTest, StopsAtOnceWithoutDatagrams) {
   stopper.join();
 }
 
-TEST_F(FriThreadTest, APortInUseIsSaid) {
+TEST_F(FriThreadTest, APortInUseIsReported) {
   FriThreadOptions same = options();
   same.port = fri.port();
   Bridge other(test::defaultConfig());
@@ -154,7 +154,7 @@ TEST_F(FriThreadTest, ARestartedThreadIsFoundWhereItWas) {
   EXPECT_GT(third.port(), 0);
 }
 
-/// In a process without any right to priority or locked memory: 0 if it warned and answers anyway.
+/// In a process without rights to priority or locked memory: 0 if it warned and still answers.
 int answersWithoutRights() {
   if (geteuid() == 0 && setresuid(65534, 65534, 65534) != 0) return 10;
   rlimit none{0, 0};
@@ -175,7 +175,7 @@ int answersWithoutRights() {
   return peer.receive(c) ? 0 : 14;
 }
 
-TEST(FriThreadRights, WithoutThemItWarnsAndRunsOn) {
+TEST(FriThreadRights, WithoutRightsItWarnsAndContinues) {
   const pid_t child = fork();
   if (child == 0) _exit(answersWithoutRights());
   int status = 0;
@@ -214,8 +214,8 @@ BridgeConfig patient() {
   return config;
 }
 
-/// Of several that wait only the newest is answered: the controller has given up the others.
-TEST(FriThreadRules, TheNewestOfThoseThatWaitIsAnswered) {
+/// Of several waiting datagrams only the newest is answered; the controller gave up the others.
+TEST(FriThreadRules, OnlyTheNewestWaitingDatagramIsAnswered) {
   Bridge bridge(patient());
   std::atomic<bool> held{false}, waits{false};
   std::atomic<int> idle{0};
@@ -250,9 +250,9 @@ TEST(FriThreadRules, TheNewestOfThoseThatWaitIsAnswered) {
   EXPECT_EQ(bridge.snapshot().session.rejected(), 0U);  // they were not even looked at
 }
 
-/// Each of the controller's datagrams that waits behind another is a cycle of lateness; those of
-/// somebody else are none. Four cycles of it are what costs command mode here.
-TEST(FriThreadRules, WhatWaitsForTheThreadIsItsLateness) {
+/// Each waiting datagram of the controller behind another one is a cycle of lateness; those of
+/// other senders are not. Here four cycles of lateness end command mode.
+TEST(FriThreadRules, WaitingDatagramsCountAsLatenessOfTheThread) {
   Bridge bridge(patient());
   std::atomic<bool> held{false}, waits{false};
   std::atomic<int> served{0};

@@ -1,4 +1,4 @@
-/// The leash: a blocked arm stores no leap; when it trips, how it returns, when it lets go.
+/// The leash: a blocked arm stores no jump; conditions to trip, return and release.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -57,8 +57,8 @@ TEST(Leash, RelaxesABlockedArmInEveryMode) {
   }
 }
 
-/// A soft arm sags under what it holds, friction holds it back: no block, it goes on. A stiff one
-/// that lies back as far is blocked.
+/// A soft arm sags under a load, or friction holds it back: this is no block. A stiff arm that lags
+/// as far is blocked.
 TEST(Leash, ASoftArmThatSagsIsNotBlocked) {
   for (const bool soft : {true, false}) {
     Bridge bridge(defaultConfig());
@@ -169,9 +169,9 @@ TEST(LeashEdges, OnlyMotionAwayFromTheArmTrips) {
   }
 }
 
-/// Home is where the arm was at the trip, however it is pushed afterwards; it lets go within 1 mrad
-/// of it when the outward motion is not asked for any more.
-TEST(LeashEdges, LetsGoAtHomeWithoutTheOldRequest) {
+/// Home is the arm's position at the trip, even if it is pushed afterwards. The leash releases
+/// within 1 mrad of it when the outward motion is no longer requested.
+TEST(LeashEdges, ReleasesAtHomeWithoutTheOldRequest) {
   for (const double sign : {-1.0, 1.0}) {
     Tied tied;
     const Vector7 arm = unit(1, -sign * 0.06), outward = unit(1, sign * 0.2);

@@ -56,7 +56,7 @@ TEST(ToolFrame, TheFlangeIsWhereTheJointsCarryIt) {
   }
 }
 
-/// What the joints move moves the frame that the controller reports, whatever tool it has.
+/// Joint motion moves the reported frame of the controller, with any tool.
 TEST(ToolFrame, TheCartesianSetPointCarriesTheReportedFrameAlong) {
   for (unsigned seed = 0; seed < 10; ++seed) {
     const Vector7 from = posture(seed), to = posture(seed + 100);

@@ -1,5 +1,5 @@
-/// The configurator in virtual time: what it asks of the KRL program, when it gives up, and what an
-/// outcome tells.
+/// The configurator in virtual time: its requests to the KRL program, its time limits and its
+/// outcomes.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -14,7 +14,7 @@ using fri::FriState;
 using fri::KrlConvention;
 using fri::Quality;
 
-/// A configurator and what it sees: our own program in monitor mode, quality OK, all drives on.
+/// A configurator and its observations: our own program in monitor mode, quality OK, all drives on.
 struct Desk {
   explicit Desk(KrlConvention convention = KrlConvention::Coglab)
       : configurator(convention, 4, ConfiguratorLimits()) {
@@ -89,7 +89,7 @@ TEST(Configurator, AStartEndsWithCommandModeAndPower) {
   EXPECT_EQ(desk.codeAt(1.3), OutcomeCode::Pending);
 }
 
-TEST(Configurator, CommandModeIsAskedForWithGoodQualityOnly) {
+TEST(Configurator, CommandModeIsRequestedOnlyWithGoodQuality) {
   for (const Quality quality : {Quality::Unacceptable, Quality::Bad}) {
     Desk desk;
     desk.m.quality = static_cast<std::uint16_t>(quality);
@@ -102,7 +102,7 @@ TEST(Configurator, CommandModeIsAskedForWithGoodQualityOnly) {
   }
 }
 
-TEST(Configurator, AStartIsGivenUpAfterItsTimeLimit) {
+TEST(Configurator, AStartIsCancelledAfterItsTimeLimit) {
   Desk desk;
   desk.start();
   desk.at(0.005);
@@ -198,7 +198,7 @@ TEST(Configurator, AStopIsGivenUpAfterItsTimeLimits) {
   desk.stop();
   EXPECT_EQ(desk.codeAt(2.0), OutcomeCode::Pending);
   EXPECT_EQ(desk.codeAt(2.001), OutcomeCode::NotLeft);
-  // Silence: whatever was seen last, nobody knows what the controller does.
+  // Silence: the controller's state is unknown, also if the last one was good.
   for (const FriState state : {FriState::Monitor, FriState::Command}) {
     Desk silent;
     silent.m.state = static_cast<std::uint16_t>(state);
@@ -209,7 +209,7 @@ TEST(Configurator, AStopIsGivenUpAfterItsTimeLimits) {
   }
 }
 
-TEST(Configurator, AFallBackWithdrawsWhatWouldBringCommandModeBack) {
+TEST(Configurator, AFallBackWithdrawsTheRequestForCommandMode) {
   Desk desk(KrlConvention::Stanford);
   desk.start();
   desk.at(0.005);
@@ -258,7 +258,7 @@ TEST(Configurator, TheFlagOfAProgramThatOnlyWorksIsWatchedForHalfASecond) {
   EXPECT_EQ(desk.codeAt(2.0), OutcomeCode::Pending);
 }
 
-/// A program that was asked for a start may be just about to enter command mode.
+/// A program with a start request may be about to enter command mode.
 TEST(Configurator, AStopAfterAnUnfinishedStartWaitsUntilMonitorModeLasts) {
   Desk desk;
   desk.start();

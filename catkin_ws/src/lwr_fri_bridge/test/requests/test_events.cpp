@@ -1,5 +1,4 @@
-/// Events of ros_events and command, outcomes in words, KRL conventions, and what the diagnosis
-/// says.
+/// Events of ros_events and command, messages of outcomes, KRL conventions, and the diagnosis.
 #include <gtest/gtest.h>
 
 #include <stdexcept>

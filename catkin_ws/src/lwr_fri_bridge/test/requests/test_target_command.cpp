@@ -1,4 +1,4 @@
-/// Messages on target_joint_states: what moves the arm, and what age, stamp, epoch and form refuse.
+/// Messages on target_joint_states: valid ones, and refusals by age, stamp, epoch and form.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -24,7 +24,7 @@ struct Message {
   }
 };
 
-TEST(TargetCommand, CarriesTheAgeAndTheEpochOfWhereItWasMade) {
+TEST(TargetCommand, KeepsTheAgeAndEpochOfItsSource) {
   Message m;
   m.epoch = "7";
   const TargetVerdict verdict = m.judge();
@@ -34,8 +34,8 @@ TEST(TargetCommand, CarriesTheAgeAndTheEpochOfWhereItWasMade) {
   EXPECT_DOUBLE_EQ(verdict.command.velocity[6], 0.7);
 }
 
-/// Held and released while the message was on its way: by its epoch, or by its stamp without one.
-TEST(TargetCommand, WhatWasMadeBeforeThePermissionMovesNothing) {
+/// Hold and reset during the transport of a message: detected by its epoch, else by its stamp.
+TEST(TargetCommand, CommandsFromBeforeThePermissionMoveNothing) {
   Message m;
   m.epoch = "6";
   EXPECT_EQ(m.judge().fault, TargetFault::Epoch);
@@ -47,7 +47,7 @@ TEST(TargetCommand, WhatWasMadeBeforeThePermissionMovesNothing) {
   EXPECT_EQ(m.judge(7, kNow - 6 * kMs).fault, TargetFault::None);
 }
 
-TEST(TargetCommand, ExtremeStampsAreRefusedAndSaid) {
+TEST(TargetCommand, ExtremeStampsAreRefusedWithAReason) {
   Message m;
   m.stamped = false;
   EXPECT_EQ(m.judge().fault, TargetFault::Stamp);

@@ -1,4 +1,4 @@
-/// Every reason and outcome that has words has a number too.
+/// Every reason and outcome with a text also has a code.
 #include <gtest/gtest.h>
 
 #include <string>

@@ -1,5 +1,5 @@
-/// The edges of what counts as lateness, loss and rest before command mode is lost, the sentences
-/// of the causes, and when a restart is due, without a bridge around.
+/// Limits of lateness, loss and rest before a loss of command mode, the texts of the causes, and
+/// the conditions of a restart, without a bridge.
 #include <gtest/gtest.h>
 
 #include "lwr_fri_bridge/supervision/command_mode_loss.hpp"
@@ -74,7 +74,7 @@ TEST(CommandModeWatch, RestIsHalfASecondOfCommandedAndMeasuredStandstill) {
   EXPECT_FALSE(watch.judge(leftByItself()).at_rest);  // from the motion on
 }
 
-TEST(CommandModeWatch, WhatIsCertainComesBeforeWhatIsLikely) {
+TEST(CommandModeWatch, CertainCausesComeBeforeLikelyOnes) {
   CommandModeWatch watch;
   watch.late(1.0);
   watch.tick(0.005, 9, 0.0, 0.0);
@@ -91,7 +91,7 @@ TEST(CommandModeWatch, WhatIsCertainComesBeforeWhatIsLikely) {
   EXPECT_EQ(loss.position, facts.position);
 }
 
-/// What a restart sees of an arm that stood when this computer was late, and stands since.
+/// View of an arm that stood when this computer was late, and has stood since.
 QuietRestart::View calm(float lost_at = 10.0F) {
   QuietRestart::View view;
   view.loss.cause = LossCause::ComputerLate;

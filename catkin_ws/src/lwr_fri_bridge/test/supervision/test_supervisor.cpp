@@ -1,5 +1,4 @@
-/// The supervisor alone: which reason counts first, which state is told, and what ends a
-/// permission.
+/// The supervisor alone: order of the reasons, reported state, and end of a permission.
 #include <gtest/gtest.h>
 
 #include "lwr_fri_bridge/supervision/supervisor.hpp"
@@ -23,7 +22,7 @@ struct Started : Supervisor {
   }
 };
 
-/// Of several reasons the one is told that has to go first.
+/// Of several reasons, the one that must be removed first is reported.
 TEST(Supervisor, ReasonsCountInTheirOrder) {
   struct Row {
     MotionBlock block;
@@ -54,8 +53,8 @@ TEST(Supervisor, ReasonsCountInTheirOrder) {
   }
 }
 
-/// What is lost while started needs a start; a leash does not.
-TEST(Supervisor, WhatIsLostNeedsAStartAndIsCounted) {
+/// A loss after the start needs a new start; a leash does not.
+TEST(Supervisor, ALossNeedsAStartAndIsCounted) {
   struct Row {
     bool SupervisorInput::*what;
     bool value;

@@ -4,8 +4,8 @@
 ///     <dmp_library version="1">
 ///       <primitive id="reach_human" description="…">
 ///         <system duration="1.2" alpha="4.605" stiffness="150" damping="24.495"/>
-///         <goal_weight kind="linear"/>                   or kind="sigmoid" centre="0.5"
-///         steepness="10" <shape mapping="similarity"/>                  or "upright", "none"
+///         <goal_weight kind="linear"/>       or kind="sigmoid" centre="0.5" steepness="10"
+///         <shape mapping="similarity"/>      or "upright", "none"
 ///         <start position="0 0 0" velocity="0 0 0"/>
 ///         <goal position="0.5 0 0"/>
 ///         <basis centre="1" width="20.1" weight="0 0 0"/>   2 to kMaxBasis of them

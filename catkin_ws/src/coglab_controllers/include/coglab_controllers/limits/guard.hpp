@@ -17,7 +17,7 @@ struct GuardParameters {
   JointVector acceleration =
       JointVector::Constant(10.0);                  ///< rad/s^2 with which the interpolator brakes
   JointVector jerk = JointVector::Constant(500.0);  ///< rad/s^3 with which the interpolator brakes
-  double position_margin = 0.01;                    ///< rad kept free before a joint's stop
+  double position_margin = 0.01;                    ///< rad, distance kept from a joint's stop
   double hand_speed = 1.0;                          ///< m/s of the tip, what the arm behind its
                                                     ///< servos adds included; 0: no limit
   double elbow_speed = 1.0;                         ///< m/s of the elbow; 0: no limit
@@ -41,7 +41,7 @@ const char* describe(GuardReason reason) noexcept;
 
 /// Result of one cycle.
 struct GuardResult {
-  /// rad/s: `scale` times the request, but for a joint at its stop that asked for next to nothing
+  /// rad/s: `scale` times the request; zero for a joint at its stop with a very small request
   JointVector velocity = JointVector::Zero();
   double scale = 1.0;                      ///< 0..1
   GuardReason reason = GuardReason::None;  ///< of the restriction that bound hardest
@@ -52,24 +52,24 @@ struct GuardResult {
 /// Limits joint velocities. Construction validates and may throw; `limit` neither allocates nor
 /// throws.
 ///
-/// Towards a joint's stop the bound is the speed from which the interpolator can still stop in
-/// front of it, within its acceleration and jerk. A joint beyond its limits may only move back; if
-/// it asks for next to nothing outward (1e-3 of the fastest joint's speed, or 1e-5 rad/s), it alone
-/// is stopped. A restriction that is already violated still allows motion out of it.
+/// Towards a joint's stop the bound is the speed from which the interpolator can still stop before
+/// it, within its acceleration and jerk. A joint beyond its limits may only move back. If its
+/// outward request is very small (1e-3 of the fastest joint's speed, or 1e-5 rad/s), only this
+/// joint is stopped. A restriction that is already violated still allows motion out of it.
 class Guard {
  public:
   /// @throws std::invalid_argument naming joint and parameter.
   Guard(const GuardParameters& parameters, const Chain& chain);
 
   /// @param state kinematics at the measured joints, from the chain given at construction.
-  /// @param q rad; where measured and commanded joints differ, the ones further on their way.
+  /// @param q rad; if measured and commanded joints differ, the ones further along the motion.
   /// @param request rad/s.
   void limit(const ChainState& state, const JointVector& q, const JointVector& request,
              GuardResult& result) const noexcept;
 
-  /// What the robot's interface keeps before joints' stops besides position_margin, so that it cuts
-  /// nothing that was let pass here: the time (s, >= 0) that the arm may go on without hearing of a
-  /// stop, and the rounding of its bound (rad, >= 0). 0 until they are set.
+  /// Distance that the robot's interface keeps from joints' stops besides position_margin. With it
+  /// the interface never cuts a velocity that passed here. lost_time (s, >= 0): the arm may move
+  /// this long after a lost stop command; rounding of its bound (rad, >= 0). Both are 0 until set.
   void setInterfaceReserve(double lost_time, double rounding) noexcept {
     lost_time_ = lost_time;
     rounding_ = rounding;

@@ -4,10 +4,10 @@
 
 namespace coglab_controllers {
 
-/// Turns a speed scale and the scaling that limits would impose into the `rate` of
-/// CartesianMotion::step and of the profile time of a point-to-point motion. The rate rises, and
-/// follows the speed scale, at a bounded speed, so that it never makes a step in velocity; where
-/// limits have slowed the arm already, it falls at once.
+/// Computes the `rate` of CartesianMotion::step, and of the profile time of a point-to-point
+/// motion, from the speed scale and the scaling by limits. The rate rises, and follows the speed
+/// scale, at a bounded speed, so the velocity makes no step. If limits have already slowed the
+/// arm, the rate falls at once.
 class PhaseGovernor {
  public:
   /// @param rise, fall largest change of the rate per second.  @throws std::invalid_argument unless

@@ -36,7 +36,7 @@ class FeedbackStage {
   FeedbackStage(const RobotSetup& setup, double period, bool lockstep,
                 ctrl_more::Logger* logger = nullptr);
 
-  /// The managers in their order; with no file of its own, feedback controllers alone.
+  /// The managers in their order; without a file only the feedback manager.
   ctrl_more::CentralModule& central() { return *central_; }
   /// Replaces the managers by those of a file; before the first cycle.
   /// @param file path
@@ -52,7 +52,7 @@ class FeedbackStage {
   /// The robot signals that come from messages.
   SignalInputs& signals() { return signals_; }
   const SignalInputs& signals() const { return signals_; }
-  /// Adds rows of a file of signals, all or nothing; before the first cycle.
+  /// Adds rows of a file of signals, all or nothing. Only before the first cycle.
   ctrl_more::Status addSignals(const std::vector<SignalInput>& rows) {
     return signals_.add(rows, robot_);
   }
@@ -77,7 +77,7 @@ class FeedbackStage {
   void begin(std::int64_t now_ns, double dt) noexcept;
   /// Applies the feedback profile of a motion controller, in the cycle that switches to it.
   void switchProfile() noexcept { manager().adoptPrepared(); }
-  /// True: feedback controllers give up their corrections, because the arm is to rest where it is.
+  /// True: feedback controllers drop their corrections, because the arm must rest at its position.
   void letGo(bool let_go) noexcept { manager().letGo(let_go); }
   /// Step 2: writes the measurement to the robot states. If a number is not finite, it writes
   /// nothing and returns false.

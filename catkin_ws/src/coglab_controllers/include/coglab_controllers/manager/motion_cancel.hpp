@@ -69,21 +69,21 @@ class MotionCancel {
   std::uint64_t taken_ = 0;  // control thread
 };
 
-/// When a request was made: what happened since then may make it void.
+/// Time of a request. A later cancel or a new motion epoch makes the request void.
 struct RequestStamp {
   std::uint64_t cancels = 0;       ///< newest cancel of its controller at that time
   std::uint32_t motion_epoch = 0;  ///< of the joint state that allowed it
 };
 
-/// A cancel on its way, see ControllerManager::askCancel().
+/// A cancel in progress, see ControllerManager::askCancel().
 struct CancelOrder {
   std::shared_ptr<MotionCancel> cancel;  ///< null: no such controller
   std::string id;
   std::uint64_t number = 0;
-  std::uint64_t cycles = 0;  ///< count of the report when it was asked for
+  std::uint64_t cycles = 0;  ///< CycleReport::cycles at the time of the request
 };
 
-/// Answer to a cancel; success: the set-point of the arm stands.
+/// Answer to a cancel; success: the set-point of the arm is at rest.
 struct CancelAnswer : Answer {
   bool was_running = false;  ///< there was a motion to end
 };

@@ -107,17 +107,18 @@ struct SignalFile {
   std::vector<SignalOutput> out;
 };
 
-/// What the program around the signals knows of topics.
+/// Rules of the host program for topics.
 struct TopicRules {
-  /// Full name of a topic of the file, after remapping. May throw. Empty: `/` before the name.
+  /// Returns the full name of a topic of the file, after remapping. May throw. If empty: "/" +
+  /// name.
   std::function<std::string(const std::string& topic)> resolve;
-  /// Why a row cannot have this topic (full name, type of the row, true: it is an output); empty:
-  /// it can. No function: every row can.
+  /// Returns why a row cannot have this topic (full name, type of the row, true: output), or an
+  /// empty text. No function: every topic is allowed.
   std::function<std::string(const std::string& topic, const std::string& type, bool out)> refusal;
 };
 
-/// Checks all rows together, of one or more files: each key and each output has one row, one topic
-/// has one type, none is input and output, and the program has no other use for it.
+/// Checks all rows of one or more files together. Each key and each output has one row. A topic has
+/// one type, is not both input and output, and is not used otherwise by the program.
 /// @throws ctrl_more::ConfigError with file and line of the rows
 void checkSignals(const SignalFile& all, const TopicRules& rules);
 

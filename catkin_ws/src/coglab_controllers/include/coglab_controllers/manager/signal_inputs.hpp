@@ -1,5 +1,5 @@
 /// @file
-/// Robot signals from messages: checks each message, and hands its numbers to the control cycle.
+/// Robot signals from messages: checks each message and passes its numbers to the control cycle.
 #pragma once
 
 #include <atomic>
@@ -15,7 +15,7 @@
 
 namespace coglab_controllers {
 
-/// A message as the rows read it. It refers to the message's own memory.
+/// View of a message for the rows. It refers to the memory of the message.
 struct SignalMessage {
   struct Field {
     const double* numbers = nullptr;
@@ -27,15 +27,15 @@ struct SignalMessage {
   std::vector<std::string> joint_names;  ///< of a JointState
 };
 
-/// Why a message was not taken.
+/// Why a message was refused.
 enum class SignalRefusal : std::uint8_t {
   None,
   Frame,      ///< another frame_id
-  Missing,    ///< a field, joint or index is not there
-  Size,       ///< another number of doubles than the row's
+  Missing,    ///< a field, joint or index is missing
+  Size,       ///< number of doubles differs from that of the row
   NotFinite,  ///< NaN or infinity
   NoStamp,    ///< header without a stamp
-  Past,       ///< older than the largest age, or not newer than the message before
+  Past,       ///< older than the largest age, or not newer than the previous message
   Future,     ///< ahead of the clock
 };
 
@@ -55,7 +55,7 @@ class SignalInputs {
   /// @return failure if a signal has another writer already
   ctrl_more::Status add(const std::vector<SignalInput>& rows, ctrl_more::RobotStates& robot);
 
-  /// Gives up all rows but the first ones; before the first cycle. Their signals stay absent.
+  /// Removes all rows after the first ones; before the first cycle. Their signals stay absent.
   void keepFirst(std::size_t rows) {
     while (rows_.size() > rows) rows_.pop_back(), boxes_.pop_back();
   }
@@ -66,15 +66,15 @@ class SignalInputs {
   /// Passes the numbers of one row on to the cycle. A refused message changes nothing.
   /// @param row index in rows()
   /// @param message of the row's type
-  /// @param now_ns present time of the stamps' clock
+  /// @param now_ns current time on the clock of the stamps
   SignalPost post(std::size_t row, const SignalMessage& message, std::int64_t now_ns);
 
-  /// Stamp (ns) of the newest message of a row that was taken; ctrl_more::kNeverWritten: none yet.
+  /// Stamp (ns) of the newest accepted message of a row; ctrl_more::kNeverWritten: none yet.
   std::int64_t newestStamp(std::size_t row) const {
     return boxes_[row].newest.load(std::memory_order_relaxed);
   }
 
-  /// Writes the newest values into the robot states; what is too old becomes absent.
+  /// Writes the newest values into the robot states. Signals with too old values become absent.
   void deliver(ctrl_more::RobotStates& robot, std::int64_t now_ns) noexcept {
     for (Box& box : boxes_) box.mailbox.deliver(robot, now_ns);
   }

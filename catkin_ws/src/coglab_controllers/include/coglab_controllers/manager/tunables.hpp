@@ -28,7 +28,7 @@ class Tunable {
   const std::string name, text;  ///< the parameter's name, and a sentence with its unit
   const double least, most;      ///< range
 
-  /// The value that was set last. Any thread, wait-free.
+  /// The last value set. Any thread, wait-free.
   double wanted() const noexcept { return wanted_.load(std::memory_order_relaxed); }
   /// Sets a value within the range. Any thread, wait-free.
   void set(double value) noexcept { wanted_.store(value, std::memory_order_relaxed); }

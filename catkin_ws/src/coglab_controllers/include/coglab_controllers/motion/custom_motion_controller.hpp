@@ -19,9 +19,9 @@ struct MotionRequestByName {
   bool queue = false;              ///< true: start after the current motion; false: replace it
 };
 
-/// The numbers of the file that is being compiled, for libraries of motions: what they share with
-/// the program beside what motionAbi() names. The first one is raised when meanings change. Static,
-/// so that a library keeps its own.
+/// ABI numbers of the compiled file, for libraries of motions: those of the classes that
+/// motionAbi() does not cover. The first number is raised when meanings change. The function is
+/// static, so that each library keeps its own.
 static inline constexpr ctrl_more::Abi customMotionAbi() {
   return ctrl_more::abiOf<Motion<>, MotionConfiguration, MotionArgument, MotionArguments,
                           MotionStart<>, SetPoint, MotionCycle, IkResult, MotionReference>(2);
@@ -30,8 +30,8 @@ static inline constexpr ctrl_more::Abi customMotionAbi() {
 /// Runs any Motion<>. Parameters: those of MotionRunner, and one for the default of each argument.
 class CustomMotionController : public MotionRunner<MotionArguments> {
  public:
-  /// One for a motion of a library. Made here and not in the library, which may have been compiled
-  /// when a controller had another size.
+  /// Makes a controller for a motion from a library. It is made here, because the library may have
+  /// been compiled with another size of this class.
   /// @param motion the motion to run
   /// @param library ABI of the caller; use the default
   /// @throws std::runtime_error if the program was compiled with another ABI
@@ -57,8 +57,8 @@ class CustomMotionController : public MotionRunner<MotionArguments> {
 }  // namespace coglab_controllers
 
 /// Registers a class derived from Motion<> from one of its library's source files, outside of any
-/// namespace: `COGLAB_REGISTER_MOTION("wave/Wave", Wave)`. Where the library is lib<name>.so and
-/// the type <name>/…, load_controller finds it by the type alone.
+/// namespace: `COGLAB_REGISTER_MOTION("wave/Wave", Wave)`. If the library is lib<name>.so and the
+/// type <name>/…, load_controller finds the library by the type.
 #define COGLAB_REGISTER_MOTION(type, Class)                                                    \
   namespace {                                                                                  \
   const ::coglab_controllers::MotionRegistration coglab_motion_registration(                   \

@@ -9,9 +9,8 @@ namespace coglab_controllers {
 
 /// Lets a motion start without a step if the commanded and the measured state differ.
 ///
-/// References begin at the commanded state, and loops close on the measured one. At the start of a
-/// motion the difference of the two counts as no error; it becomes one within about `blend`
-/// seconds.
+/// References begin at the commanded state, and control loops use the measured one. At the start of
+/// a motion their difference does not count as an error; it is blended in within about `blend` s.
 class StartBlend {
  public:
   /// @param blend time constant, s
@@ -32,7 +31,7 @@ class StartBlend {
   JointVector joints_ = JointVector::Zero();
 };
 
-/// What feedback controllers made of a pose: p' = p + shift, R' = turn R.
+/// Correction of a pose by feedback controllers: p' = p + shift, R' = turn R.
 struct PoseCorrection {
   Vector3 shift = Vector3::Zero();  ///< m
   Quaternion turn = Quaternion::Identity();
@@ -42,34 +41,34 @@ struct PoseCorrection {
   bool none() const noexcept {
     return shift.isZero(0.0) && turn.coeffs() == Quaternion::Identity().coeffs();
   }
-  Pose onto(const Pose& pose) const noexcept;   ///< the corrected pose; the same bits if none()
-  Pose outOf(const Pose& pose) const noexcept;  ///< the pose that is corrected to this one
+  Pose onto(const Pose& pose) const noexcept;   ///< corrected pose; bit-identical if none()
+  Pose outOf(const Pose& pose) const noexcept;  ///< inverse: the pose before the correction
 };
 
-/// The arm brakes within its limits; once it stands, the commanded posture is remembered as the
-/// reference. If feedback controllers leave the reference alone, the velocity is exactly zero; if
-/// they move it, the hand follows. No allocation, no throw.
+/// The arm brakes within its limits. Once it stands, the commanded posture is the reference. If
+/// feedback controllers do not change the reference, the velocity is exactly zero; if they change
+/// it, the hand follows. No allocation, no throw.
 ///
-/// The reference is the commanded pose without the correction that it has already: a constant
-/// correction moves nothing.
+/// The reference is the commanded pose without its present correction, so a constant correction
+/// causes no motion.
 ///
-/// All joints brake together, each in proportion to its speed, in the time that the slowest one
-/// needs: where each braked as fast as it can, joints that cancel each other's motion, as in a hand
-/// that only turns, would throw the hand aside.
+/// All joints brake in proportion to their speeds, within the braking time of the slowest one. If
+/// each joint braked as fast as possible, joints whose motions cancel each other (as in a hand that
+/// only turns) would move the hand aside.
 class Hold {
  public:
-  /// Another hold begins: the arm may still be moving.
+  /// Begins a new hold. The arm may still be moving.
   void begin() noexcept {
     latched_ = false;
     begins_ = true;
   }
 
-  /// Writes pose, zero twist, joint position and the joint velocity of braking, at rest zero.
-  /// @param correction of the pose in the cycle before
+  /// Writes pose, zero twist, joint position and the joint velocity of braking (zero at rest).
+  /// @param correction of the pose in the last cycle
   void computeReference(const CycleInput& input, const RobotSetup& setup,
                         const PoseCorrection& correction, References& references) noexcept;
 
-  /// @param solve makes joint velocities from a chain state, joints and a Cartesian reference:
+  /// @param solve computes joint velocities from a chain state, joints and a Cartesian reference:
   /// (const ChainState&, const
   ///        JointVector&, const CartesianReference&) -> JointVector
   template <typename Solve>
@@ -89,12 +88,12 @@ class Hold {
  private:
   bool moved(const References& references) const noexcept;
 
-  /// Joint velocities (rad/s) of braking: the slowest joint brakes as it can, the others with it.
+  /// Joint velocities (rad/s) while braking. The slowest joint sets the duration for all.
   JointVector braked(const RobotSample& robot, const coglab_rt::JointLimits& limits) noexcept;
 
   bool latched_ = false, begins_ = true;
   JointVector from_ = JointVector::Zero();  // rad/s, when it began to brake
-  int slowest_ = 0;                         // the joint that needs longest for that
+  int slowest_ = 0;                         // joint with the longest braking time
   Eigen::Array<bool, kMaxJoints, 1> slow_ = Eigen::Array<bool, kMaxJoints, 1>::Constant(true);
   double share_ = 1.0;    // of from_, in the last cycle
   ChainState commanded_;  // kinematics at the commanded joints
@@ -102,7 +101,7 @@ class Hold {
   JointVector joints_ = JointVector::Zero();
 };
 
-/// Pose of a reference as the stores keep it.
+/// Writes a pose into the references.
 inline void writePose(References& references, const Pose& pose) noexcept {
   references.states.view<7>(references.pose) << pose.position, pose.orientation.coeffs();
 }

@@ -1,5 +1,5 @@
 /// @file
-/// Joint positions over time, through given points.
+/// Joint positions over time through given points.
 #pragma once
 
 #include <utility>
@@ -17,8 +17,8 @@ struct JointPoint {
   JointVector acceleration = JointVector::Zero();  ///< rad/s^2
 };
 
-/// The state between two points, at a time between theirs. The polynomial meets positions and
-/// velocities (cubic), and the accelerations too (quintic). Real-time safe.
+/// Returns the state at a time between two points. The polynomial matches their positions and
+/// velocities (cubic), and also their accelerations (quintic). Real-time safe.
 JointPoint hermite(const JointPoint& from, const JointPoint& to, bool quintic,
                    double time) noexcept;
 
@@ -26,19 +26,19 @@ JointPoint hermite(const JointPoint& from, const JointPoint& to, bool quintic,
 class JointSpline {
  public:
   JointSpline() = default;
-  /// @param points at least one, with growing times
-  /// @param quintic true: the accelerations of the points are met too
+  /// @param points at least one, with increasing times
+  /// @param quintic true: also match the accelerations of the points
   JointSpline(std::vector<JointPoint> points, bool quintic)
       : points_(std::move(points)), quintic_(quintic) {}
 
-  /// Sets the velocities of the inner points so that no joint turns back or overshoots between two
-  /// points: zero where a joint reverses, else the weighted harmonic mean of both slopes
-  /// (Fritsch and Butland, 1984). First and last stay as they are.
+  /// Sets the velocities of the inner points so that no joint reverses or overshoots between two
+  /// points: zero if a joint reverses at the point, else the weighted harmonic mean of both slopes
+  /// (Fritsch and Butland, 1984). The first and the last velocity stay unchanged.
   static void estimateVelocities(std::vector<JointPoint>& points);
 
   double duration() const noexcept { return points_.empty() ? 0.0 : points_.back().time; }
-  /// The state at a time, s; before the first and after the last point it rests there. Real-time
-  /// safe.
+  /// Returns the state at a time, s. Before the first and after the last point it is at rest there.
+  /// Real-time safe.
   JointPoint at(double time) const noexcept;
 
  private:

@@ -123,11 +123,11 @@ class Motion {
   /// Sets the reference for this cycle and the next one, or rest.
   virtual void computeReference(const MotionCycle& cycle, MotionReference& reference) = 0;
 
-  /// Running or Holding while it is under way; Reached once its reference has ended (the
-  /// runner then waits until the arm arrives); Aborted if it gives up.
+  /// Running or Holding during the motion; Reached once its reference has ended (the
+  /// runner then waits until the arm arrives); Aborted if it failed.
   virtual MotionState state() const = 0;
 
-  /// @name Seldom needed
+  /// @name Optional
   /// @{
 
   /// Reason for Holding or Aborted.

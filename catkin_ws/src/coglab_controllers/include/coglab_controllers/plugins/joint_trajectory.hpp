@@ -1,5 +1,5 @@
 /// @file
-/// Motion controller that follows joint trajectories, as planners make them.
+/// Motion controller that follows joint trajectories from planners.
 #pragma once
 
 #include <atomic>
@@ -16,8 +16,7 @@
 
 namespace coglab_controllers {
 
-/// What a client of control_msgs/FollowJointTrajectory is told; the numbers are those of the
-/// action.
+/// Result codes for clients of control_msgs/FollowJointTrajectory, with the numbers of the action.
 enum class TrajectoryError : int {
   None = 0,
   InvalidGoal = -1,
@@ -47,11 +46,11 @@ struct TrajectoryRequest {
   std::vector<Point> points;
   std::vector<Tolerance> path_tolerance, goal_tolerance;
   double goal_time_tolerance = 0.0;  ///< s; 0: parameter `goal_time`
-  /// s since the stamp of the trajectory, 0 without one; negative: it begins in so many seconds
+  /// s since the stamp of the trajectory; 0 without a stamp; negative: s until it begins
   double age = 0.0;
 
   static constexpr std::size_t kMostPoints = 10000;
-  static constexpr double kLongestWait = 60.0;  ///< s that a stamp may be ahead
+  static constexpr double kLongestWait = 60.0;  ///< s, largest lead of a stamp over the clock
 };
 
 struct TrajectoryAnswer : MotionAnswer {
@@ -64,7 +63,7 @@ struct TrajectoryTolerance {
   JointVector velocity = JointVector::Constant(std::numeric_limits<double>::infinity());  ///< rad/s
 };
 
-/// A checked trajectory. Does not change while the cycle follows it.
+/// A checked trajectory. It does not change while the cycle follows it.
 struct JointPath {
   JointSpline spline;
   TrajectoryTolerance path, goal;
@@ -72,18 +71,18 @@ struct JointPath {
   std::uint64_t number = 0;
 };
 
-/// A trajectory that was accepted and begins at the time of its stamp.
+/// An accepted trajectory that begins at the time of its stamp.
 struct WaitingTrajectory {
   TrajectoryRequest request;
-  RequestStamp accepted;  ///< a cancel, or a stop of the robot, after this makes it void
+  RequestStamp accepted;  ///< a later cancel or stop of the robot makes it void
 };
 
-/// What the control cycle takes over.
+/// Plan for the control cycle.
 struct TrajectoryPlan {
   const JointPath* trajectory = nullptr;  ///< owned by the controller
 };
 
-/// Where a trajectory wants the arm, and where it is.
+/// Desired and actual state of the arm on a trajectory.
 struct TrajectoryProgress {
   std::int64_t stamp_ns = 0;
   int id = -1;  ///< of the motion
@@ -91,13 +90,13 @@ struct TrajectoryProgress {
   JointPoint desired, actual;  ///< `actual` without acceleration
 };
 
-/// Follows one trajectory at a time; a new one takes the place of the old one in mid-motion. It
-/// begins at the arm's set-point: what the first point differs by, at most `start_tolerance`, fades
-/// within half a second, or within the trajectory if it is shorter. While a speed limit or
-/// `speed_scale` slows the arm, the trajectory takes longer, on the same path.
+/// Follows one trajectory at a time. A new one replaces the running one during the motion. It
+/// begins at the arm's set-point. The difference to its first point, at most `start_tolerance`,
+/// fades out within half a second, or within the trajectory if that is shorter. A speed limit or
+/// `speed_scale` makes the trajectory take longer, on the same path.
 ///
-/// A joint that leaves the path tolerance ends the motion. It has ended well when all joints are
-/// within the goal tolerance, at most `goal_time` after its end.
+/// The motion ends if a joint leaves the path tolerance. It succeeds if all joints come within the
+/// goal tolerance, at most `goal_time` after the end of the trajectory.
 ///
 /// Parameters besides those of MotionRunner: `path_tolerance` (rad, default 0.2), `goal_tolerance`
 /// (rad, 0.01), `goal_time` (s, 2), `start_tolerance` (rad, 0.05).
@@ -105,17 +104,17 @@ class JointTrajectory : public MotionRunner<TrajectoryPlan> {
  public:
   JointTrajectory();
 
-  /// Whether a trajectory could begin, apart from which controller is active: joints, sizes, times,
-  /// limits, workspace, and where the arm is. Where the arm is does not count for a trajectory that
+  /// Checks whether a trajectory could begin if this controller were active: joints, sizes, times,
+  /// limits, workspace, and the arm's position. The position is not checked for a trajectory that
   /// begins later (age < 0). Any thread.
   TrajectoryAnswer check(const TrajectoryRequest& request) const;
   /// Checks a trajectory that begins later. The caller keeps it until then. Any thread.
   TrajectoryAnswer accept(WaitingTrajectory& waiting);
   /// Checks a trajectory and begins it at once. Any thread.
   TrajectoryAnswer follow(const TrajectoryRequest& request);
-  /// The same for one that has waited; refused if it has become void.
+  /// The same for a waiting trajectory; refused if it has become void.
   TrajectoryAnswer follow(const WaitingTrajectory& waiting);
-  /// What a client is told of a motion that ended.
+  /// Result code for the client of an ended motion.
   static TrajectoryError errorOf(const EndedMotion& end);
   /// Newest progress; one reader thread.
   bool readProgress(TrajectoryProgress& progress) { return progress_.read(progress); }
@@ -132,7 +131,7 @@ class JointTrajectory : public MotionRunner<TrajectoryPlan> {
   double path_tolerance_ = 0.2, goal_tolerance_ = 0.01, start_tolerance_ = 0.05;  // rad
   double goal_time_ = 2.0;                                                        // s
   std::uint64_t made_ = 0;                       // under the host's request lock
-  std::deque<std::unique_ptr<JointPath>> kept_;  // the same; freed once a later one has begun
+  std::deque<std::unique_ptr<JointPath>> kept_;  // likewise; freed once a later one has begun
   coglab_rt::TripleBuffer<TrajectoryProgress> progress_;
 };
 

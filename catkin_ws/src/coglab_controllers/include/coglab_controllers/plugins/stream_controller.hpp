@@ -17,44 +17,43 @@ namespace coglab_controllers {
 
 /// One command of a stream, for the control cycle.
 struct StreamCommand {
-  JointVector numbers = JointVector::Zero();  ///< a twist has six, the seventh is 0
-  std::int64_t stamp_ns = 0;                  ///< when it was made, MotionHost::now_ns()
-  bool in_tool = false;                       ///< a twist in the axes of the tool frame
+  JointVector numbers = JointVector::Zero();  ///< a twist uses six; the seventh is 0
+  std::int64_t stamp_ns = 0;                  ///< time of creation, MotionHost::now_ns()
+  bool in_tool = false;                       ///< true: a twist in the axes of the tool frame
 };
 
 /// One command of a stream, from a user.
 struct StreamMessage {
-  std::vector<double> numbers;  ///< as the kind of stream says
-  double age = 0.0;             ///< s since it was made; negative: from the future
-  bool in_tool = false;         ///< twists: in the axes of the tool frame, as the hand turns
+  std::vector<double> numbers;  ///< as defined by the kind of stream
+  double age = 0.0;             ///< s since its creation; negative: from the future
+  bool in_tool = false;         ///< true: a twist in the axes of the (turning) tool frame
 };
 
-/// The commands of a stream, from the sender to the control cycle. The cycle reads without waiting.
+/// Commands of a stream, from the sender to the control cycle. The cycle never waits for them.
 using StreamMailbox = TripleBuffer<StreamCommand>;
 
 /// Request that opens a stream.
 struct StreamRequest {
-  std::int64_t opened_ns = 0;  ///< older commands do not count
+  std::int64_t opened_ns = 0;  ///< older commands are ignored
 };
 
 /// The arm follows the newest command until the stream is closed: by a cancel, by a switch to
 /// another controller, or because the robot stops. If no command came for `command_timeout`, the
 /// arm brakes and stands, and the stream stays open for the next one. A limit slows the arm but
-/// does not close the stream. `speed_scale` slows it as it slows every motion.
+/// does not close the stream. `speed_scale` slows it like every motion.
 ///
-/// Commands are reduced to the largest speeds below, in their direction; changes of velocity to the
-/// largest accelerations. The reference stays within `leash` of the commanded arm, so
-/// that it does not run ahead while a limit holds the arm. Of several commands within a cycle the
-/// newest counts.
+/// Commands are scaled down to the largest speeds below, in the same direction, and changes of
+/// velocity to the largest accelerations. The reference stays within `leash` of the commanded arm,
+/// so it does not run ahead while a limit slows the arm. If several commands arrive within a cycle,
+/// only the newest is used.
 ///
 /// Parameters: those of MotionRunner without a queue, and `command_timeout` (s, default 0.1).
 class StreamController : public MotionRunner<StreamRequest> {
  public:
-  /// Opens the stream, or opens it anew. Any thread.
+  /// Opens the stream, or reopens it. Any thread.
   MotionAnswer open();
-  /// Sends one command; refused if the stream is not open, for a wrong size, for a number that
-  /// is not finite, for an age above `command_timeout`, and from the future. Any thread but the
-  /// control thread.
+  /// Sends one command. Refused if the stream is not open, the size is wrong, a number is not
+  /// finite, or the age is negative or above `command_timeout`. Any thread but the control thread.
   Answer send(const StreamMessage& message);
   Answer send(const std::vector<double>& numbers) { return send({numbers, 0.0, false}); }
   /// True while the stream is open.
@@ -69,7 +68,7 @@ class StreamController : public MotionRunner<StreamRequest> {
   void adopt(const CycleInput& input) override;
 
  protected:
-  /// What a kind of stream is made of.
+  /// Parts of a kind of stream.
   struct Parts {
     std::unique_ptr<Motion<StreamRequest>> motion;
     StreamMailbox* mailbox;          ///< a member of the motion
@@ -81,7 +80,7 @@ class StreamController : public MotionRunner<StreamRequest> {
 
  private:
   void report(std::int64_t stamp_ns) override;
-  /// What else is wrong with numbers of the right size; empty: nothing.
+  /// Further check of numbers with the right size. Returns the error, or an empty text.
   virtual std::string wrong(const std::vector<double>& /*numbers*/) const { return {}; }
 
   double timeout_ = 0.1;  // s
@@ -89,7 +88,7 @@ class StreamController : public MotionRunner<StreamRequest> {
   StreamMailbox& mailbox_;
   const std::vector<std::string> names_;
   const std::string units_;
-  std::mutex sending_;  // among senders; the cycle does not take it
+  std::mutex sending_;  // between senders; the cycle does not lock it
   std::atomic<bool> open_{false};
 };
 
@@ -97,16 +96,16 @@ class StreamController : public MotionRunner<StreamRequest> {
 /// of the base frame or of the tool frame. Parameters besides those of StreamController:
 /// `max_speed` (m/s, default 0.8, and at most 0.8 times `hand_speed_limit`), `max_turning`
 /// (rad/s, 3.0), `max_acceleration` (m/s^2, 3.0), `max_turning_acceleration` (rad/s^2, 12.0),
-/// `leash` (m, 0.02; the same number of tenths of a radian for the orientation).
+/// `leash` (m, 0.02; for the orientation 10 times this number, in rad).
 class TwistStream : public StreamController {
  public:
   TwistStream();
 };
 
 /// Follows poses of the tool frame in the base frame: position (m), then a unit quaternion
-/// x y z w. The hand goes to the newest pose within the limits of TwistStream, whose parameters it
-/// has, and slows before it by `gain` (1/s, default 10, tunable). A position outside the workspace
-/// is followed to its border.
+/// x y z w. The hand moves to the newest pose within the limits of TwistStream (same parameters).
+/// Near the pose its speed is `gain` (1/s, default 10, tunable) times the distance. A position
+/// outside the workspace is followed up to the border.
 class PoseStream : public StreamController {
  public:
   PoseStream();
@@ -115,8 +114,8 @@ class PoseStream : public StreamController {
   std::string wrong(const std::vector<double>& numbers) const override;
 };
 
-/// Follows joint velocities (rad/s), seven in wire order. A joint near its stop brakes by itself;
-/// the others go on. Parameters besides those of StreamController: `max_share` (of the robot's
+/// Follows joint velocities (rad/s), seven in wire order. A joint near its stop brakes alone; the
+/// others continue. Parameters besides those of StreamController: `max_share` (of the robot's
 /// velocity limits, default 1.0), `max_acceleration_share` (of its acceleration limits, 0.5),
 /// `leash` (rad, 0.05).
 class JointVelocityStream : public StreamController {

@@ -1,5 +1,5 @@
 /// @file
-/// Bounds on what a remote process sends: distance, speed and change of speed.
+/// Bounds on the output of a remote process: distance, speed and change of speed.
 #pragma once
 
 #include <algorithm>
@@ -9,9 +9,9 @@
 
 namespace coglab_controllers {
 
-/// Follows a target that comes from outside, within a largest speed and change of speed of every
-/// number. In steady motion within the bounds it follows without lag. No allocation, no throw.
-/// @tparam N numbers
+/// Follows a target from another process, with bounds on speed and acceleration of each number. In
+/// steady motion within the bounds it follows without lag. No allocation, no throw.
+/// @tparam N count of numbers
 template <int N>
 class BoundedFollower {
  public:
@@ -27,12 +27,12 @@ class BoundedFollower {
     velocity_ = velocity;
   }
 
-  /// One cycle toward a target that moves.
+  /// One cycle toward a moving target.
   void follow(const Vector& target, const Vector& velocity, double dt) noexcept {
     const Vector error = target - at_;
     Vector wanted;
     for (int i = 0; i < N; ++i) {
-      // Never faster toward the target than it can brake before it, with half of the bound.
+      // Largest speed toward the target from which half of the acceleration bound can brake.
       const double size = std::abs(error[i]);
       const double closing = std::min(size / (4.0 * dt), std::sqrt(acceleration_[i] * size));
       wanted[i] = velocity[i] + std::copysign(closing, error[i]);
@@ -45,7 +45,7 @@ class BoundedFollower {
   const Vector& at() const noexcept { return at_; }              ///< now
   const Vector& next() const noexcept { return next_; }          ///< at the end of the cycle
   const Vector& velocity() const noexcept { return velocity_; }  ///< of this cycle
-  /// To be called after follow() or brake(), when the cycle's numbers have been used.
+  /// Call it after follow() or brake(), when the numbers of the cycle have been used.
   void advance() noexcept { at_ = next_; }
 
  private:
@@ -61,8 +61,8 @@ class BoundedFollower {
   Vector at_ = Vector::Zero(), next_ = Vector::Zero(), velocity_ = Vector::Zero();
 };
 
-/// A correction of three numbers: within a ball, changed no faster than a rate, and faded to
-/// exactly zero within a time when nothing comes. No allocation, no throw.
+/// A correction of three numbers with a bounded norm and rate. Without answers it fades to exactly
+/// zero within a fixed time. No allocation, no throw.
 class BoundedCorrection {
  public:
   using Vector = Eigen::Vector3d;
@@ -74,14 +74,14 @@ class BoundedCorrection {
     rate_ = rate;
     fade_ = fade;
   }
-  /// Nothing is corrected from now on, at once.
+  /// Sets the correction to zero at once.
   void clear() noexcept { at_.setZero(), begun_ = false; }
 
   void follow(const Vector& wanted, double dt) noexcept {
     begun_ = false;
     move(within(wanted, size_), rate_ * dt);
   }
-  /// One cycle without an answer. Along a straight line to zero.
+  /// One cycle without an answer: moves along a straight line to zero.
   void fade(double dt) noexcept {
     if (!begun_) slope_ = at_.norm() / fade_;
     begun_ = true;

@@ -1,7 +1,7 @@
 /// @file
-/// What the control cycle and a Python process write for each other (coglab/control/slot.py has the
-/// same fields). All numbers have 8 bytes. Poses are x y z and the quaternion x y z w, those of the
-/// tool in the robot's base frame.
+/// Records that the control cycle and a Python process exchange (coglab/control/slot.py has the
+/// same fields). All numbers have 8 bytes. Poses are x y z and the quaternion x y z w of the tool
+/// in the robot's base frame.
 #pragma once
 
 #include <cstdint>
@@ -10,20 +10,21 @@
 
 namespace coglab_controllers {
 
-/// Raise it when a field or its meaning changes. Another number is refused.
+/// Version of the records. Raise it when a field or its meaning changes. Other versions are
+/// refused.
 constexpr int kRemoteInterface = 1;
 
-/// What a slot is for.
+/// Kind of controller behind a slot.
 enum class RemoteKind : std::int64_t { Motion = 1, Feedback = 2 };
 
-/// From the cycle, once each cycle while a motion or the feedback controller runs.
+/// From the cycle, in each cycle while a motion or the feedback controller runs.
 struct RemoteQuestion {
   std::int64_t stamp_ns;    ///< of the sample, on the clock of the samples
   std::int64_t written_ns;  ///< on the steady clock
   std::int64_t run;         ///< number of the motion, or of the reset; 0: none yet
   std::int64_t running;     ///< 0: the motion has ended
   std::int64_t late;        ///< cycles of this run without an answer to one of the last two
-  std::int64_t refused;     ///< answers of this run that were not usable
+  std::int64_t refused;     ///< number of unusable answers in this run
   std::int64_t cycle;       ///< number of the cycle in this run
   double dt;                ///< s, true time since the last cycle
   double time, next;        ///< s of motion time

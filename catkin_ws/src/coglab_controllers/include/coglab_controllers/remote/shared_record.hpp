@@ -12,10 +12,10 @@ namespace coglab_controllers {
 
 /// One value in shared memory with its number and a checksum of both.
 ///
-/// The reader copies everything and believes the copy only if the checksum fits. So it needs no
-/// lock and no order of the writer's stores: half-written records, random bytes and fresh memory
-/// are all refused in the same way. Both sides are wait-free, and a process that dies while it
-/// writes harms nothing. Python has the same code in coglab/control/slot.py.
+/// The reader copies everything and accepts the copy only if the checksum is correct. So it needs
+/// no lock and no order of the writer's stores: it refuses half-written records, random bytes and
+/// fresh memory in the same way. Both sides are wait-free. A process that dies during a write does
+/// no harm. Python has the same code in coglab/control/slot.py.
 /// @tparam T trivially copyable, of 8-byte numbers only
 template <typename T>
 class SharedRecord {
@@ -25,7 +25,7 @@ class SharedRecord {
  public:
   static constexpr std::size_t kWords = sizeof(T) / 8;
 
-  /// Writes a value under the next number. One writer.
+  /// Writes a value with its number. One writer.
   void write(const T& value, std::uint64_t number) noexcept {
     std::uint64_t words[kWords];
     std::memcpy(words, &value, sizeof(T));
@@ -34,7 +34,7 @@ class SharedRecord {
     for (std::size_t i = 0; i < kWords; ++i) words_[i].store(words[i], std::memory_order_relaxed);
   }
 
-  /// Copies the value if it is whole. It tries once: the next cycle reads again.
+  /// Copies the value if it is complete. It tries once, because the next cycle reads again.
   /// @param number of the value that was read
   bool read(T& value, std::uint64_t& number) const noexcept {
     std::uint64_t words[kWords];
@@ -48,7 +48,7 @@ class SharedRecord {
   }
 
  private:
-  /// Sum of all words, each times an odd number of its own; never 0 for empty memory.
+  /// Sum of all words, each times a different odd number; never 0 for empty memory.
   static std::uint64_t checksum(const std::uint64_t* words, std::uint64_t number) noexcept {
     std::uint64_t sum = 0x9e3779b97f4a7c15u + number * 0xd6e8feb86659fd93u;
     std::uint64_t factor = 1;

@@ -13,14 +13,14 @@ namespace coglab_controllers {
 
 /// Shared memory of one slot, and the thread that hands it out.
 ///
-/// The robot makes the memory (memfd, sealed: nobody can shorten it, so that no read of the cycle
+/// The robot makes the memory (memfd, sealed: no process can shorten it, so no read of the cycle
 /// can fail) and passes it over a local socket with the abstract name
-/// `coglab/<user>/<pid of the robot>/<slot>`. The socket tells more than a file could: the kernel
-/// names the process at the other end, and closes the connection when it dies. One process at a
-/// time; the second is refused with the number of the first.
+/// `coglab/<user>/<pid of the robot>/<slot>`. Through the socket the kernel identifies the other
+/// process and closes the connection when it dies. One process at a time; a second one is refused
+/// with the number of the first.
 ///
-/// ask(), read() and connected() are for the cycle: wait-free, no system call. The process looks
-/// for questions about once a millisecond by itself, because waking it would be a system call.
+/// ask(), read() and connected() are for the cycle: wait-free, no system call. The process polls
+/// for questions about once a millisecond, because waking it would be a system call.
 class RemoteSlot {
  public:
   /// @param id of the controller
@@ -34,7 +34,7 @@ class RemoteSlot {
   void ask(const RemoteQuestion& question) noexcept {
     segment_->question.write(question, ++asked_);
   }
-  /// Copies the newest answer. Returns true if it is whole and has not been read before.
+  /// Copies the newest answer. Returns true if it is complete and was not read before.
   bool read(RemoteAnswer& answer) noexcept {
     if (!connected()) return false;
     std::uint64_t number = 0;

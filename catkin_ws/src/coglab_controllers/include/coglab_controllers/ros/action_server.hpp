@@ -1,5 +1,5 @@
 /// @file
-/// An action server that no stamp of a client can end.
+/// An action server that works with any stamp from a client.
 #pragma once
 
 #include <actionlib/server/action_server_base.h>
@@ -9,10 +9,9 @@
 
 namespace coglab_controllers {
 
-/// Speaks the protocol of actionlib with actionlib's own logic of goals, and keeps the stamps of
-/// goals and cancels out of it that are ahead of the clock. actionlib::ActionServer adds to such a
-/// stamp, which overflows and ends the process, and takes it for the newest cancel, which refuses
-/// every later goal.
+/// Implements the protocol of actionlib with actionlib's own logic of goals, but removes stamps of
+/// goals and cancels that are ahead of the clock. In actionlib::ActionServer such a stamp can
+/// overflow and end the process. As the newest cancel it would refuse every later goal.
 template <typename Action>
 class ActionServer : public actionlib::ActionServerBase<Action> {
   using Base = actionlib::ActionServerBase<Action>;
@@ -22,7 +21,7 @@ class ActionServer : public actionlib::ActionServerBase<Action> {
   using GoalHandle = typename Base::GoalHandle;
   using Callback = boost::function<void(GoalHandle)>;
 
-  /// Serves below `name`; the callbacks come from the queue of `node`. Call start().
+  /// Serves below `name`; the queue of `node` runs the callbacks. Call start() next.
   ActionServer(const ros::NodeHandle& node, const std::string& name, Callback on_goal,
                Callback on_cancel)
       : Base(std::move(on_goal), std::move(on_cancel)), node_(node, name) {}
@@ -35,7 +34,8 @@ class ActionServer : public actionlib::ActionServerBase<Action> {
 
  private:
   static constexpr double kStatusPeriod = 0.2;  // s
-  static constexpr double kKept = 5.0;          // s that the status of an ended goal is published
+  static constexpr double kKept =
+      5.0;  // s, time for which the status of an ended goal is published
 
   void initialize() override {
     results_ = node_.template advertise<ActionResult>("result", 50);

@@ -19,8 +19,8 @@ class FeedbackReconfigure {
  public:
   FeedbackReconfigure(const ros::NodeHandle& node, ControllerManager& manager);
 
-  /// Starts and ends servers, so that there is one for each loaded controller, and tells the gains
-  /// to the clients. After each load, unload and change of gains. Calls the ROS master.
+  /// Starts and ends servers, so that each loaded controller has one, and publishes the gains. Call
+  /// it after each load, unload and change of gains. It calls the ROS master.
   void refresh();
 
  private:

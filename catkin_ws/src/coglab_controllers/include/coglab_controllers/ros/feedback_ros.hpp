@@ -42,7 +42,7 @@ class FeedbackRos {
   FeedbackRos(const ros::NodeHandle& node, ControllerManager& manager);
   ~FeedbackRos();
 
-  /// After a feedback controller was loaded or unloaded by another way than these services.
+  /// Call it after a feedback controller was loaded or unloaded without these services.
   void refreshGains() { reconfigure_.refresh(); }
 
   /// Publishes status if it changed, and state while it has a subscriber. Publisher thread.

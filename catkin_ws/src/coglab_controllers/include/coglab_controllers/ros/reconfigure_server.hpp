@@ -24,17 +24,17 @@ struct ReconfigureField {
   double value = 0.0, least = 0.0, most = 0.0, fallback = 0.0;
 };
 
-/// Speaks the protocol of dynamic_reconfigure below its node: service `set_parameters`, latched
-/// topics `parameter_descriptions` and `parameter_updates`. The numbers come from the program at
-/// run time, so no .cfg file describes them. If a value is out of its range or no number, or a name
-/// is unknown, nothing changes: the answer has the values in force, the log the reason.
+/// Implements the protocol of dynamic_reconfigure below its node: service `set_parameters`, latched
+/// topics `parameter_descriptions` and `parameter_updates`. The program defines the numbers at run
+/// time, without a .cfg file. If a value is out of range or not a number, or a name is unknown,
+/// nothing changes: the response contains the present values, and the reason is logged.
 class ReconfigureServer {
  public:
   using Read = std::function<std::vector<ReconfigureField>()>;
   using Write = std::function<Answer(const std::map<std::string, double>& changed)>;
 
-  /// @param read the present numbers, always the same ones in the same order
-  /// @param write sets some of them, all or none
+  /// @param read returns the present numbers, always in the same order
+  /// @param write sets some of them, all or nothing
   ReconfigureServer(const ros::NodeHandle& node, Read read, Write write);
   /// Shows and changes the gains of a motion controller, which outlives this object.
   ReconfigureServer(const ros::NodeHandle& node, Tunables& tunables);
@@ -42,7 +42,7 @@ class ReconfigureServer {
   ReconfigureServer(const ReconfigureServer&) = delete;
   ReconfigureServer& operator=(const ReconfigureServer&) = delete;
 
-  /// Tells the present numbers to the clients: they have been changed by another way.
+  /// Publishes the present numbers after they were changed in another way.
   void publish();
 
  private:

@@ -1,5 +1,5 @@
 /// @file
-/// Limits how often a sentence is logged, each sentence for itself.
+/// Limits how often a sentence is logged, separately for each sentence.
 #pragma once
 
 #include <algorithm>
@@ -11,13 +11,13 @@
 
 namespace coglab_controllers {
 
-/// A fault that comes with every message is logged once in a while, and does not hide another one.
-/// Sentences that differ only in their digits are the same one.
+/// A fault that every message causes is logged from time to time and does not hide other faults.
+/// Sentences that differ only in their digits count as the same.
 class SentenceThrottle {
  public:
   explicit SentenceThrottle(double period) : period_ns_(static_cast<std::int64_t>(1e9 * period)) {}
 
-  /// Whether this sentence may be logged now (steady clock, ns). One thread at a time.
+  /// Returns true if this sentence may be logged now (steady clock, ns). One thread at a time.
   bool may(std::string sentence, std::int64_t now_ns) {
     sentence.erase(std::remove_if(sentence.begin(), sentence.end(),
                                   [](unsigned char letter) { return std::isdigit(letter) != 0; }),

@@ -19,15 +19,15 @@ namespace coglab_controllers {
 /// A message for SignalInputs::post(), with the numbers that it refers to.
 class SignalReading {
  public:
-  /// Without an orientation if `orientation_covariance[0]` is -1, as the message defines it; the
-  /// same for the other two fields.
+  /// Omits the orientation if `orientation_covariance[0]` is -1 (the message's definition), and
+  /// likewise the other two fields.
   explicit SignalReading(const sensor_msgs::Imu& message);
   explicit SignalReading(const geometry_msgs::WrenchStamped& message);
   explicit SignalReading(const geometry_msgs::PoseStamped& message);
   explicit SignalReading(const geometry_msgs::TwistStamped& message);
   explicit SignalReading(const sensor_msgs::JointState& message);
   explicit SignalReading(const std_msgs::Float64MultiArray& message);
-  /// Of each finger the sum over its phalanges.
+  /// Takes the sum over the phalanges of each finger.
   /// @throws std::invalid_argument with the expected and the received value
   explicit SignalReading(const coglab_msgs::FingertipForces& message);
   SignalReading(const SignalReading&) = delete;

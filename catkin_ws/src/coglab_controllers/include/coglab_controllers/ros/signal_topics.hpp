@@ -16,18 +16,18 @@ namespace coglab_controllers {
 
 class SignalReading;
 
-/// The rules of this process for the topics of a file of signals: names are resolved with its
-/// remappings; topics of this node, the arm, tf and rosout are not for outputs, and nodes of ROS
-/// agree on one type for a topic.
+/// Rules of this process for the topics of a file of signals. Names are resolved with its
+/// remappings. Outputs may not use topics of this node, the arm, tf or rosout. A topic that exists
+/// keeps its type.
 /// @param node namespace of the manager
 TopicRules topicRules(const ros::NodeHandle& node);
 
 /// Subscribes to the topics of the manager's robot signals and publishes its outputs. Relative
 /// names begin in the namespace above the manager's.
 ///
-/// Messages that cannot be used are logged once, and again if the same reason comes back after 10
-/// s. A topic that stops for 0.5 s is logged once, too. Its signals are absent from their largest
-/// age on, and controllers that need them wait.
+/// Unusable messages are logged once, and again if the same reason returns after 10 s. A topic that
+/// is silent for 0.5 s is also logged once. Its signals become absent at their largest age, and
+/// controllers that need them wait.
 class SignalTopics {
  public:
   /// @param node namespace of the manager; its callback queue is used
@@ -48,8 +48,8 @@ class SignalTopics {
   struct Topic {
     ros::Subscriber subscriber;
     std::deque<Row> rows;
-    std::string writer;         ///< node whose messages are taken
-    std::int64_t heard_ns = 0;  ///< from this node
+    std::string writer;         ///< node whose messages are accepted
+    std::int64_t heard_ns = 0;  ///< time of the last message from this node
     bool unreadable = false, two_writers = false;
     double max_age = 0.0;  ///< s, largest of the rows
   };

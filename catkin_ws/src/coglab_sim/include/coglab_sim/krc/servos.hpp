@@ -67,8 +67,8 @@ class Servos {
 
  private:
   /// Linear law: torque = constant - damping * velocity after the step. That velocity is predicted
-  /// from the dampers only (`pull`: their torque on a standing arm), because an arm that something
-  /// holds does not follow its springs.
+  /// from the dampers only (`pull`: their torque on a standing arm), because a held arm does not
+  /// follow its springs.
   struct Law {
     Vector7 constant = Vector7::Zero(), pull = Vector7::Zero();
     Matrix7 damping = Matrix7::Zero();

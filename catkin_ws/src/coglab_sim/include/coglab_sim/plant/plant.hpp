@@ -85,7 +85,7 @@ class Plant {
   void setPerson(const PersonInput& person);
   void setPush(const Wrench& push) { push_ = push; }  ///< on ih2_palm about its origin
   void setBrakes(bool on);                            ///< motors without torque, brakes closed
-  void setBlock(bool on);                             ///< somebody holds all joints in place
+  void setBlock(bool on);                             ///< a person holds all joints in place
   HandMotors& motors() { return motors_; }
   const HandMotors& motors() const { return motors_; }
   /// @throws std::invalid_argument if the object would overlap something by more than 3 mm, or the

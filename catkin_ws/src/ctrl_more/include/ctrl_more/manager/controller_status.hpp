@@ -17,7 +17,7 @@ struct ManagerOptions {
                               ///< controller has an `overrun_us`
   bool lockstep = false;      ///< simulated time: overruns are not judged
   int overruns_to_pause = 5;  ///< overruns in a row that pause a controller
-  bool check_undeclared = false;  ///< test mode: compare everything a controller did not declare
+  bool check_undeclared = false;  ///< test mode: check all signals a controller did not declare
 };
 
 /// Options of one controller: its block in the list file.

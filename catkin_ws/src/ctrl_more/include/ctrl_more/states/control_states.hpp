@@ -190,7 +190,7 @@ class ControlStates {
     return constant<N>(handle.signal_);
   }
 
-  /// As above; for whoever has the permission to modify the signal.
+  /// As above, by the permission to modify the signal.
   /// @throws EmptyHandle
   template <int N>
   Eigen::Map<const Eigen::Matrix<double, N, 1>> view(const Modify<N>& handle) const {

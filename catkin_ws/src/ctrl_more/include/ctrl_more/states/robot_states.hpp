@@ -147,7 +147,7 @@ class RobotStates {
   /// @param stamp_ns monotonic nanoseconds >= 0
   bool write(RobotSignal signal, const double* values, std::int64_t stamp_ns);
 
-  /// Makes a signal absent, as if it was never written: controllers that need it wait for it.
+  /// Makes a signal absent, as if it was never written. Controllers that need it wait for it.
   void forget(RobotSignal signal) { stamps_[signal.index()] = kNeverWritten; }
   /// @}
 

@@ -1,5 +1,5 @@
 /// @file
-/// Hand guiding: a person leads the arm in joint impedance with almost no stiffness, and the
+/// Hand guiding: a person moves the arm in joint impedance with almost no stiffness, and the
 /// set-point follows the arm. Without that, the robot controller would pull the arm back to where
 /// the guiding began as soon as it leaves the mode, with its own, high stiffness.
 #pragma once
@@ -9,10 +9,10 @@
 
 namespace lwr_fri_bridge {
 
-/// Nm/rad; a joint with this stiffness or less counts as led by hand.
+/// Nm/rad; a joint with this stiffness or less counts as guided by hand.
 constexpr double kGuidingStiffness = 0.1;
 
-/// Whether the arm gives way in this mode: joint impedance, no joint stiffer than
+/// True if a person can guide the arm in this mode: joint impedance, no joint stiffer than
 /// kGuidingStiffness. Real-time safe.
 bool givesWay(const ControlMode& mode);
 
