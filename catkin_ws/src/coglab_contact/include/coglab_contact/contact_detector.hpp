@@ -68,8 +68,7 @@ class ContactDetector {
   ContactDetector(const DetectorSettings& settings, JacobianAt jacobian);
 
   /// Uses these settings from the next sample on. An armed request keeps its k and load share.
-  /// `cutoff`, `window` and `learn_samples` do not change, because the learnt noise depends on
-  /// them.
+  /// `cutoff`, `window` and `learn_samples` do not change: the learnt noise depends on them.
   void tune(const DetectorSettings& settings);
 
   /// Watches as soon as the arm stands still.

@@ -47,8 +47,7 @@ inline const char* describe(MotionBlock block) {
     case MotionBlock::Stopping:
       return "stop was requested";
     case MotionBlock::Leashed:
-      return "the set-point was too far ahead of the arm, which is blocked; request the motion "
-             "again";
+      return "the set-point was too far ahead of a blocked arm; request the motion again";
     case MotionBlock::PoorQuality:
       return "the robot controller judged the connection unacceptable: answers were missing or "
              "late; look at answer rate and latency on /diagnostics, relieve this computer or its "

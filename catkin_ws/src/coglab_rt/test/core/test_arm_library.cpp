@@ -39,8 +39,7 @@ TEST(ArmLibrary, UnusableLibrariesAreRefusedWithAReason) {
   for (const auto& [file, words] :
        {std::pair<std::string, std::string>{library("none"), "has no arm; write COGLAB_ARM"},
         {library("other_version"), "was made for interface 999 of an arm, expected 1; compile"},
-        {library("throwing"),
-         "its arm could not be made: no cable is plugged in; correct the cause"},
+        {library("throwing"), "its arm could not be made: no cable is plugged in; correct"},
         {"/nowhere/libmy_arm.so", "cannot be opened: /nowhere/libmy_arm.so"},
         {__FILE__, "cannot be opened"}}) {
     const std::string said = refusal(file);

@@ -97,8 +97,7 @@ TEST(LettingGoTest, CorrectionOfAPauseFadesWhenItResumesWithoutItsSensor) {
   }
 }
 
-// For a host that stops its arm: the arm must stand, even if a controller or a pause holds a
-// correction.
+// For a host that stops its arm: it must stand, even if a controller or pause holds a correction.
 TEST(LettingGoTest, LetGoRemovesCorrectionsAndThenBlendsInNewOnes) {
   Rig rig(0.1);
   TestController* raw = rig.add(adder("pose", "ee", 1.0), "c");
