@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from contextlib import redirect_stdout
 from importlib import import_module
 from typing import NoReturn
 
@@ -54,7 +55,9 @@ def run(words: list[str]) -> int:
         except ImportError:  # only completion needs it
             pass
         options = parser.parse_args(words)
-        answer: Answer = options.run(options)
+        as_json = options.json
+        with redirect_stdout(sys.stderr if as_json else sys.stdout):  # prompts too: the answer is alone on stdout
+            answer: Answer = options.run(options)
     except CommandError as error:
         return _refuse(str(error), error.status, as_json)
     except ModuleNotFoundError as error:

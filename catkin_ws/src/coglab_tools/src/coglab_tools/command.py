@@ -60,26 +60,31 @@ class NotThere(CommandError):
     status = NOT_THERE
 
 
+def plural(count: int, name: str) -> str:
+    """Such as "1 trial" or "2 trials"."""
+    return f"{count} {name}{'s' * (count != 1)}"
+
+
 def progress(items: Iterable[Item], total: int, title: str) -> Iterator[Item]:
     """Yield the items. On a terminal a bar shows how many of `total` are done once this has taken more than 2 s."""
     if not sys.stderr.isatty():
         yield from items
         return
-    from time import monotonic
+    from threading import Timer
 
     from rich.console import Console
     from rich.progress import Progress
 
-    begin, bar, task = monotonic(), None, None
+    bar = Progress(console=Console(stderr=True), transient=True)
+    task = bar.add_task(title, total=total)
+    late = Timer(2.0, bar.start)  # also while the first item takes long
+    late.daemon = True
+    late.start()
     try:
         for done, item in enumerate(items):
-            if bar is None and monotonic() - begin > 2.0:
-                bar = Progress(console=Console(stderr=True), transient=True)
-                bar.start()
-                task = bar.add_task(title, total=total)
-            if bar is not None and task is not None:
-                bar.update(task, completed=done)
+            bar.update(task, completed=done)
             yield item
     finally:
-        if bar is not None:
-            bar.stop()
+        late.cancel()
+        late.join()
+        bar.stop()

@@ -77,6 +77,8 @@ _ALL = (
             ("outcome",)),
     Command("answer", "writes answers to a questionnaire of the study that is run live", {
         "questionnaire": _NAME,
+        "of": {"type": "array", "minItems": 3, "maxItems": 3,
+               "items": {"type": ["string", "integer"], "maxLength": 64}},  # participant, block, condition of the form
         "answers": {"type": "object", "minProperties": 1, "maxProperties": 200,
                     "additionalProperties": {"type": "number"}},
     }, ("questionnaire", "answers"), operator=False),

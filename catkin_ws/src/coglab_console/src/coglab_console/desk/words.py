@@ -172,6 +172,7 @@ def command(name: str, arguments: Mapping[str, Any]) -> str:
         return "Acknowledge"
     elif name == "answer":
         words = "Questionnaire"
+        given.pop("of", None)
         given.pop("answers", None)  # what a participant answered is nobody else's business
     else:
         words = COMMANDS.get(name) or button(name)

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 ANSWERS = "questionnaires.csv"
 COLUMNS = ("participant", "block", "condition", "questionnaire", "item", "answer")
+Visit = tuple[str, int, str]  # participant, block, condition
 LARGEST = 20_000_000  # bytes of a file of answers
 _WORDS = {"type": "array", "minItems": 1, "uniqueItems": True, "items": {"type": "string", "pattern": r"^[a-z0-9_]+\Z"}}
 _SCHEMA = {
@@ -158,6 +159,18 @@ def answers_of(study: Study) -> list[AnswerRow]:
     """All answers of a study. An empty list if there are none. CheckFailed names file and line."""
     path = study.folder / ANSWERS
     return read_answers(path, study) if path.exists() else []
+
+
+def open_items(study: Study, visits: Iterable[Visit]) -> dict[Visit, dict[str, list[str]]]:
+    """The items that are not answered yet, by visit and questionnaire. {} of a visit: all are answered."""
+    answered = {row.place for row in answers_of(study)}
+    found: dict[Visit, dict[str, list[str]]] = {}
+    for visit in visits:
+        found[visit] = {}
+        for each in study.questionnaires:
+            if items := [item for item in each.items if (*visit, each.name, item) not in answered]:
+                found[visit][each.name] = items
+    return found
 
 
 def add_answers(study: Study, rows: Iterable[AnswerRow]) -> tuple[int, int]:
