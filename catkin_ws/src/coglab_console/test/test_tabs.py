@@ -152,7 +152,7 @@ def test_a_questionnaire_is_filled_in_recordings_are_listed_and_a_primitive_is_p
     page.tab("Experiment")
     asked = {"name": "tlx", "title": "Workload", "low": 0, "high": 100, "step": 5, "ends": ["low", "high"],
              "items": [["effort", "How hard?"], ["pace", "How hurried?"]]}  # fmt: skip
-    of = ["P03", 1, "calm"]
+    of = ["P03", "1", "calm"]
     study = {"study": "s", "participant": "P03", "condition": "calm", "of": of, "problem": ""}
     row = {"name": "x", "started": "2026-11-28T13:41:48.795+00:00", "action": "take", "object": "mug",
            "participant": "P03", "condition": "calm", "outcome": "succeeded", "duration_s": 9.4,

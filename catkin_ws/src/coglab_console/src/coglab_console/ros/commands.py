@@ -185,7 +185,7 @@ class RosBackend:
         self._view.files_changed()
         return answer
 
-    def _answer(self, questionnaire: str, answers: dict[str, float], of: list[Any] | None = None) -> Answer:
+    def _answer(self, questionnaire: str, answers: dict[str, float], of: list[str] | None = None) -> Answer:
         from coglab_tools.command import CommandError
 
         try:

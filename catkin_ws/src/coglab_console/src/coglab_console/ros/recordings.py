@@ -78,19 +78,21 @@ class LiveStudy:
         if not self.name:
             return None
         head: dict[str, Any] = {name: str(named.get(name, "")) for name in ("study", "participant", "condition")}
-        head["of"] = self._head(named)
+        head["of"] = list(map(str, self._head(named)))
         try:
             return {**head, "problem": "", "questionnaires": self._open(named)}
         except CommandError as error:
             return {**head, "problem": str(error), "questionnaires": []}
 
-    def answer(self, questionnaire: str, answers: dict[str, float], of: list[Any] | None = None) -> str:
+    def answer(self, questionnaire: str, answers: dict[str, float], of: list[str] | None = None) -> str:
         """Write answers of the participant under this condition, all or none. `of`: participant, block and condition
         that the form was about; None: the current ones. Returns a sentence. CommandError: why they cannot be
         written."""
         from coglab_tools.command import CheckFailed
         from coglab_tools.study.questionnaires import AnswerRow, add_answers
 
+        if not answers:
+            raise CheckFailed("nothing is filled in: type a number at one item or more")
         named = self._named()
         if not named.get("study_folder"):
             raise CheckFailed("no study is run live: ./coglab study run FOLDER --live")
@@ -103,7 +105,7 @@ class LiveStudy:
             if sentence:
                 raise CheckFailed(f"{item}: {sentence}")
         head = self._head(named)
-        if of is not None and tuple(of) != head:
+        if of is not None and of != list(map(str, head)):
             raise CheckFailed(
                 f"the study went on to {head[0]}, {head[2]}, and nothing was written: ./coglab study ask {of[0]} asks "
                 f"for {of[2]} later"
