@@ -9,13 +9,15 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from contextlib import redirect_stdout
+from contextlib import nullcontext, redirect_stdout
 from importlib import import_module
 from typing import NoReturn
 
-from coglab_tools.command import NOT_THERE, Answer, CommandError, UsageError
+from coglab_tools.command import NOT_THERE, Answer, CommandError, UsageError, working
 
 NOUNS = ("dmp", "people", "trial", "study")
+TALKATIVE = {("dmp", "record"), ("trial", "replay"), ("study", "ask"), ("study", "run"), ("study", "resume")}
+"""verbs that print or ask while they run, and so have no bar from beginning to end"""
 
 
 class Parser(argparse.ArgumentParser):
@@ -57,7 +59,9 @@ def run(words: list[str]) -> int:
         options = parser.parse_args(words)
         as_json = options.json
         with redirect_stdout(sys.stderr if as_json else sys.stdout):  # prompts too: the answer is alone on stdout
-            answer: Answer = options.run(options)
+            talks = (options.noun, options.verb) in TALKATIVE
+            with nullcontext() if talks else working(f"{options.noun} {options.verb}"):
+                answer: Answer = options.run(options)
     except CommandError as error:
         return _refuse(str(error), error.status, as_json)
     except ModuleNotFoundError as error:

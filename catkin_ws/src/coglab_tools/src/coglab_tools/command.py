@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
@@ -65,26 +66,47 @@ def plural(count: int, name: str) -> str:
     return f"{count} {name}{'s' * (count != 1)}"
 
 
-def progress(items: Iterable[Item], total: int, title: str) -> Iterator[Item]:
-    """Yield the items. On a terminal a bar shows how many of `total` are done once this has taken more than 2 s."""
-    if not sys.stderr.isatty():
-        yield from items
+_bar: Any = None  # of the command that runs: rich's Progress with one task
+
+
+@contextmanager
+def working(title: str) -> Iterator[None]:
+    """On a terminal a bar moves once the block has taken more than 2 s. Nothing else may write or read there."""
+    global _bar
+    if _bar is not None or not sys.stderr.isatty():
+        yield
         return
     from threading import Timer
 
     from rich.console import Console
     from rich.progress import Progress
 
-    bar = Progress(console=Console(stderr=True), transient=True)
-    task = bar.add_task(title, total=total)
-    late = Timer(2.0, bar.start)  # also while the first item takes long
+    _bar = Progress(console=Console(stderr=True), transient=True)
+    _bar.add_task(title, total=None)
+    late = Timer(2.0, _bar.start)
     late.daemon = True
     late.start()
     try:
-        for done, item in enumerate(items):
-            bar.update(task, completed=done)
-            yield item
+        yield
     finally:
         late.cancel()
         late.join()
-        bar.stop()
+        _bar.stop()
+        _bar = None
+
+
+def progress(items: Iterable[Item], total: int, title: str) -> Iterator[Item]:
+    """Yield the items. On a terminal a bar shows how many of `total` are done once this has taken more than 2 s."""
+    with working(title):
+        if _bar is None:
+            yield from items
+            return
+        bar = _bar
+        (before,) = bar.tasks
+        bar.remove_task(before.id)
+        task = bar.add_task(title, total=total)
+        for done, item in enumerate(items):
+            bar.update(task, completed=done)
+            yield item
+        bar.remove_task(task)
+        bar.add_task(before.description, total=None)
