@@ -211,6 +211,11 @@ def read_answers(path: Path, study: Study) -> list[AnswerRow]:
         raise CheckFailed(f"{path}:1: with a column answer, the columns questionnaire and item are expected too")
     if not long:
         for name in header:
+            if len(both := [each.name for each in known if name in each.items]) > 1:
+                raise CheckFailed(
+                    f"{path}:1: the column '{name}' is an item of {' and '.join(both)}: write one row per answer, with "
+                    "the columns participant, condition, questionnaire, item, answer"
+                )
             if name not in owner and name not in ("participant", "condition", "block"):
                 raise CheckFailed(
                     f"{path}:1: the column '{name}' is no item of {', '.join(by_name) or 'any questionnaire'}"
