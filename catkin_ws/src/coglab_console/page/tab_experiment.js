@@ -58,18 +58,25 @@ function recorded({ folder = '', recording = false, rows = [] } = {}) {
   ];
 }
 
-/** A questionnaire of the live study: one number per item. Items left empty stay on the page. */
-function asked(one, told) {
+/** A questionnaire of the live study: one number per item. Items left empty are asked again. */
+function asked(one, of, told) {
   const inputs = one.items.map(([, text]) => h('input', { type: 'number', min: one.low, max: one.high, step: one.step, 'aria-label': text }));
-  const request = () => ['answer', { questionnaire: one.name, answers: Object.fromEntries(one.items.flatMap(([item], i) => (inputs[i].value === '' ? [] : [[item, Number(inputs[i].value)]]))) }];
+  const request = () => ['answer', { questionnaire: one.name, of, answers: Object.fromEntries(one.items.flatMap(([item], i) => (inputs[i].value === '' ? [] : [[item, Number(inputs[i].value)]]))) }];
   return h('form', { onsubmit: (event) => event.preventDefault() }, h('h3', {}, one.title), h('p', {}, `${one.low}: ${one.ends[0]}; ${one.high}: ${one.ends[1]}`),
     ...one.items.map(([, text], i) => field(text, inputs[i])), h('div', { class: 'row' }, commandButton('Write the answers', { name: 'answer', told, words: `Write the answers: ${one.title}`, request })));
 }
 
-function questions(study, told) {
+/** `forms`: those of the last time, so that what is being typed in one stays while another is written. */
+function questions(study, told, forms) {
+  const before = new Map(forms);
+  forms.clear();
   if (!study) return [];
+  for (const one of study.questionnaires) {
+    const key = JSON.stringify([study.of, one]);
+    forms.set(key, before.get(key) ?? asked(one, study.of, told));
+  }
   const stands = study.problem || (study.questionnaires.length ? '' : 'Every questionnaire under this condition is answered.');
-  return [h('h2', {}, `Questionnaires of ${study.participant}, condition ${study.condition}, study ${study.study}`), stands ? h('p', {}, stands) : null, ...study.questionnaires.map((one) => asked(one, told))];
+  return [h('h2', {}, `Questionnaires of ${study.participant}, condition ${study.condition}, study ${study.study}`), stands ? h('p', {}, stands) : null, ...forms.values()];
 }
 
 export function experimentPage(page) {
@@ -106,11 +113,12 @@ export function experimentPage(page) {
     notes.replaceChildren(table(['Time', 'Who', 'Note'], session.notes.slice().reverse().map((note) => [clock(note.stamp), note.who, note.text]), 'Notes'));
   };
   let before = '';
+  const forms = new Map();
   const drawStudy = () => {
     const key = JSON.stringify(store.docs.study ?? null);
     if (key === before) return; // keep what is being typed
     before = key;
-    open.replaceChildren(...questions(store.docs.study, told).filter(Boolean));
+    open.replaceChildren(...questions(store.docs.study, told, forms).filter(Boolean));
   };
   const drawRecordings = () => recordings.replaceChildren(...recorded(store.docs.recordings).filter(Boolean));
   draw();

@@ -42,9 +42,13 @@ def test_answers_of_the_page_are_those_of_the_study(tmp_path, parameters):
     }  # fmt: skip
     (one,) = live.document()["questionnaires"]
     assert ["effort", "How hard did you have to work to accomplish your level of performance?"] in one["items"]
+    with pytest.raises(CheckFailed, match="nothing is filled in"):
+        live.answer("nasa_tlx", {})
     with pytest.raises(CheckFailed, match="effort: 0 to 100"):
         live.answer("nasa_tlx", {"effort": 52})
-    live.answer("nasa_tlx", {"effort": 50})
+    with pytest.raises(CheckFailed, match="went on to P01, calm"):
+        live.answer("nasa_tlx", {"effort": 45}, ["P01", "1", "brisk"])
+    live.answer("nasa_tlx", {"effort": 50}, ["P01", "1", "calm"])
     assert [(row.participant, row.item, row.answer) for row in answers_of(load(tmp_path))] == [("P01", "effort", 50.0)]
     assert len(live.document()["questionnaires"][0]["items"]) == 5
     (tmp_path / "study.yaml").write_text("nothing")

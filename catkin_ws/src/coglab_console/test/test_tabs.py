@@ -152,16 +152,19 @@ def test_a_questionnaire_is_filled_in_recordings_are_listed_and_a_primitive_is_p
     page.tab("Experiment")
     asked = {"name": "tlx", "title": "Workload", "low": 0, "high": 100, "step": 5, "ends": ["low", "high"],
              "items": [["effort", "How hard?"], ["pace", "How hurried?"]]}  # fmt: skip
+    of = ["P03", "1", "calm"]
+    study = {"study": "s", "participant": "P03", "condition": "calm", "of": of, "problem": ""}
     row = {"name": "x", "started": "2026-11-28T13:41:48.795+00:00", "action": "take", "object": "mug",
            "participant": "P03", "condition": "calm", "outcome": "succeeded", "duration_s": 9.4,
            "notes": "looked away"}  # fmt: skip
     live.put(
-        study={"study": "s", "participant": "P03", "condition": "calm", "problem": "", "questionnaires": [asked]},
+        study={**study, "questionnaires": [asked, {**asked, "name": "other", "items": [["calm", "How calm?"]]}]},
         recordings={"folder": "/x", "recording": True, "rows": [row]},
     )
     field = "document.querySelector('#page input[aria-label=\"How hard?\"]')"
     page.until(f"return {field} !== null && document.body.innerText.includes('looked away')", 60.0)
     page.js(f"{field}.value = '55'")
+    live.put(study={**study, "questionnaires": [asked]})  # the other one was written
     live.put(recordings={"folder": "/y", "recording": True, "rows": [row]})
     page.until("return document.body.innerText.includes('/y')", 60.0)
     assert page.js(f"return {field}.value") == "55"  # what is being filled in stays
@@ -169,7 +172,7 @@ def test_a_questionnaire_is_filled_in_recordings_are_listed_and_a_primitive_is_p
         "[...document.querySelectorAll('#page button')].find((one) => one.innerText === 'Write the answers').click()"
     )
     page.until("return document.querySelector('#page p[aria-live]').innerText.includes('done')", 60.0)
-    assert live.robot.calls[-1] == ("answer", {"questionnaire": "tlx", "answers": {"effort": 55}})
+    assert live.robot.calls[-1] == ("answer", {"questionnaire": "tlx", "of": of, "answers": {"effort": 55}})
     page.tab("Primitives")
     shown = {
         "name": "reach_me",

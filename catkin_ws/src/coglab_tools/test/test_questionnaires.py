@@ -108,3 +108,12 @@ def test_an_invalid_answers_file_is_refused_with_file_and_line(tmp_path, line):
     (tmp_path / "questionnaires.csv").write_text(f"participant,block,condition,questionnaire,item,answer\n{line}\n")
     with pytest.raises(CheckFailed, match="questionnaires.csv:2:"):
         answers_of(study_in(tmp_path))
+
+
+def test_a_column_of_two_questionnaires_is_refused(tmp_path):
+    own = "title: Own\nsource: us\nlow: 0\nhigh: 9\nscales: {load: [effort]}\n"
+    (tmp_path / "own.yaml").write_text(own)
+    (tmp_path / "answers.csv").write_text("participant,condition,effort\nP01,calm,5\n")
+    study = study_in(tmp_path, STUDY.replace("godspeed", "own.yaml"))
+    with pytest.raises(CheckFailed, match=":1: the column 'effort' is an item of nasa_tlx and own"):
+        read_answers(tmp_path / "answers.csv", study)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import json
 import os
 import signal
 import subprocess
@@ -17,7 +19,7 @@ from coglab_tools.__main__ import run
 from coglab_tools.command import CheckFailed, UsageError
 from coglab_tools.study import settings, simulate
 from coglab_tools.study.cluster import local_cluster
-from coglab_tools.study.live import session
+from coglab_tools.study.live import machines_file, session, write_machines
 from coglab_tools.study.plan import load
 from coglab_tools.study.report import write_report
 from coglab_tools.study.rows import ROWS, open_rows
@@ -156,7 +158,7 @@ def test_a_lost_worker_and_a_lost_scheduler_change_nothing(undisturbed, tmp_path
         wait_for_rows(folder, 2, study)
         kill(scheduler)
         said, _ = study.communicate(timeout=LIMIT)
-        assert study.returncode == 3 and "study resume" in said, said
+        assert study.returncode == 3 and "study resume" in said and "Traceback" not in said, said
     finally:
         for process in (*workers, scheduler):
             kill(process)
@@ -208,7 +210,7 @@ def test_a_study_with_all_trials_skipped_has_no_report(tmp_path):
     with open_rows(load(folder), write=True) as rows:
         rows.begin({}, simulated=False)
         rows.add(1, [])
-    with pytest.raises(CheckFailed, match="all 1 trials so far were skipped"):
+    with pytest.raises(CheckFailed, match="every trial so far .1. was skipped"):
         write_report(load(folder))
 
 
@@ -225,7 +227,7 @@ def test_ctrl_c_names_the_command_to_continue(undisturbed, tmp_path, monkeypatch
     (folder / ROWS).write_bytes(b"".join(lines[:3]))
     monkeypatch.setattr(simulate, "run", lambda job: (_ for _ in ()).throw(KeyboardInterrupt))
     assert run(["study", "resume", str(folder), "--workers", "1"]) == 130
-    assert f"2 of 4 trials are done and kept. To go on: ./coglab study resume {folder}" in capsys.readouterr().err
+    assert f"2 of 4 trials done and kept. To go on: ./coglab study resume {folder}" in capsys.readouterr().err
 
 
 def test_primitive_delivery_and_feedback_reach_the_world():
@@ -283,13 +285,54 @@ def test_a_live_session_with_notes_repetition_and_resume(tmp_path, capsys):
     text = YAML.replace("[receive]", "[receive, give]").replace("simulated:", "questionnaires: [nasa_tlx]\nsimulated:")
     folder, system = make(tmp_path / "kill", text), StubSystem()
     with coglab.World(seed=3, person="accustomed", perfect_perception=True) as world:
-        lines = iter(["what", "n looked away", "", "", *["50"] * 6, "r", "", "n let go early", "l", "q"])
-        data = session(load(folder), world.robot, system, "P02", lambda prompt: next(lines))
+        lines = iter(["what", "n looked away", "", "", *["50"] * 5, "skip", "r", "", "n let go early", "l", "q"])
+        data = session(load(folder), world.robot, lambda _: system, "P02", lambda prompt: next(lines))
     assert (data["trials"], data["trials_now"], data["handovers"], data["succeeded"]) == (1, 1, 2, 2)
     first = system.calls[1]
-    assert system.calls == ["looked away", first, f"P02 {first}", f"P02 {first}", "let go early", "restored"]
+    assert system.calls == ["looked away", first, *[f"P02 {first}"] * 4, "let go early", "restored"]
     with open_rows(load(folder)) as rows:
         assert [(row["attempt"], row["notes"]) for row in rows.table()] == [(2, "let go early")] * 2
     assert b"looked away" in (folder / ROWS).read_bytes()
     with pytest.raises(CheckFailed, match="live trials"):
         run_simulated(load(folder))
+
+
+def test_a_later_session_asks_what_is_open_and_its_last_trial_is_repeated(tmp_path, capsys):
+    text = YAML.replace("[receive]", "[receive, give]").replace("simulated:", "questionnaires: [nasa_tlx]\nsimulated:")
+    folder, system = make(tmp_path / "kill", text), StubSystem()
+    with open_rows(load(folder), write=True) as rows:
+        rows.begin({}, simulated=False)
+        (first, second) = [trial for trial in load(folder).trials() if trial.participant == "P01"]
+        row = {
+            "participant": "P01",
+            "condition": first.condition,
+            "action": "receive",
+            "outcome": "",
+            "reason_code": "",
+        }
+        rows.add(first.number, [{**row, "block": 1, "success": 0}])
+    with coglab.World(seed=3, person="accustomed", perfect_perception=True) as world:
+        lines = iter(["", *["50"] * 6, "", "l", "r", "", "l", "n good", "r", "s", "l", ""])
+        session(load(folder), world.robot, lambda _: system, "P01", lambda prompt: next(lines))
+    with open_rows(load(folder)) as rows:
+        assert [(row["attempt"], row["notes"]) for row in rows.trials[second.number]] == [(2, "good")] * 2
+    assert run(["study", "status", str(folder)]) == 0
+    assert "all questionnaires of 1 of 2 conditions" in capsys.readouterr().out
+
+
+def test_a_second_session_leaves_the_files_of_the_first_alone(tmp_path, capsys):
+    folder = make(tmp_path / "kill")
+    study = load(folder)
+    with open_rows(study, write=True):
+        write_machines(study, study.conditions["calm"])
+        before = machines_file(study).read_bytes()
+        assert run(["study", "run", str(folder), "--live", "--json"]) == 2
+        assert machines_file(study).read_bytes() == before
+    assert "another process" in json.loads(capsys.readouterr().out)["error"]
+
+
+def test_json_is_alone_on_stdout_when_questions_are_asked(tmp_path, capsys, monkeypatch):
+    text = YAML.replace("simulated:", "questionnaires: [nasa_tlx]\nsimulated:")
+    monkeypatch.setattr("sys.stdin", io.StringIO("101\n50\n" + "skip\n" * 11))
+    assert run(["study", "ask", "P01", str(make(tmp_path / "kill", text)), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"answers": 1}

@@ -45,5 +45,10 @@ def test_no_scatter_and_no_pairs_give_no_effect():
     assert np.isnan(compare([1.0, 1.0], [2.0, 2.0]).effect) and compare([], []).pairs == 0
 
 
+def test_two_participants_have_a_difference_and_no_effect():
+    found = compare([1.0, 2.0], [2.0, 5.0])
+    assert found.low < 2.0 < found.high and np.isnan([found.effect, found.effect_low, found.effect_high]).all()
+
+
 def test_holm():
     assert holm([0.01, 0.04, float("nan"), 0.03])[:2] == pytest.approx([0.03, 0.06])

@@ -9,12 +9,15 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from contextlib import nullcontext, redirect_stdout
 from importlib import import_module
 from typing import NoReturn
 
-from coglab_tools.command import NOT_THERE, Answer, CommandError, UsageError
+from coglab_tools.command import NOT_THERE, Answer, CommandError, UsageError, working
 
 NOUNS = ("dmp", "people", "trial", "study")
+TALKATIVE = {("dmp", "record"), ("trial", "replay"), ("study", "ask"), ("study", "run"), ("study", "resume")}
+"""verbs that print or ask while they run, and so have no bar from beginning to end"""
 
 
 class Parser(argparse.ArgumentParser):
@@ -54,7 +57,11 @@ def run(words: list[str]) -> int:
         except ImportError:  # only completion needs it
             pass
         options = parser.parse_args(words)
-        answer: Answer = options.run(options)
+        as_json = options.json
+        with redirect_stdout(sys.stderr if as_json else sys.stdout):  # prompts too: the answer is alone on stdout
+            talks = (options.noun, options.verb) in TALKATIVE
+            with nullcontext() if talks else working(f"{options.noun} {options.verb}"):
+                answer: Answer = options.run(options)
     except CommandError as error:
         return _refuse(str(error), error.status, as_json)
     except ModuleNotFoundError as error:

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
@@ -60,26 +61,52 @@ class NotThere(CommandError):
     status = NOT_THERE
 
 
-def progress(items: Iterable[Item], total: int, title: str) -> Iterator[Item]:
-    """Yield the items. On a terminal a bar shows how many of `total` are done once this has taken more than 2 s."""
-    if not sys.stderr.isatty():
-        yield from items
+def plural(count: int, name: str) -> str:
+    """Such as "1 trial" or "2 trials"."""
+    return f"{count} {name}{'s' * (count != 1)}"
+
+
+_bar: Any = None  # of the command that runs: rich's Progress with one task
+
+
+@contextmanager
+def working(title: str) -> Iterator[None]:
+    """On a terminal a bar moves once the block has taken more than 2 s. Nothing else may write or read there."""
+    global _bar
+    if _bar is not None or not sys.stderr.isatty():
+        yield
         return
-    from time import monotonic
+    from threading import Timer
 
     from rich.console import Console
     from rich.progress import Progress
 
-    begin, bar, task = monotonic(), None, None
+    _bar = Progress(console=Console(stderr=True), transient=True)
+    _bar.add_task(title, total=None)
+    late = Timer(2.0, _bar.start)
+    late.daemon = True
+    late.start()
     try:
-        for done, item in enumerate(items):
-            if bar is None and monotonic() - begin > 2.0:
-                bar = Progress(console=Console(stderr=True), transient=True)
-                bar.start()
-                task = bar.add_task(title, total=total)
-            if bar is not None and task is not None:
-                bar.update(task, completed=done)
-            yield item
+        yield
     finally:
-        if bar is not None:
-            bar.stop()
+        late.cancel()
+        late.join()
+        _bar.stop()
+        _bar = None
+
+
+def progress(items: Iterable[Item], total: int, title: str) -> Iterator[Item]:
+    """Yield the items. On a terminal a bar shows how many of `total` are done once this has taken more than 2 s."""
+    with working(title):
+        if _bar is None:
+            yield from items
+            return
+        bar = _bar
+        (before,) = bar.tasks
+        bar.remove_task(before.id)
+        task = bar.add_task(title, total=total)
+        for done, item in enumerate(items):
+            bar.update(task, completed=done)
+            yield item
+        bar.remove_task(task)
+        bar.add_task(before.description, total=None)

@@ -16,7 +16,8 @@ STARTS = ("initialise", "reset", "exchange_human_to_robot", "exchange_robot_to_h
 _OBJECT = {"type": "string", "pattern": r"^([a-z][a-z0-9_]{0,31})?\Z"}
 _ACTION = {"type": "string", "pattern": r"^[a-z][a-z0-9_]{0,63}\Z"}
 _NAME = {"type": "string", "pattern": r"^[A-Za-z0-9_./-]{1,64}\Z"}
-_LABEL = {"type": "string", "pattern": r"^[A-Za-z0-9_ .-]{1,40}\Z"}
+_LABEL = {"type": "string", "pattern": r"^[A-Za-z0-9_ .-]{1,40}\Z",
+          "description": "letters A-Z, digits, spaces, _ . - (at most 40)"}  # fmt: skip
 # JSON can contain single UTF-16 surrogates, which UTF-8 cannot encode.
 _TEXT = {"type": "string", "minLength": 1, "maxLength": 500, "pattern": "^[^\ud800-\udfff]*\\Z"}
 
@@ -64,12 +65,14 @@ _ALL = (
             ("value",)),
     Command("select_object", "chooses the object of the next action", {"object_id": _OBJECT}, ("object_id",)),
     Command("session_begin", "begins a session with a participant", {
-        "participant": {"type": "string", "pattern": r"^[A-Za-z0-9_-]{1,32}\Z"},
+        "participant": {"type": "string", "pattern": r"^[A-Za-z0-9_-]{1,32}\Z",
+                        "description": "a pseudonym such as P07, of letters A-Z, digits, _ - (at most 32),"},
         "number": {"type": "integer", "minimum": 0, "maximum": 9999},
         "conditions": {"type": "array", "minItems": 1, "maxItems": 12, "uniqueItems": True, "items": _LABEL},
         "repetitions": {"type": "integer", "minimum": 1, "maximum": 50},
         "order": {"enum": ["as_listed", "latin_square", "random"]},
-        "study": {"type": "string", "pattern": r"^([a-z0-9][a-z0-9_.-]{0,39})?\Z"},
+        "study": {"type": "string", "pattern": r"^([a-z0-9][a-z0-9_.-]{0,39})?\Z",
+                  "description": "a name of letters a-z, digits, _ . - (at most 40)"},
     }, ("participant", "conditions", "repetitions", "order")),
     Command("session_end", "ends the session", {}),
     Command("trial_begin", "begins the next trial of the order", {}),
@@ -77,8 +80,9 @@ _ALL = (
             ("outcome",)),
     Command("answer", "writes answers to a questionnaire of the live study", {
         "questionnaire": _NAME,
-        "answers": {"type": "object", "minProperties": 1, "maxProperties": 200,
-                    "additionalProperties": {"type": "number"}},
+        "of": {"type": "array", "minItems": 3, "maxItems": 3,  # participant, block, condition of the form
+               "items": {"type": "string", "maxLength": 64}},
+        "answers": {"type": "object", "maxProperties": 200, "additionalProperties": {"type": "number"}},
     }, ("questionnaire", "answers"), operator=False),
     Command("preview", "shows the path of a primitive toward the goal of the next action; empty: ends the preview",
             {"primitive": {"type": "string", "pattern": r"^[A-Za-z0-9_.-]{0,64}\Z"}}, ("primitive",), operator=False),
@@ -116,7 +120,9 @@ def judge(name: Any, arguments: Any) -> Command:
         raise BadCommand(f"{name}: lists are nested too deeply") from None
     if error is not None:
         where = ".".join(str(part) for part in error.absolute_path)
-        raise BadCommand(f"{name}{': ' + where if where else ''}: {error.message[:200]}")
+        plain = error.schema.get("description", "") if error.validator == "pattern" else ""
+        told = f"{plain} is expected, got '{error.instance[:40]}'" if plain else error.message[:200]
+        raise BadCommand(f"{name}{': ' + where if where else ''}: {told}")
     return COMMANDS[name]
 
 

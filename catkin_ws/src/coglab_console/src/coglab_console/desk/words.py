@@ -172,6 +172,7 @@ def command(name: str, arguments: Mapping[str, Any]) -> str:
         return "Acknowledge"
     elif name == "answer":
         words = "Questionnaire"
+        given.pop("of", None)
         given.pop("answers", None)  # the answers of a participant are confidential
     else:
         words = COMMANDS.get(name) or button(name)

@@ -185,11 +185,11 @@ class RosBackend:
         self._view.files_changed()
         return answer
 
-    def _answer(self, questionnaire: str, answers: dict[str, float]) -> Answer:
+    def _answer(self, questionnaire: str, answers: dict[str, float], of: list[str] | None = None) -> Answer:
         from coglab_tools.command import CommandError
 
         try:
-            told = self._view.study.answer(questionnaire, answers)
+            told = self._view.study.answer(questionnaire, answers, of)
         except CommandError as error:
             return Answer(False, str(error))
         self._view.files_changed()

@@ -77,18 +77,21 @@ class LiveStudy:
         self.name = str(named.get("study", "")) if named.get("study_folder") else ""
         if not self.name:
             return None
-        head = {name: str(named.get(name, "")) for name in ("study", "participant", "condition")}
+        head: dict[str, Any] = {name: str(named.get(name, "")) for name in ("study", "participant", "condition")}
+        head["of"] = list(map(str, self._head(named)))
         try:
             return {**head, "problem": "", "questionnaires": self._open(named)}
         except CommandError as error:
             return {**head, "problem": str(error), "questionnaires": []}
 
-    def answer(self, questionnaire: str, answers: dict[str, float]) -> str:
-        """Writes answers of the participant under this condition, all or none. Returns a sentence. CommandError if they
-        cannot be written."""
+    def answer(self, questionnaire: str, answers: dict[str, float], of: list[str] | None = None) -> str:
+        """Writes answers of the participant under this condition, all or none. `of`: participant, block and condition
+        of the form; None: the current ones. Returns a sentence. CommandError if they cannot be written."""
         from coglab_tools.command import CheckFailed
         from coglab_tools.study.questionnaires import AnswerRow, add_answers
 
+        if not answers:
+            raise CheckFailed("nothing is filled in: type a number at one item or more")
         named = self._named()
         if not named.get("study_folder"):
             raise CheckFailed("no study is live: ./coglab study run FOLDER --live")
@@ -101,19 +104,23 @@ class LiveStudy:
             if sentence:
                 raise CheckFailed(f"{item}: {sentence}")
         head = self._head(named)
+        if of is not None and of != list(map(str, head)):
+            raise CheckFailed(
+                f"the study went on to {head[0]}, {head[2]}, and nothing was written: ./coglab study ask {of[0]} asks "
+                f"for {of[2]} later"
+            )
         add_answers(study, [AnswerRow(*head, questionnaire, item, float(value)) for item, value in answers.items()])
         return f"{len(answers)} answers of {head[0]} under {head[2]} written"
 
     def _open(self, named: dict[str, Any]) -> list[dict[str, Any]]:
-        from coglab_tools.study.questionnaires import answers_of
+        from coglab_tools.study.questionnaires import open_items
 
         study = self._load(named)
         head = self._head(named)
-        answered = {row.place for row in answers_of(study)}
+        missing = open_items(study, [head])[head]
         found = []
         for one in study.questionnaires:
-            items = [item for item in one.items if (*head, one.name, item) not in answered]
-            if items:
+            if items := missing.get(one.name):
                 found.append(
                     {
                         "name": one.name,

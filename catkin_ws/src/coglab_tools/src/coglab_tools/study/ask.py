@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from coglab_tools.command import CheckFailed, UsageError
 from coglab_tools.study.plan import Study
-from coglab_tools.study.questionnaires import AnswerRow, Questionnaire, add_answers, answers_of
+from coglab_tools.study.questionnaires import AnswerRow, Questionnaire, add_answers, open_items
 
 
 def ask(study: Study, participant: str, condition: str = "", block: int = 0, line: Callable[[str], str] = input) -> int:
@@ -21,14 +21,14 @@ def ask(study: Study, participant: str, condition: str = "", block: int = 0, lin
         )
     if condition and condition not in study.conditions:
         raise UsageError(f"--condition: one of {', '.join(study.conditions)} is expected, got '{condition}'")
-    answered = {row.place for row in answers_of(study)}
-    visits = dict.fromkeys((t.block, t.condition) for t in study.trials() if t.participant == participant)
+    visits = dict.fromkeys(t.visit for t in study.trials() if t.participant == participant)
+    missing = open_items(study, visits)
     count = 0
-    for visit, shown in visits:
+    for _, visit, shown in visits:
         if condition in ("", shown) and block in (0, visit):
             for questionnaire in study.questionnaires:
                 head = (participant, visit, shown, questionnaire.name)
-                items = [item for item in questionnaire.items if (*head, item) not in answered]
+                items = missing[head[:3]].get(questionnaire.name)
                 if not items:
                     continue
                 say = f"{participant}, condition {shown}" + (f", block {visit}" if study.blocks > 1 else "")

@@ -13,6 +13,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from typing import Any
 
 from coglab_tools.command import CheckFailed, NotThere, UsageError
@@ -50,7 +51,7 @@ def results(jobs: Sequence[simulate.Job], workers: int = 0, scheduler: str = "")
     import dask
     import distributed
 
-    for name in ("distributed", "distributed.client"):  # each has its own level
+    for name in ("asyncio", "distributed", "distributed.client"):  # each has its own level
         logging.getLogger(name).setLevel(logging.CRITICAL)  # errors are reported here in one sentence
     dask.config.set({"distributed.comm.timeouts.connect": "10s", "distributed.scheduler.allowed-failures": 3})
     if scheduler:
@@ -104,7 +105,8 @@ def _with_scheduler(jobs: Sequence[simulate.Job], distributed: Any, place: Any) 
     try:
         yield from _gathered(jobs, distributed, client)
     finally:
-        client.close(timeout=5)
+        with suppress(OSError, distributed.TimeoutError):  # a lost scheduler does not answer
+            client.close(timeout=5)
 
 
 def _gathered(jobs: Sequence[simulate.Job], distributed: Any, client: Any) -> Iterator[Done]:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from coglab_tools.command import Answer, CheckFailed, UsageError
+from coglab_tools.command import Answer, CheckFailed, UsageError, plural
 
 HELP = "studies: plan, run, resume, report"
 
@@ -69,8 +69,8 @@ def _init(options: argparse.Namespace) -> Answer:
     file = new(options.name)
     study = load(file.parent)
     text = (
-        f"wrote {file}: {len(study.participants)} participants, {len(study.conditions)} conditions, "
-        f"{len(study.trials())} trials; edit it as you like"
+        f"wrote {file}: {plural(len(study.participants), 'participant')}, "
+        f"{plural(len(study.conditions), 'condition')}, {plural(len(study.trials()), 'trial')}; edit it as you like"
     )
     return Answer(text, {"file": str(file), "trials": len(study.trials())}, f"./coglab study run {file.parent}")
 
@@ -87,12 +87,12 @@ def _run(options: argparse.Namespace) -> Answer:
     if options.fresh and done and not live:
         if done == total:
             return Answer(
-                f"all {total} trials of {study.name} are done",
+                f"{study.name}: {total} of {plural(total, 'trial')} done",
                 {"trials": total},
                 f"./coglab study report {study.folder}",
             )
         raise UsageError(
-            f"{done} of {total} trials are done already: ./coglab study resume {study.folder} runs the others"
+            f"{done} of {plural(total, 'trial')} done already: ./coglab study resume {study.folder} runs the others"
         )
     if not options.fresh and not done and not live:
         raise UsageError(f"nothing was interrupted, no trial is done: ./coglab study run {study.folder}")
@@ -116,12 +116,12 @@ def _run(options: argparse.Namespace) -> Answer:
             done = len(rows.trials)
         verb = "resume" if done or live else "run"
         raise KeyboardInterrupt(
-            f"ended by Ctrl-C; {done} of {total} trials are done and kept. To go on: ./coglab study {verb} "
+            f"ended by Ctrl-C; {done} of {plural(total, 'trial')} done and kept. To go on: ./coglab study {verb} "
             f"{study.folder}{' --live' if live else ''}"
         ) from None
     text = (
-        f"{data['trials']} of {total} trials of {study.name} are done, {data['trials_now']} of them now: "
-        f"{data['succeeded']} of {data['handovers']} handovers succeeded; {data['table']}"
+        f"{study.name}: {data['trials']} of {plural(total, 'trial')} done, {data['trials_now']} of them now; "
+        f"{data['succeeded']} of {plural(data['handovers'], 'handover')} succeeded; {data['table']}"
     )
     if not live and (study.folder / "machines.yaml").exists():
         text += f"; {study.folder / 'machines.yaml'} is for live sessions, simulated trials have the shipped one"
@@ -131,33 +131,39 @@ def _run(options: argparse.Namespace) -> Answer:
 
 def _status(options: argparse.Namespace) -> Answer:
     from coglab_tools.study.plan import load
-    from coglab_tools.study.questionnaires import answers_of
+    from coglab_tools.study.questionnaires import open_items
     from coglab_tools.study.rows import open_rows
 
     study = load(options.folder)
     trials = study.trials()
-    answered = {(row.participant, row.condition) for row in answers_of(study)}
     with open_rows(study) as rows:
         done, started, simulated = set(rows.trials), rows.header is not None, rows.simulated
         table = rows.table()
     kind = ("simulated" if simulated else "live") if started else "not started"
-    lines = [f"{study.name}, {kind}: {len(done)} of {len(trials)} trials done"]
+    missing = open_items(study, [trial.visit for trial in trials])
+    lines = [f"{study.name}, {kind}: {len(done)} of {plural(len(trials), 'trial')} done"]
     people = []
     for name in study.participants:
         own = [trial for trial in trials if trial.participant == name]
-        order = list(dict.fromkeys((trial.block, trial.condition) for trial in own))
+        order = list(dict.fromkeys(trial.visit for trial in own))
         finished = sum(trial.number in done for trial in own)
         failed = sum(row["participant"] == name and not int(row["success"]) for row in table)
-        asked = sum((name, condition) in answered for condition in study.conditions)
+        asked = sum(not missing[visit] for visit in order) if study.questionnaires else 0
         people.append({"participant": name, "done": finished, "trials": len(own), "failed": failed, "answered": asked})
+        questions = (
+            f", all questionnaires of {asked} of {plural(len(order), 'condition')}" if study.questionnaires else ""
+        )
         lines.append(
-            f"  {name}  {finished:3d} of {len(own)} trials, {failed} failed handovers, questionnaires of {asked} of "
-            f"{len(study.conditions)} conditions; order {', '.join(condition for _, condition in order)}"
+            f"  {name}  {finished:3d} of {plural(len(own), 'trial')}, {plural(failed, 'failed handover')}{questions}; "
+            f"order {', '.join(condition for *_, condition in order)}"
         )
     if len(lines) > 42:
         lines[41:] = [f"  ... {len(study.participants) - 40} more; --json has all"]
     following = next((trial for trial in trials if trial.number not in done), None)
-    if following is None:
+    asked_next = next((t.participant for t in trials if missing[t.visit]), "") if started and not simulated else ""
+    if following is None and asked_next:
+        then = f"./coglab study ask {asked_next} {study.folder}"
+    elif following is None:
         then = f"./coglab study report {study.folder}"
     else:
         live = " --live" if started and not simulated else ""
@@ -172,7 +178,7 @@ def _ask(options: argparse.Namespace) -> Answer:
 
     study = load(options.folder)
     count = ask(study, study.participant(options.participant), options.condition)
-    text = f"{count} answers of {options.participant} written"
+    text = f"{plural(count, 'answer')} of {options.participant} written"
     return Answer(text, {"answers": count}, f"./coglab study status {study.folder}")
 
 
@@ -187,7 +193,7 @@ def _import(options: argparse.Namespace) -> Answer:
         )
     rows = read_answers(options.file, study)
     new, replaced = add_answers(study, rows)
-    text = f"{new} new answers, {replaced} replaced, from {options.file}"
+    text = f"{plural(new, 'new answer')}, {replaced} replaced, from {options.file}"
     return Answer(text, {"new": new, "replaced": replaced}, f"./coglab study report {study.folder}")
 
 

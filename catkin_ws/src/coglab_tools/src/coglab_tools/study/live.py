@@ -8,6 +8,7 @@ again and the object database its folder, so the system is launched with the cop
 from __future__ import annotations
 
 import copy
+import shlex
 import time
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
@@ -20,12 +21,13 @@ from coglab_py.packages import package_path
 from coglab_smach.context.config import Config, ConfigError
 from coglab_smach.parameters import BY_NAME
 
-from coglab_tools.command import CheckFailed, NotThere, UsageError
+from coglab_tools.command import CheckFailed, NotThere, UsageError, plural
 from coglab_tools.files import write_whole
 from coglab_tools.study import settings as condition_settings
 from coglab_tools.study.ask import ask
 from coglab_tools.study.own_files import PRIMITIVES
 from coglab_tools.study.plan import Study, Trial
+from coglab_tools.study.questionnaires import open_items
 from coglab_tools.study.recordings import RECORDINGS
 from coglab_tools.study.rows import Rows, open_rows, undone, write_table
 from coglab_tools.study.simulate import identity
@@ -62,31 +64,37 @@ def run_live(study: Study, participant: str = "") -> dict[str, Any]:
     """
     from coglab.running import NoRobot, connect
 
+    if participant:
+        study.participant(participant)
     try:
         with connect() as robot:
-            system = RunningSystem(study)
-            return session(study, robot, system, participant)
+            return session(study, robot, RunningSystem, participant)
     except (NoRobot, ImportError) as error:
-        prepare(study)
+        with open_rows(study, write=True):  # not below a session that runs
+            prepare(study)
         raise NotThere(f"{error}; for this study: {launch_line(study)}") from None
 
 
 def session(
-    study: Study, robot: Any, system: System, participant: str = "", line: Callable[[str], str] = input
+    study: Study,
+    robot: Any,
+    system_of: Callable[[Study], System],
+    participant: str = "",
+    line: Callable[[str], str] = input,
 ) -> dict[str, Any]:
-    """The session itself. ``line``: reads a line after a prompt."""
+    """The session itself. ``system_of``: makes the System once no other session can run. ``line``: reads a line after
+    a prompt."""
     with open_rows(study, write=True) as rows:
         left = [trial for trial in undone(study, rows) if participant in ("", trial.participant)]
-        if participant:
-            study.participant(participant)
         if not left:
             who = participant or "every participant"
             raise UsageError(f"{study.folder}: all trials of {who} are done; ./coglab study report {study.folder}")
         left = [trial for trial in left if trial.participant == left[0].participant]
+        system = system_of(study)
         rows.begin(identity(), simulated=False)
         name = f"{study.name}_{left[0].participant}_{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
         before = len(rows.trials)
-        print(f"{left[0].participant}: {len(left)} trials. {HELP}")
+        print(f"{left[0].participant}: {plural(len(left), 'trial')}. {HELP}")
         try:
             _Session(study, robot, system, rows, name, line).run(left)
         except EOFError:
@@ -119,14 +127,21 @@ class _Session:
 
     def run(self, left: list[Trial]) -> None:
         place = 0
-        while place < len(left):
-            trial = left[place]
-            print(
-                f"\n{trial.participant}, trial {place + 1} of {len(left)}: {trial.condition}"
-                f" ({trial.repetition} of {self.study.repetitions}): {', '.join(self.study.actions)}"
-            )
+        own = [trial for trial in self.study.trials() if trial.participant == left[0].participant]
+        for trial in {trial.visit: trial for trial in own}.values():
+            self._questions(trial, left)  # those that an earlier session has left open
+        while place <= len(left):
+            over = place == len(left)
+            trial = left[min(place, len(left) - 1)]
+            if over:
+                print(f"\n{trial.participant}: every trial is done. Enter ends the session; n TEXT and r as before")
+            else:
+                print(
+                    f"\n{trial.participant}, trial {place + 1} of {len(left)}: {trial.condition}"
+                    f" ({trial.repetition} of {self.study.repetitions}): {', '.join(self.study.actions)}"
+                )
             word, _, text = self.line("> ").strip().partition(" ")
-            if word == "q":
+            if word == "q" or (over and word == ""):
                 return
             if word == "n":
                 self._note(text.strip())
@@ -134,9 +149,11 @@ class _Session:
                 self._reset()
             elif word == "r" and place > 0:
                 place -= 1
-            elif word == "s":
-                self.rows.add(trial.number, [])
+            elif word == "s" and not over:
+                if trial.number not in self.rows.trials:  # after r, what was done before stays
+                    self.rows.add(trial.number, [])
                 place += 1
+                self._questions(trial, left[place:])
             elif word == "":
                 if self._run(trial):
                     place += 1
@@ -178,7 +195,7 @@ class _Session:
                 named = object_id if action in ("receive", "take") else None
                 result = getattr(self.robot, action)(named, limit=self.study.limit)
             except coglab.Refused as error:
-                print(f"  refused: {error}")
+                print(f"  refused: {error}; from another terminal: ./coglab start ACTION")
                 if not rows:
                     return False
                 rows.append(row | {"success": 0, "outcome": "refused", "reason_code": error.name, "reason": str(error)})
@@ -223,10 +240,14 @@ class _Session:
             print(f"  {error}")
 
     def _questions(self, trial: Trial, left: list[Trial]) -> None:
-        """After the last trial under a condition: its questionnaires."""
-        if not self.study.questionnaires or any((t.block, t.condition) == (trial.block, trial.condition) for t in left):
+        """After the last trial under a condition: its questionnaires, if a trial was done and an item is open."""
+        own = [each for each in self.study.trials() if each.visit == trial.visit]
+        done = any(self.rows.trials.get(each.number) for each in own)  # a skipped trial has no rows
+        if any(each in left for each in own) or not done or not any(open_items(self.study, [trial.visit]).values()):
             return
-        how = "questionnaires: Enter asks for them here, or after they were filled in at the console; l: later > "
+        self.system.announce(trial, self.name)  # the console shows the questionnaires of this trial
+        how = "asks for them here, or after they were filled in at the console; l: later > "
+        how = f"questionnaires, {trial.condition}: Enter {how}"
         word = self.line(how).strip()
         while word.partition(" ")[0] == "n":
             self._note(word.partition(" ")[2].strip())
@@ -273,10 +294,14 @@ def recordings_folder(study: Study) -> Path:
 
 def launch_line(study: Study) -> str:
     """The command that starts the system for this study."""
-    own = f"primitives:={primitives_copy(study)} " if study.own.primitives else ""
-    return (
-        f"./coglab launch machines:={machines_file(study)} objects:={objects_copy(study)} {own}"
-        f"record:={recordings_folder(study)}"
+    own = [f"primitives:={primitives_copy(study)}"] if study.own.primitives else []
+    return "./coglab launch " + shlex.join(
+        [
+            f"machines:={machines_file(study)}",
+            f"objects:={objects_copy(study)}",
+            *own,
+            f"record:={recordings_folder(study)}",
+        ]
     )
 
 

@@ -22,7 +22,7 @@ from coglab_tools.command import CheckFailed, UsageError
 from coglab_tools.files import write_whole
 from coglab_tools.study import settings as condition_settings
 from coglab_tools.study.own_files import OwnFiles
-from coglab_tools.study.questionnaires import Questionnaire, find
+from coglab_tools.study.questionnaires import Questionnaire, Visit, find
 
 FILE = "study.yaml"
 OWN_FILES = "own files"  # key of their hashes in the plan
@@ -79,6 +79,11 @@ class Trial:
     """seed of the virtual person: the same for all trials of a participant"""
     seed: int
     """seed of the variation between trials: the same for all conditions of a block and repetition"""
+
+    @property
+    def visit(self) -> Visit:
+        """Participant, block and condition, for which the questionnaires are filled in once."""
+        return self.participant, self.block, self.condition
 
     @property
     def label(self) -> str:

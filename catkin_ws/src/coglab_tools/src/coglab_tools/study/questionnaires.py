@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 ANSWERS = "questionnaires.csv"
 COLUMNS = ("participant", "block", "condition", "questionnaire", "item", "answer")
+Visit = tuple[str, int, str]  # participant, block, condition
 LARGEST = 20_000_000  # bytes of a file of answers
 _WORDS = {"type": "array", "minItems": 1, "uniqueItems": True, "items": {"type": "string", "pattern": r"^[a-z0-9_]+\Z"}}
 _SCHEMA = {
@@ -160,6 +161,18 @@ def answers_of(study: Study) -> list[AnswerRow]:
     return read_answers(path, study) if path.exists() else []
 
 
+def open_items(study: Study, visits: Iterable[Visit]) -> dict[Visit, dict[str, list[str]]]:
+    """The items that are not answered yet, by visit and questionnaire. {} of a visit: all are answered."""
+    answered = {row.place for row in answers_of(study)}
+    found: dict[Visit, dict[str, list[str]]] = {}
+    for visit in visits:
+        found[visit] = {}
+        for each in study.questionnaires:
+            if items := [item for item in each.items if (*visit, each.name, item) not in answered]:
+                found[visit][each.name] = items
+    return found
+
+
 def add_answers(study: Study, rows: Iterable[AnswerRow]) -> tuple[int, int]:
     """Add answers to the study's file, or replace older answers to the same items. The file is written completely or
     not at all. Returns the numbers of new and of replaced answers."""
@@ -198,6 +211,11 @@ def read_answers(path: Path, study: Study) -> list[AnswerRow]:
         raise CheckFailed(f"{path}:1: with a column answer, the columns questionnaire and item are expected too")
     if not long:
         for name in header:
+            if len(both := [each.name for each in known if name in each.items]) > 1:
+                raise CheckFailed(
+                    f"{path}:1: the column '{name}' is an item of {' and '.join(both)}: write one row per answer, with "
+                    "the columns participant, condition, questionnaire, item, answer"
+                )
             if name not in owner and name not in ("participant", "condition", "block"):
                 raise CheckFailed(
                     f"{path}:1: the column '{name}' is no item of {', '.join(by_name) or 'any questionnaire'}"

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from coglab_py.packages import package_path
 
-from coglab_tools.command import CheckFailed
+from coglab_tools.command import CheckFailed, plural
 from coglab_tools.files import write_whole
 from coglab_tools.report.metrics import METRICS
 from coglab_tools.study.plan import Study
@@ -49,7 +49,7 @@ def write_report(study: Study, pdf: bool = False) -> dict[str, Any]:
             raise CheckFailed(f"{study.folder}: no trial of {study.name} is done: ./coglab study run {study.folder}")
         if not rows.table():
             raise CheckFailed(
-                f"{study.folder / ROWS} has no handover: all {len(rows.trials)} trials so far were skipped; "
+                f"{study.folder / ROWS} has no handover: every trial so far ({len(rows.trials)}) was skipped; "
                 f"./coglab study status {study.folder} shows what is left"
             )
         table, problems = joined(study, rows.table())
@@ -81,10 +81,10 @@ def _verdict(study: Study, table: Sequence[Mapping[str, Any]], done: int, left: 
     good, all_ = sum(int(row["success"]) for row in table), len(table)
     low, high = wilson(good, all_)
     people = len({row["participant"] for row in table})
-    missing = f", {left} trials are left" if left else ""
+    missing = f"; to do: {plural(left, 'trial')}" if left else ""
     return (
-        f"{good} of {all_} handovers succeeded ({100 * good / all_:.1f} %, 95 % interval {100 * low:.1f} to "
-        f"{100 * high:.1f} %), in {done} trials with {people} participants{missing}."
+        f"{good} of {plural(all_, 'handover')} succeeded ({100 * good / all_:.1f} %, 95 % interval {100 * low:.1f} to "
+        f"{100 * high:.1f} %), in {plural(done, 'trial')} with {plural(people, 'participant')}{missing}."
     )
 
 
@@ -323,7 +323,7 @@ def _page(
     for trial in study.trials():
         orders.setdefault(trial.participant, {})[trial.block, trial.condition] = None
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    environment.filters |= {"number": _number, "p": _p}
+    environment.filters |= {"number": _number, "p": _p, "plural": plural}
     environment.globals |= {"interval": _interval}
     template = package_path("coglab_tools", "templates", "study_report.html").read_text(encoding="utf-8")
     return environment.from_string(template).render(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from coglab_tools.command import CheckFailed, CommandError, progress
+from coglab_tools.command import CheckFailed, CommandError, plural, progress
 from coglab_tools.study import cluster, simulate
 from coglab_tools.study.plan import Study
 from coglab_tools.study.recordings import RECORDINGS
@@ -30,7 +30,7 @@ def run_simulated(study: Study, workers: int = 0, scheduler: str = "") -> dict[s
                 rows.add(job.trial.number, found)
         except CommandError as error:
             kind = type(error)
-            state = f"{len(rows.trials)} of {len(study.trials())} trials are done and kept"
+            state = f"{len(rows.trials)} of {plural(len(study.trials()), 'trial')} done and kept"
             verb = "resume" if rows.trials else "run"
             raise kind(f"{error}. {state}; to go on: ./coglab study {verb} {study.folder}") from error
         everything = rows.table()

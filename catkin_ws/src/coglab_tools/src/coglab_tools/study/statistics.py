@@ -62,7 +62,8 @@ def compare(a: Sequence[float], b: Sequence[float], level: float = LEVEL) -> Com
     df, error = n - 1, scatter / math.sqrt(n)
     half = float(t.ppf(0.5 + level / 2, df)) * error
     statistic = mean / error
-    correction = 1 - 3 / (4 * df - 1)
+    # With two participants the correction is 0, and the effect has no unbiased estimate.
+    correction = 1 - 3 / (4 * df - 1) if df > 1 else nan
     low, high = (correction * value / math.sqrt(n) for value in _noncentral(statistic, df, level))
     p = float(2 * t.sf(abs(statistic), df))
     return Comparison(n, mean, mean - half, mean + half, correction * mean / scatter, low, high, p)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import argparse
 import glob
-import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from coglab_tools.command import OK, Answer, CheckFailed, CommandError, UsageError
+from coglab_tools.command import OK, Answer, CheckFailed, CommandError, UsageError, plural
 from coglab_tools.trial.record import BAG, FILE, TrialRecord, find_trials, trials_folder
 
 HELP = "recorded handovers: list, show, plot, explain, report, video, replay"
@@ -98,7 +97,7 @@ def list_trials(options: argparse.Namespace) -> Answer:
     widths = [max(len(line[k]) for line in table) for k in range(len(columns))]
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in table]
     good = sum(row["outcome"] == "succeeded" for row in rows)
-    lines.append(f"{len(rows)} trials in {folder}, {good} succeeded")
+    lines.append(f"{plural(len(rows), 'trial')} in {folder}, {good} succeeded")
     lines += [f"cannot be read: {sentence}" for sentence in bad]
     lines += [f"being recorded, or cut off: {part}; rosbag reindex {part}/{BAG} saves the rest" for part in parts]
     data = {"trials": rows, "unreadable": bad, "unfinished": parts}
@@ -191,7 +190,7 @@ def replay(options: argparse.Namespace) -> Answer:
     TrialRecord.load(place)
     if not (place / BAG).is_file():
         raise CheckFailed(f"{place} has no {BAG}: a trial of virtual time is not replayed; ./coglab trial plot {place}")
-    seconds = run(place / BAG, options.rate, options.rviz, sys.stderr if options.json else sys.stdout)
+    seconds = run(place / BAG, options.rate, options.rviz)
     return Answer(
         f"{place / BAG}: replayed in {seconds:.0f} s", {"seconds": seconds}, f"./coglab trial explain {place}"
     )

@@ -10,16 +10,14 @@ import subprocess
 import tempfile
 import time
 from pathlib import Path
-from typing import TextIO
 
 from coglab_tools.command import CheckFailed, NotThere, UsageError
 
 END_LIMIT = 20.0  # s for roslaunch to end its nodes
 
 
-def replay(bag: Path, rate: float, rviz: bool, words: TextIO) -> float:
-    """Play a bag until its end or Ctrl-C. `words`: where the address of the master is
-    printed. Returns how long that took (s). UsageError: `rate` is no speed. NotThere:
+def replay(bag: Path, rate: float, rviz: bool) -> float:
+    """Play a bag until its end or Ctrl-C. Returns how long that took (s). UsageError: `rate` is no speed. NotThere:
     roslaunch or a screen for rviz is missing. CheckFailed: it ended with an error."""
     if not (math.isfinite(rate) and 0.01 <= rate <= 100.0):
         raise UsageError(f"--rate is {rate:g}: 0.01 to 100 times real time are expected")
@@ -32,7 +30,7 @@ def replay(bag: Path, rate: float, rviz: bool, words: TextIO) -> float:
     environment.pop("ROS_HOSTNAME", None)
     command = ["roslaunch", "-p", str(port), "coglab_tools", "replay.launch", f"bag:={bag.absolute()}"]
     command += [f"rate:={rate}", f"rviz:={'true' if rviz else 'false'}"]
-    print(f"in another terminal: export ROS_MASTER_URI=http://127.0.0.1:{port}; rostopic list", file=words, flush=True)
+    print(f"in another terminal: export ROS_MASTER_URI=http://127.0.0.1:{port}; rostopic list", flush=True)
     begun = time.monotonic()
     try:
         errors = tempfile.TemporaryFile()  # roslaunch calls the end of the bag a death
