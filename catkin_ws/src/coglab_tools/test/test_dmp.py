@@ -78,7 +78,7 @@ def test_each_column_has_the_unit_of_its_name(tmp_path):
     assert "x is in mm" in said and "y is in cm" in said and "yaw is in deg" in said
 
 
-@pytest.mark.parametrize(("scale", "said"), [(100.0, "lengths are in cm"), (1000.0, "lengths are in mm")])
+@pytest.mark.parametrize(("scale", "said"), [(100.0, "--length in"), (1000.0, "lengths are in mm")])
 def test_a_missing_unit_of_length_is_guessed(tmp_path, scale, said):
     times, places = reach()
     found = read(write(tmp_path / "a.csv", "t,x,y,z", [times, *(scale * places).T]))
@@ -90,6 +90,27 @@ def test_a_missing_unit_of_rotation_is_noted(tmp_path):
     columns = [times, *places.T, 0 * times, 0 * times, 0.3 * share(times)]
     found = read(write(tmp_path / "a.csv", "t,x,y,z,roll,pitch,yaw", columns))
     assert any("taken as rad" in note and "--angle deg" in note for note in found.notes)
+
+
+def test_columns_in_other_units_or_of_no_use_are_not_taken_silently(tmp_path):
+    times, places = reach()
+    columns = [times, *(places / 0.0254).T, 50.0 * share(times), 0 * times]
+    found = read(write(tmp_path / "a.csv", "t,x_in,y_in,z_in,closing_percent,thumb", columns))
+    assert follows(found, times, places) and found.closing.max() == pytest.approx(0.5)
+    assert "not used: thumb" in found.notes
+    for name, unit in (("t_deg", "deg"), ("closing_deg", "deg")):
+        header = "t,x,y,z,closing".replace(name.partition("_")[0], name)
+        with pytest.raises(CheckFailed, match=f"is in {unit}"):
+            read(write(tmp_path / "b.csv", header, [times, *places.T, 90 * share(times)]))
+
+
+def test_a_reach_with_a_gap_does_not_cost_the_other_one(tmp_path):
+    times, places = reach()
+    after = times[-1] + 0.01 + times
+    kept = np.abs(times - REST - DURATION / 2) > 0.2
+    columns = [np.append(times[kept], after), *np.concatenate([places[kept], places + WAY]).T]
+    found = cut.reaches(read(write(tmp_path / "a.csv", "t,x,y,z", columns)))
+    assert len(found) == 1 and any("left out: a gap" in note for note in found[0].notes)
 
 
 def test_units_behind_names_count_in_npz_files(tmp_path):

@@ -84,7 +84,7 @@ def _reading(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--frame", default="", help="tf frame, or the hand's name in the file (human_hand)")
     parser.add_argument("--world", default="world", help="parent frame of the transforms in a bag")
     parser.add_argument("--topic", default="", help="topic in a bag")
-    parser.add_argument("--length", default="", help="unit m, cm or mm (default: guessed)")
+    parser.add_argument("--length", default="", help="unit m, cm, mm or in (default: guessed)")
     parser.add_argument("--time", default="", help="unit s, ms, us or ns (default: guessed)")
     parser.add_argument("--angle", default="", help="unit rad or deg (default: guessed)")
     parser.add_argument("--back", action="store_true", help="use motions back as reaches too")
@@ -179,7 +179,12 @@ def record(options: argparse.Namespace) -> Answer:
                     ends=lambda: pressed() or (button is not None and not button.held),
                     show=terminal.show,
                 )
-            state = "" if options.frame else recorder.settle(robot, terminal, options.stay)
+            try:
+                state = "" if options.frame else recorder.settle(robot, terminal, options.stay)
+            except KeyboardInterrupt:  # the demonstration is valid
+                state = "ended by Ctrl-C before the arm was home; go on with: ./coglab start reset"
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt("ended by Ctrl-C; nothing was recorded") from None
     except NoRobot as error:
         raise NotThere(str(error)) from None
     except (coglab.Refused, TimeoutError) as error:
@@ -223,7 +228,7 @@ def _running_master() -> str:
 def _free(folder: Path, name: str) -> Path:
     """A path that does not exist yet: name.csv, name_2.csv, ..."""
     path, number = folder / f"{name}.csv", 1
-    while path.exists():
+    while path.exists() or path.with_name(f"{path.name}.failed").exists():
         number += 1
         path = folder / f"{name}_{number}.csv"
     return path

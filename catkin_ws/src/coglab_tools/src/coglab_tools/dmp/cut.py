@@ -60,13 +60,14 @@ def reaches(raw: Demonstration, back: bool = False, cut_off: bool = False) -> li
     """The reaches of a recording, in order, smoothed and each from time 0; motions back too if `back`, and
     incomplete reaches at the ends of the recording if `cut_off`.
 
-    CheckFailed if there is none, or if a gap or a jump lies in one.
+    A reach with a gap or a jump is left out, with a note. CheckFailed if there is no other one.
     """
     whole = smooth(raw)
     found: list[Demonstration] = []
     farthest = 0.0
     before: Array | None = None  # m, (3,): from start to end of the last reach
     lost = ""
+    faults: list[str] = []
     for begin, end in motions(whole.times, whole.speed):
         part = _part(whole, begin, end)
         farthest = max(farthest, part.way)
@@ -85,11 +86,17 @@ def reaches(raw: Demonstration, back: bool = False, cut_off: bool = False) -> li
                 lost = f"the recording {word} within it, while the hand moves at {speed[at]:.2f} m/s"
         if lost and (begin == 0 or end == len(whole.times) - 1):
             continue
-        gap = _refuse_gap(raw, whole.times[begin], whole.times[end])
+        try:
+            gap = _refuse_gap(raw, whole.times[begin], whole.times[end])
+            _refuse_jump(raw, whole.times[begin], whole.times[end], way)
+        except CheckFailed as error:
+            faults.append(str(error))
+            continue
         if gap > NOTED_GAP:
             part = replace(part, notes=(*part.notes, f"a gap of {gap:.2f} s was bridged"))
-        _refuse_jump(raw, whole.times[begin], whole.times[end], way)
         found.append(part)
+    if not found and faults:
+        raise CheckFailed(faults[0])
     if not found and lost:
         raise CheckFailed(f"{raw.name}: no whole reach in it: {lost}; record it again, or allow 'moving' in train")
     if not found:
@@ -97,6 +104,8 @@ def reaches(raw: Demonstration, back: bool = False, cut_off: bool = False) -> li
             f"{raw.name}: no reach in it: the longest motion goes {farthest:.3f} m, a reach at least {SHORTEST:g} m. "
             "Is it the right frame? A reach begins and ends slowly"
         )
+    left_out = tuple(f"a reach was left out: {fault.removeprefix(f'{raw.name}: ')}" for fault in faults)
+    found[0] = replace(found[0], notes=(*found[0].notes, *left_out))
     if len(found) == 1:
         return found
     return [replace(part, name=f"{raw.name}_{i + 1}") for i, part in enumerate(found)]

@@ -8,7 +8,7 @@ Columns of a CSV, arrays of an npz (each (n,), or `position` (n, 3) and `orienta
 * fingers: `closing`, 0 open .. 1 closed, or in percent, or as the hand's bytes 0 .. 254;
 * `frame`: several hands or objects in one file.
 
-A name may end with a unit: `x_mm`, `x [mm]`, `t_ms`, `yaw_deg`; each column has its own. Without units, they are
+A name may end with a unit: `x_mm`, `x [in]`, `t_ms`, `yaw_deg`; each column has its own. Without units, they are
 guessed from the numbers, with a note. A CSV may have commas, semicolons or tabs between its columns;
 with the latter two, a comma in a number is a decimal comma.
 """
@@ -30,10 +30,13 @@ from coglab_tools.dmp.demonstration import Array, Demonstration
 FASTEST = 5.0  # m/s between two samples; above it the tracker confused the hand with something else
 BRIEF_JUMP = 0.1  # s; a jump that ends within this time is left out
 MOST_SAMPLES = 1_000_000
-LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
 TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 ANGLE = {"rad": 1.0, "deg": np.pi / 180.0}
+CLOSING = {"percent": 100.0, "%": 100.0}  # values of a closed hand
 JOINTS = tuple(f"lwr_{name}" for name in ("a1", "a2", "e1", "a3", "a4", "a5", "a6"))
+TURNS = ("roll", "pitch", "yaw", "qx", "qy", "qz", "qw")
+UNITS = ((("t",), TIME), (("x", "y", "z"), LENGTH), (TURNS[:3] + JOINTS, ANGLE), (("closing",), CLOSING))
 MOTOR_CLOSED = 254.0  # position of a closed motor of the IH2 hand
 
 Table = dict[str, Array]
@@ -143,7 +146,7 @@ def _named(header: list[str]) -> tuple[list[str], dict[str, str]]:
     """Known column names without their units, and the units by name."""
     names, units = [], {}
     for word in header:
-        match = re.fullmatch(r"(.+?)[\s_]*[\[(_]\s*(m|cm|mm|s|ms|us|ns|rad|deg)\s*[\])]?", word.strip())
+        match = re.fullmatch(r"(.+?)[\s_]*[\[(_]\s*(m|cm|mm|in|s|ms|us|ns|rad|deg|percent|%)\s*[\])]?", word.strip())
         name, unit = (match.group(1), match.group(2)) if match else (word.strip(), "")
         name = {"time": "t", "stamp": "t"}.get(name.lower(), name)
         name = name if name in JOINTS else name.lower()
@@ -311,7 +314,14 @@ def _judge(path: Path, table: Table, units: dict[str, str], place: Place, source
     table, index = {name: value[whole] for name, value in table.items()}, np.flatnonzero(whole)
     if len(np.unique(table["t"])) < 10:
         raise CheckFailed(f"{path}: expected at least 10 different times, got {len(np.unique(table['t']))}")
-    lonely = [name for name in ("roll", "pitch", "yaw", "qx", "qy", "qz", "qw") if name in table and name not in used]
+    for name, unit in units.items():
+        known = next((k for names, k in UNITS if name in names), None)
+        if name in table and known is not None and unit not in known:
+            raise CheckFailed(f"{path}: the column {name} is in {unit}; expected {', '.join(known)}, or no unit")
+    unread = [name for name in table if name not in ("t", "x", "y", "z", "closing", *TURNS, *JOINTS)]
+    if unread:
+        notes.append(f"not used: {', '.join(unread)}")
+    lonely = [name for name in TURNS if name in table and name not in used]
     if lonely:
         notes.append(f"{', '.join(lonely)} left out: a turn needs qx, qy, qz and qw, or roll, pitch and yaw")
 
@@ -332,7 +342,7 @@ def _judge(path: Path, table: Table, units: dict[str, str], place: Place, source
     if same.any():
         notes.append(f"{int(same.sum())} samples repeat the one before and were left out")
     kept = _without_jumps(path, times, places, ~same, notes)
-    closing = _closing(path, table, notes)
+    closing = _closing(path, table, units.get("closing", ""), notes)
     return Demonstration(
         path.stem,
         times[kept] - times[kept][0],
@@ -409,7 +419,8 @@ def _length_unit(path: Path, places: Array, given: str, notes: list[str]) -> flo
             f"{path}: the hand moves over {extent:.3g}; expected up to 3 (m), 10 to 90 (cm) or 200 to 3000 (mm); name "
             "the unit with --length"
         )
-    notes.append(f"lengths are in {unit} (the hand moves over {extent:.0f}), converted to m")
+    inches = "; if they are inches: --length in" if unit == "cm" else ""
+    notes.append(f"lengths are in {unit} (the hand moves over {extent:.0f}), converted to m{inches}")
     return LENGTH[unit]
 
 
@@ -459,13 +470,15 @@ def _turns(path: Path, table: Table, given: str, notes: list[str], place: Place)
     return q
 
 
-def _closing(path: Path, table: Table, notes: list[str]) -> Array | None:
+def _closing(path: Path, table: Table, given: str, notes: list[str]) -> Array | None:
     values = table.get("closing")
     if values is None or not np.isfinite(values).any():
         return None
     values = np.interp(np.arange(len(values)), np.flatnonzero(np.isfinite(values)), values[np.isfinite(values)])
     low, top = float(values.min()), float(values.max())
-    scale = 1.0 if top <= 1.2 else 100.0 if top <= 100.0 else MOTOR_CLOSED
+    scale = CLOSING.get(given, 1.0 if top <= 1.2 else 100.0 if top <= 100.0 else MOTOR_CLOSED)
+    if not given and 1.2 < top < 5.0:
+        raise CheckFailed(f"{path}: closing goes up to {top:g}: 0..1 or percent? For percent, name it closing_percent")
     if low < -0.2 * scale or top > 1.2 * scale:
         raise CheckFailed(f"{path}: closing goes from {low:g} to {top:g}; expected 0..1, percent or 0..254")
     if scale > 1.0:
