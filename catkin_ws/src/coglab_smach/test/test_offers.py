@@ -36,6 +36,8 @@ class Offers:
         self.state._deadline = 1e9
 
     def locate(self, name, limit):
+        if name == "board":
+            return Ready(Located("board", "world", (0.45, -0.55, 0.05), IDENTITY, 0.0))
         self.asked = (name, limit)
         found = Located(f"object_{name}", "world", tuple(self.at(self.trial.clock.now())), IDENTITY, self.age)
         return Ready(found)
@@ -63,6 +65,15 @@ def test_the_region_is_10_cm_larger_for_a_still_object(axis, margin):
         assert error.value.code == ReasonCode.OBJECT_NOT_SEEN
         where = ", ".join(f"{v:.2f}" for v in place)
         assert error.value.sentence.startswith(f"'mug' was not offered within 8 s: it stayed at ({where}) m")
+
+
+def test_an_object_that_stands_on_the_board_is_no_offer():
+    for place in ((0.45, -0.55, 0.05), (0.40, -0.42, 0.12)):  # the second place is in the handover region
+        with pytest.raises(PortError) as error:
+            Offers(lambda t, place=place: place).wait()
+        assert error.value.code == ReasonCode.OBJECT_NOT_SEEN and "request take" in error.value.causes[0]
+    goal, when = Offers(lambda t: (0.45, -0.42, 0.10 + 0.2 * min(max(t - 1.0, 0.0), 2.0))).wait()
+    assert goal["frame"] == "object_mug" and 1.0 < when < 1.8, "it was picked up"
 
 
 def test_an_unreachable_offer_is_reported_at_the_time_limit():

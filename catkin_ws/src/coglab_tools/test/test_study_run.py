@@ -297,6 +297,14 @@ def test_a_live_session_with_notes_repetition_and_resume(tmp_path, capsys):
         run_simulated(load(folder))
 
 
+def test_between_live_trials_the_object_is_given_back(tmp_path):
+    folder = make(tmp_path / "kill")
+    with coglab.World(seed=3, person="accustomed", perfect_perception=True) as world:
+        lines = iter(["", "", "g", "", "q"])  # the second Enter is refused: the hand is full
+        data = session(load(folder), world.robot, lambda _: StubSystem(), "P02", lambda prompt: next(lines))
+    assert (data["trials_now"], data["succeeded"]) == (2, 2)
+
+
 def test_a_later_session_asks_what_is_open_and_its_last_trial_is_repeated(tmp_path, capsys):
     text = YAML.replace("[receive]", "[receive, give]").replace("simulated:", "questionnaires: [nasa_tlx]\nsimulated:")
     folder, system = make(tmp_path / "kill", text), StubSystem()

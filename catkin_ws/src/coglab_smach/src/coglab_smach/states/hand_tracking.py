@@ -29,6 +29,8 @@ SWAPPED = 0.2  # s after which a sight beyond JUMP is accepted
 LATELY = 0.4  # s, time window for judging whether something is held still
 STILL = 0.025  # m, limit of motion of something that is held still
 STILL_TIME = 0.3  # s, shortest time for which it is held still
+BOARD_RADIUS = 0.35  # m around the middle of the storage board
+BOARD_HEIGHT = 0.15  # m above the board; the frame of a standing object is lower
 
 
 def jumped_from(last: Sight | None, now: float, place: np.ndarray) -> tuple[bool, Sight | None]:
@@ -162,6 +164,15 @@ def from_palm(state: CoglabState, track: HandTrack, limit: float = GLANCE) -> fl
         return None
     away = _follow(state.ctx, track, seen, palm)
     return away if track.is_one else None
+
+
+def stands_on_board(state: CoglabState, place: np.ndarray) -> bool:
+    """True if an object at this place (m, base frame) stands on the storage board. False without a sight of the board."""
+    board = sight_of(state, state.ctx.config.text("perception.board"), 0.05)
+    if board is None:
+        return False
+    x, y, z = (Pose(board.xyz, board.quaternion).inverse() * Pose(place)).position
+    return bool(np.hypot(x, y) <= BOARD_RADIUS and z <= BOARD_HEIGHT)
 
 
 class HandoverRegion:

@@ -25,6 +25,7 @@ from coglab_smach.states.hand_tracking import (
     hand_name,
     palm_at,
     person_at,
+    stands_on_board,
     unless_withdrawn,
 )
 
@@ -125,9 +126,9 @@ def await_offer(state: CoglabState, target: str, goals: Goals, margin: float = 0
     The arm must have a posture for one of ``goals``, so that the hand does not hit the person. Both must hold for
     ``handover.start_after`` s. Returns that goal.
 
-    An object that is held still slightly outside counts too. ``margin`` (m) widens the region: a hand is behind the
-    object that it holds or requests. PortError if nobody comes within ``handover.offer_timeout`` s; the arm has not
-    moved then.
+    An object that stands on the board is not offered. One that is held still slightly outside the region counts too.
+    ``margin`` (m) widens the region: a hand is behind the object that it holds or requests. PortError if nobody comes
+    within ``handover.offer_timeout`` s; the arm has not moved then.
     """
     config = state.ctx.config
     region = HandoverRegion(state.ctx, margin)
@@ -142,6 +143,8 @@ def await_offer(state: CoglabState, target: str, goals: Goals, margin: float = 0
             now, place = state.ctx.clock.now(), np.array(located["xyz"])
             passes = ends_outside(state.ctx, region, located["frame"])
             offered = region.offers(now - located["age"], place, moving=not passes)
+            stands = offered and not person and stands_on_board(state, place)
+            offered = offered and not stands
             early = believed(state.ctx, target, located, person, region)
             candidates = goals(located)
             goal = first_reachable(state.ctx, located, candidates) if offered else None
@@ -154,6 +157,12 @@ def await_offer(state: CoglabState, target: str, goals: Goals, margin: float = 0
                     return goal
             if now > end and offered and goal is None:
                 raise PortError(*out_of_reach(target, located, candidates[0]), ReasonCode.GOAL_UNREACHABLE)
+            if now > end and stands:
+                raise PortError(
+                    f"'{target}' was not offered within {limit:.0f} s: it stands on the board",
+                    ("nobody holds it out; hold it out to the robot, or request take",),
+                    ReasonCode.OBJECT_NOT_SEEN,
+                )
             if now > end and goal is None:
                 where = ", ".join(f"{v:.2f}" for v in place)
                 raise PortError(

@@ -35,9 +35,10 @@ from coglab_tools.study.simulate import identity
 LIVE = "live"
 ANSWER = 5.0  # s, limit for an answer of a node
 PARAMETERS, NOTES = "/coglab/trial", "/coglab/note"
+BETWEEN = {"p": "put", "t": "take", "g": "give"}  # actions that belong to no trial, by key
 HELP = (
-    "Enter starts, n TEXT adds a note to the last trial (before the first trial: to that one), r "
-    "repeats the last one, s skips this one, c resets the robot, q ends the session"
+    "Enter starts, n TEXT adds a note to the last trial (before the first trial: to that one), r repeats the last one, "
+    "s skips this one, p puts the object down, t takes it, g gives it back, c resets the robot, q ends the session"
 )
 
 
@@ -147,6 +148,8 @@ class _Session:
                 self._note(text.strip())
             elif word == "c":
                 self._reset()
+            elif word in BETWEEN:
+                self._between(BETWEEN[word], trial)
             elif word == "r" and place > 0:
                 place -= 1
             elif word == "s" and not over:
@@ -195,7 +198,7 @@ class _Session:
                 named = object_id if action in ("receive", "take") else None
                 result = getattr(self.robot, action)(named, limit=self.study.limit)
             except coglab.Refused as error:
-                print(f"  refused: {error}; from another terminal: ./coglab start ACTION")
+                print(f"  refused: {error}; between trials p puts the object down, t takes it, g gives it back")
                 if not rows:
                     return False
                 rows.append(row | {"success": 0, "outcome": "refused", "reason_code": error.name, "reason": str(error)})
@@ -232,6 +235,18 @@ class _Session:
         rows = [row | {"notes": "; ".join(filter(None, [row["notes"], text]))} for row in rows]
         self.rows.add(number, rows)  # the newer line of a trial counts
         self._last = number, rows
+
+    def _between(self, action: str, trial: Trial) -> None:
+        """Move the object, so that the next trial can begin. It counts for no trial."""
+        try:
+            named = self.study.object_of(trial.condition) if action == "take" else None
+            print(f"  {action} ...", flush=True)
+            print(f"  {getattr(self.robot, action)(named, limit=self.study.limit)}")
+        except KeyboardInterrupt:
+            self.robot.stop("the experimenter pressed Ctrl-C")
+            print("  stopped. c resets the robot")
+        except (RuntimeError, TimeoutError) as error:
+            print(f"  {error}")
 
     def _reset(self) -> None:
         try:
