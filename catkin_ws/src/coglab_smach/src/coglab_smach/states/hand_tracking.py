@@ -167,7 +167,7 @@ def from_palm(state: CoglabState, track: HandTrack, limit: float = GLANCE) -> fl
 
 
 def stands_on_board(state: CoglabState, place: np.ndarray) -> bool:
-    """True if an object at this place (m, base frame) stands on the storage board. False without a sight of the board."""
+    """True if an object at this place (m, base frame) stands on the storage board. False if no board is in sight."""
     board = sight_of(state, state.ctx.config.text("perception.board"), 0.05)
     if board is None:
         return False
