@@ -171,7 +171,7 @@ def stands_on_board(state: CoglabState, place: np.ndarray) -> bool:
     board = sight_of(state, state.ctx.config.text("perception.board"), 0.05)
     if board is None:
         return False
-    x, y, z = (Pose(board.xyz, board.quaternion).inverse() * Pose(place)).position
+    x, y, z = (Pose(np.array(board.xyz), np.array(board.quaternion)).inverse() * Pose(place)).position
     return bool(np.hypot(x, y) <= BOARD_RADIUS and z <= BOARD_HEIGHT)
 
 
