@@ -97,7 +97,7 @@ async def test_a_browser_that_dies_with_a_button_held_is_told_to_the_others(cons
         await ws.send_str(json.dumps({"t": "hold", "name": "start", "arguments": RECEIVE}))
         await asyncio.sleep(0.1)
     ws._response.connection.transport.abort()
-    await until(lambda: any("button" in text for text in events_of(console, "command")))
+    await until(lambda: any("while holding" in text for text in events_of(console, "command")))
     (told,) = events_of(console, "command")
     assert "browser 1" in told and "Receive" in told and "nothing was begun" in told
     assert not console.robot.calls
@@ -117,7 +117,7 @@ async def test_a_button_that_was_let_go_or_has_begun_something_is_not_told_when_
             await ws.send_str('{"t": "release"}')
         await ws.close()
         await until(lambda: not console.server.clients)
-    assert not [text for text in events_of(console, "command") if "button" in text]
+    assert not [text for text in events_of(console, "command") if "while holding" in text]
     assert len(console.robot.calls) == 1
 
 

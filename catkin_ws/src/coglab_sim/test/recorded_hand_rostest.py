@@ -76,11 +76,12 @@ class RecordedHand(unittest.TestCase):
         cls.folder.cleanup()
 
     def held_as_recorded(self) -> float:
-        """Distance (m) between actual and recorded position of the object in the person's hand."""
+        """Distance (m) between actual and recorded position of the object in the person's hand, or 0.1 m per rad of the
+        turn between them if that is larger. Before the person comes, the cell's own object is in the hand."""
         now = self.truth[-1]
         in_hand = pose_of(now.human_hand).inverse() * pose_of(now.object)
-        self.assertLess(abs((in_hand.rotation * IN_HAND.rotation.inv()).magnitude()), 0.05)
-        return float(np.linalg.norm(in_hand.position - IN_HAND.position))
+        turn = abs((in_hand.rotation * IN_HAND.rotation.inv()).magnitude())
+        return max(float(np.linalg.norm(in_hand.position - IN_HAND.position)), 0.1 * float(turn))
 
     def test_1_the_object_lies_in_the_hand_as_it_was_recorded(self) -> None:
         self.assertTrue(wait_for(lambda: self.hand and self.truth), "no person, or no cell")
