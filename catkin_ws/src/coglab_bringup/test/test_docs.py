@@ -67,6 +67,8 @@ def test_blocks_parse(page: Path):
 
 
 @pytest.mark.parametrize("block", blocks(TOP / "README.md", "python"))
-def test_python_of_the_readme_runs(block: str):
-    done = subprocess.run([sys.executable, "-c", block], text=True, capture_output=True, timeout=300, check=False)
+def test_python_of_the_readme_runs(block: str, tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-c", block], text=True, capture_output=True, timeout=300, check=False, cwd=tmp_path
+    )
     assert done.returncode == 0, done.stderr
