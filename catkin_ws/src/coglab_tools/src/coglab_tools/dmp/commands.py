@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from coglab_tools.command import CHECK_FAILED, OK, Answer, CheckFailed, NotThere, UsageError, progress
+from coglab_tools.command import CHECK_FAILED, OK, Answer, CheckFailed, NotThere, UsageError, plural, progress
 
 HELP = "teach motions: record, import, learn, inspect and check primitives"
 MAPPINGS = ("none", "similarity", "upright")
@@ -292,7 +292,7 @@ def train(options: argparse.Namespace) -> Answer:
         lines.append(f"fingers: {fingers_in_words(taught.closing, primitive.duration)}; kept beside the library")
     if taught.strange:
         lines.append(f"far from the others: {', '.join(taught.strange)}; check the picture, and leave out wrong ones")
-    lines.append(f"wrote {options.library} ({count} primitives) and {path}")
+    lines.append(f"wrote {options.library} ({plural(count, 'primitive')}) and {path}")
     data = {
         "id": options.id,
         "duration_s": primitive.duration,
