@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 from dataclasses import FrozenInstanceError
@@ -342,3 +344,24 @@ def test_an_error_in_an_own_machine_is_raised_in_the_caller(alone):
     with pytest.raises(RuntimeError, match="division by zero"):
         coglab.World(seed=1, machine=machine)
     coglab.World(seed=1).close()
+
+
+def test_a_seed_ends_alike_with_any_number_of_threads():
+    program = (
+        "import coglab, hashlib\n"
+        "with coglab.World(seed=5, person='drawn') as world:\n"  # the arm is shifted at the person
+        "    trial = world.trial('receive', 'give')\n"
+        "    print(hashlib.sha256(trial.joints.tobytes()).hexdigest(), trial.results)"
+    )
+    ends = [
+        subprocess.run(
+            [sys.executable, "-c", program],
+            env={**os.environ, "OPENBLAS_NUM_THREADS": threads},
+            capture_output=True,
+            text=True,
+            timeout=240,
+            check=True,
+        ).stdout
+        for threads in ("1", "2")
+    ]
+    assert ends[0] == ends[1]

@@ -18,7 +18,7 @@ import numpy as np
 from coglab_msgs.msg import ReasonCode
 from coglab_py.packages import package_path
 from coglab_py.pose import Pose
-from coglab_smach.kinematics.reachability import default_arm, home_posture, joint_limits, solve
+from coglab_smach.kinematics.reachability import damped_step, default_arm, home_posture, joint_limits, solve
 from coglab_smach.ports.interfaces import DmpRequest
 from coglab_smach.ports.pending import Pending, PortError
 from ih2_hand.grasps import CLOSING_MOTORS, LEVELS, levels_of
@@ -832,11 +832,10 @@ def _posture(target: Pose, start: np.ndarray) -> np.ndarray | None:
         for _ in range(20):
             position, orientation = arm.fk(posture)
             turn = (target.rotation * Pose(position, orientation).rotation.inv()).as_rotvec()
-            error = np.concatenate([target.position - position, turn])
-            if np.abs(error[:3]).max() < 1e-4 and np.abs(error[3:]).max() < 2e-4:
+            way = target.position - position
+            if np.abs(way).max() < 1e-4 and np.abs(turn).max() < 2e-4:
                 return posture
-            j = arm.jacobian(posture)
-            posture = posture + j.T @ np.linalg.solve(j @ j.T + 1e-8 * np.eye(6), error)
+            posture = posture + damped_step(arm.jacobian(posture), way, turn, 1e-8 * np.eye(6))
             posture = np.clip(posture, limits.lower_position, limits.upper_position)
     return None
 

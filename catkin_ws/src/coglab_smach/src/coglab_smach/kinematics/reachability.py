@@ -65,16 +65,17 @@ def solve(arm: cc.Chain, target: Pose, start: Sequence[float] | None = None, ste
             return q
         way *= min(1.0, 0.08 / max(1e-9, far))
         turn *= min(1.0, 0.3 / max(1e-9, turned))
-        q = np.minimum(np.maximum(q + _damped_step(arm.jacobian(q), way, turn), lower), upper)
+        q = np.minimum(np.maximum(q + damped_step(arm.jacobian(q), way, turn, DAMPING), lower), upper)
     return None
 
 
-def _damped_step(jacobian: np.ndarray, way: np.ndarray, turn: np.ndarray) -> np.ndarray:
-    """Joint step (rad) of damped least squares for a way (m) and a turn (rad) of the palm.
+def damped_step(jacobian: np.ndarray, way: np.ndarray, turn: np.ndarray, damping: np.ndarray) -> np.ndarray:
+    """Joint step (rad) of least squares, damped by a 6 x 6 matrix, for a way (m) and a turn (rad) of the palm.
 
-    The six equations are solved in two blocks of three: for six at once OpenBLAS wakes threads, which takes longer.
+    The six equations are solved in two blocks of three. For six at once OpenBLAS wakes threads: that takes longer, and
+    rounds differently with each number of cores, so that a virtual trial ends differently on another computer.
     """
-    square = jacobian @ jacobian.T + DAMPING
+    square = jacobian @ jacobian.T + damping
     first = np.linalg.solve(square[:3, :3], np.column_stack([square[:3, 3:], way]))
     coupling = square[3:, :3]
     last = np.linalg.solve(square[3:, 3:] - coupling @ first[:, :3], turn - coupling @ first[:, 3])

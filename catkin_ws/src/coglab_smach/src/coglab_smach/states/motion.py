@@ -8,7 +8,7 @@ import numpy as np
 
 from coglab_smach.context.context import Context
 from coglab_smach.kinematics.motion_time import ptp_time
-from coglab_smach.kinematics.reachability import default_arm
+from coglab_smach.kinematics.reachability import damped_step, default_arm
 from coglab_smach.ports.pending import Pending, PortError
 
 POLL_PERIOD = 0.01  # s
@@ -69,8 +69,7 @@ def shift_time(ctx: Context, by: np.ndarray, speed: float) -> float:
 def _joint_way(ctx: Context, here: Sequence[float], by: np.ndarray, speed: float) -> tuple[list[float], list[float]]:
     """Returns the joint positions after a shift (rad) and the joint speeds (rad/s)."""
     jacobian = default_arm().jacobian(np.asarray(here))
-    twist = np.concatenate([by, np.zeros(3)])
-    way = jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + 1e-4 * np.eye(6), twist)
+    way = damped_step(jacobian, by, np.zeros(3), 1e-4 * np.eye(6))
     velocity = np.maximum(np.abs(way) * speed / float(np.linalg.norm(by)), 1e-3)
     # The controller refuses speeds above a limit. Slow all joints by the same factor, so that the path stays straight.
     share = float(np.min(np.asarray(ctx.arm.motion_limits().velocity) / velocity))
