@@ -44,7 +44,7 @@ def demo_parser(top: Path) -> Parser:
         choices=("patient", "accustomed", "drawn"),
         default="patient",
         help="patient: waits for the robot, seen without noise or delay (default); accustomed: also helps it by habit; "
-        "drawn: realistic, by the seed, and seen by a realistic tracker; not every handover succeeds, least with "
+        "drawn: late and inexact, by the seed, and seen with noise; not every handover succeeds, least with "
         "drawn people",
     )
     return parser

@@ -146,14 +146,14 @@ def unfinished(kind: str, error: BaseException) -> dict:
 PEOPLE = {
     "patient": (
         ("profile:=patient", "perfect_perception:=true"),
-        "a patient person, who waits for the robot and is seen without noise or delay; realistic people: "
+        "a patient person, who waits for the robot and is seen without noise or delay; people who differ: "
         "./coglab demo --person drawn",
     ),
     "accustomed": (
         ("profile:=accustomed", "perfect_perception:=true"),
         "an accustomed person, who waits for the robot, helps it by habit and is seen without noise or delay",
     ),
-    "drawn": ((), "a realistic person, drawn by the seed and seen by a realistic tracker"),
+    "drawn": ((), "a person drawn by the seed, seen with noise and delay"),
 }
 """Launch arguments of each kind of person, and their description."""
 
