@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -49,6 +50,14 @@ def test_a_table_of_a_web_form_is_read_scored_and_kept(tmp_path):
     assert add_answers(study, rows[:1]) == (0, 1)
     scores = scores_of(answers_of(study), study.questionnaires)
     assert [(s["participant"], s["scale"], s["value"]) for s in scores] == [("P01", "workload", 35.0)]
+
+
+def test_answers_from_console_and_terminal_at_the_same_time_are_all_kept(tmp_path):
+    study = study_in(tmp_path)
+    rows = read(tmp_path, f"participant,condition,{TLX}\nP01,calm,10,20,30,40,50,60\nP02,calm,5,5,5,5,5,5\n")
+    with ThreadPoolExecutor(len(rows)) as pool:
+        assert sum(new for new, _ in pool.map(lambda row: add_answers(study, [row]), rows)) == 12
+    assert len(answers_of(study)) == 12
 
 
 @pytest.mark.parametrize(

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import tempfile
-from collections.abc import Callable
-from contextlib import suppress
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from coglab_tools.command import CheckFailed
@@ -44,3 +46,22 @@ def write_by(path: Path, write: Callable[[Path], object]) -> Path:
         why = error.strerror or error
         raise CheckFailed(f"{path} cannot be written: {why}; the earlier file is kept") from None
     return path
+
+
+@contextmanager
+def alone(folder: Path, limit: float = 10.0) -> Iterator[None]:
+    """Within it, no other process or thread is within `alone` of the same folder. CheckFailed after `limit` s."""
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        end = time.monotonic() + limit
+        while True:
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError:
+                if time.monotonic() > end:
+                    raise CheckFailed(f"another program has written in {folder} for {limit:g} s: try again") from None
+                time.sleep(0.02)
+        yield
+    finally:
+        os.close(descriptor)

@@ -84,7 +84,7 @@ def _reading(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--frame", default="", help="tf frame, or the hand's name in the file (human_hand)")
     parser.add_argument("--world", default="world", help="parent frame of the transforms in a bag")
     parser.add_argument("--topic", default="", help="topic in a bag")
-    parser.add_argument("--length", default="", help="unit m, cm, mm or in (default: guessed)")
+    parser.add_argument("--length", default="", help="unit m, cm, mm, in or ft (default: guessed)")
     parser.add_argument("--time", default="", help="unit s, ms, us or ns (default: guessed)")
     parser.add_argument("--angle", default="", help="unit rad or deg (default: guessed)")
     parser.add_argument("--back", action="store_true", help="use motions back as reaches too")

@@ -19,6 +19,7 @@ CUT_OFF = 6.0  # Hz; usual for motions of the arm (Winter, Biomechanics and Moto
 SHORTEST = 0.1  # m, farthest point of a reach from its start
 NOTED_GAP = 0.05  # s without a sample, mentioned in a note
 LONGEST_GAP = 0.2  # s without a sample within a reach
+FASTEST = 5.0  # m/s between two samples; above it the tracker confused the hand with something else
 LARGEST_STEP = 0.5  # share of a reach between two samples without a gap; above it the tracker lost the hand
 LOW, LOW_SHARE = 0.02, 0.05  # m/s, and share of the peak speed: below the larger one the hand rests
 HIGH_SHARE = 0.25  # share of the largest speed that a motion must reach
@@ -181,7 +182,7 @@ def _refuse_jump(raw: Demonstration, begin: float, end: float, way: float) -> No
     steps = np.linalg.norm(np.diff(raw.positions, axis=0), axis=1)
     steps[(t[1:] < begin) | (t[:-1] > end) | (np.diff(t) > 2.0 * float(np.median(np.diff(t))))] = 0.0
     worst = int(np.argmax(steps))
-    if steps[worst] > LARGEST_STEP * way:
+    if steps[worst] > min(LARGEST_STEP * way, FASTEST * (t[worst + 1] - t[worst])):
         raise CheckFailed(
             f"{raw.name}: the hand jumps by {steps[worst]:.2f} m at {t[worst + 1]:.2f} s, from one sample to the next: "
             "the tracker confused it with something else; cut the file there, or record again"

@@ -25,12 +25,13 @@ from typing import Any
 import numpy as np
 
 from coglab_tools.command import CheckFailed, NotThere, UsageError
+from coglab_tools.dmp.cut import FASTEST
 from coglab_tools.dmp.demonstration import Array, Demonstration
 
-FASTEST = 5.0  # m/s between two samples; above it the tracker confused the hand with something else
 BRIEF_JUMP = 0.1  # s; a jump that ends within this time is left out
 MOST_SAMPLES = 1_000_000
-LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
+LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254, "ft": 0.3048}
+LONG_REACH = 1.2  # m; a longer motion is rare for a person at a table, and may be in feet
 TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 ANGLE = {"rad": 1.0, "deg": np.pi / 180.0}
 CLOSING = {"percent": 100.0, "%": 100.0}  # values of a closed hand
@@ -412,6 +413,8 @@ def _length_unit(path: Path, places: Array, given: str, notes: list[str]) -> flo
         return LENGTH[given]
     extent = float(np.linalg.norm(np.percentile(places, 99, axis=0) - np.percentile(places, 1, axis=0)))
     if extent <= 3.0:
+        if extent > LONG_REACH:
+            notes.append(f"lengths are taken as m (the hand moves over {extent:.1f}); if they are feet: --length ft")
         return 1.0
     unit = "cm" if 10.0 <= extent < 90.0 else "mm" if 200.0 <= extent <= 3000.0 else ""
     if not unit:

@@ -20,7 +20,7 @@ from coglab_py.packages import package_path
 from coglab_py.yaml_file import YamlError, read
 
 from coglab_tools.command import CheckFailed
-from coglab_tools.files import write_whole
+from coglab_tools.files import alone, write_whole
 
 if TYPE_CHECKING:
     from coglab_tools.study.plan import Study
@@ -176,15 +176,16 @@ def open_items(study: Study, visits: Iterable[Visit]) -> dict[Visit, dict[str, l
 def add_answers(study: Study, rows: Iterable[AnswerRow]) -> tuple[int, int]:
     """Add answers to the study's file, or replace older answers to the same items. The file is written completely or
     not at all. Returns the numbers of new and of replaced answers."""
-    known = {row.place: row for row in answers_of(study)}
     new = {row.place: row for row in rows}
-    replaced = len(known.keys() & new.keys())
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    for row in sorted({**known, **new}.values(), key=lambda row: row.place):
-        writer.writerow([*row.place, f"{row.answer:g}"])
-    write_whole(study.folder / ANSWERS, text.getvalue().encode())
+    with alone(study.folder):  # the console and `study ask` can write at the same time
+        known = {row.place: row for row in answers_of(study)}
+        replaced = len(known.keys() & new.keys())
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        for row in sorted({**known, **new}.values(), key=lambda row: row.place):
+            writer.writerow([*row.place, f"{row.answer:g}"])
+        write_whole(study.folder / ANSWERS, text.getvalue().encode())
     return len(new) - replaced, replaced
 
 

@@ -89,7 +89,7 @@ def list_trials(options: argparse.Namespace) -> Answer:
         row = {
             name: getattr(record, name) for name in ("id", "started", "action", "object", "participant", "condition")
         }
-        outcome = "succeeded" if record.outcome.success else record.outcome.reason
+        outcome = "succeeded" if record.outcome.success else record.outcome.reason.replace("NONE", "no result")
         rows.append({**row, "outcome": outcome, "duration_s": round(record.duration_s, 2), "folder": str(place)})
     parts = sorted(str(each) for each in Path(folder).glob(f"{HIDDEN}*")) if Path(folder).is_dir() else []
     columns = ("id", "object", "participant", "condition", "outcome", "duration_s")
