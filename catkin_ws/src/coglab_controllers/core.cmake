@@ -39,7 +39,7 @@ target_link_libraries(coglab_controllers_core
   PUBLIC Eigen3::Eigen ${orocos_kdl_LIBRARIES}
   PRIVATE ${KDL_PARSER_LIBRARY} ${COGLAB_TINYXML2_LIBRARY})
 target_compile_features(coglab_controllers_core PUBLIC cxx_std_17)
-target_compile_options(coglab_controllers_core PRIVATE -Wall -Wextra)
+target_compile_options(coglab_controllers_core PRIVATE -Wall -Wextra -O2)
 set_target_properties(coglab_controllers_core PROPERTIES POSITION_INDEPENDENT_CODE ON)
 
 if(TARGET ctrl_more)
@@ -61,7 +61,7 @@ add_library(coglab_controllers_manager
   src/manager/signal_inputs.cpp
   src/manager/tunables.cpp)
 target_compile_features(coglab_controllers_manager PUBLIC cxx_std_17)
-target_compile_options(coglab_controllers_manager PRIVATE -Wall -Wextra)
+target_compile_options(coglab_controllers_manager PRIVATE -Wall -Wextra -O2)
 target_include_directories(coglab_controllers_manager
   PUBLIC ${CMAKE_CURRENT_SOURCE_DIR}/include ${ctrl_more_INCLUDE_DIRS} ${coglab_rt_INCLUDE_DIRS})
 target_link_libraries(coglab_controllers_manager
@@ -82,7 +82,7 @@ add_library(coglab_controllers_plugins
   src/plugins/ptp_controller.cpp
   src/plugins/stream_controller.cpp
   src/remote/slot.cpp)
-target_compile_options(coglab_controllers_plugins PRIVATE -Wall -Wextra)
+target_compile_options(coglab_controllers_plugins PRIVATE -Wall -Wextra -O2)
 target_link_libraries(coglab_controllers_plugins PUBLIC coglab_controllers_manager)
 set_target_properties(coglab_controllers_plugins PROPERTIES POSITION_INDEPENDENT_CODE ON)
 

@@ -84,7 +84,7 @@ foreach(library coglab_controllers_plugins coglab_controllers_manager coglab_con
   endif()
 endforeach()
 add_library(coglab_sim_virtual src/limit_watch.cpp src/virtual_robot.cpp)
-target_compile_options(coglab_sim_virtual PRIVATE -Wall -Wextra)
+target_compile_options(coglab_sim_virtual PRIVATE -Wall -Wextra -O2)
 set_target_properties(coglab_sim_virtual PROPERTIES POSITION_INDEPENDENT_CODE ON)
 target_link_libraries(coglab_sim_virtual PUBLIC coglab_sim ${COGLAB_SIM_ROBOT} yaml-cpp)
 pybind11_add_module(coglab_sim_virtual_python python/python_motion.cpp python/virtual_binding.cpp)
