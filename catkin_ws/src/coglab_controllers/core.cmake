@@ -124,7 +124,6 @@ if(CATKIN_ENABLE_TESTING)
     file(GLOB sources CONFIGURE_DEPENDS test/${room}/*.cpp)
     catkin_add_gtest(coglab_controllers_test_${room} ${sources})
     if(TARGET coglab_controllers_test_${room})
-      set_target_properties(coglab_controllers_test_${room} PROPERTIES UNITY_BUILD OFF)
       target_link_libraries(coglab_controllers_test_${room} coglab_controllers_core yaml-cpp gtest_main gtest)
       target_include_directories(coglab_controllers_test_${room} PRIVATE ${coglab_rt_INCLUDE_DIRS} test)
       target_compile_definitions(coglab_controllers_test_${room} PRIVATE

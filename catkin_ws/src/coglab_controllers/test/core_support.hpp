@@ -14,6 +14,8 @@
 
 namespace coglab_controllers::test {
 
+constexpr double kCycle = 0.005;  // s
+
 inline std::string readFile(const std::string& path) {
   std::ifstream file(path);
   if (!file) throw std::runtime_error("cannot read " + path);

@@ -15,6 +15,10 @@
 
 namespace coglab_controllers {
 
+inline const Vector3 kGoal(0.80, 0.0, 0.45);  // m, a goal within reach
+inline const std::vector<double> kThere = {-1.0, -0.5, 1.2, 1.5, 0.3, 0.3, 0.6};  // rad
+constexpr std::int64_t kMs = 1'000'000;                                           // ns
+
 /// Parameters that name the plug-ins of these tests.
 inline const std::string kTypes =
     "types: {test/Misbehaving: libcoglab_test_misbehaving.so, test/Twin: "

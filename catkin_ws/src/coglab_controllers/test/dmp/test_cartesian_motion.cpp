@@ -13,8 +13,6 @@ using namespace coglab_controllers::test;
 
 namespace {
 
-constexpr double kCycle = 0.005;
-
 DmpPlan reachPlan(double duration = 1.0, double length = 0.51) {
   LearningOptions options;
   options.mapping = ShapeMapping::Similarity;

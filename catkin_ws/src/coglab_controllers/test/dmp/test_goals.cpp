@@ -17,7 +17,7 @@ using namespace coglab_controllers::test;
 
 namespace {
 
-constexpr double kCycle = 0.005, kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr std::int64_t kSecond = 1'000'000'000, kMs = 1'000'000;
 using State = GoalLimits::State;
 

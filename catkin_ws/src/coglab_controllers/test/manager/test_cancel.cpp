@@ -11,9 +11,6 @@
 namespace coglab_controllers {
 namespace {
 
-const std::vector<double> kThere = {-1.0, -0.5, 1.2, 1.5, 0.3, 0.3, 0.6};
-const Vector3 kGoal(0.80, 0.0, 0.45);
-
 std::vector<EndedMotion> endsOf(PtpController& ptp) {
   std::vector<EndedMotion> ends;
   for (EndedMotion end; ptp.readEnd(end);) ends.push_back(end);

@@ -14,7 +14,6 @@
 namespace coglab_controllers {
 namespace {
 
-const Vector3 kGoal(0.80, 0.0, 0.45);
 TEST(Manager, RefusesBadPluginsAndKeepsTheLoadedOnes) {
   VirtualRobot robot("{" + kTypes + "}");
   robot.loadBoth("ptp");

@@ -244,12 +244,12 @@ TEST(SignalInputs, OrientationsThatAreNoUnitQuaternionsAreRefused) {
 }
 
 /// A controller that needs the signal `imu`, and notes its age in each cycle.
-class Probe : public ctrl_more::FeedbackController {
+class AgeProbe : public ctrl_more::FeedbackController {
  public:
-  explicit Probe(std::vector<std::int64_t>* ages) : ages_(ages) {}
+  explicit AgeProbe(std::vector<std::int64_t>* ages) : ages_(ages) {}
   ctrl_more::Description describe() const override {
     ctrl_more::Description d;
-    d.type = "Probe";
+    d.type = "AgeProbe";
     d.summary = "Notes the age of a signal.";
     d.use = d.when = d.limitations = d.law = d.source = "For this test.";
     d.stage = ctrl_more::Stage::Task;
@@ -272,7 +272,7 @@ TEST(SignalInputs, ControllersGetASignalWithinTwoCyclesAndWaitWhileItIsAbsent) {
   robot.loadBoth("ptp");
   auto& feedback = robot.manager->feedback();
   std::vector<std::int64_t> ages;
-  ASSERT_TRUE(feedback.addController(std::make_unique<Probe>(&ages), "probe").ok());
+  ASSERT_TRUE(feedback.addController(std::make_unique<AgeProbe>(&ages), "probe").ok());
   ASSERT_TRUE(feedback.enable("probe").ok());
   const auto status = [&] { return feedback.status("probe"); };
   robot.run(0.1);

@@ -9,8 +9,6 @@
 namespace coglab_controllers {
 namespace {
 
-const std::vector<double> kThere = {-1.0, -0.5, 1.2, 1.5, 0.3, 0.3, 0.6};
-
 std::vector<std::string> loaded(ControllerManager& manager) {
   std::vector<std::string> ids, types;
   manager.list(ids, types);

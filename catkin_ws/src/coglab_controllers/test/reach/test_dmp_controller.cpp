@@ -4,8 +4,6 @@
 namespace coglab_controllers {
 namespace {
 
-const Vector3 kGoal(0.80, 0.0, 0.45);
-
 TEST(DmpController, ReachesTheGoalFrameAndRestsExactlyStill) {
   VirtualRobot robot;
   robot.loadBoth();

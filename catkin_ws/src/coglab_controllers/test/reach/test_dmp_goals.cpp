@@ -8,8 +8,6 @@
 namespace coglab_controllers {
 namespace {
 
-const Vector3 kGoal(0.80, 0.0, 0.45);
-
 TEST(DmpController, FollowsAgainOnlyWhenTheGoalLeavesItsBall) {
   VirtualRobot robot;
   robot.loadBoth();

@@ -7,8 +7,6 @@
 namespace coglab_controllers {
 namespace {
 
-const Vector3 kGoal(0.80, 0.0, 0.45);
-
 // A running motion, and an undisturbed copy of it.
 class DmpRefusals : public ::testing::Test {
  protected:

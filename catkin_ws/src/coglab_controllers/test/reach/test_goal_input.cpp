@@ -8,8 +8,7 @@
 namespace coglab_controllers {
 namespace {
 
-const Vector3 kGoal(0.80, 0.0, 0.45);
-constexpr std::int64_t kMs = 1'000'000, kSecond = 1000 * kMs, kNow = 5000 * kMs;
+constexpr std::int64_t kSecond = 1000 * kMs, kNow = 5000 * kMs;
 
 /// A host that provides only the time.
 class Clock : public MotionHost {

@@ -9,9 +9,6 @@
 namespace coglab_controllers {
 namespace {
 
-const Vector3 kGoal(0.80, 0.0, 0.45);
-constexpr std::int64_t kMs = 1'000'000;
-
 std::vector<double> posture(int joint = 0, double angle = kHome[0]) {
   std::vector<double> there(kHome.data(), kHome.data() + 7);
   there[static_cast<std::size_t>(joint)] = angle;

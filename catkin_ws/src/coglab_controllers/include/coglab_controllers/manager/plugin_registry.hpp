@@ -66,18 +66,22 @@ class MotionRegistration {
 
 }  // namespace coglab_controllers
 
+// Two levels, so that the counter becomes a number before it is joined to the name.
+#define COGLAB_MOTION_NAME_(number) coglab_motion_registration_##number
+#define COGLAB_MOTION_NAME(number) COGLAB_MOTION_NAME_(number)
+
 /// Registers a motion controller from one of its library's source files, outside of any namespace:
 /// `COGLAB_REGISTER_MOTION_CONTROLLER("my_lab/Wiggle", my_lab::Wiggle)`.
 #define COGLAB_REGISTER_MOTION_CONTROLLER(type, Class)                                           \
   namespace {                                                                                    \
-  const ::coglab_controllers::MotionRegistration coglab_motion_registration(                     \
+  const ::coglab_controllers::MotionRegistration COGLAB_MOTION_NAME(__COUNTER__)(                \
       type, {[]() -> ::coglab_controllers::MotionController* { return new Class(); }, nullptr}); \
   }
 
 /// The same for a controller with a ROS side.
 #define COGLAB_REGISTER_MOTION_CONTROLLER_WITH_ROS(type, Class, RosClass)                     \
   namespace {                                                                                 \
-  const ::coglab_controllers::MotionRegistration coglab_motion_registration(                  \
+  const ::coglab_controllers::MotionRegistration COGLAB_MOTION_NAME(__COUNTER__)(             \
       type, {[]() -> ::coglab_controllers::MotionController* { return new Class(); },         \
              []() -> ::coglab_controllers::MotionControllerRos* { return new RosClass(); }}); \
   }
