@@ -11,7 +11,6 @@ using namespace coglab_controllers::test;
 
 namespace {
 
-constexpr double kCycle = 0.005;
 
 GuardParameters armLimits() {
   GuardParameters p;
