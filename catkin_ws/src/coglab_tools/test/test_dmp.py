@@ -78,7 +78,9 @@ def test_each_column_has_the_unit_of_its_name(tmp_path):
     assert "x is in mm" in said and "y is in cm" in said and "yaw is in deg" in said
 
 
-@pytest.mark.parametrize(("scale", "said"), [(100.0, "--length in"), (1000.0, "lengths are in mm"), (3.28, "--length ft")])
+@pytest.mark.parametrize(
+    ("scale", "said"), [(100.0, "--length in"), (1000.0, "lengths are in mm"), (3.28, "--length ft")]
+)
 def test_a_missing_unit_of_length_is_guessed(tmp_path, scale, said):
     times, places = reach()
     found = read(write(tmp_path / "a.csv", "t,x,y,z", [times, *(scale * places).T]))

@@ -11,7 +11,6 @@ using namespace coglab_controllers::test;
 
 namespace {
 
-
 GuardParameters armLimits() {
   GuardParameters p;
   p.upper_position << 2.967, 2.094, 2.967, 2.094, 2.967, 2.094, 2.967;
