@@ -75,7 +75,17 @@ class Twist:
     """Publishes a target velocity at 50 Hz, made when it is sent, until stopped."""
 
     def __init__(self, publisher: rospy.Publisher, velocity: list[float]) -> None:
-        self.timer = rospy.Timer(rospy.Duration(0.02), lambda _: publisher.publish(target_message(velocity)))
+        self.longest_pause = 0.0
+        """s between two messages; a crowded computer makes it longer than 0.02"""
+        self._sent = time.monotonic()
+        self._publisher, self._velocity = publisher, velocity
+        self.timer = rospy.Timer(rospy.Duration(0.02), self._send)
+
+    def _send(self, _: object) -> None:
+        now = time.monotonic()
+        self.longest_pause = max(self.longest_pause, now - self._sent)
+        self._sent = now
+        self._publisher.publish(target_message(self._velocity))
 
     def stop(self) -> None:
         self.timer.shutdown()
