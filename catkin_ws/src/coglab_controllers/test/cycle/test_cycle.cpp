@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
@@ -352,7 +353,9 @@ TEST(Cycle, SlotsOfPythonProcessesNeitherAllocateNorLock) {
   const std::uint64_t allocations_before = allocations, locks_before = locks;
   int moving = 0;
   for (std::uint64_t i = 1; i <= 3000; ++i) {
-    if (i % 1000 == 1) motion.startMotion({});
+    // A thread of the slot takes the process on, on a busy computer a moment later.
+    for (int k = 0; i % 1000 == 1 && k < 5000 && !motion.startMotion({}).success; ++k)
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
     if (system_calls) SystemCalls::start();
     counting = true;
     robot.tick();
