@@ -52,7 +52,7 @@ def test_a_table_of_a_web_form_is_read_scored_and_kept(tmp_path):
     assert [(s["participant"], s["scale"], s["value"]) for s in scores] == [("P01", "workload", 35.0)]
 
 
-def test_answers_from_console_and_terminal_at_the_same_time_are_all_kept(tmp_path):
+def test_answers_written_at_the_same_time_are_all_kept(tmp_path):
     study = study_in(tmp_path)
     rows = read(tmp_path, f"participant,condition,{TLX}\nP01,calm,10,20,30,40,50,60\nP02,calm,5,5,5,5,5,5\n")
     with ThreadPoolExecutor(len(rows)) as pool:

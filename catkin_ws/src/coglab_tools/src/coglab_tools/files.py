@@ -50,8 +50,12 @@ def write_by(path: Path, write: Callable[[Path], object]) -> Path:
 
 @contextmanager
 def alone(folder: Path, limit: float = 10.0) -> Iterator[None]:
-    """Within it, no other process or thread is within `alone` of the same folder. CheckFailed after `limit` s."""
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    """Within it, no other process or thread is within `alone` of the same folder. CheckFailed after `limit` s, or if
+    the folder cannot be opened."""
+    try:
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    except OSError as error:
+        raise CheckFailed(f"{folder} cannot be opened: {error.strerror}; nothing was written") from None
     try:
         end = time.monotonic() + limit
         while True:
