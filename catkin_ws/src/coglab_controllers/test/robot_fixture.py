@@ -51,7 +51,12 @@ DMP_SERVICES = {
 }
 
 
-LATE = (ReasonCode.COMPUTER_LATE, ReasonCode.ROBOT_DISCONNECTED, ReasonCode.NOT_IN_COMMAND_MODE)
+LATE = (
+    ReasonCode.COMPUTER_LATE,
+    ReasonCode.ROBOT_DISCONNECTED,
+    ReasonCode.NOT_IN_COMMAND_MODE,
+    ReasonCode.STALE_JOINT_STATE,
+)
 """why a motion ends on a computer that is late"""
 LIMIT = 60.0  # s, for all that is waited for: nothing is red because the computer is busy
 
@@ -205,22 +210,30 @@ class Robot:
         assert answer.success, answer.message
         return answer
 
+    def begin(self, position: list[float]) -> object:
+        """Adds a point-to-point motion, again while a late computer is the reason against it; returns the answer."""
+        end = time.monotonic() + LIMIT
+        answer = self.add_ptp(position)
+        while answer.status == AddPtpRequest.REJECTED and time.monotonic() < end:
+            assert answer.reason_code in LATE, answer
+            self.start()
+            time.sleep(0.1)  # with split:=true the manager hears of command mode a little later
+            answer = self.add_ptp(position)
+        assert answer.status != AddPtpRequest.REJECTED, answer
+        return answer
+
     def go(self, position: list[float]) -> None:
         """Moves to a posture with the point-to-point plug-in and waits for its end; begins again where a late computer
         has ended command mode."""
         self.switch("ptp")
-        end = time.monotonic() + 60.0
+        end = time.monotonic() + LIMIT
         while time.monotonic() < end:
-            answer = self.add_ptp(position)
-            if answer.status == AddPtpRequest.STARTED:
-                wait_until(lambda motion=answer.ptp_id: motion in {*self.finished, *self.unfinished}, "its end")
-                if answer.ptp_id in self.finished:
-                    return
-                answer = self.unfinished[answer.ptp_id]
-            assert answer.reason_code in LATE, answer
-            self.start()
-            time.sleep(0.1)  # with split:=true the manager hears of command mode a little later
-        raise AssertionError(f"no motion ended well within 60 s: {answer}")
+            motion = self.begin(position).ptp_id
+            wait_until(lambda motion=motion: motion in {*self.finished, *self.unfinished}, "its end")
+            if motion in self.finished:
+                return
+            assert self.unfinished[motion].reason_code in LATE, self.unfinished[motion]
+        raise AssertionError(f"no motion ended well within {LIMIT} s: {self.unfinished[motion]}")
 
     def execute(self, primitive: str = "reach_human", **fields: object) -> object:
         """Calls execute_dmp."""

@@ -71,7 +71,7 @@ class Split(unittest.TestCase):
         robot = self.robot
         robot.go(HOME)
         robot.switch("dmp")
-        self.assertTrue(robot.execute(dmp_ratio=6.0).success)
+        wait_until(lambda: robot.execute(dmp_ratio=6.0).success, "execute_dmp")
         wait_until(lambda: robot.feedback.state == "running" and robot.feedback.phase < 0.8, "in mid-motion")
         refused = robot.add_ptp(HOME)
         self.assertEqual(refused.status, AddPtpRequest.REJECTED)
@@ -87,7 +87,7 @@ class Split(unittest.TestCase):
         robot.switch("ptp")
         wait_until(lambda: robot.status.standing, "standing")
         there = [HOME[0] + 0.6, *HOME[1:]]
-        ids = [robot.add_ptp(there).ptp_id, robot.add_ptp(HOME).ptp_id]
+        ids = [robot.begin(there).ptp_id, robot.begin(HOME).ptp_id]
         wait_until(lambda: max(abs(v) for v in robot.joints.velocity) > 0.1, "in motion")
         wait_until(lambda: not robot.status.standing, "status of a moving arm")
         answer = robot.cancel("ptp", "a test gives up")
@@ -177,7 +177,7 @@ class Split(unittest.TestCase):
         robot = self.robot
         robot.go(HOME)
         target = [angle + 0.8 if joint == 6 else angle for joint, angle in enumerate(HOME)]
-        self.assertEqual(robot.add_ptp(target).status, AddPtpRequest.STARTED)
+        self.assertEqual(robot.begin(target).status, AddPtpRequest.STARTED)
         wait_until(lambda: robot.joints.velocity[6] > 0.2, "in mid-motion")
         manager = rosnode.get_api_uri(rosgraph.Master("/split"), "/controller_manager")
         process = xmlrpc.client.ServerProxy(manager).getPid("/split")[2]

@@ -220,7 +220,7 @@ class TopicGoal(FeedbackOnRos):
         robot.switch("dmp")
         rospy.sleep(0.3)
         self.assertEqual(told, [], "before a motion nothing is published")
-        self.assertTrue(robot.execute(dmp_ratio=2.0).success)
+        wait_until(lambda: robot.execute(dmp_ratio=2.0).success, "execute_dmp")
         wait_until(lambda: any(not m.poses for m in told), "the end of the path")
         paths = told[: next(i for i, m in enumerate(told) if not m.poses)]
         self.assertGreater(len(paths), 1)
