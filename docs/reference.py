@@ -174,6 +174,7 @@ PYTHON_CLASSES = (  # heading, modules; after a colon: only these names of the m
     ("Virtual time", "coglab_trials.virtual_clock: VirtualClock, using"),
     ("Motion", "coglab_controllers"),
     ("Hand", "ih2_hand.driver"),
+    ("Feedback controllers on any robot", "ctrl_more"),
     ("State machines", "coglab_smach.states.base", "coglab_smach.ports.interfaces"),
     ("Perception, objects", "coglab_perception.belief", "coglab_objects.database"),
     ("The simulated cell", "coglab_sim._cell", "coglab_sim._virtual", "coglab_sim.person.participant"),

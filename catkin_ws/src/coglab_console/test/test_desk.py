@@ -120,7 +120,7 @@ def test_role_of_absent_operator_becomes_free():
         ({"in_hub": False, "state": "/m/approach", "actions": ()}, "take", "busy: it reaches"),
         ({"master_alive": False}, "take", "not there"),
         ({}, "exchange_robot_to_human", "the hand is empty"),
-        ({"state": "/m/stopped", "actions": ("reset",)}, "take", "only Go on leads on"),
+        ({"state": "/m/stopped", "actions": ("reset",)}, "take", "press Go on to continue"),
         ({"hand_connected": False}, "calibrate", "does not answer"),
         ({"motion_allowed": False, "arm_reason": "hold is latched"}, "home", "hold is latched"),
         ({"arm_alive": False}, "home", "not there"),

@@ -1,4 +1,4 @@
-// Parameters of the manager and the plug-ins: both ends of each range of docs/reference.md, and
+// Parameters of the manager and the plug-ins: both ends of each range of config/controllers.yaml, and
 // values just beyond with the error message.
 #include <cmath>
 #include <fstream>

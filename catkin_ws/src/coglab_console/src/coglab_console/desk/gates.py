@@ -167,7 +167,7 @@ class Standing:
 
 
 def _leads_on(now: Standing) -> str:
-    return f"{now.leaf}: only {' or '.join(map(button, now.actions))} leads on"
+    return f"{now.leaf}: press {' or '.join(map(button, now.actions))} to continue"
 
 
 def _start_reason(action: str, now: Standing) -> str:

@@ -1,5 +1,5 @@
 /// @file
-/// Checks of a moving goal (limits in docs/reference.md): which goal frames a motion accepts, and
+/// Checks of a moving goal (limits in config/controllers.yaml): which goal frames a motion accepts, and
 /// when the motion ends because the goal leaves, retreats or drops.
 #pragma once
 

@@ -91,7 +91,9 @@ class WaitTaker(WaitForPerson):
         event = contact.event()
         if event is not None:
             return f"touched on the way: {event.message}"
-        return f"the hand came to within {nearest:.2f} m of its goal and is followed no more" if leaving() else ""
+        if leaving():
+            return f"the hand moved away when the arm was {nearest:.2f} m from its goal; the arm does not follow it"
+        return ""
 
     def _comes_to_its_end(self) -> bool:
         within = self.ctx.config.number("give.touch_within")

@@ -172,7 +172,7 @@ class WaitStop(CoglabState):
 
 class WaitForPerson(WaitStop):
     """A reach for an object that a person offers, or for their hand. If nobody seems to offer or request any more, the
-    arm pauses (PausedForPerson) and stands. It continues if the person continues within ``handover.pause`` s, else it
+    arm pauses and stands. It continues if the person continues within ``handover.pause`` s, else it
     gives up."""
 
     def __init__(self, ctx: Context, keys: Sequence[str]) -> None:
@@ -507,9 +507,9 @@ class PersonsGrip:
 
 
 class ReachWatch:
-    """Watches the target of a reach: an offered object or the person's hand. It must not go back or fall (cc.GoalWatch,
-    as in the controller, but over several motions). It must be seen, or predicted, in the handover region. And somebody
-    must continue to offer it."""
+    """Watches the target of a reach: an offered object or the person's hand. It must not go back or fall
+    (cc.GoalLimits, as in the controller, but over several motions). It must be seen, or predicted, in the handover
+    region. And somebody must continue to offer it."""
 
     def __init__(
         self,
@@ -525,14 +525,14 @@ class ReachWatch:
         self._frame = str(goal["frame"]).removesuffix("_ahead")
         self.predicted = self._began_on_belief = self._frame != goal["frame"]
         """True if the arm moves to the predicted place of the target, not to the seen one"""
-        self._watch: cc.GoalWatch | None = None
+        self._watch: cc.GoalLimits | None = None
         self._sure = state.ctx.clock.now()  # s, time of the last belief
         self._looked = self._sure - PERIOD
         self._last: Sight | None = None  # newest sight without a jump
         self._from: np.ndarray | None = None  # m, position of the palm at the start of the reach
         self._nearest, self._back = np.inf, 0.0
         """nearest: m, smallest distance of the target from there; back: m by which the target has gone back since"""
-        self._hand: cc.GoalWatch | None = None  # watches the person's hand, for a hidden object
+        self._hand: cc.GoalLimits | None = None  # watches the person's hand, for a hidden object
         self._hand_last: Sight | None = None  # newest sight of the hand without a jump
         self._seen_at = 0.0  # s, time of the newest sight of the target
         self._region = HandoverRegion(state.ctx, self.may["margin"])
@@ -628,10 +628,10 @@ class ReachWatch:
             return
         if self._hand is None:
             nowhere = np.zeros(3)
-            self._hand = cc.GoalWatch(nowhere, nowhere, self.may["retreat"], 0.0, self._from, place)
+            self._hand = cc.GoalLimits(nowhere, nowhere, self.may["retreat"], 0.0, self._from, place)
         code, sentence = self._hand.update(passed, place)
         if code and hidden and not self._closes():
-            raise TimeLimit(f"the reach was given up: {sentence}, as the hand that hides it", (), code)
+            raise TimeLimit(f"the reach was given up: the hand that hides the object moved ({sentence})", (), code)
 
     def _follow(self, place: np.ndarray, passed: float) -> None:
         jumped, self._last = jumped_from(self._last, self.state.ctx.clock.now(), place)
@@ -641,7 +641,7 @@ class ReachWatch:
             palm = self._from = palm_at(self.state.ctx)
             if palm is not None:
                 nowhere = np.zeros(3)
-                self._watch = cc.GoalWatch(nowhere, nowhere, self.may["retreat"], self.may["drop"], palm, place)
+                self._watch = cc.GoalLimits(nowhere, nowhere, self.may["retreat"], self.may["drop"], palm, place)
             return
         distance = float(np.linalg.norm(place - self._from))
         self._nearest = min(self._nearest, distance)

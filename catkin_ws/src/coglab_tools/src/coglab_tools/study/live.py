@@ -36,10 +36,14 @@ LIVE = "live"
 ANSWER = 5.0  # s, limit for an answer of a node
 PARAMETERS, NOTES = "/coglab/trial", "/coglab/note"
 BETWEEN = {"p": "put", "t": "take", "g": "give"}  # actions that belong to no trial, by key
-HELP = (
-    "Enter starts, n TEXT adds a note to the last trial (before the first trial: to that one), r repeats the last one, "
-    "s skips this one, p puts the object down, t takes it, g gives it back, c resets the robot, q ends the session"
-)
+HELP = """  Enter   starts this trial
+  n TEXT  adds a note to the last trial, before the first trial to that one
+  r       repeats the last trial
+  s       skips this trial
+  p, t    puts the object down, takes it
+  g       gives the object back
+  c       resets the robot
+  q       ends the session"""
 
 
 class System(Protocol):
@@ -95,7 +99,7 @@ def session(
         rows.begin(identity(), simulated=False)
         name = f"{study.name}_{left[0].participant}_{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
         before = len(rows.trials)
-        print(f"{left[0].participant}: {plural(len(left), 'trial')}. {HELP}")
+        print(f"{left[0].participant}: {plural(len(left), 'trial')}\n{HELP}")
         try:
             _Session(study, robot, system, rows, name, line).run(left)
         except EOFError:
@@ -162,7 +166,7 @@ class _Session:
                     place += 1
                     self._questions(trial, left[place:])
             else:
-                print(f"  {HELP}")
+                print(HELP)
 
     def _run(self, trial: Trial) -> bool:
         """Run a trial and write its rows. False if it did not begin."""
