@@ -62,7 +62,7 @@ def accustomed_people(quick: bool) -> Iterator[Row]:
     trials = in_parallel(run_trial, jobs(20_000, 4 if quick else 100, profile="accustomed", perception=NOISY))
     yield success("handovers that succeed, accustomed people", trials, ">= 97")
     late = [value for trial in trials for value in trial["late"] or [None]]
-    yield median("extra time until the arm is at its goal, beside a person, receiving", late, "s", "<= 0.25")
+    yield median("extra time until the arm is at its goal, compared with a person, receiving", late, "s", "<= 0.25")
 
 
 def false_starts(quick: bool) -> Iterator[Row]:

@@ -104,7 +104,7 @@ def in_the_cycle(quick: bool) -> Iterator[Row]:
                 if manager.status(name).activity != "running":
                     raise RuntimeError(f"{name} does not run: {manager.status(name).fault_text}")
     more = [1e6 * (python - cpp) for cpp, python in zip(*spent.values(), strict=True)]
-    yield median("extra time of a Python admittance in World, beside C++, per cycle", more, "us", "<= 20")
+    yield median("extra time of a Python admittance in World, compared with C++, per cycle", more, "us", "<= 20")
 
 
 class Timed:

@@ -123,7 +123,7 @@ def answers(quick: bool) -> Iterator[Row]:
     yield Row("answer to a FRI datagram, monitor mode", found["us"], "us", f"<= {1.1 * found['echo']:.4g}")
     yield median("answer time divided by that of a bare echo, monitor mode", found["ratios"], "", "<= 1.1")
     moving = measured("moving", quick)
-    yield median("answer over a bare echo, while a motion runs", moving["ratios"], "", "<= 1.1")
+    yield median("answer time divided by that of a bare echo, while a motion runs", moving["ratios"], "", "<= 1.1")
     missing = found["missing"] + moving["missing"]
     yield Row("FRI datagrams without an answer within 20 ms", missing, "", "<= 0")
 
