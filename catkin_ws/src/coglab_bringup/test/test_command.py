@@ -91,6 +91,10 @@ def test_no_root(checkout):
 
 @needs("unshare", "--mount", "true")
 def test_wrong_release(checkout):
+    """Its Python may be too old for this project."""
+    package = checkout / "catkin_ws" / "src" / "coglab_bringup" / "src" / "coglab_bringup"
+    package.mkdir(parents=True)
+    (package / "arguments.py").write_text("raise TypeError('this Python is too old')\n")
     other = checkout / "os-release"
     other.write_text('PRETTY_NAME="Ubuntu 20.04"\nVERSION_CODENAME=focal\n')
     script = 'mount --bind "$1" "$(readlink -f /etc/os-release)" && exec "$2" test'
