@@ -125,3 +125,6 @@ def test_slowed_time_passes_by_the_factor_and_never_jumps():
     assert [time.at(clock) for clock in (11.0, 12.0, 16.0)] == pytest.approx([10.5, 11.0, 12.0])
     time.change(16.0, 1.0)
     assert time.at(17.0) == pytest.approx(13.0)
+    for clock in (5.0, 11.0, 13.0, 17.0):  # earlier moments keep their times
+        assert time.clock(time.at(clock)) == pytest.approx(clock)
+    assert time.at(11.0) == pytest.approx(10.5)

@@ -12,21 +12,28 @@ class Slowed:
     """Maps the time of a clock to slowed time, which passes by a factor. Continuous when the factor changes."""
 
     def __init__(self) -> None:
-        self._pieces = [(0.0, 0.0, 1.0)]  # (clock time, slowed time, factor from then on); the two newest
+        self._pieces = [(0.0, 0.0, 1.0)]  # (clock time, slowed time, factor from then on)
 
     def at(self, clock: float) -> float:
         """Slowed time (s) at a clock time (s)."""
-        since, time_then, factor = self._pieces[-1] if clock >= self._pieces[-1][0] else self._pieces[0]
+        since, time_then, factor = self._piece(0, clock)
         return time_then + (clock - since) * factor
 
     def clock(self, time_here: float) -> float:
         """Clock time (s) at a slowed time (s)."""
-        since, time_then, factor = self._pieces[-1] if time_here >= self._pieces[-1][1] else self._pieces[0]
+        since, time_then, factor = self._piece(1, time_here)
         return since + (time_here - time_then) / factor
 
     def change(self, clock: float, factor: float) -> None:
         """From this clock time (s) on, slowed time passes by this factor."""
-        self._pieces = [self._pieces[-1], (clock, self.at(clock), factor)]
+        here = self.at(clock)
+        while self._pieces and self._pieces[-1][0] >= clock:  # the clock was set back
+            self._pieces.pop()
+        self._pieces.append((clock, here, factor))
+
+    def _piece(self, axis: int, value: float) -> tuple[float, float, float]:
+        """The newest piece that begins before a value of the clock (axis 0) or of slowed time (1), else the first."""
+        return next((piece for piece in reversed(self._pieces) if piece[axis] <= value), self._pieces[0])
 
 
 class Pace:
