@@ -1,5 +1,8 @@
 """Arguments of the launch files reach their nodes."""
 
+import _ctypes
+from pathlib import Path
+
 import pytest
 from coglab_bringup.launch_arguments import whole_path
 from coglab_bringup.launch_files import check
@@ -108,6 +111,15 @@ def test_a_file_that_cannot_be_written_is_refused(tmp_path, name):
 def test_arguments_with_unknown_values_are_refused(arguments, named):
     with pytest.raises(ValueError, match=named):
         check(arguments)
+
+
+def test_a_library_that_is_cut_short_is_refused_as_arm(tmp_path):
+    """Loading it would end the process."""
+    whole = Path(_ctypes.__file__).read_bytes()
+    cut = tmp_path / "libcut.so"
+    cut.write_bytes(whole[: len(whole) // 8])
+    with pytest.raises(ValueError, match="cut short"):
+        check({"arm": str(cut)})
 
 
 @pytest.mark.parametrize(

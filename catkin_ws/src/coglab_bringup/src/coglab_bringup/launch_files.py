@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+import signal
+import subprocess
+import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from xml.etree import ElementTree
@@ -12,6 +15,17 @@ from coglab_py.packages import package_path
 
 LARGEST_FILE = 10_000_000  # bytes; the largest shipped one, primitives.xml, has some 10 000
 PERCEPTION = ("stand_in", "bridge", "none")
+LOAD_TIMEOUT = 20  # s
+
+_NO_ARM = 3  # exit status of _LOAD
+_LOAD = f"""
+import ctypes, os, sys
+try:
+    library = ctypes.CDLL(sys.argv[1], os.RTLD_LAZY | os.RTLD_LOCAL)
+except OSError as error:
+    sys.exit(str(error))
+os._exit(0 if hasattr(library, "coglab_arm") else {_NO_ARM})
+"""
 
 
 def check(arguments: Mapping[str, str]) -> None:
@@ -137,18 +151,28 @@ def _patterns(value: str) -> None:
 
 def _arm(value: str) -> None:
     """`fri`, `ideal`, or a library that the loader finds and that has an arm."""
-    import ctypes
-
     if value in ("fri", "ideal"):
         return
     if "/" not in value and ".so" not in value:
         raise ValueError("expected fri, ideal, or a library such as libmy_arm.so")
+    # In a process of its own: loading a file that is cut short ends the process.
     try:
-        library = ctypes.CDLL(value, os.RTLD_LAZY | os.RTLD_LOCAL)
-    except OSError as error:
-        raise ValueError(f"the library cannot be loaded: {error}; give its whole path, or build it") from None
-    if not hasattr(library, "coglab_arm"):
+        tried = subprocess.run(
+            [sys.executable, "-c", _LOAD, value], capture_output=True, text=True, errors="replace", timeout=LOAD_TIMEOUT
+        )
+    except subprocess.TimeoutExpired:
+        raise ValueError(
+            f"the library was not loaded within {LOAD_TIMEOUT} s; see what its static objects wait for"
+        ) from None
+    if tried.returncode < 0:
+        raise ValueError(
+            f"loading the library ended the process ({signal.strsignal(-tried.returncode)}); the file is cut short, or "
+            "a static object of the library fails; build it again"
+        )
+    if tried.returncode == _NO_ARM:
         raise ValueError("the library has no arm; end its source with COGLAB_ARM(MyArm), see docs/arm_back_end.md")
+    if tried.returncode:
+        raise ValueError(f"the library cannot be loaded: {tried.stderr}; give its whole path, or build it")
 
 
 def _objects(value: str) -> None:

@@ -5,12 +5,17 @@
 #include <dlfcn.h>
 
 #include <cstdint>
+#include <cstdlib>
 #include <exception>
+#include <filesystem>
 #include <memory>
+#include <sstream>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 
 #include "coglab_rt/arm_port.hpp"
+#include "coglab_rt/library_length.hpp"
 
 namespace coglab_rt {
 
@@ -37,6 +42,20 @@ constexpr ArmEntry armEntry() {
   return entry;
 }
 
+/// The file of a library as the linker finds it by its name: the first one in the folders of
+/// LD_LIBRARY_PATH. A path, and a name that is not found there, is returned as it is.
+inline std::string armFile(const std::string& library) {
+  const char* const folders = std::getenv("LD_LIBRARY_PATH");
+  if (library.find('/') != std::string::npos || folders == nullptr) return library;
+  std::istringstream list(folders);
+  std::error_code no_error;
+  for (std::string folder; std::getline(list, folder, ':');) {
+    const std::string file = (std::filesystem::path(folder) / library).string();
+    if (std::filesystem::is_regular_file(file, no_error)) return file;
+  }
+  return library;
+}
+
 /// Opens a library and makes its arm. The library stays open until the process ends.
 /// @param library path of the file, or its name where the linker finds it (LD_LIBRARY_PATH)
 /// @throws std::runtime_error naming the library, what was expected and what to do
@@ -57,6 +76,7 @@ inline std::unique_ptr<ArmPort> loadArm(const std::string& library) {
            "; correct the cause or the constructor of the arm, and start again");
     return nullptr;
   };
+  if (const std::string why = cutShort(armFile(library)); !why.empty()) refuse(why);
   // Through a pointer: constructors of static objects can throw, which the declaration of dlopen()
   // excludes.
   void* (*const volatile open)(const char*, int) = dlopen;

@@ -3,6 +3,8 @@
 
 #include <atomic>
 #include <chrono>
+#include <cstdlib>
+#include <filesystem>
 #include <string>
 #include <thread>
 
@@ -46,6 +48,20 @@ TEST(ArmLibrary, UnusableLibrariesAreRefusedWithAReason) {
     EXPECT_NE(said.find("the arm's library " + file + ": "), std::string::npos) << said;
     EXPECT_NE(said.find(words), std::string::npos) << said;
   }
+}
+
+// To open such a file can end the process: the linker maps more than there is.
+TEST(ArmLibrary, AFileThatIsCutShortIsRefusedByPathAndByName) {
+  namespace fs = std::filesystem;
+  const fs::path folder = fs::path(testing::TempDir()) / "coglab_cut_arm";
+  fs::create_directories(folder);
+  const fs::path file = folder / "libcoglab_cut_arm.so";
+  fs::copy_file(library("shortest"), file, fs::copy_options::overwrite_existing);
+  fs::resize_file(file, fs::file_size(file) / 8);
+  setenv("LD_LIBRARY_PATH", folder.c_str(), 1);
+  for (const std::string& name : {file.string(), file.filename().string()})
+    EXPECT_NE(refusal(name).find("cut short"), std::string::npos) << refusal(name);
+  fs::remove_all(folder);
 }
 
 }  // namespace

@@ -1,26 +1,22 @@
 #include "loading/library_file.hpp"
 
-#include <elf.h>
 #include <fcntl.h>
-#include <link.h>
 #include <poll.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <csignal>
-#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <stdexcept>
 #include <system_error>
 #include <thread>
 
+#include "coglab_rt/library_length.hpp"
 #include "ctrl_more/loading/search_path.hpp"
 
 namespace fs = std::filesystem;
@@ -147,34 +143,8 @@ LibraryCopy::~LibraryCopy() {
 }
 
 void LibraryCopy::check() const {
-  checkLength();
+  if (const std::string clause = coglab_rt::cutShort(path_); !clause.empty()) refuse(file_, clause);
   probe();
-}
-
-// The linker maps the sizes in the headers. Access beyond the end of the file ends the process.
-void LibraryCopy::checkLength() const {
-  std::ifstream in(path_, std::ios::binary);
-  ElfW(Ehdr) header{};
-  in.read(reinterpret_cast<char*>(&header), sizeof header);
-  const unsigned char native = sizeof(void*) == 8 ? ELFCLASS64 : ELFCLASS32;
-  if (!in || std::memcmp(header.e_ident, ELFMAG, SELFMAG) != 0 ||
-      header.e_ident[EI_CLASS] != native) {
-    return;  // the linker refuses it
-  }
-  std::uint64_t announced = header.e_shoff + std::uint64_t{header.e_shentsize} * header.e_shnum;
-  in.seekg(static_cast<std::streamoff>(header.e_phoff));
-  for (int i = 0; i < header.e_phnum && in; ++i) {
-    ElfW(Phdr) part{};
-    in.read(reinterpret_cast<char*>(&part), sizeof part);
-    if (part.p_type == PT_LOAD) {
-      announced = std::max<std::uint64_t>(announced, part.p_offset + part.p_filesz);
-    }
-  }
-  const std::uint64_t size = fs::file_size(path_);
-  if (!in || announced > size) {
-    refuse(file_, "is cut short: it has " + std::to_string(size) + " of " +
-                      std::to_string(announced) + " bytes; build it again");
-  }
 }
 
 void LibraryCopy::probe() const {

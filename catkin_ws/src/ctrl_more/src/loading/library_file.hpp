@@ -42,7 +42,6 @@ class LibraryCopy {
   void check() const;
 
  private:
-  void checkLength() const;
   void probe() const;
 
   std::string file_, path_;
