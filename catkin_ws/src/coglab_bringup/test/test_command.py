@@ -1,6 +1,7 @@
 """./coglab with faults: one clear sentence, the next step, and nothing incomplete."""
 
 import os
+import platform
 import shutil
 import socket
 import subprocess
@@ -187,6 +188,33 @@ def test_a_build_that_fails_without_the_word_error(workspace):
     assert ended.returncode == 1
     assert "previously built by 'catkin build'" in ended.stdout
     assert "the build failed; whole log:" in ended.stdout.splitlines()[-1]
+
+
+CATKIN_MAKE = """#!/bin/sh
+[ -e build/CMakeCache.txt ] && echo "old build: kept" || echo "old build: gone"
+exit 1
+"""
+HERE = platform.freedesktop_os_release().get("VERSION_CODENAME")
+
+
+@needs("unshare", "--mount", "true")
+@pytest.mark.parametrize(
+    "release, moved, end", [(HERE, "", "kept"), ("sarge", "", "gone"), (None, "", "gone"), (HERE, "/before", "gone")]
+)
+def test_only_a_build_of_this_release_and_folder_is_kept(workspace, release, moved, end):
+    """cmake refuses a build of another folder. One of another release fails later, with other messages."""
+    tool = workspace / "catkin_make"
+    tool.write_text(CATKIN_MAKE)
+    tool.chmod(0o755)
+    build = workspace / "catkin_ws" / "build"
+    build.mkdir()
+    (build / "CMakeCache.txt").write_text(f"CMAKE_CACHEFILE_DIR:INTERNAL={moved}{build.resolve()}\n")
+    (workspace / ".coglab").mkdir()
+    if release:
+        (workspace / ".coglab" / "release").write_text(f"{release}\n")
+    script = 'mount --bind "$1" /usr/bin/catkin_make && exec "$2" build'
+    ended = run("unshare", "--mount", "sh", "-c", script, "sh", tool, workspace / "coglab")
+    assert f"old build: {end}" in ended.stdout, ended.stdout
 
 
 def test_nothing_is_built_when_no_source_is_newer():
