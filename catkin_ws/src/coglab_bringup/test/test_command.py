@@ -116,16 +116,27 @@ esac
 
 
 @needs("unshare", "--mount", "true")
-@pytest.mark.parametrize("suite, advice", [("sid", "/etc/apt also names sid"), ("", "to go on by hand: apt-get")])
-def test_packages_that_cannot_be_installed(checkout, suite, advice):
-    """An incomplete upgrade of Debian is named; the caller's umask 077 does not affect Debian's packages."""
-    tool = checkout / "apt-get"
-    tool.write_text(APT_GET)
-    tool.chmod(0o755)
-    script = 'umask 077; mount --bind "$1" /usr/bin/apt-get && exec "$2" build'
+@pytest.mark.parametrize(
+    "suite, broken, advice",
+    [
+        ("sid", "", "/etc/apt also names sid"),
+        ("", "bash", "dpkg --configure -a"),
+        ("", "", "to go on by hand: apt-get"),
+    ],
+)
+def test_packages_that_cannot_be_installed(checkout, suite, broken, advice):
+    """An incomplete upgrade of Debian or of a package is named; the caller's umask 077 does not affect Debian's
+    packages."""
+    for name, text in (("apt-get", APT_GET), ("dpkg", "#!/bin/sh\nprintf '%s' \"$BROKEN\"\n")):
+        (checkout / name).write_text(text)
+        (checkout / name).chmod(0o755)
+    script = (
+        'umask 077; for tool in apt-get dpkg; do mount --bind "$1/$tool" /usr/bin/$tool; done; exec "$1/coglab" build'
+    )
     log = checkout / "umask"
-    words = ("unshare", "--mount", "sh", "-c", script, "sh", tool, checkout / "coglab")
-    ended = run(*words, APT_SUITE=suite, UMASK_LOG=str(log))
+    ended = run(
+        *("unshare", "--mount", "sh", "-c", script, "sh", checkout), APT_SUITE=suite, BROKEN=broken, UMASK_LOG=str(log)
+    )
     assert ended.returncode == 1 and "held broken packages" in ended.stdout
     (error,) = lines_of(ended.stdout)
     assert advice in error and log.read_text() == "0022\n"
