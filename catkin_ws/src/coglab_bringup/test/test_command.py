@@ -10,6 +10,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
+from test_choose_smach import function
 
 TOP = Path(__file__).resolve().parents[4]
 ABSENT = "coglab-test-no-such-package"
@@ -140,6 +141,33 @@ def test_packages_that_cannot_be_installed(checkout, suite, broken, advice):
     assert ended.returncode == 1 and "held broken packages" in ended.stdout
     (error,) = lines_of(ended.stdout)
     assert advice in error and log.read_text() == "0022\n"
+
+
+PIP_WITHOUT_NETWORK = """#!/bin/sh
+case "$*" in *"-m pip install"*) echo "ERROR: no distribution of $NAME"; exit 1 ;; esac
+exec /usr/bin/python3 "$@"
+"""
+
+
+def test_oracles_that_cannot_be_downloaded_are_skipped_with_a_sentence(checkout):
+    """The tests that do not need them run."""
+    for name in ("test-oracles.txt", "extras.txt"):
+        (checkout / name).write_text("numpy\n")
+    fake = checkout / "venv" / "bin" / "python"
+    fake.parent.mkdir(parents=True)
+    fake.write_text(PIP_WITHOUT_NETWORK)
+    fake.chmod(0o755)
+    make = "/usr/bin/python3 -m venv"
+    assert make in function("oracle_python")
+    script = f"""set -euo pipefail
+        say() {{ echo "$*" >&2; }}
+        top={checkout} state={checkout}
+        {function("oracle_python").replace(make, "true")}
+        "$(oracle_python)" -c 'print("tests run")'
+        """
+    ended = run("bash", "-c", script, NAME=ABSENT)
+    assert ended.returncode == 0 and "tests run" in ended.stdout
+    assert f"no distribution of {ABSENT}" in ended.stdout and "skipped" in ended.stdout
 
 
 def test_path_with_a_space(checkout, tmp_path):
