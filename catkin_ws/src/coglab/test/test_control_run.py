@@ -41,6 +41,21 @@ def test_a_bad_file_is_refused_with_a_reason(tmp_path, text, words):
         find_class(load_module(file))
 
 
+def test_a_missing_service_is_named_though_the_date_stands(monkeypatch):
+    """A clock that is set back must not keep the command waiting."""
+    from coglab.control import ros
+
+    def unknown(_master: object, name: str) -> str:
+        raise ros.rosgraph.MasterError(name)
+
+    monkeypatch.setattr(ros.rosgraph, "is_master_online", lambda: True)
+    monkeypatch.setattr(ros.rosgraph.Master, "lookupService", unknown)
+    monkeypatch.setattr(ros, "WAIT", 0.3)
+    monkeypatch.setattr(time, "time", lambda: 1000.0)
+    with pytest.raises(wire.SlotError, match="feedback/enable"):
+        ros.SlotServices().enable("slot")
+
+
 @pytest.fixture(name="robot", scope="module")
 def running_robot() -> Iterator[subprocess.Popen]:
     """A robot node with the ideal arm and the slot `python_motion`."""

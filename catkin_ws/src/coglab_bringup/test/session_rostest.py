@@ -81,7 +81,8 @@ class Session(Handover):
         cls.rows = {}
         cls.outcomes = dict.fromkeys(ORDER, "not reached: an action before it failed")
         for action in ORDER:
-            cls.rows[action] = run_handover(action, "mug", recorder)[0]
+            cls.rows[action], *span = run_handover(action, "mug", recorder)
+            cls.spans.append(span)
             cls.outcomes[action] = cls.rows[action]["outcome"]
             if cls.outcomes[action] != "success":
                 break

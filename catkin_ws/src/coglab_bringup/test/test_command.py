@@ -1,6 +1,7 @@
 """./coglab with faults: one clear sentence, the next step, and nothing incomplete."""
 
 import os
+import platform
 import shutil
 import socket
 import subprocess
@@ -9,6 +10,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
+from test_choose_smach import function
 
 TOP = Path(__file__).resolve().parents[4]
 ABSENT = "coglab-test-no-such-package"
@@ -115,19 +117,57 @@ esac
 
 
 @needs("unshare", "--mount", "true")
-@pytest.mark.parametrize("suite, advice", [("sid", "/etc/apt also names sid"), ("", "to go on by hand: apt-get")])
-def test_packages_that_cannot_be_installed(checkout, suite, advice):
-    """An incomplete upgrade of Debian is named; the caller's umask 077 does not affect Debian's packages."""
-    tool = checkout / "apt-get"
-    tool.write_text(APT_GET)
-    tool.chmod(0o755)
-    script = 'umask 077; mount --bind "$1" /usr/bin/apt-get && exec "$2" build'
+@pytest.mark.parametrize(
+    "suite, broken, advice",
+    [
+        ("sid", "", "/etc/apt also names sid"),
+        ("", "bash", "dpkg --configure -a"),
+        ("", "", "to go on by hand: apt-get"),
+    ],
+)
+def test_packages_that_cannot_be_installed(checkout, suite, broken, advice):
+    """An incomplete upgrade of Debian or of a package is named; the caller's umask 077 does not affect Debian's
+    packages."""
+    for name, text in (("apt-get", APT_GET), ("dpkg", "#!/bin/sh\nprintf '%s' \"$BROKEN\"\n")):
+        (checkout / name).write_text(text)
+        (checkout / name).chmod(0o755)
+    script = (
+        'umask 077; for tool in apt-get dpkg; do mount --bind "$1/$tool" /usr/bin/$tool; done; exec "$1/coglab" build'
+    )
     log = checkout / "umask"
-    words = ("unshare", "--mount", "sh", "-c", script, "sh", tool, checkout / "coglab")
-    ended = run(*words, APT_SUITE=suite, UMASK_LOG=str(log))
+    ended = run(
+        *("unshare", "--mount", "sh", "-c", script, "sh", checkout), APT_SUITE=suite, BROKEN=broken, UMASK_LOG=str(log)
+    )
     assert ended.returncode == 1 and "held broken packages" in ended.stdout
     (error,) = lines_of(ended.stdout)
     assert advice in error and log.read_text() == "0022\n"
+
+
+PIP_WITHOUT_NETWORK = """#!/bin/sh
+case "$*" in *"-m pip install"*) echo "ERROR: no distribution of $NAME"; exit 1 ;; esac
+exec /usr/bin/python3 "$@"
+"""
+
+
+def test_oracles_that_cannot_be_downloaded_are_skipped_with_a_sentence(checkout):
+    """The tests that do not need them run."""
+    for name in ("test-oracles.txt", "extras.txt"):
+        (checkout / name).write_text("numpy\n")
+    fake = checkout / "venv" / "bin" / "python"
+    fake.parent.mkdir(parents=True)
+    fake.write_text(PIP_WITHOUT_NETWORK)
+    fake.chmod(0o755)
+    make = "/usr/bin/python3 -m venv"
+    assert make in function("oracle_python")
+    script = f"""set -euo pipefail
+        say() {{ echo "$*" >&2; }}
+        top={checkout} state={checkout}
+        {function("oracle_python").replace(make, "true")}
+        "$(oracle_python)" -c 'print("tests run")'
+        """
+    ended = run("bash", "-c", script, NAME=ABSENT)
+    assert ended.returncode == 0 and "tests run" in ended.stdout
+    assert f"no distribution of {ABSENT}" in ended.stdout and "skipped" in ended.stdout
 
 
 def test_path_with_a_space(checkout, tmp_path):
@@ -187,6 +227,33 @@ def test_a_build_that_fails_without_the_word_error(workspace):
     assert ended.returncode == 1
     assert "previously built by 'catkin build'" in ended.stdout
     assert "the build failed; whole log:" in ended.stdout.splitlines()[-1]
+
+
+CATKIN_MAKE = """#!/bin/sh
+[ -e build/CMakeCache.txt ] && echo "old build: kept" || echo "old build: gone"
+exit 1
+"""
+HERE = platform.freedesktop_os_release().get("VERSION_CODENAME")
+
+
+@needs("unshare", "--mount", "true")
+@pytest.mark.parametrize(
+    "release, moved, end", [(HERE, "", "kept"), ("sarge", "", "gone"), (None, "", "gone"), (HERE, "/before", "gone")]
+)
+def test_only_a_build_of_this_release_and_folder_is_kept(workspace, release, moved, end):
+    """cmake refuses a build of another folder. One of another release fails later, with other messages."""
+    tool = workspace / "catkin_make"
+    tool.write_text(CATKIN_MAKE)
+    tool.chmod(0o755)
+    build = workspace / "catkin_ws" / "build"
+    build.mkdir()
+    (build / "CMakeCache.txt").write_text(f"CMAKE_CACHEFILE_DIR:INTERNAL={moved}{build.resolve()}\n")
+    (workspace / ".coglab").mkdir()
+    if release:
+        (workspace / ".coglab" / "release").write_text(f"{release}\n")
+    script = 'mount --bind "$1" /usr/bin/catkin_make && exec "$2" build'
+    ended = run("unshare", "--mount", "sh", "-c", script, "sh", tool, workspace / "coglab")
+    assert f"old build: {end}" in ended.stdout, ended.stdout
 
 
 def test_nothing_is_built_when_no_source_is_newer():

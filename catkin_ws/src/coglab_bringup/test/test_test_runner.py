@@ -5,7 +5,7 @@ import sys
 import pytest
 from coglab_bringup import arguments
 from coglab_bringup.arguments import test_options as options_of_test
-from coglab_bringup.test_runner import Program, find_programs, report, run, unfinished
+from coglab_bringup.test_runner import Program, find_programs, report, report_differences, run, unfinished
 from coglab_bringup.usage import Refused
 
 GREEN = (
@@ -132,6 +132,23 @@ def test_a_hanging_test_is_named(tmp_path):
     log = tmp_path / "log"
     log.write_text("header\ntest_a.py::test_x \n[gw0] [ 50%] PASSED test_a.py::test_x \ntest_a.py::test_y \n")
     assert unfinished(log) == ["test_a.py::test_y"]
+
+
+def test_repeated_runs_are_compared_case_by_case(tmp_path, capsys):
+    def one_run(**cases: str) -> list[Program]:
+        made = program(tmp_path, "")
+        made.cases, made.failed = cases, list(cases.values()).count("failed")
+        return [made]
+
+    def compared(*runs: list[Program]) -> tuple[int, str]:
+        return report_differences(list(runs), tmp_path), capsys.readouterr().out
+
+    for end in ("passed", "failed", "skipped"):
+        assert compared(one_run(a=end), one_run(a=end))[0] == 0
+    status, text = compared(one_run(a="passed", b="passed"), one_run(a="passed", b="failed"), one_run(a="passed"))
+    assert status == 1 and "test_x.py: b\n" in text and "test_x.py: a\n" not in text
+    for part in ("passed in run 1\n", "failed in run 2\n", "missing in run 3\n", "run_2"):
+        assert part in text
 
 
 def test_a_named_test_builds_its_targets(tmp_path):

@@ -1,9 +1,12 @@
 """Figures and intervals of trials with known values."""
 
+import os
+
 import numpy as np
 import pytest
 from coglab.plot import draw_trial, figure_of, rows_without_overlap
 from coglab.series import Series
+from coglab_bringup import demo
 from coglab_bringup.demo import keep, unfinished
 from coglab_bringup.handover import NotTaken
 from coglab_bringup.trial_recorder import summarise
@@ -47,6 +50,29 @@ def test_a_handover_that_did_not_end_has_a_code():
     assert unfinished("take", RuntimeError("roslaunch ended"))["reason_code"] == ReasonCode.NODE_SILENT
     refused = unfinished("take", NotTaken("take was not taken", ReasonCode.WRONG_STATE))
     assert refused == {"kind": "take", "outcome": "take was not taken", "reason_code": ReasonCode.WRONG_STATE}
+
+
+@pytest.mark.parametrize("load", [9.0, 1.0])
+def test_a_slow_start_is_explained_by_the_load_of_the_computer(monkeypatch, capsys, load):
+    """Before the simulated cell runs, nothing else tells why the screen stands still."""
+    monkeypatch.setattr(demo, "SLOW_START", 0.01)
+    monkeypatch.setattr(os, "getloadavg", lambda: (load, 0.0, 0.0))
+    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    watch = demo.PaceWatch()
+    watch.slow_start.join()
+    assert ("load 9.0 on 2 processors" in capsys.readouterr().out) == (load > 2.0)
+
+
+def test_each_slower_pace_of_the_cell_is_shown_once(monkeypatch, capsys):
+    monkeypatch.setattr(demo, "SLOW_START", 3600.0)
+    watch, shown = demo.PaceWatch(), []
+    for factor in (1.0, 0.5, 0.5, 1.0, 0.5, 0.25):
+        watch.take(factor)
+        shown.append(capsys.readouterr().out)
+    assert [bool(text) for text in shown] == [False, True, False, False, False, True] and "0.25" in shown[-1]
+    assert watch.lowest == 0.25
+    watch.slow_start.join(60.0)
+    assert not watch.slow_start.is_alive(), "the cell runs: its start is over"
 
 
 def test_children_of_a_concurrence_have_their_own_rows():

@@ -77,7 +77,7 @@ class BridgeNode:
     def name_unknown_objects(self) -> None:
         """Warn of objects in the mapping that the object database does not have."""
         try:
-            rospy.wait_for_service("object_database/list_objects", DATABASE_WAIT)
+            steady.wait_for_service("object_database/list_objects", DATABASE_WAIT)
             known = rospy.ServiceProxy("object_database/list_objects", ListObjects)().object_ids
         except (rospy.ROSException, rospy.ServiceException):  # no database: perception alone
             return

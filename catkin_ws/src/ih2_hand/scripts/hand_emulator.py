@@ -73,19 +73,22 @@ def read_commands(server: PtyServer) -> None:
 
 def main() -> int:
     as_node = any(argument.startswith("__name:=") for argument in sys.argv)
-    arguments, announce = sys.argv[1:], None
+    arguments, announce, clock = sys.argv[1:], None, None
     if as_node:
         import rospy
         from coglab_py.alone import init_node
+        from coglab_py.pace import Pace
         from coglab_py.steady import end_quietly
-        from ih2_hand.ros.emulator_node import EmulatorNode
+        from ih2_hand.ros.emulator_node import CellClock, EmulatorNode
 
         init_node("hand_emulator", disable_signals=True)
         end_quietly()
         arguments, announce = rospy.myargv(sys.argv)[1:], EmulatorNode.announce
+        clock = CellClock(Pace().follow("real_time_factor"))  # of the cell, in the same namespace
     options = parse(arguments)
     try:
         hand = EmulatedHand(
+            clock,
             dialect=options.dialect,
             calibration_scale=options.calibration_scale,
             greeting=options.greeting,

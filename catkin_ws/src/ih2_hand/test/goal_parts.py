@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import pytest
 import rospy
 from coglab_msgs.msg import HandStatus, MotorStatus
+from coglab_py.pace import Pace
 from ih2_hand.progress import Verdict
 from ih2_hand.ros import goals
 
@@ -129,7 +130,7 @@ class Master:
         self.warnings: list[str] = []
 
 
-def queue_of_goals(monkeypatch: pytest.MonkeyPatch) -> tuple[goals.GoalQueue, Master]:
+def queue_of_goals(monkeypatch: pytest.MonkeyPatch, pace: Pace | None = None) -> tuple[goals.GoalQueue, Master]:
     """A queue of goals without a master; its thread is not started."""
     master = Master()
     Server.started = 0
@@ -140,7 +141,7 @@ def queue_of_goals(monkeypatch: pytest.MonkeyPatch) -> tuple[goals.GoalQueue, Ma
     for log in ("logwarn", "logerr"):
         monkeypatch.setattr(goals.rospy, log, lambda text, *values: master.warnings.append(text % values))
     monkeypatch.setattr(goals.rospy, "logwarn_throttle", lambda _, text, *values: master.warnings.append(text % values))
-    return goals.GoalQueue(Owner()), master
+    return goals.GoalQueue(Owner(), pace or Pace()), master
 
 
 def status_now(**fields: object) -> HandStatus:

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import actionlib
 import pytest
 import rospy
+from coglab_py import pace
 from goal_parts import Handle, Owner, Server, Task, queue_of_goals, status_now
 from ih2_hand.errors import HandConnectionLost
 from ih2_hand.progress import RESENDS
@@ -22,8 +23,10 @@ class Desk:
         self.now = 100.0
         clock = SimpleNamespace(monotonic=lambda: self.now, sleep=lambda seconds: None)
         monkeypatch.setattr(goals, "time", clock)
+        monkeypatch.setattr(pace, "time", clock)
         monkeypatch.setattr(goals.rospy.Time, "now", lambda: rospy.Time.from_sec(self.now))
-        self.queue, self.master = queue_of_goals(monkeypatch)
+        self.pace = pace.Pace()
+        self.queue, self.master = queue_of_goals(monkeypatch, self.pace)
         self.owner: Owner = self.queue._owner
 
     def work(self) -> None:
@@ -138,6 +141,19 @@ def test_a_goal_has_its_time_limit(desk):
     desk.status(after=0.1)
     assert handle.ended == ("aborted", "not done within 3 s; fingers stopped", Reason.TIME_LIMIT)
     assert desk.stops == 1
+
+
+def test_limits_of_time_pass_with_the_simulated_cell(desk):
+    """In a cell at a quarter of real time a finger needs four times as long: it is neither stuck nor too late."""
+    desk.pace.change(0.25)
+    handle = desk.goal()
+    desk.task.limit = 3.0
+    for _ in range(118):
+        desk.status(after=0.1)
+    assert handle.ended is None and desk.task.asked[-1] == pytest.approx(11.8 / 4)
+    for _ in range(4):
+        desk.status(after=0.1)
+    assert handle.ended is not None and handle.ended[2] == Reason.TIME_LIMIT
 
 
 def test_silence_counts_from_the_last_status(desk):

@@ -1,11 +1,17 @@
 """The emulator's bytes if the physics turns the motors and provides positions, currents and the stop at contact."""
 
+from types import SimpleNamespace
+
 import pytest
+import rospy
+from coglab_py import pace
+from ih2_hand import frames
 from ih2_hand.clock import SteppedClock
 from ih2_hand.driver import HandSerialDriver
 from ih2_hand.emulator.hand import EmulatedHand
 from ih2_hand.emulator.physical_motor import MotorState
 from ih2_hand.emulator.virtual_link import VirtualLink
+from ih2_hand.ros.emulator_node import CellClock
 
 FREE, STROKE_S, DT = 40.0, 1.0, 0.005
 
@@ -106,3 +112,20 @@ def test_speed_moves_end_at_the_end_sensors_and_stop_holds():
     bench.driver.move_motor(2, 511, False)
     bench.run(1.2)
     assert bench.driver.get_finger_status(2)["raw"] == 0x08
+
+
+def test_a_calibration_in_a_slowed_cell_opens_the_fingers(monkeypatch):
+    """The cell runs at a quarter of real time: the fingers need four times as long, and so does the calibration."""
+    now, factor = [100.0], 0.25
+    monkeypatch.setattr(pace, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    monkeypatch.setattr(rospy, "get_time", lambda: now[0])
+    slowed = pace.Pace()
+    slowed.change(factor)
+    hand, physics = EmulatedHand(CellClock(slowed), physical=True), Physics()
+    physics.position = [1.0] * 5
+    hand.receive(bytes((frames.FAST_CALIBRATION,)))
+    while hand.calibrating:
+        now[0] += DT / factor
+        hand.follow(physics.step(hand.orders()))
+        hand.advance()
+    assert physics.position == pytest.approx([0.0] * 5, abs=0.001)

@@ -18,12 +18,13 @@ from coglab_py.alone import log_without_raising
 
 from coglab_bringup import process_tree
 from coglab_bringup.arguments import demo_parser
-from coglab_bringup.run_directory import free_port, record_run, run_environment
+from coglab_bringup.run_directory import free_port, print_load, record_run, run_environment
 from coglab_bringup.usage import Refused
 
 OBJECT = "mug"  # object that the simulated person offers (coglab_sim/config/cell.yaml)
 KINDS = ("exchange_human_to_robot", "exchange_robot_to_human")  # in this order
 MASTER_LIMIT = 30.0  # s until the ROS master answers, counted while roslaunch uses no processor time
+SLOW_START = 10.0  # s until the cell runs, after which a high load of this computer is printed
 CONSOLE_LIMIT = 30.0  # s until a message reports that the console starts late
 
 
@@ -70,10 +71,14 @@ def say_console(home: Path, alive: Callable[[], bool], limit: float = CONSOLE_LI
 
 
 class PaceWatch:
-    """Reports when this computer is too busy for real time. Stores the lowest real-time factor of the cell."""
+    """Prints why the system is slow: the load of this computer if the cell does not run yet, then each lower real-time
+    factor of the cell. Stores the lowest factor."""
 
     def __init__(self) -> None:
         self.lowest = 1.0
+        self.slow_start = threading.Timer(SLOW_START, print_load)
+        self.slow_start.daemon = True
+        self.slow_start.start()
 
     def follow(self) -> None:
         """Subscribe to the cell's real-time factor."""
@@ -85,6 +90,7 @@ class PaceWatch:
 
     def take(self, factor: float) -> None:
         """Process a new real-time factor of the cell."""
+        self.slow_start.cancel()  # the cell runs
         if factor < self.lowest:
             self.lowest = factor
             print(

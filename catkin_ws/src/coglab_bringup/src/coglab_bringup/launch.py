@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from coglab_bringup.launch_arguments import judge_launch, split_port, whole_path
-from coglab_bringup.run_directory import free_port, lasting_home, port_is_free, record_run, run_environment
+from coglab_bringup.run_directory import free_port, lasting_home, port_is_free, print_load, record_run, run_environment
 from coglab_bringup.usage import Refused
 
 
@@ -27,6 +27,7 @@ def main(arguments: list[str]) -> int:
     home, _lock = lasting_home(top)  # kept between runs: it stores which object the hand holds
     environment = run_environment(port, home)
     record_run(top, port, "launch")
+    print_load()
     print(
         "[coglab] in another terminal: ./coglab status, ./coglab start; for ROS tools: ./coglab shell, and in it",
         flush=True,

@@ -28,6 +28,16 @@ def port_is_free(port: int) -> bool:
     return True
 
 
+def print_load() -> None:
+    """Print that nodes start slowly if this computer has more to do than its processors can."""
+    load, processors = os.getloadavg()[0], os.cpu_count() or 1
+    if load > processors:
+        print(
+            f"[coglab] this computer is busy (load {load:.1f} on {processors} processors): nodes start slowly",
+            flush=True,
+        )
+
+
 def run_environment(port: int, home: Path | None = None) -> dict[str, str]:
     """Environment of one run. `port`: of its ROS master; `home`: ROS_HOME (default: a new temporary folder)."""
     ros_home = home or Path(tempfile.mkdtemp(prefix="coglab-run-"))

@@ -42,8 +42,6 @@ from coglab_controllers._core import (
     rotation_between,
 )
 
-GoalWatch = GoalLimits  # its name until 0.3
-
 __all__ = [
     "MAX_BASIS",
     "ArmDynamics",

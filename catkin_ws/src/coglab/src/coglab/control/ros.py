@@ -8,6 +8,7 @@ from xmlrpc.client import ServerProxy
 import rosgraph
 import rospy
 from coglab_msgs.srv import FeedbackSelect, LoadController, StartMotion, SwitchController
+from coglab_py.steady import wait_for_service
 
 from coglab.control.slot import SlotError
 
@@ -53,7 +54,7 @@ class SlotServices:
         if not rosgraph.is_master_online():
             raise SlotError("no ROS master answers; start the system first: ./coglab launch")
         try:
-            rospy.wait_for_service(name, WAIT)
+            wait_for_service(name, WAIT)
             answer = rospy.ServiceProxy(name, kind)(*words)
         except (rospy.ROSException, rospy.ServiceException, OSError) as error:
             raise SlotError(f"{name} does not answer: {error}") from error

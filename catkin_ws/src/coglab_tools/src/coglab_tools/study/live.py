@@ -506,16 +506,19 @@ class RunningSystem:
 
     @staticmethod
     def _status() -> list[Any]:
-        import rospy
         from coglab_msgs.msg import FeedbackStatus
+        from coglab_py.steady import wait_for
+        from coglab_smach.ros.calls import Newest
 
+        status = Newest("controller_manager/feedback/status", FeedbackStatus)
         try:
-            status = rospy.wait_for_message("controller_manager/feedback/status", FeedbackStatus, timeout=ANSWER)
-        except rospy.ROSException:
-            raise NotThere(
-                f"controller_manager/feedback/status has not been published for {ANSWER:g} s; ./coglab status"
-            ) from None
-        return list(status.controllers)
+            if not wait_for(lambda: status.message, ANSWER):
+                raise NotThere(
+                    f"controller_manager/feedback/status has not been published for {ANSWER:g} s; ./coglab status"
+                )
+            return list(status.message.controllers)
+        finally:
+            status.close()
 
     @staticmethod
     def _call(name: str, kind: Any, **fields: Any) -> Any:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import time
+
 import rospy
 from coglab_msgs.msg import FingerContact, FingerPositions, MotorCommands, MotorStates
+from coglab_py.pace import Pace
 from coglab_py.steady import SteadyTimer
 from std_msgs.msg import String
 
@@ -11,6 +14,22 @@ from ih2_hand.emulator.physical_motor import MotorState
 from ih2_hand.emulator.pty_server import PtyServer
 
 PUBLISH_HZ = 50.0
+
+
+class CellClock:
+    """Clock of the emulated hand. It passes with the simulated cell, which moves the fingers; without a cell it is
+    steady."""
+
+    def __init__(self, pace: Pace):
+        self._pace = pace
+
+    def monotonic(self) -> float:
+        """Time (s) of the cell."""
+        return self._pace.now()
+
+    def sleep(self, seconds: float) -> None:
+        """Wait for this time (s) of the cell."""
+        time.sleep(seconds / self._pace.factor)
 
 
 class EmulatorNode:

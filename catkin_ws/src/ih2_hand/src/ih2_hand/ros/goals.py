@@ -33,6 +33,7 @@ from coglab_msgs.msg import (
     HandStatus,
 )
 from coglab_py.action_server import ActionServer
+from coglab_py.pace import Pace
 from coglab_py.steady import ending, worker
 
 from ih2_hand.errors import HandError
@@ -40,7 +41,7 @@ from ih2_hand.progress import RESENDS, Task, Verdict
 from ih2_hand.reasons import Reason, reason_of
 
 SETTLE_S = 0.02  # s after a command in which a poll may still show the status before it
-# s, longest time between two polls that counts: on a busy computer a finger may have moved in a longer gap
+# s of the cell, longest time between two polls that counts: on a busy computer a finger may have moved in a longer gap
 LONGEST_GAP_S = 0.1
 BACKLOG = 50  # waiting requests other than goals
 SENDING_S = 0.1  # s that a result published at shutdown needs to leave the process
@@ -79,14 +80,15 @@ class Running:
     fillers: int = 0
     resends: int = 0
     looked: float = 0.0  # start of the last poll
-    watched: float = 0.0  # s since the command; each gap between polls counts at most LONGEST_GAP_S
+    watched: float = 0.0  # s of the cell since the command; a gap between polls counts at most LONGEST_GAP_S
 
 
 class GoalQueue:
-    """Runs one goal at a time. `owner` is the hand node (driver, preshape and events)."""
+    """Runs one goal at a time. `owner` is the hand node (driver, preshape and events). The limits of a movement pass
+    with `pace`, because the simulated cell moves the fingers of an emulated hand."""
 
-    def __init__(self, owner: Any):
-        self._owner = owner
+    def __init__(self, owner: Any, pace: Pace):
+        self._owner, self._pace = owner, pace
         self._mailbox: queue.Queue[Item] = queue.Queue()
         self._running: Running | None = None
         self._newest: Any = None  # the last goal that arrived
@@ -220,7 +222,7 @@ class GoalQueue:
         running.last_status = time.monotonic()
         since = max(running.looked, running.begun)
         running.looked = max(begun, since)
-        running.watched += min(running.looked - since, LONGEST_GAP_S)
+        running.watched += min(self._pace.at(running.looked) - self._pace.at(since), LONGEST_GAP_S)
         if not status.connected:
             self._fail(status.message, Reason.HAND_LINK_LOST)
             return
@@ -261,7 +263,7 @@ class GoalQueue:
         if now - running.last_status > SILENCE_S:
             self._stop_fingers()
             self._fail(f"no hand_status for {SILENCE_S} s from {self._owner.port}", Reason.HAND_LINK_LOST)
-        elif now - running.begun > running.task.limit:
+        elif self._pace.at(now) - self._pace.at(running.begun) > running.task.limit:
             self._stop_fingers()
             self._fail(f"not done within {running.task.limit:.0f} s; fingers stopped", Reason.TIME_LIMIT)
 

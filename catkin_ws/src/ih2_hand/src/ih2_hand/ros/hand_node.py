@@ -10,6 +10,7 @@ from typing import Any
 import rospy
 from coglab_msgs.msg import HandStatus
 from coglab_py import parameters, steady
+from coglab_py.pace import Pace
 from coglab_py.steady import ending
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -102,7 +103,7 @@ class HandNode(HandMemory):
         self._joints = rospy.Publisher("~joint_states", JointState, queue_size=5)
         self._diagnostics = Diagnostics(self)
         self._trace = TracePublisher()
-        self.goals = GoalQueue(self)
+        self.goals = GoalQueue(self, Pace().follow())
         rospy.Service("~stop", Trigger, self._on_stop)
         rospy.Subscriber("~hand_calibration", String, self._on_calibration, queue_size=5)
         self._thread = steady.worker(self._poll, "poll")
