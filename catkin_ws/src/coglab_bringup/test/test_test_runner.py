@@ -50,6 +50,24 @@ def test_counts(tmp_path, script, counts, capsys):
     assert capsys.readouterr().out.splitlines()[-1] == "{} passed, {} failed, {} skipped".format(*counts)
 
 
+def test_a_failure_outside_of_every_case_shows_its_reason(tmp_path):
+    """rosunit reports a failure of setUpClass without a case; its reason stands only in the log of the test node."""
+    script = """
+from pathlib import Path
+log, reports = Path(XML, 'log', '1'), Path(XML, 'test_results', 'pkg')
+log.mkdir(parents=True)
+reports.mkdir(parents=True)
+(reports / 'rosunit-arm.xml').write_text('<testsuite errors="1" tests="0"/>')
+(log / 'arm-4-stdout.log').write_text('ERRORS: 1 [setUpClass\\nAssertionError: not within 60 s: its end')
+raise SystemExit(2)
+"""
+    item = program(tmp_path, script)
+    item.kind, item.name, item.files = "rostest", "arm.test", []
+    run(item, tmp_path / "log", limit=60.0)
+    assert (item.passed, item.failed, item.skipped) == (0, 1, 0)
+    assert "not within 60 s: its end" in item.failures[0]
+
+
 def test_a_gtest_that_was_not_built_is_a_failure(tmp_path):
     package = tmp_path / "catkin_ws" / "src" / "pkg"
     (package / "test").mkdir(parents=True)

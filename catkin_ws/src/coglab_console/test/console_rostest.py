@@ -117,13 +117,13 @@ class Console(unittest.TestCase):
         self.ready("wait_without_object")
         self.says("calibrate", "is calibrated")
         self.browser.tab("Health")
+        self.addCleanup(self.browser.tab, "Live")
         found = "[...document.querySelectorAll('#page button')].find((one) => one.innerText === 'Forced calibration')"
         self.browser.until(f"return {found} && !{found}.hasAttribute('aria-disabled')", LIMIT)
         button = self.browser.js(f"const one = {found}; one.scrollIntoView(); return one")
         told = "return coglab.events().some((one) => one.source === arguments[0] && one.text.includes(arguments[1]))"
         press_and_hold(self.browser, button, lambda: self.browser.js(told, "command", "complete started"), LIMIT)
         self.browser.until(told, LIMIT, "hand", "calibration complete ended")
-        self.browser.tab("Live")
 
     def _distance_to_tf(self):
         place = self.frames.lookup_transform(
@@ -186,7 +186,7 @@ class Console(unittest.TestCase):
         leaf = "/fault" if self.machine.state.endswith("/fault") else "/stopped"
         self.page_in(leaf)
         self.browser.until("return document.getElementById('acknowledge').offsetParent !== null", LIMIT)
-        acknowledge(self.browser, self.browser.driver.find_element(By.ID, "acknowledge").click)
+        acknowledge(self.browser, self.browser.driver.find_element(By.ID, "acknowledge").click, LIMIT)
         button = self.enabled("initialise" if leaf == "/fault" else "reset")
         press_and_hold(self.browser, button, lambda: not self.machine.state.endswith(leaf), LIMIT)
         self.page_in(hub)
@@ -323,7 +323,7 @@ class Console(unittest.TestCase):
     def test_11_without_webgl_the_view_is_2d(self):
         used = self.link
         with Browser(webgl=False) as other:
-            other.open(fresh_link(Path(rospkg.get_ros_home()), used))
+            other.open(fresh_link(Path(rospkg.get_ros_home()), used, LIMIT), LIMIT)
             self.assertEqual(other.js("return coglab.view()"), "2D")
             other.until(
                 "return document.getElementById('role').innerText.includes('you watch')",

@@ -271,6 +271,17 @@ def test_a_motion_is_made_shown_and_cancelled(robot: Robot) -> None:
     assert none.success and not none.was_running and "no motion of 'ptp'" in none.message
 
 
+def test_the_end_of_the_last_motion_reaches_a_late_subscriber(robot: Robot) -> None:
+    """A motion to where the arm stands ends at once, often before the subscriber of a new controller is connected."""
+    robot.started()
+    here = list(robot.joints[-1].position)
+    answer = robot.call("controller_manager/ptp/add_ptp", AddPtp, here, [], [])
+    wait_until(lambda: answer.ptp_id in robot.finished, "finished_ptp")
+    late = ["rostopic", "echo", "-n1", "/controller_manager/ptp/finished_ptp/ptp_id"]
+    heard = subprocess.run(late, capture_output=True, text=True, timeout=60.0, check=True).stdout
+    assert heard.split()[0] == str(answer.ptp_id)
+
+
 def test_gains_change_by_dynamic_reconfigure(robot: Robot) -> None:
     dmp = Client("/controller_manager/dmp", timeout=30.0)
     described = {each["name"]: each for each in dmp.get_parameter_descriptions(timeout=30.0)}

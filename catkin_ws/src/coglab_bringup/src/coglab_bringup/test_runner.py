@@ -39,6 +39,7 @@ BUSY = ("-c", "import os\nparent = os.getppid()\nwhile os.getppid() == parent:\n
 """A process that uses one core while its parent lives."""
 OWN_NODE = "rospy.init_node("  # in a pytest file: the file needs its own process
 SLOWEST = 10  # programs and files whose time is printed at the end
+LAST_LINES = 15  # of the output of a program that failed outside of its cases
 TIME_LIMIT = 1800.0  # s per test program
 LONG_TIME_LIMIT = 7200.0  # s with --long
 
@@ -159,6 +160,16 @@ def unfinished(log: Path) -> list[str]:
     return [line.strip() for line in lines if "::" in line and line.strip() == line.split()[0] not in ended]
 
 
+def end_of_output(program: Program, log: Path) -> str:
+    """The last lines of a program that failed outside of its cases. rosunit writes a failure of setUpClass only into
+    the log of the test node."""
+    texts = [path.read_text(errors="replace") for path in sorted(program.junit.glob("log/[0-9a-f]*/*-stdout.log"))]
+    texts = [text for text in texts if "setUpClass" in text]
+    texts += [log.read_text(errors="replace") if log.exists() else ""]
+    lines = [line for line in texts[0].splitlines() if line.strip()]
+    return "".join(f"\n       {line}" for line in lines[-LAST_LINES:])
+
+
 def count(program: Program, status: int | None, log: Path) -> None:
     """Read the program's JUnit files. A missing file, or a program that died without a failed case, is one failure."""
     if program.kind == "rostest":
@@ -181,7 +192,8 @@ def count(program: Program, status: int | None, log: Path) -> None:
     all_skipped = program.kind == "pytest" and status == 5 and program.skipped
     if not program.failed and (not reports or status != 0 and not all_skipped):
         program.failed += 1
-        program.failures.append(f"{program.name} {ended} and reported no failed case; see its log")
+        end = end_of_output(program, log)
+        program.failures.append(f"{program.name} {ended} and reported no failed case. The end of its output:{end}")
     elif status is not None:
         empty = program.files if program.kind == "pytest" else [] if program.cases else [program.name]
         empty = [name for name in empty if name not in program.seconds_of]

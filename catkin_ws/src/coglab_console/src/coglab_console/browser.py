@@ -26,6 +26,7 @@ OPTIONS = (
 )
 SOFTWARE_GL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")
 NO_GL = ("--disable-gpu", "--disable-3d-apis")
+HOLD_AGAIN = 5.0  # s
 
 
 class Browser:
@@ -41,7 +42,7 @@ class Browser:
         options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
         service = webdriver.chrome.service.Service("/usr/bin/chromedriver")
         self.driver = webdriver.Chrome(service=service, options=options)
-        self.driver.set_script_timeout(20)
+        self.driver.set_script_timeout(60)
         # Without this, Tab after the last control gives the focus to the browser itself, and the page looks different.
         self.driver.execute_cdp_cmd("Emulation.setFocusEmulationEnabled", {"enabled": True})
         self._touch = touch
@@ -172,15 +173,22 @@ def acknowledge(browser: Browser, press: Callable[[], None], limit: float = 20.0
 
 
 def press_and_hold(browser: Browser, element: Any, done: Callable[[], bool], limit: float = 5.0) -> None:
-    """Holds a button with the mouse until `done()`. TimeoutError after `limit` s."""
+    """Holds a button with the mouse until `done()`. TimeoutError after `limit` s.
+
+    Lets go and presses again every HOLD_AGAIN s: on a busy computer the page may move the button away from the mouse,
+    or refuse the command for a moment, and each of them ends the holding."""
     from selenium.webdriver.common.action_chains import ActionChains
 
-    ActionChains(browser.driver).move_to_element(element).click_and_hold().perform()
     end = time.monotonic() + limit
-    try:
-        while not done():
-            if time.monotonic() > end:
-                raise TimeoutError(f"holding the button did nothing within {limit:.0f} s; {browser.summary()}")
-            time.sleep(0.05)
-    finally:
-        ActionChains(browser.driver).release().perform()
+    while True:
+        ActionChains(browser.driver).move_to_element(element).click_and_hold().perform()
+        again = time.monotonic() + HOLD_AGAIN
+        try:
+            while time.monotonic() < min(again, end):
+                if done():
+                    return
+                time.sleep(0.05)
+        finally:
+            ActionChains(browser.driver).release().perform()
+        if time.monotonic() >= end:
+            raise TimeoutError(f"holding the button did nothing within {limit:.0f} s; {browser.summary()}")

@@ -19,7 +19,8 @@ class PtpControllerRos : public MotionControllerRos {
               const RosContext&) override {
     controller_ = &dynamic_cast<PtpController&>(controller);
     node_ = node;
-    finished_ = node_.advertise<coglab_msgs::FinishedPtp>("finished_ptp", 50);
+    // Latched: a short motion may end before the subscribers of a new controller are connected.
+    finished_ = node_.advertise<coglab_msgs::FinishedPtp>("finished_ptp", 50, true);
     unfinished_ = node_.advertise<coglab_msgs::UnfinishedPtp>("unfinished_ptp", 100);
     path_.attach(node_, controller_->baseFrame());
     service_ = node_.advertiseService("add_ptp", &PtpControllerRos::onAdd, this);
