@@ -38,7 +38,7 @@ BUMPS = 2  # touches of other things after which the arm still tries again
 RETREAT = 0.06  # m, retreat of the hand after such a touch
 RETREAT_SPEED = 0.1  # m/s
 RETREAT_TIMEOUT = 5.0  # s, added to the planned duration of the retreat
-SEATED = 0.03  # m, largest distance from the grasp at which the fingers may close at a touch
+NEAR_GRASP = 0.03  # m, largest distance from the grasp at which the fingers may close at a touch
 FIRM = 2.5  # margin of a contact that is more than brushing past
 BETWEEN = 0.01  # m, added to ``handover.close_within``: an object within this distance is between the fingers
 NEWS = 0.02  # s after which the arm reports a started motion
@@ -381,12 +381,12 @@ class WaitContact(WaitForPerson):
                     ReasonCode.NO_CONTACT,
                 )
             return Phase.BUMPED
-        if event is not None and away is not None and away > SEATED and event.margin < FIRM:
+        if event is not None and away is not None and away > NEAR_GRASP and event.margin < FIRM:
             self._slide_in()
-        self._tell(event)
+        self._report_contact(event)
         return Phase.HELD
 
-    def _tell(self, event: ContactEvent | None) -> None:
+    def _report_contact(self, event: ContactEvent | None) -> None:
         self.ctx.journal.mark("contact")
         felt = "the fingers hold it" if event is None else f"contact by {event.source}, margin {event.margin:.1f}"
         self.reason = (event.message if event is not None else "") or felt
@@ -399,7 +399,7 @@ class WaitContact(WaitForPerson):
         try:
             while self.ctx.clock.now() < end and not self.arrived():
                 away, event = off_grasp(self, self._goal), contact.event()
-                if away is None or away <= SEATED or (event is not None and event.margin >= FIRM):
+                if away is None or away <= NEAR_GRASP or (event is not None and event.margin >= FIRM):
                     return
                 if event is not None:
                     arming = contact.arm("contact_in_motion", 1.0, self._contact_settings)

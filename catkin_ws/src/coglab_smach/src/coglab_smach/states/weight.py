@@ -144,7 +144,7 @@ class TakeWeight(CoglabState):
         """Reset for each object."""
         self._top: float | None = None  # m, target height of the palm
         self._rises = 0
-        self._told = self._seen_away = False
+        self._said = self._seen_away = False
         self._farther: float | None = None  # m from the palm beyond which the person's hand has left the object
         self._gone: float | None = None  # s, time when the hand left
         self._on: float | None = None  # s, time of the next rise with the weight; None: the arm does not carry it yet
@@ -182,7 +182,7 @@ class TakeWeight(CoglabState):
         event = contact.event()
         self.reason = event.message if event is not None else "the person's hand has left it"
         ud.grip.shared, ud.hand_seen_away = False, self._seen_away
-        self._tell()
+        self._say_i_have_it()
         self.ctx.journal.mark("released")
         return "succeeded"
 
@@ -201,7 +201,7 @@ class TakeWeight(CoglabState):
         self._follow()
         if carried:
             self.ctx.journal.mark("loaded")
-            self._tell()
+            self._say_i_have_it()
         # Before and after from_palm(), which waits for a sight.
         self._way.follow()
         away = from_palm(self, self._hand)
@@ -251,10 +251,10 @@ class TakeWeight(CoglabState):
             self._closes = now + FOLLOWS
             self._closing = self.ctx.hand.close(self.ctx.config.get("give.close_speed"))
 
-    def _tell(self) -> None:
+    def _say_i_have_it(self) -> None:
         """Inform the person once that the robot carries the object."""
-        if not self._told:
-            self._told = True
+        if not self._said:
+            self._said = True
             self.ctx.say(Say.I_HAVE_IT, "I have it.")
 
     def _rise(self, most: float = math.inf) -> None:
