@@ -11,7 +11,6 @@ from coglab_smach.context.context import Context
 from coglab_smach.context.grip import Grip
 from coglab_smach.context.holding import UNKNOWN
 from coglab_smach.context.requests import command
-from coglab_smach.context.wait_reasons import HAND
 from coglab_smach.ports.interfaces import Verdict
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.arm import HomeRobot
@@ -110,7 +109,7 @@ class SecureHand(CoglabState):
                 self.ctx.hand.open(self.ctx.config.get("hand.open_speed")),
                 "opening of the empty hand",
                 8.0,
-                code=HAND,
+                code=ReasonCode.WAITS_FOR_HAND,
             )
         except PortError as error:
             if self._grip.shared:

@@ -8,7 +8,6 @@ from typing import Any
 from coglab_msgs.msg import ReasonCode, Say
 
 from coglab_smach.context.context import Context
-from coglab_smach.context.wait_reasons import PERSON
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.base import CoglabState, TimeLimit
 from coglab_smach.states.hand_tracking import AT_HAND, AWAY, HandTrack, from_palm, hand_name, palm_at, sight_of
@@ -166,7 +165,12 @@ class TakeWeight(CoglabState):
         try:
             self.pause(self.ctx.config.number("hand.lift_after"))
             self._rise()
-            self.wait_for(self._has_let_go, "the person's letting go", end - self.ctx.clock.now(), code=PERSON)
+            self.wait_for(
+                self._has_let_go,
+                "the person's letting go",
+                end - self.ctx.clock.now(),
+                code=ReasonCode.WAITS_FOR_PERSON,
+            )
         except TimeLimit as error:
             if error.code != ReasonCode.TIME_LIMIT:
                 raise
