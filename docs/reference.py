@@ -5,6 +5,7 @@ One function per table. docs/build.py writes them as pages of the site.
 
 from __future__ import annotations
 
+import argparse
 import ast
 import inspect
 import re
@@ -13,7 +14,10 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 from pathlib import Path
 
-COMMANDS = ("demo", "test", "bench", "launch", "film")  # commands of ./coglab with a --help
+COMMANDS = (  # commands of ./coglab whose --help says more than ./coglab help
+    "demo", "test", "bench", "launch", "start", "status", "hold", "stop", "film", "controller new",
+    "controller new --python", "controller run", "object new", "object check", "object list", "hand trace",
+)  # fmt: skip
 
 
 def table(head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
@@ -273,11 +277,25 @@ def packages(top: Path) -> str:
 
 def commands(top: Path) -> str:
     """Help texts of ./coglab."""
+    from coglab_tools.__main__ import NOUNS, make_parser
+
+    texts = {}
+    for words in ("help", *(f"{name} --help" for name in COMMANDS)):
+        done = subprocess.run([top / "coglab", *words.split()], capture_output=True, text=True, check=True)
+        texts[words] = done.stdout
+    nouns = _verbs(make_parser())
+    for noun in NOUNS:
+        for verb, parser in _verbs(nouns[noun]).items():
+            texts[f"{noun} {verb} --help"] = parser.format_help()
     page = ["# Commands of ./coglab"]
-    for words in (["help"], *([name, "--help"] for name in COMMANDS)):
-        done = subprocess.run([top / "coglab", *words], capture_output=True, text=True, check=True)
-        page += ["", f"## ./coglab {' '.join(words)}", "", "```text", done.stdout.rstrip(), "```"]
+    for name, text in texts.items():
+        page += ["", f"## ./coglab {name}", "", "```text", text.rstrip(), "```"]
     return "\n".join(page)
+
+
+def _verbs(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
+    """The parsers below `parser`, by name."""
+    return next(action.choices for action in parser._actions if isinstance(action, argparse._SubParsersAction))
 
 
 PAGES = {

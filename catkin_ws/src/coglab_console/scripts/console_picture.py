@@ -79,6 +79,9 @@ def of_a_system(path: Path) -> None:
 
 def main(words: list[str]) -> int:
     """Entry point."""
+    if words in (["-h"], ["--help"]):
+        print(__doc__)
+        return 0
     if len(words) > 1 or any(word.startswith("-") for word in words):
         print(__doc__, file=sys.stderr)
         return 2

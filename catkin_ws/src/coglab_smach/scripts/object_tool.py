@@ -61,15 +61,15 @@ def cmd_new(folder: Path, object_id: str) -> int:
 
 def main() -> int:
     """Entry point."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(prog="./coglab object", description=__doc__)
     parser.add_argument("--folder", type=Path, default=None, help="folder of the object files")
     parser.add_argument("--dialect", choices=("legacy", "v17"), default="legacy", help="firmware dialect of the hand")
     verbs = parser.add_subparsers(dest="verb", required=True)
-    verbs.add_parser("list")
-    check = verbs.add_parser("check")
-    check.add_argument("ids", nargs="*")
-    new = verbs.add_parser("new")
-    new.add_argument("id")
+    verbs.add_parser("list", description=cmd_list.__doc__)
+    check = verbs.add_parser("check", description=cmd_check.__doc__)
+    check.add_argument("ids", nargs="*", metavar="ID", help="default: all objects of the folder")
+    new = verbs.add_parser("new", description=cmd_new.__doc__)
+    new.add_argument("id", metavar="ID", help="name of the object and of its file, e.g. cup")
     arguments = parser.parse_args()
     folder = arguments.folder or objects_folder()
     if arguments.verb == "check":

@@ -144,7 +144,7 @@ def test_an_object_held_by_an_edge_is_grasped_again():
     again = order[order.index("close") + 1 : order.index("arm lift")]
     assert again[0] == "preshape cylindrical" and again[-1] == "close", order
     labels = [t.from_state for t in trial.ctx.journal.transitions if t.path.endswith("/exchange_human_to_robot")]
-    assert labels[labels.index("open_beside") :][:4] == ["open_beside", "seat", "hand_close", "take_weight"]
+    assert labels[labels.index("open_to_regrasp") :][:4] == ["open_to_regrasp", "regrasp", "hand_close", "take_weight"]
 
 
 def test_an_object_held_by_an_edge_is_kept_if_the_person_has_left():

@@ -38,7 +38,7 @@ class Lifted:
             follow=lambda: None, idle=lambda: not self.busy, begin=lambda m: None, stop=lambda: None
         )
         state._way.halt = lambda why: self.rises.append(why)
-        state._rises, state._on, state._told, state._seen_away = 0, None, False, False
+        state._rises, state._on, state._said, state._seen_away = 0, None, False, False
         monkeypatch.setattr(weight, "from_palm", lambda state, track, *_: self.away)
         state._hand = self.hand = seen_all_the_way()
         self.ctx.arm.motion_allowed = lambda: Verdict(True)

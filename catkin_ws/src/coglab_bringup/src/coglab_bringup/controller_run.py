@@ -13,6 +13,8 @@ from coglab_bringup.ask import Refused, find_master
 
 def main(words: list[str]) -> int:
     """Command line. A user's own ROS master counts even if no brain runs there."""
+    if {"-h", "--help"} & set(words):
+        return run(["--help"])
     own = os.environ.get("COGLAB_USER_MASTER", "")
     try:
         os.environ["ROS_MASTER_URI"] = find_master(Path(os.environ["COGLAB_TOP"]), 0, own)

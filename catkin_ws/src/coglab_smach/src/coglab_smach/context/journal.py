@@ -47,7 +47,7 @@ class Failure:
 
 @dataclass(frozen=True)
 class Wait:
-    """What an active state waits for: a sentence, a code of ``wait_reasons``, and the time (s of the journal's clock)
+    """What an active state waits for: a sentence, its ``ReasonCode``, and the time (s of the journal's clock)
     at which it gives up. ``aside``: the state only monitors others in parallel; no state waits for its end."""
 
     what: str = ""

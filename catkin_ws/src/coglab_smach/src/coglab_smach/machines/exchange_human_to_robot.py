@@ -37,11 +37,11 @@ def build_exchange_human_to_robot(ctx: Context) -> CoglabMachine:
         machine.add_state(
             "hand_close",
             HandClose(ctx, from_person=True),
-            to_recovery(succeeded="take_weight", missed="open_again", edge="open_beside"),
+            to_recovery(succeeded="take_weight", missed="open_again", edge="open_to_regrasp"),
         )
         machine.add_state("open_again", HandPreshape(ctx), to_recovery(succeeded="set_dmp_goal"))
-        machine.add_state("open_beside", HandPreshape(ctx), to_recovery(succeeded="seat"))
-        machine.add_state("seat", Regrasp(ctx), to_recovery(succeeded="hand_close"))
+        machine.add_state("open_to_regrasp", HandPreshape(ctx), to_recovery(succeeded="regrasp"))
+        machine.add_state("regrasp", Regrasp(ctx), to_recovery(succeeded="hand_close"))
         machine.add_state("take_weight", TakeWeight(ctx), to_recovery(succeeded="hand_tighten"))
         machine.add_state("hand_tighten", HandTighten(ctx), to_recovery(succeeded="coglab_home_robot"))
         machine.add_state("coglab_home_robot", HomeRobot(ctx, carries=True), to_recovery(succeeded="tighten_at_home"))

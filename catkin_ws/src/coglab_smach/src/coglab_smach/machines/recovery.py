@@ -11,7 +11,6 @@ from coglab_smach.context.context import Context
 from coglab_smach.context.grip import Grip
 from coglab_smach.context.holding import UNKNOWN
 from coglab_smach.context.requests import command
-from coglab_smach.context.wait_reasons import HAND
 from coglab_smach.ports.interfaces import Verdict
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.arm import HomeRobot
@@ -78,19 +77,19 @@ class SecureHand(CoglabState):
 
     def __init__(self, ctx: Context, operator: bool = False) -> None:
         super().__init__(ctx, outcomes=["succeeded", "stopped"], io_keys=["grip"])
-        self.operator, self._told, self._grip = operator, False, Grip()
+        self.operator, self._said, self._grip = operator, False, Grip()
 
     def run(self, ud: Any) -> str:
-        self._told, self._grip = self.operator, ud.grip
+        self._said, self._grip = self.operator, ud.grip
         outcome = self._secure()
         if outcome == "succeeded":
-            self._tell()
+            self._say_given_up()
         return outcome
 
-    def _tell(self) -> None:
+    def _say_given_up(self) -> None:
         """Inform the person once that the action is over."""
-        if not self._told:
-            self._told = True
+        if not self._said:
+            self._said = True
             self.ctx.say(Say.GIVEN_UP, "That did not work; I stop here.")
 
     def _secure(self) -> str:
@@ -110,7 +109,7 @@ class SecureHand(CoglabState):
                 self.ctx.hand.open(self.ctx.config.get("hand.open_speed")),
                 "opening of the empty hand",
                 8.0,
-                code=HAND,
+                code=ReasonCode.WAITS_FOR_HAND,
             )
         except PortError as error:
             if self._grip.shared:
@@ -149,7 +148,7 @@ class SecureHand(CoglabState):
     def _await_letting_go(self) -> None:
         """Wait until the person's hand is seen away from the object: then only the robot holds it. If the hand was not
         tracked on its whole way, it may be another hand. Then the arm measures whether the person holds the object."""
-        self._tell()
+        self._say_given_up()
         self.allow(LETS_GO + 10.0)
         end, felt = self.ctx.clock.now() + LETS_GO, False
         while self.ctx.clock.now() < end:

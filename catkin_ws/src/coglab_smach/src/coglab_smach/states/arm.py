@@ -9,7 +9,6 @@ from typing import Any
 from coglab_msgs.msg import ReasonCode
 
 from coglab_smach.context.context import Context
-from coglab_smach.context.wait_reasons import ARM
 from coglab_smach.kinematics.motion_time import ptp_time
 from coglab_smach.ports.pending import Polled, PortError
 from coglab_smach.states.base import CoglabState, TimeLimit
@@ -69,7 +68,9 @@ class ConfigureLwr(CoglabState):
                     self.await_pending(self.ctx.arm.lwr_command("stop"), "LWR command 'stop'")
                 self.pause(1.0)
         try:
-            self.wait_for(lambda: self.ctx.arm.motion_allowed()[0], "command mode of the LWR", code=ARM)
+            self.wait_for(
+                lambda: self.ctx.arm.motion_allowed()[0], "command mode of the LWR", code=ReasonCode.WAITS_FOR_ARM
+            )
         except TimeLimit as limit:
             blocked = self.ctx.arm.motion_allowed()
             limit.causes, limit.code = (blocked.why,), blocked.code
@@ -134,7 +135,7 @@ class PtpMotion(CoglabState):
             Polled(lambda: bool(look()) or motion.done(), motion.result, motion.cancel),
             f"the motion to posture '{self.posture}'",
             pace=arm.speed_scale,
-            code=ARM,
+            code=ReasonCode.WAITS_FOR_ARM,
         )
 
     def _look_after(self, ud: Any) -> Callable[[], object]:
@@ -150,7 +151,12 @@ class PtpMotion(CoglabState):
             return measured is None or max(abs(m - t) for m, t in zip(measured, target, strict=False)) <= tolerance
 
         self.allow(1.5)
-        self.wait_for(arrived, f"all measured joints within {tolerance} rad of posture '{self.posture}'", 1.0, code=ARM)
+        self.wait_for(
+            arrived,
+            f"all measured joints within {tolerance} rad of posture '{self.posture}'",
+            1.0,
+            code=ReasonCode.WAITS_FOR_ARM,
+        )
 
 
 class HomeRobot(PtpMotion):

@@ -11,7 +11,6 @@ from typing import Any
 import smach
 from coglab_msgs.msg import ReasonCode
 
-from coglab_smach.context import wait_reasons
 from coglab_smach.context.config import ConfigError
 from coglab_smach.context.context import Context
 from coglab_smach.context.grip import Grip
@@ -186,11 +185,11 @@ class CoglabState(smach.State):
         what: str,
         limit: float | None = None,
         pace: Callable[[], float] | None = None,
-        code: int = wait_reasons.ANSWER,
+        code: int = ReasonCode.WAITS_FOR_ANSWER,
         looks: bool = False,
     ) -> None:
         """Wait until ``condition()``. After ``limit`` s or at the state's own limit: TimeLimit that names ``what``.
-        ``code``: the code of ``wait_reasons``, for programs.
+        ``code``: a ``ReasonCode.WAITS_FOR_...``, for programs.
 
         ``pace`` (0..1, e.g. the speed scale): the limit counts the time of a slowed motion. The used time is multiplied
         by the pace (at least 0.1), and the state's own limit is extended accordingly.
@@ -237,7 +236,7 @@ class CoglabState(smach.State):
         what: str,
         limit: float | None = None,
         pace: Callable[[], float] | None = None,
-        code: int = wait_reasons.ANSWER,
+        code: int = ReasonCode.WAITS_FOR_ANSWER,
     ) -> Any:
         """Wait for the pending call and return its value. Cancel the call if the wait ends otherwise."""
         try:

@@ -12,7 +12,6 @@ from coglab_msgs.msg import ReasonCode
 
 from coglab_smach.context.context import Context
 from coglab_smach.context.grip import Grip
-from coglab_smach.context.wait_reasons import PERSON, SIGHT
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
 from coglab_smach.states.hand import firm_speed
@@ -61,7 +60,7 @@ class WaitTaker(WaitForPerson):
         if not self.reason:  # the arm must come to rest at its latched goal
             await_rest(self.ctx, self.check)
         self.await_pending(self.ctx.arm.switch_controller("ptp"), "end of the reach by switching to 'ptp'", 3.0)
-        self.wait_for(self._held.there, "a sight of the object in the hand", 2.0, code=SIGHT)
+        self.wait_for(self._held.there, "a sight of the object in the hand", 2.0, code=ReasonCode.WAITS_FOR_SIGHT)
         limit = float(release.get("timeout", self.ctx.config.get("release_timeout")))
         weight = {"mass": settings["mass"], "load_share": float(release.get("threshold", 0.5))}
         # give_load starts immediately afterwards, and disarms it.
@@ -177,7 +176,7 @@ class GiveLoad(CoglabState):
         now = self.ctx.clock.now()
         self._look_at, self._lower_at = now + self._number("bring_after"), now + self._number("lower_after")
         try:
-            self.wait_for(self._taken, "the person's taking of the load", limit, code=PERSON)
+            self.wait_for(self._taken, "the person's taking of the load", limit, code=ReasonCode.WAITS_FOR_PERSON)
         except TimeLimit as error:
             self._keep()
             error.code = error.code if error.code != ReasonCode.TIME_LIMIT else ReasonCode.NOT_RELEASED

@@ -9,7 +9,6 @@ from coglab_msgs.msg import ReasonCode, Say
 from ih2_hand.grasps import CLOSING_MOTORS, LEVELS, levels_of
 
 from coglab_smach.context.context import Context
-from coglab_smach.context.wait_reasons import ARM, HAND
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.base import CoglabState, Interrupted, TimeLimit
 from coglab_smach.states.hand_tracking import AT_HAND, AWAY, HandLook, HandTrack, from_palm, hand_from_palm, palm_axis
@@ -69,7 +68,7 @@ class CalibrateHand(CoglabState):
             self.reason = "the hand is calibrated already"
             return "succeeded"
         mode = self.ctx.config.text("hand.calibration")
-        self.await_pending(self.ctx.hand.calibrate(mode), f"hand calibration '{mode}'", code=HAND)
+        self.await_pending(self.ctx.hand.calibrate(mode), f"hand calibration '{mode}'", code=ReasonCode.WAITS_FOR_HAND)
         return "succeeded"
 
 
@@ -83,7 +82,11 @@ class HandPreshape(CoglabState):
 
     def run(self, ud: Any) -> str:
         hand, ud.grip.preshaped = ud.grasp["hand"], False
-        self.await_pending(self.ctx.hand.preshape(hand["mode"], hand["level"]), f"preshape '{hand['mode']}'", code=HAND)
+        self.await_pending(
+            self.ctx.hand.preshape(hand["mode"], hand["level"]),
+            f"preshape '{hand['mode']}'",
+            code=ReasonCode.WAITS_FOR_HAND,
+        )
         ud.grip.preshaped = True
         self.ctx.journal.mark("preshaped")
         return "succeeded"
@@ -126,7 +129,7 @@ class HandClose(CoglabState):
             except (Interrupted, TimeLimit):
                 closing.cancel()
                 raise
-        self.await_pending(closing, "closing of the hand", code=HAND)
+        self.await_pending(closing, "closing of the hand", code=ReasonCode.WAITS_FOR_HAND)
         self.ctx.journal.mark("closed")
         end = self.ctx.clock.now() + self.ctx.config.number("hand.settle_after_close")
         while not self.ctx.hand.state().holding and self.ctx.clock.now() < end:
@@ -169,7 +172,7 @@ class HandClose(CoglabState):
             return closing.done()
 
         try:
-            self.wait_for(closed, "closing of the hand", code=HAND)
+            self.wait_for(closed, "closing of the hand", code=ReasonCode.WAITS_FOR_HAND)
         finally:
             way.stop()
 
@@ -239,7 +242,11 @@ class HandOpen(CoglabState):
 
     def run(self, ud: Any) -> str:
         self.ctx.journal.mark("opening")
-        self.await_pending(self.ctx.hand.open(self.ctx.config.get("hand.open_speed")), "opening of the hand", code=HAND)
+        self.await_pending(
+            self.ctx.hand.open(self.ctx.config.get("hand.open_speed")),
+            "opening of the hand",
+            code=ReasonCode.WAITS_FOR_HAND,
+        )
         self.ctx.holding = ""
         ud.grip.release()
         return "succeeded"
@@ -263,7 +270,9 @@ class LetGo(CoglabState):
         hand, closed = ud.grasp["hand"], self.ctx.hand.state().positions
         opening, back = self.ctx.hand.preshape(hand["mode"], hand["level"]), None
         try:
-            self.wait_for(lambda: opening.done() or self._open_by(closed), "opening of the hand", code=HAND)
+            self.wait_for(
+                lambda: opening.done() or self._open_by(closed), "opening of the hand", code=ReasonCode.WAITS_FOR_HAND
+            )
         except TimeLimit:
             # At STOP the fingers continue to open: the person has the object.
             opening.cancel()
@@ -275,7 +284,7 @@ class LetGo(CoglabState):
             speed = self.ctx.config.number("give.draw_back_speed")
             limit += shift_time(self.ctx, -way * axis, speed)
             back = shift(self.ctx, -way * axis, speed)
-        self.await_pending(opening, "opening of the hand", code=HAND)
+        self.await_pending(opening, "opening of the hand", code=ReasonCode.WAITS_FOR_HAND)
         self.ctx.holding = ""
         ud.grip.release()
         # Not earlier: the person leaves after this message, and half-open fingers would keep the object.
@@ -283,7 +292,7 @@ class LetGo(CoglabState):
         if back is not None:
             self.allow(limit + 1.0)
             try:
-                self.await_pending(back, "drawing back", limit, self.ctx.arm.speed_scale, ARM)
+                self.await_pending(back, "drawing back", limit, self.ctx.arm.speed_scale, ReasonCode.WAITS_FOR_ARM)
             except PortError as error:
                 self.reason = error.sentence  # an incomplete retreat is enough; the motion home goes on from there
         return "succeeded"

@@ -10,11 +10,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from coglab_msgs.msg import ReasonCode
 from coglab_py.pose import Pose
 
 from coglab_smach.context.context import Context
 from coglab_smach.context.grip import JUMP, HandTrack, Sight, far
-from coglab_smach.context.wait_reasons import SIGHT
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.interfaces import Located
 from coglab_smach.ports.pending import Pending, PortError
@@ -62,7 +62,10 @@ def sight_or_refusal(state: CoglabState, target: str, limit: float = 0.3) -> Loc
     sight is older than OLDEST."""
     try:
         seen: Located = state.await_pending(
-            state.ctx.perception.locate_object(target, limit), f"sight of '{target}'", limit + 0.2, code=SIGHT
+            state.ctx.perception.locate_object(target, limit),
+            f"sight of '{target}'",
+            limit + 0.2,
+            code=ReasonCode.WAITS_FOR_SIGHT,
         )
     except PortError as error:
         return error
@@ -114,7 +117,9 @@ def way_to_hand(state: CoglabState, object_id: str, delivery: Mapping[str, Any])
     """Returns the vector from the object to the delivery's place at the hand as seen now, but NEARER to the person."""
     hand, thing = hand_name(state.ctx), seen_at(state, object_id)
     try:
-        seen = state.await_pending(state.ctx.perception.locate_object(hand, 0.3), f"sight of '{hand}'", 0.5, code=SIGHT)
+        seen = state.await_pending(
+            state.ctx.perception.locate_object(hand, 0.3), f"sight of '{hand}'", 0.5, code=ReasonCode.WAITS_FOR_SIGHT
+        )
     except PortError:
         return None
     if thing is None or seen.age > OLDEST:

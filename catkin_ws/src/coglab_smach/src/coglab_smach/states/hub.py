@@ -11,7 +11,6 @@ from coglab_msgs.msg import ReasonCode
 from coglab_smach.context.context import Context
 from coglab_smach.context.holding import UNKNOWN
 from coglab_smach.context.requests import Request, command
-from coglab_smach.context.wait_reasons import ARM, OPERATOR
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState, Interrupted
 
@@ -35,7 +34,7 @@ class WaitForTrigger(CoglabState):
             self.wait_for(
                 lambda: self.ctx.requests.take() is not None,
                 f"trigger '{self.action}' ({command(self.action)})",
-                code=OPERATOR,
+                code=ReasonCode.WAITS_FOR_OPERATOR,
             )
         finally:
             self.ctx.requests.close()
@@ -195,7 +194,9 @@ class Stopped(CoglabState):
             self.pause(0.3)
             if not self.ctx.arm.motion_allowed().ok:
                 self.await_pending(self.ctx.arm.lwr_command("start"), "LWR command 'start'", 20.0)
-            self.wait_for(lambda: self.ctx.arm.motion_allowed().ok, "command mode of the LWR", 10.0, code=ARM)
+            self.wait_for(
+                lambda: self.ctx.arm.motion_allowed().ok, "command mode of the LWR", 10.0, code=ReasonCode.WAITS_FOR_ARM
+            )
         return "succeeded"
 
 

@@ -14,7 +14,6 @@ from coglab_py.pose import Pose, mean_pose
 from coglab_smach.context.context import Context
 from coglab_smach.context.grip import Grip
 from coglab_smach.context.journal import Wait
-from coglab_smach.context.wait_reasons import PERSON, SIGHT
 from coglab_smach.kinematics.goals import approach_of, delivery_goal, grasp_goal, palm_at_grasp, place_goal, ranked
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState
@@ -40,7 +39,9 @@ class InitVision(CoglabState):
 
     def run(self, ud: Any) -> str:
         self.reason = str(
-            self.await_pending(self.ctx.perception.init_vision(self.left()), "start of perception", code=SIGHT)
+            self.await_pending(
+                self.ctx.perception.init_vision(self.left()), "start of perception", code=ReasonCode.WAITS_FOR_SIGHT
+            )
         )
         return "succeeded"
 
@@ -103,7 +104,10 @@ def locate(state: CoglabState, target: str) -> dict[str, Any]:
     limit = state.ctx.config.number("perception.locate_timeout")
     with refused_as(ReasonCode.OBJECT_NOT_SEEN):
         found = state.await_pending(
-            state.ctx.perception.locate_object(target, limit), f"sight of '{target}'", limit + 1.0, code=SIGHT
+            state.ctx.perception.locate_object(target, limit),
+            f"sight of '{target}'",
+            limit + 1.0,
+            code=ReasonCode.WAITS_FOR_SIGHT,
         )
     oldest = state.ctx.config.number("perception.max_age")
     if found.age > oldest:
@@ -137,7 +141,9 @@ def await_offer(state: CoglabState, target: str, goals: Goals, margin: float = 0
     since: float | None = None
     person = target == hand_name(state.ctx)
     offer = "the person's hand within reach" if person else f"'{target}' on offer"
-    with state.ctx.journal.waiting(f"{state.path()}/{state.label}/offer", Wait(offer, end, PERSON)):
+    with state.ctx.journal.waiting(
+        f"{state.path()}/{state.label}/offer", Wait(offer, end, ReasonCode.WAITS_FOR_PERSON)
+    ):
         while True:
             located = locate(state, target)
             now, place = state.ctx.clock.now(), np.array(located["xyz"])
@@ -384,7 +390,10 @@ class FindPlace(CoglabState):
     def run(self, ud: Any) -> str:
         limit = self.ctx.config.number("perception.locate_timeout")
         places = self.await_pending(
-            self.ctx.perception.free_places(ud.object_id, limit), "a free place on the board", limit + 1.0, code=SIGHT
+            self.ctx.perception.free_places(ud.object_id, limit),
+            "a free place on the board",
+            limit + 1.0,
+            code=ReasonCode.WAITS_FOR_SIGHT,
         )
         if not places:
             raise PortError("perception names no free place on the board; clear one", code=ReasonCode.NO_FREE_PLACE)

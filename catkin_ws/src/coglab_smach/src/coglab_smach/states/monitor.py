@@ -5,8 +5,9 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
+from coglab_msgs.msg import ReasonCode
+
 from coglab_smach.context.context import Context
-from coglab_smach.context.wait_reasons import ARM, SIGHT
 from coglab_smach.states.base import CoglabState, Interrupted
 from coglab_smach.states.reach import dmp_request
 
@@ -25,7 +26,7 @@ class MonitorDmp(CoglabState):
 
     def run(self, ud: Any) -> str:
         if not self.ctx.config.get("monitor.enabled"):
-            self.wait_for(lambda: False, "the end of the motion", code=ARM, looks=True)
+            self.wait_for(lambda: False, "the end of the motion", code=ReasonCode.WAITS_FOR_ARM, looks=True)
         running = ud.goal["primitive"]
         family = dict(self.ctx.config.get("monitor.primitives"))
         if running not in family.values():
@@ -34,7 +35,7 @@ class MonitorDmp(CoglabState):
         while True:
             try:
                 other = partial(self._other_pattern, family, running)
-                self.wait_for(other, "another reaching pattern", code=SIGHT, looks=True)
+                self.wait_for(other, "another reaching pattern", code=ReasonCode.WAITS_FOR_SIGHT, looks=True)
             except Interrupted as end:
                 if end.stop:
                     raise

@@ -12,7 +12,6 @@ from coglab_msgs.msg import ReasonCode
 
 from coglab_smach.context.context import Context
 from coglab_smach.context.grip import Grip
-from coglab_smach.context.wait_reasons import ARM, CONTACT, HAND, PERSON
 from coglab_smach.kinematics.motion_time import reach_time
 from coglab_smach.ports.interfaces import ContactEvent, DmpProgress, DmpRequest
 from coglab_smach.ports.pending import PortError
@@ -38,7 +37,7 @@ BUMPS = 2  # touches of other things after which the arm still tries again
 RETREAT = 0.06  # m, retreat of the hand after such a touch
 RETREAT_SPEED = 0.1  # m/s
 RETREAT_TIMEOUT = 5.0  # s, added to the planned duration of the retreat
-SEATED = 0.03  # m, largest distance from the grasp at which the fingers may close at a touch
+NEAR_GRASP = 0.03  # m, largest distance from the grasp at which the fingers may close at a touch
 FIRM = 2.5  # margin of a contact that is more than brushing past
 BETWEEN = 0.01  # m, added to ``handover.close_within``: an object within this distance is between the fingers
 NEWS = 0.02  # s after which the arm reports a started motion
@@ -148,7 +147,7 @@ class WaitStop(CoglabState):
             asked = begun.remaining_time + reach_time(arm.motion_limits(), begun.remaining_distance)
             limit = self.ctx.config.number("reach_timeout") + asked
             self.allow(limit + 10.0)
-            self.wait_for(near, "the end of the reach", limit, arm.speed_scale, ARM)
+            self.wait_for(near, "the end of the reach", limit, arm.speed_scale, ReasonCode.WAITS_FOR_ARM)
         except TimeLimit as error:
             progress = arm.dmp_progress()
             error.causes = error.causes or (
@@ -210,10 +209,12 @@ class WaitForPerson(WaitStop):
         limit = self.ctx.config.number("handover.pause")
         self.allow(limit + 8.0)
         resting = self.ctx.arm.cancel_motion("the arm waits: nobody offers or requests")
-        self.await_pending(resting, "rest of the arm", 3.0, code=ARM)
+        self.await_pending(resting, "rest of the arm", 3.0, code=ReasonCode.WAITS_FOR_ARM)
         self.ctx.journal.mark("paused")
         try:
-            self.wait_for(watch.hopeful, "a new offer or request of the person", limit, code=PERSON)
+            self.wait_for(
+                watch.hopeful, "a new offer or request of the person", limit, code=ReasonCode.WAITS_FOR_PERSON
+            )
         except TimeLimit as error:
             if error.code != ReasonCode.TIME_LIMIT:
                 raise
@@ -317,7 +318,9 @@ class WaitContact(WaitForPerson):
         arming = self.ctx.contact.arm("contact_in_motion", limit, settings)
         self.await_pending(arming, "arming of the contact detector", 2.0)
         try:
-            self.wait_for(self._feels_something, "contact of an object with the hand", limit, code=CONTACT)
+            self.wait_for(
+                self._feels_something, "contact of an object with the hand", limit, code=ReasonCode.WAITS_FOR_CONTACT
+            )
         except TimeLimit as error:
             error.code = error.code if error.code != ReasonCode.TIME_LIMIT else ReasonCode.NO_CONTACT
             raise
@@ -381,12 +384,12 @@ class WaitContact(WaitForPerson):
                     ReasonCode.NO_CONTACT,
                 )
             return Phase.BUMPED
-        if event is not None and away is not None and away > SEATED and event.margin < FIRM:
+        if event is not None and away is not None and away > NEAR_GRASP and event.margin < FIRM:
             self._slide_in()
-        self._tell(event)
+        self._report_contact(event)
         return Phase.HELD
 
-    def _tell(self, event: ContactEvent | None) -> None:
+    def _report_contact(self, event: ContactEvent | None) -> None:
         self.ctx.journal.mark("contact")
         felt = "the fingers hold it" if event is None else f"contact by {event.source}, margin {event.margin:.1f}"
         self.reason = (event.message if event is not None else "") or felt
@@ -399,7 +402,7 @@ class WaitContact(WaitForPerson):
         try:
             while self.ctx.clock.now() < end and not self.arrived():
                 away, event = off_grasp(self, self._goal), contact.event()
-                if away is None or away <= SEATED or (event is not None and event.margin >= FIRM):
+                if away is None or away <= NEAR_GRASP or (event is not None and event.margin >= FIRM):
                     return
                 if event is not None:
                     arming = contact.arm("contact_in_motion", 1.0, self._contact_settings)
@@ -414,7 +417,9 @@ class WaitContact(WaitForPerson):
         self._bumps += 1
         self.allow(20.0)
         # Stop the arm first: a motion that starts while the arm moves inherits its speed and brakes later.
-        self.await_pending(arm.cancel_motion("something touches the hand"), "rest of the arm", 3.0, code=ARM)
+        self.await_pending(
+            arm.cancel_motion("something touches the hand"), "rest of the arm", 3.0, code=ReasonCode.WAITS_FOR_ARM
+        )
         self.await_pending(arm.switch_controller("ptp"), "switching to 'ptp'", 3.0)
         self._open_again()
         outward = palm_axis(self.ctx)
@@ -424,7 +429,7 @@ class WaitContact(WaitForPerson):
             motion = shift(self.ctx, -RETREAT * outward, RETREAT_SPEED)
             if motion is not None:
                 try:
-                    self.await_pending(motion, "drawing back", limit, arm.speed_scale, ARM)
+                    self.await_pending(motion, "drawing back", limit, arm.speed_scale, ReasonCode.WAITS_FOR_ARM)
                 except PortError as error:
                     self.reason = error.sentence  # an incomplete retreat is enough
         self.await_pending(arm.switch_controller("dmp"), "switching to controller 'dmp'", 3.0)
@@ -467,7 +472,7 @@ class WaitContact(WaitForPerson):
             return
         closing.cancel()
         opening = self.ctx.hand.preshape(self._hand["mode"], self._hand["level"])
-        self.await_pending(opening, "the hand's opening", 5.0, code=HAND)
+        self.await_pending(opening, "the hand's opening", 5.0, code=ReasonCode.WAITS_FOR_HAND)
         self._grip.shared = False
 
 
@@ -650,7 +655,7 @@ class ReachWatch:
         if code == ReasonCode.GOAL_FELL and self._grip is not None:
             # The arm stops while this is decided.
             resting = self.state.ctx.arm.cancel_motion(sentence)
-            self.state.await_pending(resting, "rest of the arm", 3.0, code=ARM)
+            self.state.await_pending(resting, "rest of the arm", 3.0, code=ReasonCode.WAITS_FOR_ARM)
             code = self._grip.fell_or_withdrawn()
             sentence = sentence if code == ReasonCode.GOAL_FELL else LOWERED
         if code:

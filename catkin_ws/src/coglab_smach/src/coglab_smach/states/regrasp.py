@@ -6,9 +6,9 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from coglab_msgs.msg import ReasonCode
 
 from coglab_smach.context.context import Context
-from coglab_smach.context.wait_reasons import ARM
 from coglab_smach.ports.pending import Pending
 from coglab_smach.states.base import CoglabState, TimeLimit
 from coglab_smach.states.hand_tracking import way_to_grasp
@@ -45,7 +45,7 @@ class Regrasp(CoglabState):
         if motion is not None:
             over = partial(self._over, motion)
             try:
-                self.wait_for(over, "the way to the grasp", limit, self.ctx.arm.speed_scale, ARM)
+                self.wait_for(over, "the way to the grasp", limit, self.ctx.arm.speed_scale, ReasonCode.WAITS_FOR_ARM)
             except TimeLimit as error:
                 # The object moves away as the palm comes: the fingers can close here too.
                 self.reason = error.sentence

@@ -8,7 +8,6 @@ from typing import Any
 from coglab_msgs.msg import ReasonCode, Say
 
 from coglab_smach.context.context import Context
-from coglab_smach.context.wait_reasons import PERSON
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.base import CoglabState, TimeLimit
 from coglab_smach.states.hand_tracking import AT_HAND, AWAY, HandTrack, from_palm, hand_name, palm_at, sight_of
@@ -144,7 +143,7 @@ class TakeWeight(CoglabState):
         """Reset for each object."""
         self._top: float | None = None  # m, target height of the palm
         self._rises = 0
-        self._told = self._seen_away = False
+        self._said = self._seen_away = False
         self._farther: float | None = None  # m from the palm beyond which the person's hand has left the object
         self._gone: float | None = None  # s, time when the hand left
         self._on: float | None = None  # s, time of the next rise with the weight; None: the arm does not carry it yet
@@ -166,7 +165,12 @@ class TakeWeight(CoglabState):
         try:
             self.pause(self.ctx.config.number("hand.lift_after"))
             self._rise()
-            self.wait_for(self._has_let_go, "the person's letting go", end - self.ctx.clock.now(), code=PERSON)
+            self.wait_for(
+                self._has_let_go,
+                "the person's letting go",
+                end - self.ctx.clock.now(),
+                code=ReasonCode.WAITS_FOR_PERSON,
+            )
         except TimeLimit as error:
             if error.code != ReasonCode.TIME_LIMIT:
                 raise
@@ -182,7 +186,7 @@ class TakeWeight(CoglabState):
         event = contact.event()
         self.reason = event.message if event is not None else "the person's hand has left it"
         ud.grip.shared, ud.hand_seen_away = False, self._seen_away
-        self._tell()
+        self._say_i_have_it()
         self.ctx.journal.mark("released")
         return "succeeded"
 
@@ -201,7 +205,7 @@ class TakeWeight(CoglabState):
         self._follow()
         if carried:
             self.ctx.journal.mark("loaded")
-            self._tell()
+            self._say_i_have_it()
         # Before and after from_palm(), which waits for a sight.
         self._way.follow()
         away = from_palm(self, self._hand)
@@ -251,10 +255,10 @@ class TakeWeight(CoglabState):
             self._closes = now + FOLLOWS
             self._closing = self.ctx.hand.close(self.ctx.config.get("give.close_speed"))
 
-    def _tell(self) -> None:
+    def _say_i_have_it(self) -> None:
         """Inform the person once that the robot carries the object."""
-        if not self._told:
-            self._told = True
+        if not self._said:
+            self._said = True
             self.ctx.say(Say.I_HAVE_IT, "I have it.")
 
     def _rise(self, most: float = math.inf) -> None:
