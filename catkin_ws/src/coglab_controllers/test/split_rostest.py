@@ -55,15 +55,20 @@ class Split(unittest.TestCase):
         answer = robot.switch("dmp")
         self.assertEqual(answer.controller_type, "coglab/DmpController")
         robot.see_hand(GOAL)
-        wait_until(lambda: robot.execute().success, "execute_dmp")
-        wait_until(lambda: robot.feedback.state == "running", "running")
-        wait_until(lambda: self.frames.can_transform("lwr_base_link", "dmp_goal", rospy.Time(0)), "tf2 frame dmp_goal")
+
+        def reach() -> None:
+            wait_until(lambda: robot.execute().success, "execute_dmp")
+            wait_until(
+                lambda: self.frames.can_transform("lwr_base_link", "dmp_goal", rospy.Time(0)), "tf2 frame dmp_goal"
+            )
+            wait_until(lambda: robot.feedback.state == "reached", "reached")
+            wait_until(lambda: robot.feedback.remaining_distance < 0.002, "2 mm from the goal")
+
+        robot.unless_late(reach)
         goal = self.frames.lookup_transform("lwr_base_link", "dmp_goal", rospy.Time(0))
         place = goal.transform.translation
         for value, wanted in zip((place.x, place.y, place.z), GOAL, strict=False):
             self.assertAlmostEqual(value, wanted, delta=0.01)
-        wait_until(lambda: robot.feedback.state == "reached", "reached")
-        wait_until(lambda: robot.feedback.remaining_distance < 0.002, "2 mm from the goal")
         phases = [m.phase for m in robot.feedbacks if m.state == "running"]
         self.assertTrue(all(a >= b for a, b in zip(phases[-20:], phases[-19:], strict=False)))
 
@@ -71,8 +76,13 @@ class Split(unittest.TestCase):
         robot = self.robot
         robot.go(HOME)
         robot.switch("dmp")
-        wait_until(lambda: robot.execute(dmp_ratio=6.0).success, "execute_dmp")
-        wait_until(lambda: robot.feedback.state == "running" and robot.feedback.phase < 0.8, "in mid-motion")
+
+        def begin() -> None:
+            robot.feedbacks.clear()
+            wait_until(lambda: robot.execute(dmp_ratio=6.0).success, "execute_dmp")
+            wait_until(lambda: any(m.state == "running" and m.phase < 0.8 for m in robot.feedbacks), "in mid-motion")
+
+        robot.unless_late(begin)
         refused = robot.add_ptp(HOME)
         self.assertEqual(refused.status, AddPtpRequest.REJECTED)
         self.assertEqual(refused.reason_code, ReasonCode.NOT_ACTIVE)
@@ -84,26 +94,30 @@ class Split(unittest.TestCase):
 
     def test_5_cancel_ends_a_motion_and_its_queue_and_answers_when_the_arm_stands(self) -> None:
         robot = self.robot
-        robot.switch("ptp")
-        wait_until(lambda: robot.status.standing, "standing")
         there = [HOME[0] + 0.6, *HOME[1:]]
-        ids = [robot.begin(there).ptp_id, robot.begin(HOME).ptp_id]
-        wait_until(lambda: max(abs(v) for v in robot.joints.velocity) > 0.1, "in motion")
-        wait_until(lambda: not robot.status.standing, "status of a moving arm")
-        answer = robot.cancel("ptp", "a test gives up")
-        self.assertTrue(answer.success, answer.message)
-        self.assertTrue(answer.was_running)
-        self.assertEqual(answer.reason_code, ReasonCode.NONE)
-        wait_until(lambda: all(i in robot.unfinished for i in ids), "unfinished_ptp")
-        for i in ids:
-            self.assertEqual(robot.unfinished[i].reason_code, ReasonCode.CANCELLED)
-            self.assertNotIn(i, robot.finished)
-        wait_until(
-            lambda: robot.status.standing and robot.status.reason_code == ReasonCode.CANCELLED,
-            "status after the cancel",
-        )
-        self.assertIn("a test gives up", robot.status.reason)
-        self.assertGreater(abs(robot.arm()[0] - there[0]), 0.05, "it went on to its target")
+
+        def cancel() -> None:
+            robot.go(HOME)
+            wait_until(lambda: robot.status.standing, "standing")
+            ids = [robot.begin(there).ptp_id, robot.begin(HOME).ptp_id]
+            wait_until(lambda: max(abs(v) for v in robot.joints.velocity) > 0.1, "in motion")
+            wait_until(lambda: not robot.status.standing, "status of a moving arm")
+            answer = robot.cancel("ptp", "a test gives up")
+            self.assertTrue(answer.success, answer.message)
+            self.assertTrue(answer.was_running)
+            self.assertEqual(answer.reason_code, ReasonCode.NONE)
+            wait_until(lambda: all(i in robot.unfinished for i in ids), "unfinished_ptp")
+            for i in ids:
+                self.assertEqual(robot.unfinished[i].reason_code, ReasonCode.CANCELLED)
+                self.assertNotIn(i, robot.finished)
+            wait_until(
+                lambda: robot.status.standing and robot.status.reason_code == ReasonCode.CANCELLED,
+                "status after the cancel",
+            )
+            self.assertIn("a test gives up", robot.status.reason)
+            self.assertGreater(abs(robot.arm()[0] - there[0]), 0.05, "it went on to its target")
+
+        robot.unless_late(cancel)
         again = robot.cancel("dmp")
         self.assertTrue(again.success, again.message)
         self.assertFalse(again.was_running)
@@ -175,12 +189,16 @@ class Split(unittest.TestCase):
     def test_7_a_frozen_manager_moves_nothing_after_hold_and_reset(self) -> None:
         """The manager freezes during a motion. After hold and reset without it, it continues with its old state."""
         robot = self.robot
-        robot.go(HOME)
         target = [angle + 0.8 if joint == 6 else angle for joint, angle in enumerate(HOME)]
-        self.assertEqual(robot.begin(target).status, AddPtpRequest.STARTED)
-        wait_until(lambda: robot.joints.velocity[6] > 0.2, "in mid-motion")
         manager = rosnode.get_api_uri(rosgraph.Master("/split"), "/controller_manager")
         process = xmlrpc.client.ServerProxy(manager).getPid("/split")[2]
+
+        def begin() -> None:
+            robot.go(HOME)
+            self.assertEqual(robot.begin(target).status, AddPtpRequest.STARTED)
+            wait_until(lambda: robot.joints.velocity[6] > 0.2, "in mid-motion")
+
+        robot.unless_late(begin)
         os.kill(process, signal.SIGSTOP)
         try:
             for event in ("hold", "reset"):
