@@ -118,6 +118,22 @@ def contact_parameters(top: Path) -> str:
     )
 
 
+def belief_parameters(_top: Path) -> str:
+    """Parameters of the belief, from the fields of its settings and their docstrings."""
+    from coglab_perception.belief import BeliefSettings
+    from coglab_perception.carried import CarriedSettings
+    from coglab_perception.reach_bank import ReachSettings
+
+    rows = [
+        (code(above + name), code(getattr(settings, name)), meaning)
+        for above, settings in (("", BeliefSettings()), ("reach/", ReachSettings()), ("carried/", CarriedSettings()))
+        for name, meaning in _fields(type(settings)).items()
+        if name not in ("reach", "carried") or above
+    ]
+    about = "Private parameters of the node `/motion_recogniser`, below `belief`. Lengths in m, times in s."
+    return f"# Parameters of the belief\n\n{about}\n\n" + table(("name", "default", "meaning"), rows)
+
+
 def machine_parameters(_top: Path) -> str:
     """Parameters of the state machines, from their table."""
     from coglab_smach import parameters
@@ -145,17 +161,22 @@ def _spread(values: list) -> str:
     return f"{middle:.2g}" if low == high else f"{middle:.2g} ({low:.2g} .. {high:.2g})"
 
 
+def _fields(kind: type) -> dict[str, str]:
+    """The fields of a dataclass with their docstrings; empty where there is none."""
+    body = ast.parse(inspect.getsource(kind)).body[0].body
+    return {
+        field.target.id: " ".join(text.value.value.split()) if isinstance(text, ast.Expr) else ""
+        for field, text in zip(body, [*body[1:], None], strict=True)
+        if isinstance(field, ast.AnnAssign)
+    }
+
+
 def person_parameters(_top: Path) -> str:
     """Parameters of the simulated person: meanings from the class, values from 1000 drawn people."""
     from coglab_sim.person.participant import Participant
 
     people = [Participant.draw(seed) for seed in range(1000)]
-    body = ast.parse(inspect.getsource(Participant)).body[0].body
-    meanings = {
-        field.target.id: text.value.value
-        for field, text in zip(body, body[1:], strict=False)
-        if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr)
-    }
+    meanings = _fields(Participant)
     rows = [
         (code(name), _spread([getattr(person, name) for person in people]), meanings.get(name, ""))
         for name in vars(people[0])
@@ -308,6 +329,7 @@ PAGES = {
     "cell_parameters": cell_parameters,
     "machine_parameters": machine_parameters,
     "contact_parameters": contact_parameters,
+    "belief_parameters": belief_parameters,
     "wire_choices": wire_choices,
     "person_parameters": person_parameters,
     "console_commands": console_commands,

@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 from coglab_perception.belief import Belief, BeliefFilter, BeliefSettings
 from coglab_perception.reach_bank import ReachSettings
 from coglab_perception.recogniser import PatternEnd
@@ -18,7 +16,6 @@ from synthetic_reaches import START, share
 
 END = np.array([0.84, 0.02, 0.46])
 IN_HAND = np.array([-0.08, 0.0, -0.05])
-FILE = Path(__file__).resolve().parents[1] / "config" / "belief.yaml"
 LEVEL = BeliefSettings().decision
 ONSET, TIME = 1.0, 1.15
 OVER = ONSET + TIME
@@ -267,9 +264,7 @@ def test_a_recognised_pattern_comes_into_the_prediction_gradually():
     assert np.trace(helped.beliefs[-1].covariance) < 0.7 * np.trace(plain.beliefs[-1].covariance)
 
 
-def test_the_file_holds_the_defaults_and_faults_in_it_are_said():
-    data = yaml.safe_load(FILE.read_text(encoding="utf-8"))
-    assert BeliefSettings.from_mapping(data) == BeliefSettings()
+def test_settings_change_what_they_name_and_faults_are_refused():
     changed = BeliefSettings.from_mapping({"reach": {"place": [0.8, -0.1, 0.4]}, "decision": 0.85})
     assert changed == replace(BeliefSettings(), decision=0.85, reach=ReachSettings(place=(0.8, -0.1, 0.4)))
     for wrong, words in (

@@ -24,6 +24,7 @@ class ReachSettings:
     place: tuple[float, float, float] = (0.86, 0.0, 0.44)
     """mean place of a person's hand at a handover, world axes"""
     place_deviation: tuple[float, float, float] = (0.06, 0.08, 0.08)
+    """standard deviation of this place per axis"""
     handover_rate: float = 0.2
     """rate of motions from rest toward a handover"""
     other_rate: float = 0.7
@@ -35,10 +36,13 @@ class ReachSettings:
     reach_times: tuple[float, ...] = (0.7, 0.85, 1.0, 1.2, 1.4, 1.7, 2.1, 2.6)
     """s, grid of durations"""
     small_times: tuple[float, ...] = (0.25, 0.4, 0.6, 0.9)
+    """the same for small other motions"""
     wide_times: tuple[float, ...] = (0.5, 0.7, 0.9, 1.2, 1.6)
+    """the same for wide other motions"""
     small_way: float = 0.06
     """standard deviation per axis of the displacements of small other motions, which are as likely as wide ones"""
     wide_way: float = 0.30
+    """the same of wide other motions"""
     return_rate: float = 1.0
     """rate of motions back to the usual rest, from a place more than 2 return_way away from it"""
     return_way: float = 0.06
@@ -48,6 +52,7 @@ class ReachSettings:
     correction_rate: float = 0.1
     """rate of changes of a motion's end during the motion, and of displacements of a hand at a handover"""
     correction_times: tuple[float, ...] = (0.45, 0.7, 1.1)
+    """grid of durations of these changes"""
     correction_way: float = 0.10
     """standard deviation per axis of these changes"""
     vertical_shares: tuple[float, ...] = (0.82, 0.95)

@@ -9,7 +9,7 @@ from functools import lru_cache
 import coglab_controllers as cc
 import numpy as np
 from coglab_py.packages import package_path
-from coglab_py.yaml_file import read
+from coglab_smach.context.config import Config
 from coglab_smach.kinematics.reachability import default_arm, home_posture, joint_limits
 
 from coglab_tools.dmp.demonstration import Array
@@ -73,8 +73,9 @@ def home_palm() -> tuple[Array, Array]:
 @lru_cache(maxsize=1)
 def region() -> tuple[Array, Array]:
     """Corners (3,) in m of the handover region in the machines' configuration, base frame."""
-    handover = read(package_path("coglab_smach", "config", "machines.yaml")).value["handover"]
-    return np.array(handover["region_low"], dtype=float), np.array(handover["region_high"], dtype=float)
+    machines = Config.load(str(package_path("coglab_smach", "config", "machines.yaml")))
+    low, high = (np.array(machines.get(f"handover.region_{end}"), dtype=float) for end in ("low", "high"))
+    return low, high
 
 
 def region_middle() -> Array:
