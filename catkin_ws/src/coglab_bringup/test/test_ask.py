@@ -5,6 +5,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from coglab_bringup import ask as ask_module
@@ -98,6 +99,19 @@ def test_start_waits_for_the_hub_and_takes_the_offered_object(brain):
     assert process.returncode == 0, output
     assert brain.started == [("exchange_human_to_robot", "mug")]
     brain.started.clear()
+
+
+def test_start_waits_as_long_as_nodes_come(monkeypatch):
+    """On a busy computer a node needs a minute. Four of them come, then none for 90 s."""
+    now = 0.0
+    monkeypatch.setattr(ask_module, "time", SimpleNamespace(monotonic=lambda: now))
+    monkeypatch.setattr(
+        ask_module, "master_call", lambda *_: [[], [], [["/service", ["/node"]]] * min(int(now / 60), 4)]
+    )
+    patience = ask_module.Patience("http://127.0.0.1:11311", 90.0)
+    while patience.left() > 0.0:
+        now += 1.0
+    assert now == pytest.approx(4 * 60 + 90, abs=1.0)
 
 
 def test_hold_status_and_reset(brain):

@@ -25,6 +25,7 @@ from coglab_bringup.usage import Parser, Refused, master_port
 DEFAULT_MASTER = "http://127.0.0.1:11311"  # of a plain roslaunch
 ANSWER_LIMIT = 5.0  # s, longest wait for a service that exists
 STATE_LIMIT = 3.0  # s, longest wait for the latched state
+LONGEST_START = 600.0  # s that it waits for the hub while nodes start
 CHANGE_LIMIT = 5.0  # s before an action is refused that the hub does not list: after a hold the list needs a moment
 DEFAULT_ACTIONS = ("exchange_human_to_robot", "exchange_robot_to_human")  # the first one that the hub accepts
 FACTOR_TOPIC = "/coglab_sim/real_time_factor"
@@ -72,7 +73,9 @@ def ask_parser(command: str) -> Parser:
             metavar="delivery:=NAME",
             help="delivery of the object's file: how it is given",
         )
-        parser.add_argument("--wait", type=float, default=90.0, metavar="S", help="longest wait, s (default 90)")
+        parser.add_argument(
+            "--wait", type=float, default=90.0, metavar="S", help="longest wait while no node starts, s (default 90)"
+        )
     parser.add_argument(
         "-p", type=master_port, default=0, dest="port", metavar="PORT", help="port of the ROS master, if not clear"
     )
@@ -181,6 +184,27 @@ class Brain:
         return float(Reader(data).take("d")) if data else 1.0
 
 
+class Patience:
+    """Time that is left for the system to start: `limit` s since a node registered a service for the last time, because
+    nodes start slowly on a busy computer. Never longer than LONGEST_START, or `limit` if that is longer."""
+
+    def __init__(self, master: str, limit: float):
+        self._master, self._limit = master, limit
+        self._begun = self._moved = time.monotonic()
+        self._services = -1
+
+    def left(self) -> float:
+        """Time (s) that is left."""
+        now = time.monotonic()
+        try:
+            services = len(master_call(self._master, "getSystemState")[2])
+        except NoAnswer:
+            services = -1
+        if services != self._services:
+            self._services, self._moved = services, now
+        return min(self._moved + self._limit, self._begun + max(self._limit, LONGEST_START)) - now
+
+
 def sentence_of(state: State) -> str:
     """State, object and reason, one per line."""
     name = state.state.rpartition("/")[2]
@@ -229,13 +253,17 @@ def choose(master: str, options: argparse.Namespace, state: State) -> tuple[str,
 def start(brain: Brain, options: argparse.Namespace) -> int:
     """Wait for the hub, then request the action. A refusal that may be temporary is retried until the time limit."""
     options.action = SHORT_NAMES.get(options.action, options.action)
-    deadline, wanted = time.monotonic() + options.wait, options.action
+    patience, wanted = Patience(brain.master, options.wait), options.action
     if not brain.wait_for_state(lambda state: state.in_hub, min(1.0, options.wait)):
         now = brain.state.state.rpartition("/")[2] if brain.state.state else "the brain is starting"
-        print(f"[coglab] waiting for the hub, {options.wait:.0f} s at most; now: {now}", file=sys.stderr, flush=True)
-    while (left := deadline - time.monotonic()) > 0:
-        if not brain.wait_for_state(lambda state: state.in_hub, left):
-            break
+        print(
+            f"[coglab] waiting for the hub until no node starts for {options.wait:.0f} s; now: {now}",
+            file=sys.stderr,
+            flush=True,
+        )
+    while (left := patience.left()) > 0:
+        if not brain.wait_for_state(lambda state: state.in_hub, min(left, 1.0)):
+            continue
         if wanted and wanted not in brain.state.actions:
             brain.wait_for_state(lambda state: wanted in state.actions or not state.in_hub, min(CHANGE_LIMIT, left))
             if brain.state.in_hub and wanted not in brain.state.actions:
@@ -252,7 +280,9 @@ def start(brain: Brain, options: argparse.Namespace) -> int:
             continue  # the hub was left at this moment
         raise Refused(message)
     state = brain.state.state or "/coglab/state never came"
-    raise Refused(f"no hub within {options.wait:.0f} s; the machine is in {state}; more: ./coglab status")
+    raise Refused(
+        f"no hub, and no node has started for {options.wait:.0f} s; the machine is in {state}; more: ./coglab status"
+    )
 
 
 def hold(brain: Brain, _options: argparse.Namespace) -> int:
