@@ -11,9 +11,11 @@ import rospkg
 import rospy
 import tf2_ros
 import yaml
-from coglab_bringup.handover import run_handover
+from coglab_bringup.handover import HUBS, READY_LIMIT, ask_for, run_handover
 from coglab_bringup.trial_recorder import TrialRecorder
+from coglab_msgs.msg import MasterState
 from interface import FRAMES, missing_names
+from lateness import Lateness
 from rosgraph_msgs.msg import Log
 from tf2_msgs.msg import TFMessage
 
@@ -36,11 +38,36 @@ class Handover(unittest.TestCase):
             rospy.Subscriber(topic, TFMessage, cls.on_tf, queue_size=100)
         cls.logged = []
         rospy.Subscriber("/rosout", Log, cls.logged.append, queue_size=1000)
-        recorder = TrialRecorder()
-        cls.row, *span = run_handover("exchange_human_to_robot", "mug", recorder)
-        cls.spans = [span]  # start and end of every action (s, steady clock)
-        cls.trial = recorder.stop()
+        cls.lateness = Lateness()
+        cls.spans = []  # start and end of every action (s, steady clock)
+        cls.row = cls.perform("exchange_human_to_robot")
         cls.stamps_later = rospy.get_time() - time.monotonic()  # s, ROS time minus steady clock
+
+    @classmethod
+    def perform(cls, action):
+        """The result row of an action with the mug. Repeats it if a late computer may be why it failed."""
+        for _ in range(3):
+            cls.lateness.begin()
+            recorder = TrialRecorder()
+            row, cls.start, cls.end = run_handover(action, "mug", recorder)
+            cls.trial = recorder.stop()
+            if row["outcome"] == "success" or not cls.lateness.may_explain(row["reason_code"]):
+                break
+            cls.return_to_hub()
+        cls.spans.append((cls.start, cls.end))
+        return row
+
+    @classmethod
+    def return_to_hub(cls):
+        """Until the machine accepts actions. It may have stopped by itself."""
+        end = time.monotonic() + 2 * READY_LIMIT
+        while not (state := rospy.wait_for_message("/coglab/state", MasterState, READY_LIMIT)).state.endswith(HUBS):
+            if time.monotonic() > end:
+                raise TimeoutError(f"not in a hub within {2 * READY_LIMIT:.0f} s: {state.state}, {state.why}")
+            for leaf, action in (("/stopped", "reset"), ("/fault", "initialise")):
+                if state.state.endswith(leaf):
+                    ask_for(action, "", lambda: True, READY_LIMIT)
+            time.sleep(0.5)
 
     @classmethod
     def on_tf(cls, message):

@@ -37,10 +37,10 @@ class IdealArm(unittest.TestCase):
         return self.robot.call("lwr/command", LwrCommand, event)
 
     def test_1_stands_at_home_until_start(self) -> None:
-        joints = rospy.wait_for_message("lwr/joint_states", JointState, 20.0)
+        joints = rospy.wait_for_message("lwr/joint_states", JointState, 60.0)
         self.assertEqual(joints.name, JOINTS)
         self.assertEqual(list(joints.position), HOME)
-        state = rospy.wait_for_message("lwr/state", LwrState, 20.0)
+        state = rospy.wait_for_message("lwr/state", LwrState, 60.0)
         self.assertEqual((state.supervisor, state.motion_allowed), ("monitor", False))
         self.assertEqual(state.reason_code, ReasonCode.NOT_IN_COMMAND_MODE)
         self.assertIn("rosservice call /lwr/command start", state.reason)
@@ -69,14 +69,21 @@ class IdealArm(unittest.TestCase):
 
     def test_3_hold_brakes_and_latches_until_reset(self) -> None:
         robot = self.robot
-        motion = robot.add_ptp(HOME)
-        self.assertEqual(motion.status, AddPtpRequest.STARTED, motion.message)
-        wait_until(lambda: max(abs(v) for v in robot.joints.velocity) > 0.1, "in motion")
+        motions = []
+
+        def begin() -> None:
+            robot.go(AWAY)
+            motion = robot.add_ptp(HOME, [0.05] * 7)  # 10 s: it runs when the hold comes
+            self.assertEqual(motion.status, AddPtpRequest.STARTED, motion.message)
+            wait_until(lambda: max(abs(v) for v in robot.joints.velocity) > 0.04, "in motion")
+            motions.append(motion.ptp_id)
+
+        robot.unless_late(begin)
         self.events.publish("hold")
         wait_until(lambda: robot.state.hold_latched, "hold")
         self.assertEqual((robot.state.supervisor, robot.state.reason_code), ("holding", ReasonCode.HELD))
         wait_until(lambda: not any(robot.joints.velocity), "stand-still")
-        wait_until(lambda: motion.ptp_id in robot.unfinished, "unfinished_ptp")
+        wait_until(lambda: motions[-1] in robot.unfinished, "unfinished_ptp")
         held = robot.arm()
         refused = self.command("start")
         self.assertEqual((refused.success, refused.reason_code), (False, ReasonCode.HELD))
@@ -95,17 +102,15 @@ class IdealArm(unittest.TestCase):
         robot.switch("dmp")
         enabled = robot.call("controller_manager/feedback/enable", FeedbackSelect, ["ee_admittance"], "")
         self.assertTrue(enabled.success, enabled.message)
-        status = rospy.wait_for_message("controller_manager/feedback/status", FeedbackStatus, 20.0)
+        status = rospy.wait_for_message("controller_manager/feedback/status", FeedbackStatus, 60.0)
         self.assertTrue(status.controllers)
         robot.see_hand(GOAL)
-        answers = []
 
-        def begun() -> bool:
-            answers.append(robot.execute())
-            return answers[-1].success
+        def reach() -> None:
+            wait_until(lambda: robot.execute().success, "execute_dmp")
+            wait_until(lambda: robot.feedback.state == "reached", "reached")
 
-        wait_until(begun, "execute_dmp")
-        wait_until(lambda: robot.feedback.state == "reached", "reached")
+        robot.unless_late(reach)
         self.assertLess(robot.feedback.remaining_distance, 0.006)
 
     def test_5_modes_with_forces_are_refused(self) -> None:

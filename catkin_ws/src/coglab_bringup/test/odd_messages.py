@@ -102,7 +102,7 @@ class OddMessages:
         except Exception:  # any error: no answer
             return 0
 
-    def send(self, to_topics: int, to_services: int, limit: float = 60.0) -> None:
+    def send(self, to_topics: int, to_services: int, limit: float = 180.0) -> None:
         """Send these numbers of messages to each topic and to each service."""
         threads = {
             name: threading.Thread(target=self._call, args=(name, kind, to_services), daemon=True)

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 import unittest
+from collections.abc import Callable
 from unittest import mock
 
 import coglab
@@ -20,8 +21,9 @@ from coglab_bringup.handover import READY_LIMIT
 from coglab_msgs.msg import ReasonCode
 from coglab_msgs.srv import Start
 from coglab_py.packages import package_path
+from lateness import Lateness
 
-LIMIT = 90.0  # s for an exchange on a loaded machine
+LIMIT = 180.0  # s for a motion or an exchange on a loaded machine
 
 
 class PythonRobot(unittest.TestCase):
@@ -41,6 +43,23 @@ class PythonRobot(unittest.TestCase):
             if time.monotonic() > end:
                 raise TimeoutError("the system is not ready")
             time.sleep(0.5)
+        cls.lateness = Lateness()
+
+    def done(self, act: Callable[[], coglab.Result]) -> coglab.Result:
+        """Acts and expects success. Acts again if a late computer may be why it failed."""
+        for left in (2, 1, 0):
+            self.lateness.begin()
+            try:
+                result = act()
+                problem, code = str(result), result.code
+                if result.ok:
+                    return result
+            except coglab.Refused as refused:
+                problem, code = str(refused), refused.code
+            if not left or not self.lateness.may_explain(code):
+                self.fail(problem)
+            self.robot.reset(limit=LIMIT)
+        raise AssertionError(problem)
 
     @classmethod
     def tearDownClass(cls) -> None:
@@ -49,27 +68,31 @@ class PythonRobot(unittest.TestCase):
     def test_1_moves_and_stops_at_the_end_of_a_block(self) -> None:
         arm = self.robot.arm
         target = arm.home + 0.1
-        result = arm.move_joints(target)
-        self.assertTrue(result.ok, str(result))
+        self.done(lambda: arm.move_joints(target, limit=LIMIT))
         self.assertLess(np.abs(arm.joints - target).max(), 0.01)
-        with arm.start_joints(arm.home - 0.3, duration=8.0) as motion:
-            time.sleep(1.0)
-            self.assertFalse(motion.done)
+        for left in (2, 1, 0):
+            self.lateness.begin()
+            with arm.start_joints(arm.home - 0.3, duration=8.0, limit=LIMIT) as motion:
+                time.sleep(1.0)
+                done = motion.done
+            if not done or not left or not self.lateness.may_explain(motion.result.code):
+                break
+            self.robot.reset(limit=LIMIT)
+        self.assertFalse(done)
         self.assertEqual((motion.result.ok, motion.result.reason), (False, "CANCELLED"))
         self.assertTrue(self.robot.state.standing)
         self.assertGreater(np.abs(arm.joints - arm.home + 0.3).max(), 0.05)
 
     def test_2_reaches_a_pose_and_follows_a_function(self) -> None:
         arm = self.robot.arm
-        self.assertTrue(arm.move_joints(arm.home).ok)
+        self.done(lambda: arm.move_joints(arm.home, limit=LIMIT))
         palm = arm.palm
         there = coglab.Pose(palm.position + [0.05, 0.0, 0.05], palm.orientation)
-        self.assertTrue(arm.move_to(there).ok)
+        self.done(lambda: arm.move_to(there, limit=LIMIT))
         self.assertLess(np.linalg.norm(arm.palm.position - there.position), 0.01)
-        self.assertTrue(arm.reach("reach_human", palm).ok)
+        self.done(lambda: arm.reach("reach_human", palm, limit=LIMIT))
         self.assertLess(np.linalg.norm(arm.palm.position - palm.position), 0.01)
-        result = arm.follow(lambda t: palm.position + [0.0, 0.03 * t, 0.0], 3.0)
-        self.assertTrue(result.ok, str(result))
+        self.done(lambda: arm.follow(lambda t: palm.position + [0.0, 0.03 * t, 0.0], 3.0, limit=LIMIT))
         self.assertGreater(arm.palm.position[1] - palm.position[1], 0.03)
 
     def test_3_hold_is_latched_until_reset(self) -> None:
@@ -78,8 +101,7 @@ class PythonRobot(unittest.TestCase):
         with self.assertRaises(coglab.Refused) as refused:
             robot.arm.move_joints(robot.arm.home)
         self.assertIn("robot.reset()", str(refused.exception))
-        result = robot.reset(limit=LIMIT)
-        self.assertTrue(result.ok, str(result))
+        self.done(lambda: robot.reset(limit=LIMIT))
 
     def test_4_receives_and_gives_back(self) -> None:
         robot = self.robot
@@ -90,24 +112,30 @@ class PythonRobot(unittest.TestCase):
         with self.assertRaises(coglab.Refused) as refused:
             robot.receive("teapot_of_nobody")
         self.assertEqual(refused.exception.code, ReasonCode.OBJECT_UNKNOWN)
-        received = robot.receive("mug", limit=LIMIT)
-        self.assertTrue(received.ok, str(received))
+        received = self.done(lambda: robot.receive("mug", limit=LIMIT))
         self.assertEqual(robot.state.holding, "mug")
         self.assertTrue(received.started <= received.marks["closed"] <= received.ended <= rospy.get_time())
         with self.assertRaises(coglab.Refused):
             robot.hand.open()
         # A client that uses only actionlib and the messages gives it back.
         client = str(package_path("coglab_smach", "examples", "handover_client.py"))
-        given = subprocess.run([sys.executable, client, "give", "mug"], capture_output=True, text=True, timeout=LIMIT)
-        self.assertEqual(given.returncode, 0, given.stdout + given.stderr)
+        give = [sys.executable, client, "give", "mug"]
+        for left in (2, 1, 0):
+            self.lateness.begin()
+            given = subprocess.run(give, capture_output=True, text=True, timeout=LIMIT)
+            if given.returncode == 0:
+                break
+            if not left or not self.lateness.may_explain(robot.state.code):
+                self.fail(given.stdout + given.stderr)
+            robot.reset(limit=LIMIT)
         self.assertIn("/exchange_robot_to_human/", given.stdout)
         self.assertEqual(robot.state.holding, "")
         kinds = {event.kind for event in robot.events()}
         self.assertEqual(kinds, {"transition", "result", "said"})
-        self.assertTrue(robot.hand.preshape("lateral").ok)
+        self.assertTrue(robot.hand.preshape("lateral", limit=LIMIT).ok)
 
     def test_5_several_connections_and_a_clean_end(self) -> None:
-        with coglab.connect() as second:
+        with coglab.connect(limit=60.0) as second:
             self.assertEqual(second.state.holding, self.robot.state.holding)
         with self.assertRaises(RuntimeError):
             second.arm.joints  # noqa: B018  (a property that is refused)

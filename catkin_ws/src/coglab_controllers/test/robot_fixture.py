@@ -202,15 +202,16 @@ class Robot:
         )
         if self.state.motion_allowed:
             return
-        answers: list[str] = []
 
-        def started() -> bool:  # on a busy machine datagrams may pause for a moment
-            answer = self.call("lwr/command", LwrCommand, "start")
-            answers.append(answer.message)
-            return answer.success
+        def allowed() -> bool:  # on a busy machine datagrams may pause for a moment, also after the answer
+            if not self.call("lwr/command", LwrCommand, "start").success:
+                return False
+            end = time.monotonic() + 5.0
+            while not self.state.motion_allowed and time.monotonic() < end:
+                time.sleep(0.01)
+            return self.state.motion_allowed
 
-        wait_until(started, f"start: {answers[-1:]}")
-        wait_until(lambda: self.state.motion_allowed, "motion allowed")
+        wait_until(allowed, "motion allowed")
 
     def unless_late(self, attempt: Callable[[], None]) -> None:
         """Runs a part of a test in which the arm moves; again if it fails and a late computer has ended a motion."""

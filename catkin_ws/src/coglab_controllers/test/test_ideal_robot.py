@@ -94,7 +94,7 @@ class Robot:
 
     @staticmethod
     def call(name: str, kind: type, *arguments: object):
-        rospy.wait_for_service(name, 20.0)
+        rospy.wait_for_service(name, 60.0)
         return rospy.ServiceProxy(name, kind)(*arguments)
 
     def command(self, event: str):

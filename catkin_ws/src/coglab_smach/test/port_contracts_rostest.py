@@ -8,12 +8,13 @@ import time
 import unittest
 import xmlrpc.client
 from contextlib import contextmanager
+from functools import wraps
 
 import numpy as np
 import rosgraph
 import rospy
 import rostest
-from coglab_msgs.msg import HandoverBelief, ReasonCode, Recognition
+from coglab_msgs.msg import ContactSignal, ControllerStatus, HandoverBelief, LwrState, ReasonCode, Recognition
 from coglab_py.packages import package_path
 from coglab_smach.ports.interfaces import Ahead, DmpRequest
 from coglab_smach.ports.interfaces import Recognition as Recognised
@@ -25,6 +26,15 @@ from geometry_msgs.msg import Vector3, Wrench
 
 PATIENCE = 20.0  # factor on all time limits, for a busy computer
 LIBRARY = str(package_path("coglab_controllers", "config", "primitives.xml"))
+LATE = {
+    ReasonCode.COMPUTER_LATE,
+    ReasonCode.GOAL_LOST,
+    ReasonCode.GOAL_STALE,
+    ReasonCode.NOT_IN_COMMAND_MODE,
+    ReasonCode.ROBOT_DISCONNECTED,
+    ReasonCode.STALE_JOINT_STATE,
+}
+"""why a motion ends on a computer that is late"""
 REACH = DmpRequest("take_board", "board", [0.0, -0.25, 0.45], dmp_ratio=4.0)
 
 
@@ -46,6 +56,17 @@ def settle(pending, limit=5.0):
     """The value of a call; fails after ``limit`` s."""
     until(pending.done, limit, "the answer")
     return pending.result()
+
+
+def answered(ask):
+    """The value of a call. Calls again if it fails, because a busy computer may see too late."""
+    end = time.monotonic() + 5.0 * PATIENCE
+    while True:
+        try:
+            return settle(ask())
+        except PortError:
+            if time.monotonic() > end:
+                raise
 
 
 def refused(pending, code):
@@ -70,10 +91,31 @@ def frozen(node):
         os.kill(pid, signal.SIGCONT)
 
 
+def again_if_late(test):
+    """A test that is repeated if it fails and a late computer has ended a motion, or a node was late to answer."""
+
+    @wraps(test)
+    def run(self):
+        for left in (2, 1, 0):
+            self.reasons.clear()
+            try:
+                return test(self)
+            except (AssertionError, PortError) as error:
+                time.sleep(0.5)  # the reason may be on its way
+                late = getattr(error, "code", 0) in (*LATE, ReasonCode.NODE_SILENT) or LATE & set(self.reasons)
+                if not left or not late:
+                    raise
+                self.tearDown()
+                self.setUp()
+
+    return run
+
+
 class WithArm(unittest.TestCase):
     """A RosArm that may move, with its controllers loaded. Only push() touches the hand."""
 
     arm = None
+    reasons = []  # ReasonCodes of the arm and its controllers
 
     @classmethod
     def setUpClass(cls):
@@ -83,6 +125,8 @@ class WithArm(unittest.TestCase):
         cls.push = staticmethod(lambda force: pushes.publish(Wrench(force=Vector3(0.0, 0.0, force))))
         if WithArm.arm is not None:
             return
+        for topic, kind in (("/lwr/state", LwrState), ("/controller_manager/status", ControllerStatus)):
+            rospy.Subscriber(topic, kind, lambda message: cls.reasons.append(message.reason_code))
         arm = WithArm.arm = RosArm()
         until(lambda: arm.standing().ok, 10.0, "the arm at rest")
         refused(arm.switch_controller("ptp"), ReasonCode.UNKNOWN_NAME)
@@ -93,10 +137,16 @@ class WithArm(unittest.TestCase):
 
     def setUp(self):
         self.push(0.0)
-        if not self.arm.motion_allowed().ok:
-            settle(self.arm.lwr_command("start"), 20.0)
-        until(lambda: self.arm.motion_allowed().ok, 10.0, "command mode")
+        until(self.may_move, 10.0, "command mode")
         self.ready("ptp")
+
+    def may_move(self):
+        """True if the arm may move. Otherwise asks for command mode; on a busy computer the first time may fail."""
+        if self.arm.motion_allowed().ok:
+            return True
+        start = self.arm.lwr_command("start")
+        until(start.done, 20.0, "the answer")
+        return False
 
     def ready(self, controller):
         settle(self.arm.switch_controller(controller))
@@ -122,11 +172,13 @@ class Motions(WithArm):
         time.sleep(0.3)
         assert np.max(np.abs(place - self.arm.joint_positions())) < 0.01, "it moved on"
 
+    @again_if_late
     def test_a_motion_is_executed_to_its_end(self):
         motion, target = self.start_ptp(0.1)
         assert not motion.done() and settle(motion) is None
         assert np.max(np.abs(np.subtract(self.arm.joint_positions(), target))) < 0.03
 
+    @again_if_late
     def test_cancelling_ends_motions_that_run_and_wait(self):
         _, target = self.start_ptp()
         queued = self.arm.move_ptp(target, [])
@@ -137,6 +189,7 @@ class Motions(WithArm):
         self.stands_before(target)
         settle(self.arm.cancel_motion("the test"), 2.5)  # succeeds without a motion too
 
+    @again_if_late
     def test_cancel_of_the_handle_and_a_switch_end_a_motion(self):
         motion, target = self.start_ptp()
         motion.cancel()
@@ -147,6 +200,7 @@ class Motions(WithArm):
         refused(motion, ReasonCode.SWITCHED)
         self.stands_before(target)
 
+    @again_if_late
     def test_a_hold_ends_the_motion_and_latches(self):
         motion, target = self.start_ptp()
         settle(self.arm.hold("the test"))
@@ -158,6 +212,7 @@ class Motions(WithArm):
         until(lambda: self.arm.motion_allowed().ok, 2.0, "the end of the hold")
         stays(lambda: self.arm.standing().ok, 0.2)
 
+    @again_if_late
     def test_a_reach_reports_progress_changes_its_primitive_and_is_cancelled(self):
         self.ready("dmp")
         refused(self.arm.execute_dmp(DmpRequest("to_the_moon", "board", REACH.goal_offset)), ReasonCode.UNKNOWN_NAME)
@@ -174,6 +229,7 @@ class Motions(WithArm):
         until(lambda: progress().state == "aborted", 1.0, "news of the end")
         assert progress().code == ReasonCode.CANCELLED
 
+    @again_if_late
     def test_feedback_profiles_are_applied_and_a_controller_brings_its_own(self):
         self.ready("dmp")
         until(lambda: self.arm.profile_settled("dmp").ok, 3.0, "the controller's own profile")
@@ -202,6 +258,8 @@ class Contact(WithArm):
     def setUpClass(cls):
         super().setUpClass()
         cls.contact = RosContact()
+        cls.signal = ContactSignal()
+        rospy.Subscriber("/contact_detector/signal", ContactSignal, lambda message: setattr(cls, "signal", message))
 
     def tearDown(self):
         self.push(0.0)
@@ -210,8 +268,8 @@ class Contact(WithArm):
 
     def watch(self, mode, **settings):
         """Arm the detector and wait until it has enough samples of the arm at rest."""
-        settle(self.contact.arm(mode, 20.0, settings))
-        time.sleep(3.0)
+        settle(self.contact.arm(mode, 600.0, settings))
+        until(lambda: (self.signal.state, self.signal.mode) == ("watching", mode), 3.0, "watching")
         assert self.contact.event() is None, self.contact.event()
 
     def happens(self, contact, code):
@@ -220,6 +278,7 @@ class Contact(WithArm):
         assert (event.contact, event.code) == (contact, code), event
         assert event.margin >= 1.0 and 0.5 <= event.confidence <= 1.0 and event.source, event
 
+    @again_if_late
     def test_touch_weight_and_release_are_each_detected_once(self):
         refused(self.contact.arm("juggle", 1.0, {}), ReasonCode.INVALID_ARGUMENT)
         self.watch("contact", k=20.0)
@@ -239,6 +298,7 @@ class Contact(WithArm):
         self.contact.disarm()
         assert self.contact.share_gone() is None
 
+    @again_if_late
     def test_a_disarmed_detector_is_silent_and_a_frozen_one_does_not_answer(self):
         with frozen("/contact_detector"):
             armed = self.contact.arm("contact", 1.0, {})
@@ -250,10 +310,11 @@ class Contact(WithArm):
         self.push(-8.0)
         stays(lambda: self.contact.event() is None, 0.5)
 
+    @again_if_late
     def test_touch_is_detected_while_the_arm_moves(self):
         self.start_ptp(0.8)
         time.sleep(0.3)
-        settle(self.contact.arm("contact_in_motion", 20.0, {}))
+        settle(self.contact.arm("contact_in_motion", 600.0, {}))
         stays(lambda: self.contact.event() is None, 0.7)
         self.push(-15.0)
         self.happens(True, ReasonCode.CONTACT_FOUND)
@@ -281,14 +342,14 @@ class Hand(unittest.TestCase):
         assert not closing.done()
         settle(closing, 8.0)
         until(lambda: finger() > 100, 1.0, "the closed fingers")
-        closed, opening = finger(), hand.open(100)
+        closed, opening = finger(), hand.open(60)  # slow: it runs when it is cancelled
         until(lambda: finger() < closed - 10, 2.0, "the loosening")
         opening.cancel()
         refused(opening, ReasonCode.CANCELLED)
-        time.sleep(0.4)
+        time.sleep(1.0)
         there = finger()
         stays(lambda: abs(finger() - there) <= 1, 0.4)
-        closing = hand.close(200)
+        closing = hand.close(60)
         time.sleep(0.05)
         settle(hand.open(511), 8.0)
         refused(closing, ReasonCode.SUPERSEDED)
@@ -311,16 +372,16 @@ class PerceptionAndDatabase(unittest.TestCase):
     def test_perception(self):
         rospy.wait_for_service("/perception/locate_object", 60.0)
         perception = RosPerception()
-        assert isinstance(settle(perception.init_vision(5.0), 8.0), str)
+        assert isinstance(answered(lambda: perception.init_vision(5.0)), str)
         with frozen("/perception"):
             sight = perception.locate_object("board", 0.2)
             time.sleep(0.6)
             assert not sight.done()
             sight.cancel()
-        board = settle(perception.locate_object("board", 2.0), 4.0)
+        board = answered(lambda: perception.locate_object("board", 2.0))
         assert (board.frame, board.parent) == ("board", "world") and np.linalg.norm(board.quaternion) > 0.99
         assert "elephant" in refused(perception.locate_object("elephant", 0.5), ReasonCode.OBJECT_NOT_SEEN).sentence
-        places = settle(perception.free_places("mug", 2.0), 4.0)
+        places = answered(lambda: perception.free_places("mug", 2.0))
         assert places and all(place.parent == "board" for place in places)
 
     def test_an_offer_and_a_pattern_expire_when_no_longer_published(self):
@@ -336,8 +397,13 @@ class PerceptionAndDatabase(unittest.TestCase):
             beliefs.publish(message)
 
         timer = rospy.Timer(rospy.Duration(0.05), publish)
-        until(lambda: perception.ahead().offer == 0.75 and perception.recognition().decided, 2.0, "the belief")
-        assert perception.ahead().object_id == "mug" and perception.recognition().pattern == "mug"
+
+        def both():
+            ahead, recognition = perception.ahead(), perception.recognition()
+            known = ahead.offer == 0.75 and recognition.decided
+            return known and (ahead.object_id, recognition.pattern) == ("mug", "mug")
+
+        until(both, 2.0, "the belief")
         timer.shutdown()
         until(lambda: perception.ahead() == Ahead() and perception.recognition() == Recognised(), 1.0, "silence")
 

@@ -67,8 +67,9 @@ class HandFaults(unittest.TestCase):
         self.assertTrue(self.hand.run("hand_preshape", "lateral", "high").isOk)
         before = [110, 5, 160, 245, 245]
         self.hand.wait(lambda: list(self.hand.fingers.position) == before, "fingers at rest")
+        count = len(self.hand.statuses)
         self.hand.fault("unplug 1")
-        self.hand.wait(lambda: not self.hand.status.connected, "loss")
+        self.hand.wait(lambda: any(not status.connected for status in self.hand.statuses[count:]), "loss")
         self.hand.wait(lambda: self.hand.status.connected, "reconnection")
         status = self.hand.fresh_status()
         self.assertTrue(status.holding)

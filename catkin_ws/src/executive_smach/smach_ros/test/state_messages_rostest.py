@@ -149,7 +149,7 @@ class TestCondition(unittest.TestCase):
 
     def test_condition_unlimited_with_timeout(self):
         count = []
-        outcome = self.run_state(lambda ud: count.append(1), max_checks=-1, timeout=rospy.Duration(0.3))
+        outcome = self.run_state(lambda ud: count.append(1), max_checks=-1, timeout=rospy.Duration(3.0))
         self.assertEqual(outcome, "false")
         self.assertGreater(len(count), 3)
 
