@@ -25,25 +25,16 @@ from rospy import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from tf2_msgs.msg import TFMessage
+from topics import Topics
 
 URDF = Path(__file__).resolve().parents[2] / "lwr_description" / "urdf" / "lwr_ih2.urdf"
 
 
-class Subscriber:
-    """A connected subscriber."""
-
-    def __init__(self, *_arguments, **_options):
-        pass
-
-    def get_num_connections(self):
-        return 1
-
-
 @pytest.fixture
 def seen(monkeypatch):
-    """A view with its documents and events."""
-    documents, events = {}, []
-    monkeypatch.setattr(ros_view.rospy, "Subscriber", Subscriber)
+    """A view with its topics, documents and events."""
+    topics, documents, events = Topics(), {}, []
+    monkeypatch.setattr(ros_view.rospy, "Subscriber", topics)
     monkeypatch.setattr(ros_view.rospy, "get_time", lambda: 100.0)
     model = RobotModel(URDF.read_text())
     frames = {"human_hand": "human_hand", "board": "board"}
@@ -51,7 +42,7 @@ def seen(monkeypatch):
         model, frames, lambda *words: events.append(words), documents.__setitem__, lambda *_: None, lambda _: None
     )
     found.listen()
-    return found, documents, events
+    return found, topics.send, documents, events
 
 
 @pytest.mark.parametrize(
@@ -59,75 +50,77 @@ def seen(monkeypatch):
 )
 def test_all_drives_are_on_where_each_joint_has_its_bit(seen, power, on):
     """Further bits have other meanings."""
-    view, _, _ = seen
-    view._on_arm(LwrState(power=power))
+    view, send, _, _ = seen
+    send("lwr/state", LwrState(power=power))
     assert view.status()["arm"]["power"] is on
 
 
 def test_each_time_the_robot_comes_to_stand_is_counted(seen):
-    view, _, _ = seen
-    view._on_machine(MasterState(state="/coglab_master/stopped", why="hold is latched"))
+    view, send, _, _ = seen
+    send("coglab/state", MasterState(state="/coglab_master/stopped", why="hold is latched"))
     assert view.stopped() == (True, "hold is latched", 1)
-    view._on_machine(MasterState(state="/coglab_master/fault", why="no command mode"))
+    send("coglab/state", MasterState(state="/coglab_master/fault", why="no command mode"))
     assert view.stopped() == (True, "no command mode", 2)
-    view._on_arm(LwrState(hold_latched=True))
-    view._on_arm(LwrState(hold_latched=True))
+    send("lwr/state", LwrState(hold_latched=True))
+    send("lwr/state", LwrState(hold_latched=True))
     assert view.stopped()[2] == 3
 
 
 TOPICS = {
-    "brain": ("_on_machine", MasterState()),
-    "arm": ("_on_arm", LwrState()),
-    "hand": ("_on_hand", HandStatus()),
-    "controllers": ("_on_manager", ControllerStatus()),
-    "contact": ("_on_signal", ContactSignal()),
+    "brain": ("coglab/state", MasterState()),
+    "arm": ("lwr/state", LwrState()),
+    "hand": ("ih2_hand/hand_status", HandStatus()),
+    "controllers": ("controller_manager/status", ControllerStatus()),
+    "contact": ("contact_detector/signal", ContactSignal()),
 }
 
 
 @pytest.mark.parametrize("source", TOPICS)
 def test_silent_source_is_reported_within_a_second(seen, monkeypatch, source):
     """The source is still connected, like a frozen program; the others continue."""
-    view, _, _ = seen
+    view, send, _, _ = seen
     clock = [1000.0]
     monkeypatch.setattr(ros_view.time, "monotonic", lambda: clock[0])
     view.sources = Sources(lambda: clock[0])
     for _ in range(8):
-        for name, (callback, message) in TOPICS.items():
+        for name, (topic, message) in TOPICS.items():
             if name != source or clock[0] < 1000.5:
-                getattr(view, callback)(message)
+                send(topic, message)
         assert not view.frame()["silent"] or clock[0] >= 1001.0
         clock[0] += 0.25
     assert list(view.frame()["silent"]) == [source] and view.frame()["silent"][source] > 1.0
 
 
 def test_values_of_a_silent_arm_are_not_shown_as_new(seen, monkeypatch):
-    view, _, _ = seen
+    view, send, _, _ = seen
     clock = [1000.0]
     monkeypatch.setattr(ros_view.time, "monotonic", lambda: clock[0])
     view.sources = Sources(lambda: clock[0])
-    view._on_arm(LwrState())
-    view._on_latency(Float64(0.001))
+    send("lwr/state", LwrState())
+    send("lwr/fri_latency", Float64(0.001))
     view.tables.latency = view.tables.answer_time = 0.002
-    view._on_joints(JointState(name=["lwr_a1"], position=[0.1]))
+    send("joint_states", JointState(name=["lwr_a1"], position=[0.1]))
     assert (view.frame()["fri"], view.frame()["answer"], view.frame()["live"]) == (1.0, 2.0, True)
     clock[0] += 1.0
     # As from joint_state_publisher, which repeats the last positions of a silent arm.
-    view._on_joints(JointState(name=["lwr_a1"], position=[0.1]))
+    send("joint_states", JointState(name=["lwr_a1"], position=[0.1]))
     frame = view.frame()
     assert (frame["fri"], frame["answer"], frame["speed"], frame["live"]) == (None, None, None, False)
     assert not view.standing().arm_alive
 
 
 def test_a_transition_belongs_to_the_phase_that_has_ended(seen):
-    view, _, events = seen
+    view, send, _, events = seen
     path = "/coglab_master/exchange_human_to_robot"
-    view._on_machine(MasterState(state=f"{path}/hand_close"))
-    view._on_transition(Transition(path=path, from_state="set_dmp_goal", outcome="succeeded", to_state="approach"))
+    send("coglab/state", MasterState(state=f"{path}/hand_close"))
+    send(
+        "coglab/transitions", Transition(path=path, from_state="set_dmp_goal", outcome="succeeded", to_state="approach")
+    )
     assert events == [("machine", "now: reaches", "info", "waits until it is offered")]
     reason = "the arm is blocked"
     told = Transition(path=path, from_state="approach", outcome="failed", to_state="recover", reason=reason)
     told.causes = ["hold is latched; send reset"]
-    view._on_transition(told)
+    send("coglab/transitions", told)
     words = "the arm is blocked, because hold is latched (reaches: failed; now: recovers)"
     assert events[1:] == [("machine", words, "warning", "reaches")]
 
@@ -143,9 +136,14 @@ def test_a_transition_belongs_to_the_phase_that_has_ended(seen):
 )
 def test_requested_end_of_a_motion_is_not_a_warning(seen, code, level):
     """The brain cancels the reach when something touches the hand: that is how an exchange succeeds."""
-    view, _, events = seen
-    view._on_dmp(DmpFeedback(state="aborted", reason_code=code, reason="something touches the hand"))
-    view._on_unfinished(UnfinishedPtp(ptp_id=1, reason_code=code, reason="the weight has come"))
+    view, send, _, events = seen
+    send(
+        "controller_manager/dmp/feedback",
+        DmpFeedback(state="aborted", reason_code=code, reason="something touches the hand"),
+    )
+    send(
+        "controller_manager/ptp/unfinished_ptp", UnfinishedPtp(ptp_id=1, reason_code=code, reason="the weight has come")
+    )
     assert [event[2] for event in events] == [level, level]
 
 
@@ -162,15 +160,15 @@ def tf_of(*children, stamp=100.0):
 
 def test_the_picture_follows_its_frames_beside_a_motion_capture_system(seen):
     """Hundreds of markers, and of joints of other robots, are published first and repeatedly."""
-    view, _, _ = seen
+    view, send, _, _ = seen
     view.entry = lambda: {"frame": "object_mug"}
     view.named |= {"object_mug"}
     markers = [f"marker_{number}" for number in range(300)]
-    view._on_joints(JointState(name=markers, position=[0.0] * 300))
+    send("joint_states", JointState(name=markers, position=[0.0] * 300))
     for stamp in (98.0, 99.0):
-        view._on_tf(tf_of(*markers, stamp=stamp))
-        view._on_tf(tf_of("human_hand", "board", "object_mug", "dmp_goal", stamp=stamp))
-    view._on_joints(JointState(name=[*markers, "lwr_a1"], position=[0.0] * 300 + [0.1]))
+        send("/tf", tf_of(*markers, stamp=stamp))
+        send("/tf", tf_of("human_hand", "board", "object_mug", "dmp_goal", stamp=stamp))
+    send("joint_states", JointState(name=[*markers, "lwr_a1"], position=[0.0] * 300 + [0.1]))
     frame = view.frame()
     assert frame["ages"] == {"hand": 1.0, "object": 1.0, "board": 1.0, "goal": 1.0} and frame["q"][0] == 0.1
     assert set(view.frames) == {"human_hand", "board", "object_mug", "dmp_goal"}
@@ -184,28 +182,28 @@ def path_of(motion, *places):
 
 
 def test_a_path_is_shown_until_its_own_controller_ends_it(seen):
-    view, documents, _ = seen
-    view._on_path(path_of("reach_human", (0.1, 0, 0.3), (0.4, 0, 0.3)), "dmp")
+    view, send, documents, _ = seen
+    send("controller_manager/dmp/predicted_path", path_of("reach_human", (0.1, 0, 0.3), (0.4, 0, 0.3)))
     assert view.path_runs() and documents["path"]["motion"] == "reach_human" and documents["path"]["kind"] == "running"
-    view._on_path(path_of("", *[]), "ptp")
+    send("controller_manager/ptp/predicted_path", path_of(""))
     assert view.path_runs() and documents["path"] is not None
-    view._on_path(path_of("ptp 3", (0.4, 0, 0.3), (0.1, 0, 0.3)), "ptp")
-    view._on_path(path_of("", *[]), "dmp")
+    send("controller_manager/ptp/predicted_path", path_of("ptp 3", (0.4, 0, 0.3), (0.1, 0, 0.3)))
+    send("controller_manager/dmp/predicted_path", path_of(""))
     assert view.path_runs() and documents["path"]["motion"] == "ptp 3"
-    view._on_path(path_of("", *[]), "ptp")
+    send("controller_manager/ptp/predicted_path", path_of(""))
     assert not view.path_runs() and documents["path"] is None
 
 
 def test_a_path_of_a_controller_that_fell_silent_is_over(seen, monkeypatch):
-    view, _, _ = seen
-    view._on_path(path_of("reach_human", (0.1, 0, 0.3), (0.4, 0, 0.3)), "dmp")
+    view, send, _, _ = seen
+    send("controller_manager/dmp/predicted_path", path_of("reach_human", (0.1, 0, 0.3), (0.4, 0, 0.3)))
     later = ros_view.time.monotonic() + 1.5
     monkeypatch.setattr(ros_view.time, "monotonic", lambda: later)
     assert not view.path_runs()
 
 
 def test_invalid_path_is_not_drawn(seen):
-    view, _, _ = seen
+    view, send, _, _ = seen
     elsewhere = path_of("x", (0.1, 0, 0.3), (0.4, 0, 0.3))
     elsewhere.header.frame_id = "somewhere"
     without_times = path_of("x", (0.1, 0, 0.3))

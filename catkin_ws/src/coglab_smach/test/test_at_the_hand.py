@@ -38,7 +38,7 @@ class Seen:
         ctx.arm.joint_positions = lambda: HERE
         ctx.perception.locate_object = self.locate
         self.state = hands.HandOpen(ctx)  # any
-        self.state._deadline = 1e9
+        self.state.allow(1e9)
 
     def locate(self, name, limit):
         if self.things.get(name) is None:
@@ -48,7 +48,7 @@ class Seen:
 
     def run(self, state, **ud):
         """Returns the state's outcome and its duration (s)."""
-        state._deadline = 1e9
+        state.allow(1e9)
         with using(self.trial.clock):
             begin = self.trial.clock.now()
             outcome = state.run(SimpleNamespace(grip=self.trial.grip, **ud))

@@ -62,7 +62,8 @@ def test_a_blocked_arm_is_the_reason_and_not_the_person(monkeypatch):
 def test_an_object_that_moves_with_the_persons_hand_was_taken_back(monkeypatch):
     lifted, lost = Lifted(monkeypatch), PortError("'mug' has left the hand", ("open",), ReasonCode.OBJECT_NOT_SEEN)
     taken, fell = ReasonCode.GOAL_WITHDRAWN, ReasonCode.OBJECT_NOT_SEEN
-    sights, lifted.state._deadline = {}, 1e9
+    sights = {}
+    lifted.state.allow(1e9)
     monkeypatch.setattr(weight, "sight_of", lambda s, name: sights.get(name))
     with using(lifted.trial.clock) as clock:
         for thing, age, code in ((0.1, 0.1, taken), (0.3, 0.1, fell), (0.1, 0.2, fell), (None, 0.0, fell)):

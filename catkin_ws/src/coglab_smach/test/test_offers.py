@@ -33,7 +33,7 @@ class Offers:
         self.ctx.perception.ahead = lambda: self.ahead
         self.ctx.perception.locate_object = self.locate
         self.state = CoglabState(self.ctx)
-        self.state._deadline = 1e9
+        self.state.allow(1e9)
 
     def locate(self, name, limit):
         if name == "board":

@@ -82,7 +82,7 @@ def test_an_object_from_the_board_keeps_its_grasp_and_may_be_named_again(trial):
 
 def ran(trial, state, **ud):
     """Returns the state's outcome and its duration (s)."""
-    state._deadline = trial.clock.now() + state.time_limit()
+    state.allow(state.time_limit())
     with using(trial.clock):
         begin = trial.clock.now()
         return state.run(SimpleNamespace(**ud)), trial.clock.now() - begin

@@ -24,7 +24,8 @@ class Scale:
     def __init__(self, monkeypatch, mass, lifts, pull=0.0, over_ros=False):
         self.lifted = Lifted(monkeypatch)
         self.clock, self.ctx, self.state = self.lifted.trial.clock, self.lifted.ctx, self.lifted.state
-        self.state._deadline, self.settings = 1e9, {"mass": mass, "load_share": 0.5}
+        self.state.allow(1e9)
+        self.settings = {"mass": mass, "load_share": 0.5}
         self.lifts, self.carried, self.over_ros = lifts, 9.81 * mass + pull, over_ros
         self.load, self.fed = None, 0.0
         self.ways: list[tuple[float, float, float]] = []

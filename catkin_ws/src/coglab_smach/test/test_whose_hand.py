@@ -249,7 +249,8 @@ def test_a_grip_on_a_light_object_is_measured_before_the_arm_moves(hand, holds):
 @pytest.mark.parametrize("trouble", ["refuses", "silent", "the arm stands", ""])
 def test_a_failed_measurement_does_not_mean_that_nobody_holds(monkeypatch, trouble):
     lifted = Lifted(monkeypatch)
-    lifted.state._deadline, contact = 1e9, lifted.ctx.contact
+    lifted.state.allow(1e9)
+    contact = lifted.ctx.contact
     contact.share_gone = lambda: None if trouble == "silent" else 0.0
     if trouble == "refuses":
         contact.arm = lambda *_: Ready(error=PortError("no torques come"))
@@ -314,7 +315,8 @@ def test_stop_ends_the_closing_during_the_first_look_at_the_person():
 
 def test_the_time_limit_of_sinking_follows_the_speed_scale(monkeypatch):
     lifted = Lifted(monkeypatch)
-    lifted.state._deadline, lifted.ctx.contact.share_gone = 1e9, lambda: 0.0
+    lifted.state.allow(1e9)
+    lifted.ctx.contact.share_gone = lambda: 0.0
     lifted.ctx.arm.speed_scale = lambda: 0.2
     began = lifted.trial.clock.now()
     monkeypatch.setattr(

@@ -68,7 +68,7 @@ def desk(monkeypatch) -> Desk:
 def test_only_the_last_of_many_goals_begins(desk):
     flood = [Handle() for _ in range(5)]
     for handle in flood:
-        desk.queue._on_goal("hand_close", handle)
+        Server.every["~hand_close"].on_goal(handle)
     desk.work()
     replaced = ("cancelled", "replaced by a new goal before it began", Reason.SUPERSEDED)
     assert [handle.ended for handle in flood] == [replaced] * 4 + [None]
@@ -79,7 +79,7 @@ def test_only_the_last_of_many_goals_begins(desk):
 def test_a_goal_that_was_cancelled_while_it_waited_does_not_begin(desk):
     handle = Handle()
     handle.status = actionlib.GoalStatus.PREEMPTING
-    desk.queue._on_goal("hand_close", handle)
+    Server.every["~hand_close"].on_goal(handle)
     desk.work()
     assert handle.ended == ("cancelled", "cancelled before it began", Reason.CANCELLED)
     assert desk.task.begun == 0 and desk.queue.active is None
@@ -212,10 +212,10 @@ def fails(error: Exception):
 def test_a_goal_ends_whatever_happens_and_the_next_is_taken(working, error, why, code):
     queue, _ = working
     handle, after = Handle(), Handle()
-    queue._on_goal("hand_close", handle)
+    Server.every["~hand_close"].on_goal(handle)
     wait(lambda: queue.active)
     queue.call(lambda: fails(error))
     wait(lambda: handle.ended)
     assert handle.ended == ("aborted", why, code)
-    queue._on_goal("hand_open", after)
+    Server.every["~hand_open"].on_goal(after)
     wait(lambda: queue.active == "hand_open")

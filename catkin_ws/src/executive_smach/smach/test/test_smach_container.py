@@ -14,7 +14,7 @@ def test_keys_are_copied_in_and_out():
     ud = smach.UserData()
     ud.i, ud.unrelated = 1, 5
     assert sm.execute(ud) == "done"
-    assert ud.o == 2 and sm.userdata._data == {"i": 1, "o": 2}
+    assert ud.o == 2 and (sm.userdata.i, sm.userdata.o) == (1, 2) and "unrelated" not in sm.userdata
 
 
 def test_a_missing_key_is_one_warning(log):
@@ -78,13 +78,15 @@ def test_unregister_callback():
 def test_open_close_and_stack():
     a, b = smach.StateMachine(["done"]), smach.StateMachine(["done"])
     a.open()
-    assert a.is_opened() and smach.Container._construction_stack[-1] is a
+    assert a.is_opened()
     b.open()
     assert b.is_opened() and not a.is_opened()
     with pytest.raises(smach.InvalidStateError):
         a.close()
-    b.close(), a.close()
-    assert not smach.Container._construction_stack
+    b.close()
+    assert a.is_opened() and not b.is_opened()
+    a.close()
+    assert not a.is_opened()
     with pytest.raises(smach.InvalidStateError):
         a.close()
 
@@ -95,7 +97,7 @@ def test_a_with_block_that_raises_is_closed_better(log):
         with sm:
             inner.open()
             raise ValueError("construction went wrong")
-    assert not smach.Container._construction_stack
+    assert not sm.is_opened() and not inner.is_opened()
     assert "construction went wrong" in log.text("error")
     other = in_thread(lambda: machine(Says("done")).execute())
     other.join(60.0)

@@ -15,7 +15,7 @@ def test_attributes_and_items_are_the_same():
     ud = smach.UserData()
     ud.a = 1
     ud["b"] = 2
-    assert (ud["a"], ud.b) == (1, 2) and ud._data == {"a": 1, "b": 2}
+    assert (ud["a"], ud.b) == (1, 2)
     assert "a" in ud and "c" not in ud and ud.keys() == ["a", "b"]
 
 
@@ -32,7 +32,7 @@ def test_extract_and_merge_with_remapping():
     ud = smach.UserData()
     ud.a, ud.b = [1], 2
     local = ud.extract(["a", "b"], {"x": "a"})
-    assert local._data == {"x": [1], "b": 2}
+    assert (local.x, local.b, len(local.keys())) == ([1], 2, 2)
     assert local.x is not ud.a  # a shallow copy
     local.x = [9]
     ud.merge(local, ["x"], {"x": "a"})
@@ -107,7 +107,7 @@ def test_remapper_undeclared_write_is_logged_and_ignored(log):
     view, ud = view_of(1)
     view.v = 2
     view["z"] = 3
-    assert ud._data == {"v": 1} and len(log.error) == 2 and "'v'" in log.error[0]
+    assert (ud.v, ud.keys()) == (1, ["v"]) and len(log.error) == 2 and "'v'" in log.error[0]
 
 
 def test_remapper_renames():
