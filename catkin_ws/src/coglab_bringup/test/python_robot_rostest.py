@@ -56,6 +56,8 @@ class PythonRobot(unittest.TestCase):
                     return result
             except coglab.Refused as refused:
                 problem, code = str(refused), refused.code
+            except TimeoutError as silent:
+                problem, code = str(silent), ReasonCode.TIME_LIMIT
             if not left or not self.lateness.may_explain(code):
                 self.fail(problem)
             self.robot.reset(limit=LIMIT)

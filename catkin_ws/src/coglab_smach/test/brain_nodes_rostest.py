@@ -199,10 +199,12 @@ class BrainNodes(unittest.TestCase):
         self.assertEqual(answer.reason_code, ReasonCode.WRONG_STATE)
         waits = []
         rospy.Subscriber("/coglab/state", MasterState, waits.append)
+        self.until(lambda: waits, "the state, which is latched")
+        transitions.clear()
         self.assertTrue(start("initialise", "").success)
-        end = time.monotonic() + LIMIT
-        while not any("is its node running?" in t.reason for t in transitions) and time.monotonic() < end:
-            time.sleep(0.1)
+        self.until(lambda: any(not m.state.endswith("/fault") for m in waits), "the initialisation")
+        self.until(lambda: waits[-1].state.endswith("/fault") and not waits[-1].waits_for, "fault again")
+        self.until(lambda: any("is its node running?" in t.reason for t in transitions), "the reason of the fault")
         self.assertTrue(
             any("is its node running?" in t.reason and t.reason_code == ReasonCode.NODE_SILENT for t in transitions)
         )
@@ -215,7 +217,6 @@ class BrainNodes(unittest.TestCase):
         self.assertEqual(sights, {ReasonCode.WAITS_FOR_SIGHT})
         vision = [s for s, m in zip(ahead, limited, strict=True) if m.waits_for == "start of perception"]
         self.assertTrue(any(0.0 < seconds <= 4.0 for seconds in vision), [(m.state, m.waits_for) for m in limited])
-        self.until(lambda: waits[-1].state.endswith("/fault"), "fault again")
         self.assertEqual((waits[-1].waits_for, waits[-1].deadline.to_sec()), ("", 0.0))
         self.handover_by_a_standard_client(shown["kind"], written["reason"])
 
