@@ -75,14 +75,14 @@ def test_where_the_object_lies_in_the_hand():
 
 
 def test_recordings_without_a_handover_are_refused():
-    with pytest.raises(RecordingError, match=r"r.csv: 'human_hand' moves 0.09\d m, a reach is at least 0.1 m long"):
+    with pytest.raises(RecordingError, match=r"r.csv: 'human_hand' moves 0.09\d m"):
         recorded(reach(way=0.096, speed=0.1))
     recorded(reach(way=0.11, speed=0.1))
     recorded(apart=np.array([0.299, 0.0, 0.0]))
-    with pytest.raises(RecordingError, match="'object_mug' begins 0.31 m from the hand, at most 0.3 m are accepted"):
+    with pytest.raises(RecordingError, match="'object_mug' begins 0.31 m"):
         recorded(apart=np.array([0.0, 0.31, 0.0]))
     tracks = {OBJECT: track([0.0, 1.0], np.zeros((2, 3)))}
-    with pytest.raises(RecordingError, match="needs the frame 'human_hand', the recording has object_mug"):
+    with pytest.raises(RecordingError, match="'human_hand'.* object_mug"):
         RecordedHand(Playback(Recording(tracks), PlaybackSettings()), None)
 
 
