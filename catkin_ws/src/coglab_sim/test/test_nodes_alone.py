@@ -101,17 +101,20 @@ class Person:
 
 
 def test_commands_and_words_reach_the_person(monkeypatch):
-    one = Person(monkeypatch)
+    one, asked, heard = Person(monkeypatch), [], []
     monkeypatch.setattr(one.module.time, "monotonic", lambda: 3.0)
+    command = one.node.human.command
+    monkeypatch.setattr(one.node.human, "command", lambda text: command(text) or asked.append(text))
+    monkeypatch.setattr(one.node.human, "hear", lambda t, code: heard.append((t, code)))
     one.ros.subscribed["human_command"](String("give mug"))
-    assert one.node.human._pending == "give"
+    assert asked == ["give mug"]
     one.ros.subscribed["human_command"](String("juggle"))
     assert "give, receive or rest" in one.ros.said[-1]
     one.ros.subscribed["/a/say"](Say(code=Say.I_HAVE_IT))
-    assert one.node.human._heard == [(3.0 + one.node.human.participant.hearing_delay, Say.I_HAVE_IT)]
+    assert heard == [(3.0, Say.I_HAVE_IT)]
     for age in (60.0, 3.0):  # latched: said before this person came
         one.ros.now = 100.0
         late = Say(code=Say.READY_TO_RECEIVE)
         late.header.stamp = rospy.Time.from_sec(100.0 - age)
         one.ros.subscribed["/a/say"](late)
-    assert [code for _, code in one.node.human._heard] == [Say.I_HAVE_IT, Say.READY_TO_RECEIVE]
+    assert [code for _, code in heard] == [Say.I_HAVE_IT, Say.READY_TO_RECEIVE]

@@ -28,16 +28,16 @@ def same(one, two):
 def test_invalid_poses_are_refused(turn):
     plant = still()
     for call in (lambda: plant.place("world", [1.0, 0.0, 1.0], turn), lambda: plant.set_person([1.0, 0.0, 1.0], turn)):
-        with pytest.raises(ValueError, match="a pose needs finite numbers and a quaternion x y z w of length 1"):
+        with pytest.raises(ValueError, match="quaternion"):
             call()
-    with pytest.raises(ValueError, match="a pose needs finite numbers"):
+    with pytest.raises(ValueError, match="finite"):
         plant.place("world", [1.0, np.inf, 1.0])
     plant.place("world", [1.0, 0.0, 1.0], [0, 0, 0, 1.0005])
 
 
 def test_a_hand_that_was_refused_is_not_there():
     plant = still()
-    with pytest.raises(ValueError, match="the person's hand would stand"):
+    with pytest.raises(ValueError, match="person's hand"):
         plant.set_person(plant.state()["palm"][0] - [0.15, 0.0, 0.0])
     state = run(plant, 0.1)
     assert state["person_hand"][0] == pytest.approx([1.30, 0.20, 0.15], abs=2e-5)
@@ -47,7 +47,7 @@ def test_a_hand_that_was_refused_is_not_there():
 def test_a_person_who_would_bring_the_object_into_something_is_not_there():
     plant = still(board=True)
     plant.place("human_hand", [-0.08, 0.0, -0.05])
-    with pytest.raises(ValueError, match="object 'mug' would stand .* inside board in that hand"):
+    with pytest.raises(ValueError, match="'mug'.* board"):
         plant.set_person(BOARD_TOP + [0.08, 0.0, 0.04])
     plant.set_person(BOARD_TOP + [0.08, 0.0, 0.06])
     assert plant.state()["object"][0] == pytest.approx(BOARD_TOP + [0.0, 0.0, 0.01])

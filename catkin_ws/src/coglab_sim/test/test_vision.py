@@ -80,7 +80,7 @@ def test_unseen_object_is_reported_within_the_limit(limit):
     scene = Scene()
     scene.see()
     began = time.monotonic()
-    with pytest.raises(NotSeen, match="'object_mug' was not seen within .* in view: human_hand") as refusal:
+    with pytest.raises(NotSeen, match="'object_mug'.* human_hand") as refusal:
         scene.vision.locate("mug", limit)
     assert refusal.value.code == ReasonCode.OBJECT_NOT_SEEN
     assert time.monotonic() - began < 60.0
@@ -88,7 +88,7 @@ def test_unseen_object_is_reported_within_the_limit(limit):
 
 def test_init_vision():
     scene = Scene()
-    with pytest.raises(NotSeen, match=r"not visible within 0\.1 s; is the simulated cell"):
+    with pytest.raises(NotSeen, match=r"0\.1 s"):
         scene.vision.init_vision(0.05)
     scene.see()
     assert "sees" in scene.vision.init_vision(0.05)
@@ -96,7 +96,7 @@ def test_init_vision():
 
 def test_free_places():
     scene = Scene()
-    with pytest.raises(NotSeen, match="the board was not visible") as refusal:
+    with pytest.raises(NotSeen, match="board") as refusal:
         scene.vision.free_places("mug", 0.02)
     assert refusal.value.code == ReasonCode.NOT_PERCEIVED
     scene.see()
@@ -105,7 +105,7 @@ def test_free_places():
     on_a1, on_a2 = Pose(board.apply(SLOTS["A1"])), Pose(board.apply(SLOTS["A2"]))
     scene.see(objects={"object_mug": on_a1, "object_ball": on_a2})
     assert [name for name, _ in scene.vision.free_places("mug", 0.1)] == ["A1"]
-    with pytest.raises(NotSeen, match="no place on the board is free: object_ball, object_mug lie") as refusal:
+    with pytest.raises(NotSeen, match="object_ball, object_mug") as refusal:
         scene.vision.free_places("bottle", 0.1)
     assert refusal.value.code == ReasonCode.NO_FREE_PLACE
 
@@ -181,5 +181,5 @@ def test_chosen_partner_is_reset_when_the_choice_is_unclear():
     assert choice.choose(hands(a=0.9), None) == "a" and choice.choose({}, ROBOT) == ""
     assert choice.choose(hands(a=0.9, b=0.8), ROBOT) == ""
     for wrong in (-0.01, math.inf, math.nan):
-        with pytest.raises(ValueError, match="partner_margin must be 0 or more metres"):
+        with pytest.raises(ValueError, match="partner_margin"):
             PartnerChoice(wrong)

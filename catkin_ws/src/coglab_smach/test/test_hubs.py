@@ -21,11 +21,10 @@ def test_a_hold_in_a_hub_is_shown_and_needs_a_reset(with_object):
         before = len(t.cell.called())
         t.cell.arm.held = True  # somebody sent 'hold' directly to the robot
         t.wait_hub("stopped", limit=2.0)
-        assert t.ctx.journal.why() == (
-            "the arm is blocked: hold is latched; reset first; when its cause is away, type: ./coglab start reset"
-        )
+        why = t.ctx.journal.why()
+        assert "hold is latched" in why and "./coglab start reset" in why
         ok, message, _ = t.ctx.requests.submit("take", "mug")
-        assert not ok and message == "'take' refused: stopped takes reset; type: ./coglab start reset"
+        assert not ok and "./coglab start reset" in message
         assert t.cell.called()[before:] == [], "something moved in a hub that is blocked"
         t.start("reset", "")
         t.wait_hub(hub)
@@ -113,7 +112,7 @@ def test_a_restarted_robot_node_without_plugins_ends_in_fault():
         t.cell.loaded.clear()  # killed and started again: nothing is loaded any more
         t.start("reset", "")
         t.wait_hub("fault")
-        assert t.ctx.journal.why() == "end_motion: controller 'ptp' is not loaded"
+        assert "'ptp'" in t.ctx.journal.why()
         t.start("initialise")
         t.wait_hub("wait_without_object")
 
@@ -196,7 +195,7 @@ def test_a_removed_object_leads_to_the_hub_without_object():
         t.wait_hub("wait_without_object")
 
     trial.run(script)
-    assert any(r.reason == "'mug' is not in the hand any more" for r in trial.ctx.journal.transitions)
+    assert any("'mug' is not in the hand" in r.reason for r in trial.ctx.journal.transitions)
 
 
 def test_an_old_belief_does_not_trigger():

