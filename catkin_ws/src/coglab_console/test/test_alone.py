@@ -83,6 +83,15 @@ def test_frozen_console_counts_as_running(master):
             look_for_another(master)
 
 
+def test_a_node_of_a_computer_that_is_off_is_named_with_the_way_out():
+    with socket.socket() as off:
+        off.bind(("127.0.0.1", 0))
+        off.listen()
+        uri = f"http://127.0.0.1:{off.getsockname()[1]}/"
+        with serving({"lookupNode": lambda _caller, _name: [1, "", uri]}) as master:
+            assert "rosnode cleanup" in alone.living(master, "/robot")
+
+
 def test_start_waits_for_a_console_that_is_ending(master, monkeypatch):
     monkeypatch.setattr(startup, "PATIENCE", 10.0)
     with contextlib.ExitStack() as stack:

@@ -200,6 +200,11 @@ bool FeedbackControllerPrototypes::insert(
   return add(entry.first, entry.second, abi);
 }
 
+void FeedbackControllerPrototypes::tryOne(const std::string& type) const {
+  const std::unique_ptr<FeedbackController> controller(find(type)());
+  if (controller) controller->describe();
+}
+
 FeedbackControllerPrototypes& prototypes() {
   static FeedbackControllerPrototypes the_map;
   return the_map;

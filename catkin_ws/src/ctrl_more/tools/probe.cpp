@@ -1,14 +1,13 @@
-// Tries a library of controllers in a separate process, which the library may crash. PluginLibrary
+// Tries a library of plug-ins in a separate process, which the library may crash. PluginLibrary
 // runs this program before it opens the library.
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
 #include <csignal>
-#include <memory>
 #include <string>
 
-#include "ctrl_more/feedback_controller.hpp"
+#include "ctrl_more/loading/plugin_types.hpp"
 #include "loading/library_file.hpp"
 
 namespace {
@@ -28,12 +27,10 @@ void report(const std::string& text) {
 }
 
 // Exceptions are ignored here. The program that makes the controller reports them.
-void make(const std::string& type) {
-  report("while controller '" + type + "' was made and described");
+void make(const ctrl_more::PluginTypes& types, const std::string& type) {
+  report("while " + types.kind() + " '" + type + "' was made and described");
   try {
-    const std::unique_ptr<ctrl_more::FeedbackController> controller(
-        ctrl_more::prototypes().find(type)());
-    if (controller) controller->describe();
+    types.tryOne(type);
   } catch (...) {
   }
 }
@@ -55,7 +52,9 @@ int main(int argc, char** argv) {
     refuse("threw something that is not a std::exception while it was opened");
   }
   if (!library) refuse(std::string("cannot be loaded: ") + dlerror());
-  for (const std::string& type : ctrl_more::prototypes().types()) make(type);
+  for (const ctrl_more::PluginTypes* types : ctrl_more::PluginTypes::all()) {
+    for (const std::string& type : types->types()) make(*types, type);
+  }
   report("while it was closed");
   dlclose(library);
   report(ctrl_more::kProbeDone);

@@ -247,7 +247,8 @@ void ControlCycle::compute(JointVector& velocity) noexcept {
   // Step 7: joint-stage feedback controllers.
   feedback_.run(ctrl_more::Stage::Joint);
   velocity = references.states.view<kMaxJoints>(references.joint_velocity);
-  guard_.setSpeedLimit(std::max(0.0, references.states.view<1>(references.speed_limit)[0]));
+  speed_limit_ = std::max(0.0, references.states.view<1>(references.speed_limit)[0]);
+  guard_.setSpeedLimit(speed_limit_);
 }
 
 void ControlCycle::run(const RobotSample& sample, double dt, VelocityCommand& out) noexcept {
@@ -267,6 +268,7 @@ void ControlCycle::run(const RobotSample& sample, double dt, VelocityCommand& ou
   feedback_.begin(sample.stamp_ns, input_.dt);
   JointVector velocity = JointVector::Zero();
   limit_scale_ = 1.0;
+  speed_limit_ = kFastest;
   report_.guard = GuardResult();
   if (fine) {
     // Step 2: fill RobotStates.
@@ -311,6 +313,7 @@ void ControlCycle::idle(std::int64_t now_ns) noexcept {
   heartbeat_.fetch_add(1, std::memory_order_relaxed);
   const std::int64_t begin = settings_.overrun_time > 0.0 ? steadyNow() : 0;
   input_.motion_allowed = false;
+  speed_limit_ = kFastest;
   input_.time_scale = governor_.rate();
   feedback_.begin(now_ns, settings_.cycle_time);
   const double silent = 1e-9 * static_cast<double>(now_ns - input_.robot.stamp_ns);
@@ -355,6 +358,11 @@ void ControlCycle::publish(std::int64_t begin_ns) noexcept {
     report_.reason = Reason(ReasonCode::StaleJointState, "no joint state from the robot yet");
   } else if (input_.robot.block != MotionBlock::None) {
     report_.reason = Reason(codeOf(input_.robot.block), describe(input_.robot.block));
+  } else if (report_.motion == MotionState::Running && speed_limit_ <= 0.0) {
+    report_.reason =
+        Reason(ReasonCode::WaitsForPerson,
+               "the speed limit is 0 m/s: a manager such as SafeDistance stops the arm "
+               "while a person is too near or not seen; the motion then goes on");
   }
   if (begin_ns != 0) {
     report_.duration = 1e-9 * static_cast<double>(steadyNow() - begin_ns);

@@ -681,6 +681,10 @@ MotionTypes::MotionTypes()
     : PluginTypesOf("motion controller", "COGLAB_REGISTER_MOTION_CONTROLLER", "coglab_controllers",
                     motionAbi()) {}
 
+void MotionTypes::tryOne(const std::string& type) const {
+  std::unique_ptr<MotionController>(find(type).controller());
+}
+
 MotionTypes& MotionTypes::instance() {
   static MotionTypes types;
   return types;

@@ -61,6 +61,7 @@ static_assert(same(ReasonCode::TargetNotReached, Code::TARGET_NOT_REACHED));
 static_assert(same(ReasonCode::ControllerFault, Code::CONTROLLER_FAULT));
 static_assert(same(ReasonCode::CycleStalled, Code::CYCLE_STALLED));
 static_assert(same(ReasonCode::TimeLimit, Code::TIME_LIMIT));
+static_assert(same(ReasonCode::WaitsForPerson, Code::WAITS_FOR_PERSON));
 
 }  // namespace
 

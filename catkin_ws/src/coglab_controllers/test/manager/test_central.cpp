@@ -78,16 +78,18 @@ TEST(SpeedLimit, OfAManagerSlowsHandAndClockAndStopsBoth) {
   const Vector3 goal = robot.hand().position + Vector3(0.1, 0.1, 0.1);
   robot.see("human_hand", goal);
   ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(robot.reach())));
-  int standing = 0, cycles = 0;
+  int standing = 0, cycles = 0, explained = 0;
   for (; robot.state() != MotionState::Reached && cycles < 2000; ++cycles) {
     robot.see("human_hand", goal);
     robot.tick();
     ASSERT_NE(robot.state(), MotionState::Aborted) << robot.reason();
     EXPECT_LE(robot.handVelocity().norm(), 0.1 + 1e-6);
     standing += robot.command.velocity.isZero(1e-9) && cycles > 50 ? 1 : 0;
+    explained += robot.manager->report().reason.code() == ReasonCode::WaitsForPerson ? 1 : 0;
   }
   EXPECT_EQ(robot.state(), MotionState::Reached) << "it goes on where it waited";
   EXPECT_GE(standing, 190);
+  EXPECT_EQ(explained, 200) << "the report has the reason, as long as it stands for it";
   EXPECT_LT((robot.hand().position - goal).norm(), 0.01);
 }
 

@@ -49,6 +49,11 @@ TEST(Manager, LibraryThatIsCutShortIsRefused) {
   EXPECT_TRUE(refused(robot.manager->load("a", "test/Cut"), {"cut short"}));
 }
 
+TEST(Manager, LibraryWhoseConstructorCrashesIsRefused) {
+  VirtualRobot robot("{types: {test/Crashing: " PLUGIN_DIR "/libcoglab_test_crashing.so}}");
+  EXPECT_TRUE(refused(robot.manager->load("a", "test/Crashing"), {"crashed", "'test/Crashing'"}));
+}
+
 TEST(Manager, BadPluginsAndSwitchesLeaveARunningMotionAsItIs) {
   VirtualRobot robot("{" + kTypes + "}"), twin("{" + kTypes + "}");
   for (VirtualRobot* one : {&robot, &twin}) {

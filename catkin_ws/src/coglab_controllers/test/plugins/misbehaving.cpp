@@ -1,7 +1,9 @@
-// Motion controllers that misbehave on demand, as a shared object for the tests of the manager.
+// Motion controllers that misbehave on demand, one of them (CRASHING) as soon as it is made, as a
+// shared object for the tests of the manager.
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <stdexcept>
 #include <string>
 
@@ -17,6 +19,9 @@ using namespace coglab_controllers;
 /// times.
 class Misbehaving : public MotionController {
  public:
+#ifdef CRASHING
+  Misbehaving() { std::raise(SIGSEGV); }
+#endif
   void configure(const MotionSetup& setup) override {
     const Parameters parameters(setup.parameters, setup.id);
     fault_ = parameters.text("fault", "none");

@@ -53,7 +53,7 @@ def living(master: str, name: str) -> str:
     try:
         process = answer(uri, "getPid")
     except TimeoutError:
-        return f"{name} at {uri}, which does not answer"
+        return f"{name} at {uri}, which does not answer (if its computer is off, remove it: rosnode cleanup)"
     if process is None:
         return ""
     command = _command(process)

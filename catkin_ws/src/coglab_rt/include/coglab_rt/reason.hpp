@@ -63,7 +63,9 @@ enum class ReasonCode : std::uint16_t {
   TargetNotReached = 405,
   ControllerFault = 406,
   CycleStalled = 407,
-  TimeLimit = 408
+  TimeLimit = 408,
+
+  WaitsForPerson = 644
 };
 
 /// A code with its sentence. It can be composed inside the control cycle: no allocation.

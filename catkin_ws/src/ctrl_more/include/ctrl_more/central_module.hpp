@@ -29,6 +29,8 @@ class ManagerPrototypes : public PluginTypesOf<ManagerLibraryMaker> {
   ManagerPrototypes();
   /// Registers a maker; false if the type is known or the ABI differs, which the loader reports.
   bool insert(const std::string& type, ManagerLibraryMaker maker, const Abi& abi = thisAbi());
+  /// Does nothing: a manager is made from its block of a file.
+  void tryOne(const std::string&) const override {}
 };
 
 /// The types, one list per process.

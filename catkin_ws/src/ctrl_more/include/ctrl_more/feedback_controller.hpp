@@ -206,6 +206,9 @@ class FeedbackControllerPrototypes : public PluginTypesOf<FeedbackControllerMake
   /// @return false if the name is already registered or the ABI differs; the loader then reports it
   bool insert(const std::pair<const std::string, FeedbackControllerMaker>& entry,
               const Abi& abi = thisAbi());
+
+  /// Makes a controller, calls describe() and destroys it.
+  void tryOne(const std::string& type) const override;
 };
 
 /// The map, one per process. A function, so that the map exists before the static objects of any

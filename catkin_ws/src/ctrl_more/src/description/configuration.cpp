@@ -19,6 +19,7 @@ std::string outOfRange(const std::string& what, const Spec& spec,
     std::ostringstream text;
     text << what << " expects " << spec.min << " to " << spec.max << " " << spec.unit << ", got "
          << v;
+    if (spec.unit.compare(0, 3, "rad") == 0 && std::isfinite(v)) text << "; is it in degrees?";
     return text.str();
   }
   return "";

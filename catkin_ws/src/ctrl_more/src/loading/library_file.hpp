@@ -36,8 +36,8 @@ class LibraryCopy {
   const std::string& path() const { return path_; }
 
   /// Refuses a library that could end or block the program. The file must have the length in its
-  /// headers. Then the program `ctrl_more_probe` opens it, makes each of its feedback controllers,
-  /// calls describe() and closes it.
+  /// headers. Then the program `ctrl_more_probe` opens it, makes each of its controllers (feedback
+  /// and motion), calls describe() of the feedback controllers and closes it.
   /// @throws std::runtime_error with the error of the library
   void check() const;
 

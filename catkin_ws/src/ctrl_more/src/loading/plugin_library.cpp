@@ -19,6 +19,39 @@ namespace fs = std::filesystem;
 
 namespace ctrl_more {
 
+namespace {
+
+struct AllTypes {
+  std::mutex mutex;
+  std::vector<const PluginTypes*> lists;
+};
+
+AllTypes& allTypes() {
+  static AllTypes all;
+  return all;
+}
+
+}  // namespace
+
+PluginTypes::PluginTypes(std::string kind, std::string macro, std::string package, const Abi& abi)
+    : kind_(std::move(kind)), macro_(std::move(macro)), package_(std::move(package)), abi_(abi) {
+  AllTypes& all = allTypes();
+  const std::lock_guard<std::mutex> lock(all.mutex);
+  all.lists.push_back(this);
+}
+
+PluginTypes::~PluginTypes() {
+  AllTypes& all = allTypes();
+  const std::lock_guard<std::mutex> lock(all.mutex);
+  all.lists.erase(std::find(all.lists.begin(), all.lists.end(), this));
+}
+
+std::vector<const PluginTypes*> PluginTypes::all() {
+  AllTypes& all = allTypes();
+  const std::lock_guard<std::mutex> lock(all.mutex);
+  return all.lists;
+}
+
 std::vector<PluginTypes::Refusal> PluginTypes::takeRefused() {
   const std::lock_guard<std::mutex> lock(mutex_);
   std::vector<Refusal> refused;

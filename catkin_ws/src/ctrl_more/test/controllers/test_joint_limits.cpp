@@ -70,6 +70,10 @@ TEST_F(JointLimitsTest, WrongConfigurationsAreRefused) {
   EXPECT_FALSE(
       rig.load("joint_limits", "lower: [1, 1, 1, 1, 1, 1, 1]\nupper: [0, 1, 1, 1, 1, 1, 1]\n"));
   EXPECT_FALSE(rig.load("joint_limits", "lower: [-1, -1]\nupper: [1, 1]\n")) << "7 joints here";
+  const auto degrees = rig.load("joint_limits",
+                                "lower: [-170, -120, -170, -120, -170, -120, -170]\n"
+                                "upper: [170, 120, 170, 120, 170, 120, 170]\n");
+  EXPECT_NE(degrees.message().find("degrees"), std::string::npos) << degrees.message();
   ASSERT_TRUE(rig.load("joint_limits", kConfiguration));
   EXPECT_FALSE(rig.manager->setGains("c", {{"safety", {0.4}}})) << "not below influence";
   EXPECT_TRUE(rig.manager->setGains("c", {{"safety", {0.4}}, {"influence", {0.5}}}));

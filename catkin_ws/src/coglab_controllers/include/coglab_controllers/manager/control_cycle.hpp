@@ -48,7 +48,7 @@ struct CycleReport {
   Name active;                   ///< id of the active motion controller
   ManagerState state = ManagerState::Idle;
   MotionState motion = MotionState::Idle;
-  Reason reason;       ///< of holding, abort or fault; else empty
+  Reason reason;       ///< of holding, abort, fault, or a speed limit of 0; else empty
   bool fault = false;  ///< the active controller is at fault until it is switched to again
   /// True if the set-point of the arm stands: no velocity, no acceleration, and zero velocity was
   /// sent in this cycle and the one before. False without a usable joint state.
@@ -139,6 +139,7 @@ class ControlCycle {
   Reason fault_reason_;
   Reason input_reason_;
   double limit_scale_ = 1.0;
+  double speed_limit_ = 0.0;   // of the managers in this cycle, m/s
   std::uint64_t numbers_ = 0;  // number of cycles with a joint state
   bool cancelled_ = false;     // a cancel came, and no motion since
   bool asked_still_ = false;   // the last cycle with a joint state sent zero velocity

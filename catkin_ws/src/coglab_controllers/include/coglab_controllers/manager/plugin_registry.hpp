@@ -43,6 +43,9 @@ class MotionTypes : public ctrl_more::PluginTypesOf<MotionMaker> {
     return add(type, maker, abi);
   }
 
+  /// Makes a controller and destroys it. It is not configured.
+  void tryOne(const std::string& type) const override;
+
  private:
   MotionTypes();
 };

@@ -40,7 +40,10 @@ inline std::string livingNamesake() {
   while (!(done = node.executeCheckDone(process)) && std::chrono::steady_clock::now() < end)
     dispatch.work(0.02);  // s
   dispatch.removeSource(&node);
-  if (!done) return "at " + address + ", which does not answer";
+  if (!done) {
+    return "at " + address +
+           ", which does not answer (if its computer is off, remove it: rosnode cleanup)";
+  }
   if (process.getType() != XmlRpc::XmlRpcValue::TypeArray || process.size() != 3) return "";
   return "process " + std::to_string(static_cast<int>(process[2])) + " at " + address;
 }

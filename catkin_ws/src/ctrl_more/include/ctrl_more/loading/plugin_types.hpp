@@ -78,9 +78,8 @@ class PluginTypes {
   /// @param macro macro that registers a type
   /// @param package package of the headers for libraries
   /// @param abi ABI of the program
-  PluginTypes(std::string kind, std::string macro, std::string package, const Abi& abi)
-      : kind_(std::move(kind)), macro_(std::move(macro)), package_(std::move(package)), abi_(abi) {}
-  virtual ~PluginTypes() = default;
+  PluginTypes(std::string kind, std::string macro, std::string package, const Abi& abi);
+  virtual ~PluginTypes();
   PluginTypes(const PluginTypes&) = delete;
   PluginTypes& operator=(const PluginTypes&) = delete;
 
@@ -105,6 +104,11 @@ class PluginTypes {
   virtual std::vector<std::string> bringBack(const std::vector<std::string>& types) = 0;
   /// The library of these types was removed from memory. Discards their makers.
   virtual void forget(const std::vector<std::string>& types) = 0;
+  /// Makes an object of a type and destroys it again. Exceptions of its code pass through. Does
+  /// nothing for a kind whose objects need more than their maker.
+  virtual void tryOne(const std::string& type) const = 0;
+  /// The lists of all kinds in this process.
+  static std::vector<const PluginTypes*> all();
   /// @}
 
  protected:
