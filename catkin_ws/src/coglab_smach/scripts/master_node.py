@@ -245,22 +245,22 @@ class MasterNode:
 
     def run(self) -> None:
         """Execute the machine until shut-down."""
-        self.thread.start()
         # rospy calls this before its own shut-down: the machine can still reach the arm and end its motion.
         rospy.on_shutdown(self.end)
+        self.thread.start()
         clock = ClockWatch()
         while not rospy.is_shutdown() and self.thread.is_alive():
             self.thread.join(STATE_PERIOD)
             self.watch.tell_again()
             clock.look()
-        self.thread.join(1.0)
+        self.end()  # if the shut-down began before on_shutdown() was called
         if self.server is not None:
             self.server.stop()
 
     def end(self) -> None:
         """Preempt the machine and wait for its end, at most 4 s."""
         self.master.request_preempt()
-        if threading.current_thread() is not self.thread:
+        if self.thread.is_alive() and threading.current_thread() is not self.thread:
             self.thread.join(4.0)
 
 

@@ -1,11 +1,15 @@
-"""Prevents a node from replacing a running node of the same name. Otherwise rospy would end the running node, roslaunch
-would restart it, and two launches on one ROS master would end each other's nodes again and again."""
+"""Starts a node so that it replaces no other and can be ended at any moment.
+
+If a node with its name ran, rospy would end that one, roslaunch would restart it, and two launches on one ROS master
+would end each other's nodes again and again."""
 
 from __future__ import annotations
 
 import logging
 import os
+import signal
 import sys
+import threading
 import time
 from http.client import HTTPConnection, HTTPException
 from pathlib import Path
@@ -67,7 +71,10 @@ def refuse(sentence: str) -> NoReturn:
 
 
 def init_node(name: str, **options: Any) -> None:
-    """rospy.init_node, unless a running node has this name. Then the process ends with an error message."""
+    """rospy.init_node, unless a running node has this name. Then the process ends with an error message.
+
+    `options` are those of rospy. Unless they contain disable_signals, SIGINT and SIGTERM end the node.
+    """
     import rosgraph.names
     import rospy
 
@@ -78,8 +85,19 @@ def init_node(name: str, **options: Any) -> None:
         if time.monotonic() > end:
             refuse(f"another node has this name: {there}; end it first, or use your own ROS master")
         time.sleep(0.2)
-    rospy.init_node(name, **options)
+    if not options.get("disable_signals"):
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, _shut_down)
+    rospy.init_node(name, **{**options, "disable_signals": True})
     log_without_raising()
+
+
+def _shut_down(number: int, _frame: object) -> None:
+    """End the node in a thread of its own. rospy does it inside the signal handler, and so interrupts the main thread:
+    if that one calls the master at this moment, it holds the lock that rospy then waits for, for ever."""
+    import rospy
+
+    threading.Thread(target=rospy.signal_shutdown, args=(f"signal {number}",), name="shutdown").start()
 
 
 def log_without_raising() -> None:
