@@ -33,7 +33,8 @@ class JointLimits : public FeedbackController {
 Description JointLimits::describe() const {
   // 170 and 120 degrees, as in the robot's table of joint limits.
   const double wide = 2.967059728390360, narrow = 2.094395102393195;
-  const double turn = 6.2832;  // a number in degrees is larger
+  const double turns =
+      12.5664;  // two turns, more than any wrist has; a number in degrees is larger
   Description d;
   d.type = "JointLimits";
   d.summary = "Bounds the speed of each joint toward the end of its range.";
@@ -78,12 +79,12 @@ Description JointLimits::describe() const {
   d.setting("joint_position", "joint_position")
       .about("key of the joint positions in `measuredData`");
   d.setting("lower", std::vector<double>{-wide, -narrow, -wide, -narrow, -wide, -narrow, -wide})
-      .range(-turn, turn)
+      .range(-turns, turns)
       .in("rad")
       .anySize()
       .about("lower end of each joint");
   d.setting("upper", std::vector<double>{wide, narrow, wide, narrow, wide, narrow, wide})
-      .range(-turn, turn)
+      .range(-turns, turns)
       .in("rad")
       .anySize()
       .about("upper end of each joint");
