@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import smach
 from coglab_msgs.msg import ReasonCode, Say
 from coglab_py.pose import Pose
 from coglab_smach.context.grip import Grip
@@ -257,3 +258,19 @@ def test_the_wait_uses_the_share_and_time_of_the_delivery():
     assert armed[-2:] == [("release", limit, {"mass": 0.31, "load_share": 0.7}) for limit in (10.0, 16.0)]
     assert "the person's taking of the load within 5.0 s" in trial.ctx.journal.why()
     assert ("lift", 5.0, {"mass": 0.31, "load_share": 0.5}) in armed
+
+
+def test_a_person_who_never_comes_leaves_no_warning_of_smach(monkeypatch):
+    """A warning about a missing key looks like a fault of the program."""
+    warned = []
+    monkeypatch.setattr(smach, "logwarn", warned.append)
+    trial = Trial()
+
+    def script(t):
+        t.receive()
+        t.cell.faults.dead.add("perception")
+        t.start(GIVE)
+        t.wait_hub("wait_with_object")
+
+    trial.run(script)
+    assert trial.result().outcome == "failed_holding" and warned == []

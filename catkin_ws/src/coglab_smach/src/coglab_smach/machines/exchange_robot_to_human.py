@@ -19,7 +19,6 @@ def build_exchange_robot_to_human(ctx: Context) -> CoglabMachine:
         "exchange_robot_to_human",
         ACTION_OUTCOMES,
         input_keys=["object_id", "object_entry", "grasp", "grasp_name"],
-        output_keys=["delivery_pose"],
         io_keys=["grip", "delivery_name"],
     )
     machine.is_action = True

@@ -337,7 +337,7 @@ class SetDeliveryGoal(CoglabState):
         super().__init__(
             ctx,
             input_keys=["object_entry", "grasp"],
-            output_keys=["goal", "delivery", "delivery_pose"],
+            output_keys=["goal", "delivery"],
             io_keys=["delivery_name"],
         )
 
@@ -358,7 +358,6 @@ class SetDeliveryGoal(CoglabState):
         asked = await_offer(self, hand, goals, margin)
         goal = unless_withdrawn(self.ctx, asked, margin, may_fall=False)
         ud.delivery_name = name
-        ud.delivery_pose = {"xyz": goal["offset"], "quaternion": goal["orientation"]}
         ud.goal = goal
         return "succeeded"
 
