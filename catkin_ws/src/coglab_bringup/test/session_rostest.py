@@ -145,10 +145,8 @@ class Session(Handover):
         ask_for(action, "", lambda: True, READY_LIMIT)
         end = time.monotonic() + READY_LIMIT
         while "wait_without_object takes" not in answer.message and time.monotonic() < end:
-            time.sleep(0.5)
+            self.return_to_hub()
             answer = start("put", "")
-            if "takes initialise" in answer.message:
-                start("initialise", "")
         self.assertIn("wait_without_object takes", answer.message)
 
 
