@@ -160,13 +160,13 @@ def test_errors_in_many_trials_name_their_cause():
 def test_import_needs_neither_ros_nor_the_simulation():
     words = "import sys, coglab.control, coglab; assert 'Robot' in dir(coglab); "
     words += "assert not {'rospy', 'coglab_sim', 'matplotlib'} & set(sys.modules)"
-    subprocess.run([sys.executable, "-c", words], check=True, timeout=60)
+    subprocess.run([sys.executable, "-c", words], check=True, timeout=600)
     words = "import sys, coglab; w = coglab.World(seed=1); w.close(); assert 'rospy' not in sys.modules"
-    subprocess.run([sys.executable, "-c", words], check=True, timeout=120)
+    subprocess.run([sys.executable, "-c", words], check=True, timeout=600)
 
 
 def test_a_failed_connection_is_reported():
     words = "import coglab\ntry: coglab.connect('http://127.0.0.1:9')\nexcept ConnectionError as e: print(e)\n"
     words += "try: coglab.connect('ftp://nowhere')\nexcept ValueError as e: print(e)"
-    done = subprocess.run([sys.executable, "-c", words], check=True, timeout=60, capture_output=True, text=True)
+    done = subprocess.run([sys.executable, "-c", words], check=True, timeout=600, capture_output=True, text=True)
     assert "no ROS master answers at http://127.0.0.1:9" in done.stdout and "HOST:PORT" in done.stdout

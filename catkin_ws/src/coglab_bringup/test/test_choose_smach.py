@@ -58,7 +58,7 @@ class Script:
             choose_smach
             echo "left out: $left_out; before: $was_left_out; path: ${{CMAKE_PREFIX_PATH:-}}"
             """
-        return subprocess.run(["bash", "-c", text], text=True, capture_output=True, timeout=120, check=False)
+        return subprocess.run(["bash", "-c", text], text=True, capture_output=True, timeout=600, check=False)
 
 
 @pytest.fixture

@@ -23,7 +23,7 @@ def run(*command: object, **environment: str) -> subprocess.CompletedProcess:
         words,
         env={**os.environ, **environment},
         text=True,
-        timeout=120,
+        timeout=600,
         check=False,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,

@@ -38,7 +38,7 @@ class Checkout:
             env={"PATH": path or f"{self.tools}:{os.environ['PATH']}", "ENGINE_LOG": str(self.log), **environment},
             capture_output=True,
             text=True,
-            timeout=60,
+            timeout=600,
             check=False,
         )
 

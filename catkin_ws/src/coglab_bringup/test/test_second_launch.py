@@ -39,7 +39,7 @@ def refusal(environment: dict, *command: object) -> str:
         env=environment,
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=600,
         check=False,
     )
     assert ended.returncode == 1, ended.stdout + ended.stderr

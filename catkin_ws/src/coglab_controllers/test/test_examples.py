@@ -30,7 +30,7 @@ def test_the_packages_primitives_are_those_that_are_made(tmp_path: Path) -> None
     script = str(EXAMPLES / "make_primitives.py")
     for arguments, file in (([], "primitives.xml"), (["mine.xml"], "mine.xml")):
         command = [sys.executable, script, *arguments]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=120, cwd=tmp_path)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=600, cwd=tmp_path)
         assert done.returncode == 0, done.stderr[-2000:]
         made = cc.Library()
         made.load(str(tmp_path / file))

@@ -127,7 +127,7 @@ def test_a_parameter_that_cannot_be_used_ends_the_start_and_is_named(name: str, 
     rospy.set_param(f"/goal_helper/{name}", value)
     try:
         ended = subprocess.run(
-            [node_path("goal_helper_node")], timeout=60.0, check=False, stderr=subprocess.PIPE, text=True
+            [node_path("goal_helper_node")], timeout=600, check=False, stderr=subprocess.PIPE, text=True
         )
     finally:
         rospy.delete_param(f"/goal_helper/{name}")

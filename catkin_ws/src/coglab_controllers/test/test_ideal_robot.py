@@ -278,7 +278,7 @@ def test_the_end_of_the_last_motion_reaches_a_late_subscriber(robot: Robot) -> N
     answer = robot.call("controller_manager/ptp/add_ptp", AddPtp, here, [], [])
     wait_until(lambda: answer.ptp_id in robot.finished, "finished_ptp")
     late = ["rostopic", "echo", "-n1", "/controller_manager/ptp/finished_ptp/ptp_id"]
-    heard = subprocess.run(late, capture_output=True, text=True, timeout=60.0, check=True).stdout
+    heard = subprocess.run(late, capture_output=True, text=True, timeout=600, check=True).stdout
     assert heard.split()[0] == str(answer.ptp_id)
 
 

@@ -36,7 +36,7 @@ def clean(master: rosgraph.Master) -> None:
 
 def refused() -> str:
     """Output of a failed start, which ends with status 1."""
-    ended = subprocess.run([node_path("controller_manager_node")], capture_output=True, text=True, timeout=60)
+    ended = subprocess.run([node_path("controller_manager_node")], capture_output=True, text=True, timeout=600)
     assert ended.returncode == 1, ended.stderr[-2000:]
     return ended.stderr
 

@@ -33,7 +33,7 @@ def test_try_it_block_runs_with_the_ideal_arm() -> None:
             for line in lines[len(stays) :]:
                 command = line.replace("rosservice call", "rosservice call --wait")
                 done = subprocess.run(
-                    command, shell=True, executable="/bin/bash", timeout=120, capture_output=True, text=True
+                    command, shell=True, executable="/bin/bash", timeout=600, capture_output=True, text=True
                 )
                 assert done.returncode == 0 and "success: False" not in done.stdout, (line, done.stdout, done.stderr)
             assert "reached" in done.stdout or "running" in done.stdout

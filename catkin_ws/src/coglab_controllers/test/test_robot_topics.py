@@ -189,6 +189,6 @@ def test_a_motion_beside_it_reaches_its_end_all_the_limits(system):
 def test_a_start_that_fails_says_why_and_ends_with_1(system):
     """Like every program of this project with invalid settings; roslaunch shows the status."""
     command = [node_path("controller_manager_node"), "__name:=another_manager", "_arm_namespace:=7"]
-    ended = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=600)
     assert ended.returncode == 1, ended.stderr
     assert "another_manager/arm_namespace" in ended.stderr and "expected a name" in ended.stderr

@@ -70,7 +70,7 @@ def robot_node(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ["pkg-config", "--libs", "roscpp", "tf2_ros", "diagnostic_updater", "roslib"],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=600,
     ).stdout.split()
     built = subprocess.run(
         [
@@ -123,7 +123,7 @@ def test_nothing_runs_on_over_what_is_freed(
             [str(robot_node)],
             capture_output=True,
             text=True,
-            timeout=60.0,
+            timeout=600,
             env=dict(os.environ, ASAN_OPTIONS="detect_leaks=0"),
         )
     finally:

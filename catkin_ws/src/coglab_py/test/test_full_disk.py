@@ -24,7 +24,7 @@ def test_a_log_that_cannot_be_written_does_not_end_the_caller(tmp_path):
             stdout=full,
             stderr=subprocess.PIPE,
             text=True,
-            timeout=60,
+            timeout=600,
             check=False,
             env={"PYTHONPATH": ":".join(sys.path), "PATH": "/usr/bin:/bin", "ROS_LOG_DIR": str(tmp_path)},
         )

@@ -18,7 +18,7 @@ def run_on(engine, *files):
         cwd=PACKAGE / "test",
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=600,
         check=False,
     )
     assert ended.returncode == 0, (ended.stdout + ended.stderr)[-3000:]

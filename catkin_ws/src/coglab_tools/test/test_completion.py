@@ -29,5 +29,5 @@ printf '%s\n' "${COMPREPLY[@]}"
 )
 def test_tab_completes_commands_verbs_and_options(line, words):
     pytest.importorskip("argcomplete")
-    done = subprocess.run(["bash", "-c", BASH, "bash", line], cwd=TOP, capture_output=True, text=True, timeout=60)
+    done = subprocess.run(["bash", "-c", BASH, "bash", line], cwd=TOP, capture_output=True, text=True, timeout=600)
     assert set(done.stdout.split()) == words, done.stderr

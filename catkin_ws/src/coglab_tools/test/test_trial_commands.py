@@ -46,7 +46,7 @@ page_of(measured())
 
 def test_a_report_needs_only_the_libraries_that_the_demo_builds():
     command, place = [sys.executable, "-c", AFTER_THE_FIRST_DEMO], Path(__file__).parent
-    ended = subprocess.run(command, cwd=place, capture_output=True, text=True, timeout=120)
+    ended = subprocess.run(command, cwd=place, capture_output=True, text=True, timeout=600)
     assert ended.returncode == 0, ended.stderr
 
 

@@ -94,7 +94,7 @@ def test_wrong_version_is_refused(prefix: Path, tmp_path: Path) -> None:
         ["cmake", "-S", tmp_path, "-B", tmp_path / "build", f"-DCMAKE_PREFIX_PATH={prefix}"],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=600,
         env=clean_environment(),
     )
     (version,) = re.findall("<version>(.*)</version>", (PACKAGE / "package.xml").read_text())
@@ -126,7 +126,7 @@ def failed_configure(folder: Path) -> str:
         ["cmake", "-S", folder, "-B", folder / "elsewhere"],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=600,
         env=clean_environment(),
     )
     assert result.returncode != 0

@@ -61,7 +61,7 @@ def test_records_go_to_logging(caplog: pytest.LogCaptureFixture) -> None:
 
 def call(*arguments: str | Path, cwd: Path | None = None) -> tuple[int, str]:
     done = subprocess.run(
-        [sys.executable, *map(str, arguments)], capture_output=True, text=True, timeout=120, check=False, cwd=cwd
+        [sys.executable, *map(str, arguments)], capture_output=True, text=True, timeout=600, check=False, cwd=cwd
     )
     return done.returncode, done.stdout + done.stderr
 

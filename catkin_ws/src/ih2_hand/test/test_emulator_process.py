@@ -84,7 +84,7 @@ def test_port_link_commands_and_trace(start, tmp_path):
 )
 def test_bad_arguments(tmp_path, arguments):
     done = subprocess.run(
-        [sys.executable, SCRIPT, *arguments], capture_output=True, text=True, timeout=120, check=False
+        [sys.executable, SCRIPT, *arguments], capture_output=True, text=True, timeout=600, check=False
     )
     assert done.returncode == 2
     assert "hand_emulator:" in done.stderr

@@ -76,11 +76,11 @@ def test_requests_before_a_resynchronisation_expect_no_answer():
 def test_script_explains_hex():
     script = Path(__file__).resolve().parents[1] / "scripts" / "hand_trace.py"
     done = subprocess.run(
-        [sys.executable, str(script), "--hex", "44 04 64 61"], capture_output=True, text=True, timeout=120, check=True
+        [sys.executable, str(script), "--hex", "44 04 64 61"], capture_output=True, text=True, timeout=600, check=True
     )
     assert "SetFingerPosition motor 4 to 100" in done.stdout
     assert "grasp cylindrical medium" in done.stdout
     bad = subprocess.run(
-        [sys.executable, str(script), "--hex", "4"], capture_output=True, text=True, timeout=120, check=False
+        [sys.executable, str(script), "--hex", "4"], capture_output=True, text=True, timeout=600, check=False
     )
     assert bad.returncode == 2 and "pairs of hex digits" in bad.stderr
