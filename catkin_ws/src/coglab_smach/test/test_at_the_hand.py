@@ -8,7 +8,7 @@ from coglab_msgs.msg import ReasonCode
 from coglab_py.pose import Pose, about_z
 from coglab_smach.context.grip import Grip
 from coglab_smach.kinematics.reachability import default_arm
-from coglab_smach.ports.interfaces import HandState, Located
+from coglab_smach.ports.interfaces import HandState, Located, Verdict
 from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states import hand as hands
 from coglab_smach.states import hand_tracking, regrasp
@@ -172,7 +172,29 @@ def test_an_object_at_its_first_distance_stays(moved, after, stays):
 # --- to the grasp -----------------------------------------------------------------------------------------------------
 
 
-IN_THE_WAY, LATE = "something is in the way", "the way to the grasp within 1.7 s"
+def test_the_palm_retreats_before_it_goes_to_the_grasp(monkeypatch):
+    """A hand that touches the object would drag it along. The object would stay beside its grasp."""
+    seen, at = Seen(), [np.zeros(3)]
+    beside = np.array([0.0, 0.0, -0.02])
+    monkeypatch.setattr(regrasp, "way_to_grasp", lambda *_: beside - at[-1])
+    monkeypatch.setattr(regrasp, "shift", lambda ctx, way, speed: at.append(at[-1] + way) or Ready())
+    seen.ctx.contact.force = lambda: (0.0, 0.0, 0.0)
+    assert seen.run(regrasp.Regrasp(seen.ctx), goal={})[0] == "succeeded"
+    away = -palm_axis(seen.ctx)
+    assert at[1] @ away > 0.05 and np.linalg.norm(at[1] - at[1] @ away * away) < 0.001
+    assert np.allclose(at[-1], beside)
+
+
+def test_a_retreat_beyond_a_limit_of_the_arm_ends_no_handover(monkeypatch):
+    seen, asked = Seen(), []
+    refused = Ready(error=PortError("refused", code=ReasonCode.OUT_OF_RANGE))
+    monkeypatch.setattr(regrasp, "way_to_grasp", lambda *_: np.array([0.0, 0.0, -0.02]))
+    monkeypatch.setattr(regrasp, "shift", lambda ctx, way, speed: asked.append(way) or refused)
+    seen.ctx.arm.motion_allowed = lambda: Verdict(True, "")
+    assert seen.run(regrasp.Regrasp(seen.ctx), goal={})[0] == "succeeded" and len(asked) == 1
+
+
+IN_THE_WAY, LATE = "something is in the way", "the way to the grasp within"
 
 
 @pytest.mark.parametrize(("newton", "arrives", "why"), [(6.4, 0.5, ""), (6.6, 0.5, IN_THE_WAY), (6.4, 99.0, LATE)])

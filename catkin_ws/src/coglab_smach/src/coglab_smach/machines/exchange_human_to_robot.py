@@ -20,7 +20,7 @@ def build_exchange_human_to_robot(ctx: Context) -> CoglabMachine:
     (if the person's hand was seen to leave) -> home -> tighten there otherwise.
 
     If the hand closed on nothing, it opens to its preshape and the arm reaches once more. If it closed on an edge, it
-    opens, moves from there to the grasp, and closes again."""
+    opens, retreats, goes to the grasp as it is seen now, and closes again."""
     machine = CoglabMachine(
         ctx, "exchange_human_to_robot", ACTION_OUTCOMES, input_keys=["object_id"], output_keys=SHARED, io_keys=["grip"]
     )
