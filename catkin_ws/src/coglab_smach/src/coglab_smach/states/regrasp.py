@@ -46,7 +46,8 @@ class Regrasp(CoglabState):
             seen, here = way_to_grasp(self, ud.goal), palm_at(self.ctx)
             if here is not None:
                 way = palm + way - here if seen is None else seen
-                self._moved(way * min(1.0, (FARTHEST + CLEAR) / float(np.linalg.norm(way))), SPEED)
+                length = max(LEAST, float(np.linalg.norm(way)))
+                self._moved(way * min(1.0, (FARTHEST + CLEAR) / length), SPEED)
         return "succeeded"
 
     def _moved(self, way: np.ndarray, speed: float) -> bool:
