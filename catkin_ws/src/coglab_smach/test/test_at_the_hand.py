@@ -4,10 +4,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from coglab_controllers import rotation_between
 from coglab_msgs.msg import ReasonCode
 from coglab_py.pose import Pose, about_z
 from coglab_smach.context.grip import Grip
-from coglab_smach.kinematics.reachability import default_arm
+from coglab_smach.kinematics.reachability import default_arm, home_posture
 from coglab_smach.ports.interfaces import HandState, Located, Verdict
 from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states import hand as hands
@@ -21,6 +22,7 @@ from coglab_smach.states.hand_tracking import (
     way_to_hand,
 )
 from coglab_smach.states.held_object import HeldObject
+from coglab_smach.states.motion import shift
 from coglab_trials.virtual_clock import using
 from conftest import Trial
 
@@ -175,35 +177,64 @@ def test_an_object_at_its_first_distance_stays(moved, after, stays):
 def test_the_palm_retreats_before_it_goes_to_the_grasp(monkeypatch):
     """A hand that touches the object would drag it along. The object would stay beside its grasp."""
     seen, at = Seen(), [np.zeros(3)]
-    beside = np.array([0.0, 0.0, -0.02])
-    monkeypatch.setattr(regrasp, "way_to_grasp", lambda *_: beside - at[-1])
-    monkeypatch.setattr(regrasp, "shift", lambda ctx, way, speed: at.append(at[-1] + way) or Ready())
-    seen.ctx.contact.force = lambda: (0.0, 0.0, 0.0)
-    assert seen.run(regrasp.Regrasp(seen.ctx), goal={})[0] == "succeeded"
+    clock, beside = seen.trial.clock, np.array([0.0, 0.0, -0.02])
+
+    def lasts(ctx, way, speed):
+        at.append(at[-1] + way)
+        end = clock.now() + 0.5
+        return Polled(lambda: clock.now() > end, lambda: None)
+
     away = -palm_axis(seen.ctx)
+    monkeypatch.setattr(regrasp, "palm_at", lambda ctx: at[-1])
+    monkeypatch.setattr(regrasp, "way_to_grasp", lambda *_: beside - at[-1])
+    monkeypatch.setattr(regrasp, "shift", lasts)
+    seen.ctx.contact.force = lambda: tuple(10.0 * away)  # the object that the palm still presses
+    assert seen.run(regrasp.Regrasp(seen.ctx), goal={})[0] == "succeeded"
     assert at[1] @ away > 0.05 and np.linalg.norm(at[1] - at[1] @ away * away) < 0.001
     assert np.allclose(at[-1], beside)
 
 
-def test_a_retreat_beyond_a_limit_of_the_arm_ends_no_handover(monkeypatch):
-    seen, asked = Seen(), []
-    refused = Ready(error=PortError("refused", code=ReasonCode.OUT_OF_RANGE))
-    monkeypatch.setattr(regrasp, "way_to_grasp", lambda *_: np.array([0.0, 0.0, -0.02]))
-    monkeypatch.setattr(regrasp, "shift", lambda ctx, way, speed: asked.append(way) or refused)
+def test_a_retreat_beyond_a_limit_of_the_arm_leaves_the_direct_way(monkeypatch):
+    seen, asked, way = Seen(), [], np.array([0.0, 0.0, -0.02])
+    answers = [Ready(error=PortError("refused", code=ReasonCode.OUT_OF_RANGE)), Ready()]
+    monkeypatch.setattr(regrasp, "way_to_grasp", lambda *_: way)
+    monkeypatch.setattr(regrasp, "shift", lambda ctx, way, speed: asked.append(way) or answers[len(asked) - 1])
     seen.ctx.arm.motion_allowed = lambda: Verdict(True, "")
-    assert seen.run(regrasp.Regrasp(seen.ctx), goal={})[0] == "succeeded" and len(asked) == 1
+    assert seen.run(regrasp.Regrasp(seen.ctx), goal={})[0] == "succeeded"
+    assert len(asked) == 2 and np.allclose(asked[1], way)
+
+
+@pytest.mark.parametrize("by", [[-0.15, 0.0, 0.0], [0.0, 0.1, 0.1], [0.08, 0.0, -0.1]])
+def test_a_shift_ends_where_it_was_asked_to_without_rotation(by):
+    seen, asked, by = Seen(), [], np.array(by)
+    seen.ctx.arm.move_ptp = lambda position, velocity: asked.append(position) or Ready()
+    seen.ctx.arm.joint_positions = home_posture
+    place, posture = default_arm().fk(home_posture())
+    shift(seen.ctx, by, 0.06)
+    end, turned = default_arm().fk(np.asarray(asked[0]))
+    assert np.linalg.norm(end - place - by) < 0.003
+    assert np.linalg.norm(rotation_between(turned, posture)) < np.radians(1.0)
 
 
 IN_THE_WAY, LATE = "something is in the way", "the way to the grasp within"
 
 
-@pytest.mark.parametrize(("newton", "arrives", "why"), [(6.4, 0.5, ""), (6.6, 0.5, IN_THE_WAY), (6.4, 99.0, LATE)])
-def test_the_way_to_the_grasp_ends_at_a_push_of_6_5_newton_or_its_time_limit(monkeypatch, newton, arrives, why):
+@pytest.mark.parametrize(
+    ("newton", "takes", "why"), [(6.4, 0.5, []), (6.6, 0.5, [IN_THE_WAY]), (6.4, 99.0, [LATE, LATE])]
+)
+def test_the_way_to_the_grasp_ends_at_a_push_of_6_5_newton_or_its_time_limit(monkeypatch, newton, takes, why):
     seen, cancelled = Seen(), []
     clock = seen.trial.clock
+
+    def lasts(ctx, way, speed):
+        end = clock.now() + takes
+        return Polled(lambda: clock.now() > end, lambda: None)
+
     monkeypatch.setattr(regrasp, "way_to_grasp", lambda *_: np.array([0.0, 0.0, -0.03]))
-    monkeypatch.setattr(regrasp, "shift", lambda ctx, way, speed: Polled(lambda: clock.now() > arrives, lambda: None))
+    monkeypatch.setattr(regrasp, "shift", lasts)
     seen.ctx.contact.force = lambda: (0.0, 0.0, newton)
     seen.ctx.arm.cancel_motion = lambda reason: cancelled.append(reason) or Ready()
     assert seen.run(regrasp.Regrasp(seen.ctx), goal={})[0] == "succeeded"
-    assert [reason[: len(why)] for reason in cancelled] == [why] * bool(why)
+    assert len(cancelled) == len(why) and all(
+        reason.startswith(word) for reason, word in zip(cancelled, why, strict=True)
+    )

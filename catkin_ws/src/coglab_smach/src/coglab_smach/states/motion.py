@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from coglab_controllers import rotation_between
 
 from coglab_smach.context.context import Context
 from coglab_smach.kinematics.motion_time import ptp_time
@@ -12,6 +14,7 @@ from coglab_smach.kinematics.reachability import damped_step, default_arm
 from coglab_smach.ports.pending import Pending, PortError
 
 POLL_PERIOD = 0.01  # s
+LINEAR = 0.03  # m, longest part of a way for which one step of the Jacobian is exact enough (2 mm)
 SILENCE = 0.5  # s, time limit for a silent robot; the request stays in force
 
 
@@ -68,12 +71,18 @@ def shift_time(ctx: Context, by: np.ndarray, speed: float) -> float:
 
 def _joint_way(ctx: Context, here: Sequence[float], by: np.ndarray, speed: float) -> tuple[list[float], list[float]]:
     """Returns the joint positions after a shift (rad) and the joint speeds (rad/s)."""
-    jacobian = default_arm().jacobian(np.asarray(here))
-    way = damped_step(jacobian, by, np.zeros(3), 1e-4 * np.eye(6))
+    arm, begin, joints = default_arm(), np.asarray(here), np.asarray(here)
+    place, posture = arm.fk(begin)
+    steps = math.ceil(float(np.linalg.norm(by)) / LINEAR)
+    for step in range(1, steps + 1):
+        now, turned = arm.fk(joints)
+        ahead, back = place + by * (step / steps) - now, rotation_between(turned, posture)
+        joints = joints + damped_step(arm.jacobian(joints), ahead, back, 1e-4 * np.eye(6))
+    way = joints - begin
     velocity = np.maximum(np.abs(way) * speed / float(np.linalg.norm(by)), 1e-3)
     # The controller refuses speeds above a limit. Slow all joints by the same factor, so that the path stays straight.
     share = float(np.min(np.asarray(ctx.arm.motion_limits().velocity) / velocity))
-    return (np.asarray(here) + way).tolist(), (velocity * min(1.0, share)).tolist()
+    return joints.tolist(), (velocity * min(1.0, share)).tolist()
 
 
 def _await(ctx: Context, pending: Pending) -> str:
