@@ -185,13 +185,13 @@ class Brain:
 
 
 class Patience:
-    """Time that is left for the system to start: `limit` s since a node registered a service for the last time, because
-    nodes start slowly on a busy computer. Never longer than LONGEST_START, or `limit` if that is longer."""
+    """Time that is left for the system to start: `limit` s since the last node came, because nodes start slowly on a
+    busy computer. Never longer than LONGEST_START, or `limit` if that is longer."""
 
     def __init__(self, master: str, limit: float):
         self._master, self._limit = master, limit
         self._begun = self._moved = time.monotonic()
-        self._services = -1
+        self._most = 0  # services that were registered at the same time
 
     def left(self) -> float:
         """Time (s) that is left."""
@@ -199,9 +199,9 @@ class Patience:
         try:
             services = len(master_call(self._master, "getSystemState")[2])
         except NoAnswer:
-            services = -1
-        if services != self._services:
-            self._services, self._moved = services, now
+            services = 0
+        if services > self._most:  # a node that ends and comes again is no progress
+            self._most, self._moved = services, now
         return min(self._moved + self._limit, self._begun + max(self._limit, LONGEST_START)) - now
 
 
@@ -253,11 +253,11 @@ def choose(master: str, options: argparse.Namespace, state: State) -> tuple[str,
 def start(brain: Brain, options: argparse.Namespace) -> int:
     """Wait for the hub, then request the action. A refusal that may be temporary is retried until the time limit."""
     options.action = SHORT_NAMES.get(options.action, options.action)
-    patience, wanted = Patience(brain.master, options.wait), options.action
+    begun, patience, wanted = time.monotonic(), Patience(brain.master, options.wait), options.action
     if not brain.wait_for_state(lambda state: state.in_hub, min(1.0, options.wait)):
         now = brain.state.state.rpartition("/")[2] if brain.state.state else "the brain is starting"
         print(
-            f"[coglab] waiting for the hub until no node starts for {options.wait:.0f} s; now: {now}",
+            f"[coglab] waiting for the hub; gives up {options.wait:.0f} s after the last node has come; now: {now}",
             file=sys.stderr,
             flush=True,
         )
@@ -280,9 +280,7 @@ def start(brain: Brain, options: argparse.Namespace) -> int:
             continue  # the hub was left at this moment
         raise Refused(message)
     state = brain.state.state or "/coglab/state never came"
-    raise Refused(
-        f"no hub, and no node has started for {options.wait:.0f} s; the machine is in {state}; more: ./coglab status"
-    )
+    raise Refused(f"no hub within {time.monotonic() - begun:.0f} s; the machine is in {state}; more: ./coglab status")
 
 
 def hold(brain: Brain, _options: argparse.Namespace) -> int:

@@ -172,7 +172,7 @@ def _arm(value: str) -> None:
     if tried.returncode == _NO_ARM:
         raise ValueError("the library has no arm; end its source with COGLAB_ARM(MyArm), see docs/arm_back_end.md")
     if tried.returncode:
-        raise ValueError(f"the library cannot be loaded: {tried.stderr}; give its whole path, or build it")
+        raise ValueError(f"the library cannot be loaded: {tried.stderr.strip()}; give its whole path, or build it")
 
 
 def _objects(value: str) -> None:
