@@ -17,6 +17,7 @@ from typing import Any, NoReturn
 from xmlrpc.client import Error, ServerProxy, Transport
 
 ANSWER_LIMIT = 2.0  # s, longest wait for master or node
+HELD = 5.0  # s, longest time that the end of a node holds its main thread
 PATIENCE = 2.0  # s in which a node that is being restarted may end
 
 
@@ -94,10 +95,15 @@ def init_node(name: str, **options: Any) -> None:
 
 def _shut_down(number: int, _frame: object) -> None:
     """End the node in a thread of its own. rospy does it inside the signal handler, and so interrupts the main thread:
-    if that one calls the master at this moment, it holds the lock that rospy then waits for, for ever."""
+    if that one calls the master at this moment, it holds the lock that rospy then waits for, for ever.
+
+    The main thread stands meanwhile, as with rospy, so that it publishes on no closed topic; but HELD s at most.
+    """
     import rospy
 
-    threading.Thread(target=rospy.signal_shutdown, args=(f"signal {number}",), name="shutdown").start()
+    end = threading.Thread(target=rospy.signal_shutdown, args=(f"signal {number}",), name="shutdown")
+    end.start()
+    end.join(HELD)
 
 
 def log_without_raising() -> None:
