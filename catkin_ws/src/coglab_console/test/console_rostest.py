@@ -112,7 +112,10 @@ class Console(unittest.TestCase):
         return found
 
     def test_03_scene_shows_hand_at_its_tf_pose(self):
-        self.assertLess(self._distance_to_tf(), 0.002)
+        end = time.monotonic() + LIMIT
+        while (distance := self._distance_to_tf()) >= 0.002 and time.monotonic() < end:
+            time.sleep(0.2)
+        self.assertLess(distance, 0.002)
 
     def test_03b_held_button_calibrates_hand_and_shows_its_end(self):
         self.ready("wait_without_object")
@@ -127,10 +130,12 @@ class Console(unittest.TestCase):
         self.browser.until(told, LIMIT, "hand", "calibration complete ended")
 
     def _distance_to_tf(self):
+        """Distance (m) of the drawn palm to its frame; infinite while it is not drawn."""
         place = self.frames.lookup_transform(
             "world", "ih2_palm", rospy.Time(0), rospy.Duration(LIMIT)
         ).transform.translation
-        return float(np.linalg.norm(np.array(self.browser.js("return coglab.palm()")) - [place.x, place.y, place.z]))
+        drawn = self.browser.js("return coglab.palm()")
+        return float(np.linalg.norm(np.array(drawn) - [place.x, place.y, place.z])) if drawn else float("inf")
 
     def receive(self):
         """Receives once. True if the object is in the hand at the end. On a crowded computer the machine may stop by
