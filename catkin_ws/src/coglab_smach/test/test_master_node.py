@@ -120,7 +120,7 @@ def test_each_namespace_has_its_own_file_for_the_held_object(master, monkeypatch
 
 def test_a_node_that_cannot_be_configured_ends_with_status_1(monkeypatch):
     module, said = script("master_node"), []
-    monkeypatch.setattr(rospy, "init_node", lambda name, **_: None)
+    monkeypatch.setattr(module, "init_node", lambda name: None)
     monkeypatch.setattr(rospy, "logfatal", lambda *words: said.append(words))
     monkeypatch.setattr(module.parameters, "found_above", lambda name, kind: "<robot/>")
 
