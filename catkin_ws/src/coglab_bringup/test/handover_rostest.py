@@ -1,6 +1,7 @@
 """Cases of a whole handover from person to robot through the plain launch file: names, outcome, error, limits at every
 tick, bytes of the hand. session_rostest.py runs them."""
 
+import sys
 import time
 import unittest
 from pathlib import Path
@@ -11,13 +12,16 @@ import rospkg
 import rospy
 import tf2_ros
 import yaml
-from coglab_bringup.handover import HUBS, READY_LIMIT, ask_for, run_handover
+from coglab_bringup.handover import HUBS, READY_LIMIT, NotTaken, ask_for, run_handover
 from coglab_bringup.trial_recorder import TrialRecorder
 from coglab_msgs.msg import MasterState
+from coglab_py.packages import package_path
 from interface import FRAMES, missing_names
-from lateness import Lateness
 from rosgraph_msgs.msg import Log
 from tf2_msgs.msg import TFMessage
+
+sys.path.insert(0, str(package_path("coglab_controllers", "test")))
+from lateness import Lateness, say_again
 
 PAGE = Path(__file__).resolve().parents[4] / "docs" / "architecture.md"
 CMD = 2  # FRI state in which the arm follows our commands
@@ -53,7 +57,7 @@ class Handover(unittest.TestCase):
             cls.trial = recorder.stop()
             if row["outcome"] == "success" or not left or not cls.lateness.may_explain(row["reason_code"]):
                 break
-            print(f"{action} again, because this computer is late: {row['outcome']}")
+            say_again(action, row["outcome"])
             time.sleep(5.0)  # s in which the computer may become less busy
             cls.return_to_hub()
         cls.spans.append((cls.start, cls.end))
@@ -66,10 +70,18 @@ class Handover(unittest.TestCase):
         while not (state := rospy.wait_for_message("/coglab/state", MasterState, READY_LIMIT)).state.endswith(HUBS):
             if time.monotonic() > end:
                 raise TimeoutError(f"not in a hub within {2 * READY_LIMIT:.0f} s: {state.state}, {state.why}")
-            for leaf, action in (("/stopped", "reset"), ("/fault", "initialise")):
-                if state.state.endswith(leaf):
-                    ask_for(action, "", lambda: True, READY_LIMIT)
+            cls.leave(state.state)
             time.sleep(0.5)
+
+    @classmethod
+    def leave(cls, state):
+        """Asks for the action that leads out of a state of rest. The machine may go on to the other one meanwhile."""
+        for leaf, action in (("/stopped", "reset"), ("/fault", "initialise")):
+            if state.endswith(leaf):
+                try:
+                    ask_for(action, "", lambda: True, 5.0)
+                except NotTaken as refused:
+                    print(refused, flush=True)
 
     @classmethod
     def on_tf(cls, message):

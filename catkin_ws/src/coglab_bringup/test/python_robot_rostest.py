@@ -21,7 +21,9 @@ from coglab_bringup.handover import READY_LIMIT
 from coglab_msgs.msg import ReasonCode
 from coglab_msgs.srv import Start
 from coglab_py.packages import package_path
-from lateness import Lateness
+
+sys.path.insert(0, str(package_path("coglab_controllers", "test")))
+from lateness import Lateness, say_again
 
 LIMIT = 180.0  # s for a motion or an exchange on a loaded machine
 
@@ -60,6 +62,7 @@ class PythonRobot(unittest.TestCase):
                 problem, code = str(silent), ReasonCode.TIME_LIMIT
             if not left or not self.lateness.may_explain(code):
                 self.fail(problem)
+            say_again("a call of the robot", problem)
             self.robot.reset(limit=LIMIT)
         raise AssertionError(problem)
 
@@ -79,6 +82,7 @@ class PythonRobot(unittest.TestCase):
                 done = motion.done
             if not done or not left or not self.lateness.may_explain(motion.result.code):
                 break
+            say_again("start_joints", motion.result)
             self.robot.reset(limit=LIMIT)
         self.assertFalse(done)
         self.assertEqual((motion.result.ok, motion.result.reason), (False, "CANCELLED"))
@@ -129,6 +133,7 @@ class PythonRobot(unittest.TestCase):
                 break
             if not left or not self.lateness.may_explain(robot.state.code):
                 self.fail(given.stdout + given.stderr)
+            say_again("give", given.stdout + given.stderr)
             robot.reset(limit=LIMIT)
         self.assertIn("/exchange_robot_to_human/", given.stdout)
         self.assertEqual(robot.state.holding, "")

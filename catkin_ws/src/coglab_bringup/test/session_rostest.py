@@ -16,7 +16,7 @@ import numpy as np
 import rospkg
 import rospy
 import rostest
-from coglab_bringup.handover import READY_LIMIT, ask_for
+from coglab_bringup.handover import READY_LIMIT
 from coglab_msgs.srv import Start
 from handover_rostest import Handover
 from odd_messages import OddMessages
@@ -141,9 +141,7 @@ class Session(Handover):
             answer = start("put", "")
         why = rospy.ServiceProxy("/coglab/why", Trigger)().message
         self.assertRegex(why, "robot is silent|arm is blocked|arm does not follow")
-        action = "initialise" if "takes initialise" in answer.message else "reset"
-        ask_for(action, "", lambda: True, READY_LIMIT)
-        end = time.monotonic() + READY_LIMIT
+        end = time.monotonic() + 2 * READY_LIMIT
         while "wait_without_object takes" not in answer.message and time.monotonic() < end:
             self.return_to_hub()
             answer = start("put", "")

@@ -68,6 +68,22 @@ raise SystemExit(2)
     assert "not within 60 s: its end" in item.failures[0]
 
 
+def test_a_part_that_was_repeated_for_a_late_computer_is_listed(tmp_path, capsys):
+    script = f"""
+from pathlib import Path
+log, reports = Path(XML, 'log', '1'), Path(XML, 'test_results', 'pkg')
+log.mkdir(parents=True)
+reports.mkdir(parents=True)
+(reports / 'rosunit-arm.xml').write_text('''{GREEN}''')
+(log / 'arm-4-stdout.log').write_text('begins\\nREPEATED reach: no goal\\n')
+"""
+    item = program(tmp_path, script)
+    item.kind, item.name, item.files = "rostest", "arm.test", []
+    run(item, tmp_path / "log", limit=60.0)
+    assert report([item], tmp_path) == 0
+    assert "REPEATED reach: no goal" in capsys.readouterr().out
+
+
 def test_a_gtest_that_was_not_built_is_a_failure(tmp_path):
     package = tmp_path / "catkin_ws" / "src" / "pkg"
     (package / "test").mkdir(parents=True)

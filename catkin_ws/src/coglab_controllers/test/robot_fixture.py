@@ -13,7 +13,7 @@ from xmlrpc.client import ServerProxy
 
 import rospy
 import tf2_ros
-from coglab_msgs.msg import ControllerStatus, DmpFeedback, FinishedPtp, LwrState, ReasonCode, UnfinishedPtp
+from coglab_msgs.msg import ControllerStatus, DmpFeedback, FinishedPtp, LwrState, UnfinishedPtp
 from coglab_msgs.srv import (
     AddPtp,
     AddPtpRequest,
@@ -32,6 +32,7 @@ from coglab_msgs.srv import (
     SwitchDmp,
 )
 from geometry_msgs.msg import TransformStamped
+from lateness import LATE, say_again
 from sensor_msgs.msg import JointState
 
 HOME = [-1.4349, -0.6086, 1.4986, 1.7048, 0.1857, 0.2152, 0.782]
@@ -50,16 +51,6 @@ DMP_SERVICES = {
     "switch_dmp": SwitchDmp,
 }
 
-
-LATE = (
-    ReasonCode.COMPUTER_LATE,
-    ReasonCode.ROBOT_DISCONNECTED,
-    ReasonCode.NOT_IN_COMMAND_MODE,
-    ReasonCode.STALE_JOINT_STATE,
-    ReasonCode.GOAL_STALE,
-    ReasonCode.GOAL_LOST,
-)
-"""why a motion ends on a computer that is late; the last two: these tests publish the goal themselves"""
 LIMIT = 60.0  # s, for all that is waited for: nothing is red because the computer is busy
 
 
@@ -213,17 +204,21 @@ class Robot:
 
         wait_until(allowed, "motion allowed")
 
-    def unless_late(self, attempt: Callable[[], None]) -> None:
-        """Runs a part of a test in which the arm moves; again if it fails and a late computer has ended a motion."""
+    def unless_late(self, attempt: Callable[[], None], late: frozenset[int] = LATE) -> None:
+        """Runs a part of a test in which the arm moves; again if it fails and a late computer has ended a motion.
+
+        `late`: the ReasonCodes that a late computer explains.
+        """
         for left in reversed(range(5)):
             self.start()
             self.reasons.clear()
             try:
                 return attempt()
-            except AssertionError:
+            except AssertionError as error:
                 time.sleep(0.5)  # its reason may be on its way
-                if not left or not set(LATE) & set(self.reasons):
+                if not left or not late & set(self.reasons):
                     raise
+                say_again(attempt.__name__, error)
 
     def load(self) -> None:
         """Loads both plug-ins unless they are there."""
@@ -262,6 +257,7 @@ class Robot:
             if motion in self.finished:
                 return
             assert self.unfinished[motion].reason_code in LATE, self.unfinished[motion]
+            say_again("point-to-point motion", self.unfinished[motion].reason)
         raise AssertionError(f"no motion ended well within {LIMIT} s: {self.unfinished[motion]}")
 
     def execute(self, primitive: str = "reach_human", **fields: object) -> object:

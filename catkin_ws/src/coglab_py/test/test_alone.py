@@ -18,6 +18,12 @@ while not rospy.is_shutdown():
     rospy.get_param_names()
 """
 
+STARTS = """
+from coglab_py.alone import init_node
+print("starts", flush=True)
+init_node("starts")
+"""
+
 
 @pytest.fixture
 def environment():
@@ -45,3 +51,21 @@ def test_a_signal_ends_a_node_that_calls_the_master(environment, number):
         finally:
             node.kill()
             node.communicate()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_a_node_that_waits_for_its_master(number):
+    with socket.socket() as nobody:
+        nobody.bind(("127.0.0.1", 0))
+        environment = {**os.environ, "ROS_MASTER_URI": f"http://127.0.0.1:{nobody.getsockname()[1]}"}
+        starts = [sys.executable, "-c", STARTS]
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
+        with subprocess.Popen(starts, env=environment, text=True, **pipes) as node:
+            try:
+                assert node.stdout.readline() == "starts\n"
+                assert "master" in node.stdout.readline()  # it waits
+                node.send_signal(number)
+                assert node.wait(60.0) == 0
+                assert "Traceback" not in node.stdout.read()
+            finally:
+                node.kill()

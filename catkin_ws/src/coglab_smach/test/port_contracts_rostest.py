@@ -24,17 +24,11 @@ from coglab_smach.ros.hand import RosHand
 from coglab_smach.ros.ports import RosContact, RosDatabase, RosPerception
 from geometry_msgs.msg import Vector3, Wrench
 
+sys.path.insert(0, str(package_path("coglab_controllers", "test")))
+from lateness import LATE, say_again
+
 PATIENCE = 20.0  # factor on all time limits, for a busy computer
 LIBRARY = str(package_path("coglab_controllers", "config", "primitives.xml"))
-LATE = {
-    ReasonCode.COMPUTER_LATE,
-    ReasonCode.GOAL_LOST,
-    ReasonCode.GOAL_STALE,
-    ReasonCode.NOT_IN_COMMAND_MODE,
-    ReasonCode.ROBOT_DISCONNECTED,
-    ReasonCode.STALE_JOINT_STATE,
-}
-"""why a motion ends on a computer that is late"""
 REACH = DmpRequest("take_board", "board", [0.0, -0.25, 0.45], dmp_ratio=4.0)
 
 
@@ -102,9 +96,10 @@ def again_if_late(test):
                 return test(self)
             except (AssertionError, PortError) as error:
                 time.sleep(0.5)  # the reason may be on its way
-                late = getattr(error, "code", 0) in (*LATE, ReasonCode.NODE_SILENT) or LATE & set(self.reasons)
+                late = getattr(error, "code", 0) in LATE or LATE & set(self.reasons)
                 if not left or not late:
                     raise
+                say_again(test.__name__, error)
                 self.tearDown()
                 self.setUp()
 

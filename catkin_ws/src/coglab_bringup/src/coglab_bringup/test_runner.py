@@ -38,6 +38,7 @@ BESIDE = AT_A_TIME // 2  # rostests beside them: a rostest mostly waits for its 
 BUSY = ("-c", "import os\nparent = os.getppid()\nwhile os.getppid() == parent:\n  sum(range(100000))")
 """A process that uses one core while its parent lives."""
 OWN_NODE = "rospy.init_node("  # in a pytest file: the file needs its own process
+REPEATED = "REPEATED "  # begins the line of a rostest that repeats a part because the computer was late
 SLOWEST = 10  # programs and files whose time is printed at the end
 LAST_LINES = 15  # of the output of a program that failed outside of its cases
 TIME_LIMIT = 1800.0  # s per test program
@@ -61,6 +62,7 @@ class Program:
     skipped: int = 0
     failures: list[str] = field(default_factory=list)
     cases: dict[str, str] = field(default_factory=dict)  # passed, failed or skipped, by name of the case
+    repeated: list[str] = field(default_factory=list)  # rostest: parts repeated because the computer was late
     seconds_of: dict[str, float] = field(default_factory=dict)  # pytest: by file
 
 
@@ -160,11 +162,15 @@ def unfinished(log: Path) -> list[str]:
     return [line.strip() for line in lines if "::" in line and line.strip() == line.split()[0] not in ended]
 
 
+def node_outputs(program: Program) -> list[str]:
+    """What the nodes of a rostest printed. The test node is one of them."""
+    return [path.read_text(errors="replace") for path in sorted(program.junit.glob("log/[0-9a-f]*/*-stdout.log"))]
+
+
 def end_of_output(program: Program, log: Path) -> str:
     """The last lines of a program that failed outside of its cases. rosunit writes a failure of setUpClass only into
     the log of the test node."""
-    texts = [path.read_text(errors="replace") for path in sorted(program.junit.glob("log/[0-9a-f]*/*-stdout.log"))]
-    texts = [text for text in texts if "setUpClass" in text]
+    texts = [text for text in node_outputs(program) if "setUpClass" in text]
     texts += [log.read_text(errors="replace") if log.exists() else ""]
     lines = [line for line in texts[0].splitlines() if line.strip()]
     return "".join(f"\n       {line}" for line in lines[-LAST_LINES:])
@@ -175,6 +181,8 @@ def count(program: Program, status: int | None, log: Path) -> None:
     if program.kind == "rostest":
         # rosunit-*.xml contains the cases; rostest-*.xml only records whether each test node wrote such a file
         reports = sorted(program.junit.rglob("rosunit-*.xml"))
+        lines = [line for text in node_outputs(program) for line in text.splitlines()]
+        program.repeated = [line for line in lines if line.startswith(REPEATED)]
         if status != 0 and not reports:
             reports = sorted(program.junit.rglob("rostest-*.xml"))
     else:
@@ -273,6 +281,8 @@ def report(programs: list[Program], results: Path) -> int:
         for failure in program.failures:
             print(f"FAILED {program.package} {program.name}: {failure}")
             print(f"       log: {log_of(program, results)}")
+        for line in program.repeated:
+            print(f"the computer was late in {program.package} {program.name}: {line}")
     by_package: dict[str, float] = {}
     for program in programs:
         by_package[program.package] = by_package.get(program.package, 0.0) + program.seconds

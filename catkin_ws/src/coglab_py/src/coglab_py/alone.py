@@ -17,7 +17,7 @@ from typing import Any, NoReturn
 from xmlrpc.client import Error, ServerProxy, Transport
 
 ANSWER_LIMIT = 2.0  # s, longest wait for master or node
-HELD = 5.0  # s, longest time that the end of a node holds its main thread
+HELD = 5.0  # s, longest time that the end of a node holds its main thread, or takes before the node is complete
 PATIENCE = 2.0  # s in which a node that is being restarted may end
 
 
@@ -86,11 +86,21 @@ def init_node(name: str, **options: Any) -> None:
         if time.monotonic() > end:
             refuse(f"another node has this name: {there}; end it first, or use your own ROS master")
         time.sleep(0.2)
-    if not options.get("disable_signals"):
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, _shut_down)
+    signals = () if options.get("disable_signals") else (signal.SIGINT, signal.SIGTERM)
+    for number in signals:
+        signal.signal(number, _give_up)
     rospy.init_node(name, **{**options, "disable_signals": True})
+    for number in signals:
+        signal.signal(number, _shut_down)
     log_without_raising()
+
+
+def _give_up(number: int, _frame: object) -> None:
+    """End a process whose node is not complete: its main thread waits for the master and holds rospy's locks."""
+    late = threading.Timer(HELD, os._exit, (1,))
+    late.daemon = True
+    late.start()
+    sys.exit(0)
 
 
 def _shut_down(number: int, _frame: object) -> None:
