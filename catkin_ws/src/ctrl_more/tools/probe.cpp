@@ -28,7 +28,7 @@ void report(const std::string& text) {
 
 // Exceptions are ignored here. The program that makes the controller reports them.
 void make(const ctrl_more::PluginTypes& types, const std::string& type) {
-  report("while " + types.kind() + " '" + type + "' was made and described");
+  report("while " + types.kind() + " '" + type + "' was made");
   try {
     types.tryOne(type);
   } catch (...) {

@@ -19,7 +19,8 @@ std::string outOfRange(const std::string& what, const Spec& spec,
     std::ostringstream text;
     text << what << " expects " << spec.min << " to " << spec.max << " " << spec.unit << ", got "
          << v;
-    if (spec.unit.compare(0, 3, "rad") == 0 && std::isfinite(v)) text << "; is it in degrees?";
+    const double most = std::max(std::abs(spec.min), std::abs(spec.max));
+    if (spec.unit == "rad" && std::isfinite(v) && std::abs(v) > most) text << "; is it in degrees?";
     return text.str();
   }
   return "";
