@@ -192,3 +192,4 @@ def press_and_hold(browser: Browser, element: Any, done: Callable[[], bool], lim
             ActionChains(browser.driver).release().perform()
         if time.monotonic() >= end:
             raise TimeoutError(f"holding the button did nothing within {limit:.0f} s; {browser.summary()}")
+        print(f"REPEATED holding a button: nothing within {HOLD_AGAIN:.0f} s", flush=True)  # ./coglab test lists it
