@@ -14,6 +14,7 @@ import coglab
 import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
+from coglab_smach.context.requests import Answer, ask_for
 from coglab_smach.machines import build_master
 
 _shared: list[coglab.World] = []
@@ -132,6 +133,20 @@ def test_hold_and_stop_are_latched_until_reset(world, latch):
     with pytest.raises(coglab.Refused, match=r"robot.reset\(\)"):
         robot.receive()
     assert robot.reset().ok and robot.arm.move_joints(robot.arm.home).ok
+
+
+def test_reset_asks_again_if_the_brain_has_gone_on_meanwhile(world, monkeypatch):
+    asked = []
+
+    def gone_on(context, action, object_id):
+        asked.append(action)
+        late = Answer(False, "fault takes initialise", ReasonCode.WRONG_STATE)
+        return late if len(asked) == 1 else ask_for(context, action, object_id)
+
+    monkeypatch.setattr("coglab.world.ask_for", gone_on)
+    world.robot.stop()
+    world.step(1.0)
+    assert world.robot.reset().ok and len(asked) == 2
 
 
 def test_robot_is_reset_after_the_controller_left_command_mode(world):

@@ -552,13 +552,9 @@ class Robot:
             self._enable_arm()
         else:
             self._wait(lambda: self._resettable() or self._in_order(), limit, "a hub of the brain")
-            offered = self._cell.state().actions
-            action = next((name for name in ("reset", "initialise") if name in offered), "")
-            if action:
-                answer = self._cell.submit(action, "")
-                if not answer.ok:
-                    raise Refused(_for_python(answer.message), answer.code)
-                self._wait(lambda: not self._resettable(), ANSWER, "the brain to leave its stop")
+            if self._resettable():
+                action = self._ask_for_reset()
+                self._wait(lambda: not self._resettable(), limit, "the brain to leave its stop")
                 self._wait(lambda: self._cell.state().in_hub, limit, f"a hub after '{action}'")
         state = self._cell.state()
         ok = arm.motion_allowed().ok and not self._resettable()
@@ -702,6 +698,19 @@ class Robot:
 
     def _resettable(self) -> bool:
         return bool({"reset", "initialise"} & set(self._cell.state().actions))
+
+    def _ask_for_reset(self) -> str:
+        """Ask for the action that leads out of the stop, and return it. A stop may become a fault meanwhile, which
+        takes another action."""
+        end = self._cell.clock() + ANSWER
+        while True:
+            action = "reset" if "reset" in self._cell.state().actions else "initialise"
+            answer = self._cell.submit(action, "")
+            if answer.ok:
+                return action
+            if self._cell.clock() >= end:
+                raise Refused(_for_python(answer.message), answer.code)
+            self._pause(0.1)
 
     def _in_order(self) -> bool:
         return self._cell.state().in_hub and self._cell.arm.motion_allowed().ok
