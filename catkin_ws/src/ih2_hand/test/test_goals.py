@@ -116,7 +116,7 @@ def test_a_goal_ends_though_its_fingers_cannot_be_stopped(desk, driver):
     else:
         desk.owner.driver = None
     desk.cancel("hand_close", handle)
-    assert handle.ended is not None and desk.queue.active is None
+    assert handle.ended[0] == "cancelled" and desk.queue.active is None
 
 
 def test_a_goal_does_not_go_on_with_another_connection(desk):
