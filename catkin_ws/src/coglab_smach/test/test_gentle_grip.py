@@ -51,14 +51,13 @@ def test_a_hand_that_refuses_to_tighten_keeps_the_object():
     assert trial.ctx.holding == "mug"
 
 
-@pytest.mark.parametrize(
-    ("grasps", "chosen"), [(("handle", "around_handle"), "around_handle"), (("handle",), "handle")]
-)
-def test_grasps_without_a_gentle_level_are_not_used_near_a_person(grasps, chosen):
-    """The screwdriver's handle is held laterally, which has no gentle level. Both grasps are at the same place."""
+@pytest.mark.parametrize(("modes", "chosen"), [(("lateral", "tridigit"), "tridigit"), (("lateral",), "lateral")])
+def test_grasps_without_a_gentle_level_are_not_used_near_a_person(modes, chosen):
+    """Mode lateral has no gentle level. All grasps are at the same place, and the first one is preferred."""
     trial = Trial()
-    every = trial.database.get("screwdriver")["grasps"]
-    entry = {**trial.database.get("screwdriver"), "grasps": {name: every[name] for name in grasps}}
+    shipped = trial.database.get("screwdriver")
+    grasps = {mode: {**shipped["grasps"]["handle"], "hand": {"mode": mode, "level": "high"}} for mode in modes}
+    entry = {**shipped, "grasps": grasps, "default_grasp": "lateral"}
     trial.ctx.database.get_object = lambda object_id: Ready(entry)
     trial.cell.objects["screwdriver"] = trial.cell.objects["mug"]
 
