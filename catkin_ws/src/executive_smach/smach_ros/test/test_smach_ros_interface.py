@@ -113,3 +113,31 @@ def test_new_viewers_get_their_first_heartbeat_after_a_delay(seed, monkeypatch):
         gaps = [after - before for before, after in itertools.pairwise([*sent, end])]
         assert max(gaps) <= 2.02, "a beat was left out"
         assert sent[-1] < end
+
+
+def test_a_restarted_server_publishes_each_status_once(monkeypatch):
+    sent, rospy = [], introspection.rospy
+    topic = SimpleNamespace(
+        impl=SimpleNamespace(connections=[]),
+        get_num_connections=lambda: 1,
+        publish=sent.append,
+        unregister=lambda: None,
+    )
+    monkeypatch.setattr(rospy, "Publisher", lambda *_, **__: topic)
+    monkeypatch.setattr(rospy, "Subscriber", lambda *_: topic)
+    monkeypatch.setattr(rospy, "is_shutdown", lambda: False)
+    monkeypatch.setattr(rospy.Time, "now", rospy.Time)
+    machine = smach.StateMachine(["end"])
+    with machine:
+        smach.StateMachine.add("WORK", smach.CBState(lambda _: "end", outcomes=["end"]))
+    server = IntrospectionServer("/server", machine, "/SM_ROOT")
+    for _ in range(2):
+        server.start()
+        sent.clear()
+        machine.execute()
+        server.stop()
+    assert [message.info for message in sent].count("END end") == 1
+    machine.execute()
+    server.start()
+    server.stop()
+    assert [message.info for message in sent].count("END end") == 1, "a stopped server follows nothing"
