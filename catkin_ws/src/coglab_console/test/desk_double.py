@@ -3,7 +3,9 @@
 import asyncio
 import json
 import time
+from unittest import mock
 
+from coglab_console.desk import desk as module
 from coglab_console.desk.desk import Desk
 from coglab_console.desk.events import EventLog
 from coglab_console.desk.gates import HeldButton
@@ -44,9 +46,13 @@ def newest(desk):
     return shown(desk)["guard"]["stop"]
 
 
+def buttons_follow(clock):
+    """A context in which the held buttons of a desk measure time with this clock."""
+    return mock.patch.object(module, "HeldButton", lambda: HeldButton(clock))
+
+
 def hold_for(desk, seconds, gap=0.1, who="a", what=("start", RECEIVE)):
     clock = Clock()
-    desk._held[who] = HeldButton(clock)
 
     async def press():
         answers = []
@@ -55,4 +61,5 @@ def hold_for(desk, seconds, gap=0.1, who="a", what=("start", RECEIVE)):
             clock.time += gap
         return [answer for answer in answers if answer is not None]
 
-    return asyncio.run(press())
+    with buttons_follow(clock):
+        return asyncio.run(press())

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 from coglab_console.desk.desk import Answer
 from coglab_console.desk.gates import HOLD_TIME, HeldButton, MotionGuard, Standstills
-from desk_double import RECEIVE, Clock, ask, hold_for, newest, shown
+from desk_double import RECEIVE, Clock, ask, buttons_follow, hold_for, newest, shown
 
 
 def test_after_a_stop_acknowledge_then_hold(desk):
@@ -97,7 +97,6 @@ def test_a_held_button_begins_the_motion_once(desk):
 def test_button_held_during_its_own_command_is_not_refused(desk):
     """The command itself has changed the state by then."""
     clock = Clock()
-    desk._held["a"] = HeldButton(clock)
     let = asyncio.Event()
 
     async def call(name, arguments):
@@ -118,7 +117,9 @@ def test_button_held_during_its_own_command_is_not_refused(desk):
         return [answer for answer in answers if answer is not None]
 
     desk.backend.call = call
-    assert [dict(answer) for answer in asyncio.run(press())] == [{"success": True, "message": "started"}]
+    with buttons_follow(clock):
+        answers = asyncio.run(press())
+    assert [dict(answer) for answer in answers] == [{"success": True, "message": "started"}]
     desk.released("a")
     answer = asyncio.run(desk.held("a", "calibrate", {"mode": "complete"}))
     assert "calibrates" in answer["message"]

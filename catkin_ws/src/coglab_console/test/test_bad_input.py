@@ -3,6 +3,7 @@ page would send: each refused or bounded, and said."""
 
 import asyncio
 import json
+import socket
 
 import aiohttp
 import pytest
@@ -96,7 +97,7 @@ async def test_a_browser_that_dies_with_a_button_held_is_told_to_the_others(cons
     for _ in range(4):
         await ws.send_str(json.dumps({"t": "hold", "name": "start", "arguments": RECEIVE}))
         await asyncio.sleep(0.1)
-    ws._response.connection.transport.abort()
+    ws.get_extra_info("socket").shutdown(socket.SHUT_RDWR)
     await until(lambda: any("while holding" in text for text in events_of(console, "command")))
     (told,) = events_of(console, "command")
     assert "browser 1" in told and "Receive" in told and "nothing was begun" in told

@@ -1,5 +1,6 @@
 """Calibration of the hand: refused with a reason if the hand would refuse it, else answered with its message."""
 
+import asyncio
 import threading
 import time
 from dataclasses import replace
@@ -65,7 +66,7 @@ class Hand:
 def calibrated_by(hand, monkeypatch, **arguments):
     monkeypatch.setattr(commands.rospy, "Publisher", lambda *_, **__: hand)
     monkeypatch.setattr(commands, "HAND_LIMIT", 0.5)
-    return commands.RosBackend(hand, lambda who: None, False)._calibrate(**arguments)
+    return asyncio.run(commands.RosBackend(hand, lambda who: None, False).call("calibrate", arguments))
 
 
 REFUSED = HandStatus(event_code=ReasonCode.HAND_REFUSED, message="calibration refused: the hand may hold an object")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 import time
 
 import pytest
@@ -23,7 +22,6 @@ def ros(monkeypatch):
     monkeypatch.setattr(rospy, "signal_shutdown", said.append)
     monkeypatch.setattr(rospy, "spin", lambda: None)
     monkeypatch.setattr(steady, "ending", lambda: False)
-    monkeypatch.setattr(steady, "_failed", threading.Event())
     yield said
     rospy.rostime.switch_to_wallclock()
 
@@ -66,7 +64,7 @@ def test_single_failures_do_not_end_a_timer_but_lasting_ones_end_the_node(ros, m
     assert steady.spin() == 0 and len(ros) == 2
     monkeypatch.setattr(steady, "FAILING", 0.1)
     steady.SteadyTimer(0.01, lambda: [][0], "always")
-    wait(steady._failed.is_set)
+    wait(lambda: steady.exit_status() == 1)
     wait(lambda: "the thread 'always' has ended" in ros)
     assert steady.spin() == 1
 

@@ -20,7 +20,12 @@ def use_engine(folder):
 
 def watch_user_data(container, seen):
     """Collect the user data that a viewer receives at each transition. Other engines pickle it."""
-    container.register_transition_cb(lambda *_: seen.append(pickle.dumps(container.userdata._data, 2)))
+
+    def collect(*_):
+        data = container.userdata
+        seen.append(pickle.dumps({key: data[key] for key in list(data.keys())}, 2))
+
+    container.register_transition_cb(collect)
     for child in container.get_children().values():
         if hasattr(child, "get_children"):
             watch_user_data(child, seen)

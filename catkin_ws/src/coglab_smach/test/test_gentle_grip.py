@@ -1,13 +1,10 @@
 """Near a person's hand the fingers close with the lowest force; after it has let go, firmly."""
 
-import numpy as np
 import pytest
-from coglab_objects.database import objects_folder, read_object
-from coglab_py.pose import Pose
+from coglab_objects.database import objects_folder
 from coglab_smach.ports.pending import PortError, Ready
 from coglab_smach.states import hand as hand_states
-from coglab_smach.states import knowledge, weight
-from coglab_smach.states.hand import closes_gently
+from coglab_smach.states import weight
 from conftest import Trial
 
 RECEIVE = "exchange_human_to_robot"
@@ -54,16 +51,22 @@ def test_a_hand_that_refuses_to_tighten_keeps_the_object():
     assert trial.ctx.holding == "mug"
 
 
-def test_grasps_without_a_gentle_level_are_not_used_near_a_person(monkeypatch):
-    """The screwdriver's handle is held laterally; it has two other grasps."""
-    entry = read_object(objects_folder() / "screwdriver.yaml")[0]
-    assert {name for name, grasp in entry["grasps"].items() if not closes_gently(grasp)} == {"handle"}
-    for name in ("person_at", "palm_at"):
-        monkeypatch.setattr(knowledge, name, lambda _: None)
-    state, seen = knowledge.SetGraspGoal(Trial().ctx), Pose(np.array([0.6, 0.0, 0.4])).to_dict()
-    assert {goal["grasp_name"] for goal in state._goals(entry, seen, Trial().grip)} == set(entry["grasps"]) - {"handle"}
-    only = {**entry, "grasps": {"handle": entry["grasps"]["handle"]}}
-    assert [goal["grasp_name"] for goal in state._goals(only, seen, Trial().grip)] == ["handle"]
+@pytest.mark.parametrize(("modes", "chosen"), [(("lateral", "tridigit"), "tridigit"), (("lateral",), "lateral")])
+def test_grasps_without_a_gentle_level_are_not_used_near_a_person(modes, chosen):
+    """Mode lateral has no gentle level. All grasps are at the same place, and the first one is preferred."""
+    trial = Trial()
+    shipped = trial.database.get("screwdriver")
+    grasps = {mode: {**shipped["grasps"]["handle"], "hand": {"mode": mode, "level": "high"}} for mode in modes}
+    entry = {**shipped, "grasps": grasps, "default_grasp": "lateral"}
+    trial.ctx.database.get_object = lambda object_id: Ready(entry)
+    trial.cell.objects["screwdriver"] = trial.cell.objects["mug"]
+
+    def script(t):
+        t.begin(object_id="screwdriver")
+        t.until(lambda: t.ctx.journal.marked("motion_started"))
+
+    trial.run(script)
+    assert trial.master.get_children()[RECEIVE].userdata.grasp_name == chosen
 
 
 @pytest.mark.parametrize(

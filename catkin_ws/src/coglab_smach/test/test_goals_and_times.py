@@ -115,7 +115,7 @@ def test_limits_come_from_the_managers_parameters():
 
 
 def solid(text):
-    return board_room._solid(ElementTree.fromstring(f"<collision>{text}</collision>"))
+    return board_room.read_solid(ElementTree.fromstring(f"<collision>{text}</collision>"))
 
 
 def test_the_lowest_point_of_plain_shapes():

@@ -6,9 +6,7 @@ from coglab_msgs.msg import ReasonCode
 from coglab_smach.ports.interfaces import Located, Verdict
 from coglab_smach.ports.pending import Polled, PortError
 from coglab_smach.states import weight
-from coglab_smach.states.base import TimeLimit
 from coglab_smach.states.hand_tracking import HandTrack
-from coglab_trials.virtual_clock import using
 from conftest import Trial
 from test_weight_and_recovery import Lifted
 
@@ -36,43 +34,57 @@ def test_a_stop_ends_the_firm_closing_as_well(moment):
     assert firm and cancelled == firm
 
 
-def test_an_object_pulled_out_of_the_hand_is_not_let_go(monkeypatch):
+@pytest.mark.parametrize(
+    ("away", "moved", "there", "let_go"),
+    [
+        (0.2, True, True, False),
+        (0.2, False, True, True),  # it is not seen, and the fingers have not closed past it
+        (0.2, False, False, False),  # it is seen away from the palm
+        (0.31, True, True, True),  # it has slipped a little, and stays away from the hand
+    ],
+)
+def test_an_object_pulled_out_of_the_hand_is_not_let_go(monkeypatch, away, moved, there, let_go):
     lifted = Lifted(monkeypatch)
-    lifted.state._farther, lifted.away, lifted.kept, lifted.held.moved = 0.14, 0.2, False, True
-    with using(lifted.trial.clock) as clock:
-        for _ in range(100):
-            assert not lifted.state._has_let_go()
-            clock.sleep(0.01)
-        lifted.held.moved = False
-        assert lifted.state._has_let_go(), "it is not seen, and the fingers have not closed past it"
-        lifted.held.there = lambda: False
-        assert not lifted.state._has_let_go(), "it is seen away from the palm"
-        lifted.held.there, lifted.held.moved, lifted.away = (lambda: True), True, 0.31
-        assert lifted.state._has_let_go(), "it has slipped a little, and stays away from the hand"
+    lifted.away, lifted.kept, lifted.held.moved, lifted.held.there = away, False, moved, lambda: there
+    if let_go:
+        assert lifted.take(hand_distance=0.1) == "succeeded"
+    else:
+        assert lifted.failure(hand_distance=0.1).code == ReasonCode.NOT_RELEASED
 
 
 def test_a_blocked_arm_is_the_reason_and_not_the_person(monkeypatch):
     lifted = Lifted(monkeypatch)
     lifted.ctx.arm.motion_allowed = lambda: Verdict(False, "the operator holds it", int(ReasonCode.HELD))
-    with pytest.raises(TimeLimit) as error:
-        lifted.state._has_let_go()
-    assert error.value.code == ReasonCode.HELD and "the operator holds it" in " ".join(error.value.causes)
+    error = lifted.failure()
+    assert error.code == ReasonCode.HELD and "the operator holds it" in " ".join(error.causes)
 
 
-def test_an_object_that_moves_with_the_persons_hand_was_taken_back(monkeypatch):
-    lifted, lost = Lifted(monkeypatch), PortError("'mug' has left the hand", ("open",), ReasonCode.OBJECT_NOT_SEEN)
-    taken, fell = ReasonCode.GOAL_WITHDRAWN, ReasonCode.OBJECT_NOT_SEEN
-    sights = {}
-    lifted.state.allow(1e9)
+@pytest.mark.parametrize(
+    ("thing", "age", "code"),
+    [
+        (0.1, 0.1, ReasonCode.GOAL_WITHDRAWN),
+        (0.3, 0.1, ReasonCode.OBJECT_NOT_SEEN),
+        (0.1, 0.2, ReasonCode.OBJECT_NOT_SEEN),
+        (None, 0.0, ReasonCode.OBJECT_NOT_SEEN),
+    ],
+)
+def test_an_object_that_moves_with_the_persons_hand_was_taken_back(monkeypatch, thing, age, code):
+    lifted, lost_at = Lifted(monkeypatch), []
+    sights = {
+        "human_hand": Located("human_hand", "", (0.8, 0.0, 0.4), (0.0, 0.0, 0.0, 1.0), 0.1),
+        "mug": thing and Located("object_mug", "", (0.8, thing, 0.4), (0.0, 0.0, 0.0, 1.0), age),
+    }
     monkeypatch.setattr(weight, "sight_of", lambda s, name: sights.get(name))
-    with using(lifted.trial.clock) as clock:
-        for thing, age, code in ((0.1, 0.1, taken), (0.3, 0.1, fell), (0.1, 0.2, fell), (None, 0.0, fell)):
-            sights["human_hand"] = Located("human_hand", "", (0.8, 0.0, 0.4), (0.0, 0.0, 0.0, 1.0), 0.1)
-            sights["mug"] = thing and Located("object_mug", "", (0.8, thing, 0.4), (0.0, 0.0, 0.0, 1.0), age)
-            begun = clock.now()
-            assert lifted.state._taken_back("mug", lost).code == code
-            looks = 0.4 if thing and age <= 0.15 else 0.8
-            assert clock.now() - begun == pytest.approx(looks, abs=0.06), "a falling object is far below by then"
+
+    def lost():
+        lost_at.append(lifted.trial.clock.now())
+        raise PortError("'mug' has left the hand", ("open",), ReasonCode.OBJECT_NOT_SEEN)
+
+    lifted.held.check = lost
+    assert lifted.failure().code == code
+    looks = 0.4 if thing and age <= 0.15 else 0.8
+    took = lifted.trial.clock.now() - lost_at[0]
+    assert took == pytest.approx(looks, abs=0.06), "a falling object is far below by then"
 
 
 def seen(track, way, frames=5, frame=0.033, since=0.0, jitter=0.0):

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_py.pose import Pose
+from coglab_smach.context.grip import Grip
 from coglab_smach.ports.interfaces import ContactEvent, Verdict
-from coglab_smach.ports.pending import Polled, Ready
+from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states import weight
-from coglab_smach.states.base import TimeLimit
-from coglab_smach.states.hand_tracking import HandTrack
 from coglab_smach.states.weight import TakeWeight
+from coglab_trials.virtual_clock import using
 from conftest import Trial
 
 RECEIVE = "exchange_human_to_robot"
@@ -20,34 +20,44 @@ WEIGHT = 0.31 * 9.81
 # --- taking the weight ------------------------------------------------------------------------------------------------
 
 
-def seen_all_the_way():
-    track = HandTrack()
-    track.is_sure = True
-    return track
-
-
 class Lifted:
-    """A TakeWeight whose methods the test calls. ``rises``: (m, m/s) of each rise."""
+    """A TakeWeight beside a person whose hand is ``away`` m from the palm. ``at_limit`` is called at its time limit."""
 
-    def __init__(self, monkeypatch, carried=False):
-        self.trial, self.rises, self.z, self.away = Trial(), [], 0.5, 0.1
-        self.ctx = self.trial.ctx
-        state = self.state = TakeWeight(self.ctx)
-        self.busy = False
-        state._way = SimpleNamespace(
-            follow=lambda: None, idle=lambda: not self.busy, begin=lambda m: None, stop=lambda: None
+    def __init__(self, monkeypatch):
+        self.trial, self.mass, self.away, self.kept, self.event = Trial(), 0.31, 0.1, True, None
+        self.ctx, self.grip = self.trial.ctx, Grip()
+        self.state, self.hand = TakeWeight(self.ctx), self.grip.hand
+        self.hand.is_sure = True
+        self.at_limit = lambda: None
+        self.held = SimpleNamespace(check=lambda: None, stays=lambda since: self.kept, moved=False, there=lambda: True)
+        way = SimpleNamespace(
+            follow=lambda: None,
+            idle=lambda: True,
+            begin=lambda motion: None,
+            halt=lambda why: None,
+            stop=lambda: self.at_limit(),
         )
-        state._way.halt = lambda why: self.rises.append(why)
-        state._rises, state._on, state._said, state._seen_away = 0, None, False, False
-        monkeypatch.setattr(weight, "from_palm", lambda state, track, *_: self.away)
-        state._hand = self.hand = seen_all_the_way()
         self.ctx.arm.motion_allowed = lambda: Verdict(True)
-        state._held = self.held = SimpleNamespace(check=lambda: None, stays=lambda since: self.kept, moved=False)
-        self.kept, self.held.there = True, lambda: True
-        self.event = ContactEvent(True, "x", 1.0) if carried else None
         self.ctx.contact.event = lambda: self.event
-        monkeypatch.setattr(weight, "palm_at", lambda ctx: np.array([0.0, 0.0, self.z]))
-        monkeypatch.setattr(weight, "rise", lambda ctx, by, speed: self.rises.append((by, speed)) or Ready())
+        monkeypatch.setattr(weight, "HeldObject", lambda *_: self.held)
+        monkeypatch.setattr(weight, "YieldToPull", lambda ctx: way)
+        monkeypatch.setattr(weight, "from_palm", lambda state, track, *_: self.away)
+        monkeypatch.setattr(weight, "palm_at", lambda ctx: np.array([0.0, 0.0, 0.5]))
+        monkeypatch.setattr(weight, "rise", lambda ctx, by, speed: Ready())
+
+    def take(self, hand_distance=None):
+        """Take the weight of the mug. ``hand_distance``: m from the palm before the fingers closed."""
+        self.state.allow(1e9)
+        entry = {"mass": self.mass}
+        ud = SimpleNamespace(object_id="mug", object_entry=entry, hand_distance=hand_distance, grip=self.grip)
+        with using(self.trial.clock):
+            return self.state.run(ud)
+
+    def failure(self, hand_distance=None):
+        """The same for an object that is not taken. Returns the error."""
+        with pytest.raises(PortError) as raised:
+            self.take(hand_distance)
+        return raised.value
 
 
 @pytest.mark.parametrize("stop", [True, False])
@@ -82,10 +92,10 @@ def test_the_repeated_closing_ends_with_the_state(stop):
 )
 def test_a_hand_within_30_cm_that_carries_the_object_gets_it_back(monkeypatch, away, holds, loaded, keeps):
     lifted = Lifted(monkeypatch)
-    lifted.away, lifted.ctx.holding = away, "mug"
+    lifted.ctx.holding, lifted.at_limit = "mug", lambda: setattr(lifted, "away", away)
     lifted.event = ContactEvent(True, "x", 1.0) if loaded else None
     monkeypatch.setattr(weight, "person_holds", lambda state, settings: holds)
-    error = lifted.state._not_released("mug", 5.0, TimeLimit("the wait"), {"mass": 0.31})
+    error = lifted.failure()
     assert error.sentence == "the person did not let go of 'mug' within 5 s" and error.code == ReasonCode.NOT_RELEASED
     assert (lifted.ctx.holding == "mug") == keeps and len(error.causes) == 1 + keeps
 

@@ -1,12 +1,13 @@
 """Measures whether the person holds the object: the arm sinks, and the real LeavingLoad measures the load."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from coglab_contact.load import LeavingLoad
 from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states import weight
-from coglab_smach.states.base import TimeLimit
-from coglab_smach.states.motion import _joint_way
+from coglab_smach.states.motion import rise
 from coglab_smach.states.weight import person_has_it, person_holds
 from coglab_trials.virtual_clock import using
 from test_weight_and_recovery import Lifted
@@ -25,23 +26,33 @@ class Scale:
         self.lifted = Lifted(monkeypatch)
         self.clock, self.ctx, self.state = self.lifted.trial.clock, self.lifted.ctx, self.lifted.state
         self.state.allow(1e9)
+        self.lifted.mass = mass
         self.settings = {"mass": mass, "load_share": 0.5}
         self.lifts, self.carried, self.over_ros = lifts, 9.81 * mass + pull, over_ros
         self.load, self.fed = None, 0.0
         self.ways: list[tuple[float, float, float]] = []
         """start (s), sunk distance then (m), target of the motion (m)"""
         monkeypatch.setattr(weight, "palm_at", lambda ctx: np.array([0.0, 0.0, 0.5 - self.sunk()]))
-        there = _joint_way(self.ctx, GIVING, np.array([0.0, 0.0, -WAY]), 0.03)[0]
+        arm = SimpleNamespace(
+            joint_positions=lambda: GIVING,
+            move_ptp=lambda position, speeds: position,
+            motion_limits=self.ctx.arm.motion_limits,
+        )
+        there = rise(SimpleNamespace(arm=arm), -WAY, 0.03)
         self.way, contact = np.asarray(there) - GIVING, self.ctx.contact
         contact.arm, contact.share_gone, contact.disarm = self.arm, self.share, lambda: None
         monkeypatch.setattr(weight, "rise", self.sink)
 
     def arm(self, mode, limit, settings):
+        if mode == "lift":  # before the question who holds it
+            return Ready()
         self.load = LeavingLoad(settings["mass"], settings["load_share"], self.clock.now() + limit, self.carried)
         self.fed = self.clock.now()
         return Ready()
 
     def sink(self, ctx, up, speed):
+        if self.load is None:
+            return Ready()
         self.ways.append((self.clock.now(), self.sunk(), self.sunk() - up))
         return Polled(lambda: self.sunk() == self.ways[-1][2], lambda: None, self.stand)
 
@@ -119,8 +130,7 @@ def test_the_robot_keeps_the_object_if_a_pull_ends_during_the_sinking(monkeypatc
         return -3.0 if since < late else 0.0
 
     scale.lifts = lifts
-    with using(scale.clock):
-        failure = scale.state._not_released("mug", 5.0, TimeLimit("no"), scale.settings)
+    failure = scale.lifted.failure()
     assert scale.ctx.holding == "mug" and "and the person's hand is" in failure.causes[1]
 
 

@@ -7,6 +7,7 @@ import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_py.pose import Pose
 from coglab_smach.kinematics.reachability import default_arm
+from coglab_smach.ports.interfaces import Ahead
 from coglab_smach.ports.pending import Polled, PortError, Ready
 from coglab_smach.states import reach, weight
 from coglab_smach.states.hand_tracking import HandTrack
@@ -164,16 +165,14 @@ def tells_late(hand, clock, late):
 @pytest.mark.parametrize(("touched", "seen_after"), [(False, 1.5), (True, 1.5), (False, 0.6)])
 def test_fingers_that_caught_the_object_do_not_open_when_it_is_seen_again(monkeypatch, touched, seen_after):
     """The person lets go at the first touch. The object in the robot's fingers is seen again after a pause."""
-    trial, opened = Trial(), []
+    trial, opened = Trial(**{"handover.belief": 0.5}), []
     tells_late(trial.ctx.hand, trial.clock, 0.1)
     monkeypatch.setattr(reach, "off_grasp", lambda state, goal: 0.02)
-    init = reach.ReachWatch.__init__
-
-    def believed(self, *given):
-        init(self, *given)
-        self._began_on_belief = True
-
-    monkeypatch.setattr(reach.ReachWatch, "__init__", believed)
+    # The reach begins on a belief, which is gone afterwards.
+    offered = trial.cell.objects["mug"]
+    trial.cell.objects["mug"] = Pose(offered.position + [0.7, 0.0, 0.0])
+    belief = Ahead(1.0, 0.0, "mug", "object_mug_ahead", tuple(map(float, offered.position)))
+    trial.ctx.perception.ahead = lambda: Ahead() if trial.ctx.journal.marked("motion_started") else belief
     trial.cell.partner.touch_after, trial.cell.partner.take_after = (1.2 if touched else None), None
     preshape = trial.ctx.hand.preshape
 
@@ -184,6 +183,8 @@ def test_fingers_that_caught_the_object_do_not_open_when_it_is_seen_again(monkey
     trial.ctx.hand.preshape = watched
 
     def lets_go(t):
+        t.cell.objects["mug"] = offered
+        t.until(lambda: t.ctx.journal.marked("closing_on_the_way"))
         # The object stays at its place, within the region.
         t.cell.at_palm = ("mug", t.cell.objects["mug"].inverse() * Pose(*default_arm().fk(t.cell.arm.position())))
         t.cell.goes = t.clock.now(), np.array([1.6, 0.0, 0.4])
@@ -191,7 +192,7 @@ def test_fingers_that_caught_the_object_do_not_open_when_it_is_seen_again(monkey
         t.clock.sleep(seen_after)
         t.cell.faults.not_seen.discard("mug")
 
-    result = receive(trial, lambda t: t.ctx.journal.marked("closing_on_the_way"), lets_go)
+    result = receive(trial, lambda t: t.ctx.journal.marked("motion_started"), lets_go)
     assert "paused" in result.marks and not opened, result
     assert "contact" in result.marks, "a held object counts as contact, even if none was detected"
 

@@ -41,14 +41,16 @@ def play(file, person, timing="natural", **more):
     from the recorded one while only that hand holds the object."""
     recording = {"file": file, "person": person, **more}
     trial, off = VirtualTrial(world=World(8, CONSIDERATE, recording=recording), settings={"timing": timing}), [0.0]
+    begun: list[float] = []
+    """s, begin of the recording"""
 
     def beside(t):
         human, truth = t.world.human, t.world.cell.truth()
         # From the robot's grip on, the arm lifts the object and the hand with it.
         if human.phase == "reaching" and truth["held_by"] == "human":
-            begun = t.world.t - human._since
+            begun[:] = begun or [t.world.t]
             shown = pose_of_truth(truth["human_hand"]).position
-            off.append(float(np.linalg.norm(shown - human.recorded.at(begun).position)))
+            off.append(float(np.linalg.norm(shown - human.recorded.at(t.world.t - begun[0]).position)))
 
     trial.beside = beside
     result = trial.run(RECEIVE)[0]
@@ -73,7 +75,8 @@ def test_a_recorded_person_continues_or_leaves_at_the_recorded_time(tmp_path, ha
     human = trial.world.human
     assert human.phase in ("idle", "retreating", "holding", "releasing")
     if person == "leave":
-        assert np.linalg.norm(human._hand - human.recorded.at(human.recorded.end).position) < 0.02
+        hand = pose_of_truth(trial.world.cell.truth()["human_hand"]).position
+        assert np.linalg.norm(hand - human.recorded.at(human.recorded.end).position) < 0.02
 
 
 @pytest.mark.parametrize("person, outcome", [("leave", "failed_empty"), ("no_wait", "succeeded")])

@@ -130,7 +130,7 @@ class Master:
         self.warnings: list[str] = []
 
 
-def queue_of_goals(monkeypatch: pytest.MonkeyPatch, pace: Pace | None = None) -> tuple[goals.GoalQueue, Master]:
+def queue_of_goals(monkeypatch: pytest.MonkeyPatch, pace: Pace, owner: Owner) -> tuple[goals.GoalQueue, Master]:
     """A queue of goals without a master; its thread is not started."""
     master = Master()
     Server.started = 0
@@ -141,7 +141,7 @@ def queue_of_goals(monkeypatch: pytest.MonkeyPatch, pace: Pace | None = None) ->
     for log in ("logwarn", "logerr"):
         monkeypatch.setattr(goals.rospy, log, lambda text, *values: master.warnings.append(text % values))
     monkeypatch.setattr(goals.rospy, "logwarn_throttle", lambda _, text, *values: master.warnings.append(text % values))
-    return goals.GoalQueue(Owner(), pace or Pace()), master
+    return goals.GoalQueue(owner, pace), master
 
 
 def status_now(**fields: object) -> HandStatus:

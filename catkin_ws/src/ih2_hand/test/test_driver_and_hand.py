@@ -75,7 +75,7 @@ def link_that_loses(count: int) -> VirtualLink:
 
 
 def opened(link: VirtualLink, **options: object) -> HandSerialDriver:
-    return HandSerialDriver(transport=link, clock=link._clock, **options)
+    return HandSerialDriver(transport=link, clock=link.hand.clock, **options)
 
 
 def test_one_lost_answer_does_not_keep_the_port_from_being_opened():
@@ -104,7 +104,7 @@ def test_a_port_is_closed_with_its_block():
 
 
 def test_unrequested_bytes_are_flushed_before_a_request(bench):
-    bench.link._input += b"\x55"
+    bench.link.write(bytes.fromhex("45 01"))  # nobody reads the position that it returns
     assert bench.driver.get_finger_status(1)["raw"] == 0x08
     assert bench.driver.counters.reasons == {"bytes without a request": 1}
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from types import SimpleNamespace
 
@@ -17,21 +18,36 @@ from ih2_hand.ros import goals
 
 
 class Desk:
-    """A queue whose entries the test processes one by one, with its own clock."""
+    """A queue with its own clock. Every call waits until the goals' thread has processed what it sent."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.now = 100.0
-        clock = SimpleNamespace(monotonic=lambda: self.now, sleep=lambda seconds: None)
+        self.now, self.looks = 100.0, 0
+        clock = SimpleNamespace(monotonic=self.look, sleep=lambda seconds: None)
         monkeypatch.setattr(goals, "time", clock)
         monkeypatch.setattr(pace, "time", clock)
         monkeypatch.setattr(goals.rospy.Time, "now", lambda: rospy.Time.from_sec(self.now))
-        self.pace = pace.Pace()
-        self.queue, self.master = queue_of_goals(monkeypatch, self.pace)
-        self.owner: Owner = self.queue._owner
+        self.pace, self.owner, self.started = pace.Pace(), Owner(), False
+        self.queue, self.master = queue_of_goals(monkeypatch, self.pace, self.owner)
+
+    def look(self) -> float:
+        now = self.now
+        self.looks += 1
+        return now
 
     def work(self) -> None:
-        while not self.queue._mailbox.empty():
-            self.queue._handle(self.queue._mailbox.get())
+        if not self.started:
+            self.started = True
+            self.queue.start()
+            assert Server.started == len(goals.SPECS)
+        done = threading.Event()
+        self.queue.call(done.set)
+        assert done.wait(60.0), "it waits for ever"
+
+    def tick(self) -> None:
+        """Wait until the idle thread has looked at the present time, or ended the goal."""
+        before = self.looks
+        wait(lambda: self.looks > before + 1 or self.queue.active is None)
+        self.work()
 
     def goal(self, name: str = "hand_close") -> Handle:
         handle = Handle()
@@ -43,13 +59,10 @@ class Desk:
         Server.every[f"~{name}"].on_cancel(handle)
         self.work()
 
-    def put(self, kind: str, name: str = "", content: object = None) -> None:
-        self.queue._mailbox.put(goals.Item(kind, name, content))
-        self.work()
-
     def status(self, after: float = 0.1, **fields: object) -> None:
         self.now += after
-        self.put("status", content=(status_now(**fields), self.now))
+        self.queue.polled(status_now(**fields), self.now)
+        self.work()
 
     @property
     def task(self) -> Task:
@@ -61,8 +74,18 @@ class Desk:
 
 
 @pytest.fixture
-def desk(monkeypatch) -> Desk:
-    return Desk(monkeypatch)
+def desk(monkeypatch):
+    desk = Desk(monkeypatch)
+    yield desk
+    if desk.started:
+        desk.queue.shutdown()
+
+
+def wait(what) -> None:
+    end = time.monotonic() + 60.0
+    while not what():
+        assert time.monotonic() < end, "it waits for ever"
+        time.sleep(0.005)
 
 
 def test_only_the_last_of_many_goals_begins(desk):
@@ -93,7 +116,7 @@ def test_a_goal_ends_though_its_fingers_cannot_be_stopped(desk, driver):
     else:
         desk.owner.driver = None
     desk.cancel("hand_close", handle)
-    assert handle.ended is not None and desk.queue.active is None
+    assert handle.ended[0] == "cancelled" and desk.queue.active is None
 
 
 def test_a_goal_does_not_go_on_with_another_connection(desk):
@@ -160,10 +183,10 @@ def test_silence_counts_from_the_last_status(desk):
     handle = desk.goal()
     desk.status(after=goals.SILENCE_S)
     desk.now += goals.SILENCE_S
-    desk.put("tick")
+    desk.tick()
     assert handle.ended is None
     desk.now += 0.01
-    desk.put("tick")
+    desk.tick()
     assert handle.ended[0] == "aborted" and "no hand_status for 1.5 s" in handle.ended[1]
 
 
@@ -174,28 +197,6 @@ def test_gap_between_polls_does_not_count_as_standstill(desk):
         desk.status(after=after)
     first, second, third = desk.task.asked
     assert second - first == pytest.approx(0.04) and third - second == pytest.approx(goals.LONGEST_GAP_S)
-
-
-# -- with its thread -----------------------------------------------------------------------------
-
-
-@pytest.fixture
-def working(monkeypatch):
-    """A queue that works by itself; ended at the end of the test."""
-    rospy.rostime.set_rostime_initialized(True)
-    rospy.rostime.switch_to_wallclock()
-    queue, master = queue_of_goals(monkeypatch)
-    queue.start()
-    assert Server.started == len(goals.SPECS)
-    yield queue, master
-    queue.shutdown()
-
-
-def wait(what) -> None:
-    end = time.monotonic() + 60.0
-    while not what():
-        assert time.monotonic() < end, "it waits for ever"
-        time.sleep(0.005)
 
 
 def fails(error: Exception):
@@ -209,13 +210,10 @@ def fails(error: Exception):
         (KeyError("slip"), "internal error: 'slip'", Reason.UNEXPECTED),
     ],
 )
-def test_a_goal_ends_whatever_happens_and_the_next_is_taken(working, error, why, code):
-    queue, _ = working
-    handle, after = Handle(), Handle()
-    Server.every["~hand_close"].on_goal(handle)
-    wait(lambda: queue.active)
-    queue.call(lambda: fails(error))
-    wait(lambda: handle.ended)
+def test_a_goal_ends_whatever_happens_and_the_next_is_taken(desk, error, why, code):
+    handle = desk.goal()
+    desk.queue.call(lambda: fails(error))
+    desk.work()
     assert handle.ended == ("aborted", why, code)
-    Server.every["~hand_open"].on_goal(after)
-    wait(lambda: queue.active == "hand_open")
+    desk.goal("hand_open")
+    assert desk.queue.active == "hand_open"

@@ -7,7 +7,6 @@ import os
 import pty
 import time
 import tty
-from types import SimpleNamespace
 
 import pytest
 import serial
@@ -62,15 +61,15 @@ def test_read_of_missing_bytes_ends_at_its_time_limit(far, there, last):
 
 def test_bytes_that_come_one_by_one_are_one_answer(far, monkeypatch):
     pieces = [b"\x01", b"\x02", b"\x03"]
+    far.says(b"\x00")  # never read: the port always has bytes
     monkeypatch.setattr(transport.os, "read", lambda descriptor, most: pieces.pop(0))
-    monkeypatch.setattr(far.port, "_poll", SimpleNamespace(poll=lambda milliseconds: True))
     assert far.port.read(3, 5.0) == b"\x01\x02\x03"
 
 
 def test_an_end_of_file_is_a_lost_port(far, monkeypatch):
     pieces = [b"\x01", b""]
+    far.says(b"\x00")  # never read: the port always has bytes
     monkeypatch.setattr(transport.os, "read", lambda descriptor, most: pieces.pop(0))
-    monkeypatch.setattr(far.port, "_poll", SimpleNamespace(poll=lambda milliseconds: True))
     with pytest.raises(HandConnectionLost, match="is gone .*end of file.*last byte received none; check the cable"):
         far.port.read(2, 5.0)
 

@@ -147,7 +147,6 @@ class TestIntrospection(unittest.TestCase):
         finally:
             proxy.stop()
         self.assertEqual({m.path for m in self.viewer.structures + self.viewer.statuses}, {"/SM_ROOT"})
-        self.assertEqual((self.root._start_cbs, self.root._transition_cbs), ([], []))
 
     def test_user_data_and_what_cannot_be_pickled(self):
         self.start()
@@ -199,7 +198,6 @@ class TestIntrospection(unittest.TestCase):
         self.assertEqual([t.name for t in ours if "introspection" in t.name], ["smach_introspection:/quiet"])
         server.stop()
         self.assertFalse([t for t in threading.enumerate() if "introspection:/quiet" in t.name])
-        self.assertEqual((self.root._start_cbs, self.root._transition_cbs), ([], []))
         self.assertNotIn("/quiet" + STATUS_TOPIC, [name for name, _ in rospy.get_published_topics()])
 
     def test_stop_sends_what_is_left(self):

@@ -141,13 +141,14 @@ class TestActionState(unittest.TestCase):
         self.assertEqual(state.execute(self.ud), "succeeded")
 
     def test_cancelled_but_succeeded_does_not_poison_the_next_run_better(self):
-        state = action_state(SUCCEED_WHEN_CANCELLED)
+        state = smach_ros.SimpleActionState("reference", TestAction, goal_key="whole")
+        self.ud.whole = TestGoal(goal=SUCCEED_WHEN_CANCELLED)
         run = in_thread(state.execute, self.ud)
         self.assertTrue(wait_for(lambda: self.server.goals))
         state.request_preempt()
         run.join(LIMIT)
         self.assertEqual(run.result, "succeeded")
-        state._goal = TestGoal(goal=SUCCEED)
+        self.ud.whole = TestGoal(goal=SUCCEED)
         self.assertEqual(state.execute(self.ud), "succeeded")
 
     def test_cancelled_but_succeeded_the_machine_carries_the_request_on(self):

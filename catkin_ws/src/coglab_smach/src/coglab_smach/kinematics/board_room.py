@@ -51,8 +51,8 @@ def _pose(element: ElementTree.Element) -> Pose:
     return Pose.from_dict({"xyz": xyz, "rpy_deg": np.degrees(rpy).tolist()})
 
 
-def _solid(element: ElementTree.Element) -> Solid | None:
-    """Converts a <collision> or <visual>. None for a mesh, which is not a primitive shape."""
+def read_solid(element: ElementTree.Element) -> Solid | None:
+    """Reads a <collision> or <visual> of a robot description. None for a mesh, which is not a primitive shape."""
     at = _pose(element)
     for shape in element.findall("geometry/*"):
         if shape.tag == "box":
@@ -96,7 +96,7 @@ class BoardRoom:
             link.get("name", ""): [
                 solid
                 for each in link.findall("collision") or link.findall("visual")
-                if (solid := _solid(each)) is not None
+                if (solid := read_solid(each)) is not None
             ]
             for link in root.findall("link")
         }
