@@ -9,14 +9,14 @@ from coglab.control.simulation import simulate
 @pytest.mark.parametrize(
     ("fields", "words"),
     [
-        ({"joints": np.zeros(6)}, r"joints: shape \(7,\) is expected, shape \(6,\) came"),
-        ({"joints": [0.0] * 6 + [np.nan]}, r"finite numbers are expected, joints\[6\] is nan"),
+        ({"joints": np.zeros(6)}, r"joints: .*\(7,\).*\(6,\)"),
+        ({"joints": [0.0] * 6 + [np.nan]}, r"joints\[6\].* nan"),
         ({"joints": np.zeros(7) + 1j}, "7 numbers"),
         ({"joints": ["a"] * 7}, "7 numbers"),
         ({"joint_velocity": np.zeros(7)}, "without joints"),
         ({"joints": np.zeros(7), "twist": np.zeros(6)}, "both came"),
-        ({"position": np.zeros(3)}, "needs position and orientation"),
-        ({"position": np.zeros(3), "orientation": [0, 0, 0, 2]}, "length is 2"),
+        ({"position": np.zeros(3)}, "position and orientation"),
+        ({"position": np.zeros(3), "orientation": [0, 0, 0, 2]}, " 2"),
     ],
 )
 def test_an_invalid_reference_is_refused_with_a_reason(fields, words):
@@ -36,9 +36,9 @@ def test_arguments_have_defaults_and_ranges():
     name = setup.argument("radius", "m", 0.05, 0.0, 0.15)
     assert setup.values({}) == {name: 0.05}
     for wrong in (0.2, float("nan"), "wide"):
-        with pytest.raises(ControlError, match="0.0 to 0.15 m is expected"):
+        with pytest.raises(ControlError, match=r"0\.0 to 0\.15 m"):
             setup.values({"radius": wrong})
-    with pytest.raises(ControlError, match="no argument 'size'; it has: radius"):
+    with pytest.raises(ControlError, match="'size'.*radius"):
         setup.values({"size": 1.0})
 
 
@@ -53,5 +53,5 @@ def test_done_must_return_a_truth_value():
         def done(self):
             return "not yet"
 
-    with pytest.raises(ControlError, match="'not yet'; True or False is expected"):
+    with pytest.raises(ControlError, match="'not yet'"):
         simulate(Talks())

@@ -110,11 +110,11 @@ def test_invalid_actions_are_refused_and_change_nothing(make):
         env.step(np.zeros(7))
     env.reset(seed=1)
     for bad, words in (
-        (np.zeros(6), r"action of control 'palm_twist': shape \(7,\) is expected, got \(6,\)"),
-        (np.full(7, np.nan), "finite numbers"),
-        ([np.inf] * 7, "finite numbers"),
-        ("up", "numbers of shape"),
-        (np.zeros(7) + 1j, "numbers of shape"),
+        (np.zeros(6), r"'palm_twist'.*\(7,\).*\(6,\)"),
+        (np.full(7, np.nan), "finite"),
+        ([np.inf] * 7, "finite"),
+        ("up", "shape"),
+        (np.zeros(7) + 1j, "shape"),
     ):
         with pytest.raises(ValueError, match=words):
             env.step(bad)
@@ -125,14 +125,14 @@ def test_invalid_actions_are_refused_and_change_nothing(make):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"split": "exam"}, "split 'exam' is none of train, validation"),
-        ({"objects": ("sword",)}, "object 'sword' is none of mug"),
-        ({"objects": ()}, "objects is empty"),
-        ({"control": "torque"}, "control 'torque' is none of palm_twist"),
-        ({"time_limit": math.nan}, r"time_limit: a finite number \(s\) is expected, got nan"),
-        ({"time_limit": "long"}, "time_limit: a finite number"),
-        ({"reward": 3}, "reward: a coglab.envs.handover.Reward"),
-        ({"render_mode": "human"}, "render_mode 'human' is none of"),
+        ({"split": "exam"}, "split.*'exam'.*train, validation"),
+        ({"objects": ("sword",)}, "object.*'sword'.*mug"),
+        ({"objects": ()}, "objects"),
+        ({"control": "torque"}, "control.*'torque'.*palm_twist"),
+        ({"time_limit": math.nan}, "time_limit.*nan"),
+        ({"time_limit": "long"}, "time_limit"),
+        ({"reward": 3}, "reward.*coglab.envs.handover.Reward"),
+        ({"render_mode": "human"}, "render_mode.*'human'"),
     ],
 )
 def test_invalid_arguments_are_refused_with_a_reason(arguments, words):
@@ -144,8 +144,8 @@ def test_a_person_can_be_chosen_and_an_unknown_one_is_refused(make):
     env = make(split="test")
     assert env.reset(options={"person": 7})[1]["person"] == SPLITS["test"].seeds[7]
     for options, words in (
-        ({"person": 300}, "people 0 to 299"),
-        ({"people": 1}, "the only option is person"),
+        ({"person": 300}, "299"),
+        ({"people": 1}, "person"),
         (3, "dict"),
     ):
         with pytest.raises(ValueError, match=words):
@@ -223,7 +223,7 @@ def test_environments_in_their_own_processes():
         assert reward.shape == (2,) and np.all(np.isfinite(reward))
     finally:
         vector.close()
-    with pytest.raises(ValueError, match="'coglab/Throw-v0' is none of"):
+    with pytest.raises(ValueError, match="'coglab/Throw-v0'"):
         coglab.envs.make_vec("coglab/Throw-v0", 2)
 
 

@@ -93,10 +93,10 @@ class Needy(Shift):
 @pytest.mark.parametrize(
     ("more", "named"),
     [
-        (lambda d: d.measured("imu", size=9), "Needy needs measuredData/imu"),
-        (lambda d: d.measured("wrench", size=3), "'wrench' has size 6"),
-        (lambda d: d.reads("jointSpaceReference", "Position"), "needs jointSpaceReference/Position"),
-        (lambda d: d.modifies("zmp", "zmp"), "needs zmp/zmp"),
+        (lambda d: d.measured("imu", size=9), "Needy.*measuredData/imu"),
+        (lambda d: d.measured("wrench", size=3), "'wrench'.*6"),
+        (lambda d: d.reads("jointSpaceReference", "Position"), "jointSpaceReference/Position"),
+        (lambda d: d.modifies("zmp", "zmp"), "zmp/zmp"),
     ],
 )
 def test_controller_that_needs_more_than_a_slot_carries_is_refused(more: Any, named: str) -> None:
@@ -105,7 +105,7 @@ def test_controller_that_needs_more_than_a_slot_carries_is_refused(more: Any, na
 
 
 @pytest.mark.parametrize(
-    ("gains", "named"), [({"height": 0.2}, "0 to 0.1 m, got 0.2"), ({"hight": 0.1}, "height"), ({"height": [1, 2]}, "")]
+    ("gains", "named"), [({"height": 0.2}, r"0\.1 m.*0\.2"), ({"hight": 0.1}, "height"), ({"height": [1, 2]}, "")]
 )
 def test_gains_out_of_range_are_refused(gains: dict[str, Any], named: str) -> None:
     with pytest.raises(ControlError, match=named):

@@ -68,7 +68,7 @@ def test_palm_reaches_poses_and_frames(world):
         assert arm.move_to(target).ok
         assert np.linalg.norm(arm.palm.position - where) < 0.001
         assert abs(np.dot(arm.palm.orientation, here.orientation)) > 0.9999
-    with pytest.raises(coglab.Refused, match="cannot be brought") as refused:
+    with pytest.raises(coglab.Refused) as refused:
         arm.move_to((here.position + [2.0, 0.0, 0.0], here.orientation))
     assert refused.value.name == "GOAL_UNREACHABLE"
 
@@ -238,7 +238,7 @@ def test_a_fork_of_an_open_world_is_refused(world):
 def test_a_function_of_the_period_may_not_let_time_pass(world):
     world.after_period.append(lambda w: w.step())
     try:
-        with pytest.raises(RuntimeError, match="may only look"):
+        with pytest.raises(RuntimeError, match="after_period"):
             world.step()
     finally:
         world.after_period.clear()
@@ -278,7 +278,7 @@ def test_a_world_that_fails_leaves_its_thread_free(alone):
 
 def test_an_action_without_an_object_uses_that_of_the_world(alone):
     with coglab.World(seed=3, person="accustomed", object="ball", perfect_perception=True) as world:
-        with pytest.raises(coglab.Refused, match="'dance' is no action.*receive"):
+        with pytest.raises(coglab.Refused, match="'dance'.*receive"):
             world.robot.do("dance")
         assert world.robot.receive().object_id == "ball"
 
@@ -334,7 +334,7 @@ def test_an_exchange_that_fails_is_a_result_with_a_reason(alone):
 
 def test_an_exchange_that_takes_too_long_stops_the_robot(alone):
     with coglab.World(seed=3, person="accustomed", perfect_perception=True) as world:
-        with pytest.raises(TimeoutError, match="the end of 'receive'.*robot.reset"):
+        with pytest.raises(TimeoutError, match="'receive'.*robot.reset"):
             world.robot.receive(limit=2.0)
         assert world.robot.state.standing and "reset" in world.robot.state.actions
         assert world.robot.reset().ok and world.robot.receive().ok

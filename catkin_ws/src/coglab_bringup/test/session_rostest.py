@@ -135,17 +135,17 @@ class Session(Handover):
         start = rospy.ServiceProxy("/coglab/start", Start)
         end = time.monotonic() + 60.0
         answer = start("put", "")
-        waits = ("takes initialise", "takes reset")
+        waits = ("start initialise", "start reset")
         while not any(words in answer.message for words in waits) and time.monotonic() < end:
             time.sleep(0.2)
             answer = start("put", "")
         why = rospy.ServiceProxy("/coglab/why", Trigger)().message
-        self.assertRegex(why, "robot is silent|arm is blocked|arm does not follow")
+        self.assertRegex(why, "silent|blocked|follow")
         end = time.monotonic() + 2 * READY_LIMIT
-        while "wait_without_object takes" not in answer.message and time.monotonic() < end:
+        while "start exchange_human_to_robot" not in answer.message and time.monotonic() < end:
             self.return_to_hub()
             answer = start("put", "")
-        self.assertIn("wait_without_object takes", answer.message)
+        self.assertIn("start exchange_human_to_robot", answer.message)
 
 
 if __name__ == "__main__":

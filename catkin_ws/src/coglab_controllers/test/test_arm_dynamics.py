@@ -101,7 +101,7 @@ def test_a_payload_adds_its_weight_and_its_inertia_at_its_place(chain: cc.Chain)
     dynamics.set_payload(0.5)
     assert np.abs(dynamics.evaluate(HOME, ONE).gravity - bare.gravity).max() > 0.1
     for mass, centre in ((-1e-9, [0] * 3), (math.nan, [0] * 3), (math.inf, [0] * 3), (0.1, [0, math.nan, 0])):
-        with pytest.raises(ValueError, match="a mass of 0 kg or more and a finite centre"):
+        with pytest.raises(ValueError, match="mass.*centre"):
             dynamics.set_payload(mass, centre)
 
 
@@ -128,14 +128,14 @@ def test_an_arm_without_dynamics_is_refused_in_words() -> None:
     text = URDF.read_text()
     base = "lwr_base_link"
     for arguments, words in (
-        (("<robot/>",), "one tree of links"),
-        ((text, base, "nowhere"), "to link 'nowhere' in the URDF, found none"),
-        ((text, base, "lwr_link_4"), f"expected 7 movable joints between '{base}' and 'lwr_link_4', found"),
+        (("<robot/>",), "tree"),
+        ((text, base, "nowhere"), "'nowhere'"),
+        ((text, base, "lwr_link_4"), f"7 .*'{base}' .*'lwr_link_4'"),
     ):
         with pytest.raises(ValueError, match=words):
             cc.ArmDynamics(*arguments)
     dynamics = cc.ArmDynamics(text)
     bad = np.full(7, math.nan)
-    for q, dq, words in ((bad, ZERO, "q: expected finite"), (HOME, bad, "velocity: expected finite")):
+    for q, dq, words in ((bad, ZERO, "q: "), (HOME, bad, "velocity: ")):
         with pytest.raises(ValueError, match=words):
             dynamics.evaluate(q, dq)

@@ -35,9 +35,9 @@ def parsed(*primitives: str, **options: str) -> cc.Library:
 def test_what_cannot_be_written_leaves_nothing_behind(tmp_path: Path) -> None:
     made = parsed(weighted())
     (tmp_path / "folder" / "inside").mkdir(parents=True)
-    with pytest.raises(cc.LibraryError, match=":0: cannot be replaced"):
+    with pytest.raises(cc.LibraryError, match="folder:0: "):
         made.save(str(tmp_path / "folder"))
-    with pytest.raises(cc.LibraryError, match=":0: cannot be written; check that the folder exists"):
+    with pytest.raises(cc.LibraryError, match="a.xml:0: "):
         made.save(str(tmp_path / "nowhere" / "a.xml"))
     assert [p.name for p in tmp_path.iterdir()] == ["folder"]
     made.save(str(tmp_path / "a.xml"))

@@ -151,8 +151,7 @@ class TopicGoal(FeedbackOnRos):
         self.assertFalse(answer.success)
         for scale in (2.0, -0.1, math.nan):
             answer = robot.manager("speed_scale", scale)
-            self.assertFalse(answer.success)
-            self.assertIn("0 (stand still) to 1", answer.message)
+            self.assertEqual((answer.success, answer.reason_code), (False, ReasonCode.OUT_OF_RANGE))
         publisher = rospy.Publisher("controller_manager/dmp/dmp_goal", DmpGoal, queue_size=1)
         wait_until(lambda: publisher.get_num_connections() > 0, "connection")
         robot.see_hand(None)

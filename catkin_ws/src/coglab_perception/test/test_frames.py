@@ -36,9 +36,9 @@ def test_the_file():
     [
         ({"board": ""}, "missing: board"),
         ({"palm": "x"}, "unknown: palm"),
-        ({"object": "thing"}, "must contain {id}"),
-        ({"board": "world"}, "differ from each other"),
-        ({"world": "/world"}, "no leading slash"),
+        ({"object": "thing"}, "{id}"),
+        ({"board": "world"}, "differ"),
+        ({"world": "/world"}, "slash"),
         ({"world": 3}, "missing: world"),
     ],
 )
@@ -51,11 +51,11 @@ def test_bad_frames(tmp_path, change, words):
 
 
 def test_bad_files(tmp_path):
-    with pytest.raises(FramesError, match="cannot be read"):
+    with pytest.raises(FramesError, match="none.yaml"):
         FrameNames.load(str(tmp_path / "none.yaml"))
     path = tmp_path / "frames.yaml"
     path.write_text("world: [")
     with pytest.raises(FramesError, match="not YAML"):
         FrameNames.load(str(path))
-    with pytest.raises(FramesError, match=r"load coglab_perception/config/frames\.yaml there"):
+    with pytest.raises(FramesError, match=r"coglab_perception/config/frames\.yaml"):
         FrameNames.from_mapping(None)

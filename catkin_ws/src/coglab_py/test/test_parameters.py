@@ -84,7 +84,7 @@ def test_the_nearest_parameter_above_or_none(server):
     server["/above/port"] = 7
     assert parameters.found_above("port", int) == 7
     server["/above/port"] = "seven"
-    with pytest.raises(ParameterError, match="parameter /above/port: expected a whole number, got 'seven'"):
+    with pytest.raises(ParameterError, match="/above/port.*'seven'"):
         parameters.found_above("port", int)
 
 

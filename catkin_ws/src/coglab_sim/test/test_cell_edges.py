@@ -27,7 +27,7 @@ def test_losses_are_shares_of_each_way(session):
     s.cell.set_loss(0.0, 0.0)
     assert s.tick() is not None
     for wrong in ((1.1, 0.0), (0.0, 1.1), (-0.1, 0.0), (0.0, -0.1)):
-        with pytest.raises(ValueError, match="fault/packet_loss = .* is outside its range 0..1"):
+        with pytest.raises(ValueError, match=r"fault/packet_loss.* 0\.\.1"):
             s.cell.set_loss(*wrong)
 
 

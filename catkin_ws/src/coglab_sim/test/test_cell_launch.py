@@ -62,5 +62,5 @@ def test_a_library_that_cannot_be_loaded_ends_the_launch_before_anything_starts(
     with pytest.raises(RLException):
         resolve()
     said = capfd.readouterr().err
-    assert f"the simulated cell cannot be loaded ({tmp_path}/libcoglab_sim_plant.so: file too short)" in said
-    assert "run ./coglab build" in said and "libmujoco-dev" in said and "./coglab doctor" in said
+    assert f"{tmp_path}/libcoglab_sim_plant.so: file too short" in said
+    assert "./coglab build" in said and "libmujoco-dev" in said and "./coglab doctor" in said

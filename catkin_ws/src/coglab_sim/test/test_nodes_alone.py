@@ -53,7 +53,7 @@ def test_hand_and_object_are_broadcast_with_their_capture_time(monkeypatch):
         assert (found.x, found.y, found.z) == where and seen[name].header.stamp.to_sec() == pytest.approx(one.ros.now)
     assert sorted(one.see(truth(""))) == ["human_hand"]
     one.ros.subscribed["~people"](UInt8(2))
-    assert sorted(one.see()) == ["object_mug"] and one.node.people == 2 and "2 people in view" in one.ros.said[-1]
+    assert sorted(one.see()) == ["object_mug"] and one.node.people == 2 and "2 people" in one.ros.said[-1]
     one.ros.subscribed["~people"](UInt8(0))
     assert sorted(one.see()) == ["object_mug"]
     bad = truth(human_hand=message((float("nan"), 0, 0)))
@@ -109,7 +109,7 @@ def test_commands_and_words_reach_the_person(monkeypatch):
     one.ros.subscribed["human_command"](String("give mug"))
     assert asked == ["give mug"]
     one.ros.subscribed["human_command"](String("juggle"))
-    assert "give, receive or rest" in one.ros.said[-1]
+    assert "give, receive" in one.ros.said[-1]
     one.ros.subscribed["/a/say"](Say(code=Say.I_HAVE_IT))
     assert heard == [(3.0, Say.I_HAVE_IT)]
     for age in (60.0, 3.0):  # latched: said before this person came

@@ -20,7 +20,7 @@ def test_a_grasp_holds_under_shaking_and_lets_go(name):
 def test_a_grasp_without_friction_is_lost():
     """The fingers close around a bottle; then its friction is set to zero."""
     bottle = objects()["bottle"]
-    with pytest.raises(ValueError, match="object 'bottle' cannot be placed in the robot's hand there"):
+    with pytest.raises(ValueError, match="'bottle'"):
         GraspTrial({**bottle, "friction": 0.02}, "index up")
     trial = GraspTrial(bottle, "index up")
     trial.close()
@@ -84,7 +84,7 @@ def test_out_of_the_fingers_reach_nothing_is_placed_in_the_robots_hand(place):
     """Beside the hand, before it, behind it."""
     plant = _cell.Plant(URDF, HOME, objects()["mug"], board=False)
     before = plant.bytes()
-    with pytest.raises(ValueError, match="object 'mug' cannot be placed in the robot's hand there: closed around it,"):
+    with pytest.raises(ValueError, match="'mug'.*closed"):
         plant.place("robot_hand", place, [-0.5, -0.5, -0.5, 0.5])
     assert plant.bytes() == before, "nothing has changed"
 

@@ -29,15 +29,15 @@ def test_bad_objects_are_refused_with_words(change, words):
 
 def test_an_object_inside_something_is_refused():
     plant = _cell.Plant(URDF, HOME, BOX)
-    with pytest.raises(ValueError, match=r"object 'box' would stand \d+(\.\d+)? mm inside board there"):
+    with pytest.raises(ValueError, match=r"'box'.* \d+(\.\d+)? mm .*board"):
         plant.place("world", BOARD_TOP - [0.0, 0.0, 0.015])
-    with pytest.raises(ValueError, match="inside ih2_base_link there"):
+    with pytest.raises(ValueError, match="ih2_base_link"):
         plant.place("robot_hand", [0.0, 0.0, 0.0])
-    with pytest.raises(ValueError, match=r"object 'box' would stand \d+(\.\d+)? mm inside the person's hand in that"):
+    with pytest.raises(ValueError, match=r"'box'.* \d+(\.\d+)? mm .*person"):
         plant.place("human_hand", [0.15, 0.0, -0.02])
     plant.place("world", BOARD_TOP)
     before = plant.bytes()
-    with pytest.raises(ValueError, match="inside board there"):
+    with pytest.raises(ValueError, match="board"):
         plant.place("world", BOARD_TOP - [0.0, 0.0, 0.015])
     assert plant.bytes() == before, "the object stays where it was"
 

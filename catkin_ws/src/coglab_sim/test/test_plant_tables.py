@@ -46,13 +46,13 @@ def test_descriptions_are_refused_with_file_line_and_element(tmp_path, text, sen
     path = described(tmp_path, text())
     with pytest.raises(RuntimeError) as refusal:
         _cell.Plant(path, HOME, BOX)
-    assert f"robot description {path}" in str(refusal.value)
+    assert path in str(refusal.value)
     assert re.search(sentence, str(refusal.value)), str(refusal.value)
 
 
 def test_links_that_hang_in_a_circle_do_not_hang_below_the_root(tmp_path):
     text = replaced('<parent link="world"/>', '<parent link="lwr_link_7"/>')
-    with pytest.raises(RuntimeError, match="'ih2_base_link' does not hang below the root link"):
+    with pytest.raises(RuntimeError, match="'ih2_base_link'"):
         _cell.Plant(described(tmp_path, text), HOME, BOX)
 
 

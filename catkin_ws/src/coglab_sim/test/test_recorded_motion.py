@@ -157,7 +157,7 @@ class Bomb:
 def test_bad_npz_files_are_named(tmp_path):
     path = tmp_path / "bad.npz"
     path.write_bytes(b"nonsense")
-    with pytest.raises(RecordingError, match="not an npz file"):
+    with pytest.raises(RecordingError, match="npz"):
         load_recording(str(path))
     np.savez(path, t=np.array([Bomb()], dtype=object), position=np.zeros((1, 3)))
     with pytest.raises(RecordingError, match="npz"):
@@ -170,7 +170,7 @@ def test_bad_npz_files_are_named(tmp_path):
 def test_bad_bags_are_named(tmp_path):
     path = tmp_path / "bad.bag"
     path.write_bytes(b"#ROSBAG V2.0\n but then nonsense")
-    with pytest.raises(RecordingError, match="not a readable bag"):
+    with pytest.raises(RecordingError, match="bad.bag"):
         load_recording(str(path))
     with pytest.raises(RecordingError, match="'world'.* map"):
         load_recording(write_bag(tmp_path / "map.bag", world="map"))
@@ -179,7 +179,7 @@ def test_bad_bags_are_named(tmp_path):
 def test_bad_names_and_settings(tmp_path):
     with pytest.raises(RecordingError, match=r"'\.txt'"):
         load_recording("reach.txt")
-    with pytest.raises(RecordingError, match="no such file"):
+    with pytest.raises(RecordingError, match="none.csv"):
         load_recording(str(tmp_path / "none.csv"))
     for fault, words in (
         ({"speed": 2}, "unknown fields speed"),

@@ -161,13 +161,13 @@ def test_a_robot_that_gives_up_is_believed(code):
 
 
 def test_commands_and_files_are_checked():
-    with pytest.raises(ValueError, match="give, receive or rest"):
+    with pytest.raises(ValueError, match="give, receive"):
         Stage().human.command("juggle")
-    with pytest.raises(ValueError, match="unknown fields"):
+    with pytest.raises(ValueError, match="hat"):
         Participant.from_mapping({"seed": 1, "hat": "green"})
-    with pytest.raises(ValueError, match="is none of"):
+    with pytest.raises(ValueError, match="angry"):
         Participant(behaviour="angry")
-    with pytest.raises(ValueError, match="profile 'saint' is none of drawn, patient, accustomed"):
+    with pytest.raises(ValueError, match="'saint'.* drawn, patient, accustomed"):
         Participant.from_mapping({"profile": "saint"})
     assert set(BEHAVIOURS) >= {"normal", "tug"}
 

@@ -144,10 +144,10 @@ def test_two_people_have_no_partner_and_their_objects_no_owner(away, doubt):
     held = Pose(NEAR.position + [0.0, 0.0, away])
     sights = seen.see({"one": NEAR, "two": Pose(np.array([2.0, 0.0, 0.4]))}, {"object_mug": held})
     assert [sight.name for sight in sights] == ["object_mug"] and seen.vision.people == 2
-    sentence = "2 people are in view; one partner is expected: ask the others to step back"
-    assert refused(seen.vision.locate, "human_hand", 0.0) == (sentence, ReasonCode.NOT_PERCEIVED)
+    why, code = refused(seen.vision.locate, "human_hand", 0.0)
+    assert "2 people" in why and code == ReasonCode.NOT_PERCEIVED
     if doubt:
-        assert refused(seen.vision.locate, "mug", 0.0) == (sentence, ReasonCode.NOT_PERCEIVED)
+        assert refused(seen.vision.locate, "mug", 0.0) == (why, code)
     else:
         assert seen.vision.locate("mug", 0.0)[0] == "object_mug"
     assert refused(seen.vision.locate, "ball", 0.0)[1] == ReasonCode.OBJECT_NOT_SEEN

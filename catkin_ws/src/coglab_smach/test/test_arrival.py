@@ -42,7 +42,7 @@ def test_an_arm_beside_its_target_has_not_arrived(size):
     trial = take_with(lambda t: size)
     result = trial.result()
     assert result.outcome == "failed_empty"
-    assert "all measured joints within 0.03 rad of posture 'board' within 1.0 s" in result.reason
+    assert "'board'" in result.reason and "0.03" in result.reason
     assert result.code == ReasonCode.TIME_LIMIT
     assert not trial.cell.called("close"), "the hand must not close there"
 

@@ -143,7 +143,7 @@ class Carried:
 def test_an_object_15_cm_farther_for_300_ms_is_lost(first, then, gone):
     carried = Carried(first)
     assert carried.gone_after(then) == (None if gone is None else pytest.approx(gone, abs=0.011))
-    assert gone is None or carried.words == f"it is seen {then:.2f} m from the palm"
+    assert gone is None or f" {then:.2f} m" in carried.words
 
 
 @pytest.mark.parametrize(
@@ -155,7 +155,7 @@ def test_fully_open_or_closed_fingers_hold_nothing(positions, lost):
     if lost:
         with pytest.raises(PortError) as error:
             carried.held.check()
-        assert error.value.causes == ("the fingers have closed past it",)
+        assert error.value.code == ReasonCode.OBJECT_NOT_SEEN and "fingers" in error.value.causes[0]
     else:
         carried.held.check()
     assert carried.ctx.holding == ("" if lost else "mug") and carried.grip.shared is not lost
@@ -216,13 +216,8 @@ def test_a_shift_ends_where_it_was_asked_to_without_rotation(by):
     assert np.linalg.norm(rotation_between(turned, posture)) < np.radians(1.0)
 
 
-IN_THE_WAY, LATE = "something is in the way", "the way to the grasp within"
-
-
-@pytest.mark.parametrize(
-    ("newton", "takes", "why"), [(6.4, 0.5, []), (6.6, 0.5, [IN_THE_WAY]), (6.4, 99.0, [LATE, LATE])]
-)
-def test_the_way_to_the_grasp_ends_at_a_push_of_6_5_newton_or_its_time_limit(monkeypatch, newton, takes, why):
+@pytest.mark.parametrize(("newton", "takes", "cancels"), [(6.4, 0.5, 0), (6.6, 0.5, 1), (6.4, 99.0, 2)])
+def test_the_way_to_the_grasp_ends_at_a_push_of_6_5_newton_or_its_time_limit(monkeypatch, newton, takes, cancels):
     seen, cancelled = Seen(), []
     clock = seen.trial.clock
 
@@ -235,6 +230,4 @@ def test_the_way_to_the_grasp_ends_at_a_push_of_6_5_newton_or_its_time_limit(mon
     seen.ctx.contact.force = lambda: (0.0, 0.0, newton)
     seen.ctx.arm.cancel_motion = lambda reason: cancelled.append(reason) or Ready()
     assert seen.run(regrasp.Regrasp(seen.ctx), goal={})[0] == "succeeded"
-    assert len(cancelled) == len(why) and all(
-        reason.startswith(word) for reason, word in zip(cancelled, why, strict=True)
-    )
+    assert len(cancelled) == cancels and all(cancelled)

@@ -28,10 +28,10 @@ def hand_refuses(t):
 
 
 PASSED_ON = {
-    goal_lost: ("the reach was aborted, because ", ReasonCode.GOAL_LOST),
-    two_people: ("", ReasonCode.NOT_PERCEIVED),
-    database_refuses: ("", ReasonCode.OBJECT_UNKNOWN),
-    hand_refuses: ("", ReasonCode.HAND_STALLED),
+    goal_lost: ReasonCode.GOAL_LOST,
+    two_people: ReasonCode.NOT_PERCEIVED,
+    database_refuses: ReasonCode.OBJECT_UNKNOWN,
+    hand_refuses: ReasonCode.HAND_STALLED,
 }
 
 
@@ -47,21 +47,20 @@ def test_the_error_of_a_node_reaches_the_operator_unchanged_with_its_code(prepar
 
     trial.run(script)
     result = trial.result()
-    frame, code = PASSED_ON[prepare]
-    assert result.outcome == "failed_empty" and result.code == code
-    assert frame + WORDS in trial.ctx.journal.why(), trial.ctx.journal.why()
+    assert result.outcome == "failed_empty" and result.code == PASSED_ON[prepare]
+    assert WORDS in trial.ctx.journal.why(), trial.ctx.journal.why()
     assert WORDS in " ".join([result.reason, *result.causes])
     assert list(trial.cell.joints) == trial.ctx.config.get("postures.home")
 
 
 @pytest.mark.parametrize(
-    "moment, hub, sentence, code",
+    "moment, hub, state, limit, code",
     [
-        (0.3, "wait_without_object", "hand_preshape: preshape 'cylindrical' within 6.0 s", ReasonCode.TIME_LIMIT),
-        (2.6, "stopped", "hand_close: closing of the hand within 11.9 s", ReasonCode.NOT_RELEASED),
+        (0.3, "wait_without_object", "hand_preshape", "6.0 s", ReasonCode.TIME_LIMIT),
+        (2.6, "stopped", "hand_close", "11.9 s", ReasonCode.NOT_RELEASED),
     ],
 )
-def test_hand_node_dies_during_the_exchange(moment, hub, sentence, code):
+def test_hand_node_dies_during_the_exchange(moment, hub, state, limit, code):
     trial = Trial()
 
     def script(t):
@@ -73,7 +72,8 @@ def test_hand_node_dies_during_the_exchange(moment, hub, sentence, code):
     trial.run(script)
     result = trial.result()
     assert (result.outcome, result.code) == ("failed_empty" if hub == "wait_without_object" else "stopped", code)
-    assert [result.reason, *result.causes][-1] == f"{sentence} expected, it did not happen"
+    first = [result.reason, *result.causes][-1]
+    assert first.startswith(state) and limit in first
     assert "open" not in [c for c in trial.cell.called() if c == "open"][1:]
 
 

@@ -107,7 +107,7 @@ def test_a_second_goal_is_rejected_and_does_not_disturb_the_first():
         t.until(lambda: first.state == "active")
         state, result = t.end_of(t.send("give"))
         assert (state, result.outcome, result.reason_code) == ("rejected", "refused", ReasonCode.BUSY)
-        assert "a handover of another client runs ('receive'" in result.reason
+        assert "'receive'" in result.reason
         t.server.on_cancel(Handle())  # not the running goal
         assert t.end_of(first)[0] == "succeeded"
 
@@ -117,13 +117,13 @@ def test_a_second_goal_is_rejected_and_does_not_disturb_the_first():
 @pytest.mark.parametrize(
     ("fields", "code", "said"),
     [
-        ({"action": "give", "wait": 3.0}, ReasonCode.WRONG_STATE, "wait_without_object takes"),
-        ({"action": "juggle", "wait": 9.0}, ReasonCode.UNKNOWN_NAME, "there are: receive, give"),
-        ({"action": ""}, ReasonCode.INVALID_ARGUMENT, "action: a name is expected"),
-        ({"action": "take", "object_id": "elephant", "wait": 9.0}, ReasonCode.OBJECT_UNKNOWN, "not in the database"),
-        ({"action": "take", "wait": float("nan")}, ReasonCode.OUT_OF_RANGE, "wait: 0 .. 3600 s is expected, got nan"),
-        ({"action": "take", "condition": "x" * 65}, ReasonCode.OUT_OF_RANGE, "condition: at most 64"),
-        ({"action": "take", "delivery": "rim_first"}, ReasonCode.INVALID_ARGUMENT, "the hand is empty"),
+        ({"action": "give", "wait": 3.0}, ReasonCode.WRONG_STATE, "wait_without_object"),
+        ({"action": "juggle", "wait": 9.0}, ReasonCode.UNKNOWN_NAME, "receive, give"),
+        ({"action": ""}, ReasonCode.INVALID_ARGUMENT, "action"),
+        ({"action": "take", "object_id": "elephant", "wait": 9.0}, ReasonCode.OBJECT_UNKNOWN, "elephant"),
+        ({"action": "take", "wait": float("nan")}, ReasonCode.OUT_OF_RANGE, "nan"),
+        ({"action": "take", "condition": "x" * 65}, ReasonCode.OUT_OF_RANGE, "condition"),
+        ({"action": "take", "delivery": "rim_first"}, ReasonCode.INVALID_ARGUMENT, "rim_first"),
     ],
 )
 def test_an_invalid_goal_is_rejected_with_a_reason_and_nothing_moves(fields, code, said):
@@ -152,7 +152,6 @@ def test_cancel_is_stop_and_the_same_action_can_request_reset():
         t.server.on_cancel(goal)
         state, result = t.end_of(goal)
         assert (state, result.outcome, result.reason_code) == ("canceled", "stopped", ReasonCode.STOP_LATCHED)
-        assert "its client has cancelled it" in result.reason
         assert t.ctx.arm.standing().ok and t.ctx.stop.pressed() and t.ctx.requests.hub() == "stopped"
         state, result = t.end_of(t.send("receive", "mug"))
         assert (state, result.reason_code) == ("rejected", ReasonCode.WRONG_STATE)
@@ -189,7 +188,7 @@ def test_after_its_time_limit_the_action_is_stopped():
         begun = t.clock.now()
         state, result = t.end_of(t.send("receive", "mug", time_limit=2.0))
         assert (state, result.outcome, result.reason_code) == ("aborted", "stopped", ReasonCode.TIME_LIMIT)
-        assert "its time limit of 2 s is over" in result.reason and t.clock.now() - begun < 4.0
+        assert "2 s" in result.reason and t.clock.now() - begun < 4.0
 
     trial.run(script)
 

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from coglab_msgs.msg import ReasonCode
 from coglab_py.pose import Pose
 from coglab_smach.context.holding import HoldingMemory
 from conftest import Trial
@@ -22,7 +23,7 @@ def test_a_hold_in_a_hub_is_shown_and_needs_a_reset(with_object):
         t.cell.arm.held = True  # somebody sent 'hold' directly to the robot
         t.wait_hub("stopped", limit=2.0)
         why = t.ctx.journal.why()
-        assert "hold is latched" in why and "./coglab start reset" in why
+        assert t.ctx.journal.newest_failure().code == ReasonCode.HELD and "./coglab start reset" in why
         ok, message, _ = t.ctx.requests.submit("take", "mug")
         assert not ok and "./coglab start reset" in message
         assert t.cell.called()[before:] == [], "something moved in a hub that is blocked"
@@ -43,7 +44,7 @@ def test_command_mode_lost_in_a_hub_is_started_again_by_the_reset():
         t.wait_hub("wait_without_object")
         t.cell.arm.enabled = False
         t.wait_hub("stopped", limit=2.0)
-        assert "command mode was not asked for" in t.ctx.journal.why()
+        assert t.ctx.journal.newest_failure().code == ReasonCode.NOT_STARTED
         t.cell.calls.clear()
         t.start("reset", "")
         t.wait_hub("wait_without_object")
@@ -73,7 +74,7 @@ def test_a_robot_node_that_dies_in_a_hub_ends_in_fault():
         t.wait_hub("wait_without_object")
         t.cell.faults.dead.add("arm")
         t.wait_hub("fault", limit=5.0)
-        assert t.ctx.journal.why().startswith("wait_without_object: the robot is silent, because ")
+        assert t.ctx.journal.newest_failure().code == ReasonCode.NODE_SILENT
         t.cell.faults.dead.clear()
         t.start("initialise")
         t.wait_hub("wait_without_object")
@@ -97,9 +98,7 @@ def test_a_hold_during_an_action_never_opens_the_hand():
         t.wait_hub("wait_with_object")
 
     trial.run(script)
-    assert trial.result().outcome == "stopped" and "hold is latched" in trial.result().reason + str(
-        trial.result().causes
-    )
+    assert trial.result().outcome == "stopped" and trial.result().code == ReasonCode.HELD
 
 
 def test_a_restarted_robot_node_without_plugins_ends_in_fault():
@@ -157,17 +156,12 @@ def test_a_restarted_brain_without_a_note_needs_the_objects_name(tmp_path):
 
     def script(t):
         t.wait_hub("wait_with_object")
-        ok, message, _ = t.ctx.requests.submit("put", "")
-        assert not ok and message == (
-            "'put' refused: the hand holds an object that is not known after a restart; "
-            "name its object_id, type: ./coglab start put OBJECT"
-        )
+        ok, message, code = t.ctx.requests.submit("put", "")
+        assert not ok and code == ReasonCode.OBJECT_UNKNOWN and message.endswith("./coglab start put OBJECT")
         t.start("put", "elephant")
         t.wait_hub("wait_with_object")
-        assert (
-            "'elephant' is not in the database"
-            in [r for r in t.ctx.journal.transitions if r.outcome == "refused"][-1].reason
-        )
+        refused = [r for r in t.ctx.journal.transitions if r.outcome == "refused"][-1]
+        assert refused.code == ReasonCode.OBJECT_UNKNOWN and "'elephant'" in refused.reason
         t.start("put", "mug")
         t.wait_hub("wait_without_object")
 
@@ -195,7 +189,7 @@ def test_a_removed_object_leads_to_the_hub_without_object():
         t.wait_hub("wait_without_object")
 
     trial.run(script)
-    assert any("'mug' is not in the hand" in r.reason for r in trial.ctx.journal.transitions)
+    assert trial.ctx.holding == ""
 
 
 def test_an_old_belief_does_not_trigger():
@@ -221,5 +215,5 @@ def test_an_old_belief_does_not_trigger():
         t.wait_hub("wait_without_object")
 
     trial.run(script)
-    asked = [r.outcome for r in trial.ctx.journal.transitions if "belief in an " in r.reason]
+    asked = [r.outcome for r in trial.ctx.journal.transitions if "belief" in r.reason]
     assert asked == ["exchange_human_to_robot", "exchange_robot_to_human"]

@@ -126,10 +126,10 @@ def test_the_published_wait_does_not_change_with_each_sight():
         t.until(lambda: "arm lift" in t.cell.called())
         t.clock.sleep(0.3)
         for _ in range(100):
-            told.append(t.ctx.journal.wait().what)
+            told.append(t.ctx.journal.wait().code)
             t.clock.sleep(0.011)
         t.ctx.stop.press("enough")
         t.wait_hub("stopped")
 
     trial.run(script)
-    assert set(told) == {"the person's letting go"}, set(told)
+    assert set(told) == {ReasonCode.WAITS_FOR_PERSON}, set(told)

@@ -35,30 +35,30 @@ FAILURES = {
     "an object that is not in the database": (
         lambda t: None,
         ReasonCode.OBJECT_UNKNOWN,
-        "'elephant' is not in the database",
+        "'elephant'",
     ),
     "an object that is not seen": (lambda t: t.cell.faults.not_seen.add("mug"), ReasonCode.OBJECT_NOT_SEEN, "mug"),
     "nobody offers it": (
         lambda t: t.cell.objects.update(mug=Pose([1.2, 0.2, 0.1])),
-        None,
-        "'mug' was not offered within 8 s",
+        ReasonCode.OBJECT_NOT_SEEN,
+        "8 s",
     ),
     "nobody touches": (lambda t: setattr(t.cell.partner, "touch_after", None), ReasonCode.NO_CONTACT, "contact"),
-    "no contact detector": (lambda t: t.cell.faults.dead.add("contact"), None, "arming of the contact detector"),
-    "no database": (lambda t: t.cell.faults.dead.add("database"), None, "entry of object 'mug'"),
-    "an empty hand": (lambda t: setattr(t.cell.faults, "empty_grasp", True), None, "the hand closed on nothing"),
+    "no contact detector": (lambda t: t.cell.faults.dead.add("contact"), ReasonCode.TIME_LIMIT, "2.0 s"),
+    "no database": (lambda t: t.cell.faults.dead.add("database"), ReasonCode.TIME_LIMIT, "'mug'"),
+    "an empty hand": (lambda t: setattr(t.cell.faults, "empty_grasp", True), ReasonCode.OBJECT_NOT_SEEN, "hand_close"),
     "a programming error": (lambda t: setattr(t.ctx.database, "get_object", None), ReasonCode.UNEXPECTED, "TypeError"),
 }
-"""preparation, code of the result (None: any), part of its reason"""
+"""preparation, code of the result, part of its reason"""
 
 
 @pytest.mark.parametrize("prepare, code, word", FAILURES.values(), ids=FAILURES)
 def test_a_failure_ends_at_home_with_an_empty_hand_and_its_reason(prepare, code, word):
     trial = failed_exchange(prepare, object_id="elephant" if code == ReasonCode.OBJECT_UNKNOWN else "mug")
     assert_recovered_empty(trial, word)
-    assert code is None or trial.result().code == code, trial.result()
+    assert trial.result().code == code, trial.result()
     assert all(t.reason for t in trial.ctx.journal.transitions if t.outcome in ("failed", "failed_empty"))
-    if word.endswith("offered within 8 s"):
+    if word == "8 s":
         assert "execute_dmp" not in trial.cell.called(), "the arm has not moved"
 
 
@@ -87,7 +87,8 @@ def test_the_arm_does_not_follow_an_offer_withdrawn_before_its_start():
 def test_a_person_who_does_not_let_go_gets_the_object_back(monkeypatch):
     monkeypatch.setattr(weight, "from_palm", lambda state, track, *_: 0.1)
     trial = failed_exchange(lambda t: setattr(t.cell.partner, "let_go_after", None))
-    assert_recovered_empty(trial, "the person did not let go of 'mug' within 5 s")
+    assert_recovered_empty(trial, "'mug'")
+    assert trial.result().code == ReasonCode.NOT_RELEASED
 
 
 def test_a_carried_object_is_not_dropped_when_the_person_disappears():
@@ -99,7 +100,7 @@ def test_a_carried_object_is_not_dropped_when_the_person_disappears():
         t.start("exchange_human_to_robot")
         t.wait_hub("stopped")
         assert t.cell.called("open") == [] and t.ctx.holding == "mug"
-        assert "the person's hand is not seen any more" in t.ctx.journal.why()
+        assert "not seen" in t.ctx.journal.why()
         # The operator has looked: only the robot holds the object.
         t.start("reset", "")
         t.wait_hub("wait_with_object")
@@ -122,7 +123,7 @@ def test_an_object_is_kept_when_the_person_disappears_without_measured_weight():
         t.cell.faults.not_seen.add("human_hand")
         t.wait_hub("stopped")
         assert t.cell.called("open") == [] and t.ctx.holding == "mug"
-        assert "its weight has not come, and the person's hand is not seen any more" in t.ctx.journal.why()
+        assert "not seen" in t.ctx.journal.why()
 
     trial.begun_once = False
     trial.run(script)
@@ -137,7 +138,7 @@ def test_dead_arm_node_ends_in_fault_and_can_be_initialised_again():
         t.clock.sleep(1.0)
         t.cell.faults.dead.add("arm")
         t.wait_hub("fault")
-        assert "is silent" in t.ctx.journal.why()
+        assert t.ctx.journal.newest_failure().code == ReasonCode.NODE_SILENT
         t.cell.faults.dead.clear()
         t.start("initialise")
         t.wait_hub("wait_without_object")
@@ -193,7 +194,7 @@ def test_stop_holds_never_opens_the_hand_and_needs_a_reset(moment):
         t.wait_hub("wait_with_object" if held else "wait_without_object")
 
     trial.run(script)
-    assert "STOP" in trial.ctx.journal.results[-1].reason
+    assert trial.ctx.journal.results[-1].code == ReasonCode.STOP_LATCHED
 
 
 def test_a_request_for_another_object_uses_the_held_one(trial):
@@ -203,7 +204,7 @@ def test_a_request_for_another_object_uses_the_held_one(trial):
         t.wait_hub("wait_without_object")
 
     trial.run(script)
-    assert any("the hand holds 'mug'" in t.reason for t in trial.ctx.journal.transitions)
+    assert any("'bottle'" in t.reason and "'mug'" in t.reason for t in trial.ctx.journal.transitions)
 
 
 def test_no_free_place_keeps_the_object():
@@ -216,4 +217,4 @@ def test_no_free_place_keeps_the_object():
         t.wait_hub("wait_with_object")
 
     trial.run(script)
-    assert trial.result().outcome == "failed_holding" and "no free place" in trial.result().reason
+    assert trial.result().outcome == "failed_holding" and trial.result().code == ReasonCode.NO_FREE_PLACE

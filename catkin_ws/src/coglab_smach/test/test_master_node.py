@@ -58,16 +58,16 @@ def test_deadlines_are_published_in_ros_time(master):
 def test_stop_is_latched_whatever_the_arm_answers(master):
     master.hold = Ready("held")
     answer = master.on_stop(None)
-    assert answer.success and answer.message == "STOP: held; to go on type: ./coglab start reset"
+    assert answer.success and "held" in answer.message and answer.message.endswith("./coglab start reset")
     master.hold = Polled(lambda: master.now > 101.0, lambda: "held")
     assert master.on_stop(None).success
     master.hold, begin = Polled(lambda: False, lambda: None), master.now
     answer = master.on_stop(None)
-    assert not answer.success and "did not answer within 2 s: use the emergency stop" in answer.message
+    assert not answer.success and "emergency stop" in answer.message
     assert master.now - begin == pytest.approx(2.0, abs=0.006)
     master.hold = Ready(error=PortError("no line"))
     answer = master.on_stop(None)
-    assert not answer.success and answer.message == "STOP is latched in the machine, but: no line"
+    assert not answer.success and "no line" in answer.message
     assert len(master.pressed) == 4
 
 

@@ -37,14 +37,14 @@ def test_the_reason_is_published_until_the_operator_acts():
         t.wait_hub("stopped")
         stopped = t.shown[-1]
         assert stopped.state == "/coglab_master/stopped" and stopped.in_hub and stopped.actions == ("reset",)
-        assert stopped.reason_code == ReasonCode.HELD and stopped.why.endswith("type: ./coglab start reset")
+        assert stopped.reason_code == ReasonCode.HELD and stopped.why.endswith("./coglab start reset")
         # Somebody ends the hold directly at the robot: the machine still waits for the operator's reset.
         t.cell.arm.held = False
         t.clock.sleep(1.0)
         assert t.ctx.requests.hub() == "stopped"
         refused = t.ask("initialise")
         assert not refused.ok and refused.code == ReasonCode.WRONG_STATE
-        assert refused.message.endswith("type: ./coglab start reset")
+        assert refused.message.endswith("./coglab start reset")
         assert t.ask("reset").ok
         t.wait_hub("wait_without_object")
         assert t.shown[-1].why == "" and t.shown[-1].reason_code == 0
@@ -74,21 +74,26 @@ def test_waits_are_published_with_their_deadline():
 
     trial.run(script)
     assert all((s.deadline > 0.0) == bool(s.waits_for) == bool(s.waits_code) for s in trial.shown)
-    receiving = {s.waits_for for s in trial.shown if f"/{RECEIVE}/" in s.state}
-    giving = {s.waits_for for s in trial.shown if f"/{GIVE}/" in s.state}
-    assert {"'mug' on offer", "contact of an object with the hand"} <= receiving  # the end of the reach
-    assert {"the person's hand within reach", "the end of the reach", "the person's taking of the load"} <= giving
-    codes = {s.waits_for: s.waits_code for s in trial.shown}
-    assert codes["'mug' on offer"] == codes["the person's taking of the load"] == ReasonCode.WAITS_FOR_PERSON
-    assert codes["the person's hand within reach"] == ReasonCode.WAITS_FOR_PERSON
-    assert codes["contact of an object with the hand"] == ReasonCode.WAITS_FOR_CONTACT
-    assert codes["the end of the reach"] == codes["the motion to posture 'home'"] == ReasonCode.WAITS_FOR_ARM
-    assert codes["opening of the hand"] == ReasonCode.WAITS_FOR_HAND
-    assert codes["start of perception"] == ReasonCode.WAITS_FOR_SIGHT
-    left = [s.deadline - stamp for stamp, s in timed if s.waits_for == "the person's taking of the load"]
+    beginning, receiving, giving = (
+        {(s.state.split("/")[-1], s.waits_code) for s in trial.shown if f"/{action}/" in s.state}
+        for action in ("coglab_init_system", RECEIVE, GIVE)
+    )
+    assert {
+        ("coglab_home_robot", ReasonCode.WAITS_FOR_ARM),
+        ("coglab_init_vision", ReasonCode.WAITS_FOR_SIGHT),
+    } <= beginning
+    assert {("set_dmp_goal", ReasonCode.WAITS_FOR_PERSON), ("wait_stop", ReasonCode.WAITS_FOR_CONTACT)} <= receiving
+    assert {
+        ("set_dmp_goal", ReasonCode.WAITS_FOR_PERSON),
+        ("wait_stop", ReasonCode.WAITS_FOR_ARM),
+        ("give_load", ReasonCode.WAITS_FOR_PERSON),
+        ("hand_open", ReasonCode.WAITS_FOR_HAND),
+    } <= giving
+    taking = ReasonCode.WAITS_FOR_PERSON
+    left = [s.deadline - t for t, s in timed if s.state.endswith("/give_load") and s.waits_code == taking]
     assert left and abs(left[0] - 8.0) < 0.05  # the limit in the mug's delivery
     # The monitor beside the motion is never shown as a wait, not even between two waits of the motion.
-    assert "another reaching pattern" not in receiving
+    assert not any("pattern" in s.waits_for for s in trial.shown)
 
 
 def test_an_extended_wait_is_published_again():
@@ -129,7 +134,7 @@ def test_a_failure_is_published_until_the_next_success():
         t.ask(RECEIVE, "mug")
         t.clock.sleep(0.5)
         t.wait_hub("wait_without_object")
-        assert "was not seen" in t.shown[-1].why and t.shown[-1].reason_code == ReasonCode.OBJECT_NOT_SEEN
+        assert t.shown[-1].why and t.shown[-1].reason_code == ReasonCode.OBJECT_NOT_SEEN
         t.cell.faults.not_seen.clear()
         assert t.ask(RECEIVE, "mug").ok
         t.wait_hub("wait_with_object")
@@ -186,14 +191,14 @@ def held_by_the_hub(t):
 @pytest.mark.parametrize(
     "refuse, code, words",
     [
-        (no_hub, ReasonCode.WRONG_STATE, "is not in a hub now"),
-        (lambda t: t.ask(GIVE), ReasonCode.WRONG_STATE, "wait_without_object takes"),
-        (no_name, ReasonCode.OBJECT_UNKNOWN, "not known after a restart"),
-        (asked_twice, ReasonCode.BUSY, "'take' was requested a moment ago"),
-        (silent_database, ReasonCode.NODE_SILENT, "database has not answered within 2 s"),
-        (broken_database, ReasonCode.NODE_SILENT, "list_objects is not there"),
-        (lambda t: t.ask("take", "elephant"), ReasonCode.OBJECT_UNKNOWN, "'elephant' is not in the database"),
-        (held_by_the_hub, ReasonCode.OBJECT_UNKNOWN, "'mug' is not in the database"),
+        (no_hub, ReasonCode.WRONG_STATE, "hub"),
+        (lambda t: t.ask(GIVE), ReasonCode.WRONG_STATE, "wait_without_object"),
+        (no_name, ReasonCode.OBJECT_UNKNOWN, "restart"),
+        (asked_twice, ReasonCode.BUSY, "'take'"),
+        (silent_database, ReasonCode.NODE_SILENT, "2 s"),
+        (broken_database, ReasonCode.NODE_SILENT, "list_objects"),
+        (lambda t: t.ask("take", "elephant"), ReasonCode.OBJECT_UNKNOWN, "'elephant'"),
+        (held_by_the_hub, ReasonCode.OBJECT_UNKNOWN, "'mug'"),
     ],
 )
 def test_every_refusal_has_a_reason_and_ends_with_a_command(refuse, code, words):
@@ -203,6 +208,6 @@ def test_every_refusal_has_a_reason_and_ends_with_a_command(refuse, code, words)
         t.wait_hub("wait_without_object")
         refused = refuse(t)
         assert not refused.ok and refused.code == code and words in refused.message, refused
-        assert re.search(r"type: \./coglab start \w+( \w+)?( or \./coglab start \w+)*$", refused.message), refused
+        assert re.search(r"\./coglab start \w+( \w+)?( or \./coglab start \w+)*$", refused.message), refused
 
     trial.run(script)

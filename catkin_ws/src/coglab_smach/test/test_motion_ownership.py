@@ -46,7 +46,7 @@ def test_a_motion_beyond_its_time_limit_is_ended_before_recovery_begins(monkeypa
         assert t.cell.arm.standing().ok
 
     trial = watched(script)
-    assert "the motion to posture 'board' within" in trial.result().reason
+    assert "'board'" in trial.result().reason
     assert trial.result().code == ReasonCode.TIME_LIMIT
     assert len(trial.cell.called("cancel")) >= 2
 
@@ -206,8 +206,8 @@ def test_the_arm_stays_if_the_person_holds_on_and_the_hand_does_not_open(hub_aft
         t.clock.sleep(5.0)
         assert t.cell.joints == place and t.cell.called("move") == moved
         why = t.ctx.journal.why()
-        assert why.startswith("the arm stays where it is: the hand could not be opened") and "did not let go" in why
-        assert "type: ./coglab start reset" in why
+        assert "motors 2, 3 are stuck" in why and t.ctx.journal.newest_failure().code == ReasonCode.NOT_RELEASED
+        assert "./coglab start reset" in why
         t.start("reset", "")
         t.wait_hub("stopped")  # still stuck: the arm stays
         assert t.cell.joints == place
@@ -229,7 +229,7 @@ def test_the_arm_stays_if_the_hand_does_not_open_after_the_load_was_taken():
         place = t.cell.joints
         t.wait_hub("stopped")
         t.clock.sleep(3.0)
-        assert t.cell.joints == place and "the person may still hold 'mug'" in t.ctx.journal.why()
+        assert t.cell.joints == place and t.ctx.journal.newest_failure().code == ReasonCode.NOT_RELEASED
         # The operator has looked: only the robot holds the object.
         t.start("reset", "")
         t.wait_hub("wait_with_object")

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from coglab_msgs.msg import ReasonCode
+from coglab_msgs.msg import ReasonCode, Say
 from coglab_smach.context.config import Config, ConfigError
 from coglab_smach.context.parts import Parts
 from coglab_smach.context.requests import ask_for
@@ -92,24 +92,24 @@ def test_a_failure_in_a_users_action_goes_through_recovery():
 def test_a_users_state_replaces_a_shipped_one():
     trial = Trial(states={"exchange_human_to_robot/query_database": "my_lab.states:AnnounceAndQuery"})
     said = []
-    trial.ctx.say = lambda code, text: said.append(text)
+    trial.ctx.say = lambda code, text: said.append(code)
     trial.run(received)
-    assert "I will take the mug." in said and trial.result().outcome == "succeeded"
+    assert Say.NOTHING in said and trial.result().outcome == "succeeded"
 
 
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
-        ({"actions": {"wipe": "my_labb.machines:build"}}, "actions.wipe: no module 'my_labb.machines'; put its file"),
-        ({"actions": {"wipe": "my_lab.machines:biuld"}}, "has no function 'biuld'; it has: .*build_wipe"),
-        ({"actions": {"wipe": f"{__name__}:plain_value"}}, "has to return a CoglabState .* a value of type int"),
-        ({"actions": {"wipe": f"{__name__}:raises"}}, r"raised AttributeError: .*no_such_port.* \(test_own_parts.py:"),
-        ({"actions": {"wipe": f"{__name__}:OtherOutcomes"}}, "outcomes have to be failed, preempted, succeeded; "),
-        ({"actions": {"take": "my_lab.machines:build_wipe"}}, "actions.take: this name is in use"),
-        ({"actions": {"wipe": "my_lab.machines"}}, "'module:function' is expected, .* got 'my_lab.machines'"),
+        ({"actions": {"wipe": "my_labb.machines:build"}}, "actions.wipe: .*'my_labb.machines'"),
+        ({"actions": {"wipe": "my_lab.machines:biuld"}}, "'biuld'.*build_wipe"),
+        ({"actions": {"wipe": f"{__name__}:plain_value"}}, r"CoglabState.* int\b"),
+        ({"actions": {"wipe": f"{__name__}:raises"}}, r"AttributeError.*no_such_port.*test_own_parts.py:\d"),
+        ({"actions": {"wipe": f"{__name__}:OtherOutcomes"}}, "failed, preempted, succeeded"),
+        ({"actions": {"take": "my_lab.machines:build_wipe"}}, "actions.take"),
+        ({"actions": {"wipe": "my_lab.machines"}}, "module:function.*'my_lab.machines'"),
         ({"actions": {"wipe": {"build": "my_lab.machines:build_wipe", "hand": "left"}}}, "actions.wipe"),
-        ({"states": {"take/hand_closes": "my_lab.states:Announce"}}, "no such state; there are: take/approach_board, "),
-        ({"deliveries": {"low": "my_lab.deliveries:lower"}}, "deliveries.low: .* no function 'lower'; it has: low"),
+        ({"states": {"take/hand_closes": "my_lab.states:Announce"}}, "take/approach_board"),
+        ({"deliveries": {"low": "my_lab.deliveries:lower"}}, "deliveries.low: .*'lower'.* low"),
     ],
 )
 def test_an_unusable_part_is_refused_with_a_reason(settings, said):
@@ -123,9 +123,9 @@ def test_a_failing_import_is_reported_with_module_and_line(tmp_path, monkeypatch
     (tmp_path / "lacks_more.py").write_text("import no_such_thing_4714\n")
     monkeypatch.syspath_prepend(str(tmp_path))
     for module, said in (
-        ("bad_lab", r"AttributeError: .* \(bad_lab.py:2\)"),
-        ("ends_itself", "SystemExit: 3"),
-        ("lacks_more", "needs the module 'no_such_thing_4714'"),
+        ("bad_lab", r"AttributeError.*bad_lab.py:2"),
+        ("ends_itself", "SystemExit.*3"),
+        ("lacks_more", "'no_such_thing_4714'"),
     ):
         with pytest.raises(ConfigError, match=said):
             Trial(actions={"wipe": f"{module}:build"})
@@ -159,7 +159,7 @@ def test_every_delivery_of_an_object_can_be_requested():
         for name, ask in zip([*names, "low"], [(f"/{name}", "") for name in names] + [("mug", "low")], strict=True):
             received(t)
             answer = asks(t, "give", "mug/nonsense")
-            assert answer.code == ReasonCode.UNKNOWN_NAME and f"it has: {', '.join(names)}, low" in answer.message
+            assert answer.code == ReasonCode.UNKNOWN_NAME and f"{', '.join(names)}, low" in answer.message
             assert asks(t, "put", "", name).code == ReasonCode.INVALID_ARGUMENT
             assert asks(t, "give", *ask).ok
             t.wait_hub("wait_without_object")

@@ -32,7 +32,7 @@ def test_the_note_of_the_held_object_is_written_in_one_step_and_read_again(tmp_p
         assert memory.recall() == ""
     assert len(warnings) == 3
     HoldingMemory(str(tmp_path / "a"), warnings.append).note("mug")
-    assert "cannot be written" in warnings[3]
+    assert str(tmp_path / "a") in warnings[3]
     HoldingMemory().note("mug")
     assert HoldingMemory().recall() == ""
     module, shown = script("master_node"), []
@@ -74,7 +74,7 @@ def test_an_object_from_the_board_keeps_its_grasp_and_may_be_named_again(trial):
 
     trial.run(walk)
     reasons = [t.reason for t in trial.ctx.journal.transitions if t.from_state == "wait_with_object"]
-    assert reasons[0] == "operator requested put of 'mug'"
+    assert "put" in reasons[0] and "'mug'" in reasons[0]
 
 
 # --- states -----------------------------------------------------------------------------------------------------------

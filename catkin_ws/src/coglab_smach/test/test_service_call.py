@@ -80,7 +80,7 @@ def test_a_refusal_has_its_code(monkeypatch):
     server.answer = SimpleNamespace(success=False, message="hold is latched", reason_code=ReasonCode.HELD)
     call = calls.call("lwr/command", LwrCommand, event="start")
     assert ended(call) and server.heard == ["start"]
-    with pytest.raises(PortError, match="/lwr/command refused: hold is latched") as raised:
+    with pytest.raises(PortError, match="/lwr/command.*hold is latched") as raised:
         call.result()
     assert raised.value.code == ReasonCode.HELD
 
@@ -89,6 +89,6 @@ def test_a_server_that_never_starts(monkeypatch):
     Server(monkeypatch)
     call = calls.call("lwr/command", LwrCommand, wait=0.1, event="start")
     assert ended(call)
-    with pytest.raises(PortError, match="is not there after 0 s; is its node running") as raised:
+    with pytest.raises(PortError, match="lwr/command") as raised:
         call.result()
     assert raised.value.code == ReasonCode.NODE_SILENT

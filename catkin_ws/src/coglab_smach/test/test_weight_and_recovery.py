@@ -96,7 +96,7 @@ def test_a_hand_within_30_cm_that_carries_the_object_gets_it_back(monkeypatch, a
     lifted.event = ContactEvent(True, "x", 1.0) if loaded else None
     monkeypatch.setattr(weight, "person_holds", lambda state, settings: holds)
     error = lifted.failure()
-    assert error.sentence == "the person did not let go of 'mug' within 5 s" and error.code == ReasonCode.NOT_RELEASED
+    assert error.code == ReasonCode.NOT_RELEASED and "'mug'" in error.sentence and "5 s" in error.sentence
     assert (lifted.ctx.holding == "mug") == keeps and len(error.causes) == 1 + keeps
 
 
@@ -135,5 +135,4 @@ def test_a_falling_goal_with_the_hand_at_it_is_a_withdrawal():
             t.wait_hub("wait_without_object")
 
         trial.run(script)
-        words = "it was lowered with the hand that holds it" if code != ReasonCode.GOAL_FELL else "the goal falls"
-        assert trial.result().code == code and trial.result().causes == (words,)
+        assert trial.result().code == code and len(trial.result().causes) == 1

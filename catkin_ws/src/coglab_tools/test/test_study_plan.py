@@ -29,12 +29,12 @@ def study(tmp_path, text=GOOD):
 def test_a_new_study_is_valid_and_is_not_overwritten(tmp_path):
     file = new(tmp_path / "pilot")
     assert len(load(file).trials()) == 36
-    with pytest.raises(UsageError, match="a folder holds one study"):
+    with pytest.raises(UsageError, match="pilot"):
         new(tmp_path / "pilot")
 
 
 def test_a_study_that_cannot_be_written_leaves_nothing(tmp_path, monkeypatch):
-    with pytest.raises(CheckFailed, match="/proc/pilot/study.yaml cannot be written"):
+    with pytest.raises(CheckFailed, match="/proc/pilot/study.yaml"):
         new(Path("/proc/pilot"))
 
     def full(*_):
@@ -52,7 +52,7 @@ def test_own_primitives_and_objects_are_conditions_until_they_change(tmp_path):
         study(tmp_path, text)
     shipped = package_path("coglab_controllers", "config", "primitives.xml").read_text()
     (tmp_path / "primitives.xml").write_text(shipped.replace('id="reach_human_high"', 'id="reach_high"'))
-    with pytest.raises(CheckFailed, match=r"study.yaml:6: .*objects/ of the study's folder"):
+    with pytest.raises(CheckFailed, match=r"study.yaml:6: .*objects/"):
         study(tmp_path, text)
     (tmp_path / "objects").mkdir()
     mug = package_path("coglab_objects", "objects", "mug.yaml").read_text()
@@ -69,17 +69,17 @@ def test_own_primitives_and_objects_are_conditions_until_they_change(tmp_path):
 @pytest.mark.parametrize(
     ("old", "bad", "line", "words"),
     [
-        ("participants: 2", "participants: [P01, Anna]", 3, "pseudonym such as P03"),
+        ("participants: 2", "participants: [P01, Anna]", 3, "P03"),
         ("participants: 2", "participants: [P01, P01]", 3, "twice"),
         ("{timing: calm}", "{timing: slow}", 5, "calm, natural"),
-        ("{timing: calm}", "{timeing: calm}", 5, "did you mean 'timing'"),
+        ("{timing: calm}", "{timeing: calm}", 5, "'timing'"),
         ("handover.reach_ratio: 0.8", "handover.reach_ratio: -1", 6, "minimum"),
         ("speed: 0.9", "speed: 2", 6, "0.05 to 1"),
         ("handle_first", "upside_down", 6, "handle_first"),
         ("speed: 0.9", "primitive: reach", 6, "reach_human"),
         ("speed: 0.9", "feedback: [wobble]", 6, "ee_admittance"),
         ("speed: 0.9", "auto_trigger: true", 6, "no setting"),
-        ("[receive, give]", "[give]", 7, "the hand is empty"),
+        ("[receive, give]", "[give]", 7, "empty"),
         ("[receive, give]", "[receive]\norder: latin", 8, "latin_square"),
         ("[receive, give]", "[receive]\nquestionnaires: [sus]", 8, "nasa_tlx"),
         ("[receive, give]", "[receive]\nsimulated: {person: {trsut: 1}}", 8, "trust"),

@@ -94,7 +94,7 @@ def test_a_person_who_leaves_early_takes_the_object_along(tmp_path, handover, pe
 
 def test_a_hand_without_its_object_is_refused_or_gets_one(tmp_path, handover):
     alone = write_csv(tmp_path / "hand.csv", handover, frames=("human_hand",))
-    with pytest.raises(RecordingError, match="a handover needs the frame 'object_mug', the recording has human_hand"):
+    with pytest.raises(RecordingError, match="'object_mug'.* human_hand"):
         World(1, CONSIDERATE, recording={"file": alone})
     result, _, _ = play(alone, "wait", object="in_hand")
     assert result.outcome == "succeeded", result.reason

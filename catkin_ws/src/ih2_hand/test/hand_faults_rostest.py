@@ -53,7 +53,7 @@ class HandFaults(unittest.TestCase):
             self.assertFalse(result.isOk, name)
             self.assertEqual(self.hand.clients[name].get_state(), GoalStatus.ABORTED, name)
             self.assertIn(port, result.message)
-            self.assertRegex(result.message, r"last byte received (0x\w\w|none)")
+            self.assertRegex(result.message, r"(0x\w\w|none)")
             self.hand.wait(lambda: not self.hand.status.connected, "report of the loss")
             self.assertEqual(list(self.hand.status.motors), [])
 

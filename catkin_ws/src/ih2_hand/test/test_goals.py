@@ -104,7 +104,7 @@ def test_a_goal_that_was_cancelled_while_it_waited_does_not_begin(desk):
     handle.status = actionlib.GoalStatus.PREEMPTING
     Server.every["~hand_close"].on_goal(handle)
     desk.work()
-    assert handle.ended == ("cancelled", "cancelled before it began", Reason.CANCELLED)
+    assert (handle.ended[0], handle.ended[2]) == ("cancelled", Reason.CANCELLED)
     assert desk.task.begun == 0 and desk.queue.active is None
 
 
@@ -148,7 +148,7 @@ def test_a_resynchronised_line_takes_the_command_again_but_not_for_ever(desk):
     desk.owner.driver.counters.fillers += 1
     desk.status()
     how, why, code = handle.ended
-    assert how == "aborted" and code == Reason.HAND_LINK_LOST and "resynchronised 3 times" in why
+    assert how == "aborted" and code == Reason.HAND_LINK_LOST and "3 times" in why
     assert desk.task.begun == 1 + RESENDS, "the fingers are not sent on their way once more"
     assert len(desk.task.asked) == len(handle.feedback) == 1, "nor is it told any more how they move"
     assert desk.owner.verdicts[-1].done
@@ -162,7 +162,7 @@ def test_a_goal_has_its_time_limit(desk):
         desk.status(after=1.0)
     assert handle.ended is None
     desk.status(after=0.1)
-    assert handle.ended == ("aborted", "not done within 3 s; fingers stopped", Reason.TIME_LIMIT)
+    assert (handle.ended[0], handle.ended[2]) == ("aborted", Reason.TIME_LIMIT) and "3 s" in handle.ended[1]
     assert desk.stops == 1
 
 
@@ -187,7 +187,7 @@ def test_silence_counts_from_the_last_status(desk):
     assert handle.ended is None
     desk.now += 0.01
     desk.tick()
-    assert handle.ended[0] == "aborted" and "no hand_status for 1.5 s" in handle.ended[1]
+    assert handle.ended[0] == "aborted" and "1.5 s" in handle.ended[1]
 
 
 def test_gap_between_polls_does_not_count_as_standstill(desk):

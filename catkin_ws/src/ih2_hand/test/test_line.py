@@ -90,7 +90,7 @@ def test_a_second_bad_answer_is_an_error_that_says_where_to_look(bench):
         bench.line.request(ASK, 2)
     assert bench.counted == (2, 2, 2, 1, 1)
     assert bench.line.counters.reasons == {"answer too short": 1, "answer missing": 1}
-    for words in ("hand on scripted", "`45 02`", "2 byte(s) within 50 ms, twice", "last byte received 0x01"):
+    for words in ("scripted", "`45 02`", "2 byte(s)", "50 ms", "0x01"):
         assert words in str(error.value)
 
 
@@ -170,7 +170,7 @@ def test_values_that_move_settle_by_their_median_within_what_a_finger_can_do(ben
 
 
 def test_readings_that_contradict_each_other_twice_are_an_error(bench):
-    with pytest.raises(HandInconsistentError, match=r"on scripted contradict each other \(1, 90, 2, 80, 3; last"):
+    with pytest.raises(HandInconsistentError, match=r"scripted .*\(1, 90, 2, 80, 3;"):
         bench.value(*["01", "5A", "02", "50", "03"] * 2)
     assert bench.counted == (10, 1, 0, 0, 1)
 

