@@ -24,7 +24,7 @@ GROUPS = {  # title: name of the plot, programs
 }
 HEAD = """# Benchmarks
 
-What was measured in simulation, beside a goal that a user feels or beside another program. No number says anything
+Measured in simulation, beside a goal that a user feels or another program. No number says anything
 about real people or a real arm. "Drawn people" are simulated persons with delays, habits and senses drawn by a seed
 ([people.md](people.md)). Values are medians unless the row says otherwise; intervals are 95 %.
 

@@ -1,6 +1,6 @@
 /// @file
-/// Checks of a moving goal (limits in config/controllers.yaml): which goal frames a motion accepts, and
-/// when the motion ends because the goal leaves, retreats or drops.
+/// Checks of a moving goal (limits in config/controllers.yaml): which goal frames a motion accepts,
+/// and when the motion ends because the goal leaves, retreats or drops.
 #pragma once
 
 #include <cstdint>
