@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import rospy
 from coglab_msgs.msg import ReasonCode
-from rosgraph_msgs.msg import Log
+from coglab_py.pace import TOPIC
+from std_msgs.msg import Float64
 
 LATE = frozenset(
     {
@@ -39,17 +40,15 @@ def say_again(what: str, why: object) -> None:
 
 
 class Lateness:
-    """Follows what the simulated cell logs about this computer."""
+    """Follows the real-time factor of the simulated cell: it is less than 1 on a computer that is too busy."""
 
     def __init__(self) -> None:
         self._is_busy = self._was_busy = False
-        rospy.Subscriber("/rosout", Log, self._on_log, queue_size=1000)
+        rospy.Subscriber(f"/{TOPIC}", Float64, self._on_factor)
 
-    def _on_log(self, message: Log) -> None:
-        if "too busy for real time" in message.msg:
-            self._is_busy = self._was_busy = True
-        elif "keeps real time" in message.msg:
-            self._is_busy = False
+    def _on_factor(self, message: Float64) -> None:
+        self._is_busy = message.data < 1.0
+        self._was_busy |= self._is_busy
 
     def begin(self) -> None:
         """Call this before the action or motion."""

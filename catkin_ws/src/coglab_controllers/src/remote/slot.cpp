@@ -131,9 +131,9 @@ void RemoteSlot::greet(int connection) {
   ucred who{};
   socklen_t length = sizeof(who);
   if (::getsockopt(connection, SOL_SOCKET, SO_PEERCRED, &who, &length) != 0) return;
-  const std::string why = judge(std::string(text, static_cast<std::size_t>(size)), who.uid);
-  if (!why.empty()) {
-    answer(connection, "refused " + why, -1);
+  const std::string refusal = judge(std::string(text, static_cast<std::size_t>(size)), who.uid);
+  if (!refusal.empty()) {
+    answer(connection, refusal, -1);
     return;
   }
   if (!answer(connection, "welcome", memory_)) return;
@@ -141,30 +141,31 @@ void RemoteSlot::greet(int connection) {
   owner_.store(who.pid > 0 ? who.pid : -1, std::memory_order_release);
 }
 
-/// Returns why a process is refused; empty: accepted.
+/// Returns the answer to a process that is refused: "taken" if another process holds the slot, else
+/// "refused", and a sentence. Empty: accepted.
 std::string RemoteSlot::judge(const std::string& hello, unsigned user) const {
   if (user != ::getuid())
-    return "the robot runs as user " + std::to_string(::getuid()) + ", the process as user " +
-           std::to_string(user) + "; run it as the robot's user";
+    return "refused the robot runs as user " + std::to_string(::getuid()) +
+           ", the process as user " + std::to_string(user) + "; run it as the robot's user";
   std::istringstream words(hello);
   std::string protocol;
   long interface = 0, kind = 0;
   std::size_t question = 0, answer = 0;
   words >> protocol >> interface >> kind >> question >> answer;
   if (!words || protocol != "coglab-slot")
-    return "expected the greeting of a CogLab controller; use ./coglab controller run";
+    return "refused expected the greeting of a CogLab controller; use ./coglab controller run";
   if (interface != kRemoteInterface || question != kQuestionSize || answer != kAnswerSize)
-    return "the robot has interface " + std::to_string(kRemoteInterface) + " (" +
+    return "refused the robot has interface " + std::to_string(kRemoteInterface) + " (" +
            std::to_string(kQuestionSize) + " and " + std::to_string(kAnswerSize) +
            " bytes), the process has " + std::to_string(interface) + " (" +
            std::to_string(question) + " and " + std::to_string(answer) +
            " bytes); build both from the same version";
   if (kind != static_cast<long>(kind_))
     return kind_ == RemoteKind::Motion
-               ? "this slot is for a motion; the file has a feedback controller"
-               : "this slot is for a feedback controller; the file has a motion";
+               ? "refused this slot is for a motion; the file has a feedback controller"
+               : "refused this slot is for a feedback controller; the file has a motion";
   if (connected())
-    return "process " + std::to_string(owner()) +
+    return "taken process " + std::to_string(owner()) +
            " holds this slot and is running; end it first, or use another slot";
   return "";
 }

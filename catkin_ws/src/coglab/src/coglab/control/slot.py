@@ -124,8 +124,9 @@ class Slot:
         try:
             answer = text.decode(errors="replace")
             if answer != "welcome" or not files:
-                why = answer.removeprefix("refused ") or "the robot closed the connection without an answer"
-                raise SlotTaken(why) if "holds this slot" in why else SlotError(why)
+                kind_of_refusal, _, why = answer.partition(" ")
+                why = why or "the robot closed the connection without an answer"
+                raise SlotTaken(why) if kind_of_refusal == "taken" else SlotError(why)
             return mmap.mmap(files[0], SIZE)
         finally:
             for file in files:
