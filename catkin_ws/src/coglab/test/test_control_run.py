@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -90,6 +91,17 @@ def command_of(file: str, *words: str) -> subprocess.Popen:
     """`./coglab controller run` of a file beside this one."""
     command = [sys.executable, "-u", "-m", "coglab.control.run", str(HERE / file), *words]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=dict(os.environ))
+
+
+def test_the_robot_of_the_master_is_taken_though_another_offers_the_slot(robot):
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as world:
+        world.bind(b"\0" + str(wire.Address(os.getpid(), "python_motion")).encode())
+        world.listen()
+        with command_of("my_sway.py") as process:
+            try:
+                assert process.stdout is not None and f"process {robot.pid}" in process.stdout.readline()
+            finally:
+                process.kill()
 
 
 def test_motion_of_a_file_moves_the_arm_and_is_stopped(robot):

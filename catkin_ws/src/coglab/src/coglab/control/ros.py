@@ -33,21 +33,22 @@ class SlotServices:
         self._call(f"{MANAGER}/{slot}/start_motion", StartMotion, [], [], False)
 
     def robot(self) -> int:
-        """Returns the process number of the controller manager. Raises SlotError."""
+        """Returns the process number of the controller manager; 0 if the ROS master has none, or no master answers.
+        Raises SlotError if the manager does not answer."""
         try:
-            uri = self._node_of(f"{MANAGER}/load_controller")
+            master = rosgraph.Master("/coglab_control")
+            services = dict(master.getSystemState()[2])
+            nodes = services.get(f"{MANAGER}/load_controller")
+            uri = master.lookupNode(nodes[0]) if nodes else ""
+        except (OSError, rosgraph.MasterException):
+            return 0
+        if not uri:
+            return 0
+        try:
             proxy: Any = ServerProxy(uri)
             return int(proxy.getPid("/coglab_control")[2])
-        except (OSError, rosgraph.MasterException) as error:
-            raise SlotError(f"the robot does not answer: {error}") from error
-
-    @staticmethod
-    def _node_of(service: str) -> str:
-        master = rosgraph.Master("/coglab_control")
-        for name, nodes in master.getSystemState()[2]:
-            if name == service and nodes:
-                return str(master.lookupNode(nodes[0]))
-        raise SlotError(f"nobody offers {service}; start the system: ./coglab launch")
+        except OSError as error:
+            raise SlotError(f"the controller manager at {uri} does not answer: {error}") from error
 
     @staticmethod
     def _call(name: str, kind: Any, *words: object) -> Any:

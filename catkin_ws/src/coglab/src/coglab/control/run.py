@@ -70,7 +70,9 @@ def parser() -> argparse.ArgumentParser:
     result.add_argument(
         "--slot", default="", help="id of the slot in the robot (python_motion; the first free python_feedback)"
     )
-    result.add_argument("--robot", type=int, default=0, help="number of the robot's process, if several run")
+    result.add_argument(
+        "--robot", type=int, default=0, help="number of the robot's process; default: of the ROS master"
+    )
     result.add_argument("--start", action="store_true", help="a motion: activate the slot and start the motion at once")
     result.add_argument(
         "--wait", action="store_true", help="a feedback controller: connect only; it acts when its slot is enabled"
@@ -120,23 +122,25 @@ def choose(slot: str, robot: int) -> wire.Address | None:
 def connect(options: argparse.Namespace, kind: int, services: SlotServices) -> wire.Slot:
     """Connect to the slot. Load it into the robot if it is missing. Raises SlotError.
 
-    A feedback controller without --slot gets the first slot that no other process holds.
+    Without --robot, the robot of the ROS master is taken; without a master, the only robot that offers the slot, such
+    as a World. A feedback controller without --slot gets the first slot that no other process holds.
     """
     ids = [options.slot or SLOTS[kind]]
     if kind == wire.FEEDBACK and not options.slot:
         ids += [f"{SLOTS[kind]}_{number}" for number in range(2, MOST_SLOTS + 1)]
+    robot = options.robot or services.robot()
     for slot in ids:
-        address = choose(slot, options.robot)
+        address = choose(slot, robot)
         if address is None:
             try:
                 services.load(slot, TYPES[kind])
             except wire.SlotError:
                 late = time.monotonic() + APPEARS  # another process may just be loading it
-                while choose(slot, options.robot) is None:
+                while choose(slot, robot) is None:
                     if time.monotonic() > late:
                         raise
                     time.sleep(0.05)
-            address = choose(slot, services.robot())
+            address = choose(slot, robot)
         if address is None:
             raise wire.SlotError(f"the robot loaded '{slot}', but it runs on another computer; run this one there")
         try:
