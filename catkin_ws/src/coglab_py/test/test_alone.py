@@ -5,6 +5,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
@@ -58,9 +59,11 @@ def test_a_signal_ends_a_node_that_waits_for_its_master(number):
     with socket.socket() as nobody:
         nobody.bind(("127.0.0.1", 0))
         environment = {**os.environ, "ROS_MASTER_URI": f"http://127.0.0.1:{nobody.getsockname()[1]}"}
-        starts = [sys.executable, "-c", STARTS]
+        starts = [sys.executable, "-u", "-c", STARTS]
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
         with subprocess.Popen(starts, env=environment, text=True, **pipes) as node:
+            late = threading.Timer(60.0, node.kill)
+            late.start()
             try:
                 assert node.stdout.readline() == "starts\n"
                 assert "master" in node.stdout.readline()  # it waits
@@ -68,4 +71,5 @@ def test_a_signal_ends_a_node_that_waits_for_its_master(number):
                 assert node.wait(60.0) == 0
                 assert "Traceback" not in node.stdout.read()
             finally:
+                late.cancel()
                 node.kill()
