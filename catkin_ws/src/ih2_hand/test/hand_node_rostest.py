@@ -144,6 +144,8 @@ class HandNode(unittest.TestCase):
         self.assertTrue(self.hand.run("hand_open", 511).isOk)
         self.hand.send("hand_close", 60)
         self.hand.wait(lambda: self.hand.feedback, "feedback")
+        # actionlib takes a goal for lost if an older status arrives after the cancel.
+        self.hand.wait(lambda: self.state("hand_close") == GoalStatus.ACTIVE, "the goal's status")
         self.hand.clients["hand_close"].cancel_goal()
         result = self.hand.result("hand_close")
         self.assertEqual(self.state("hand_close"), GoalStatus.PREEMPTED)

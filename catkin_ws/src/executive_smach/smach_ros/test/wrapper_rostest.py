@@ -87,6 +87,8 @@ class TestWrapper(unittest.TestCase):
             client.send_goal(TestGoal(goal=UNTIL_CANCELLED))
             before = len(state.seen)
             self.assertTrue(wait_for(lambda before=before: len(state.seen) > before or rospy.is_shutdown()))
+            # actionlib takes a goal for lost if an older status arrives after the cancel.
+            self.assertTrue(wait_for(lambda: client.get_state() == GoalStatus.ACTIVE))
             client.cancel_goal()
             self.assertTrue(client.wait_for_result(rospy.Duration(LIMIT)))
             self.assertEqual(client.get_state(), GoalStatus.PREEMPTED)
