@@ -48,7 +48,8 @@ class SlotServices:
             proxy: Any = ServerProxy(uri)
             return int(proxy.getPid("/coglab_control")[2])
         except OSError as error:
-            raise SlotError(f"the controller manager at {uri} does not answer: {error}") from error
+            why = f"the controller manager at {uri} does not answer ({error})"
+            raise SlotError(f"{why}; start the system again, or name another robot by --robot") from error
 
     @staticmethod
     def _call(name: str, kind: Any, *words: object) -> Any:
