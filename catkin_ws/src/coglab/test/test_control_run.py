@@ -46,15 +46,21 @@ def test_a_missing_service_is_named_though_the_date_stands(monkeypatch):
     """A clock that is set back must not keep the command waiting."""
     from coglab.control import ros
 
-    def unknown(_master: object, name: str) -> str:
-        raise ros.rosgraph.MasterError(name)
+    with own_master():
+        monkeypatch.setattr(ros, "WAIT", 0.3)
+        monkeypatch.setattr(time, "time", lambda: 1000.0)
+        with pytest.raises(wire.SlotError, match="feedback/enable"):
+            ros.SlotServices().enable("slot")
 
-    monkeypatch.setattr(ros.rosgraph, "is_master_online", lambda: True)
-    monkeypatch.setattr(ros.rosgraph.Master, "lookupService", unknown)
-    monkeypatch.setattr(ros, "WAIT", 0.3)
-    monkeypatch.setattr(time, "time", lambda: 1000.0)
-    with pytest.raises(wire.SlotError, match="feedback/enable"):
-        ros.SlotServices().enable("slot")
+
+def test_a_frozen_master_keeps_no_command_waiting(monkeypatch):
+    from coglab.control import ros
+
+    with socket.create_server(("127.0.0.1", 0)) as frozen:
+        monkeypatch.setenv("ROS_MASTER_URI", f"http://127.0.0.1:{frozen.getsockname()[1]}")
+        for ask in (ros.SlotServices().robot, lambda: ros.SlotServices().enable("slot")):
+            with pytest.raises(wire.SlotError, match="master"):
+                ask()
 
 
 @pytest.fixture(name="robot", scope="module")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 import time
 
 import pytest
@@ -24,6 +25,13 @@ def ros(monkeypatch):
     monkeypatch.setattr(steady, "ending", lambda: False)
     yield said
     rospy.rostime.switch_to_wallclock()
+
+
+def test_a_frozen_master_does_not_keep_a_wait_for_a_service(monkeypatch):
+    with socket.create_server(("127.0.0.1", 0)) as frozen:
+        monkeypatch.setenv("ROS_MASTER_URI", f"http://127.0.0.1:{frozen.getsockname()[1]}")
+        with pytest.raises(rospy.ROSException):
+            steady.wait_for_service("/somewhere/service", 0.1)
 
 
 def set_ros(seconds):

@@ -17,6 +17,8 @@ from typing import Any
 import rosgraph
 import rospy
 
+from coglab_py.alone import answer
+
 FAILING = 10.0  # s in which all calls of a timer's function may fail before the node ends
 SILENCE = 1.0  # s without a message on /clock that count as a fault
 STEP = 0.5  # s of ROS time against the steady clock that count as a change of the date
@@ -149,7 +151,7 @@ def service_answers(name: str) -> bool:
     """True if a service is registered and its node accepts connections."""
     caller, name = rospy.get_name(), rospy.resolve_name(name)
     try:
-        address = rospy.core.parse_rosrpc_uri(rosgraph.Master(caller).lookupService(name))
+        address = rospy.core.parse_rosrpc_uri(answer(rosgraph.get_master_uri(), "lookupService", name))
         with socket.create_connection(address, timeout=1.0) as link:
             header = {"probe": "1", "md5sum": "*", "callerid": caller, "service": name}
             rosgraph.network.write_ros_handshake_header(link, header)

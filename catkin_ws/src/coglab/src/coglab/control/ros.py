@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from typing import Any
-from xmlrpc.client import ServerProxy
 
 import rosgraph
 import rospy
 from coglab_msgs.srv import FeedbackSelect, LoadController, StartMotion, SwitchController
+from coglab_py.alone import answer
 from coglab_py.steady import wait_for_service
 
 from coglab.control.slot import SlotError
@@ -33,33 +33,39 @@ class SlotServices:
         self._call(f"{MANAGER}/{slot}/start_motion", StartMotion, [], [], False)
 
     def robot(self) -> int:
-        """Returns the process number of the controller manager; 0 if the ROS master has none, or no master answers.
-        Raises SlotError if the manager does not answer."""
+        """Returns the process number of the controller manager; 0 if the ROS master has none, or there is no master.
+        Raises SlotError if one of them does not answer."""
+        master = asked = rosgraph.get_master_uri()
         try:
-            master = rosgraph.Master("/coglab_control")
-            services = dict(master.getSystemState()[2])
-            nodes = services.get(f"{MANAGER}/load_controller")
-            uri = master.lookupNode(nodes[0]) if nodes else ""
-        except (OSError, rosgraph.MasterException):
-            return 0
-        if not uri:
-            return 0
-        try:
-            proxy: Any = ServerProxy(uri)
-            return int(proxy.getPid("/coglab_control")[2])
-        except OSError as error:
-            why = f"the controller manager at {uri} does not answer ({error})"
-            raise SlotError(f"{why}; start the system again, or name another robot by --robot") from error
+            state = answer(master, "getSystemState")
+            nodes = dict(state[2]).get(f"{MANAGER}/load_controller") if state else None
+            uri = answer(master, "lookupNode", nodes[0]) if nodes else None
+            if not uri:
+                return 0
+            asked = uri
+            process = answer(uri, "getPid")
+        except TimeoutError:
+            process = None
+        if process is None:
+            who = "ROS master" if asked == master else "controller manager"
+            raise SlotError(
+                f"the {who} at {asked} does not answer; start the system again, or name another robot by --robot"
+            )
+        return int(process)
 
     @staticmethod
     def _call(name: str, kind: Any, *words: object) -> Any:
-        if not rosgraph.is_master_online():
+        try:
+            online = answer(rosgraph.get_master_uri(), "getPid") is not None
+        except TimeoutError:
+            online = False
+        if not online:
             raise SlotError("no ROS master answers; start the system first: ./coglab launch")
         try:
             wait_for_service(name, WAIT)
-            answer = rospy.ServiceProxy(name, kind)(*words)
+            response = rospy.ServiceProxy(name, kind)(*words)
         except (rospy.ROSException, rospy.ServiceException, OSError) as error:
             raise SlotError(f"{name} does not answer: {error}") from error
-        if not answer.success:
-            raise SlotError(f"the robot refuses: {answer.message}")
-        return answer
+        if not response.success:
+            raise SlotError(f"the robot refuses: {response.message}")
+        return response
