@@ -12,6 +12,7 @@ import rospy
 import yaml
 from coglab_msgs.msg import ReasonCode
 from coglab_msgs.srv import GetObject, Start
+from coglab_py.alone import answer
 from coglab_py.pace import Pace
 from coglab_py.packages import package_path
 from coglab_py.steady import utc_of, wait_for_service
@@ -37,9 +38,10 @@ class NotTaken(RuntimeError):
 def services() -> int:
     """Number of services that the nodes of this system have registered."""
     try:
-        return len(rosgraph.Master("/coglab_demo").getSystemState()[2])
-    except (TimeoutError, OSError, rosgraph.MasterException):
+        state = answer(rosgraph.get_master_uri(), "getSystemState")
+    except TimeoutError:
         return 0
+    return len(state[2]) if state else 0
 
 
 def ask_for(action: str, object_id: str, alive: Callable[[], bool], limit: float) -> None:
@@ -55,15 +57,15 @@ def ask_for(action: str, object_id: str, alive: Callable[[], bool], limit: float
             before, moved = progress, time.monotonic()
         try:
             wait_for_service("/coglab/start", 1.0)
-            answer = rospy.ServiceProxy("/coglab/start", Start)(action, object_id)
+            response = rospy.ServiceProxy("/coglab/start", Start)(action, object_id)
         except rospy.ROSException:
             continue
         except rospy.ServiceException as error:
             refusal, code = str(error), ReasonCode.NODE_SILENT
         else:
-            if answer.success:
+            if response.success:
                 return
-            refusal, code = answer.message, answer.reason_code
+            refusal, code = response.message, response.reason_code
         time.sleep(0.2)
     raise NotTaken(f"{action} was not taken within {time.monotonic() - begun:.0f} s: {refusal}", code)
 
@@ -72,10 +74,10 @@ def entry_of(object_id: str) -> Mapping[str, Any] | None:
     """Entry of an object in the database of the running system; None if the database does not return it."""
     try:
         wait_for_service("/object_database/get_object", 2.0)
-        answer = rospy.ServiceProxy("/object_database/get_object", GetObject)(object_id)
+        response = rospy.ServiceProxy("/object_database/get_object", GetObject)(object_id)
     except (rospy.ROSException, rospy.ServiceException):
         return None
-    return yaml.safe_load(answer.yaml) if answer.success else None
+    return yaml.safe_load(response.yaml) if response.success else None
 
 
 def run_handover(

@@ -9,7 +9,7 @@ from typing import Any
 
 import rosgraph
 import rospy
-from coglab_py.alone import init_node
+from coglab_py.alone import answer, init_node
 from coglab_py.steady import ending, spin, worker
 
 from coglab_tools.trial.record import trials_folder
@@ -56,11 +56,13 @@ class RecorderNode:
     def _parameters() -> dict[str, Any]:
         try:
             # not rospy.get_param(): for "/" it returns its cache, which is empty
-            found = rosgraph.Master(rospy.get_name()).getParam(rospy.get_namespace())
-            return found if isinstance(found, dict) else {}
-        except Exception as error:  # from the master
-            rospy.logwarn("the parameters are not in trial.yaml: %s", error)
+            found = answer(rosgraph.get_master_uri(), "getParam", rospy.get_namespace())
+        except TimeoutError:
+            found = None
+        if not isinstance(found, dict):
+            rospy.logwarn("the parameters are not in trial.yaml: the ROS master does not answer")
             return {}
+        return found
 
     @staticmethod
     def _say(sentence: str, wrong: bool) -> None:
