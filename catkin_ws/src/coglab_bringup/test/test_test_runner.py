@@ -8,6 +8,8 @@ from coglab_bringup.arguments import test_options as options_of_test
 from coglab_bringup.test_runner import Program, find_programs, report, report_differences, run, unfinished
 from coglab_bringup.usage import Refused
 
+LIMIT = 600.0  # s, for programs that end by themselves, on a busy computer too
+
 GREEN = (
     '<testsuites><testsuite><testcase classname="test_x" name="one"/>'
     '<testcase classname="test_x.Group" name="two"><skipped/></testcase></testsuite></testsuites>'
@@ -43,7 +45,7 @@ def program(tmp_path, script: str) -> Program:
 )
 def test_counts(tmp_path, script, counts, capsys):
     item = program(tmp_path, script)
-    run(item, tmp_path / "log", limit=1.0 if "sleep" in script else 60.0)
+    run(item, tmp_path / "log", limit=1.0 if "sleep" in script else LIMIT)
     assert (item.passed, item.failed, item.skipped) == counts, item.failures
     status = report([item], tmp_path)
     assert status == (0 if counts[1] == 0 and counts[0] > 0 else 1)
@@ -63,7 +65,7 @@ raise SystemExit(2)
 """
     item = program(tmp_path, script)
     item.kind, item.name, item.files = "rostest", "arm.test", []
-    run(item, tmp_path / "log", limit=60.0)
+    run(item, tmp_path / "log", limit=LIMIT)
     assert (item.passed, item.failed, item.skipped) == (0, 1, 0)
     assert "not within 60 s: its end" in item.failures[0]
 
@@ -79,7 +81,7 @@ reports.mkdir(parents=True)
 """
     item = program(tmp_path, script)
     item.kind, item.name, item.files = "rostest", "arm.test", []
-    run(item, tmp_path / "log", limit=60.0)
+    run(item, tmp_path / "log", limit=LIMIT)
     assert report([item], tmp_path) == 0
     assert "REPEATED reach: no goal" in capsys.readouterr().out
 
@@ -91,7 +93,7 @@ def test_a_gtest_that_was_not_built_is_a_failure(tmp_path):
     (package / "test" / "test_thing.cpp").write_text("")
     (item,) = find_programs(tmp_path, tmp_path, sys.executable, [])
     assert item.name == "pkg_test_thing"
-    run(item, tmp_path / "log", limit=5.0)
+    run(item, tmp_path / "log", limit=LIMIT)
     assert (item.passed, item.failed, item.skipped) == (0, 1, 0) and "not built" in item.failures[0]
 
 
@@ -155,7 +157,7 @@ def test_pytests_of_a_package_share_a_process_unless_they_are_a_node(tmp_path):
     )
     first, node = find_programs(tmp_path, tmp_path, sys.executable, [])
     assert (first.files, node.files) == (["test_a.py", "test_b.py", "test_c.py"], ["test_node.py"])
-    run(first, tmp_path / "log", limit=60.0)
+    run(first, tmp_path / "log", limit=LIMIT)
     assert (first.passed, first.failed, first.skipped) == (1, 3, 0), first.failures
     told = "\n".join(first.failures)
     assert "test_a.test_bad: " in told and "test_b.py" in told

@@ -283,8 +283,8 @@ def test_the_end_of_the_last_motion_reaches_a_late_subscriber(robot: Robot) -> N
 
 
 def test_gains_change_by_dynamic_reconfigure(robot: Robot) -> None:
-    dmp = Client("/controller_manager/dmp", timeout=30.0)
-    described = {each["name"]: each for each in dmp.get_parameter_descriptions(timeout=30.0)}
+    dmp = Client("/controller_manager/dmp", timeout=120.0)
+    described = {each["name"]: each for each in dmp.get_parameter_descriptions(timeout=120.0)}
     assert described["pos_clik_gain"]["min"] == 0.0 and described["pos_clik_gain"]["max"] == 0.5 / PERIOD
     assert "eq. (6)" in described["pos_clik_gain"]["description"]
     assert dmp.update_configuration({"pos_clik_gain": 12, "goal_max_speed": 0.2})["pos_clik_gain"] == 12.0
@@ -295,8 +295,8 @@ def test_gains_change_by_dynamic_reconfigure(robot: Robot) -> None:
     assert (in_force["correction_speed"], in_force["pos_clik_gain"]) == (0.3, 12.0), "all or nothing, and told"
     assert dmp.update_configuration({"pos_clik_gain": -1.0})["pos_clik_gain"] == 12.0
     assert robot.manager("load_controller", LoadController, "soft", "EeAdmittance").success
-    soft = Client("/controller_manager/feedback/soft", timeout=30.0)
-    gain = next(name for name in soft.get_configuration(timeout=30.0) if name.startswith("damping"))
+    soft = Client("/controller_manager/feedback/soft", timeout=120.0)
+    gain = next(name for name in soft.get_configuration(timeout=120.0) if name.startswith("damping"))
     changed = soft.update_configuration({gain: 70.0})
     assert changed[gain] == 70.0
     assert soft.update_configuration({gain: -1.0})[gain] == 70.0

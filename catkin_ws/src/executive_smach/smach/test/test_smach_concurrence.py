@@ -42,7 +42,7 @@ def test_outcome_map_is_checked(conditions, log):
 
 
 def test_children_run_in_named_threads_all_released_together():
-    gate, names = threading.Barrier(3, timeout=10), []
+    gate, names = threading.Barrier(3, timeout=120), []
 
     def run(ud):
         gate.wait()
