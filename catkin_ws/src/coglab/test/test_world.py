@@ -257,7 +257,7 @@ def test_arguments_of_a_world_are_checked(world):
 
         thread = threading.Thread(target=make)
         thread.start()
-        thread.join(30)
+        thread.join(300)
         return thread_error[0]
 
     assert "mug" in other(object="teapot") and "accustomed" in other(person="robot")

@@ -29,7 +29,7 @@ def first():
     yield environment, node
     for process in (node, master):
         process.terminate()
-        process.wait(20)
+        process.wait(120)
 
 
 def refusal(environment: dict, *command: object) -> str:

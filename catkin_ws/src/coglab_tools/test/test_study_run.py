@@ -59,7 +59,7 @@ def start(*words: str) -> subprocess.Popen[str]:
 def kill(process: subprocess.Popen[str]) -> None:
     if process.poll() is None:
         os.killpg(process.pid, signal.SIGKILL)
-        process.wait(30)
+        process.wait(120)
 
 
 def wait_for_rows(folder: Path, count: int, process: subprocess.Popen[str]) -> None:

@@ -400,5 +400,5 @@ def test_a_stalled_trial_leaves_no_thread_behind(monkeypatch):
     with pytest.raises(ClockStalled, match="world"):
         trial.run(script=lambda t: None)
     for thread in set(threading.enumerate()) - before:
-        thread.join(20.0)
+        thread.join(120.0)
         assert not thread.is_alive(), thread

@@ -44,7 +44,7 @@ def test_a_preemption_at_a_virtual_time():
         caller = clock.start_thread(lambda: (clock.sleep(20.05), machine.request_preempt()), "caller")
         assert machine.execute() == "preempted"
         assert clock.now() == pytest.approx(20.1, abs=1e-6)
-        caller.join(5)
+        caller.join(120)
 
 
 def test_runs_are_the_same_each_time():
@@ -61,7 +61,7 @@ def test_runs_are_the_same_each_time():
             threads = [clock.start_thread(lambda n=n: work(n, 0.1 * (n % 3 + 1)), f"w{n}") for n in range(6)]
             clock.sleep(20.0)
             order.append("end")
-        [t.join(10) for t in threads]
+        [t.join(120) for t in threads]
         return order
 
     first = run()
@@ -90,7 +90,7 @@ def test_an_outside_thread_can_set_an_event():
     waiter = threading.Thread(target=wait)
     waiter.start()
     event.set()
-    waiter.join(5)
+    waiter.join(120)
     assert seen == [True]
 
 
@@ -110,7 +110,7 @@ def test_a_thread_that_does_not_wait_through_the_clock_is_named():
     with pytest.raises(ClockStalled, match="stubborn"):
         clock.sleep(1.0)
     stuck.set()
-    thread.join(5)
+    thread.join(120)
 
 
 STOPPED = """
@@ -157,20 +157,20 @@ def test_each_thread_may_use_its_own_clock():
 
     def use(seconds):
         with using(VirtualClock()) as clock:
-            both.wait(10)
+            both.wait(120)
             child = smach.concurrence.threading.Thread(target=lambda: clock.sleep(seconds))
             child.start()
             clock.sleep(2 * seconds)
             now = clock.now()
-            child.join(10)  # its last sleep is over; on a busy computer the thread may end later
+            child.join(120)  # its last sleep is over; on a busy computer the thread may end later
             seen[seconds] = (now, child.is_alive())
-            both.wait(10)
+            both.wait(120)
 
     threads = [threading.Thread(target=use, args=(seconds,)) for seconds in (10.0, 1000.0)]
     for thread in threads:
         thread.start()
     for thread in threads:
-        thread.join(20)
+        thread.join(240)
     assert seen == {10.0: (20.0, False), 1000.0: (2000.0, False)}
     assert smach.concurrence.threading is threading
 
@@ -184,5 +184,5 @@ def test_a_thread_that_may_think_does_not_stall_the_clock():
         threading.Event().wait(0.4)
         clock.let_think(False)
         clock.sleep(1.0)
-    thread.join(5)
+    thread.join(120)
     assert ended == [None]
