@@ -60,7 +60,7 @@ class RecorderNode:
         except TimeoutError:
             found = None
         if not isinstance(found, dict):
-            rospy.logwarn("the parameters are not in trial.yaml: the ROS master does not answer")
+            rospy.logwarn("the parameters are not in trial.yaml: the ROS master did not return them")
             return {}
         return found
 
