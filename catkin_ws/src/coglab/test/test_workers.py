@@ -29,7 +29,7 @@ def job(what):
         except ClockStalled as error:
             raise RuntimeError("a state raised") from error
     if name == "hangs":
-        time.sleep(60.0)
+        time.sleep(600.0)
     if name == "wrong":
         raise ArithmeticError("1 + 1")
     if name == "odd":
@@ -61,4 +61,4 @@ def test_a_job_that_hangs_ends_at_its_limit():
     begun = time.monotonic()
     ((_, result),) = run_each(job, [("hangs", None)], 2, limit=1.0)
     assert isinstance(result, WorkerLost) and "1 s" in str(result)
-    assert time.monotonic() - begun < 50.0
+    assert time.monotonic() - begun < 300.0

@@ -92,7 +92,7 @@ def test_observers_see_cause_of_stop_and_why_they_cannot_acknowledge(desk):
         desk.loop.call_soon_threadsafe(desk.console.desk.guard.stop, "the arm is blocked")
         other.until("return document.getElementById('stop-cause').innerText.includes('the arm is blocked')", 60.0)
         other.until(
-            "return document.getElementById('why-acknowledge').innerText.startsWith('browser 1 operates')", 10.0
+            "return document.getElementById('why-acknowledge').innerText.startsWith('browser 1 operates')", 60.0
         )
         assert other.js("return document.getElementById('acknowledge').getAttribute('aria-disabled')") == "true"
         assert look(other)[0] == []
@@ -206,7 +206,7 @@ def test_an_event_says_in_which_phase_it_was(desk):
     try:
         desk.event("a touch")
         desk.browser.until(
-            "return document.getElementById('log').innerText.includes('a touch [reaches and receives]')", 10.0
+            "return document.getElementById('log').innerText.includes('a touch [reaches and receives]')", 60.0
         )
     finally:
         desk.console.events.phase = lambda: ""

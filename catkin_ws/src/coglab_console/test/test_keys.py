@@ -30,7 +30,7 @@ def test_refused_choice_shows_reason_and_old_value(live):
                 wish,
             )
             page.until(
-                "const t = document.getElementById('told'); return !t.hidden && /watches/.test(t.textContent)", 10.0
+                "const t = document.getElementById('told'); return !t.hidden && /watches/.test(t.textContent)", 60.0
             )
             assert page.js("return document.getElementById(arguments[0]).value", field) == shown
     assert live.console.desk.object_id == "" and ("speed_scale", {"value": 0.4}) not in live.robot.calls

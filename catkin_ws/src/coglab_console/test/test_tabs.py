@@ -102,7 +102,7 @@ def test_objects_with_what_the_database_has_against_a_file(live):
     page.js("document.querySelector('#page [aria-label=\"Show mug\"]').click()")
     assert page.js("return document.querySelector('#page pre').innerText").strip() == "id: mug"
     live.put(objects={"rows": rows, "asked": True, "problems": []})
-    page.until("return document.getElementById('object-problems').innerText.includes('2 objects')", 10.0)
+    page.until("return document.getElementById('object-problems').innerText.includes('2 objects')", 60.0)
     live.put(objects={"rows": [], "asked": False, "problems": []})
     page.until("return document.getElementById('object-problems').innerText.includes('not read')", 60.0)
     page.tab("Live")

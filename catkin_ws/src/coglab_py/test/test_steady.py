@@ -96,7 +96,7 @@ def test_waiting_for_a_service_ends_on_the_steady_clock(monkeypatch):
     begun = time.monotonic()
     with pytest.raises(rospy.ROSException):
         steady.wait_for_service("/nobody", 0.3)
-    assert time.monotonic() - begun < 10.0
+    assert time.monotonic() - begun < 60.0
 
 
 def test_a_silent_clock_is_a_fault_and_a_set_one_is_logged(ros, monkeypatch):

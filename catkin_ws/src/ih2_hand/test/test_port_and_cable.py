@@ -40,6 +40,13 @@ def driver(server):
         yield driver
 
 
+def until(condition):
+    end = time.monotonic() + 60.0
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.005)
+
+
 def test_link_follows_the_pty(server, tmp_path):
     assert os.path.realpath(tmp_path / "hand") == server.path
     with HandSerialDriver(str(tmp_path / "hand")) as driver:
@@ -84,11 +91,11 @@ def test_unplugged_cable_names_port_and_last_byte(server, driver):
 def test_calibration_over_the_pty(server, driver):
     driver.set_hand_posture([100] * 5)
     time.sleep(0.5)
+    server.hand.calibration_scale = 3.0  # 5 s, so that the requests of a slow test come before its end
     outcome = []
     thread = threading.Thread(target=lambda: outcome.append(driver.calibration("fast")))
     thread.start()
-    time.sleep(0.15)
-    assert driver.calibrating
+    until(lambda: driver.calibrating)
     with pytest.raises(HandCalibratingError, match="discards every"):
         driver.get_finger_position(1)
     driver.stop_all()
@@ -98,6 +105,7 @@ def test_calibration_over_the_pty(server, driver):
 
 
 def test_calibration_broken_by_the_cable(server, driver):
+    server.hand.calibration_scale = 3.0  # so long that the cable is pulled before its end
     errors = []
 
     def calibrate():
@@ -108,7 +116,7 @@ def test_calibration_broken_by_the_cable(server, driver):
 
     thread = threading.Thread(target=calibrate)
     thread.start()
-    time.sleep(0.2)
+    until(lambda: driver.calibrating)
     server.fault("unplug")
     thread.join(60.0)
     assert len(errors) == 1
