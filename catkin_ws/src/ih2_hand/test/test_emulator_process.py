@@ -8,8 +8,8 @@ import time
 from pathlib import Path
 
 import pytest
-from ih2_hand.driver import HandSerialDriver
 from ih2_hand.errors import HandConnectionLost
+from patience import opened, until
 
 SCRIPT = str(Path(__file__).resolve().parents[1] / "scripts" / "hand_emulator.py")
 
@@ -54,11 +54,10 @@ def test_port_link_commands_and_trace(start, tmp_path):
     )
     port = process.stdout.readline().split()
     assert port[0] == "port"
-    with HandSerialDriver(str(tmp_path / "hand"), read_timeout=0.3) as driver:
+    with opened(str(tmp_path / "hand")) as driver:
         driver.calibration("fast")
         driver.set_finger_current(2, 100)
-        time.sleep(1.0)
-        assert driver.get_finger_position(2) == 105
+        until(lambda: driver.get_finger_position(2) == 105)
         process.stdin.write("unplug 0.2\n")
         process.stdin.flush()
         assert process.stdout.readline() == "port none (unplugged)\n"
