@@ -73,6 +73,20 @@ def refused(pending, code):
     raise AssertionError(f"it succeeded with {value!r}")
 
 
+def cut_short(begin, act, code):
+    """`act()` ends the call of `begin()` with this code. Again if a late computer acts after the call's own end."""
+    for left in (4, 3, 2, 1, 0):
+        pending = begin()
+        act(pending)
+        try:
+            value = settle(pending)
+        except PortError as error:
+            assert error.code == code, f"code {error.code}, expected {code}: {error.sentence}"
+            return
+        assert left, f"it succeeded with {value!r}"
+        say_again("a call that is cut short", "it had ended before")
+
+
 @contextmanager
 def frozen(node):
     """Inside the block, the process of this node is stopped."""
@@ -339,21 +353,26 @@ class Hand(unittest.TestCase):
         finger = lambda: hand.state().positions[2]  # noqa: E731
 
         settle(hand.preshape("cylindrical", "medium"), 8.0)
-        closing = hand.close_on_object()
-        assert not closing.done()
-        settle(closing, 8.0)
-        until(lambda: finger() > 100, 1.0, "the closed fingers")
-        closed, opening = finger(), hand.open(60)  # slow: it runs when it is cancelled
-        until(lambda: finger() < closed - 10, 2.0, "the loosening")
-        opening.cancel()
-        refused(opening, ReasonCode.CANCELLED)
+
+        def loosens():
+            settle(hand.close_on_object(), 8.0)
+            until(lambda: finger() > 100, 1.0, "the closed fingers")
+            return hand.open(60)  # slow: it runs when it is cancelled
+
+        def is_cancelled(opening):
+            until(lambda: finger() < 100, 2.0, "the loosening")
+            opening.cancel()
+
+        cut_short(loosens, is_cancelled, ReasonCode.CANCELLED)
         time.sleep(1.0)
         there = finger()
         stays(lambda: abs(finger() - there) <= 1, 0.4)
-        closing = hand.close(60)
-        time.sleep(0.05)
-        settle(hand.open(511), 8.0)
-        refused(closing, ReasonCode.SUPERSEDED)
+
+        def is_superseded(_closing):
+            time.sleep(0.05)
+            settle(hand.open(511), 8.0)
+
+        cut_short(lambda: hand.close(60), is_superseded, ReasonCode.SUPERSEDED)
         until(lambda: finger() < 60 and not hand.state().holding, 2.0, "the open hand")
 
         with frozen("/ih2_hand"):
