@@ -171,7 +171,7 @@ async def running(folder: Path, robot: RobotDouble | None = None, **files: objec
 
 
 def served(robot: type[RobotDouble] = RobotDouble, program: bool = False, **files: object):
-    """Makes a coroutine a test. `console`: serves for 30 s; `client`: of a browser, or of a program without cookies."""
+    """Makes a coroutine a test. `console`: serves for 120 s; `client`: of a browser, or of a program without cookies."""
 
     def of(test):
         asked = inspect.signature(test).parameters
@@ -180,10 +180,10 @@ def served(robot: type[RobotDouble] = RobotDouble, program: bool = False, **file
             async with running(folder, robot(), **files) as console:
                 given["console"] = console
                 if "client" not in asked:
-                    return await asyncio.wait_for(test(**given), 30)
+                    return await asyncio.wait_for(test(**given), 120)
                 new = aiohttp.ClientSession(cookie_jar=aiohttp.DummyCookieJar()) if program else console.browser()
                 async with new as given["client"]:
-                    await asyncio.wait_for(test(**given), 30)
+                    await asyncio.wait_for(test(**given), 120)
 
         def run(tmp_path, **given):
             if "tmp_path" in asked:

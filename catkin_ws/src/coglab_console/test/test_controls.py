@@ -61,10 +61,10 @@ def desk(tmp_path_factory):
     found.close()
 
 
-def soon(condition, limit=60.0):
+def soon(condition, limit=60.0, what=lambda: "not in time"):
     end = time.monotonic() + limit
     while not condition():
-        assert time.monotonic() < end, "not in time"
+        assert time.monotonic() < end, what()
         time.sleep(0.02)
 
 
@@ -78,11 +78,16 @@ def test_every_control_shows_observers_who_operates(desk):
         other.until("return document.getElementById('role').innerText.includes('you watch')", 60.0)
         for page in PAGES:
             other.tab(page)
-            time.sleep(0.2)
-            found = {words_of(name): why for name, why in other.js(DISABLED)}
-            wanted = OPERATORS["Live"] | OPERATORS.get(page, set())
-            assert wanted <= {name.removesuffix(" (default) ▾") for name in found}, (page, found)
-            assert all("browser 1" in why for why in found.values()), (page, found)
+            wanted, found = OPERATORS["Live"] | OPERATORS.get(page, set()), {}
+
+            def shown(wanted=wanted, found=found):
+                found.clear()
+                found.update({words_of(name): why for name, why in other.js(DISABLED)})
+                return wanted <= {name.removesuffix(" (default) ▾") for name in found} and all(
+                    "browser 1" in why for why in found.values()
+                )
+
+            soon(shown, what=lambda page=page, found=found: (page, found))
             assert look(other)[0] == [], page
 
 

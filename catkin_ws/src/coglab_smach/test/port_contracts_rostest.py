@@ -39,6 +39,18 @@ def until(condition, limit=5.0, what="it"):
         time.sleep(0.01)
 
 
+def known(ask, what):
+    """The value of `ask()`, after it has one: none is known while a node, or this test, is late."""
+    found = [None]
+
+    def ready():
+        found[0] = ask()
+        return found[0] is not None and len(found[0]) > 0
+
+    until(ready, what=what)
+    return found[0]
+
+
 def stays(condition, duration):
     end = time.monotonic() + duration
     while time.monotonic() < end:
@@ -161,9 +173,13 @@ class WithArm(unittest.TestCase):
         settle(self.arm.switch_controller(controller))
         until(lambda: self.arm.standing().ok, 3.0, "rest")
 
+    def joints(self):
+        """The joint angles, rad."""
+        return np.array(known(self.arm.joint_positions, "the joint angles"))
+
     def start_ptp(self, by=0.4):
         """A slow motion of the last joint that has begun, and its target."""
-        target = list(self.arm.joint_positions())
+        target = list(self.joints())
         target[6] += by if target[6] < 0.5 else -by
         motion = self.arm.move_ptp(target, [0.1] * 7)
         until(lambda: not self.arm.standing().ok, 2.0, "the motion")
@@ -176,16 +192,16 @@ class Motions(WithArm):
     def stands_before(self, target):
         until(lambda: self.arm.standing().ok, 2.0, "rest")
         time.sleep(0.1)
-        place = np.array(self.arm.joint_positions())
+        place = self.joints()
         assert np.max(np.abs(place - target)) > 0.02, "it went to its target"
         time.sleep(0.3)
-        assert np.max(np.abs(place - self.arm.joint_positions())) < 0.01, "it moved on"
+        assert np.max(np.abs(place - self.joints())) < 0.01, "it moved on"
 
     @again_if_late
     def test_a_motion_is_executed_to_its_end(self):
         motion, target = self.start_ptp(0.1)
         assert not motion.done() and settle(motion) is None
-        assert np.max(np.abs(np.subtract(self.arm.joint_positions(), target))) < 0.03
+        assert np.max(np.abs(self.joints() - target)) < 0.03
 
     @again_if_late
     def test_cancelling_ends_motions_that_run_and_wait(self):
@@ -248,7 +264,7 @@ class Motions(WithArm):
         assert not self.arm.profile_settled("dmp").ok
 
     def test_requests_cancelled_while_the_node_is_frozen_never_act(self):
-        before = np.array(self.arm.joint_positions())
+        before = self.joints()
         with frozen("/robot"):
             motion = self.arm.move_ptp([*before[:6], 0.0], [])
             until(lambda: self.arm.joint_positions() is None, 2.0, "silence")
@@ -257,7 +273,7 @@ class Motions(WithArm):
             motion.cancel()
         until(lambda: self.arm.joint_positions() is not None, 5.0, "the node's return")
         self.setUp()
-        stays(lambda: np.max(np.abs(before - self.arm.joint_positions())) < 0.05, 0.6)
+        stays(lambda: np.max(np.abs(before - self.joints())) < 0.05, 0.6)
 
 
 class Contact(WithArm):
@@ -346,11 +362,11 @@ class Hand(unittest.TestCase):
         if not hand.state().calibrated:
             refused(hand.preshape("cylindrical", "medium"), ReasonCode.HAND_NOT_CALIBRATED)
             settle(hand.calibrate("fast"), 12.0)
-        assert hand.state().calibrated and not hand.state().holding
+        until(lambda: hand.state().calibrated and not hand.state().holding, 5.0, "the calibrated, empty hand")
         refused(hand.calibrate("fast"), ReasonCode.HAND_REFUSED)
         refused(hand.preshape("fist", "medium"), ReasonCode.UNKNOWN_NAME)
         refused(hand.open(9999), ReasonCode.OUT_OF_RANGE)
-        finger = lambda: hand.state().positions[2]  # noqa: E731
+        finger = lambda: known(lambda: hand.state().positions, "the fingers")[2]  # noqa: E731
 
         settle(hand.preshape("cylindrical", "medium"), 8.0)
 
