@@ -41,7 +41,13 @@ class LwrNodeProcesses(unittest.TestCase):
         target = rospy.Publisher(f"/{name}/target_joint_states", JointState, queue_size=1)
         twist = Twist(target, [0.5, 0, 0, 0, 0, 0, 0])
         before = robot.position[0]
-        wait_for(lambda: robot.position[0] > before + 0.2, "motion")
+
+        def moves() -> bool:
+            if robot.state != 2:  # a late computer has ended command mode
+                command("start")
+            return robot.position[0] > before + 0.2
+
+        wait_for(moves, "motion")
         return node, robot, twist
 
     def end(self, node: subprocess.Popen, robot: UdpController, twist: Twist) -> None:
