@@ -32,7 +32,7 @@ class ReferenceServer:
         elif goal.goal == ABORT:
             self._server.set_aborted(result)
         elif goal.goal == DEAF:
-            self.release.wait(30)
+            self.release.wait(300)
             self._server.set_succeeded(result)
         else:
             while not self._server.is_preempt_requested() and not rospy.is_shutdown():

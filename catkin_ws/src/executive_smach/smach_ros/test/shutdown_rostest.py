@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 import unittest
 
 import rospy
@@ -48,11 +49,14 @@ class TestShutdown(unittest.TestCase):
             process.stdout.close()
         cls.service.shutdown()
 
-    def check(self, kind):
+    def check(self, kind, under_way=lambda: True):
         process = self.processes[kind]
         for line in process.stdout:
             if "READY" in line:
                 break
+        end = time.monotonic() + LIMIT
+        while not under_way() and time.monotonic() < end:
+            time.sleep(0.05)
         self.assertIsNone(process.poll(), "still running before the interrupt")
         process.send_signal(signal.SIGINT)
         self.assertIn("OUTCOME end", process.communicate(timeout=LIMIT)[0])
@@ -61,7 +65,7 @@ class TestShutdown(unittest.TestCase):
         self.check("action_without_server")
 
     def test_action_under_way(self):
-        self.check("action_under_way")
+        self.check("action_under_way", under_way=lambda: self.server.goals)
         self.assertEqual(self.server.goals, [3])
 
     def test_monitor(self):
