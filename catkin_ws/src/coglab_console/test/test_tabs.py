@@ -141,7 +141,7 @@ def test_contact_by_joint_against_its_threshold_and_learning(live):
     button = page.js(
         "return [...document.querySelectorAll('#page button')].find((b) => b.innerText === 'Learn again at rest')"
     )
-    press_and_hold(page, button, lambda: live.robot.calls == [("contact_learn", {})])
+    press_and_hold(page, button, lambda: live.robot.calls == [("contact_learn", {})], 60.0)
     live.state = {}
     page.tab("Live")
 
