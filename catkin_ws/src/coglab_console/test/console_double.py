@@ -171,7 +171,7 @@ async def running(folder: Path, robot: RobotDouble | None = None, **files: objec
 
 
 def served(robot: type[RobotDouble] = RobotDouble, program: bool = False, **files: object):
-    """Makes a coroutine a test. `console`: serves for 120 s; `client`: of a browser, or of a program without cookies."""
+    """Makes a coroutine a test. `console`: serves 120 s; `client`: of a browser, or of a program without cookies."""
 
     def of(test):
         asked = inspect.signature(test).parameters
