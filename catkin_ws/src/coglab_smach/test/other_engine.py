@@ -15,7 +15,7 @@ def use_engine(folder):
     """Take smach from ``folder``."""
     sys.path.insert(0, folder)
     if not hasattr(threading.Thread, "isAlive"):
-        threading.Thread.isAlive = threading.Thread.is_alive  # older releases of smach use the name of Python 2
+        threading.Thread.isAlive = lambda thread: thread.is_alive()  # older releases of smach use the name of Python 2
 
 
 def watch_user_data(container, seen):

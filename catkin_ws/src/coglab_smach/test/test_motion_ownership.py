@@ -194,7 +194,7 @@ def test_a_time_limit_follows_the_duration_of_the_primitive(monkeypatch):
 @pytest.mark.parametrize("hub_after", ["stopped"])
 def test_the_arm_stays_if_the_person_holds_on_and_the_hand_does_not_open(hub_after, monkeypatch):
     """The arm must not move away with the person's object."""
-    monkeypatch.setattr(weight, "from_palm", lambda state, track, *_: 0.1)
+    monkeypatch.setattr(weight, "from_palm", lambda state, track, *_: 0.0)  # always at the object
 
     def script(t):
         t.wait_hub("wait_without_object")

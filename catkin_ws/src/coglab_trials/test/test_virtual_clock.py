@@ -9,7 +9,7 @@ import time
 
 import pytest
 import smach
-from coglab_trials.virtual_clock import ClockStalled, VirtualClock, using
+from coglab_trials.virtual_clock import ClockStalled, VirtualClock, VirtualThread, using
 
 
 class Waits(smach.State):
@@ -111,6 +111,26 @@ def test_a_thread_that_does_not_wait_through_the_clock_is_named():
         clock.sleep(1.0)
     stuck.set()
     thread.join(120)
+
+
+def test_a_thread_is_over_with_its_last_turn():
+    """However late the operating system ends it: an engine that asks would else wait at random."""
+    ends = threading.Event()
+
+    class Late(VirtualThread):
+        def run(self):
+            super().run()
+            ends.wait(60.0)
+
+    with using(VirtualClock()) as clock:
+        thread = Late(clock, target=lambda: clock.sleep(0.5))
+        thread.start()
+        assert thread.is_alive()
+        clock.sleep(1.0)
+        alive = thread.is_alive()
+        ends.set()
+    assert not alive
+    thread.join(60.0)
 
 
 STOPPED = """

@@ -146,6 +146,11 @@ class VirtualThread(threading.Thread):
         super().__init__(*args, **kw)
         self._clock = clock
         self._turn = _Parked(self)
+        self._is_over = False
+
+    def is_alive(self) -> bool:
+        """False from the end of its last turn. The operating system ends it a little later, at any time."""
+        return super().is_alive() and not self._is_over
 
     def start(self) -> None:
         # The caller queues the thread: the order is then that of the calls, not that of the operating system.
@@ -164,6 +169,7 @@ class VirtualThread(threading.Thread):
             self._clock._await_turn(self._turn)
             super().run()
         finally:
+            self._is_over = True
             self._clock._leave(self)
 
 
