@@ -271,10 +271,24 @@ def test_a_node_that_dies_during_calibration(node):
     calibration = asked(node)
     node.say(0.1, calibrating=True)
     assert not calibration.done()
+    node.now += 1.01
+    assert not calibration.done()
     node.now += 1.0
     assert not calibration.done()
     node.now += 0.01
     assert "right_hand/hand_status" in refused(calibration, ReasonCode.NODE_SILENT).causes[0]
+
+
+def test_a_caller_that_comes_late_takes_no_old_status_for_the_end_of_a_calibration(node):
+    calibration = asked(node)
+    node.say(0.1, calibrating=True)
+    assert not calibration.done()
+    node.now += 5.0  # the computer was busy: what the hand said meanwhile has not arrived yet
+    assert not calibration.done()
+    node.say(0.1, calibrated=True)
+    assert calibration.done()
+    node.now += 5.0
+    assert calibration.done() and calibration.result() is None
 
 
 def test_a_dead_node_receives_no_order(node):

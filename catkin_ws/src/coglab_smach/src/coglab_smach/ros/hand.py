@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
 from typing import Any
 
 import actionlib
@@ -25,10 +26,11 @@ from coglab_py.steady import server_is_there, wait_for
 from std_msgs.msg import String
 
 from coglab_smach.ports.interfaces import HandState
-from coglab_smach.ports.pending import Pending, Polled, PortError
+from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.ros.calls import Newest
 
 SERVER_WAIT = 10.0  # s, time limit for an action server to appear
+SILENT_AGAIN = 1.0  # s that a hand node found silent during a calibration has to speak again
 
 
 class ActionCall(Pending):
@@ -93,6 +95,63 @@ class ActionCall(Pending):
                 self._handle.cancel()
 
 
+class Calibration(Pending):
+    """One order to calibrate, followed in the states of the hand. ``orders``: its publisher.
+
+    A caller that comes late, on a busy computer, finds an old status. So a silent node has SILENT_AGAIN to speak."""
+
+    def __init__(self, mode: str, orders: rospy.Publisher, state: Callable[[], HandState]) -> None:
+        self._mode, self._orders, self._state = mode, orders, state
+        self._asked = time.monotonic()
+        self._sent: float | None = None  # s, time of the order
+        self._silent: float | None = None  # s, since when the node is silent
+        self._begun = self._over = False
+        self._error: PortError | None = None
+
+    def done(self) -> bool:
+        if not self._over and self._sent is None:
+            self._send()
+        elif not self._over:
+            self._over = self._has_ended(self._state(), time.monotonic())
+        return self._over
+
+    def result(self) -> None:
+        if self._error is not None:
+            raise self._error
+
+    def _send(self) -> None:
+        """Send the order if it will arrive. At start the hand counts as holding until a poll shows that it is empty.
+        Wait at most 2 s for that."""
+        state = self._state()
+        settled = not state.holding or time.monotonic() - self._asked > 2.0
+        if state.connected and settled and self._orders.get_num_connections() > 0:
+            self._orders.publish(String(self._mode))
+            self._sent = time.monotonic()
+
+    def _has_ended(self, state: HandState, now: float) -> bool:
+        assert self._sent is not None
+        since, refused = now - self._sent, f"the hand does not calibrate after the order '{self._mode}'"
+        if state.event == ReasonCode.NODE_SILENT:
+            self._silent = now if self._silent is None else self._silent
+            return now - self._silent > SILENT_AGAIN and self._fail(refused, state.message, state.event)
+        self._silent = None
+        if state.calibrating:
+            self._begun = True
+            return False
+        if state.event == ReasonCode.HAND_REFUSED and since > 0.2:
+            return self._fail(refused, state.message, state.event)
+        if self._begun and not state.calibrated:
+            return self._fail("the hand's calibration ended without success", state.message, state.event)
+        if self._begun or (state.calibrated and since > 0.5):
+            return True
+        why = state.message or "hand_status does not report it"
+        return since > 3.0 and self._fail(refused, why, ReasonCode.NODE_SILENT)
+
+    def _fail(self, sentence: str, why: str, code: int) -> bool:
+        self._error = PortError(sentence, (why,), code)
+        return True
+
+
 class RosHand:
     """HandPort on ROS."""
 
@@ -132,41 +191,7 @@ class RosHand:
 
     def calibrate(self, mode: str) -> Pending:
         """Publish the order when the hand node is connected. Then follow hand_status: started, ended, or refused."""
-        begun: dict[str, Any] = {"sent": 0.0, "seen": False, "asked": time.monotonic(), "error": None}
-
-        def fail(why: str, code: int) -> bool:
-            begun["error"] = PortError(f"the hand does not calibrate after the order '{mode}'", (why,), code)
-            return True
-
-        def done() -> bool:
-            state = self.state()
-            if begun["error"] is not None:
-                return True
-            if not begun["sent"]:
-                # At start the hand counts as holding until a poll shows that it is empty. Wait at most 2 s for that.
-                settled = not state.holding or time.monotonic() - begun["asked"] > 2.0
-                if state.connected and settled and self._calibration.get_num_connections() > 0:
-                    self._calibration.publish(String(mode))
-                    begun["sent"] = time.monotonic()
-                return False
-            since = time.monotonic() - begun["sent"]
-            if state.calibrating:
-                begun["seen"] = True
-                return False
-            if state.event == ReasonCode.HAND_REFUSED and since > 0.2:
-                return fail(state.message, state.event)
-            if begun["seen"] or (state.calibrated and since > 0.5):
-                return True
-            return since > 3.0 and fail(state.message or "hand_status does not report it", ReasonCode.NODE_SILENT)
-
-        def value() -> None:
-            if begun["error"] is not None:
-                raise begun["error"]
-            state = self.state()
-            if not state.calibrated:
-                raise PortError("the hand's calibration ended without success", (state.message,), state.event)
-
-        return Polled(done, value)
+        return Calibration(mode, self._calibration, self.state)
 
     def state(self) -> HandState:
         message = self._status.message
