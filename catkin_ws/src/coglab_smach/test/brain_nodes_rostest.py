@@ -34,6 +34,8 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 LIMIT = 60.0
+SILENT = (ReasonCode.NODE_SILENT, ReasonCode.TIME_LIMIT)
+"""why the system without a robot does not start; on a busy computer the time limit may end first"""
 """s, of every wait."""
 
 
@@ -189,10 +191,10 @@ class BrainNodes(unittest.TestCase):
         shown = json.loads(rospy.wait_for_message("/coglab/results", String, LIMIT).data)
         self.assertEqual(shown["reason"], written["reason"])
         self.assertTrue(why.startswith(written["reason"]))
-        self.assertEqual(written["reason_code"], ReasonCode.NODE_SILENT)
+        self.assertIn(written["reason_code"], SILENT)
         state = rospy.wait_for_message("/coglab/state", MasterState, LIMIT)
         self.assertEqual((state.state, state.in_hub, state.actions), ("/coglab_master/fault", True, ["initialise"]))
-        self.assertEqual((state.why, state.reason_code), (why, ReasonCode.NODE_SILENT))
+        self.assertEqual((state.why, state.reason_code), (why, written["reason_code"]))
         self.assertTrue(why.endswith("./coglab start initialise") and answer.message.endswith("start initialise"))
         self.assertEqual(answer.reason_code, ReasonCode.WRONG_STATE)
         waits = []
@@ -202,8 +204,7 @@ class BrainNodes(unittest.TestCase):
         self.assertTrue(start("initialise", "").success)
         self.until(lambda: any(not m.state.endswith("/fault") for m in waits), "the initialisation")
         self.until(lambda: waits[-1].state.endswith("/fault") and not waits[-1].waits_for, "fault again")
-        silent = lambda t: t.reason and t.reason_code == ReasonCode.NODE_SILENT  # noqa: E731
-        self.until(lambda: any(silent(t) for t in transitions), "the reason of the fault")
+        self.until(lambda: any(t.reason and t.reason_code in SILENT for t in transitions), "the reason of the fault")
         # The wait and its deadline were published during the wait.
         limited = [m for m in waits if m.waits_for]
         ahead = [(m.deadline - m.header.stamp).to_sec() for m in limited]
@@ -227,7 +228,8 @@ class BrainNodes(unittest.TestCase):
         self.assertIn("fault", result.reason)
         state = client.send_goal_and_wait(HandoverGoal(action="initialise"), rospy.Duration(2 * LIMIT))
         result = client.get_result()
-        self.assertEqual((state, result.reason_code), (actionlib.GoalStatus.ABORTED, ReasonCode.NODE_SILENT))
+        self.assertEqual(state, actionlib.GoalStatus.ABORTED)
+        self.assertIn(result.reason_code, SILENT)
 
     def test_6_a_second_master_in_its_own_namespace_ends_without_a_traceback(self):
         config = rospy.get_param("/coglab/config_file")
