@@ -34,9 +34,9 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 LIMIT = 60.0
-SILENT = (ReasonCode.NODE_SILENT, ReasonCode.TIME_LIMIT)
-"""why the system without a robot does not start; on a busy computer the time limit may end first"""
 """s, of every wait."""
+SILENT = (ReasonCode.NODE_SILENT, ReasonCode.TIME_LIMIT)
+"""Why the system without a robot does not start. On a busy computer the time limit may end first."""
 
 
 def service(name, kind):
