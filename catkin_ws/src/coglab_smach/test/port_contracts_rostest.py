@@ -388,7 +388,7 @@ class Hand(unittest.TestCase):
         stays(lambda: abs(finger() - there) <= 1, 0.4)
 
         def is_superseded(_closing):
-            time.sleep(0.05)
+            until(lambda: finger() > there + 5, 2.0, "the closing")
             settle(hand.open(511), 8.0)
 
         cut_short(lambda: hand.close(60), is_superseded, ReasonCode.SUPERSEDED)

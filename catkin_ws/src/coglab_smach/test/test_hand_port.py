@@ -140,6 +140,13 @@ def test_goal_that_ends_while_it_is_sent_is_done(node):
     assert node.port.close(200).done()
 
 
+def test_a_goal_is_sent_before_the_next_one_is_asked_for(node, monkeypatch):
+    """A late thread would let an older order to close overtake a newer one to open."""
+    monkeypatch.setattr(hand.threading, "Thread", lambda **_: SimpleNamespace(start=lambda: None))
+    node.port.close(60)
+    assert len(node.client("hand_close").goals) == 1
+
+
 def test_late_end_of_an_older_goal_ends_only_that_goal(node):
     first, second = node.port.close(200), node.port.close(300)
     older, newer = node.client("hand_close").handles

@@ -45,7 +45,10 @@ class ActionCall(Pending):
         self._lock = threading.Lock()
         self._handle: actionlib.ClientGoalHandle | None = None
         self._cancelled = False
-        threading.Thread(target=self._send, args=(goal,), name=f"action:{name}", daemon=True).start()
+        if server_is_there(client):  # at once, so that orders reach the hand in their order
+            self._send(goal)
+        else:
+            threading.Thread(target=self._send, args=(goal,), name=f"action:{name}", daemon=True).start()
 
     def _send(self, goal: Any) -> None:
         if not wait_for(lambda: self._cancelled or server_is_there(self._client), SERVER_WAIT):
