@@ -34,7 +34,7 @@ def job(what):
         raise ArithmeticError("1 + 1")
     if name == "odd":
         raise Odd(1, 2)
-    return f"{name} done"
+    return None if name == "nothing" else f"{name} done"
 
 
 @pytest.mark.parametrize("workers", [1, 3])
@@ -48,10 +48,13 @@ def test_each_job_has_a_result_even_if_its_process_dies(tmp_path, workers):
         ("wrong", None),
         ("odd", None),
         ("plain", None),
+        ("nothing", None),
+        (lambda: "cannot be pickled", None),
     ]
     found = dict(run_each(job, jobs, workers))
     assert sorted(found) == list(range(len(jobs)))
     assert [found[i] for i in (0, 1, 2, 7)] == ["plain done", "killed done", "stalled done", "plain done"]
+    assert found[8] is None and "pickle" in str(found[9])
     assert isinstance(found[3], WorkerLost) and "signal 9" in str(found[3])
     assert isinstance(found[4], ClockStalled) and isinstance(found[6], RuntimeError)
     assert isinstance(found[5], ArithmeticError) and "test_workers.py" in found[5].__notes__[0]  # with its line

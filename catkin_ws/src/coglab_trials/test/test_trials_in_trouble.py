@@ -396,7 +396,7 @@ def test_a_stalled_trial_leaves_no_thread_behind(monkeypatch):
     """A world that runs on would keep its process alive."""
     monkeypatch.setattr("coglab_trials.trial.VirtualClock", partial(VirtualClock, stall_limit=0.4))
     before, trial = set(threading.enumerate()), VirtualTrial(4, machine=lambda ctx: Rests(ctx.clock))
-    once(trial, lambda t: t.clock.now() > 0.1, lambda t: time.sleep(2.0))
+    once(trial, lambda t: t.clock.now() > 0.1, lambda t: [time.sleep(0.1) for _ in range(50)])  # a stop is no stall
     with pytest.raises(ClockStalled, match="world"):
         trial.run(script=lambda t: None)
     for thread in set(threading.enumerate()) - before:
