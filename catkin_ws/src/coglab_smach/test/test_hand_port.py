@@ -286,7 +286,7 @@ def test_a_node_that_dies_during_calibration(node):
     assert "right_hand/hand_status" in refused(calibration, ReasonCode.NODE_SILENT).causes[0]
 
 
-def test_a_caller_that_comes_late_takes_no_old_status_for_the_end_of_a_calibration(node):
+def test_a_late_caller_takes_no_old_status_for_the_end(node):
     calibration = asked(node)
     node.say(0.1, calibrating=True)
     assert not calibration.done()

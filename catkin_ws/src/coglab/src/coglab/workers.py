@@ -17,7 +17,7 @@ from typing import Any
 
 from coglab_trials.virtual_clock import ClockStalled
 
-BEGUN = b"begun"
+BEGUN = b"begun"  # what a process sends when it begins a job
 STOP_LIMIT = 3.0  # s that a process has to end by itself
 TRIES = 2  # a job with a lost process, or a stalled clock on a busy machine, runs again
 
