@@ -34,6 +34,7 @@ from coglab_sim.tracker.vision import Vision
 from std_msgs.msg import UInt8
 
 PLAYBACK_HZ = 100.0
+OLDEST = 1.0  # s; an older state of the cell, or one of the future, has the stamp of another clock
 OTHERS = [[1.05, 0.45, 0.35], [1.05, -0.45, 0.35]]  # m, default of ~others: hands of the other people
 
 
@@ -61,9 +62,11 @@ class PerceptionNode:
         self.others = [Pose(np.array(place)) for place in parameters.points("~others", OTHERS)]
         self.people = parameters.read("~people", int, 1, 0, 255)
         self.truth: CellTruth | None = None
+        self.last = 0.0  # s, steady time of the newest state
         self.broadcaster = tf2_ros.TransformBroadcaster()
         self.static = tf2_ros.StaticTransformBroadcaster()
-        self.services = PerceptionServices(names, self.vision, steady.Stamps())
+        self.stamps = steady.Stamps()
+        self.services = PerceptionServices(names, self.vision, self.stamps)
         board_sight = Sight(names.board, time.monotonic(), self.vision.board.frame)
         self.static.sendTransform(self.services.transform(board_sight))
         recording = {"frame": names.human_hand, **parameters.read("~recording", dict, {})}
@@ -84,22 +87,29 @@ class PerceptionNode:
     # -- seeing ----------------------------------------------------------------------------------
 
     def on_truth(self, message: CellTruth) -> None:
-        """Takes the true state of the cell. The capture time is this node's clock, like a camera's."""
+        """Takes the true state of the cell. It was captured when the cell was in it, however late this node runs."""
         seen = [message.human_hand, message.robot_hand, *([message.object] if message.object_id else [])]
         if not plausible(map(pose_of, seen)):
             rospy.logwarn_throttle(5.0, f"perception: truth/cell ignored: {IMPLAUSIBLE}")
             return
         self.truth = message
         if not self.playback:
-            self.see()
+            self.see(self.captured(message))
 
     def on_people(self, message: UInt8) -> None:
         """Sets the number of people in view."""
         self.people = message.data
         rospy.loginfo("perception: %d people in view", message.data)
 
-    def see(self) -> None:
-        """Broadcasts the frames in view to tf, with the tracker's errors."""
+    def captured(self, message: CellTruth) -> float:
+        """Steady time (s) of a state of the cell; now if its stamp is of another clock."""
+        now = time.monotonic()
+        stamp = self.stamps.steady(message.header.stamp)
+        self.last = max(self.last, stamp if now - OLDEST < stamp <= now else now)
+        return self.last
+
+    def see(self, captured: float | None = None) -> None:
+        """Broadcasts the frames in view to tf, with the tracker's errors. ``captured``: steady time (s); None: now."""
         names, truth = self.vision.names, self.truth
         hand, robot, objects = None, None, {}
         if truth is not None:
@@ -114,7 +124,7 @@ class PerceptionNode:
             objects.update(played)
         crowd = ([hand] if hand is not None else []) + self.others
         hands = {f"person {i + 1}": each for i, each in enumerate(crowd[: self.people])}
-        sights = self.vision.see(hands, objects, robot)
+        sights = self.vision.see(hands, objects, robot, captured)
         try:
             if sights:
                 self.broadcaster.sendTransform([self.services.transform(sight) for sight in sights])

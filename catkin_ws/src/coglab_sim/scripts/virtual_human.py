@@ -37,6 +37,8 @@ from geometry_msgs.msg import Vector3
 from std_msgs.msg import String
 
 OLDEST_WORDS = 30.0  # s; the person ignores older speech of the robot
+PERIOD = 0.01  # s, between two messages
+LONGEST_STEP = 0.1  # s; for so long the cell moves the hand on without a message
 CELL_LIMIT = 30.0  # s, longest wait for the cell's service that puts a recorded object into the hand
 
 
@@ -63,6 +65,7 @@ class VirtualHumanNode:
         self.human = self.person(object_of(self.object_id))
         self.lock = threading.Lock()
         self.pace = Pace().follow("real_time_factor")  # of the cell, in the same namespace
+        self.time = self.stepped_at = self.pace.now()  # s, of the person, and of the last step
         self.view = WorldView()
         self.hand = rospy.Publisher("human_hand", HumanHand, queue_size=1, tcp_nodelay=True)
         self.state = rospy.Publisher("human_state", String, queue_size=10, latch=True)
@@ -136,18 +139,24 @@ class VirtualHumanNode:
         if message.header.stamp and (rospy.Time.now() - message.header.stamp).to_sec() > OLDEST_WORDS:
             return
         with self.lock:
-            self.human.hear(self.pace.now(), message.code)
+            self.human.hear(self.time, message.code)
 
     def run(self) -> None:
         """Steps the person at 100 Hz in the time of the cell."""
-        period = 0.01
         due = self.pace.now()
         while not rospy.is_shutdown():
-            with self.lock:
-                sample = self.human.step(self.pace.now(), self.view)
-            self.publish(sample)
-            due = max(due + period, self.pace.now() - period)
+            self.step(self.pace.now())
+            due = max(due + PERIOD, self.pace.now() - PERIOD)
             time.sleep(max(0.0, due - self.pace.now()) / self.pace.factor)
+
+    def step(self, now: float) -> None:
+        """Steps the person and publishes the hand. ``now``: time of the cell (s). If a busy computer stopped this
+        node, the hand goes on from where it stopped: it does not jump to where it would be."""
+        with self.lock:
+            self.time += min(max(0.0, now - self.stepped_at), LONGEST_STEP)
+            self.stepped_at = now
+            sample = self.human.step(self.time, self.view)
+        self.publish(sample)
 
     def publish(self, sample) -> None:
         """Publishes the hand, and the phase when it changes."""

@@ -64,6 +64,17 @@ def test_hand_and_object_are_broadcast_with_their_capture_time(monkeypatch):
     assert sorted(one.see(no_object)) == ["human_hand"]
 
 
+@pytest.mark.parametrize("late, stamped", [(0.06, 0.06), (-0.06, 0.0), (3.0, 0.0)])
+def test_a_late_node_keeps_the_time_of_capture(monkeypatch, late, stamped):
+    """A busy computer runs the node late: the stamp says when the hand was there. A stamp of another clock is not used."""
+    one = Perception(monkeypatch)
+    one.see()
+    state = truth()
+    state.header.stamp = rospy.Time.from_sec(one.ros.now + 0.1 - late)
+    seen = one.see(state)
+    assert seen["human_hand"].header.stamp.to_sec() == pytest.approx(one.ros.now - stamped)
+
+
 def test_no_sight_is_lost_when_the_clock_is_set(monkeypatch):
     one = Perception(monkeypatch)
     one.see()
@@ -100,9 +111,24 @@ class Person:
         self.node = self.module.VirtualHumanNode()
 
 
+def test_a_hand_does_not_jump_when_the_computer_stops_the_person(monkeypatch):
+    """Nobody's hand jumps: the reach goes on from where it stopped."""
+    one = Person(monkeypatch, **{"~profile": "patient"})
+    published = one.ros.published["human_hand"]
+    one.ros.subscribed["human_command"](String("give mug"))
+    now, speed = one.node.pace.now(), 0.0
+    while speed < 0.5:
+        now += 0.01
+        one.node.step(now)
+        speed = abs(published[-1].velocity.linear.x)
+        assert now < 115.0, "the person does not reach"
+    one.node.step(now + 1.0)
+    jump = abs(published[-1].pose.position.x - published[-2].pose.position.x)
+    assert 0.02 < jump < 0.12, jump  # the reach takes about a second over 0.4 m
+
+
 def test_commands_and_words_reach_the_person(monkeypatch):
     one, asked, heard = Person(monkeypatch), [], []
-    monkeypatch.setattr(one.module.time, "monotonic", lambda: 3.0)
     command = one.node.human.command
     monkeypatch.setattr(one.node.human, "command", lambda text: command(text) or asked.append(text))
     monkeypatch.setattr(one.node.human, "hear", lambda t, code: heard.append((t, code)))
@@ -111,7 +137,7 @@ def test_commands_and_words_reach_the_person(monkeypatch):
     one.ros.subscribed["human_command"](String("juggle"))
     assert "give, receive" in one.ros.said[-1]
     one.ros.subscribed["/a/say"](Say(code=Say.I_HAVE_IT))
-    assert heard == [(3.0, Say.I_HAVE_IT)]
+    assert heard == [(one.node.pace.now(), Say.I_HAVE_IT)]
     for age in (60.0, 3.0):  # latched: said before this person came
         one.ros.now = 100.0
         late = Say(code=Say.READY_TO_RECEIVE)

@@ -30,8 +30,8 @@ void GoalLimits::begin(const GoalObservation& first, const Vector3& hand,
   last_ = first;
   seen_ = true;
   believe(first);
-  believed_ns_ = first.stamp_ns;
-  age_ = 0.0;
+  arm_ns_ = -1;
+  age_ = held_ = 0.0;
   jump_ = 0.0;
   state_ = State::Fresh;
 }
@@ -69,18 +69,33 @@ void GoalLimits::judge(const GoalObservation& newest) noexcept {
   if (agreeing_ >= frames_.frames_to_accept) believe(newest);
 }
 
-GoalLimits::State GoalLimits::update(std::int64_t now_ns, const GoalObservation& newest) noexcept {
-  if (isNew(newest)) judge(newest);
-  if (newest.frame_ns == 0) last_.stamp_ns = newest.stamp_ns;
-  age_ = 1e-9 * static_cast<double>(now_ns - last_.stamp_ns);
-  if (agreeing_ == 0) believed_ns_ = last_.stamp_ns;
-  const double held = 1e-9 * static_cast<double>(now_ns - believed_ns_);
+/// Adds a cycle to the ages. Only an arrival compares two clocks: stamps know nothing of the arm's.
+void GoalLimits::grow(std::int64_t now_ns, bool arrived, std::int64_t arm_ns) noexcept {
+  const auto since = [&](std::int64_t then) { return 1e-9 * static_cast<double>(now_ns - then); };
+  const bool first = arm_ns_ < 0;
+  const double passed =
+      first ? 0.0 : 1e-9 * static_cast<double>(std::max<std::int64_t>(0, arm_ns - arm_ns_));
+  arm_ns_ = arm_ns;
+  held_ = first ? since(goal_.stamp_ns) : held_ + passed;
+  age_ = first || arrived ? since(last_.stamp_ns) : age_ + passed;
+  if (agreeing_ == 0) held_ = age_;
+}
+
+GoalLimits::State GoalLimits::update(std::int64_t now_ns, const GoalObservation& newest,
+                                     std::int64_t arm_ns) noexcept {
+  bool arrived = isNew(newest);
+  if (arrived) judge(newest);
+  if (newest.frame_ns == 0 && newest.stamp_ns != last_.stamp_ns) {
+    last_.stamp_ns = newest.stamp_ns;
+    arrived = true;
+  }
+  grow(now_ns, arrived, arm_ns);
   const State seen = agreeing_ > 0 ? State::Jumped : State::Fresh;
   if (!settled_) {
     state_ = State::Unsettled;
   } else if (frames_.max_age <= 0.0) {
     state_ = seen;
-  } else if (frames_.lost_time > 0.0 && held > frames_.lost_time) {
+  } else if (frames_.lost_time > 0.0 && held_ > frames_.lost_time) {
     state_ = State::Lost;
   } else {
     state_ = age_ > frames_.max_age ? State::Old : seen;

@@ -183,7 +183,8 @@ void DmpCycle::watchGoal(const CycleInput& input) {
   GoalObservation newest;
   goals_.read(newest);
   const bool mine = newest.request == plan_.goal.request;
-  limits_.update(input.robot.stamp_ns, mine ? newest : limits_.goal());
+  limits_.update(input.robot.stamp_ns, mine ? newest : limits_.goal(),
+                 input.robot.controller_ns);
   const Pose wanted = plan_.handAt(limits_.goal());
   goal_ = inWorkspace(wanted, projected_);
   const Vector3 hand = (dmp_from_base_ * input.chain.tool).position;

@@ -61,7 +61,7 @@ class GoalHelper {
       return;
     }
     const std::int64_t now = steadyNow();
-    if (limits_.update(now, seen) != GoalLimits::State::Fresh) {
+    if (limits_.update(now, seen, now) != GoalLimits::State::Fresh) {
       warn();
       return;
     }

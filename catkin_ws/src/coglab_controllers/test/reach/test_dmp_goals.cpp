@@ -208,5 +208,25 @@ TEST(DmpController, ReasonsMentionTheClockOnlyIfItIsTheCause) {
   }
 }
 
+/// A busy computer slows the simulated cell down: the goal is lost after a second of the arm's time.
+TEST(DmpController, AGoalIsLostByTheTimeOfTheArm) {
+  Unseen robot;
+  robot.begin(kGoal);
+  const auto halfSpeed = [&](int cycles) {
+    for (int i = 0; i < cycles; ++i) {
+      robot.now_ns += 5 * kMs;  // 10 ms pass on the computer, 5 ms in the cell
+      robot.tick();
+    }
+  };
+  halfSpeed(39);
+  EXPECT_EQ(robot.reason(), "");
+  halfSpeed(3);
+  EXPECT_EQ(robot.manager->report().reason.code(), ReasonCode::GoalStale);
+  halfSpeed(155);
+  EXPECT_EQ(robot.state(), MotionState::Holding) << robot.reason();
+  halfSpeed(5);
+  EXPECT_EQ(robot.manager->report().reason.code(), ReasonCode::GoalLost);
+}
+
 }  // namespace
 }  // namespace coglab_controllers

@@ -22,7 +22,7 @@ constexpr double kFastestJoint = 100.0;  // rad/s
 constexpr double kFastestSpin = 1000.0;  // rad/s, of a free body
 
 constexpr double kShareTime = 0.02;  // s, averaging time of load shares and squeeze
-constexpr double kPersonAge = 0.05;  // s after a message during which the hand keeps its velocity
+constexpr double kPersonAge = 0.1;   // s after a message during which the hand keeps its velocity
 constexpr double kGripBegins = 0.05, kGripEnds = 0.02;  // grip 0..1 of the person's hand
 // m that an object may slide in the person's hand beyond the grip's reach before the fingers lose
 // it: about the length of a fingertip.

@@ -79,7 +79,9 @@ class GoalLimits {
   /// @param now_ns clock of the samples
   /// @param newest the newest frame received, the same one until a newer one comes; each frame is
   /// judged once
-  State update(std::int64_t now_ns, const GoalObservation& newest) noexcept;
+  /// @param arm_ns clock of the arm. A frame that has arrived ages by this clock: it is slower than
+  /// now_ns while a busy computer slows the simulated cell down.
+  State update(std::int64_t now_ns, const GoalObservation& newest, std::int64_t arm_ns) noexcept;
 
   /// Checks the goal against the bounds of the motion, once per cycle of `dt` s.
   /// @return reason to end the motion; empty if it may continue
@@ -95,6 +97,7 @@ class GoalLimits {
  private:
   bool isNew(const GoalObservation& newest) const noexcept;
   void judge(const GoalObservation& newest) noexcept;
+  void grow(std::int64_t now_ns, bool arrived, std::int64_t arm_ns) noexcept;
   void believe(const GoalObservation& newest) noexcept;
   bool outside(const Vector3& goal) const noexcept;
 
@@ -105,8 +108,9 @@ class GoalLimits {
   int agreeing_ = 0;      // frames in a row that agree, but not with the goal
   bool settled_ = false;  // a goal is accepted
   bool seen_ = false;     // a frame was judged
-  std::int64_t believed_ns_ = 0;
+  std::int64_t arm_ns_ = -1;  // of the last cycle; -1: none since begin()
   double age_ = 0.0;
+  double held_ = 0.0;  // s, age of the accepted goal
   double jump_ = 0.0;
   State state_ = State::Unsettled;
 

@@ -77,9 +77,11 @@ class VirtualArm {
 
   /// One measurement and one cycle; the arm then follows for one period.
   const VelocityCommand& tick() {
-    now_ns += static_cast<std::int64_t>(period * 1e9);
+    const auto passed_ns = static_cast<std::int64_t>(period * 1e9);
+    now_ns += passed_ns;
     ++sample.sequence;
     sample.stamp_ns = now_ns;
+    sample.controller_ns += passed_ns;
     beforeCycle();
     manager->cycle().run(sample, period, command);
     if (sample.block != MotionBlock::None) command.velocity.setZero();

@@ -76,12 +76,19 @@ class Vision:
 
     # -- seeing ----------------------------------------------------------------------------------
 
-    def see(self, hands: Mapping[str, Pose], objects: Mapping[str, Pose], robot: Pose | None = None) -> list[Sight]:
+    def see(
+        self,
+        hands: Mapping[str, Pose],
+        objects: Mapping[str, Pose],
+        robot: Pose | None = None,
+        captured: float | None = None,
+    ) -> list[Sight]:
         """Takes the true state of the world: hands of people by any name, objects by frame name.
 
-        Returns the sights to be broadcast: the partner's hand and the objects.
+        ``captured``: time of this state (s, of the clock); None: now. Returns the sights to be broadcast: the
+        partner's hand and the objects.
         """
-        now = self.clock()
+        now = self.clock() if captured is None else captured
         with self.sights.changed:
             self.people = len(hands)
             self._hands = [hand.position for hand in hands.values()]
