@@ -110,7 +110,8 @@ def run_each(
                 try:
                     job = pickle.dumps(jobs[index])
                 except Exception as error:
-                    yield index, error
+                    words = f"job {index} cannot be sent to another process ({error}); it must be made of a module's"
+                    yield index, TypeError(f"{words} functions and classes, not of lambdas or local ones")
                     continue
                 busy.append(idle.pop() if idle else _Worker(function))
                 busy[-1].ask(index, tries, job)

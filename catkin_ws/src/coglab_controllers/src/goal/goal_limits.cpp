@@ -31,7 +31,7 @@ void GoalLimits::begin(const GoalObservation& first, const Vector3& hand,
   seen_ = true;
   believe(first);
   arm_ns_ = -1;
-  age_ = held_ = 0.0;
+  age_ns_ = held_ns_ = 0;
   jump_ = 0.0;
   state_ = State::Fresh;
 }
@@ -71,14 +71,12 @@ void GoalLimits::judge(const GoalObservation& newest) noexcept {
 
 /// Adds a cycle to the ages. Only an arrival compares two clocks: stamps know nothing of the arm's.
 void GoalLimits::grow(std::int64_t now_ns, bool arrived, std::int64_t arm_ns) noexcept {
-  const auto since = [&](std::int64_t then) { return 1e-9 * static_cast<double>(now_ns - then); };
   const bool first = arm_ns_ < 0;
-  const double passed =
-      first ? 0.0 : 1e-9 * static_cast<double>(std::max<std::int64_t>(0, arm_ns - arm_ns_));
+  const std::int64_t passed = first ? 0 : std::max<std::int64_t>(0, arm_ns - arm_ns_);
   arm_ns_ = arm_ns;
-  held_ = first ? since(goal_.stamp_ns) : held_ + passed;
-  age_ = first || arrived ? since(last_.stamp_ns) : age_ + passed;
-  if (agreeing_ == 0) held_ = age_;
+  held_ns_ = first ? now_ns - goal_.stamp_ns : held_ns_ + passed;
+  age_ns_ = first || arrived ? now_ns - last_.stamp_ns : age_ns_ + passed;
+  if (agreeing_ == 0) held_ns_ = age_ns_;
 }
 
 GoalLimits::State GoalLimits::update(std::int64_t now_ns, const GoalObservation& newest,
@@ -95,10 +93,10 @@ GoalLimits::State GoalLimits::update(std::int64_t now_ns, const GoalObservation&
     state_ = State::Unsettled;
   } else if (frames_.max_age <= 0.0) {
     state_ = seen;
-  } else if (frames_.lost_time > 0.0 && held_ > frames_.lost_time) {
+  } else if (frames_.lost_time > 0.0 && seconds(held_ns_) > frames_.lost_time) {
     state_ = State::Lost;
   } else {
-    state_ = age_ > frames_.max_age ? State::Old : seen;
+    state_ = age() > frames_.max_age ? State::Old : seen;
   }
   return state_;
 }

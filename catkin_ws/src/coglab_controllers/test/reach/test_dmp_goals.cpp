@@ -208,7 +208,8 @@ TEST(DmpController, ReasonsMentionTheClockOnlyIfItIsTheCause) {
   }
 }
 
-/// A busy computer slows the simulated cell down: the goal is lost after a second of the arm's time.
+/// If a busy computer slows the simulated cell down, a goal is lost after a second of the arm's
+/// time.
 TEST(DmpController, AGoalIsLostByTheTimeOfTheArm) {
   Unseen robot;
   robot.begin(kGoal);

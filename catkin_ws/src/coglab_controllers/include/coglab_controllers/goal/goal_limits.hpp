@@ -90,11 +90,12 @@ class GoalLimits {
   Reason checkBounds(double dt, const Vector3& goal) noexcept;
 
   const GoalObservation& goal() const noexcept { return goal_; }  ///< the one to follow
-  double age() const noexcept { return age_; }                    ///< s, of the newest frame
+  double age() const noexcept { return seconds(age_ns_); }        ///< s, of the newest frame
   double jump() const noexcept { return jump_; }  ///< m, of the newest frame against the goal held
   State state() const noexcept { return state_; }
 
  private:
+  static double seconds(std::int64_t ns) noexcept { return 1e-9 * static_cast<double>(ns); }
   bool isNew(const GoalObservation& newest) const noexcept;
   void judge(const GoalObservation& newest) noexcept;
   void grow(std::int64_t now_ns, bool arrived, std::int64_t arm_ns) noexcept;
@@ -104,13 +105,12 @@ class GoalLimits {
   GoalFrameLimits frames_;
   GoalObservation goal_;
   GoalObservation candidate_;
-  GoalObservation last_;  // the newest frame judged
-  int agreeing_ = 0;      // frames in a row that agree, but not with the goal
-  bool settled_ = false;  // a goal is accepted
-  bool seen_ = false;     // a frame was judged
-  std::int64_t arm_ns_ = -1;  // of the last cycle; -1: none since begin()
-  double age_ = 0.0;
-  double held_ = 0.0;  // s, age of the accepted goal
+  GoalObservation last_;                   // the newest frame judged
+  int agreeing_ = 0;                       // frames in a row that agree, but not with the goal
+  bool settled_ = false;                   // a goal is accepted
+  bool seen_ = false;                      // a frame was judged
+  std::int64_t arm_ns_ = -1;               // of the last cycle; -1: none since begin()
+  std::int64_t age_ns_ = 0, held_ns_ = 0;  // of the newest frame and of the accepted goal
   double jump_ = 0.0;
   State state_ = State::Unsettled;
 
