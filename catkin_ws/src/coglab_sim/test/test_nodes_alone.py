@@ -66,7 +66,7 @@ def test_hand_and_object_are_broadcast_with_their_capture_time(monkeypatch):
 
 @pytest.mark.parametrize("late, stamped", [(0.06, 0.06), (-0.06, 0.0), (3.0, 0.0)])
 def test_a_late_node_keeps_the_time_of_capture(monkeypatch, late, stamped):
-    """A busy computer runs the node late: the stamp says when the hand was there. A stamp of another clock is not used."""
+    """A busy computer runs the node late: the stamp says when the hand was there. Another clock does not count."""
     one = Perception(monkeypatch)
     one.see()
     state = truth()
