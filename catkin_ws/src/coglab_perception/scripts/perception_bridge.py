@@ -77,8 +77,7 @@ class BridgeNode:
     def name_unknown_objects(self) -> None:
         """Warn of objects in the mapping that the object database does not have."""
         try:
-            steady.wait_for_service("object_database/list_objects", DATABASE_WAIT)
-            known = rospy.ServiceProxy("object_database/list_objects", ListObjects)().object_ids
+            known = steady.call_service("object_database/list_objects", ListObjects, wait=DATABASE_WAIT).object_ids
         except (rospy.ROSException, rospy.ServiceException):  # no database: perception alone
             return
         frames = {self.names.object_frame(each) for each in known}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import threading
 import time
 
 import pytest
@@ -32,6 +33,27 @@ def test_a_frozen_master_does_not_keep_a_wait_for_a_service(monkeypatch):
         monkeypatch.setenv("ROS_MASTER_URI", f"http://127.0.0.1:{frozen.getsockname()[1]}")
         with pytest.raises(rospy.ROSException):
             steady.wait_for_service("/somewhere/service", 0.1)
+
+
+def test_a_frozen_node_does_not_keep_a_call_of_its_service(monkeypatch):
+    monkeypatch.setattr(steady, "service_answers", lambda name: True)
+    monkeypatch.setattr(rospy, "resolve_name", lambda name: name)
+    thawed = threading.Event()
+    monkeypatch.setattr(rospy, "ServiceProxy", lambda name, kind: lambda *words: thawed.wait(60.0) and words)
+    with pytest.raises(rospy.ROSException, match="/frozen"):
+        steady.call_service("/frozen", None, 1, wait=0.1, limit=0.1)
+    thawed.set()
+    assert steady.call_service("/frozen", None, 1, 2, wait=0.1) == (1, 2)
+
+
+def test_the_error_of_a_service_reaches_its_caller(monkeypatch):
+    def broken(*_):
+        raise rospy.ServiceException("broke off")
+
+    monkeypatch.setattr(steady, "service_answers", lambda name: True)
+    monkeypatch.setattr(rospy, "ServiceProxy", lambda name, kind: broken)
+    with pytest.raises(rospy.ServiceException, match="broke off"):
+        steady.call_service("/broken", None, wait=0.1)
 
 
 def set_ros(seconds):

@@ -20,14 +20,14 @@ from pathlib import Path
 import numpy as np
 import rospy
 from coglab_msgs.msg import CellTruth, HumanHand, Say
-from coglab_msgs.srv import PlaceObject
+from coglab_msgs.srv import PlaceObject, PlaceObjectRequest
 from coglab_objects.database import ObjectError, objects_folder, read_object
 from coglab_py import parameters
 from coglab_py.alone import init_node
 from coglab_py.messages import pose_message, pose_of
 from coglab_py.pace import Pace
 from coglab_py.pose import Pose
-from coglab_py.steady import wait_for_service
+from coglab_py.steady import call_service
 from coglab_sim.person.participant import Participant
 from coglab_sim.person.recorded_person import RecordedPerson, open_recorded_hand
 from coglab_sim.person.scene import Scene, WorldView
@@ -96,9 +96,8 @@ class VirtualHumanNode:
     def put_into_hand(self) -> None:
         """Puts the object into the hand at its recorded pose. ROSException if the cell does not answer."""
         scene = self.human.scene
-        wait_for_service("cell/place_object", CELL_LIMIT)
-        place = pose_message(Pose(scene.object_in_hand, scene.object_turn))
-        answer = rospy.ServiceProxy("cell/place_object", PlaceObject)(where="human_hand", pose=place)
+        place = PlaceObjectRequest(where="human_hand", pose=pose_message(Pose(scene.object_in_hand, scene.object_turn)))
+        answer = call_service("cell/place_object", PlaceObject, place, wait=CELL_LIMIT)
         if not answer.success:
             raise ValueError(f"the cell refuses the object in the recorded hand: {answer.message}")
 

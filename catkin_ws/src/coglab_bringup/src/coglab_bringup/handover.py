@@ -15,7 +15,7 @@ from coglab_msgs.srv import GetObject, Start
 from coglab_py.alone import answer
 from coglab_py.pace import Pace
 from coglab_py.packages import package_path
-from coglab_py.steady import utc_of, wait_for_service
+from coglab_py.steady import call_service, utc_of
 from coglab_py.yaml_file import read
 
 from coglab_bringup.trial_recorder import TrialRecorder, summarise
@@ -56,8 +56,7 @@ def ask_for(action: str, object_id: str, alive: Callable[[], bool], limit: float
         if (progress := (services(), refusal)) != before:
             before, moved = progress, time.monotonic()
         try:
-            wait_for_service("/coglab/start", 1.0)
-            response = rospy.ServiceProxy("/coglab/start", Start)(action, object_id)
+            response = call_service("/coglab/start", Start, action, object_id, wait=1.0)
         except rospy.ROSException:
             continue
         except rospy.ServiceException as error:
@@ -73,8 +72,7 @@ def ask_for(action: str, object_id: str, alive: Callable[[], bool], limit: float
 def entry_of(object_id: str) -> Mapping[str, Any] | None:
     """Entry of an object in the database of the running system; None if the database does not return it."""
     try:
-        wait_for_service("/object_database/get_object", 2.0)
-        response = rospy.ServiceProxy("/object_database/get_object", GetObject)(object_id)
+        response = call_service("/object_database/get_object", GetObject, object_id, wait=2.0)
     except (rospy.ROSException, rospy.ServiceException):
         return None
     return yaml.safe_load(response.yaml) if response.success else None

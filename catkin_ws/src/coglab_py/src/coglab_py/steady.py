@@ -6,6 +6,7 @@ steps back. Code for hardware uses these functions instead.
 
 from __future__ import annotations
 
+import queue
 import socket
 import threading
 import time
@@ -27,6 +28,7 @@ QUICK = 0.005  # s within which both clocks must be read for a comparison
 TRIES = 10  # attempts to read them within that time
 FOLLOWED = 0.01  # share of a smaller difference that is corrected at each reading
 POLL = 0.1  # s between two checks of a wait
+ANSWER_LIMIT = 10.0  # s, longest wait for the answer of a service
 
 _failed = threading.Event()
 
@@ -164,6 +166,30 @@ def wait_for_service(name: str, limit: float) -> None:
     """Wait until a service answers. Raises rospy.ROSException after `limit` (s)."""
     if not wait_for(lambda: service_answers(name), limit):
         raise rospy.ROSException(f"service {rospy.resolve_name(name)} does not answer after {limit:g} s")
+
+
+def call_service(name: str, kind: Any, *words: Any, wait: float, limit: float = ANSWER_LIMIT) -> Any:
+    """Call a service and return its response. `wait` (s): for the service to appear; `limit` (s): for its answer, which
+    a frozen node never gives. Raises rospy.ROSException after these, and rospy.ServiceException if the service breaks
+    off."""
+    wait_for_service(name, wait)
+    ended: queue.SimpleQueue[tuple[Any, Exception | None]] = queue.SimpleQueue()
+
+    def ask() -> None:
+        try:
+            ended.put((rospy.ServiceProxy(name, kind)(*words), None))
+        except Exception as error:
+            ended.put((None, error))
+
+    threading.Thread(target=ask, name=f"service {name}", daemon=True).start()
+    try:
+        response, error = ended.get(timeout=limit)
+    except queue.Empty:
+        who = rospy.resolve_name(name)
+        raise rospy.ROSException(f"service {who} gave no answer in {limit:g} s; its node is frozen or busy") from None
+    if error is not None:
+        raise error
+    return response
 
 
 def server_is_there(client: Any) -> bool:

@@ -8,7 +8,7 @@ import rosgraph
 import rospy
 from coglab_msgs.srv import FeedbackSelect, LoadController, StartMotion, SwitchController
 from coglab_py.alone import answer
-from coglab_py.steady import wait_for_service
+from coglab_py.steady import call_service
 
 from coglab.control.slot import SlotError
 
@@ -62,8 +62,7 @@ class SlotServices:
         if not online:
             raise SlotError("no ROS master answers; start the system first: ./coglab launch")
         try:
-            wait_for_service(name, WAIT)
-            response = rospy.ServiceProxy(name, kind)(*words)
+            response = call_service(name, kind, *words, wait=WAIT)
         except (rospy.ROSException, rospy.ServiceException, OSError) as error:
             raise SlotError(f"{name} does not answer: {error}") from error
         if not response.success:

@@ -25,7 +25,7 @@ from coglab_msgs.srv import (
     Start,
     SwitchController,
 )
-from coglab_py.steady import wait_for_service, worker
+from coglab_py.steady import call_service, worker
 from rospy.core import parse_rosrpc_uri
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -128,8 +128,7 @@ class RosBackend:
 
     @staticmethod
     def _ask(service: str, kind: Any, *fields: Any) -> Any:
-        wait_for_service(service, 2.0)
-        return rospy.ServiceProxy(service, kind)(*fields)
+        return call_service(service, kind, *fields, wait=2.0)
 
     def _told(self, service: str, kind: Any, *fields: Any) -> Answer:
         answer = self._ask(service, kind, *fields)

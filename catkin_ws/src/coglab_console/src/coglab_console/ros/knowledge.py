@@ -16,7 +16,7 @@ import rospy
 import yaml
 from coglab_msgs.srv import GetObject, ListObjects, PredictDmp, PredictDmpRequest, PredictDmpResponse
 from coglab_py import parameters
-from coglab_py.steady import wait_for_service
+from coglab_py.steady import call_service, wait_for_service
 from geometry_msgs.msg import Point, Quaternion
 
 from ..scene import path_ahead
@@ -104,11 +104,10 @@ class Knowledge:
         except rospy.ROSException:
             self._show_objects(None)
             return
-        listed = rospy.ServiceProxy("object_database/list_objects", ListObjects)()
+        listed = call_service("object_database/list_objects", ListObjects, wait=1.0)
         ids = listed.object_ids[:MAX_OBJECTS]
-        ask = rospy.ServiceProxy("object_database/get_object", GetObject)
         for name in ids:
-            answer = ask(name)
+            answer = call_service("object_database/get_object", GetObject, name, wait=1.0)
             if answer.success and answer.yaml != self._texts.get(name):
                 entry = yaml.safe_load(answer.yaml)
                 if isinstance(entry, dict):
