@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 import time
 
 import pytest
@@ -58,6 +60,31 @@ def test_each_job_has_a_result_even_if_its_process_dies(tmp_path, workers):
     assert isinstance(found[3], WorkerLost) and "signal 9" in str(found[3])
     assert isinstance(found[4], ClockStalled) and isinstance(found[6], RuntimeError)
     assert isinstance(found[5], ArithmeticError) and "test_workers.py" in found[5].__notes__[0]  # with its line
+
+
+CALLER = """
+import os, signal
+from coglab.workers import run_each
+
+def job(_):
+    os.kill(os.getppid(), signal.SIGSTOP)
+    os.kill(os.getpid(), signal.SIGKILL)
+
+if __name__ == "__main__":
+    print(*(type(result).__name__ for _, result in run_each(job, range(2), 1)))
+"""
+
+
+def test_a_process_that_dies_while_its_caller_is_stopped_is_not_missed(tmp_path):
+    """A busy computer may not run the caller while a job begins and dies."""
+    program = tmp_path / "caller.py"
+    program.write_text(CALLER)
+    with subprocess.Popen([sys.executable, program], stdout=subprocess.PIPE, text=True) as caller:
+        end = time.monotonic() + 120.0
+        while caller.poll() is None:
+            caller.send_signal(signal.SIGCONT if time.monotonic() < end else signal.SIGKILL)
+            time.sleep(0.1)
+        assert caller.stdout.read().split() == ["WorkerLost"] * 2
 
 
 def test_a_job_that_hangs_ends_at_its_limit():
