@@ -107,8 +107,7 @@ def read(text: str, moving: bool) -> dict[str, object]:
     ratios = []
     for first in range(0, len(blocks), 4):  # echo, bridge, bridge, echo
         ratios += [medians[first + 1] / medians[first], medians[first + 2] / medians[first + 3]]
-    of = {kind: statistics.median(value for k, value in blocks if k == kind) for kind in ("echo", "bridge")}
-    return {"ratios": ratios, "us": of["bridge"], "echo": of["echo"], "missing": numbers["missing"]}
+    return {"ratios": ratios, "missing": numbers["missing"]}
 
 
 def measured(way: str, quick: bool) -> dict:
@@ -120,7 +119,6 @@ def measured(way: str, quick: bool) -> dict:
 def answers(quick: bool) -> Iterator[Row]:
     """Monitor mode and moving."""
     found = measured("monitor", quick)
-    yield Row("answer to a FRI datagram, monitor mode", found["us"], "us", f"<= {1.1 * found['echo']:.4g}")
     yield median("answer time divided by that of a bare echo, monitor mode", found["ratios"], "", "<= 1.1")
     moving = measured("moving", quick)
     yield median("answer time divided by that of a bare echo, while a motion runs", moving["ratios"], "", "<= 1.1")

@@ -45,14 +45,14 @@ void ReferenceLoop::configure(const MotionSetup& setup, Spaces spaces, Tunables&
   if (spaces != Spaces::Joint) {
     const double most = std::min(200.0, largestGain(setup.cycle_time));
     position_gain_ = &tunables.add(parameters, "pos_clik_gain",
-                                   "K_pos of eq. (6), 1/s: how fast an error of the position goes",
+                                   "K_pos of eq. (6), 1/s: rate at which a position error decays",
                                    std::min(ik.pos_clik_gain, most), 0.0, most);
     rotation_gain_ =
         &tunables.add(parameters, "rot_clik_gain", "K_rot of eq. (7), 1/s: the same for rotation",
                       std::min(ik.rot_clik_gain, most), 0.0, most);
-    correction_speed_ =
-        &tunables.add(parameters, "correction_speed",
-                      "m/s, an error of the position goes no faster", kCorrectionSpeed, 1e-3, 10.0);
+    correction_speed_ = &tunables.add(parameters, "correction_speed",
+                                      "m/s, largest speed that corrects a position error",
+                                      kCorrectionSpeed, 1e-3, 10.0);
     ik.pos_clik_gain = position_gain_->wanted();
     ik.rot_clik_gain = rotation_gain_->wanted();
     ik.correction_speed = correction_speed_->wanted();

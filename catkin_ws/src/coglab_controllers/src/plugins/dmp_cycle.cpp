@@ -70,14 +70,14 @@ void DmpCycle::configure(MotionConfiguration& configuration) {
   const GoalFilterParameters filter = readFilter(parameters);
   motion_ = CartesianMotion(filter, readEnd(parameters));
   if (filter.time_constant < kShortestTracking) return;  // off
-  time_constant_ =
-      &configuration.tunable("goal_time_constant", "s, of the estimator for a still goal",
-                             filter.time_constant, kShortestTracking, 2.0);
-  noisy_time_constant_ = &configuration.tunable("noisy_goal_time_constant",
-                                                "s, to which it grows with the jitter of the goal",
-                                                filter.noisy_time_constant, kShortestTracking, 2.0);
+  time_constant_ = &configuration.tunable("goal_time_constant",
+                                          "s, time constant of the goal filter for a steady goal",
+                                          filter.time_constant, kShortestTracking, 2.0);
+  noisy_time_constant_ = &configuration.tunable(
+      "noisy_goal_time_constant", "s, time constant of the goal filter for a noisy goal",
+      filter.noisy_time_constant, kShortestTracking, 2.0);
   max_goal_speed_ =
-      &configuration.tunable("goal_max_speed", "m/s, of the goal's own speed no more is followed",
+      &configuration.tunable("goal_max_speed", "m/s, largest goal speed that the motion follows",
                              filter.max_speed, 0.01, 10.0);
 }
 
@@ -183,8 +183,7 @@ void DmpCycle::watchGoal(const CycleInput& input) {
   GoalObservation newest;
   goals_.read(newest);
   const bool mine = newest.request == plan_.goal.request;
-  limits_.update(input.robot.stamp_ns, mine ? newest : limits_.goal(),
-                 input.robot.controller_ns);
+  limits_.update(input.robot.stamp_ns, mine ? newest : limits_.goal(), input.robot.controller_ns);
   const Pose wanted = plan_.handAt(limits_.goal());
   goal_ = inWorkspace(wanted, projected_);
   const Vector3 hand = (dmp_from_base_ * input.chain.tool).position;

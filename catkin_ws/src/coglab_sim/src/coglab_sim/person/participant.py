@@ -79,7 +79,7 @@ class Participant:
     seen_turn: float = 2.0
     """standard deviation per axis of a seen orientation"""
     seen_speed: float = 0.10
-    """standard deviation of a seen speed as share of it; a speed below 0.005 m/s is not seen"""
+    """standard deviation of a seen speed as share of it; 0.005 m/s of noise is added"""
     feeling_delay: float = 0.125
     """from a force at the hand to the reaction of the hand"""
     felt_threshold: float = 0.4
