@@ -71,7 +71,7 @@ def test_cb_interface():
     assert smach.cb_interface()(lambda: 1)() == 1
 
 
-def test_cb_interface_on_a_method_better():
+def test_cb_interface_on_a_method():
     class Robot:
         @smach.cb_interface(outcomes=["a"])
         def cb(self, ud):

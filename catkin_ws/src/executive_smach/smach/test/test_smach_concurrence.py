@@ -24,7 +24,7 @@ def test_bad_arguments(wrong):
         smach.Concurrence(**{"outcomes": ["done"], "default_outcome": "done", **wrong})
 
 
-def test_a_taken_label_is_refused_better():
+def test_a_taken_label_is_refused():
     with smach.Concurrence(["done"], "done"):
         smach.Concurrence.add("A", Says("done"))
         with pytest.raises(smach.InvalidStateError, match="'A'"):
@@ -139,14 +139,14 @@ def test_a_child_that_raises_preempts_the_others_and_ends_the_container(capsys):
 
 
 @pytest.mark.parametrize("outcome", [None, "unknown", 7, []])
-def test_a_child_without_a_valid_outcome_ends_the_container_better(outcome):
+def test_a_child_without_a_valid_outcome_ends_the_container(outcome):
     both = concurrence(children={"A": Says(outcome, registered=["done"]), "B": Serves(patience=20)})
     run = in_thread(both.execute)
     run.join(60.0)
     assert isinstance(run.error, smach.InvalidStateError) and "'A'" in str(run.error)
 
 
-def test_child_termination_cb_that_raises_ends_the_container_better():
+def test_child_termination_cb_that_raises_ends_the_container():
     both = concurrence(
         children={"A": Says("done"), "B": Serves(patience=20)},
         child_termination_cb=lambda outcomes: 1 / 0,
@@ -157,7 +157,7 @@ def test_child_termination_cb_that_raises_ends_the_container_better():
     assert not both.is_running()
 
 
-def test_a_child_that_calls_exit_ends_the_container_better():
+def test_a_child_that_calls_exit_ends_the_container():
     run = in_thread(concurrence(children={"A": Raises(SystemExit()), "B": Serves(patience=20)}).execute)
     run.join(60.0)
     assert isinstance(run.error, smach.InvalidStateError)

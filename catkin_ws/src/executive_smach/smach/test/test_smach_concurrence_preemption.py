@@ -41,7 +41,7 @@ def test_preempt_ignored_is_carried_by_the_machine_around():
 
 
 @pytest.mark.parametrize("moment", ["before", "start_cb", "transition_cb"])
-def test_a_request_before_or_during_the_start_reaches_every_child_better(moment):
+def test_a_request_before_or_during_the_start_reaches_every_child(moment):
     for _ in range(20):
         children = {"A": Serves(patience=20), "B": Serves(patience=20)}
         both = concurrence(children=children, outcome_map=ALL_DONE)
@@ -62,7 +62,7 @@ def test_a_request_before_or_during_the_start_reaches_every_child_better(moment)
         assert time.monotonic() - begun < 60  # not by patience
 
 
-def test_ignored_requests_do_not_poison_the_next_run_better():
+def test_ignored_requests_do_not_poison_the_next_run():
     stubborn, polite = Ignores("done"), Serves()
     both = concurrence(children={"A": polite, "B": stubborn}, outcome_map=ALL_DONE)
     stubborn.machine = both
@@ -105,7 +105,7 @@ def test_a_request_that_a_child_did_not_take_is_carried_on(log):
     assert "deaf" in log.text("error")
 
 
-def test_shutdown_takes_the_children_along_better():
+def test_shutdown_takes_the_children_along():
     children = {"A": Serves(patience=30), "B": Serves(patience=30)}
     both = concurrence(children=children)
     run = in_thread(both.execute)
@@ -115,7 +115,7 @@ def test_shutdown_takes_the_children_along_better():
     assert not run.is_alive()
 
 
-def test_ctrl_c_in_the_main_thread_takes_the_children_along_better():
+def test_ctrl_c_in_the_main_thread_takes_the_children_along():
     code = """
 import smach, machine_parts
 both = smach.Concurrence(["done", "preempted"], "done")

@@ -35,7 +35,7 @@ def test_output_keys_are_not_copied_after_an_error():
     assert "o" not in ud
 
 
-def test_a_callback_that_raises_is_logged_and_the_others_still_run_better(log):
+def test_a_callback_that_raises_is_logged_and_the_others_still_run(log):
     calls = []
 
     def bad(*args):
@@ -49,7 +49,7 @@ def test_a_callback_that_raises_is_logged_and_the_others_still_run_better(log):
     assert len(calls) == 3 and log.text("error").count("broken callback") >= 3
 
 
-def test_end_callback_comes_in_every_case_with_the_container_idle_better():
+def test_end_callback_comes_in_every_case_with_the_container_idle():
     for state, outcome in ((Says("done"), "done"), (Raises(ValueError()), None)):
         sm = machine(state)
         seen = []
@@ -91,7 +91,7 @@ def test_open_close_and_stack():
         a.close()
 
 
-def test_a_with_block_that_raises_is_closed_better(log):
+def test_a_with_block_that_raises_is_closed(log):
     sm, inner = smach.StateMachine(["done"]), smach.StateMachine(["done"])
     with pytest.raises(ValueError):
         with sm:
@@ -124,7 +124,7 @@ def test_add_needs_an_open_container_of_its_kind():
     assert sequence.execute() == "done"
 
 
-def test_another_thread_cannot_add_to_an_open_container_better():
+def test_another_thread_cannot_add_to_an_open_container():
     with smach.StateMachine(["done"]) as sm:
         smach.StateMachine.add("A", Says("done"))
         other = in_thread(lambda: smach.StateMachine.add("B", Says("done")))
@@ -149,7 +149,7 @@ def test_non_states_are_refused_with_a_message():
         smach.StateMachine.add("A", Says("done"))
 
 
-def test_running_twice_at_once_is_refused_better():
+def test_running_twice_at_once_is_refused():
     sm = machine(Calls(lambda ud: sm.execute()))
     with pytest.raises(smach.InvalidUserCodeError):
         sm.execute()

@@ -65,14 +65,14 @@ def test_an_ignored_request_ends_the_iteration_and_is_cleared():
 
 
 @pytest.mark.parametrize("outcomes, wanted", [(["preempted"], "preempted"), (["x"], "exhausted")])
-def test_preempted_loop_outcome_is_not_returned_better(outcomes, wanted):
+def test_preempted_loop_outcome_is_not_returned(outcomes, wanted):
     state = Ignores("go")
     each = iterator(state, range(5), outcomes, loop_outcomes=["go"])
     state.machine = each
     assert each.execute() == wanted
 
 
-def test_a_request_before_the_start_reaches_the_child_better():
+def test_a_request_before_the_start_reaches_the_child():
     state = Serves()
     each = iterator(state, range(5), ["preempted"], loop_outcomes=["done"])
     each.request_preempt()
@@ -106,7 +106,7 @@ def test_a_child_that_raises():
         ({"final_outcome_map": {"bad": "nowhere"}}, "nowhere"),
     ],
 )
-def test_unknown_outcomes_are_found_better(contained, named):
+def test_unknown_outcomes_are_found(contained, named):
     state = Says("ok", registered=["ok", "bad"])
     iterator(state, loop_outcomes=["ok"], final_outcome_map={"bad": "failed"}).check_consistency()
     with pytest.raises(smach.InvalidTransitionError, match=rf"\['{named}'\]"):

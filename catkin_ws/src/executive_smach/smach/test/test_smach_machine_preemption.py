@@ -95,7 +95,7 @@ def test_a_child_whose_request_preempt_raises_is_logged_and_the_request_kept(log
     assert "no preempt here" in log.text("error")
 
 
-def test_an_ignored_request_does_not_poison_the_next_run_better():
+def test_an_ignored_request_does_not_poison_the_next_run():
     state = Ignores("done")
     sm = machine(state)
     state.machine = sm
@@ -116,7 +116,7 @@ def test_a_request_after_a_run_is_for_the_next_run():
     assert state.seen == [False, True]
 
 
-def test_a_leaf_asked_directly_keeps_no_flag_after_its_run_better():
+def test_a_leaf_asked_directly_keeps_no_flag_after_its_run():
     leaf = Says("done")
     sm = machine(leaf)
     leaf.request_preempt()

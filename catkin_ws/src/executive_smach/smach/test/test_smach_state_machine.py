@@ -17,7 +17,7 @@ def test_add_refuses_unknown_outcomes_and_taken_labels():
             smach.StateMachine.add("B", Says("done"), {"done": 3})
 
 
-def test_two_adds_may_share_one_dict_which_stays_as_it_is_better():
+def test_two_adds_may_share_one_dict_which_stays_as_it_is():
     shared = {"done": "end"}
     with smach.StateMachine(["end", "x", "y"]) as sm:
         smach.StateMachine.add("A", Says("done", "x"), shared)
@@ -65,7 +65,7 @@ def test_add_auto_connects_whatever_comes_next():
     assert sm.execute() == "end"
 
 
-def test_shutdown_inside_nested_machines_is_no_error_better(log):
+def test_shutdown_inside_nested_machines_is_no_error(log):
     outer = machine(machine(Calls(lambda ud: smach.set_shutdown_check(lambda: True)), Says("done")))
     assert outer.execute() is None and log.error == []
 

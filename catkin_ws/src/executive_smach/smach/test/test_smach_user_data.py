@@ -41,7 +41,7 @@ def test_extract_and_merge_with_remapping():
         ud.extract(["nothing"], {})
 
 
-def test_locked_makes_transactions_better():
+def test_locked_makes_transactions():
     ud = smach.UserData()
     ud.n = 0
     view = smach.Remapper(ud, ["n"], ["n"], {})
@@ -131,7 +131,7 @@ def test_const_reads_recursively():
     assert const.items["k"].z == 3
 
 
-def test_const_refuses_assignment_and_del_better():
+def test_const_refuses_assignment_and_del():
     thing = Thing()
     const = view_of(thing)[0].v
     for target in (const, const.inner):
@@ -150,7 +150,7 @@ def test_const_refuses_assignment_and_del_better():
     assert writable.data == {}
 
 
-def test_const_forwards_calls_comparison_text_and_kind_better():
+def test_const_forwards_calls_comparison_text_and_kind():
     const = view_of(Thing())[0].v
     assert const.double() == 2 and str(const) == "a thing" and f"{const}" == "a thing"
     assert const == Thing() and Thing() == const and const != 3 and const == view_of(Thing())[0].v
@@ -159,7 +159,7 @@ def test_const_forwards_calls_comparison_text_and_kind_better():
     assert view_of(lambda x: x + 1)[0].v(1) == 2
 
 
-def test_const_copies_are_free_better():
+def test_const_copies_are_free():
     thing = Thing()
     const = view_of(thing)[0].v
     for clone in (copy.copy(const), copy.deepcopy(const), pickle.loads(pickle.dumps(const))):

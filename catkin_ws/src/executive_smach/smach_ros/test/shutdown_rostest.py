@@ -86,7 +86,7 @@ class TestShutdown(unittest.TestCase):
     def test_set_preempt_handler(self):
         self.check("handler")
 
-    def test_set_preempt_handler_does_not_wait_for_its_own_thread_better(self):
+    def test_set_preempt_handler_does_not_wait_for_its_own_thread(self):
         self.check("handler_in_main_thread")
 
 

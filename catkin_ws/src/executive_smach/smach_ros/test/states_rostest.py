@@ -140,7 +140,7 @@ class TestActionState(unittest.TestCase):
         self.assertEqual(self.server.goals, [])
         self.assertEqual(state.execute(self.ud), "succeeded")
 
-    def test_cancelled_but_succeeded_does_not_poison_the_next_run_better(self):
+    def test_cancelled_but_succeeded_does_not_poison_the_next_run(self):
         state = smach_ros.SimpleActionState("reference", TestAction, goal_key="whole")
         self.ud.whole = TestGoal(goal=SUCCEED_WHEN_CANCELLED)
         run = in_thread(state.execute, self.ud)
@@ -170,7 +170,7 @@ class TestActionState(unittest.TestCase):
         self.assertEqual(self.server.cancelled, before + 1)
         self.assertFalse(state.preempt_requested())
 
-    def test_preempt_timeout_gives_up_better(self):
+    def test_preempt_timeout_gives_up(self):
         for how in ("exec_timeout", "request"):
             state = action_state(DEAF, preempt_timeout=0.3, exec_timeout=0.2 if how == "exec_timeout" else None)
             run = in_thread(state.execute, self.ud)
@@ -196,7 +196,7 @@ class TestActionState(unittest.TestCase):
         run.join(LIMIT)
         self.assertEqual(run.result, "preempted")
 
-    def test_the_server_dies_better(self):
+    def test_the_server_dies(self):
         process = subprocess.Popen([sys.executable, os.path.join(HERE, "reference_server.py"), "mortal"])
         try:
             state = action_state(UNTIL_CANCELLED, name="mortal")

@@ -59,7 +59,7 @@ class Colour(enum.IntEnum):
     RED = 1
 
 
-def test_what_is_not_plain_shows_as_its_repr_better():
+def test_what_is_not_plain_shows_as_its_repr():
     lock = threading.Lock()
     shown = decode(encode({"lock": lock, "f": len, "odd": Odd(), "set": {1}, "inside": [lock, {"x": lock}]}))
     assert shown["lock"] == repr(lock) == shown["inside"][0] == shown["inside"][1]["x"]
