@@ -62,7 +62,7 @@ def test_a_reach_met_by_the_object_is_measured_at_its_end_with_the_truth():
     assert row["final_error_by"] == "truth of the simulated cell"
 
 
-def test_a_reach_is_measured_on_arrival_and_not_after_a_later_motion_of_the_object():
+def test_reach_is_measured_on_arrival():
     trial = reach(TAKES, 2.0, 6.0, [(2.01, "running"), (4.0, "reached"), (4.2, "reached")])
     grasp = OBJECT * GRASP
     trial.poses = [(4.0, off(grasp, 30.0), HAND, OBJECT), (6.0, grasp, HAND, OBJECT)]

@@ -45,7 +45,7 @@ async def until(condition, limit=60.0):
 
 
 @served()
-async def test_of_two_operators_at_once_one_is_served_and_the_other_is_told_who_operates(console):
+async def test_only_one_of_two_operators_is_served(console):
     async with console.browser() as one, console.browser() as two:
         async with console.socket_of(one) as first, console.socket_of(two) as second:
             for ws in (first, second):
@@ -106,9 +106,7 @@ async def test_a_browser_that_dies_with_a_button_held_is_told_to_the_others(cons
 
 
 @served()
-async def test_a_button_that_was_let_go_or_has_begun_something_is_not_told_when_the_browser_leaves(
-    console, client, monkeypatch
-):
+async def test_only_a_held_button_is_reported_when_the_browser_leaves(console, client, monkeypatch):
     for release in (True, False):
         monkeypatch.setattr("coglab_console.desk.gates.HOLD_TIME", 3600.0 if release else 0.8)
         ws = await console.socket_of(client)

@@ -78,7 +78,7 @@ def test_the_trial_of_the_order_names_the_object_of_its_requests(cell):
     assert len(events) == 2 and "tea_box" in events[1] and "trial 2" in events[1]
 
 
-def test_a_choice_within_the_trial_wins_and_a_condition_without_an_object_leaves_the_choice(cell):
+def test_choice_of_the_object_wins_over_the_condition(cell):
     begin(cell, ["receive ball", "receive slowly"])
     ask(cell, "a", "select_object", object_id="mug")
     stands(cell)
@@ -88,7 +88,7 @@ def test_a_choice_within_the_trial_wins_and_a_condition_without_an_object_leaves
     assert asked(cell, RECEIVE)["object_id"] == "mug"
 
 
-def test_a_trial_that_was_under_way_when_the_console_was_killed_names_its_object_again(tmp_path):
+def test_object_of_the_trial_survives_a_killed_console(tmp_path):
     before = desk_in(tmp_path)
     before.connected("a")
     stands(before)

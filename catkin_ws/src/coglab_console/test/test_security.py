@@ -82,7 +82,7 @@ async def test_a_foreign_host_is_refused(console, host):
 
 
 @served(hosts=["127.0.0.1:4711"])
-async def test_the_end_of_a_tunnel_is_served_under_loopback_and_where_its_port_was_named(console):
+async def test_requests_through_a_tunnel_are_served(console):
     """`ssh -L`: the browser sends the name and port of its own end of the tunnel."""
     for host in (f"localhost:{console.port}", "127.0.0.1:4711"):
         headers, origin = {**console.headers, "Host": host}, f"http://{host}"

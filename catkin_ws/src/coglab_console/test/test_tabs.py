@@ -28,7 +28,7 @@ def controller(name, **more):
     return {**row, **more}
 
 
-def test_feedback_controllers_by_order_with_activity_pauses_and_who_changed_what(live):
+def test_feedback_controllers_are_shown(live):
     page = live.browser
     page.tab("Feedback")
     yields = controller("yield", activity="waits", waiting="for the wrench", faults=2, overruns=7)
@@ -146,7 +146,7 @@ def test_contact_by_joint_against_its_threshold_and_learning(live):
     page.tab("Live")
 
 
-def test_a_questionnaire_is_filled_in_recordings_are_listed_and_a_primitive_is_previewed(live):
+def test_questionnaire_recordings_and_primitive_preview(live):
     page = live.browser
     page.tab("Experiment")
     asked = {"name": "tlx", "title": "Workload", "low": 0, "high": 100, "step": 5, "ends": ["low", "high"],

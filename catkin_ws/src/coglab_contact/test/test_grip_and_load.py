@@ -72,7 +72,7 @@ def test_sensors_that_miss_the_weight_give_no_share():
     assert held.share_gone(t, WEIGHT) is None and held.grip(t) == pytest.approx(12.0)
 
 
-def test_torques_and_touch_are_weighted_and_the_lower_share_counts_if_they_differ():
+def test_lower_load_share_counts():
     assert together(None, 0.2, None) is None
     assert together(0.4, 0.2, None) == 0.4 and together(None, 0.2, Felt(0.3, 0.05)) == 0.3
     assert together(0.4, 0.2, Felt(0.3, 0.05)) == pytest.approx((0.4 / 0.04 + 0.3 / 0.0025) / (1 / 0.04 + 1 / 0.0025))

@@ -74,7 +74,7 @@ def matrix(xyzw) -> np.ndarray:
     )
 
 
-def test_gravity_is_the_slope_of_the_height_of_every_link_hand_and_fingers_included(chain: cc.Chain) -> None:
+def test_gravity_counts_every_link_with_the_hand_and_fingers(chain: cc.Chain) -> None:
     links, names = Links(URDF.read_text()), chain.joint_names
     gravity = cc.ArmDynamics(URDF.read_text()).evaluate(HOME, ZERO).gravity
     h = 1e-5

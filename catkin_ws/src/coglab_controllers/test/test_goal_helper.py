@@ -74,7 +74,7 @@ def master() -> Iterator[rosgraph.Master]:
         rospy.signal_shutdown("the test is over")
 
 
-def test_a_frame_that_moves_is_passed_on_once_it_agrees_each_once_and_without_what_leaps() -> None:
+def test_moving_frame_is_passed_on_without_leaps() -> None:
     with running(offset=[0.1, 0.0, 0.02]) as (tracker, node):
         stamps = []
         # One by one: a node that is late takes the newest of several frames.
@@ -98,7 +98,7 @@ def test_a_frame_that_moves_is_passed_on_once_it_agrees_each_once_and_without_wh
         assert node.wait(timeout=60.0) == 0
 
 
-def test_a_static_frame_is_told_at_once_and_then_once_a_second_where_it_is_asked_for() -> None:
+def test_static_frame_is_repeated_once_a_second() -> None:
     with running("/elsewhere", topic="elsewhere", frame="cup", dmp_frame_name="table") as (tracker, _):
         tracker.still.publish(TFMessage([Tracker.frame("cup", 0.3, "table")]))
         wait_until(lambda: len(tracker.goals) == 1, "the first one")

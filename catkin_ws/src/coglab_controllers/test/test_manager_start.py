@@ -82,7 +82,7 @@ def test_a_file_that_is_not_there_ends_the_start_and_is_named(
     assert len(told) == 1 and words in told[0], told
 
 
-def test_without_a_model_it_starts_with_the_packages_own_and_ends_by_either_signal(master: rosgraph.Master) -> None:
+def test_starts_with_the_packages_own_model(master: rosgraph.Master) -> None:
     master.setParam("/lwr", {"rt_priority": 0})
     master.setParam("/controller_manager", {"priority": 0})
     assert "lwr/rt_priority" not in started(master, signal.SIGTERM), "none is asked for, none is left"

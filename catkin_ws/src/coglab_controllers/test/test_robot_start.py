@@ -59,7 +59,7 @@ def test_a_busy_port_is_said_first_and_at_once(master):
 
 
 @pytest.mark.parametrize("name, value", [("lwr__hot_drive", -300.0), ("controller_manager__cycle_time", 7.0)])
-def test_a_parameter_that_is_judged_late_ends_the_start_beside_a_running_fri_thread(master, name, value):
+def test_bad_parameter_ends_the_start_with_a_running_fri_thread(master, name, value):
     """A controller sends at 1 kHz meanwhile. The memory is watched in test_start_failure.py (./coglab test --long)."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))

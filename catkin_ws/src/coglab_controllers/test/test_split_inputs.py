@@ -89,7 +89,7 @@ def arm() -> Iterator[Arm]:
             node.wait(timeout=60.0)
 
 
-def test_a_joint_state_is_answered_once_with_its_stamp_and_the_epoch_of_the_permission(arm: Arm) -> None:
+def test_each_joint_state_is_answered_once(arm: Arm) -> None:
     for _ in range(10):
         arm.answered(arm.send())
     before = len(arm.heard)

@@ -60,6 +60,6 @@ def test_no_limit_switch_is_met_at_full_speed_while_datagrams_are_lost(seed, per
     assert approach(period, 0.10, bursts, seed) == (0, True)
 
 
-def test_a_switch_within_the_range_of_the_bridge_is_counted_and_ends_command_mode():
+def test_limit_switch_within_the_range_ends_command_mode():
     switches = [limit - 0.05 for limit in bridge_module.JointLimits(LIMITS).upper_position]
     assert approach(0.005, 0.0, False, 1, krc__position_limit=switches) == (1, False)

@@ -40,7 +40,7 @@ def test_hand_that_closes_without_carrying_gets_no_object():
     assert stage.phases[-1] in ("holding", "releasing", "retreating")
 
 
-def test_an_object_is_pressed_again_into_an_open_hand_that_backs_away_but_not_for_ever():
+def test_person_presses_again_a_limited_number_of_times():
     """From the first touch on, the palm is 3 cm farther away."""
     stage = Stage(closes=False)
     stage.human.hear(0.0, Say.READY_TO_RECEIVE)

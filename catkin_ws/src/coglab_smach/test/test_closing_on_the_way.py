@@ -128,7 +128,7 @@ def test_the_arm_stays_if_closed_fingers_do_not_open_again(monkeypatch, why):
 
 
 @pytest.mark.parametrize("person", ["away", "not seen", "at it"])
-def test_an_object_caught_during_the_reach_is_not_dropped_after_the_person_let_go(monkeypatch, person):
+def test_object_caught_during_the_reach_is_not_dropped(monkeypatch, person):
     """The person lets go at the first touch, then the goal is lost. Only a person at the object gets it back."""
     trial = Trial()
     monkeypatch.setattr(reach, "off_grasp", lambda state, goal: 0.02)

@@ -79,7 +79,7 @@ def test_parameters_of_the_node_win_and_are_checked_too():
         Config.load(str(SHIPPED), {"timing": "hasty"})
 
 
-def test_a_timing_wins_over_the_file_and_a_parameter_of_the_node_over_the_timing():
+def test_parameter_wins_over_timing_and_timing_over_file():
     natural, calm = (Config.load(str(SHIPPED), {"timing": name}) for name in ("natural", "calm"))
     assert calm.get("handover.belief") < natural.get("handover.belief")
     assert calm.get("handover.doubt") == natural.get("handover.doubt")

@@ -39,7 +39,7 @@ def test_the_standoff_of_a_palm_is_against_the_approach_axis():
     assert approach_of(bare, 0.03) == pytest.approx([0.0, 0.03, 0.0])
 
 
-def test_the_cost_of_a_grasp_counts_fingertips_the_persons_hand_and_the_palms_direction():
+def test_cost_of_a_grasp():
     seen = Pose(np.array([1.0, 0.0, 0.0]))
     palm = np.array([1.0, -0.04, 0.07])
     tips = {**GRASP, "hand": {"mode": "tridigit", "level": "low"}}

@@ -105,7 +105,7 @@ def test_a_repeated_old_sight_does_not_count_as_held_still(monkeypatch):
     assert not any(early.look() for _ in range(14))
 
 
-def test_a_reach_toward_a_seen_target_needs_no_belief_but_does_not_leave_the_region(monkeypatch):
+def test_reach_toward_a_seen_target_stays_in_the_region(monkeypatch):
     seen = Watched(monkeypatch, frame="object_mug")
     seen.ahead, seen.place = Ahead(), None
     assert not seen.reach.predicted and seen.look() and seen.look(*HERE)

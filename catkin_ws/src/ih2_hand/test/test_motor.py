@@ -51,7 +51,7 @@ def test_moves_that_end_short_never_pass_an_end(begin, target, end):
     assert motor.position == pytest.approx(end) and motor.reached
 
 
-def test_a_full_close_that_reads_back_as_zero_does_so_until_the_finger_is_driven():
+def test_full_close_reads_zero_until_the_finger_is_driven():
     motor = at(0.0)
     motor.wrap = True
     motor.go_to(200)

@@ -105,7 +105,7 @@ TEST_F(CycleLimits, SilenceIsReportedAfterATenthAndEndsAMotionAfterHalfASecond) 
   EXPECT_EQ(report().motion, MotionState::Aborted);
 }
 
-TEST_F(CycleLimits, AMotionThatWasReachedAndFollowsItsGoalEndsWhenTheRobotLeftCommandMode) {
+TEST_F(CycleLimits, FollowingMotionEndsWhenTheRobotLeavesCommandMode) {
   begin();
   robot->switchTo("dmp");
   const Vector3 goal(0.8, 0.0, 0.45);

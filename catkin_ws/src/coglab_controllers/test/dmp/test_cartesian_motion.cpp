@@ -251,7 +251,7 @@ TEST(CartesianMotion, ItsVelocitiesLeadToItsPoses) {
   }
 }
 
-TEST(CartesianMotion, TheApproachShiftsTheGoalFullyUntilTheMiddleThenLessByMinimumJerk) {
+TEST(CartesianMotion, ApproachShiftsTheGoalFullyUntilTheMiddle) {
   const DmpPlan plan = reachPlan();
   const Vector3 goal(0.5, 0.1, 0), approach(0.0, 0.0, -0.1);
   CartesianMotion motion;

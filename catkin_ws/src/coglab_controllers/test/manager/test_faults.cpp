@@ -167,7 +167,7 @@ class Slow : public ctrl_more::FeedbackController {
   }
 };
 
-TEST(Faults, TheTimeOfASlowFeedbackControllerDoesNotCountForTheMotionController) {
+TEST(Faults, SlowFeedbackControllerIsNotAFaultOfTheMotionController) {
   const coglab_rt::JointLimits limits =
       coglab_rt::loadJointLimits(std::string(DESCRIPTION_DIR) + "/config/joint_limits.yaml");
   ctrl_more::Logger logger;

@@ -96,7 +96,7 @@ TEST_F(Runner, AQueueRunsInOrderFromEachEndAndRefusesWhenFull) {
   EXPECT_EQ(ask(0.1, 1.0, true).id, 3) << "what was refused has no id";
 }
 
-TEST_F(Runner, ANewMotionTakesThePlaceOfTheOneUnderWayWithoutAStepOfTheSetPoint) {
+TEST_F(Runner, NewMotionReplacesTheRunningOneWithoutAStep) {
   ask(0.3, 2.0, false);
   ask(0.3, 2.0, true);
   arm.run(1.0);

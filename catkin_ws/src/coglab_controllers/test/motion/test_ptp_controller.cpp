@@ -78,7 +78,7 @@ void during(VirtualRobot& robot, Request&& request) {
   thread.join();
 }
 
-TEST(PtpController, AMotionThatRacesAHoldIsNeitherReportedAsExecutedNorMadeAfterReset) {
+TEST(PtpController, MotionThatRacesAHoldIsNotMadeAfterReset) {
   using coglab_rt::MotionBlock;
   for (const bool split : {false, true}) {
     VirtualRobot robot("", 0.005, false);

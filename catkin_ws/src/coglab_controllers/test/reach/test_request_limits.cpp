@@ -89,7 +89,7 @@ TEST_F(Requests, OfAGivenStartAreNearTheHandAndNotTooFast) {
   EXPECT_EQ(from(still, Vector3(0, INFINITY, 0)).code, ReasonCode::InvalidArgument);
 }
 
-TEST_F(Requests, OfAFrameMayHaveItsGoalOutsideTheWorkspaceByAMarginAndOfTheTopicNot) {
+TEST_F(Requests, OnlyAFrameMayHaveItsGoalInTheMarginOfTheWorkspace) {
   const auto at = [this](const Vector3& goal) {
     robot.see("human_hand", goal);
     PredictedPath path;

@@ -164,7 +164,7 @@ TEST(LimitsUnderLoss, BurstsAtHalfSpeedOrShortPeriodsMakeTheBridgeCutNothing) {
 
 /// Here the distance of the manager is not sufficient. The bridge cuts the motion for some cycles,
 /// and so the limits hold.
-TEST(LimitsUnderLoss, BurstsAtFullSpeedAndLongPeriodsAreCutForSomeCyclesAndTheLimitsHold) {
+TEST(LimitsUnderLoss, LimitsHoldWithBurstsAndLongPeriods) {
   unsigned long cuts = 0;
   int all = 0;
   for (const double period : {0.005, 0.01, 0.02}) {
