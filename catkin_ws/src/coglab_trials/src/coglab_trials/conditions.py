@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from coglab_sim.person.participant import HABITS, Participant
+from coglab_sim.person.participant import Participant
 from coglab_sim.tracker.tracker import PerceptionSettings
 
 
@@ -41,8 +41,6 @@ PATIENT = Conditions(profile="patient", perception=PerceptionSettings(perfect=Tr
 """For tests of the physics: a patient person, perfect perception."""
 CONSIDERATE = Conditions(profile="accustomed", perception=PerceptionSettings(perfect=True))
 """For tests of the machines, not of people: an accustomed person, perfect perception."""
-CAREFUL = Conditions(person=HABITS)
-"""Default conditions, but the person has the habits of the accustomed profile. Reported beside the default."""
 
 HARDSHIPS: dict[str, Callable[[Conditions, int], Conditions]] = {
     "trust 0.1 s": lambda c, seed: replace(c, person={**c.person, "trust": 0.1}),

@@ -321,11 +321,6 @@ class Reach:
         self.found: float | None = None
         self.moving = self.moving_when_found = False
 
-    @property
-    def false_alarm(self) -> bool:
-        """True if contact was detected before anything touched the hand."""
-        return self.found is not None and (self.touched is None or self.found < self.touched)
-
     def look(self) -> None:
         """Update the record; called after each period of the world."""
         robot, t = self._world.robot, self._world.t
