@@ -158,7 +158,7 @@ TEST(FirstJointState, IsNeverAStopOfTheRobotButTheSecondCanBe) {
   ASSERT_TRUE(VirtualRobot::ok(manager.load("odd", "test/Misbehaving")));
   ASSERT_TRUE(VirtualRobot::ok(manager.switchTo("odd", type)));
   manager.cycle().idle(9000 * kMs);
-  EXPECT_EQ(manager.report().reason.str(), "no joint state from the robot yet");
+  EXPECT_EQ(manager.report().reason.code(), ReasonCode::StaleJointState);
   RobotSample sample = plain.sample;
   VelocityCommand command;
   sample.motion_epoch = 5;

@@ -178,7 +178,6 @@ TEST_F(LoopTest, JointsBeginWithoutAnErrorThatThenBlendsIn) {
   EXPECT_NEAR(loop.error(input), 0.02, 1e-12);
   EXPECT_EQ(loop.allowedError(), 0.004);
   EXPECT_EQ(loop.stuck(input).code(), ReasonCode::TargetNotReached);
-  EXPECT_EQ(loop.stuck(input).str(), "the arm does not reach the target: is it blocked?");
   for (const auto& [scale, rate] : {std::pair(0.5, 0.5), {0.1, 0.1}, {0.02, 0.1}, {1.0, 1.0}}) {
     input.time_scale = scale;
     const SetPoint from = loop.setPoint(input, false), end = loop.setPoint(input, true);

@@ -137,18 +137,20 @@ TEST(SignalMessages, FieldsThatAreNotThereAreNamed) {
                   .in)
           .ok());
   const auto refusal = [&](std::size_t row, const auto& message) {
-    return stage.signals().post(row, SignalReading(message).message(), steadyNow()).text;
+    return stage.signals().post(row, SignalReading(message).message(), steadyNow());
   };
   auto imu = stamped<sensor_msgs::Imu>();
   imu.orientation_covariance[0] = -1.0;
-  EXPECT_NE(refusal(0, imu).find("orientation"), std::string::npos);
+  EXPECT_EQ(refusal(0, imu).refusal, SignalRefusal::Missing);
+  EXPECT_NE(refusal(0, imu).text.find("orientation"), std::string::npos);
   auto joints = stamped<sensor_msgs::JointState>();
   joints.name = {"b"};
   joints.velocity = {1.0};
-  EXPECT_NE(refusal(1, joints).find("'a'"), std::string::npos);
+  EXPECT_EQ(refusal(1, joints).refusal, SignalRefusal::Missing);
+  EXPECT_NE(refusal(1, joints).text.find("'a'"), std::string::npos);
   std_msgs::Float64MultiArray array;
   array.data = {1, 2, 3};
-  EXPECT_NE(refusal(2, array).find("2 numbers"), std::string::npos);
+  EXPECT_EQ(refusal(2, array).refusal, SignalRefusal::Size);
 }
 
 TEST(Touch, ForcesOfAFingerAreTheSumOverItsPhalanges) {
@@ -174,14 +176,18 @@ TEST(Touch, BadMessagesAreRefusedWithAReason) {
   FeedbackStage stage(*setup("{tactile: true}"), 0.005, true);
   const auto refusal = [&](const coglab_msgs::FingertipForces& message) -> std::string {
     try {
-      return stage.signals().post(0, SignalReading(message).message(), steadyNow()).text;
+      SignalReading{message};
     } catch (const std::invalid_argument& error) {
       return error.what();
     }
+    return "";
+  };
+  const auto code = [&](const coglab_msgs::FingertipForces& message) {
+    return stage.signals().post(0, SignalReading(message).message(), steadyNow()).refusal;
   };
   auto message = touched();
   message.header.frame_id = "world";
-  EXPECT_NE(refusal(message).find("frame ih2_palm"), std::string::npos);
+  EXPECT_EQ(code(message), SignalRefusal::Frame);
   message = touched();
   message.fingers.pop_back();
   EXPECT_NE(refusal(message).find("3 forces"), std::string::npos);
@@ -190,7 +196,7 @@ TEST(Touch, BadMessagesAreRefusedWithAReason) {
   EXPECT_NE(refusal(message).find("0 .. 4"), std::string::npos);
   message = touched();
   message.palm.x = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_NE(refusal(message).find("finite"), std::string::npos);
+  EXPECT_EQ(code(message), SignalRefusal::NotFinite);
 }
 
 TEST(RobotStates, AreThoseOfTheMeasurementWithTheWrenchTurnedIntoTheBase) {

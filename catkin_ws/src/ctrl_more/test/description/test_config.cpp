@@ -71,8 +71,8 @@ TEST(ConfigTest, NearestNames) {
   EXPECT_EQ(nearestName("zmpip", known), "ZmpIP");
   EXPECT_EQ(nearestName("Compliantt", known), "Compliant");
   EXPECT_EQ(nearestName("Xyz", known), "");
-  EXPECT_EQ(suggestion("Xyz", known), "; known: Compliant, ZmpIP, AttitudeMPCController");
-  EXPECT_EQ(suggestion("Xyz", {}), "; there is none");
+  for (const std::string& name : known) EXPECT_TRUE(contains(suggestion("Xyz", known), name));
+  EXPECT_TRUE(contains(suggestion("Xyz", {}), "none"));
 }
 
 TEST(ConfigTest, NumbersAndTruthsAreReadWholeOrNotAtAll) {

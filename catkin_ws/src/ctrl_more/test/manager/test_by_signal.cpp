@@ -129,8 +129,7 @@ TEST_F(BySignal, SafetyControllersAreSkippedInEveryFormOfRequest) {
   for (std::size_t i = 0; i < ways.size(); ++i) {
     const Status status = ways[i]();
     EXPECT_TRUE(status) << i;
-    EXPECT_EQ(status.message(), "left alone, because safety controllers must be forced: limits")
-        << i;
+    EXPECT_TRUE(contains(status.message(), "limits")) << i;
     EXPECT_TRUE(rig.manager->isEnabled("limits")) << i;
     EXPECT_FALSE(rig.manager->isPaused("limits")) << i;
   }
