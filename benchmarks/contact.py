@@ -15,7 +15,7 @@ from collections.abc import Iterator
 import coglab_controllers as cc
 import numpy as np
 from coglab_contact.detector import ContactDetector, DetectorSettings
-from coglab_contact.fused_detector import IN_MOTION, FusedDetector
+from coglab_contact.fused_detector import IN_MOTION, OLDEST_SIGHT, FusedDetector
 from coglab_contact.load import GripAndLoad
 from coglab_contact.motion_thresholds import Thresholds
 from coglab_contact.moving_contact import MovingContact
@@ -29,7 +29,6 @@ FIRST_SEED = 300_000  # the shipped thresholds were learnt on seeds from 50 000 
 WITHIN = 0.080  # s
 TOUCH_NOISE = 0.05  # N, of each component of the touch sensors
 BEFORE = 0.6  # s of rest before the motion that are fed to the detector
-OLDEST_SIGHT = 0.15  # s
 
 
 def detector(seed: int) -> FusedDetector:

@@ -27,7 +27,7 @@ import numpy as np
 import rospy
 import tf2_ros
 from coglab_contact.detector import TUNABLE, ContactDetector, DetectorSettings
-from coglab_contact.fused_detector import IN_MOTION, LIFT, RELEASE, FusedDetector
+from coglab_contact.fused_detector import IN_MOTION, LIFT, OLDEST_SIGHT, RELEASE, FusedDetector
 from coglab_contact.load import GripAndLoad
 from coglab_contact.motion_thresholds import ThresholdError, Thresholds
 from coglab_contact.moving_contact import MotionRecorder, MovingContact, unwritable
@@ -48,7 +48,6 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
 FORCE_PERIOD = 0.009  # s, shortest time between two messages of ~force
-OLDEST_SIGHT = 0.15  # s, oldest sight of an object that is compared with the palm
 SIGNAL = 0.01  # s, shortest time between two messages on ~signal
 
 

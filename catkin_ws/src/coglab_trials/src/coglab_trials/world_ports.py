@@ -10,7 +10,7 @@ from typing import Any
 import coglab_controllers as cc
 import numpy as np
 from coglab_contact.detector import ContactDetector, DetectorSettings
-from coglab_contact.fused_detector import FusedDetector
+from coglab_contact.fused_detector import OLDEST_SIGHT, FusedDetector
 from coglab_contact.load import GripAndLoad
 from coglab_contact.motion_thresholds import Thresholds
 from coglab_contact.moving_contact import MovingContact
@@ -34,7 +34,6 @@ from coglab_trials.world import World
 
 THRESHOLDS = package_path("coglab_contact", "config", "contact_thresholds.yaml")
 HAND = "human_hand"
-OLDEST_SIGHT = 0.15  # s, oldest sight of an object that is compared with the palm
 
 
 class VirtualHand:
