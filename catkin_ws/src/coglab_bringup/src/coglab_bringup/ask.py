@@ -25,7 +25,7 @@ from coglab_bringup.usage import Parser, Refused, master_port
 DEFAULT_MASTER = "http://127.0.0.1:11311"  # of a plain roslaunch
 ANSWER_LIMIT = 5.0  # s, longest wait for a service that exists
 STATE_LIMIT = 3.0  # s, longest wait for the latched state
-LONGEST_START = 600.0  # s that it waits for the hub while nodes start
+LONGEST_START = 600.0  # s, longest wait for the hub while nodes still start
 CHANGE_LIMIT = 5.0  # s before an action is refused that the hub does not list: after a hold the list needs a moment
 DEFAULT_ACTIONS = ("exchange_human_to_robot", "exchange_robot_to_human")  # the first one that the hub accepts
 FACTOR_TOPIC = "/coglab_sim/real_time_factor"
