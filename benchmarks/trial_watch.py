@@ -14,6 +14,7 @@ from coglab_perception.recogniser import Recogniser, load_patterns
 from coglab_py.packages import package_path
 from coglab_py.pose import Pose
 from coglab_sim.person.scene import HandSample
+from coglab_smach.context.requests import HUBS
 from coglab_trials import Conditions, VirtualTrial
 from common import shared_module
 from scipy.signal import butter, find_peaks, sosfiltfilt
@@ -307,7 +308,7 @@ def run_trial(job: Job, watch_of: Callable[[VirtualTrial], Watch] = Watch) -> di
         trial.run(*job.actions, script=getattr(watch, "walk", None))
     except Exception as error:  # the script's own limit, or the physics has ended
         stuck = f"{type(error).__name__}: {error}"
-    if not stuck and trial.last_hub not in ("wait_without_object", "wait_with_object"):
+    if not stuck and trial.last_hub not in HUBS:
         stuck = f"the machine waits in '{trial.last_hub}': {trial.why()}"
     return {
         "stuck": stuck,

@@ -12,10 +12,11 @@ import rospkg
 import rospy
 import tf2_ros
 import yaml
-from coglab_bringup.handover import HUBS, READY_LIMIT, NotTaken, ask_for, run_handover
+from coglab_bringup.handover import READY_LIMIT, NotTaken, ask_for, run_handover
 from coglab_bringup.trial_recorder import TrialRecorder
 from coglab_msgs.msg import MasterState
 from coglab_py.packages import package_path
+from coglab_smach.context.requests import HUBS
 from interface import FRAMES, missing_names
 from rosgraph_msgs.msg import Log
 from tf2_msgs.msg import TFMessage

@@ -17,13 +17,13 @@ from coglab_py.pace import Pace
 from coglab_py.packages import package_path
 from coglab_py.steady import call_service, utc_of
 from coglab_py.yaml_file import read
+from coglab_smach.context.requests import HUBS
 
 from coglab_bringup.ask import LONGEST_START
 from coglab_bringup.trial_recorder import TrialRecorder, summarise
 
 READY_LIMIT = 90.0  # s without progress until the system waits in its hub
 HANDOVER_LIMIT = 60.0  # s of simulated time for one handover
-HUBS = ("wait_without_object", "wait_with_object")
 MASTER = "/coglab_master"
 
 

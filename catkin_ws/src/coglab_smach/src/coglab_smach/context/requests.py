@@ -19,6 +19,8 @@ DATABASE_WAIT = 2.0  # s, time limit of the object database for a trigger
 COMMAND = "./coglab start"  # command that requests an action
 SHORT_NAMES = {"receive": "exchange_human_to_robot", "give": "exchange_robot_to_human"}
 """Short names of actions in a trigger."""
+HUBS = ("wait_without_object", "wait_with_object")
+"""States of the master machine that wait for a trigger."""
 
 
 def command(*actions: str) -> str:

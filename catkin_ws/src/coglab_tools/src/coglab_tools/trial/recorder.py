@@ -22,6 +22,7 @@ from typing import Any, NamedTuple
 
 from coglab.results import ACTIONS, reason_name
 from coglab_msgs.msg import Transition
+from coglab_smach.context.requests import HUBS
 
 from coglab_tools.command import CommandError
 from coglab_tools.trial.record import BAG, Outcome, TrialRecord
@@ -31,7 +32,6 @@ NO_RESULT = 3.0  # s, longest wait for the result after the end of the action
 LONGEST = 1800.0  # s, a longer action is cut off
 MOST_WAITING = 100_000  # messages that wait for the disk; older ones are lost, with a note in trial.yaml
 DISK_CHECK = 1.0  # s between two looks at the free space
-HUBS = ("wait_without_object", "wait_with_object")
 NO_ACTIONS = (*HUBS, "stopped", "fault", "preempted")
 HIDDEN = ".part-"
 TRANSITIONS, RESULTS, NOTE = "coglab/transitions", "coglab/results", "coglab/note"
