@@ -19,8 +19,9 @@ import rospkg
 import rospy
 import rostest
 import tf2_ros
-from coglab_console.browser import Browser, acknowledge, fresh_link, press_and_hold
+from coglab_console.browser import fresh_link
 from coglab_msgs.msg import LwrState, MasterState
+from page_browser import PageBrowser, acknowledge, press_and_hold
 from page_check import PAGES, look
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
@@ -51,7 +52,7 @@ class Console(unittest.TestCase):
         home = Path(rospkg.get_ros_home())
         cls.pictures = home / "pictures"
         cls.link = fresh_link(home, limit=LIMIT)
-        cls.browser = Browser()
+        cls.browser = PageBrowser()
         cls.browser.open(cls.link, LIMIT)
 
     @classmethod
@@ -342,7 +343,7 @@ class Console(unittest.TestCase):
     def test_11_without_webgl_the_view_is_2d(self):
         self.holds_the_mug()
         used = self.link
-        with Browser(webgl=False) as other:
+        with PageBrowser(webgl=False) as other:
             other.open(fresh_link(Path(rospkg.get_ros_home()), used, LIMIT), LIMIT)
             self.assertEqual(other.js("return coglab.view()"), "2D")
             other.until(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from coglab_console.browser import Browser
+from page_browser import PageBrowser
 
 PAGES = ("Live", "Machine", "Experiment", "Contact", "Objects", "Primitives", "Feedback", "Events", "Health", "Help")
 _LOOK = Path(__file__).with_name("look_at_page.js").read_text()
@@ -30,14 +30,14 @@ return { place: [...document.querySelectorAll('*')].indexOf(at),
 """
 
 
-def look(browser: Browser) -> tuple[list[str], int]:
+def look(browser: PageBrowser) -> tuple[list[str], int]:
     """Faults (scroll bars, STOP hidden, controls without a name or too small, pale text), and the number of texts."""
     browser.painted()  # before that, the page has neither its final layout nor measured its own room
     found = browser.js(_LOOK)
     return found["problems"], found["texts"]
 
 
-def focus_order(browser: Browser) -> tuple[list[str], list[str]]:
+def focus_order(browser: PageBrowser) -> tuple[list[str], list[str]]:
     """Goes through the page with the Tab key. Returns the names in order, and the faults: controls not reached, out of
     order, out of sight or without a focus ring, or STOP missing."""
     from selenium.webdriver.common.action_chains import ActionChains

@@ -6,8 +6,8 @@ import threading
 import time
 
 import pytest
-from coglab_console.browser import Browser
 from console_double import PAGE_DOCUMENTS, RobotDouble, page_state, running
+from page_browser import PageBrowser
 
 needs_browser = pytest.mark.skipif(
     shutil.which("chromedriver") is None, reason="chromium-driver is missing: ./coglab install browser"
@@ -59,7 +59,7 @@ class Desk:
         self._thread = threading.Thread(target=self.loop.run_until_complete, args=(self._serve(folder),))
         self._thread.start()
         assert self._ready.wait(60.0)
-        self.browser = Browser()
+        self.browser = PageBrowser()
         self.browser.driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": IN_HAND})
         self.browser.open(self.console.link())
 

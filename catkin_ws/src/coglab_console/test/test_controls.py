@@ -5,8 +5,8 @@ import time
 from dataclasses import replace
 
 import pytest
-from coglab_console.browser import Browser
 from coglab_console.desk.words import BUTTONS
+from page_browser import PageBrowser
 from page_check import PAGES, look
 from page_double import STATUS, Desk, needs_browser
 
@@ -73,7 +73,7 @@ def words_of(label):
 
 
 def test_every_control_shows_observers_who_operates(desk):
-    with Browser() as other:
+    with PageBrowser() as other:
         other.open(desk.console.link())
         other.until("return document.getElementById('role').innerText.includes('you watch')", 60.0)
         for page in PAGES:
@@ -92,7 +92,7 @@ def test_every_control_shows_observers_who_operates(desk):
 
 
 def test_observers_see_cause_of_stop_and_why_they_cannot_acknowledge(desk):
-    with Browser() as other:
+    with PageBrowser() as other:
         other.open(desk.console.link())
         desk.loop.call_soon_threadsafe(desk.console.desk.guard.stop, "the arm is blocked")
         other.until("return document.getElementById('stop-cause').innerText.includes('the arm is blocked')", 60.0)

@@ -7,7 +7,7 @@ import pytest
 
 if shutil.which("chromedriver") is None:
     pytest.skip("chromium-driver is missing: ./coglab install browser", allow_module_level=True)
-from coglab_console.browser import Browser
+from page_browser import PageBrowser
 from page_check import PAGES, look
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
@@ -18,7 +18,7 @@ def test_refused_choice_shows_reason_and_old_value(live):
     """For an observer, the list of objects and the speed show the current value, not the wish."""
     objects = {"rows": [{"id": "ball", "name": "ball", "mass": 0.1, "text": ""}], "asked": True, "problems": []}
     live.loop.call_soon_threadsafe(live.console.documents.put, "objects", objects)
-    with Browser() as page:
+    with PageBrowser() as page:
         page.open(live.console.link())
         page.until("return document.getElementById('object').textContent.includes('(default)')", 60.0)
         for field, wish, shown in (("object", "ball", ""), ("speed", "40", "100")):

@@ -3,10 +3,10 @@
 import time
 
 import pytest
-from coglab_console.browser import Browser
 from coglab_console.desk.gates import Standing
 from coglab_console.scene.graph_layout import Container, Layout
 from console_double import PAGE_DOCUMENTS, READY
+from page_browser import PageBrowser
 from page_check import PAGES, focus_order, look
 from page_double import IN_HAND, Desk, needs_browser
 
@@ -115,7 +115,7 @@ def test_a_button_is_held_by_touch(live, monkeypatch):
 
 
 def test_a_tablet_has_stop_and_every_page_within_reach_of_a_finger(live):
-    with Browser(size=(1024, 768), touch=True) as tablet:
+    with PageBrowser(size=(1024, 768), touch=True) as tablet:
         tablet.open(live.console.link())
         tablet.until("return navigator.maxTouchPoints > 0", 60.0)
         for name in PAGES:
@@ -242,7 +242,7 @@ def test_without_libjs_the_view_is_2d_with_a_message(tmp_path, promised):
 
 def test_page_without_session_shows_what_to_do_and_that_stop_failed(live):
     """As after a restart of the console, which does not know earlier sessions."""
-    with Browser() as page:
+    with PageBrowser() as page:
         page.driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": IN_HAND})
         page.open(live.console.link())
         page.driver.delete_all_cookies()

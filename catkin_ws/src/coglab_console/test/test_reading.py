@@ -4,9 +4,9 @@ texts that are cut off. In a real browser with a double of the robot."""
 import time
 
 import pytest
-from coglab_console.browser import Browser
 from coglab_console.desk import words
 from coglab_console.scene.graph_layout import Container, Layout
+from page_browser import PageBrowser
 from page_check import focus_order, look
 from page_double import STATUS, needs_browser
 from selenium.webdriver.common.action_chains import ActionChains
@@ -93,7 +93,7 @@ def test_every_cut_off_text_can_be_unfolded(live, moment):
 
 def test_a_tablet_shows_the_whole_column_also_when_it_is_turned(live):
     stopped(live)
-    with Browser(size=(768, 1024), touch=True) as tablet:
+    with PageBrowser(size=(768, 1024), touch=True) as tablet:
         tablet.open(live.console.link())
         tablet.until("return document.getElementById('now').innerText.includes('stopped')", 60.0)
         tablet.resize((1024, 768))

@@ -5,7 +5,7 @@ import re
 import time
 
 import pytest
-from coglab_console.browser import press_and_hold
+from page_browser import press_and_hold
 from page_double import STATUS, needs_browser
 
 pytestmark = needs_browser

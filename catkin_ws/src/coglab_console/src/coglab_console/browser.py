@@ -6,7 +6,6 @@ import shutil
 import socket
 import tempfile
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -26,7 +25,6 @@ OPTIONS = (
 )
 SOFTWARE_GL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")
 NO_GL = ("--disable-gpu", "--disable-3d-apis")
-HOLD_AGAIN = 5.0  # s
 
 
 class Browser:
@@ -92,10 +90,6 @@ class Browser:
                 raise TimeoutError(f"not within {limit:.0f} s: {script} ({problem}); {self.summary()}")
             time.sleep(0.1)
 
-    def painted(self) -> None:
-        """Waits until the page was drawn twice, so that earlier changes are visible."""
-        self.driver.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]))")
-
     def summary(self) -> str:
         """Text of the page, for a message."""
         try:
@@ -103,36 +97,10 @@ class Browser:
         except Exception as error:
             return str(error).splitlines()[0]
 
-    def tab(self, name: str) -> None:
-        """Opens a tab of the console."""
-        self.js("document.getElementById('tab-' + arguments[0]).click()", name)
-
-    def touch(self, selector: str, done: Callable[[], bool] = lambda: True, limit: float = 5.0) -> None:
-        """Puts a finger on the middle of an element until `done()`, as on a tablet. TimeoutError after `limit` s."""
-        x, y = self.js(
-            "const e = document.querySelector(arguments[0]); e.scrollIntoView({ block: 'nearest', inline: 'nearest' });"
-            "const b = e.getBoundingClientRect(); return [b.left + b.width / 2, b.top + b.height / 2]",
-            selector,
-        )
-        send = self.driver.execute_cdp_cmd
-        send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [{"x": x, "y": y}]})
-        end = time.monotonic() + limit
-        try:
-            while not done():
-                if time.monotonic() > end:
-                    raise TimeoutError(f"touching {selector} did nothing within {limit:.0f} s; {self.summary()}")
-                time.sleep(0.05)
-        finally:
-            send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
-
     def picture(self, path: Path) -> None:
         """Saves a screenshot."""
         path.parent.mkdir(parents=True, exist_ok=True)
         self.driver.save_screenshot(str(path))
-
-    def complaints(self) -> list[str]:
-        """Warnings and errors of the page's console since the last call."""
-        return [row["message"] for row in self.driver.get_log("browser") if row["level"] in ("SEVERE", "WARNING")]
 
 
 def listens(link: str) -> bool:
@@ -157,39 +125,3 @@ def fresh_link(home: Path, used: str = "", limit: float = 30.0) -> str:
             return link
         time.sleep(0.1)
     raise TimeoutError(f"no new link in {path} within {limit:.0f} s; does the console run?")
-
-
-def acknowledge(browser: Browser, press: Callable[[], None], limit: float = 20.0) -> None:
-    """Acknowledges the newest stop, again if another one came in between. TimeoutError after `limit` s."""
-    end = time.monotonic() + limit
-    while browser.js("return coglab.docs().desk.guard.unacknowledged"):
-        browser.until("return document.getElementById('acknowledge').offsetParent !== null", limit)
-        press()
-        try:
-            browser.until("return !coglab.docs().desk.guard.unacknowledged", 2.0)
-        except TimeoutError:
-            if time.monotonic() > end:
-                raise
-
-
-def press_and_hold(browser: Browser, element: Any, done: Callable[[], bool], limit: float = 5.0) -> None:
-    """Holds a button with the mouse until `done()`. TimeoutError after `limit` s.
-
-    Lets go and presses again every HOLD_AGAIN s: on a busy computer the page may move the button away from the mouse,
-    or refuse the command for a moment, and each of them ends the holding."""
-    from selenium.webdriver.common.action_chains import ActionChains
-
-    end = time.monotonic() + limit
-    while True:
-        ActionChains(browser.driver).move_to_element(element).click_and_hold().perform()
-        again = time.monotonic() + HOLD_AGAIN
-        try:
-            while time.monotonic() < min(again, end):
-                if done():
-                    return
-                time.sleep(0.05)
-        finally:
-            ActionChains(browser.driver).release().perform()
-        if time.monotonic() >= end:
-            raise TimeoutError(f"holding the button did nothing within {limit:.0f} s; {browser.summary()}")
-        print(f"REPEATED holding a button: nothing within {HOLD_AGAIN:.0f} s", flush=True)  # ./coglab test lists it
