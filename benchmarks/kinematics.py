@@ -24,9 +24,13 @@ from common import DEVEL, LIMITS, SOURCES, URDF, Row, helper, in_parallel, main
 from scipy.spatial.transform import Rotation
 
 PACKAGE = SOURCES / "coglab_controllers"
-PERIOD, FRAME_PERIOD = 0.005, 0.03  # s
-START_LIMIT, REACH_LIMIT, SETTLED = 10.0, 6.0, 1.5  # s of simulated time
-NEAR, TURNED = 0.001, 3.0  # m, degrees
+PERIOD = 0.005  # s, of the control cycle
+FRAME_PERIOD = 0.03  # s between two frames of the goal
+START_LIMIT = 10.0  # s of simulated time, longest wait for a step of the start
+REACH_LIMIT = 6.0  # s of simulated time, longest reach
+SETTLED = 1.5  # s of simulated time between the end of a reach and its measurement
+NEAR = 0.001  # m, largest distance of the hand from the goal
+TURNED = 3.0  # degrees, largest angle of the hand to the goal
 
 
 def times(quick: bool) -> Iterator[Row]:

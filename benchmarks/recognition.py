@@ -21,8 +21,11 @@ from trial_watch import OBJECTS, Job, Watch, onset, run_trial
 
 PATTERNS = str(package_path("coglab_perception", "config", "patterns.json"))
 AT = 0.4  # share of the time
-RATE, NOISE, CORRELATION = 30.0, 0.004, 0.3  # Hz; m per axis; s over which the tracker's error wanders
-REST, HOLD = 0.6, 0.4  # s before and after a motion
+RATE = 30.0  # Hz, of the tracker
+NOISE = 0.004  # m, standard deviation of the tracker on each axis
+CORRELATION = 0.3  # s, correlation time of the tracker's error
+REST = 0.6  # s at rest before a motion
+HOLD = 0.4  # s at rest after a motion
 FIRST_SEED = 200_000
 
 

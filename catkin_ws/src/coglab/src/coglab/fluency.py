@@ -18,8 +18,10 @@ from dataclasses import dataclass
 import numpy as np
 
 Interval = tuple[float, float]
-GAP, BLIP = 0.15, 0.10  # s: a shorter pause does not interrupt an activity; a shorter activity is none
-PERSON_SPEED, PALM_SPEED = 0.05, 0.05  # m/s, from which a hand counts as active
+GAP = 0.15  # s; a shorter pause does not interrupt an activity
+BLIP = 0.10  # s; a shorter activity does not count
+PERSON_SPEED = 0.05  # m/s, from which the person's hand counts as active
+PALM_SPEED = 0.05  # m/s, from which the robot's palm counts as active
 TOUCH = 0.05  # N, from which the person counts as touching the object
 FINGER_SPEED = 20.0  # counts of 254 per s, from which the robot's fingers count as active
 

@@ -29,7 +29,10 @@ RATE = 12.0  # frames per second of virtual time
 COLOURS = 96  # in the palette; fewer colours give a smaller file
 LARGEST = 3e6  # bytes, limit of the file
 
-LOOK_AT, DISTANCE, AZIMUTH, ELEVATION = [0.74, 0.0, 0.39], 1.5, -84.0, -12.0  # m, degrees
+LOOK_AT = [0.74, 0.0, 0.39]  # m, world: point in the centre of the picture
+DISTANCE = 1.5  # m from the camera to LOOK_AT
+AZIMUTH = -84.0  # degrees around z: direction in which the camera looks
+ELEVATION = -12.0  # degrees; negative: the camera looks down
 
 ORANGE, GREY, DARK = (0.93, 0.45, 0.10), (0.42, 0.44, 0.47), (0.15, 0.16, 0.18)
 SKIN, SLEEVE, RED = (0.89, 0.69, 0.56), (0.45, 0.55, 0.66), (0.85, 0.12, 0.12)

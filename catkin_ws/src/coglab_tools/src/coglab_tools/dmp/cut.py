@@ -21,11 +21,13 @@ NOTED_GAP = 0.05  # s without a sample, mentioned in a note
 LONGEST_GAP = 0.2  # s without a sample within a reach
 FASTEST = 5.0  # m/s between two samples; above it the tracker confused the hand with something else
 LARGEST_STEP = 0.5  # share of a reach between two samples without a gap; above it the tracker lost the hand
-LOW, LOW_SHARE = 0.02, 0.05  # m/s, and share of the peak speed: below the larger one the hand rests
+LOW = 0.02  # m/s; a slower hand rests
+LOW_SHARE = 0.05  # share of the peak speed of a motion; a slower hand rests too
 HIGH_SHARE = 0.25  # share of the largest speed that a motion must reach
 PAUSE_SHARE = 0.35  # slowest point between two motions, share of the smaller of their peaks
 MOVING_SHARE = 0.5  # of the mean speed: a reach that is faster at its first or last sample is incomplete
-BACK, BACK_SHARE = -0.5, 1.2  # cosine to the last reach, and share of its way: a motion below both is a way back
+BACK = -0.5  # largest cosine between a way back and the reach before it
+BACK_SHARE = 1.2  # longest way back, share of the length of the reach before it
 
 
 def smooth(raw: Demonstration) -> Demonstration:

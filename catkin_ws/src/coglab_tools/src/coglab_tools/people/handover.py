@@ -19,7 +19,8 @@ from coglab_tools.files import write_whole
 
 REST = 0.5  # s, rest before the reach in a recording
 MEETING = np.array([0.86, 0.03, 0.44])  # m, base frame: palm of the (simulated) person at a handover
-BEFORE, AFTER = 0.6, 0.6  # s around the touch in which a reach may end
+BEFORE = 0.6  # s; a reach may end this long before the touch
+AFTER = 0.6  # s; a reach may end this long after the touch
 
 
 @dataclass(frozen=True, eq=False)

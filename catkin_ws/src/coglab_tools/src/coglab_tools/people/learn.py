@@ -30,11 +30,15 @@ PLACES = {
 }
 """m, base frame: end of a person's reach for each pattern"""
 REST = np.array([1.30, 0.20, 0.15])  # m, its start
-REST_SCATTER, PLACE_SCATTER = 0.02, np.array([0.03, 0.035, 0.03])  # m, standard deviation per axis
+REST_SCATTER = 0.02  # m, standard deviation of REST on each axis
+PLACE_SCATTER = np.array([0.03, 0.035, 0.03])  # m, standard deviation of an end in PLACES on each axis
 TIME_SCATTER = 0.15  # standard deviation of the logarithm of the duration
-RATE, NOISE = 30.0, 0.004  # Hz, m: of a tracker
-HOLD, BEFORE = 0.4, 0.6  # s at rest after and before a reach
-PER_PATTERN, SEED = 40, 2026
+RATE = 30.0  # Hz, of the tracker
+NOISE = 0.004  # m, standard deviation of the tracker on each axis
+HOLD = 0.4  # s at rest after a reach
+BEFORE = 0.6  # s at rest before a reach
+PER_PATTERN = 40  # reaches drawn for each pattern
+SEED = 2026  # of the random numbers
 
 PRIMITIVES = {
     "reach_human": ("taker", "similarity", False, "Reach to a person's hand, to take an object"),
