@@ -20,10 +20,13 @@ from common import Row, helper, main, median, minimum_jerk
 from movement_primitives.dmp import DMP
 
 PEER = "movement_primitives"
-BASIS, CYCLE, DURATION = 20, 0.005, 1.0
+BASIS = 20  # basis functions for each axis
+CYCLE = 0.005  # s, period of the control cycle
+DURATION = 1.0  # s, of the demonstration
 KINDS = ("straight", "curved", "looped", "moving_start", "handwriting")
 CURVE = np.linspace(0.0, 1.0, 501)
-GOAL, VELOCITY = np.array([0.51, 0.0, 0.0]), np.array([0.0, 0.1, 0.0])
+GOAL = np.array([0.51, 0.0, 0.0])  # m from the start
+VELOCITY = np.array([0.0, 0.1, 0.0])  # m/s, of a goal that moves
 UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])
 TIMES = np.linspace(0.0, DURATION, 1001)
 DEMONSTRATION = np.outer(minimum_jerk(TIMES / DURATION), GOAL)

@@ -6,7 +6,8 @@ import numpy as np
 from example import PRIMITIVES, new_figure, parser, save
 
 options = parser(__doc__).parse_args()
-CYCLE, GOAL = 0.005, np.array([0.4, 0.0, -0.2])
+CYCLE = 0.005  # s
+GOAL = np.array([0.4, 0.0, -0.2])  # m
 library = cc.Library()
 library.load(str(PRIMITIVES))
 

@@ -6,7 +6,8 @@ import numpy as np
 from example import LIMITS, new_figure, parser, save
 
 options = parser(__doc__).parse_args()
-CYCLE, KP = 0.005, 10.0
+CYCLE = 0.005  # s
+KP = 10.0  # 1/s, gain of the position error
 limits = cc.load_joint_limits(str(LIMITS))
 start = np.array([0.0, 0.5, 0.0, -1.2, 0.0, 0.8, 0.0])
 velocity = np.array([0.5, -0.2, 0.0, 0.3, 0.0, 0.0, -0.6])

@@ -36,7 +36,8 @@ OBJECTS = ("mug", "bottle", "ball", "screwdriver", "tea_box")
 FRAME = "object_mug"
 GRASP = Pose(np.array([0.0, -0.065, 0.07]), np.array([0.5, 0.5, 0.5, 0.5]))
 """pose of the palm in the goal frame: the mug's grasp, moved back by its approach distance"""
-NEWTON, RISE = 3.0, 0.06
+NEWTON = 3.0  # N, force of a push
+RISE = 0.06  # s in which the force of a push rises
 FOLLOWED = 0.40
 """s, recorded after the start of a push"""
 AFTERWARDS = 0.3

@@ -18,7 +18,8 @@ from plants import WheeledBase
 
 LIST = Path(__file__).with_suffix(".yaml")
 DT = 0.005  # s
-SPEED, TURN = 0.5, 0.3  # m/s, rad/s, of the reference
+SPEED = 0.5  # m/s, of the reference
+TURN = 0.3  # rad/s, of the reference
 SLIP = (0.0, 0.1)  # share of its speed that the right wheel loses
 
 

@@ -25,7 +25,8 @@ from coglab_tools.command import CheckFailed, NotThere
 from coglab_tools.dmp.demonstration import Array, Demonstration
 from coglab_tools.people.handover import Handover
 
-RATE, CACHE_RATE = 30.0, 1000.0  # Hz
+RATE = 30.0  # Hz, of the raw recordings
+CACHE_RATE = 1000.0  # Hz, of the recordings in the cache
 KEEP = 10  # of the cache every tenth frame is kept: 100 Hz
 WRIST = {"right": np.array([0.0957, 0.0064, 0.0062]), "left": np.array([-0.0957, 0.0064, 0.0062])}
 """m, wrist beside the translation in MANO's mean shape"""

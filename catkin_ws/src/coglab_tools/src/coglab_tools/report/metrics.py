@@ -22,7 +22,8 @@ from coglab.fluency import (
 
 from coglab_tools.trial.read import Measured
 
-CUT, SHARE = 10.0, 0.05  # Hz and share of the largest amplitude: limits of the spectrum of SPARC
+CUT = 10.0  # Hz, highest frequency in the spectrum of SPARC
+SHARE = 0.05  # of the largest amplitude; the spectrum of SPARC ends at the last amplitude above it
 FIRST_TOUCH = 0.3  # N, true force from which the robot's hand is touched
 
 

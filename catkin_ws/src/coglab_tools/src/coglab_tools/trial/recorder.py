@@ -27,7 +27,8 @@ from coglab_smach.context.requests import HUBS
 from coglab_tools.command import CommandError
 from coglab_tools.trial.record import BAG, Outcome, TrialRecord
 
-PRE_ROLL, POST_ROLL = 5.0, 1.0  # s before the action and after its result
+PRE_ROLL = 5.0  # s recorded before the action
+POST_ROLL = 1.0  # s recorded after its result
 NO_RESULT = 3.0  # s, longest wait for the result after the end of the action
 LONGEST = 1800.0  # s, a longer action is cut off
 MOST_WAITING = 100_000  # messages that wait for the disk; older ones are lost, with a note in trial.yaml
