@@ -10,7 +10,7 @@ import os
 import sys
 from pathlib import Path
 
-from coglab_py.alone import living, refuse
+from coglab_py.node_start import living, refuse
 
 NODES = ("robot", "lwr", "controller_manager", "coglab")  # every system has at least one of them
 LOOKS_ONLY = {"--dump-params", "--nodes", "--files", "--args", "--find-node", "--ros-args"}  # roslaunch starts nothing

@@ -13,7 +13,7 @@ import sys
 from types import FrameType
 
 from coglab_bringup.launch_files import check
-from coglab_py.alone import refuse
+from coglab_py.node_start import refuse
 
 LIMIT = 60  # s. It imports modules of the user; one that waits for ever would block the launch.
 

@@ -20,7 +20,7 @@ from coglab_bringup import scene
 from coglab_msgs.msg import DmpFeedback, MasterState
 from coglab_perception.tf_listener import TfListener
 from coglab_py import parameters, steady
-from coglab_py.alone import init_node
+from coglab_py.node_start import init_node
 from visualization_msgs.msg import MarkerArray
 
 PERIOD = 0.2  # s

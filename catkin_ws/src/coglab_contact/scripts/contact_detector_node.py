@@ -36,7 +36,7 @@ from coglab_msgs.srv import ArmContact, ArmContactResponse, Learn, LearnMotion, 
 from coglab_perception.frames import FrameNames, FramesError
 from coglab_perception.tf_listener import TfListener
 from coglab_py import parameters, steady
-from coglab_py.alone import init_node
+from coglab_py.node_start import init_node
 from coglab_py.pace import Pace
 from coglab_py.packages import package_path
 from coglab_py.pose import Pose

@@ -12,7 +12,7 @@ from coglab_msgs.msg import ReasonCode
 from coglab_msgs.srv import GetObject, GetObjectResponse, ListObjects, ListObjectsResponse, Reload, ReloadResponse
 from coglab_objects.database import ObjectDatabase, ObjectError
 from coglab_py import parameters, steady
-from coglab_py.alone import init_node
+from coglab_py.node_start import init_node
 
 MIRROR = "~objects"
 

@@ -25,7 +25,7 @@ from coglab_perception.frames import AHEAD, FrameNames
 from coglab_perception.recogniser import Recogniser, load_patterns
 from coglab_perception.tf_listener import TfListener
 from coglab_py import parameters, steady
-from coglab_py.alone import init_node
+from coglab_py.node_start import init_node
 from coglab_py.pace import Pace
 from geometry_msgs.msg import Point, TransformStamped, Vector3
 

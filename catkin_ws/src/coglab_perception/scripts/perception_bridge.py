@@ -26,8 +26,8 @@ from coglab_perception.sights import Board, Sight, Sights
 from coglab_perception.tf_listener import TfListener
 from coglab_perception.tracker_mapping import Source, TrackerMapping, usable
 from coglab_py import parameters, steady
-from coglab_py.alone import init_node
 from coglab_py.messages import pose_of
+from coglab_py.node_start import init_node
 from coglab_py.pose import Pose
 from geometry_msgs.msg import PoseStamped
 from visualization_msgs.msg import Marker, MarkerArray

@@ -16,7 +16,7 @@ import tf2_ros
 from coglab_perception.frames import FrameNames
 from coglab_perception.tf_listener import TfListener
 from coglab_py import parameters, steady
-from coglab_py.alone import init_node
+from coglab_py.node_start import init_node
 from geometry_msgs.msg import Point, PoseStamped
 
 NAME = re.compile("[A-Za-z][A-Za-z0-9_]*")  # frames whose name can be part of a topic's name

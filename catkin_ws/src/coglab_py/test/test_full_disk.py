@@ -9,8 +9,8 @@ NODE = """
 import logging, sys
 import rosgraph.roslogging
 rosgraph.roslogging.configure_logging("full_disk")
-from coglab_py import alone
-getattr(alone, "log_without_raising", lambda: None)()
+from coglab_py import node_start
+getattr(node_start, "log_without_raising", lambda: None)()
 for _ in range(2000):
     logging.getLogger("rosout").info("a line of some length that soon fills the buffer of the stream")
 sys.stderr.write("went on\\n")

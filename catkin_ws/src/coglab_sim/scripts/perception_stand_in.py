@@ -24,8 +24,8 @@ from coglab_perception.frames import FrameNames
 from coglab_perception.ros_services import PerceptionServices
 from coglab_perception.sights import Board, Sight, slots_of
 from coglab_py import parameters, steady
-from coglab_py.alone import init_node
 from coglab_py.messages import pose_of
+from coglab_py.node_start import init_node
 from coglab_py.pose import Pose, about_z
 from coglab_sim.person.recorded_motion import Playback, PlaybackSettings
 from coglab_sim.plausible import IMPLAUSIBLE, plausible

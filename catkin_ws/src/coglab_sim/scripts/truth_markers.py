@@ -16,8 +16,8 @@ import rospy
 from coglab_msgs.msg import CellTruth
 from coglab_objects.database import ObjectError, cell_parameters, objects_folder, read_object
 from coglab_py import parameters
-from coglab_py.alone import init_node
 from coglab_py.messages import pose_message, pose_of
+from coglab_py.node_start import init_node
 from coglab_py.pose import Pose as Frame
 from coglab_sim.person.body import arm_of
 from coglab_sim.plausible import IMPLAUSIBLE, plausible

@@ -23,8 +23,8 @@ from coglab_msgs.msg import CellTruth, HumanHand, Say
 from coglab_msgs.srv import PlaceObject, PlaceObjectRequest
 from coglab_objects.database import ObjectError, objects_folder, read_object
 from coglab_py import parameters
-from coglab_py.alone import init_node
 from coglab_py.messages import pose_message, pose_of
+from coglab_py.node_start import init_node
 from coglab_py.pace import Pace
 from coglab_py.pose import Pose
 from coglab_py.steady import call_service

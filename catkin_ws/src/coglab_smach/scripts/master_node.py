@@ -27,7 +27,7 @@ from coglab_msgs.msg import MasterState as MasterStateMsg
 from coglab_msgs.srv import Start, StartResponse
 from coglab_py import parameters
 from coglab_py.action_server import ActionServer
-from coglab_py.alone import init_node
+from coglab_py.node_start import init_node
 from coglab_py.publish import publish
 from coglab_py.steady import ClockWatch, Stamps, exit_status, utc_of, worker
 from coglab_smach.clocks.clock import PacedClock

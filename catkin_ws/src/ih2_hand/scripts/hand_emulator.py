@@ -76,7 +76,7 @@ def main() -> int:
     arguments, announce, clock = sys.argv[1:], None, None
     if as_node:
         import rospy
-        from coglab_py.alone import init_node
+        from coglab_py.node_start import init_node
         from coglab_py.pace import Pace
         from coglab_py.steady import end_quietly
         from ih2_hand.ros.emulator_node import CellClock, EmulatorNode

@@ -4,7 +4,7 @@
 import sys
 
 import rospy
-from coglab_py.alone import init_node
+from coglab_py.node_start import init_node
 from coglab_py.steady import end_quietly
 from ih2_hand.ros.hand_node import HandNode
 

@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from coglab_py.alone import log_without_raising
+from coglab_py.node_start import log_without_raising
 
 from coglab_bringup import process_tree
 from coglab_bringup.arguments import demo_parser

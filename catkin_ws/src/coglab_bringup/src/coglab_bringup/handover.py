@@ -12,7 +12,7 @@ import rospy
 import yaml
 from coglab_msgs.msg import ReasonCode
 from coglab_msgs.srv import GetObject, Start
-from coglab_py.alone import answer
+from coglab_py.node_start import answer
 from coglab_py.pace import Pace
 from coglab_py.packages import package_path
 from coglab_py.steady import call_service, utc_of

@@ -14,9 +14,9 @@
 #include "coglab_controllers/ros/manager_ros.hpp"
 #include "coglab_controllers/ros/robot_topics.hpp"
 #include "coglab_controllers/ros/ros_parameters.hpp"
-#include "coglab_rt/ros/alone.hpp"
 #include "coglab_rt/ros/exit_limit.hpp"
 #include "coglab_rt/ros/logger_service.hpp"
+#include "coglab_rt/ros/node_start.hpp"
 #include "coglab_rt/ros/parameter.hpp"
 
 namespace {

@@ -11,8 +11,8 @@
 #include "coglab_controllers/manager/parameters.hpp"
 #include "coglab_controllers/ros/tf_listener.hpp"
 #include "coglab_msgs/DmpGoal.h"
-#include "coglab_rt/ros/alone.hpp"
 #include "coglab_rt/ros/logger_service.hpp"
+#include "coglab_rt/ros/node_start.hpp"
 #include "coglab_rt/ros/parameter_tree.hpp"
 
 namespace coglab_controllers {

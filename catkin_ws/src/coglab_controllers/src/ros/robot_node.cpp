@@ -18,9 +18,9 @@
 #include "coglab_controllers/ros/manager_ros.hpp"
 #include "coglab_rt/arm_library.hpp"
 #include "coglab_rt/arm_port.hpp"
-#include "coglab_rt/ros/alone.hpp"
 #include "coglab_rt/ros/exit_limit.hpp"
 #include "coglab_rt/ros/logger_service.hpp"
+#include "coglab_rt/ros/node_start.hpp"
 #include "coglab_rt/ros/parameter.hpp"
 #include "lwr_fri_bridge/ros/bridge_ros.hpp"
 

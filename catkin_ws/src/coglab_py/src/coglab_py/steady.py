@@ -18,7 +18,7 @@ from typing import Any
 import rosgraph
 import rospy
 
-from coglab_py.alone import answer
+from coglab_py.node_start import answer
 
 FAILING = 10.0  # s in which all calls of a timer's function may fail before the node ends
 SILENCE = 1.0  # s without a message on /clock that count as a fault

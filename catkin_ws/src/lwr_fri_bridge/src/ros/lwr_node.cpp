@@ -9,9 +9,9 @@
 
 #include <ros/ros.h>
 
-#include "coglab_rt/ros/alone.hpp"
 #include "coglab_rt/ros/exit_limit.hpp"
 #include "coglab_rt/ros/logger_service.hpp"
+#include "coglab_rt/ros/node_start.hpp"
 #include "coglab_rt/ros/parameter.hpp"
 #include "lwr_fri_bridge/ros/bridge_ros.hpp"
 

@@ -7,7 +7,7 @@ from typing import Any
 import rosgraph
 import rospy
 from coglab_msgs.srv import FeedbackSelect, LoadController, StartMotion, SwitchController
-from coglab_py.alone import answer
+from coglab_py.node_start import answer
 from coglab_py.steady import call_service
 
 from coglab.control.slot import SlotError

@@ -21,7 +21,7 @@ from xmlrpc.client import Error
 
 import rosgraph
 import rospkg
-from coglab_py.alone import answer
+from coglab_py.node_start import answer
 
 PLACE = "/coglab_console_place"
 PATIENCE = 2.0  # s to wait for another console to end, for example while it is respawned

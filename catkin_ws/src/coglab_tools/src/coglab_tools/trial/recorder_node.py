@@ -9,7 +9,7 @@ from typing import Any
 
 import rosgraph
 import rospy
-from coglab_py.alone import answer, init_node
+from coglab_py.node_start import answer, init_node
 from coglab_py.steady import ending, spin, worker
 
 from coglab_tools.trial.record import trials_folder

@@ -10,7 +10,7 @@ import pytest
 import rosgraph
 from coglab_console.ros import startup
 from coglab_console.ros.startup import PLACE, StartError, announce, look_for_another
-from coglab_py import alone
+from coglab_py import node_start
 
 
 @contextlib.contextmanager
@@ -54,7 +54,7 @@ def node(pid):
 @pytest.fixture(autouse=True)
 def quickly(monkeypatch):
     monkeypatch.setattr(startup, "PATIENCE", 0.3)
-    monkeypatch.setattr(alone, "ANSWER_LIMIT", 0.3)
+    monkeypatch.setattr(node_start, "ANSWER_LIMIT", 0.3)
 
 
 def test_the_first_console_begins_and_the_second_is_told_where_the_first_is(master):
@@ -89,7 +89,7 @@ def test_a_node_of_a_computer_that_is_off_is_named_with_the_way_out():
         off.listen()
         uri = f"http://127.0.0.1:{off.getsockname()[1]}/"
         with serving({"lookupNode": lambda _caller, _name: [1, "", uri]}) as master:
-            assert "rosnode cleanup" in alone.living(master, "/robot")
+            assert "rosnode cleanup" in node_start.living(master, "/robot")
 
 
 def test_start_waits_for_a_console_that_is_ending(master, monkeypatch):

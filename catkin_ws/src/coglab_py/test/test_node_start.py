@@ -12,7 +12,7 @@ import pytest
 
 BUSY_NODE = """
 import rospy
-from coglab_py.alone import init_node
+from coglab_py.node_start import init_node
 init_node("busy")
 print("runs", flush=True)
 while not rospy.is_shutdown():
@@ -20,7 +20,7 @@ while not rospy.is_shutdown():
 """
 
 STARTS = """
-from coglab_py.alone import init_node
+from coglab_py.node_start import init_node
 print("starts", flush=True)
 init_node("starts")
 """
