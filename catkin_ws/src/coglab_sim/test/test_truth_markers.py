@@ -5,7 +5,7 @@ import pytest
 from coglab_msgs.msg import CellTruth
 from coglab_sim.person.scene import shipped
 from geometry_msgs.msg import Point, Pose, Quaternion
-from node_alone import Alone, script
+from ros_double import RosDouble, script
 from scipy.spatial.transform import Rotation
 from visualization_msgs.msg import Marker
 
@@ -26,7 +26,7 @@ class Shown:
     """The node, whose clock the test sets."""
 
     def __init__(self, monkeypatch, **parameters):
-        self.ros = Alone(monkeypatch, **parameters)
+        self.ros = RosDouble(monkeypatch, **parameters)
         self.module = script("truth_markers")
         self.clock = 100.0
         monkeypatch.setattr(self.module.time, "monotonic", lambda: self.clock)

@@ -6,7 +6,7 @@ import rospy
 from coglab_msgs.msg import CellTruth, Say
 from geometry_msgs.msg import Point, Quaternion
 from geometry_msgs.msg import Pose as PoseMessage
-from node_alone import Alone, script
+from ros_double import RosDouble, script
 from std_msgs.msg import String, UInt8
 
 FRAMES = {"world": "world", "human_hand": "human_hand", "board": "board", "object": "object_{id}"}
@@ -31,7 +31,7 @@ class Perception:
 
     def __init__(self, monkeypatch, **parameters):
         given = {"~frames": FRAMES, "~board": BOARD, "~perfect": True} | parameters
-        self.ros = Alone(monkeypatch)
+        self.ros = RosDouble(monkeypatch)
         self.ros.parameters = {name: value for name, value in given.items() if value is not None}
         self.module = script("perception_stand_in")
         self.node = self.module.PerceptionNode()
@@ -105,7 +105,7 @@ def test_tf_that_is_closed_at_the_end_is_no_error(monkeypatch):
 
 class Person:
     def __init__(self, monkeypatch, **parameters):
-        self.ros = Alone(monkeypatch)
+        self.ros = RosDouble(monkeypatch)
         self.ros.parameters = parameters
         self.module = script("virtual_human")
         self.node = self.module.VirtualHumanNode()

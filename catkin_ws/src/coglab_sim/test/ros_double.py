@@ -13,13 +13,13 @@ SCRIPTS = Path(__file__).resolve().parents[1] / "scripts"
 
 def script(name):
     """The module of a script."""
-    spec = importlib.util.spec_from_file_location(f"{name}_alone", SCRIPTS / f"{name}.py")
+    spec = importlib.util.spec_from_file_location(f"{name}_script", SCRIPTS / f"{name}.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
 
 
-class Alone:
+class RosDouble:
     """Replaces ROS for a node. ``parameters``: values by the requested name."""
 
     def __init__(self, monkeypatch, **parameters):
