@@ -12,9 +12,9 @@ from pathlib import Path
 
 import aiohttp
 from aiohttp import web
+from coglab_console.desk.control_conditions import Standing
 from coglab_console.desk.desk import Answer, Desk
 from coglab_console.desk.events import EventLog
-from coglab_console.desk.gates import Standing
 from coglab_console.web.access import CSRF_HEADER, Access, allowed_hosts
 from coglab_console.web.fan_out import Documents
 from coglab_console.web.page_files import load_all

@@ -8,7 +8,7 @@ from unittest import mock
 from coglab_console.desk import desk as module
 from coglab_console.desk.desk import Desk
 from coglab_console.desk.events import EventLog
-from coglab_console.desk.gates import HeldButton
+from coglab_console.desk.motion_guard import HeldButton
 from coglab_console.web.fan_out import Documents
 from console_double import RobotDouble
 

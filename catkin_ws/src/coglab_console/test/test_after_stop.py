@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 from coglab_console.desk.desk import Answer
-from coglab_console.desk.gates import HOLD_TIME, HeldButton, MotionGuard, Standstills
+from coglab_console.desk.motion_guard import HOLD_TIME, HeldButton, MotionGuard, Standstills
 from desk_double import RECEIVE, Clock, ask, buttons_follow, hold_for, newest, shown
 
 

@@ -16,7 +16,7 @@ RECEIVE = {"action": "exchange_human_to_robot"}
 @pytest.fixture(autouse=True)
 def patient(monkeypatch):
     """A crowded computer makes gaps between the messages of a held button; gaps have tests of their own."""
-    monkeypatch.setattr("coglab_console.desk.gates.LONGEST_GAP", 5.0)
+    monkeypatch.setattr("coglab_console.desk.motion_guard.LONGEST_GAP", 5.0)
 
 
 class SlowRobot(RobotDouble):
@@ -90,7 +90,8 @@ async def test_a_stop_during_a_request_still_asks_for_both_acts(console):
 
 @served()
 async def test_a_browser_that_dies_with_a_button_held_is_told_to_the_others(console, client, monkeypatch):
-    monkeypatch.setattr("coglab_console.desk.gates.HOLD_TIME", 3600.0)  # it dies before, however slow this computer is
+    # it dies before, however slow this computer is
+    monkeypatch.setattr("coglab_console.desk.motion_guard.HOLD_TIME", 3600.0)
     ws = await console.socket_of(client)
     await ws.send_str("{}")
     console.desk.guard.stop("a test")
@@ -108,7 +109,7 @@ async def test_a_browser_that_dies_with_a_button_held_is_told_to_the_others(cons
 @served()
 async def test_only_a_held_button_is_reported_when_the_browser_leaves(console, client, monkeypatch):
     for release in (True, False):
-        monkeypatch.setattr("coglab_console.desk.gates.HOLD_TIME", 3600.0 if release else 0.8)
+        monkeypatch.setattr("coglab_console.desk.motion_guard.HOLD_TIME", 3600.0 if release else 0.8)
         ws = await console.socket_of(client)
         await ws.send_str("{}")
         console.desk.guard.stop("a test")

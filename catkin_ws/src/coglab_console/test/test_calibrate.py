@@ -6,7 +6,8 @@ import time
 from dataclasses import replace
 
 import pytest
-from coglab_console.desk.gates import MotionGuard, Standing, reasons
+from coglab_console.desk.control_conditions import Standing, reasons
+from coglab_console.desk.motion_guard import MotionGuard
 from coglab_console.ros import commands
 from coglab_msgs.msg import HandStatus, ReasonCode
 from console_double import READY

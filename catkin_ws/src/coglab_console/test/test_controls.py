@@ -49,7 +49,7 @@ OPERATORS = {
 @pytest.fixture(autouse=True)
 def patient(monkeypatch):
     """A crowded computer makes gaps between the messages of a held button; gaps have tests of their own."""
-    monkeypatch.setattr("coglab_console.desk.gates.LONGEST_GAP", 5.0)
+    monkeypatch.setattr("coglab_console.desk.motion_guard.LONGEST_GAP", 5.0)
 
 
 @pytest.fixture(scope="module")

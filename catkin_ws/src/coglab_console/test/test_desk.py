@@ -5,9 +5,10 @@ from dataclasses import replace
 
 import pytest
 from coglab_console.desk.commands import COMMANDS, BadCommand, judge
+from coglab_console.desk.control_conditions import Standing, reasons
 from coglab_console.desk.desk import ABSENCE, NOTICE, Roles
 from coglab_console.desk.experiment import Experiment, ExperimentError
-from coglab_console.desk.gates import MotionGuard, Standing, reasons
+from coglab_console.desk.motion_guard import MotionGuard
 from coglab_py.orders import latin_row, order_of
 from console_double import READY
 from desk_double import Clock, ask, hold_for, shown

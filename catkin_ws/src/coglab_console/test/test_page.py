@@ -3,7 +3,7 @@
 import time
 
 import pytest
-from coglab_console.desk.gates import Standing
+from coglab_console.desk.control_conditions import Standing
 from coglab_console.scene.graph_layout import Container, Layout
 from console_double import PAGE_DOCUMENTS, READY
 from page_browser import PageBrowser
@@ -81,7 +81,7 @@ def test_a_click_on_a_disabled_button_says_why(live):
 
 def test_a_button_is_held_by_touch(live, monkeypatch):
     """As on a tablet: a long touch starts the command; one that ends early, or that slides off, does not."""
-    monkeypatch.setattr("coglab_console.desk.gates.LONGEST_GAP", 5.0)  # s, for a busy computer
+    monkeypatch.setattr("coglab_console.desk.motion_guard.LONGEST_GAP", 5.0)  # s, for a busy computer
     page = live.browser
     live.loop.call_soon_threadsafe(live.console.desk.guard.stop, "a test")
     live.loop.call_soon_threadsafe(lambda: live.console.desk.guard.acknowledge(live.console.desk.guard.stops))
@@ -96,7 +96,8 @@ def test_a_button_is_held_by_touch(live, monkeypatch):
 
     held = f"{button}.classList.contains('holding')"
     with monkeypatch.context() as patience:
-        patience.setattr("coglab_console.desk.gates.HOLD_TIME", 3600.0)  # however slow this browser is, it ends early
+        # however slow this browser is, it ends early
+        patience.setattr("coglab_console.desk.motion_guard.HOLD_TIME", 3600.0)
         for end in (("touchEnd",), ("touchMove", [box[0], box[1] - 200])):
             touch("touchStart", box)
             page.until(f"return {held}", 60.0)

@@ -13,9 +13,10 @@ from typing import Any, Protocol
 
 from ..web.fan_out import Documents
 from .commands import STARTS, BadCommand, judge
+from .control_conditions import Standing, control, reasons
 from .events import EventLog
 from .experiment import GIVES, TAKES, Experiment, ExperimentError
-from .gates import HeldButton, MotionGuard, Standing, control, reasons
+from .motion_guard import HeldButton, MotionGuard
 from .words import command as words_of
 from .words import plain
 

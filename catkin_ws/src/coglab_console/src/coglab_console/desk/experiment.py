@@ -16,7 +16,7 @@ from pathlib import Path
 from coglab_py.orders import order_of
 
 from ..web.fan_out import to_json
-from .gates import Standing
+from .control_conditions import Standing
 from .words import button, outcome
 
 FILE = "session.json"

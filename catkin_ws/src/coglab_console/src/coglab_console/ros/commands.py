@@ -30,8 +30,8 @@ from rospy.core import parse_rosrpc_uri
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from ..desk.control_conditions import Standing
 from ..desk.desk import Answer
-from ..desk.gates import Standing
 from ..desk.words import plain
 from .knowledge import lookup
 from .view import RosView

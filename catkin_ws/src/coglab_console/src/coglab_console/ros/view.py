@@ -26,7 +26,8 @@ from coglab_msgs.msg import (
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, String
 
-from ..desk.gates import STANDSTILL, Standing, Standstills
+from ..desk.control_conditions import Standing
+from ..desk.motion_guard import STANDSTILL, Standstills
 from ..desk.words import outcome, phase, plain, supervisor, transition
 from ..scene import path_ahead
 from ..scene.urdf_model import RobotModel
