@@ -21,12 +21,12 @@ import rostest
 import tf2_ros
 from coglab_console.browser import fresh_link
 from coglab_msgs.msg import LwrState, MasterState
+from other_machine import OtherMachine, show_machine
 from page_browser import PageBrowser, acknowledge, press_and_hold
 from page_check import PAGES, look
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
-from somebody import Somebody, show_machine
 from std_msgs.msg import String
 
 LIMIT = 60.0  # s, limit of every wait; the computer may be busy
@@ -271,14 +271,14 @@ class Console(unittest.TestCase):
         return ServerProxy(uri).getPid("/console_test")[2]
 
     def test_08_state_machine_of_another_node_is_shown(self):
-        with Somebody() as somebody:
-            picture = self.browser.until("return coglab.docs()['graph:/somebody']", LIMIT)
+        with OtherMachine() as other_machine:
+            picture = self.browser.until("return coglab.docs()['graph:/other_machine']", LIMIT)
             self.assertEqual({node["label"] for node in picture["nodes"]}, {"ALPHA", "BETA"})
             self.assertEqual([edge["outcomes"] for edge in picture["edges"]], ["on"])
             self.browser.tab("Machine")
-            show_machine(self.browser, "somebody")
+            show_machine(self.browser, "other_machine")
             self.browser.until("return document.querySelectorAll('#graph .node').length === 2", LIMIT)
-            somebody.begin()
+            other_machine.begin()
             self.browser.until("return document.querySelectorAll('#graph .edge.last').length === 1", LIMIT)
             texts = "return [...document.querySelectorAll('#graph rect.active.node + text')].map((t) => t.textContent)"
             self.assertEqual(self.browser.js(texts), ["BETA"])

@@ -8,8 +8,8 @@ import smach_ros
 from selenium.webdriver.common.by import By
 
 
-class Somebody:
-    """Publishes itself as `/somebody` while the context lasts; `begin` runs it."""
+class OtherMachine:
+    """Publishes itself as `/other_machine` while the context lasts; `begin` runs it."""
 
     def __init__(self):
         self._over = threading.Event()
@@ -17,7 +17,7 @@ class Somebody:
         with self._machine:
             smach.StateMachine.add("ALPHA", smach.CBState(lambda _: "on", outcomes=["on"]), {"on": "BETA"})
             smach.StateMachine.add("BETA", smach.CBState(self._beta, outcomes=["done"]))
-        self._server = smach_ros.IntrospectionServer("somebody", self._machine, "/SOMEBODY")
+        self._server = smach_ros.IntrospectionServer("other_machine", self._machine, "/OTHER_MACHINE")
         self._runner = threading.Thread(target=self._machine.execute, daemon=True)
 
     def _beta(self, _data):
