@@ -288,7 +288,7 @@ void Bridge::follow(const fri::Reception& reception, fri::CommandDatagram& answe
     target /= excess;  // scales the whole vector to keep the direction of the motion
 
   const bool stopping = supervisor_.state() == SupervisorState::Stopping;
-  if (wanted.isZero() && givesWay(active_mode_) && !stopping) {
+  if (wanted.isZero() && isHandGuiding(active_mode_) && !stopping) {
     leash_.reset();
     target = velocityToArm(interpolator_, sample_.position, config_.limits);
   } else {

@@ -10,7 +10,7 @@ constexpr double kDelay = 0.03;  // s, time constant of the end of the way to th
 
 }  // namespace
 
-bool givesWay(const ControlMode& mode) {
+bool isHandGuiding(const ControlMode& mode) {
   return mode.strategy == fri::ControlStrategy::JointImpedance &&
          mode.joint_stiffness.maxCoeff() <= kGuidingStiffness;
 }

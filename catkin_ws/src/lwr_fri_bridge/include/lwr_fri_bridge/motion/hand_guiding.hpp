@@ -14,7 +14,7 @@ constexpr double kGuidingStiffness = 0.1;
 
 /// True if a person can guide the arm in this mode: joint impedance, no joint stiffer than
 /// kGuidingStiffness. Real-time safe.
-bool givesWay(const ControlMode& mode);
+bool isHandGuiding(const ControlMode& mode);
 
 /// Velocities (rad/s) that bring the set-point to the measured joints (rad), within the limits, so
 /// that it can brake there. Real-time safe.
