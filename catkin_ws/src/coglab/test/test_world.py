@@ -14,7 +14,7 @@ import coglab
 import numpy as np
 import pytest
 from coglab_msgs.msg import ReasonCode
-from coglab_smach.context.requests import Answer, ask_for
+from coglab_smach.context.requests import TriggerReply, ask_for
 from coglab_smach.machines import build_master
 
 _shared: list[coglab.World] = []
@@ -140,7 +140,7 @@ def test_reset_asks_again_if_the_brain_has_gone_on_meanwhile(world, monkeypatch)
 
     def gone_on(context, action, object_id):
         asked.append(action)
-        late = Answer(False, "fault takes initialise", ReasonCode.WRONG_STATE)
+        late = TriggerReply(False, "fault takes initialise", ReasonCode.WRONG_STATE)
         return late if len(asked) == 1 else ask_for(context, action, object_id)
 
     monkeypatch.setattr("coglab.world.ask_for", gone_on)

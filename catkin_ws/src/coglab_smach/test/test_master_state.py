@@ -8,7 +8,7 @@ import pytest
 from coglab_msgs.msg import ReasonCode
 from coglab_smach.context.journal import Journal, Wait
 from coglab_smach.context.master_state import StateWatch
-from coglab_smach.context.requests import Answer, ask_for
+from coglab_smach.context.requests import TriggerReply, ask_for
 from coglab_smach.ports.pending import PortError
 from conftest import Trial
 
@@ -185,7 +185,7 @@ def held_by_the_hub(t):
     assert t.ask("put", "mug").ok
     t.clock.sleep(1.0)
     refused = [r for r in t.ctx.journal.transitions if r.outcome == "refused"][-1]
-    return Answer(False, refused.reason, refused.code)
+    return TriggerReply(False, refused.reason, refused.code)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from typing import Protocol
 
 from coglab_py.pose import Pose
 from coglab_smach.context.master_state import MasterState
-from coglab_smach.context.requests import Answer
+from coglab_smach.context.requests import TriggerReply
 from coglab_smach.ports.interfaces import ArmPort, HandPort
 
 from coglab.results import Event, Exchange
@@ -42,7 +42,7 @@ class BackEnd(Protocol):
     def state(self) -> MasterState:
         """Returns the state of the brain; an empty one without a brain."""
 
-    def submit(self, action: str, object_id: str) -> Answer:
+    def submit(self, action: str, object_id: str) -> TriggerReply:
         """Send a trigger to the brain."""
 
     def result(self, action: str) -> Exchange | None:

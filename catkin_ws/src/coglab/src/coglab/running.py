@@ -28,7 +28,7 @@ from coglab_msgs.srv import LwrCommand, Start
 from coglab_perception.tf_listener import TfListener
 from coglab_py.pose import Pose
 from coglab_smach.context.master_state import MasterState
-from coglab_smach.context.requests import Answer
+from coglab_smach.context.requests import TriggerReply
 from coglab_smach.kinematics.reachability import default_arm
 from coglab_smach.ports.pending import PortError
 from coglab_smach.ros.arm import RosArm
@@ -260,25 +260,27 @@ class _RunningBackEnd:
             message.deadline.to_sec(),
         )
 
-    def submit(self, action: str, object_id: str) -> Answer:
+    def submit(self, action: str, object_id: str) -> TriggerReply:
         submitted = time.monotonic()
         pending = call(f"{self._prefix}coglab/start", Start, wait=ANSWER, action=action, object_id=object_id)
         end = time.monotonic() + 2 * ANSWER + 2.0
         while not pending.done():
             if time.monotonic() > end:
                 pending.cancel()
-                return Answer(False, "the brain does not answer: does it run? ./coglab status", ReasonCode.NODE_SILENT)
+                return TriggerReply(
+                    False, "the brain does not answer: does it run? ./coglab status", ReasonCode.NODE_SILENT
+                )
             time.sleep(0.005)
         try:
             answer = pending.result()
         except PortError as error:
-            return Answer(False, error.sentence.partition(" refused: ")[2] or error.sentence, error.code)
+            return TriggerReply(False, error.sentence.partition(" refused: ")[2] or error.sentence, error.code)
         self._submitted = submitted
         # The state before the request must not count as the hub after the action.
         end = time.monotonic() + 1.0
         while self.state().in_hub and action in self.state().actions and time.monotonic() < end:
             time.sleep(0.005)
-        return Answer(True, answer.message)
+        return TriggerReply(True, answer.message)
 
     def result(self, action: str) -> Exchange | None:
         with self._lock:

@@ -27,7 +27,7 @@ from coglab_smach.context.config import ConfigError
 from coglab_smach.context.context import Context
 from coglab_smach.context.journal import TransitionRecord
 from coglab_smach.context.master_state import MasterState, StateWatch
-from coglab_smach.context.requests import Answer, ask_for
+from coglab_smach.context.requests import TriggerReply, ask_for
 from coglab_smach.machines import build_master
 from coglab_smach.ports.interfaces import ArmPort, HandPort
 from coglab_trials import Conditions, TrialResult, VirtualTrial, using
@@ -551,7 +551,7 @@ class _VirtualBackEnd:
     def state(self) -> MasterState:
         return self._watch.now()
 
-    def submit(self, action: str, object_id: str) -> Answer:
+    def submit(self, action: str, object_id: str) -> TriggerReply:
         before = len(self._trial.results)
         if not object_id and action in ACTIONS.values() and not self.state().object_id:
             object_id = self._world.conditions.object_id  # the only object of this world

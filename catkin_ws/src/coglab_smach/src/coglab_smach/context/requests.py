@@ -39,8 +39,8 @@ class Request:
     delivery: str = ""
 
 
-class Answer(NamedTuple):
-    """Answer to a trigger: accepted or not, one sentence, and the ReasonCode of a refusal."""
+class TriggerReply(NamedTuple):
+    """Reply to a trigger: accepted or not, one sentence, and the ReasonCode of a refusal."""
 
     ok: bool
     message: str
@@ -79,34 +79,34 @@ class Requests:
             self._hub, self._allowed, self._request = "", (), None
         self._on_change()
 
-    def refusal(self, action: str, object_id: str = "") -> Answer | None:
+    def refusal(self, action: str, object_id: str = "") -> TriggerReply | None:
         """Returns the reason why no hub accepts this now; None if one does."""
         with self._lock:
             return self._refusal(action, object_id)
 
-    def _refusal(self, action: str, object_id: str) -> Answer | None:
+    def _refusal(self, action: str, object_id: str) -> TriggerReply | None:
         if not self._hub:
-            return Answer(
+            return TriggerReply(
                 False,
                 f"'{action}' refused: the machine is not in a hub now; to wait until it is in "
                 f"wait_without_object or wait_with_object, {command(action)}",
                 ReasonCode.WRONG_STATE,
             )
         if action not in self._allowed:
-            return Answer(
+            return TriggerReply(
                 False,
                 f"'{action}' refused: {self._hub} takes {', '.join(self._allowed)}; {command(*self._allowed)}",
                 ReasonCode.WRONG_STATE,
             )
         if self._names_object and not object_id:
-            return Answer(
+            return TriggerReply(
                 False,
                 f"'{action}' refused: the hand holds an object that is not known after a restart; "
                 f"name its object_id, {command(action)} OBJECT",
                 ReasonCode.OBJECT_UNKNOWN,
             )
         if self._request is not None:
-            return Answer(
+            return TriggerReply(
                 False,
                 f"'{action}' refused: '{self._request.action}' was requested a moment ago; "
                 f"when that is over, {command(action)}",
@@ -114,14 +114,14 @@ class Requests:
             )
         return None
 
-    def submit(self, action: str, object_id: str = "", source: str = "operator", delivery: str = "") -> Answer:
+    def submit(self, action: str, object_id: str = "", source: str = "operator", delivery: str = "") -> TriggerReply:
         """Request an action. Returns whether a hub accepts it, and one sentence."""
         with self._lock:
             refusal = self._refusal(action, object_id)
             if refusal is not None:
                 return refusal
             self._request = Request(action, object_id, source, delivery)
-            return Answer(True, f"'{action}' accepted by {self._hub}")
+            return TriggerReply(True, f"'{action}' accepted by {self._hub}")
 
     def idle(self) -> bool:
         """True if a hub waits and no trigger is on its way to it."""
@@ -145,7 +145,9 @@ class Requests:
             return self._allowed
 
 
-def ask_for(ctx: Context, action: str, object_id: str = "", source: str = "operator", delivery: str = "") -> Answer:
+def ask_for(
+    ctx: Context, action: str, object_id: str = "", source: str = "operator", delivery: str = ""
+) -> TriggerReply:
     """Process a trigger from outside. It is refused at once if no hub accepts it, or if the database has no such object
     or delivery. Waits at most 2 s for each answer of the database.
 
@@ -156,7 +158,7 @@ def ask_for(ctx: Context, action: str, object_id: str = "", source: str = "opera
     known = ctx.requests.known
     if known and action not in known:
         there = ", ".join([*SHORT_NAMES, *(each for each in known if each not in SHORT_NAMES.values())])
-        return Answer(
+        return TriggerReply(
             False, f"'{action}' refused: there is no such action; there are: {there}", ReasonCode.UNKNOWN_NAME
         )
     object_id, _, behind = object_id.partition("/")
@@ -170,7 +172,7 @@ def ask_for(ctx: Context, action: str, object_id: str = "", source: str = "opera
         if default is not None and wanted:
             objects = sorted(_answer(ctx, ctx.database.list_objects()))
             if wanted not in objects:
-                return Answer(
+                return TriggerReply(
                     False,
                     f"'{action}' refused: object '{wanted}' is not in the database; it has: "
                     f"{', '.join(objects)}; {command(action)} {objects[0] if objects else 'OBJECT'}",
@@ -179,15 +181,15 @@ def ask_for(ctx: Context, action: str, object_id: str = "", source: str = "opera
         refusal = _delivery_refusal(ctx, action, object_id, delivery) if delivery else None
     except PortError as error:
         again = f"when the database answers, {command(action)} {wanted or ''}".rstrip()
-        return Answer(False, f"'{action}' refused: {error.sentence}; {again}", error.code)
+        return TriggerReply(False, f"'{action}' refused: {error.sentence}; {again}", error.code)
     return refusal or ctx.requests.submit(action, object_id, source, delivery)
 
 
-def _delivery_refusal(ctx: Context, action: str, object_id: str, delivery: str) -> Answer | None:
+def _delivery_refusal(ctx: Context, action: str, object_id: str, delivery: str) -> TriggerReply | None:
     """Returns the reason why the object in the hand cannot be given in this way; None if it can."""
     if not ctx.holding or action == "put":
         why = "'put' puts the object on the board" if ctx.holding else "the hand is empty"
-        return Answer(
+        return TriggerReply(
             False,
             f"'{action}' refused: a delivery is how an object is given, and {why}; leave delivery '{delivery}' out",
             ReasonCode.INVALID_ARGUMENT,
@@ -196,7 +198,7 @@ def _delivery_refusal(ctx: Context, action: str, object_id: str, delivery: str) 
     known = [*_answer(ctx, ctx.database.get_object(held))["deliveries"], *ctx.parts.deliveries]
     if delivery in known:
         return None
-    return Answer(
+    return TriggerReply(
         False,
         f"'{action}' refused: '{held}' has no delivery '{delivery}'; it has: {', '.join(known)}; "
         f"{command(action)} {held} delivery:={known[0]}",

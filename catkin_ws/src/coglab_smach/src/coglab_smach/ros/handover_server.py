@@ -17,7 +17,7 @@ from coglab_py.steady import ending
 
 from coglab_smach.context.context import Context
 from coglab_smach.context.journal import ActionRecord
-from coglab_smach.context.requests import SHORT_NAMES, Answer, ask_for
+from coglab_smach.context.requests import SHORT_NAMES, TriggerReply, ask_for
 
 POLL = 0.02  # s between two looks at the brain
 FEEDBACK_PERIOD = 0.2  # s between two feedback messages without a change
@@ -59,7 +59,7 @@ class HandoverServer:
             if other is None:
                 self._handle, self._begun, self._cancelled, self._ended = handle, False, False, None
         if other is not None:
-            self._reject(handle, Answer(False, self._busy(other.get_goal()), ReasonCode.BUSY))
+            self._reject(handle, TriggerReply(False, self._busy(other.get_goal()), ReasonCode.BUSY))
             return
         self._spawn(lambda: self._run(handle))
 
@@ -119,21 +119,25 @@ class HandoverServer:
                 self._handle = None
 
     @staticmethod
-    def _unfit(goal: HandoverGoal) -> Answer | None:
+    def _unfit(goal: HandoverGoal) -> TriggerReply | None:
         """Returns the refusal of a goal with a value out of range; None if all values fit."""
         for name, value in (("wait", goal.wait), ("time_limit", goal.time_limit)):
             if not (math.isfinite(value) and 0.0 <= value <= LONGEST):
-                return Answer(
+                return TriggerReply(
                     False, f"{name}: 0 .. {LONGEST:.0f} s is expected, got {value:g}", ReasonCode.OUT_OF_RANGE
                 )
         for name in ("action", "object_id", "delivery", "participant", "condition"):
             if len(getattr(goal, name)) > LONGEST_TEXT:
-                return Answer(False, f"{name}: at most {LONGEST_TEXT} characters are expected", ReasonCode.OUT_OF_RANGE)
+                return TriggerReply(
+                    False, f"{name}: at most {LONGEST_TEXT} characters are expected", ReasonCode.OUT_OF_RANGE
+                )
         if not goal.action:
-            return Answer(False, "action: a name is expected, such as receive or give", ReasonCode.INVALID_ARGUMENT)
+            return TriggerReply(
+                False, "action: a name is expected, such as receive or give", ReasonCode.INVALID_ARGUMENT
+            )
         return None
 
-    def _ask(self, handle: Any) -> Answer | None:
+    def _ask(self, handle: Any) -> TriggerReply | None:
         """Wait until a hub takes the action, at most ``wait`` s. Returns its answer; None if the goal was cancelled."""
         goal, clock = handle.get_goal(), self._ctx.clock
         end = clock.now() + goal.wait
@@ -229,5 +233,5 @@ class HandoverServer:
         result.ended = result.header.stamp = result.started
         return result
 
-    def _reject(self, handle: Any, answer: Answer) -> None:
+    def _reject(self, handle: Any, answer: TriggerReply) -> None:
         handle.set_rejected(self._refused(handle, answer.code, answer.message), answer.message)
