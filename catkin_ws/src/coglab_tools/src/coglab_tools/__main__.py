@@ -13,7 +13,7 @@ from contextlib import nullcontext, redirect_stdout
 from importlib import import_module
 from typing import NoReturn
 
-from coglab_tools.command import NOT_THERE, Answer, CommandError, UsageError, working
+from coglab_tools.command import NOT_THERE, CommandError, CommandResult, UsageError, working
 
 NOUNS = ("dmp", "people", "trial", "study")
 TALKATIVE = {("dmp", "record"), ("trial", "replay"), ("study", "ask"), ("study", "run"), ("study", "resume")}
@@ -61,7 +61,7 @@ def run(words: list[str]) -> int:
         with redirect_stdout(sys.stderr if as_json else sys.stdout):  # prompts too: the answer is alone on stdout
             talks = (options.noun, options.verb) in TALKATIVE
             with nullcontext() if talks else working(f"{options.noun} {options.verb}"):
-                answer: Answer = options.run(options)
+                answer: CommandResult = options.run(options)
     except CommandError as error:
         return _refuse(str(error), error.status, as_json)
     except ModuleNotFoundError as error:

@@ -1,7 +1,7 @@
 """Common parts of the commands `./coglab NOUN VERB`: answers, errors with exit codes, progress bars.
 
 A noun is a module `coglab_tools.NOUN.commands` with `HELP`, one sentence, and `add(verbs)`, which adds its verbs to an
-argparse subparsers object and sets `run` of each to a function from the options to an Answer::
+argparse subparsers object and sets `run` of each to a function from the options to a CommandResult::
 
     def add(verbs):
         parser = verbs.add_parser("list", help="lists the trials of a folder")
@@ -26,7 +26,7 @@ Item = TypeVar("Item")
 
 
 @dataclass(frozen=True)
-class Answer:
+class CommandResult:
     """Result of a command. ``--json`` prints ``data``, otherwise ``text`` and the next command are printed."""
 
     text: str

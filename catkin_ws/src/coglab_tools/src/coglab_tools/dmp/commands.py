@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from coglab_tools.command import CHECK_FAILED, OK, Answer, CheckFailed, NotThere, UsageError, plural, progress
+from coglab_tools.command import CHECK_FAILED, OK, CheckFailed, CommandResult, NotThere, UsageError, plural, progress
 
 HELP = "teach motions: record, import, learn, inspect and check primitives"
 MAPPINGS = ("none", "similarity", "upright")
@@ -129,7 +129,7 @@ def demonstrations(options: argparse.Namespace) -> list[Any]:
     return found
 
 
-def record(options: argparse.Namespace) -> Answer:
+def record(options: argparse.Namespace) -> CommandResult:
     """`dmp record`."""
     import re
     import signal
@@ -200,7 +200,7 @@ def record(options: argparse.Namespace) -> Answer:
         kept = path.rename(path.with_name(f"{path.name}.failed"))
         raise CheckFailed(f"{error}. What was recorded is in {kept}") from None
     lines = [f"wrote {path}: {recorded.duration:.1f} s, {len(recorded.times)} samples", *_table(found)]
-    return Answer(
+    return CommandResult(
         "\n".join([*lines, *([state] if state else [])]),
         {"file": str(path), "demonstrations": [_facts(d, path) for d in found], "state": state},
         f"./coglab dmp train {options.out}/*.csv --id NAME, or the same command again for one more demonstration",
@@ -234,7 +234,7 @@ def _free(folder: Path, name: str) -> Path:
     return path
 
 
-def import_files(options: argparse.Namespace) -> Answer:
+def import_files(options: argparse.Namespace) -> CommandResult:
     """`dmp import`."""
     found = demonstrations(options)
     names = Counter(d.name for d in found)
@@ -252,14 +252,14 @@ def import_files(options: argparse.Namespace) -> Answer:
     wrote = f"wrote {len(paths)} demonstrations to {options.out}"
     wrote += f"; {replaced} replaced earlier files" if replaced else ""
     text = [_of_files(options.files, found), *_table(found), wrote]
-    return Answer(
+    return CommandResult(
         "\n".join(text),
         {"demonstrations": [_facts(d, path) for d, path in zip(found, paths, strict=True)]},
         f"./coglab dmp train {options.out}/*.csv --id NAME",
     )
 
 
-def train(options: argparse.Namespace) -> Answer:
+def train(options: argparse.Namespace) -> CommandResult:
     """`dmp train`."""
     from coglab_tools.dmp import check, plot
     from coglab_tools.dmp.train import add_to_library, fingers_in_words
@@ -304,10 +304,10 @@ def train(options: argparse.Namespace) -> Answer:
         "plot": str(path),
         "demonstrations": [_facts(d, None) for d in found],
     }
-    return Answer("\n".join(lines), data, f"./coglab dmp validate {options.library} --id {options.id}")
+    return CommandResult("\n".join(lines), data, f"./coglab dmp validate {options.library} --id {options.id}")
 
 
-def inspect(options: argparse.Namespace) -> Answer:
+def inspect(options: argparse.Namespace) -> CommandResult:
     """`dmp inspect`."""
     import numpy as np
 
@@ -350,10 +350,10 @@ def inspect(options: argparse.Namespace) -> Answer:
         ],
         "plot": str(path),
     }
-    return Answer("\n".join(lines), data, f"./coglab launch primitives:={for_shell(options.library)}")
+    return CommandResult("\n".join(lines), data, f"./coglab launch primitives:={for_shell(options.library)}")
 
 
-def list_primitives(options: argparse.Namespace) -> Answer:
+def list_primitives(options: argparse.Namespace) -> CommandResult:
     """`dmp list`."""
     import numpy as np
 
@@ -380,10 +380,10 @@ def list_primitives(options: argparse.Namespace) -> Answer:
         for r in rows
     ]
     first = rows[0]["id"] if rows else "NAME"
-    return Answer("\n".join(lines), {"primitives": rows}, f"./coglab dmp inspect {options.library} --id {first}")
+    return CommandResult("\n".join(lines), {"primitives": rows}, f"./coglab dmp inspect {options.library} --id {first}")
 
 
-def validate(options: argparse.Namespace) -> Answer:
+def validate(options: argparse.Namespace) -> CommandResult:
     """`dmp validate`."""
     from coglab_tools.dmp import check
     from coglab_tools.dmp.demonstration import for_shell
@@ -413,7 +413,7 @@ def validate(options: argparse.Namespace) -> Answer:
             f"{', '.join(failed)}: fewer than {100 * options.needed:.0f} % of the goals, or not the middle. A longer "
             "dmp_ratio helps a slowed arm; a joint at its stop needs another path or mapping"
         )
-    return Answer(
+    return CommandResult(
         "\n".join(lines),
         {"primitives": rows},
         f"./coglab launch primitives:={for_shell(options.library)}",
@@ -421,7 +421,7 @@ def validate(options: argparse.Namespace) -> Answer:
     )
 
 
-def export(options: argparse.Namespace) -> Answer:
+def export(options: argparse.Namespace) -> CommandResult:
     """`dmp export`."""
     import io
     import json
@@ -454,7 +454,7 @@ def export(options: argparse.Namespace) -> Answer:
                                                                            "widths", "weights")}  # fmt: skip
         whole = {**values, **arrays, "t": times.tolist(), "position": path.tolist()}
         write_whole(options.out, json.dumps(whole, indent=1) + "\n")
-    return Answer(
+    return CommandResult(
         f"wrote {options.out}: {len(times)} samples, {times[-1]:.2f} s, from 0 to {np.round(line, 3).tolist()} m",
         {"file": str(options.out), "samples": len(times), "duration_s": float(times[-1])},
     )

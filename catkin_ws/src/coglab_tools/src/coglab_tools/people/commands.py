@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from coglab_tools.command import Answer, CheckFailed, NotThere, UsageError, progress
+from coglab_tools.command import CheckFailed, CommandResult, NotThere, UsageError, progress
 
 HELP = "recordings of people: made playable, and learnt from"
 KINDS = ("kth", "dexycb")
@@ -54,7 +54,7 @@ def handovers(paths: Sequence[Path], kind: str | None, rate: float | None) -> li
     return found
 
 
-def import_recordings(options: argparse.Namespace) -> Answer:
+def import_recordings(options: argparse.Namespace) -> CommandResult:
     """`people import`."""
     import re
 
@@ -81,10 +81,12 @@ def import_recordings(options: argparse.Namespace) -> Answer:
                      "peak_speed_m_s": float(reach.speed.max()), "touch_s": h.touch, "source": h.source,
                      "notes": list(h.notes)})  # fmt: skip
     held = "" if options.object else " recorded_object:=in_hand"
-    return Answer("\n".join(lines), {"recordings": rows}, f"./coglab launch recording:={for_shell(paths[0])}{held}")
+    return CommandResult(
+        "\n".join(lines), {"recordings": rows}, f"./coglab launch recording:={for_shell(paths[0])}{held}"
+    )
 
 
-def learn(options: argparse.Namespace) -> Answer:
+def learn(options: argparse.Namespace) -> CommandResult:
     """`people learn`."""
     from coglab_tools.dmp.demonstration import for_shell
     from coglab_tools.files import write_whole
@@ -114,4 +116,4 @@ def learn(options: argparse.Namespace) -> Answer:
         lines.append(f"wrote {options.patterns}: {', '.join(f'{name} ({n})' for name, n in counts.items())}")
         data["patterns"] = counts
         follow.append(f"patterns:={for_shell(options.patterns)}")
-    return Answer("\n".join(lines), data, f"./coglab launch {' '.join(follow)}")
+    return CommandResult("\n".join(lines), data, f"./coglab launch {' '.join(follow)}")

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from coglab_tools.command import Answer, CheckFailed, UsageError, plural
+from coglab_tools.command import CheckFailed, CommandResult, UsageError, plural
 
 HELP = "studies: plan, run, resume, report"
 
@@ -63,7 +63,7 @@ def _workers(text: str) -> int:
     return int(text)
 
 
-def _init(options: argparse.Namespace) -> Answer:
+def _init(options: argparse.Namespace) -> CommandResult:
     from coglab_tools.study.plan import load, new
 
     file = new(options.name)
@@ -72,10 +72,10 @@ def _init(options: argparse.Namespace) -> Answer:
         f"wrote {file}: {plural(len(study.participants), 'participant')}, "
         f"{plural(len(study.conditions), 'condition')}, {plural(len(study.trials()), 'trial')}; edit it as you like"
     )
-    return Answer(text, {"file": str(file), "trials": len(study.trials())}, f"./coglab study run {file.parent}")
+    return CommandResult(text, {"file": str(file), "trials": len(study.trials())}, f"./coglab study run {file.parent}")
 
 
-def _run(options: argparse.Namespace) -> Answer:
+def _run(options: argparse.Namespace) -> CommandResult:
     from coglab_tools.study.plan import load
     from coglab_tools.study.rows import open_rows
 
@@ -86,7 +86,7 @@ def _run(options: argparse.Namespace) -> Answer:
     live = live or options.live
     if options.fresh and done and not live:
         if done == total:
-            return Answer(
+            return CommandResult(
                 f"{study.name}: {total} of {plural(total, 'trial')} done",
                 {"trials": total},
                 f"./coglab study report {study.folder}",
@@ -126,10 +126,10 @@ def _run(options: argparse.Namespace) -> Answer:
     if not live and (study.folder / "machines.yaml").exists():
         text += f"; {study.folder / 'machines.yaml'} is for live sessions, simulated trials have the shipped one"
     following = "report" if data["trials"] == total else "status"
-    return Answer(text, data, f"./coglab study {following} {study.folder}")
+    return CommandResult(text, data, f"./coglab study {following} {study.folder}")
 
 
-def _status(options: argparse.Namespace) -> Answer:
+def _status(options: argparse.Namespace) -> CommandResult:
     from coglab_tools.study.plan import load
     from coglab_tools.study.questionnaires import open_items
     from coglab_tools.study.rows import open_rows
@@ -169,20 +169,20 @@ def _status(options: argparse.Namespace) -> Answer:
         live = " --live" if started and not simulated else ""
         then = f"./coglab study {'resume' if done else 'run'} {study.folder}{live}"
     data = {"study": study.name, "kind": kind, "done": len(done), "trials": len(trials), "participants": people}
-    return Answer("\n".join(lines), data, then)
+    return CommandResult("\n".join(lines), data, then)
 
 
-def _ask(options: argparse.Namespace) -> Answer:
+def _ask(options: argparse.Namespace) -> CommandResult:
     from coglab_tools.study.ask import ask
     from coglab_tools.study.plan import load
 
     study = load(options.folder)
     count = ask(study, study.participant(options.participant), options.condition)
     text = f"{plural(count, 'answer')} of {options.participant} written"
-    return Answer(text, {"answers": count}, f"./coglab study status {study.folder}")
+    return CommandResult(text, {"answers": count}, f"./coglab study status {study.folder}")
 
 
-def _import(options: argparse.Namespace) -> Answer:
+def _import(options: argparse.Namespace) -> CommandResult:
     from coglab_tools.study.plan import load
     from coglab_tools.study.questionnaires import add_answers, read_answers
 
@@ -194,14 +194,14 @@ def _import(options: argparse.Namespace) -> Answer:
     rows = read_answers(options.file, study)
     new, replaced = add_answers(study, rows)
     text = f"{plural(new, 'new answer')}, {replaced} replaced, from {options.file}"
-    return Answer(text, {"new": new, "replaced": replaced}, f"./coglab study report {study.folder}")
+    return CommandResult(text, {"new": new, "replaced": replaced}, f"./coglab study report {study.folder}")
 
 
-def _report(options: argparse.Namespace) -> Answer:
+def _report(options: argparse.Namespace) -> CommandResult:
     from coglab_tools.study.plan import load
     from coglab_tools.study.report import write_report
 
     study = load(options.folder)
     data = write_report(study, options.pdf)
     text = "\n".join([data["verdict"], *data["problems"], *(f"wrote {file}" for file in data["files"])])
-    return Answer(text, data, f"./coglab study status {study.folder}" if data["left"] else "")
+    return CommandResult(text, data, f"./coglab study status {study.folder}" if data["left"] else "")

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from coglab_tools.command import OK, Answer, CheckFailed, CommandError, UsageError, plural
+from coglab_tools.command import OK, CheckFailed, CommandError, CommandResult, UsageError, plural
 from coglab_tools.trial.record import BAG, FILE, TrialRecord, find_trials, trials_folder
 
 HELP = "recorded handovers: list, show, plot, explain, report, video, replay"
@@ -75,7 +75,7 @@ def _measured(options: argparse.Namespace) -> tuple[Path, Any]:
     return place, read_trial(place)
 
 
-def list_trials(options: argparse.Namespace) -> Answer:
+def list_trials(options: argparse.Namespace) -> CommandResult:
     """A row per trial; those that cannot be read are named, with the reason."""
     folder = options.folder or trials_folder()
     rows: list[dict[str, Any]] = []
@@ -102,10 +102,10 @@ def list_trials(options: argparse.Namespace) -> Answer:
     lines += [f"being recorded, or cut off: {part}; rosbag reindex {part}/{BAG} saves the rest" for part in parts]
     data = {"trials": rows, "unreadable": bad, "unfinished": parts}
     following = f"./coglab trial report {rows[-1]['folder']}" if rows else "./coglab launch, then ./coglab start"
-    return Answer("\n".join(lines), data, following, OK)
+    return CommandResult("\n".join(lines), data, following, OK)
 
 
-def show(options: argparse.Namespace) -> Answer:
+def show(options: argparse.Namespace) -> CommandResult:
     """The record and the metrics of a trial."""
     import yaml
 
@@ -125,23 +125,23 @@ def show(options: argparse.Namespace) -> Answer:
         ]
     rest = {k: v for k, v in data.items() if k not in ("marks", "outcome") and v not in ("", None, {})}
     lines.append(yaml.safe_dump(rest, sort_keys=False, allow_unicode=True, default_flow_style=None).rstrip())
-    return Answer(
+    return CommandResult(
         "\n".join(lines),
         {**data, "metrics": values[0] if len(values) == 1 else values},
         f"./coglab trial report {place}",
     )
 
 
-def explain_trial(options: argparse.Namespace) -> Answer:
+def explain_trial(options: argparse.Namespace) -> CommandResult:
     """The events, in at most ten lines."""
     from coglab_tools.trial.explain import explain
 
     place, trial = _measured(options)
     lines = explain(trial)
-    return Answer("\n".join(lines), {"lines": lines}, f"./coglab trial plot {place}")
+    return CommandResult("\n".join(lines), {"lines": lines}, f"./coglab trial plot {place}")
 
 
-def plot(options: argparse.Namespace) -> Answer:
+def plot(options: argparse.Namespace) -> CommandResult:
     """The picture of a trial, as PNG, PDF or SVG by the name of the file."""
     from coglab_tools.files import write_by
     from coglab_tools.report.page import figure_of_trial
@@ -152,10 +152,10 @@ def plot(options: argparse.Namespace) -> Answer:
         raise UsageError(f"{file} ends with {file.suffix or 'nothing'}: .png, .pdf or .svg is expected")
     figure = figure_of_trial(trial)
     write_by(file, lambda part: figure.savefig(part, dpi=160))
-    return Answer(f"{file}", {"file": str(file)}, f"./coglab trial report {place}")
+    return CommandResult(f"{file}", {"file": str(file)}, f"./coglab trial report {place}")
 
 
-def report(options: argparse.Namespace) -> Answer:
+def report(options: argparse.Namespace) -> CommandResult:
     """The page of a trial."""
     from coglab_tools.report.page import write_pdf, write_report
 
@@ -166,10 +166,10 @@ def report(options: argparse.Namespace) -> Answer:
     if options.pdf:
         data["pdf"] = str(write_pdf(file, file.with_suffix(".pdf")))
         text += f"\n{data['pdf']}"
-    return Answer(text, data, f"./coglab trial video {place}")
+    return CommandResult(text, data, f"./coglab trial video {place}")
 
 
-def video(options: argparse.Namespace) -> Answer:
+def video(options: argparse.Namespace) -> CommandResult:
     """The moving picture of a trial, as GIF or MP4 by the name of the file."""
     from coglab_tools.trial.video import KINDS, write_video
 
@@ -179,10 +179,10 @@ def video(options: argparse.Namespace) -> Answer:
         raise UsageError(f"{file} ends with {file.suffix or 'nothing'}: {' or '.join(KINDS)} is expected")
     data = write_video(trial, file)
     text = f"{file}: {data['frames']} pictures, {data['seconds']:.0f} s, {file.stat().st_size / 1e6:.1f} MB"
-    return Answer(text, {"file": str(file), **data}, f"./coglab trial report {place}")
+    return CommandResult(text, {"file": str(file), **data}, f"./coglab trial report {place}")
 
 
-def replay(options: argparse.Namespace) -> Answer:
+def replay(options: argparse.Namespace) -> CommandResult:
     """Publish the bag of a trial again, until it ends or Ctrl-C."""
     from coglab_tools.trial.replay import replay as run
 
@@ -191,6 +191,6 @@ def replay(options: argparse.Namespace) -> Answer:
     if not (place / BAG).is_file():
         raise CheckFailed(f"{place} has no {BAG}: a trial of virtual time is not replayed; ./coglab trial plot {place}")
     seconds = run(place / BAG, options.rate, options.rviz)
-    return Answer(
+    return CommandResult(
         f"{place / BAG}: replayed in {seconds:.0f} s", {"seconds": seconds}, f"./coglab trial explain {place}"
     )
