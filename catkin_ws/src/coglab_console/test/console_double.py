@@ -13,7 +13,7 @@ from pathlib import Path
 import aiohttp
 from aiohttp import web
 from coglab_console.desk.control_conditions import Standing
-from coglab_console.desk.desk import Answer, Desk
+from coglab_console.desk.desk import Desk, DeskReply
 from coglab_console.desk.events import EventLog
 from coglab_console.web.access import CSRF_HEADER, Access, allowed_hosts
 from coglab_console.web.fan_out import Documents
@@ -100,9 +100,9 @@ class RobotDouble:
     def mark(self, names: dict[str, str]) -> None:
         self.marks.append(names)
 
-    async def call(self, name: str, arguments: dict) -> Answer:
+    async def call(self, name: str, arguments: dict) -> DeskReply:
         self.calls.append((name, arguments))
-        return Answer(True, "done")
+        return DeskReply(True, "done")
 
 
 class Console:

@@ -4,7 +4,7 @@ import asyncio
 from dataclasses import replace
 
 import pytest
-from coglab_console.desk.desk import Answer
+from coglab_console.desk.desk import DeskReply
 from coglab_console.desk.motion_guard import HOLD_TIME, HeldButton, MotionGuard, Standstills
 from desk_double import RECEIVE, Clock, ask, buttons_follow, hold_for, newest, shown
 
@@ -102,7 +102,7 @@ def test_button_held_during_its_own_command_is_not_refused(desk):
     async def call(name, arguments):
         desk.backend.now = replace(desk.backend.now, calibrating=True)
         await let.wait()
-        return Answer(True, "started")
+        return DeskReply(True, "started")
 
     async def press():
         held = []

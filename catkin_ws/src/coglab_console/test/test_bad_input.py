@@ -7,7 +7,7 @@ import socket
 
 import aiohttp
 import pytest
-from coglab_console.desk.desk import Answer
+from coglab_console.desk.desk import DeskReply
 from console_double import RobotDouble, served
 
 RECEIVE = {"action": "exchange_human_to_robot"}
@@ -26,11 +26,11 @@ class SlowRobot(RobotDouble):
         super().__init__()
         self.asked, self.let = asyncio.Event(), asyncio.Event()
 
-    async def call(self, name: str, arguments: dict) -> Answer:
+    async def call(self, name: str, arguments: dict) -> DeskReply:
         self.calls.append((name, arguments))
         self.asked.set()
         await self.let.wait()
-        return Answer(True, "done")
+        return DeskReply(True, "done")
 
 
 def events_of(console, source):

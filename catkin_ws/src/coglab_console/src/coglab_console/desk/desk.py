@@ -25,7 +25,7 @@ NOTICE = 3.0  # s between the announcement of a new operator and the change
 ABSENCE = 10.0  # s without a connection after which the operator loses the role; longer than reloading a page
 
 
-class Answer(dict):
+class DeskReply(dict):
     """{"success", "message"} and, where a command gives data, "data"."""
 
     def __init__(self, success: bool, message: str, data: Any = None) -> None:
@@ -51,7 +51,7 @@ class Backend(Protocol):
     def mark(self, names: dict[str, str]) -> None:
         """Names the trial under way for recorders: study, participant, condition, session. Returns at once."""
 
-    def call(self, name: str, arguments: dict) -> Awaitable[Answer]:
+    def call(self, name: str, arguments: dict) -> Awaitable[DeskReply]:
         """Runs a command that needs the robot. It ends within its time limit."""
 
 
@@ -162,27 +162,27 @@ class Desk:
 
     # --- calls of the browsers ------------------------------------------------------------------------------------
 
-    def stop(self, who: str) -> Answer:
+    def stop(self, who: str) -> DeskReply:
         """Executes STOP, from any browser, any number of times."""
         self.backend.stop(who)
         self.guard.stop(f"{who} pressed STOP")
         if self.backend.standing().under_way:
             self.backend.tell("note", f"STOP by {who}")  # a mark in the recording
         self.tick()
-        return Answer(True, "STOP was sent to the arm and to the brain", {"stop": self.guard.stops})
+        return DeskReply(True, "STOP was sent to the arm and to the brain", {"stop": self.guard.stops})
 
-    async def command(self, who: str, name: Any, arguments: Any) -> Answer:
+    async def command(self, who: str, name: Any, arguments: Any) -> DeskReply:
         """Executes a command of the list for the browser `who`."""
         refusal = self._refusal(who, name, arguments)
         if refusal:
-            return Answer(False, refusal)
+            return DeskReply(False, refusal)
         if name == "stop":
             return self.stop(who)
         if self.guard.guarded(name, arguments):
-            return Answer(False, "press and hold the button for 0.8 s")
+            return DeskReply(False, "press and hold the button for 0.8 s")
         return await self._perform(who, name, arguments)
 
-    async def held(self, who: str, name: Any, arguments: Any) -> Answer | None:
+    async def held(self, who: str, name: Any, arguments: Any) -> DeskReply | None:
         """Processes one message of a held button. Returns None until its command was executed."""
         # The begun action may be a reason to refuse the same command again, while the button is still down.
         if who in self._begun and self._begun[who] == (name, arguments):
@@ -190,7 +190,7 @@ class Desk:
         refusal = self._refusal(who, name, arguments)
         if refusal:
             self.released(who)
-            return Answer(False, refusal)
+            return DeskReply(False, refusal)
         button = self._held.setdefault(who, HeldButton())
         if not button.held((name, sorted(arguments.items(), key=str))):
             return None
@@ -283,13 +283,13 @@ class Desk:
         reason = found.get(control(name, arguments), "")
         return f"{words_of(name, arguments)}: {reason}" if reason else ""
 
-    async def _perform(self, who: str, name: str, arguments: dict) -> Answer:
+    async def _perform(self, who: str, name: str, arguments: dict) -> DeskReply:
         try:
             answer = self._own(who, name, arguments)
         except ExperimentError as error:
-            answer = Answer(False, str(error))
+            answer = DeskReply(False, str(error))
         except OSError as error:
-            answer = Answer(False, f"a file cannot be written: {error}")
+            answer = DeskReply(False, f"a file cannot be written: {error}")
         if answer is None:
             if name == "start" and arguments["action"] in (*TAKES, *GIVES):
                 arguments = {"object_id": self._meant(arguments["action"]), **arguments}
@@ -332,28 +332,28 @@ class Desk:
         self.events.add("object", f"{who}: the next object is {object_id or 'the default'}")
         return f"object {object_id or 'none'}"
 
-    def _own(self, who: str, name: str, given: dict) -> Answer | None:
+    def _own(self, who: str, name: str, given: dict) -> DeskReply | None:
         """Executes the commands that do not need the robot. Returns None for the others."""
         session = self.experiment
         if name == "note":
             self.backend.tell("note", given["text"])
-            return Answer(True, self._note(who, given["text"]))
+            return DeskReply(True, self._note(who, given["text"]))
         if name == "acknowledge":
             # The answer, and thereby the event, contains number and cause of the stop.
             refusal = self.guard.acknowledge(given["stop"])
             told = f"acknowledged stop {self.guard.stops} ({self.guard.cause}); the first motion needs a held button"
-            return Answer(not refusal, refusal or told)
+            return DeskReply(not refusal, refusal or told)
         if name == "take_over":
-            return Answer(True, self.roles.take_over(who))
+            return DeskReply(True, self.roles.take_over(who))
         if name == "keep":
-            return Answer(True, self.roles.keep(who))
+            return DeskReply(True, self.roles.keep(who))
         if name == "invite":
-            return Answer(True, "a link for one more browser, valid once", self._invite())
+            return DeskReply(True, "a link for one more browser, valid once", self._invite())
         if name == "select_object":
             self.backend.tell("select_object", given["object_id"])
-            return Answer(True, self._select(who, given["object_id"]))
+            return DeskReply(True, self._select(who, given["object_id"]))
         if name == "session_begin":
-            return Answer(
+            return DeskReply(
                 True,
                 session.begin(
                     given["participant"],
@@ -366,14 +366,14 @@ class Desk:
                 ),
             )
         if name == "session_end":
-            return Answer(True, session.end())
+            return DeskReply(True, session.end())
         if name == "trial_begin":
             told = session.trial_begin()
             self.backend.mark(session.names())
             self._follow_trial(self.backend.standing())
-            return Answer(True, f"{told}; the next object is {self.object_id or 'the default'}")
+            return DeskReply(True, f"{told}; the next object is {self.object_id or 'the default'}")
         if name == "trial_end":
             told = session.trial_end(given["outcome"])
             self.backend.mark(session.names())
-            return Answer(True, told)
+            return DeskReply(True, told)
         return None

@@ -31,7 +31,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from ..desk.control_conditions import Standing
-from ..desk.desk import Answer
+from ..desk.desk import DeskReply
 from ..desk.words import plain
 from .knowledge import lookup
 from .view import RosView
@@ -98,14 +98,14 @@ class RosBackend:
         """See Backend."""
         self._stop(who)
 
-    async def call(self, name: str, arguments: dict) -> Answer:
+    async def call(self, name: str, arguments: dict) -> DeskReply:
         """Runs the command in its own thread. Without an answer within LIMIT, it returns a failure."""
         if not self._waiting.acquire(blocking=False):
-            return Answer(False, f"{MAX_WAITING} earlier requests have not been answered; is the ROS master there?")
+            return DeskReply(False, f"{MAX_WAITING} earlier requests have not been answered; is the ROS master there?")
         loop = asyncio.get_running_loop()
-        done: asyncio.Future[Answer] = loop.create_future()
+        done: asyncio.Future[DeskReply] = loop.create_future()
 
-        def give(answer: Answer) -> None:
+        def give(answer: DeskReply) -> None:
             if not done.done():
                 done.set_result(answer)
 
@@ -113,9 +113,9 @@ class RosBackend:
             try:
                 answer = getattr(self, f"_{name}")(**arguments)
             except rospy.ROSException as error:
-                answer = Answer(False, f"{name}: {error}")
+                answer = DeskReply(False, f"{name}: {error}")
             except Exception as error:  # nothing from outside ends the node
-                answer = Answer(False, f"{name}: {type(error).__name__}: {error}")
+                answer = DeskReply(False, f"{name}: {type(error).__name__}: {error}")
             finally:
                 self._waiting.release()
             loop.call_soon_threadsafe(give, answer)
@@ -124,26 +124,26 @@ class RosBackend:
         try:
             return await asyncio.wait_for(done, LIMIT)
         except TimeoutError:
-            return Answer(False, f"{name}: no answer within {LIMIT:.0f} s; look at the event log and at Health")
+            return DeskReply(False, f"{name}: no answer within {LIMIT:.0f} s; look at the event log and at Health")
 
     @staticmethod
     def _ask(service: str, kind: Any, *fields: Any) -> Any:
         return call_service(service, kind, *fields, wait=2.0)
 
-    def _told(self, service: str, kind: Any, *fields: Any) -> Answer:
+    def _told(self, service: str, kind: Any, *fields: Any) -> DeskReply:
         answer = self._ask(service, kind, *fields)
-        return Answer(
+        return DeskReply(
             bool(answer.success), answer.message or ("done" if answer.success else "refused without a reason")
         )
 
     # --- one method per command, in a thread of its own -------------------------------------------------------
 
-    def _start(self, action: str, object_id: str = "", delivery: str = "") -> Answer:
+    def _start(self, action: str, object_id: str = "", delivery: str = "") -> DeskReply:
         return self._told("coglab/start", Start, action, f"{object_id}/{delivery}" if delivery else object_id)
 
-    def _calibrate(self, mode: str, force: bool = False) -> Answer:
+    def _calibrate(self, mode: str, force: bool = False) -> DeskReply:
         if self._calibration.get_num_connections() == 0:
-            return Answer(False, "the hand is not there; look at Health")
+            return DeskReply(False, "the hand is not there; look at Health")
         number, before = self._view.hand_number, self._view.hand
         self._calibration.publish(String(mode + (" force" if force else "")))
         refused = ""
@@ -151,7 +151,7 @@ class RosBackend:
         while time.monotonic() < end:
             now = self._view.hand
             if self._view.hand_number > number and now.calibrating:
-                return Answer(True, f"{now.message}; the event log shows its end")
+                return DeskReply(True, f"{now.message}; the event log shows its end")
             if self._view.hand_number > number and now.event_code == ReasonCode.HAND_REFUSED:
                 refused = now.message
                 # An equal message may belong to an earlier request.
@@ -159,53 +159,55 @@ class RosBackend:
                     break
             time.sleep(0.02)
         nothing = f"the hand has not answered within {HAND_LIMIT:.0f} s; look at the event log and at Health"
-        return Answer(False, refused or nothing)
+        return DeskReply(False, refused or nothing)
 
-    def _home(self) -> Answer:
+    def _home(self) -> DeskReply:
         home = lookup(self._view.config(), "postures.home")
         if not isinstance(home, list) or len(home) != 7:
-            return Answer(False, "postures.home is not in the configuration of the machines (/coglab/config_file)")
+            return DeskReply(False, "postures.home is not in the configuration of the machines (/coglab/config_file)")
         answer = self._told("controller_manager/switch_controller", SwitchController, HOME_CONTROLLER)
         if not answer["success"]:
             return answer
         return self._told("controller_manager/ptp/add_ptp", AddPtp, [float(value) for value in home], [], [])
 
-    def _speed_scale(self, value: float) -> Answer:
+    def _speed_scale(self, value: float) -> DeskReply:
         return self._told("controller_manager/speed_scale", SetSpeedScale, float(value))
 
-    def _contact_learn(self) -> Answer:
+    def _contact_learn(self) -> DeskReply:
         return self._told("contact_detector/learn", Learn)
 
-    def _contact_arm(self, mode: str, k: float = 0.0, timeout: float = 10.0, joints: list[int] | None = None) -> Answer:
+    def _contact_arm(
+        self, mode: str, k: float = 0.0, timeout: float = 10.0, joints: list[int] | None = None
+    ) -> DeskReply:
         return self._told("contact_detector/arm", ArmContact, mode, float(timeout), float(k), joints or [], 0.0, 0.0)
 
-    def _objects_reload(self) -> Answer:
+    def _objects_reload(self) -> DeskReply:
         answer = self._told("object_database/reload", Reload)
         self._view.files_changed()
         return answer
 
-    def _answer(self, questionnaire: str, answers: dict[str, float], of: list[str] | None = None) -> Answer:
+    def _answer(self, questionnaire: str, answers: dict[str, float], of: list[str] | None = None) -> DeskReply:
         from coglab_tools.command import CommandError
 
         try:
             told = self._view.study.answer(questionnaire, answers, of)
         except CommandError as error:
-            return Answer(False, str(error))
+            return DeskReply(False, str(error))
         self._view.files_changed()
-        return Answer(True, told)
+        return DeskReply(True, told)
 
-    def _preview(self, primitive: str) -> Answer:
+    def _preview(self, primitive: str) -> DeskReply:
         self._view.preview = primitive
         shown = f"the cell shows the path of {primitive} toward the goal of the next action" if primitive else ""
-        return Answer(True, shown or "the cell shows the path of the next action")
+        return DeskReply(True, shown or "the cell shows the path of the next action")
 
-    def _feedback(self, verb: str, name: str) -> Answer:
+    def _feedback(self, verb: str, name: str) -> DeskReply:
         return self._told(f"controller_manager/feedback/{verb}", FeedbackSelect, [name], "console")
 
-    def _feedback_order(self, names: list[str]) -> Answer:
+    def _feedback_order(self, names: list[str]) -> DeskReply:
         return self._told("controller_manager/feedback/set_execution_order", SetExecutionOrder, names)
 
-    def _parameters(self) -> Answer:
+    def _parameters(self) -> DeskReply:
         rows: list[list[str]] = []
 
         def walk(path: str, value: Any) -> None:
@@ -218,7 +220,7 @@ class RosBackend:
 
         walk("", rospy.get_param("/"))
         mark = hashlib.sha256(json.dumps(rows).encode()).hexdigest()[:12]
-        return Answer(True, f"{len(rows)} parameters; the same mark means the same values: {mark}", rows)
+        return DeskReply(True, f"{len(rows)} parameters; the same mark means the same values: {mark}", rows)
 
 
 class DirectService(rospy.ServiceProxy):

@@ -15,7 +15,7 @@ from typing import Any
 
 from aiohttp import WSMessage, WSMsgType, web
 
-from ..desk.desk import Answer, Desk
+from ..desk.desk import Desk, DeskReply
 from ..desk.events import EventLog
 from .access import Access, Denied, Session
 from .fan_out import Client, Documents, to_json
@@ -107,17 +107,17 @@ class ConsoleServer:
             self.access.check_host(request.headers)
             response = await handler(request)
         except Denied as error:
-            response = web.json_response(Answer(False, str(error)), status=error.status)
+            response = web.json_response(DeskReply(False, str(error)), status=error.status)
         except web.HTTPException as error:
             words = REFUSALS.get(error.status, error.reason)
-            response = web.json_response(Answer(False, words), status=error.status)
+            response = web.json_response(DeskReply(False, words), status=error.status)
         except Exception as error:
             # A connection that became a WebSocket accepts no HTTP response.
             if isinstance(error, ConnectionError) or request.path == "/ws":
                 raise
             _LOG.exception("%s %s", request.method, request.path)
             words = f"internal error of the console ({type(error).__name__}); see its log"
-            response = web.json_response(Answer(False, words), status=500)
+            response = web.json_response(DeskReply(False, words), status=500)
         if not response.prepared:
             response.headers.update(HEADERS)
             host = request.headers.get("Host", "")
@@ -173,7 +173,7 @@ class ConsoleServer:
     async def _key(self, request: web.Request) -> web.Response:
         self._from_here(request)
         session = self._spend(self.access.bearer_of(request.headers) or "", program=True)
-        return web.json_response(Answer(True, f"the key of {session.name}, for as long as it is used", session.key))
+        return web.json_response(DeskReply(True, f"the key of {session.name}, for as long as it is used", session.key))
 
     def _redeem(self, token: str) -> web.Response:
         session = self._spend(token)
@@ -209,9 +209,9 @@ class ConsoleServer:
         session = self._changing(request)
         return web.json_response(self._press(session))
 
-    def _press(self, session: Session) -> Answer:
+    def _press(self, session: Session) -> DeskReply:
         if not session.stops.take():  # no person presses so often; an earlier STOP was sent
-            return Answer(True, "STOP was sent a moment ago")
+            return DeskReply(True, "STOP was sent a moment ago")
         return self.desk.stop(session.name)
 
     # --- one connection ---------------------------------------------------------------------------------------
@@ -288,7 +288,7 @@ class ConsoleServer:
             return f"a frame was not understood: {str(error)[:100]}"
         if kind == "stop":
             self._press(session)
-            self._reply(socket, Answer(True, "STOP was sent"), frame.get("id"))
+            self._reply(socket, DeskReply(True, "STOP was sent"), frame.get("id"))
         elif kind == "seen" and client.seen(frame.get("n")):
             pass
         elif not session.requests.take():
@@ -310,7 +310,7 @@ class ConsoleServer:
         if answer is not None:
             self._reply(socket, answer, frame.get("id"))
 
-    def _reply(self, socket: web.WebSocketResponse, answer: Answer, number: object) -> None:
+    def _reply(self, socket: web.WebSocketResponse, answer: DeskReply, number: object) -> None:
         async def send() -> None:
             try:
                 text = to_json({"t": "answer", "id": number if isinstance(number, int) else None, **answer})
