@@ -9,7 +9,7 @@ import pytest
 import rospy
 from coglab_msgs.msg import HandStatus, MotorStatus
 from coglab_py.pace import Pace
-from ih2_hand.progress import Verdict
+from ih2_hand.progress import MotorVerdict
 from ih2_hand.ros import goals
 
 
@@ -60,12 +60,12 @@ class Task:
         self.limit = 60.0
         self.begun = 0
         self.asked: list[float] = []
-        self.verdict = Verdict("under way")
+        self.verdict = MotorVerdict("under way")
 
     def begin(self, driver: object) -> None:
         self.begun += 1
 
-    def judge(self, motors: object, elapsed: float) -> Verdict:
+    def judge(self, motors: object, elapsed: float) -> MotorVerdict:
         self.asked.append(elapsed)
         return self.verdict
 
@@ -91,7 +91,7 @@ class Owner:
     def __init__(self) -> None:
         self.driver: Driver | None = Driver()
         self.tasks: list[Task] = []
-        self.verdicts: list[Verdict] = []
+        self.verdicts: list[MotorVerdict] = []
         self.refusal: Exception | None = None
 
     def connected_driver(self) -> Driver:
@@ -103,7 +103,7 @@ class Owner:
         self.tasks.append(Task())
         return self.tasks[-1]
 
-    def task_ended(self, task: Task, verdict: Verdict) -> None:
+    def task_ended(self, task: Task, verdict: MotorVerdict) -> None:
         assert task in self.tasks
         self.verdicts.append(verdict)
 

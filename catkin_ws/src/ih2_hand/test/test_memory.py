@@ -7,12 +7,12 @@ from types import SimpleNamespace
 import pytest
 from ih2_hand.errors import HandCalibratingError, RefusedError
 from ih2_hand.memory import HandMemory
-from ih2_hand.progress import GraspTask, Verdict
+from ih2_hand.progress import GraspTask, MotorVerdict
 from ih2_hand.reasons import Reason
 
 LEGACY = SimpleNamespace(dialect="legacy")
-DONE = Verdict("done", done=True, ok=True)
-BROKEN_OFF = Verdict("broken off", done=True)
+DONE = MotorVerdict("done", done=True, ok=True)
+BROKEN_OFF = MotorVerdict("broken off", done=True)
 
 
 @pytest.fixture

@@ -28,7 +28,7 @@ from ih2_hand.emulator.hand import EmulatedHand
 from ih2_hand.emulator.physical_motor import MotorState
 from ih2_hand.emulator.virtual_link import VirtualLink
 from ih2_hand.memory import HandMemory
-from ih2_hand.progress import Task, Verdict
+from ih2_hand.progress import MotorVerdict, Task
 from ih2_hand.reasons import Reason
 
 from coglab_trials.conditions import Conditions
@@ -173,7 +173,7 @@ class Job:
 
     def __init__(self, task: Task, begun: float) -> None:
         self.task, self.begun = task, begun
-        self.verdict: Verdict | None = None
+        self.verdict: MotorVerdict | None = None
 
 
 class Hand(HandMemory):
@@ -209,7 +209,7 @@ class Hand(HandMemory):
     def end(self, job: Job, text: str, reason: Reason) -> None:
         """End a goal early and stop the fingers. A goal that has already ended does not change."""
         if job is self.job:
-            self._over(Verdict(text, done=True, stop=True, reason=reason))
+            self._over(MotorVerdict(text, done=True, stop=True, reason=reason))
 
     def calibrate(self, mode: str) -> str | None:
         """Start a calibration; ``calibrating`` is True until it ends. Returns the reason if it is refused."""
@@ -261,9 +261,9 @@ class Hand(HandMemory):
             self._over(verdict)
         elif elapsed > self.job.task.limit:
             text = f"not done within {self.job.task.limit:.0f} s; fingers stopped"
-            self._over(Verdict(text, done=True, stop=True, reason=Reason.TIME_LIMIT))
+            self._over(MotorVerdict(text, done=True, stop=True, reason=Reason.TIME_LIMIT))
 
-    def _over(self, verdict: Verdict) -> None:
+    def _over(self, verdict: MotorVerdict) -> None:
         job, self.job = self.job, None
         assert job is not None
         if verdict.stop:

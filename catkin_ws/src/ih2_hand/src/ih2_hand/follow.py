@@ -7,7 +7,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from ih2_hand.driver import HandSerialDriver
-from ih2_hand.progress import RESENDS, Task, Verdict
+from ih2_hand.progress import RESENDS, MotorVerdict, Task
 from ih2_hand.reasons import Reason
 
 PERIOD_S = 1.0 / 30.0  # s between polls
@@ -18,8 +18,8 @@ def follow(
     task: Task,
     *,
     period: float = PERIOD_S,
-    on_poll: Callable[[Verdict, Sequence[Any]], bool] | None = None,
-) -> Verdict:
+    on_poll: Callable[[MotorVerdict, Sequence[Any]], bool] | None = None,
+) -> MotorVerdict:
     """Begin `task` and poll every `period` (s) until it is done or its time limit has passed.
 
     `on_poll` receives each verdict with the five readings. If it returns True, the movement is
@@ -35,13 +35,15 @@ def follow(
         asked = clock.monotonic()
         if asked - begun > task.limit:
             driver.stop_all()
-            return Verdict(f"not done within {task.limit:.0f} s; fingers stopped", done=True, reason=Reason.TIME_LIMIT)
+            return MotorVerdict(
+                f"not done within {task.limit:.0f} s; fingers stopped", done=True, reason=Reason.TIME_LIMIT
+            )
         motors = [SimpleNamespace(**reading) for reading in driver.read_motors()]
         if driver.counters.fillers != fillers:
             resends += 1
             if resends > RESENDS:
                 driver.stop_all()
-                return Verdict(
+                return MotorVerdict(
                     f"the line to {driver.port} had to be resynchronised {resends} "
                     "times during the movement: check the cable",
                     done=True,
@@ -57,4 +59,4 @@ def follow(
         if verdict.done:
             return verdict
         if broken_off:
-            return Verdict("broken off; fingers stopped", done=True, reason=Reason.CANCELLED)
+            return MotorVerdict("broken off; fingers stopped", done=True, reason=Reason.CANCELLED)

@@ -11,10 +11,10 @@ from ih2_hand.errors import HandCalibratingError, RefusedError
 from ih2_hand.progress import (
     CloseTask,
     GraspTask,
+    MotorVerdict,
     OpenTask,
     PreshapeTask,
     Task,
-    Verdict,
     refuse_calibration,
     shown_empty,
     shown_holding,
@@ -61,7 +61,7 @@ class HandMemory:
             self._preshape = None
         return task
 
-    def task_over(self, task: Task, verdict: Verdict) -> None:
+    def task_over(self, task: Task, verdict: MotorVerdict) -> None:
         """Update preshape and grip after a finished task."""
         if isinstance(task, PreshapeTask) and verdict.ok:
             self._preshape = (task.mode, task.level)

@@ -42,7 +42,7 @@ class MotorReading(Protocol):
 
 
 @dataclass(frozen=True)
-class Verdict:
+class MotorVerdict:
     """Result of one poll.
 
     If `done`, `ok` is True for success, and `holding` states whether the fingers hold an object (None: the movement
@@ -62,8 +62,8 @@ class Verdict:
         return self.reason if self.done else Reason.HAND_MOVING
 
 
-def _failed(text: str, reason: Reason) -> Verdict:
-    return Verdict(text, done=True, stop=True, reason=reason)
+def _failed(text: str, reason: Reason) -> MotorVerdict:
+    return MotorVerdict(text, done=True, stop=True, reason=reason)
 
 
 class StallWatch:
@@ -100,7 +100,7 @@ class Task(ABC):
     def begin(self, driver: HandSerialDriver) -> None:
         """Send the command. Called again after a resynchronisation, which stops the fingers."""
 
-    def judge(self, motors: Sequence[MotorReading], elapsed: float) -> Verdict:
+    def judge(self, motors: Sequence[MotorReading], elapsed: float) -> MotorVerdict:
         """Verdict on a poll that began `elapsed` s after the command."""
         bus = [motor.motor for motor in motors if motor.com_error]
         if bus:
@@ -109,7 +109,7 @@ class Task(ABC):
         return self._judge(motors, elapsed)
 
     @abstractmethod
-    def _judge(self, motors: Sequence[MotorReading], elapsed: float) -> Verdict:
+    def _judge(self, motors: Sequence[MotorReading], elapsed: float) -> MotorVerdict:
         """Verdict on motors without bus errors."""
 
 
@@ -143,7 +143,7 @@ class SpeedTask(Task):
         for motor in self.motors:
             driver.move_motor(motor, self.speed, self.close)
 
-    def _judge(self, motors: Sequence[MotorReading], elapsed: float) -> Verdict:
+    def _judge(self, motors: Sequence[MotorReading], elapsed: float) -> MotorVerdict:
         at_end: list[int] = []
         met: list[int] = []
         moving: list[int] = []
@@ -164,13 +164,13 @@ class SpeedTask(Task):
             else:
                 lost.append(number)
         if moving:
-            return Verdict(f"{_names(moving)} moving")
+            return MotorVerdict(f"{_names(moving)} moving")
         if lost:
             return _failed(f"{_names(lost)} stopped on the way without a reason on the status", Reason.HAND_STALLED)
         return self._ended(at_end, met)
 
     @abstractmethod
-    def _ended(self, at_end: list[int], met: list[int]) -> Verdict:
+    def _ended(self, at_end: list[int], met: list[int]) -> MotorVerdict:
         """Verdict when no finger moves: `at_end` reached their end sensors, `met` met an object."""
 
 
@@ -183,10 +183,10 @@ class OpenTask(SpeedTask):
     def __init__(self, speed: int):
         super().__init__("hand_open", speed)
 
-    def _ended(self, at_end: list[int], met: list[int]) -> Verdict:
+    def _ended(self, at_end: list[int], met: list[int]) -> MotorVerdict:
         if met:
             return _failed(f"{_names(met)} blocked before the open end: free the fingers", Reason.HAND_STALLED)
-        return Verdict("open", done=True, ok=True, holding=False)
+        return MotorVerdict("open", done=True, ok=True, holding=False)
 
 
 class CloseTask(SpeedTask):
@@ -198,10 +198,12 @@ class CloseTask(SpeedTask):
     def __init__(self, speed: int):
         super().__init__("hand_close", speed)
 
-    def _ended(self, at_end: list[int], met: list[int]) -> Verdict:
+    def _ended(self, at_end: list[int], met: list[int]) -> MotorVerdict:
         if met:
-            return Verdict(f"closed on an object: {_names(met)} met it", done=True, ok=True, holding=True, stop=True)
-        return Verdict("closed without meeting an object", done=True, ok=True, holding=False)
+            return MotorVerdict(
+                f"closed on an object: {_names(met)} met it", done=True, ok=True, holding=True, stop=True
+            )
+        return MotorVerdict("closed without meeting an object", done=True, ok=True, holding=False)
 
 
 class PreshapeTask(Task):
@@ -218,7 +220,7 @@ class PreshapeTask(Task):
         if not driver.send_preshape:
             driver.set_hand_posture(self.targets)
 
-    def _judge(self, motors: Sequence[MotorReading], elapsed: float) -> Verdict:
+    def _judge(self, motors: Sequence[MotorReading], elapsed: float) -> MotorVerdict:
         waiting, ignored = [], []
         for motor in motors:
             number, target = motor.motor, self.targets[motor.motor]
@@ -247,8 +249,8 @@ class PreshapeTask(Task):
                 Reason.HAND_NOT_CALIBRATED,
             )
         if waiting:
-            return Verdict(f"{_names(waiting)} moving")
-        return Verdict(f"preshape {self.mode} reached", done=True, ok=True)
+            return MotorVerdict(f"{_names(waiting)} moving")
+        return MotorVerdict(f"preshape {self.mode} reached", done=True, ok=True)
 
 
 class GraspTask(Task):
@@ -263,7 +265,7 @@ class GraspTask(Task):
         self._started = False
         driver.grasp_mode_close()
 
-    def _judge(self, motors: Sequence[MotorReading], elapsed: float) -> Verdict:
+    def _judge(self, motors: Sequence[MotorReading], elapsed: float) -> MotorVerdict:
         closing = [motor for motor in motors if motor.motor in self.closing]
         in_grasp = ("current_position", "current", "tension")
         if any(motor.mode in in_grasp for motor in closing):
@@ -288,21 +290,21 @@ class GraspTask(Task):
                     Reason.HAND_STALLED,
                 )
         if moving:
-            return Verdict(f"{_names(moving)} closing")
+            return MotorVerdict(f"{_names(moving)} closing")
         if met:
-            return Verdict(f"holding: {_names(met)} met the object", done=True, ok=True, holding=True)
-        return Verdict("closed without meeting an object", done=True, ok=True, holding=False)
+            return MotorVerdict(f"holding: {_names(met)} met the object", done=True, ok=True, holding=True)
+        return MotorVerdict("closed without meeting an object", done=True, ok=True, holding=False)
 
-    def _not_started(self, closing: Sequence[MotorReading], elapsed: float) -> Verdict:
+    def _not_started(self, closing: Sequence[MotorReading], elapsed: float) -> MotorVerdict:
         # The hand finishes the preshape first, so a motor may move in position mode for a while.
         if all(self._stall.standing(motor.motor, elapsed) >= BLOCKED_S for motor in closing):
             if all(motor.fully_closed for motor in closing):
-                return Verdict("closed without meeting an object", done=True, ok=True, holding=False)
+                return MotorVerdict("closed without meeting an object", done=True, ok=True, holding=False)
             return _failed(
                 "the hand did not begin to close: it is probably not calibrated; publish `fast` on hand_calibration",
                 Reason.HAND_NOT_CALIBRATED,
             )
-        return Verdict("taking the preshape")
+        return MotorVerdict("taking the preshape")
 
 
 def shown_empty(motors: Sequence[Any]) -> bool:

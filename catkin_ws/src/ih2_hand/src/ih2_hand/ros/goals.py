@@ -37,7 +37,7 @@ from coglab_py.pace import Pace
 from coglab_py.steady import ending, worker
 
 from ih2_hand.errors import HandError
-from ih2_hand.progress import RESENDS, Task, Verdict
+from ih2_hand.progress import RESENDS, MotorVerdict, Task
 from ih2_hand.reasons import Reason, reason_of
 
 SETTLE_S = 0.02  # s after a command in which a poll may still show the status before it
@@ -174,7 +174,7 @@ class GoalQueue:
                 self._accept(item.name, item.content)
             else:  # newer goals wait: a flood of goals must not make the hand execute replaced ones
                 item.content.set_accepted()
-                replaced = Verdict("replaced by a new goal before it began", reason=Reason.SUPERSEDED)
+                replaced = MotorVerdict("replaced by a new goal before it began", reason=Reason.SUPERSEDED)
                 item.content.set_canceled(_result(item.name, replaced), replaced.text)
         elif item.kind == "cancel":
             if running and item.content == running.handle:
@@ -199,10 +199,10 @@ class GoalQueue:
         try:
             task = self._owner.make_task(name, handle.get_goal())
         except (ValueError, HandError) as error:
-            self._finish_handle(name, handle, Verdict(str(error), reason=reason_of(error)))
+            self._finish_handle(name, handle, MotorVerdict(str(error), reason=reason_of(error)))
             return
         if handle.get_goal_status().status == actionlib.GoalStatus.PREEMPTING:
-            cancelled = Verdict("cancelled before it began", reason=Reason.CANCELLED)
+            cancelled = MotorVerdict("cancelled before it began", reason=Reason.CANCELLED)
             handle.set_canceled(_result(name, cancelled))
             return
         now = time.monotonic()
@@ -278,7 +278,7 @@ class GoalQueue:
             rospy.logwarn("fingers could not be stopped: %s", error)
 
     def _cancel(self, text: str, reason: Reason) -> None:
-        running, verdict = self._running, Verdict(text, done=True, reason=reason)
+        running, verdict = self._running, MotorVerdict(text, done=True, reason=reason)
         self._stop_fingers()
         self._running = None
         assert running is not None
@@ -287,17 +287,17 @@ class GoalQueue:
 
     def _fail(self, text: str, reason: Reason) -> None:
         if self._running:
-            verdict = Verdict(text, done=True, reason=reason)
+            verdict = MotorVerdict(text, done=True, reason=reason)
             self._owner.task_ended(self._running.task, verdict)
             self._finish(verdict)
 
-    def _finish(self, verdict: Verdict) -> None:
+    def _finish(self, verdict: MotorVerdict) -> None:
         running = self._running
         self._running = None
         assert running is not None
         self._finish_handle(running.name, running.handle, verdict)
 
-    def _finish_handle(self, name: str, handle: Any, verdict: Verdict) -> None:
+    def _finish_handle(self, name: str, handle: Any, verdict: MotorVerdict) -> None:
         result = _result(name, verdict)
         if verdict.ok:
             handle.set_succeeded(result, verdict.text)
@@ -306,5 +306,5 @@ class GoalQueue:
             handle.set_aborted(result, verdict.text)
 
 
-def _result(name: str, verdict: Verdict) -> Any:
+def _result(name: str, verdict: MotorVerdict) -> Any:
     return SPECS[name][1](isOk=verdict.ok, reason_code=int(verdict.reason), message=verdict.text)

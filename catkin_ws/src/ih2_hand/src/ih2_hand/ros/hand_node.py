@@ -32,7 +32,7 @@ from ih2_hand.errors import (
     HandTimeoutError,
 )
 from ih2_hand.memory import HandMemory
-from ih2_hand.progress import LONGEST_S, Task, Verdict
+from ih2_hand.progress import LONGEST_S, MotorVerdict, Task
 from ih2_hand.reasons import NEUTRAL, Reason, reason_of
 from ih2_hand.ros.diagnostics import Diagnostics
 from ih2_hand.ros.goals import GoalQueue
@@ -281,7 +281,7 @@ class HandNode(HandMemory):
         """Task for an accepted goal. RefusedError or HandError give the reason to refuse it."""
         return self.task_for(name, goal, self.connected_driver())
 
-    def task_ended(self, task: Task, verdict: Verdict) -> None:
+    def task_ended(self, task: Task, verdict: MotorVerdict) -> None:
         """Store preshape and grip as shown by the finished task, and publish them."""
         self.task_over(task, verdict)
         self._event = (verdict.reason, f"{task.name}: {verdict.text}")
