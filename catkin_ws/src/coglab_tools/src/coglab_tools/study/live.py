@@ -26,7 +26,7 @@ from coglab_tools.files import write_whole
 from coglab_tools.study import settings as condition_settings
 from coglab_tools.study.ask import ask
 from coglab_tools.study.own_files import PRIMITIVES
-from coglab_tools.study.plan import Study, Trial
+from coglab_tools.study.plan import PlannedTrial, Study
 from coglab_tools.study.questionnaires import open_items
 from coglab_tools.study.recordings import RECORDINGS
 from coglab_tools.study.rows import Rows, open_rows, undone, write_table
@@ -52,7 +52,7 @@ class System(Protocol):
     def apply(self, condition: str) -> None:
         """Apply the settings of a condition. CheckFailed or NotThere if they cannot."""
 
-    def announce(self, trial: Trial, session: str) -> None:
+    def announce(self, trial: PlannedTrial, session: str) -> None:
         """Announce the next trial to recorders."""
 
     def note(self, text: str) -> None:
@@ -130,7 +130,7 @@ class _Session:
         """number and rows of the last trial"""
         self._attempts: dict[int, int] = {}
 
-    def run(self, left: list[Trial]) -> None:
+    def run(self, left: list[PlannedTrial]) -> None:
         place = 0
         own = [trial for trial in self.study.trials() if trial.participant == left[0].participant]
         for trial in {trial.visit: trial for trial in own}.values():
@@ -168,7 +168,7 @@ class _Session:
             else:
                 print(HELP)
 
-    def _run(self, trial: Trial) -> bool:
+    def _run(self, trial: PlannedTrial) -> bool:
         """Run a trial and write its rows. False if it did not begin."""
         import coglab
 
@@ -240,7 +240,7 @@ class _Session:
         self.rows.add(number, rows)  # the newer line of a trial counts
         self._last = number, rows
 
-    def _between(self, action: str, trial: Trial) -> None:
+    def _between(self, action: str, trial: PlannedTrial) -> None:
         """Move the object, so that the next trial can begin. It counts for no trial."""
         try:
             named = self.study.object_of(trial.condition) if action == "take" else None
@@ -258,7 +258,7 @@ class _Session:
         except (RuntimeError, TimeoutError) as error:
             print(f"  {error}")
 
-    def _questions(self, trial: Trial, left: list[Trial]) -> None:
+    def _questions(self, trial: PlannedTrial, left: list[PlannedTrial]) -> None:
         """After the last trial under a condition: its questionnaires, if a trial was done and an item is open."""
         own = [each for each in self.study.trials() if each.visit == trial.visit]
         done = any(self.rows.trials.get(each.number) for each in own)  # a skipped trial has no rows
@@ -442,7 +442,7 @@ class RunningSystem:
         if "feedback" in self._names:
             self._set_feedback(settings.get("feedback", self._feedback))
 
-    def announce(self, trial: Trial, session: str) -> None:
+    def announce(self, trial: PlannedTrial, session: str) -> None:
         """See System: sets the parameters below /coglab/trial: study, participant, condition and session for recorders,
         study_folder and block for the console's questionnaires."""
         import rospy

@@ -64,7 +64,7 @@ SCHEMA = {
 
 
 @dataclass(frozen=True)
-class Trial:
+class PlannedTrial:
     """One trial of the plan: handovers of one participant under one condition."""
 
     number: int
@@ -117,16 +117,16 @@ class Study:
     own: OwnFiles
     """primitives and objects of the study's own"""
 
-    def trials(self) -> list[Trial]:
+    def trials(self) -> list[PlannedTrial]:
         """The whole plan, participant by participant."""
-        found: list[Trial] = []
+        found: list[PlannedTrial] = []
         for index, participant in enumerate(self.participants):
             shown = order_of(list(self.conditions), self.blocks, self.order, self.seed + index)
             for place, condition in enumerate(shown):
                 block = place // len(self.conditions)
                 for repetition in range(self.repetitions):
                     found.append(
-                        Trial(
+                        PlannedTrial(
                             len(found) + 1,
                             participant,
                             block + 1,

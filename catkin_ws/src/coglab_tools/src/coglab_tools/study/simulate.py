@@ -20,7 +20,7 @@ from coglab_py.packages import package_path
 
 from coglab_tools.study import settings as condition_settings
 from coglab_tools.study.own_files import OBJECTS, PRIMITIVES, OwnFiles
-from coglab_tools.study.plan import Study, Trial
+from coglab_tools.study.plan import PlannedTrial, Study
 
 PACKAGES = (
     "coglab", "coglab_controllers", "coglab_objects", "coglab_perception", "coglab_py", "coglab_sim", "coglab_smach",
@@ -44,7 +44,7 @@ class Job:
     """Data of one trial for a worker."""
 
     study: str
-    trial: Trial
+    trial: PlannedTrial
     actions: tuple[str, ...]
     object_id: str
     settings: Mapping[str, Any]
@@ -55,7 +55,7 @@ class Job:
     identity: Mapping[str, Any]
 
 
-def job_of(study: Study, trial: Trial) -> Job:
+def job_of(study: Study, trial: PlannedTrial) -> Job:
     """The job for one trial of a study."""
     return Job(
         study.name,
@@ -168,7 +168,7 @@ def _rest(world: Any, limit: float = 20.0) -> None:
         world.step(0.05)
 
 
-def rows_of(trial: Trial, job: Job, record: Any, failure: str = "") -> list[dict[str, Any]]:
+def rows_of(trial: PlannedTrial, job: Job, record: Any, failure: str = "") -> list[dict[str, Any]]:
     """A row per handover that was begun. ``failure``: reason of a last handover without a result."""
     from coglab_tools.study.measures import measures_of
 
@@ -188,7 +188,7 @@ def rows_of(trial: Trial, job: Job, record: Any, failure: str = "") -> list[dict
     return rows
 
 
-def _head(trial: Trial, job: Job, place: int) -> dict[str, Any]:
+def _head(trial: PlannedTrial, job: Job, place: int) -> dict[str, Any]:
     return {
         "trial": trial.number,
         "participant": trial.participant,
