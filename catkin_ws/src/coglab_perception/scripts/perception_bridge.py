@@ -20,7 +20,7 @@ import numpy as np
 import rospy
 import tf2_ros
 from coglab_msgs.srv import ListObjects
-from coglab_perception.frames import FrameNames
+from coglab_perception.frames import CLOCK_TOLERANCE, FrameNames
 from coglab_perception.ros_services import PerceptionServices
 from coglab_perception.sights import Board, Sight, Sights
 from coglab_perception.tf_listener import TfListener
@@ -33,7 +33,6 @@ from geometry_msgs.msg import PoseStamped
 from visualization_msgs.msg import Marker, MarkerArray
 
 TF_PERIOD = 0.01  # s between two reads of the tracker's tf frames
-AHEAD = 0.05  # s, largest difference of synchronised clocks
 DATABASE_WAIT = 60.0  # s
 QUIET = 5.0  # s between two warnings about the same frame
 BOARD_MOVED = 1e-3  # m and rad; a board that moves more is broadcast again
@@ -134,7 +133,7 @@ class BridgeNode:
     def _pass_on(self, source: Source, stamp: rospy.Time, pose: Pose) -> None:
         now = time.monotonic()
         captured = self.mapping.captured(self.stamps.steady(stamp), now)
-        if captured > now + AHEAD:
+        if captured > now + CLOCK_TOLERANCE:
             self._warn(source.frame, f"a pose is {captured - now:.2f} s from the future; use stamp: arrival")
             return
         if now - captured > source.largest_age:

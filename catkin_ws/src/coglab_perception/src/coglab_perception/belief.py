@@ -19,10 +19,10 @@ import numpy as np
 from coglab_py.pose import length
 
 from .carried import CarriedObject, CarriedSettings
+from .frames import CLOCK_TOLERANCE
 from .reach_bank import Prediction, ReachBank, ReachSettings
 from .recogniser import CLOCK_JUMP, PatternEnd
 
-AHEAD = 0.05  # s, largest difference of synchronised clocks; observations with a later stamp are ignored
 ROOM = 100.0  # m, upper bound of each coordinate of a hand
 GONE = 0.05  # probability of a motion toward a handover below which the hand's return is not a withdrawal
 EXTRAPOLATED = 0.10  # s for which the hand's motion is extrapolated, for an object observed after the hand
@@ -390,4 +390,4 @@ def _stamp_of(seen: tuple[float, np.ndarray]) -> float:
 def _usable(stamp: float, position: np.ndarray, now: float) -> bool:
     """True if an observation is finite, within a room, and not from the future."""
     fits = position.shape == (3,) and all(abs(value) < ROOM for value in position.tolist())
-    return math.isfinite(stamp) and stamp <= now + AHEAD and fits
+    return math.isfinite(stamp) and stamp <= now + CLOCK_TOLERANCE and fits

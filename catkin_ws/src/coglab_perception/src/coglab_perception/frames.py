@@ -10,6 +10,8 @@ from coglab_py.yaml_file import YamlError, read
 
 AHEAD = "_ahead"
 """suffix of the frame at the predicted place of a tracked frame at the handover"""
+CLOCK_TOLERANCE = 0.05
+"""s, largest difference of synchronised clocks: a later stamp is from the future, and is refused"""
 
 
 class FramesError(ValueError):

@@ -7,7 +7,8 @@ import tf2_ros
 from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
 
-AHEAD = 0.05  # s, largest difference of synchronised clocks
+from .frames import CLOCK_TOLERANCE
+
 LARGEST = 2.0**32 - 1.0  # s; the C++ part of tf2 ends the process at a larger stamp, which secs and nsecs can form
 
 
@@ -26,7 +27,7 @@ class TfListener(tf2_ros.TransformListener):
         return list(self._moving)
 
     def callback(self, data: TFMessage) -> None:
-        limit = min(rospy.get_time() + AHEAD, LARGEST)
+        limit = min(rospy.get_time() + CLOCK_TOLERANCE, LARGEST)
         data.transforms = [
             each for each in data.transforms if 0.0 <= each.header.stamp.to_sec() <= limit and self._allowed(each)
         ]
