@@ -56,7 +56,8 @@ class GoalPath : public ::testing::Test {
   /// Cycles with a poll each; much more of them than frames, as on a robot.
   void tick(int cycles = 1) {
     for (int i = 0; i < cycles; ++i) {
-      robot_.now_ns = steadyNow() - static_cast<std::int64_t>(1e9 * robot_.period);
+      robot_.sample.controller_ns = robot_.now_ns =
+          steadyNow() - static_cast<std::int64_t>(1e9 * robot_.period);
       robot_.tick();
     }
   }
