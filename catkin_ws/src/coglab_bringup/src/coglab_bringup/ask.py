@@ -44,10 +44,10 @@ def delivery_name(word: str) -> str:
 def ask_parser(command: str) -> Parser:
     """./coglab start, status, hold, stop"""
     about = {
-        "start": "Waits for the hub, then starts an action; by default takes from the person, or gives back.",
-        "status": "State, held object and reason, of the running system.",
-        "hold": "Brakes and latches; ./coglab start reset goes on.",
-        "stop": "STOP: brakes, latches and ends the action; ./coglab start reset goes on.",
+        "start": "Waits until the robot is ready, then starts an action: by default it takes from the person, or gives back.",
+        "status": "Shows the robot's state, the object in its hand, and why it stands still.",
+        "hold": "Brakes the arm and blocks its motion until ./coglab start reset.",
+        "stop": "Brakes the arm, blocks its motion until ./coglab start reset, and ends the running action.",
     }[command]
     parser = Parser(prog=f"coglab {command}", description=about)
     if command == "start":
@@ -71,7 +71,7 @@ def ask_parser(command: str) -> Parser:
             nargs="?",
             type=delivery_name,
             metavar="delivery:=NAME",
-            help="delivery of the object's file: how it is given",
+            help="how the object is given: a delivery of its file",
         )
         parser.add_argument(
             "--wait", type=float, default=90.0, metavar="S", help="longest wait while no node starts, s (default 90)"
