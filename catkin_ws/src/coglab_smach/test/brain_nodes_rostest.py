@@ -27,6 +27,7 @@ from coglab_msgs.msg import (
     Transition,
 )
 from coglab_msgs.srv import ArmContact, Learn, LearnMotion, Start
+from coglab_py.action_client import ActionClient
 from coglab_smach.kinematics.reachability import default_arm, home_posture, position_jacobian
 from sensor_msgs.msg import JointState
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
@@ -220,7 +221,7 @@ class BrainNodes(unittest.TestCase):
         last = rospy.wait_for_message("/coglab/handover_results", HandoverResult, LIMIT)
         self.assertEqual((last.action, last.reason, last.success), (kind, reason, False))
         self.assertLess(abs(last.ended.to_sec() - time.time()), 2 * LIMIT, "times are of the wall clock")
-        client = actionlib.SimpleActionClient("/coglab/handover", HandoverAction)
+        client = ActionClient("/coglab/handover", HandoverAction)
         self.assertTrue(client.wait_for_server(rospy.Duration(LIMIT)))
         state = client.send_goal_and_wait(HandoverGoal(action="take", object_id="mug"), rospy.Duration(LIMIT))
         result = client.get_result()

@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-import actionlib
 import rospy
 from actionlib.simple_action_client import SimpleGoalState
 from coglab_msgs.msg import (
@@ -23,6 +22,7 @@ from coglab_msgs.msg import (
     HandPreshapeGoal,
     HandStatus,
 )
+from coglab_py.action_client import ActionClient
 from coglab_py.steady import server_is_there
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -57,9 +57,7 @@ class HandClient:
         self._fault = rospy.Publisher(f"{cell}/hand_fault", String, queue_size=5)
         self._contact = rospy.Publisher(f"{cell}/finger_contact", FingerContact, queue_size=5)
         self.stop_service = rospy.ServiceProxy(f"{hand}/stop", Trigger)
-        self.clients = {
-            name: actionlib.SimpleActionClient(f"{hand}/{name}", types[0]) for name, types in ACTIONS.items()
-        }
+        self.clients = {name: ActionClient(f"{hand}/{name}", types[0]) for name, types in ACTIONS.items()}
 
     def _on_status(self, status: HandStatus) -> None:
         self.status = status
