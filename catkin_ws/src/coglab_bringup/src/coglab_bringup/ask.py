@@ -44,7 +44,7 @@ def delivery_name(word: str) -> str:
 def ask_parser(command: str) -> Parser:
     """./coglab start, status, hold, stop"""
     about = {
-        "start": "Waits until the robot is ready, then starts an action: ACTION, or taking from the person, or giving back.",
+        "start": "Waits until the robot is ready, then starts an action; by default it takes, or gives back.",
         "status": "Shows the robot's state, the object in its hand, and why it stands still.",
         "hold": "Brakes the arm and blocks its motion until ./coglab start reset.",
         "stop": "Brakes the arm, blocks its motion until ./coglab start reset, and ends the running action.",
