@@ -75,7 +75,7 @@ if __name__ == "__main__":
 """
 
 
-def test_a_process_that_dies_while_its_caller_is_stopped_is_not_missed(tmp_path):
+def test_a_death_while_the_caller_is_stopped_is_not_missed(tmp_path):
     """A busy computer may not run the caller while a job begins and dies."""
     program = tmp_path / "caller.py"
     program.write_text(CALLER)

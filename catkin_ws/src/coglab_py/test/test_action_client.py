@@ -32,7 +32,7 @@ def quick_server(monkeypatch):
         thread.join(60.0)
 
 
-def test_a_result_that_comes_while_the_goal_is_sent_is_not_missed(quick):
+def test_a_result_during_send_goal_is_not_missed(quick):
     ended = threading.Event()
     quick.send_goal("goal", done_cb=lambda status, result: ended.set())
     assert ended.wait(60.0) and quick.simple_state == SimpleGoalState.DONE
