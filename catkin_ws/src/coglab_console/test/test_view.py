@@ -119,7 +119,7 @@ def test_a_transition_belongs_to_the_phase_that_has_ended(seen):
     assert events == [("machine", "now: reaches", "info", "waits until it is offered")]
     reason = "the arm is blocked"
     told = Transition(path=path, from_state="approach", outcome="failed", to_state="recover", reason=reason)
-    told.causes = ["hold is latched; send reset"]
+    told.causes = ["hold is latched"]
     send("coglab/transitions", told)
     words = "the arm is blocked, because hold is latched (reaches: failed; now: recovers)"
     assert events[1:] == [("machine", words, "warning", "reaches")]

@@ -154,7 +154,7 @@ def test_it_stands_at_its_start_and_says_so(robot: Robot) -> None:
     )
     assert (state.power, state.motion_allowed, state.hold_latched, state.motion_epoch) == (0x7F, False, False, 0)
     assert state.reason_code == ReasonCode.NOT_IN_COMMAND_MODE and state.cycle_time == PERIOD
-    assert "rosservice call /lwr/command start" in state.reason
+    assert state.reason and state.next_event == "start"
     known = len(robot.states)
     wait_until(lambda: len(robot.states) > known + 4, "the state that is told again")
     again = [s.header.stamp.to_sec() for s in robot.states[-4:]]

@@ -36,7 +36,7 @@ from coglab_smach.context.context import Context
 from coglab_smach.context.holding import HoldingMemory
 from coglab_smach.context.journal import NOTHING_FAILED, ActionRecord, Journal, TransitionRecord
 from coglab_smach.context.master_state import MasterState, StateWatch
-from coglab_smach.context.requests import ask_for, command
+from coglab_smach.context.requests import ask_for
 from coglab_smach.kinematics.board_room import BoardRoom
 from coglab_smach.kinematics.reachability import solve
 from coglab_smach.machines import build_master
@@ -181,7 +181,7 @@ class MasterNode:
                     "STOP is latched in the machine, but the LWR interface did not answer "
                     "within 2 s: use the emergency stop of the robot",
                 )
-            return TriggerResponse(True, f"STOP: {pending.result()}; to go on {command('reset')}")
+            return TriggerResponse(True, f"STOP: {pending.result()}")
         except Exception as error:
             return TriggerResponse(False, f"STOP is latched in the machine, but: {error}")
 

@@ -23,9 +23,9 @@ def test_a_hold_in_a_hub_is_shown_and_needs_a_reset(with_object):
         t.cell.arm.held = True  # somebody sent 'hold' directly to the robot
         t.wait_hub("stopped", limit=2.0)
         why = t.ctx.journal.why()
-        assert t.ctx.journal.newest_failure().code == ReasonCode.HELD and "./coglab start reset" in why
+        assert t.ctx.journal.newest_failure().code == ReasonCode.HELD and "hold is latched" in why
         ok, message, _ = t.ctx.requests.submit("take", "mug")
-        assert not ok and "./coglab start reset" in message
+        assert not ok and "reset" in message
         assert t.cell.called()[before:] == [], "something moved in a hub that is blocked"
         t.start("reset", "")
         t.wait_hub(hub)
@@ -157,7 +157,7 @@ def test_a_restarted_brain_without_a_note_needs_the_objects_name(tmp_path):
     def script(t):
         t.wait_hub("wait_with_object")
         ok, message, code = t.ctx.requests.submit("put", "")
-        assert not ok and code == ReasonCode.OBJECT_UNKNOWN and message.endswith("./coglab start put OBJECT")
+        assert not ok and code == ReasonCode.OBJECT_UNKNOWN and "object_id" in message
         t.start("put", "elephant")
         t.wait_hub("wait_with_object")
         refused = [r for r in t.ctx.journal.transitions if r.outcome == "refused"][-1]

@@ -58,7 +58,7 @@ def test_deadlines_are_published_in_ros_time(master):
 def test_stop_is_latched_whatever_the_arm_answers(master):
     master.hold = Ready("held")
     answer = master.on_stop(None)
-    assert answer.success and "held" in answer.message and answer.message.endswith("./coglab start reset")
+    assert answer.success and "held" in answer.message
     master.hold = Polled(lambda: master.now > 101.0, lambda: "held")
     assert master.on_stop(None).success
     master.hold, begin = Polled(lambda: False, lambda: None), master.now

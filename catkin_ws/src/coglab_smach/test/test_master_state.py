@@ -2,7 +2,6 @@
 
 import json
 import math
-import re
 
 import pytest
 from coglab_msgs.msg import ReasonCode
@@ -37,14 +36,14 @@ def test_the_reason_is_published_until_the_operator_acts():
         t.wait_hub("stopped")
         stopped = t.shown[-1]
         assert stopped.state == "/coglab_master/stopped" and stopped.in_hub and stopped.actions == ("reset",)
-        assert stopped.reason_code == ReasonCode.HELD and stopped.why.endswith("./coglab start reset")
+        assert stopped.reason_code == ReasonCode.HELD and "hold is latched" in stopped.why
         # Somebody ends the hold directly at the robot: the machine still waits for the operator's reset.
         t.cell.arm.held = False
         t.clock.sleep(1.0)
         assert t.ctx.requests.hub() == "stopped"
         refused = t.ask("initialise")
         assert not refused.ok and refused.code == ReasonCode.WRONG_STATE
-        assert refused.message.endswith("./coglab start reset")
+        assert "stopped takes reset" in refused.message
         assert t.ask("reset").ok
         t.wait_hub("wait_without_object")
         assert t.shown[-1].why == "" and t.shown[-1].reason_code == 0
@@ -201,13 +200,14 @@ def held_by_the_hub(t):
         (held_by_the_hub, ReasonCode.OBJECT_UNKNOWN, "'mug'"),
     ],
 )
-def test_every_refusal_has_a_reason_and_ends_with_a_command(refuse, code, words):
+def test_a_refusal_has_a_reason_and_names_no_shell_command(refuse, code, words):
     trial = Watched()
 
     def script(t):
         t.wait_hub("wait_without_object")
         refused = refuse(t)
         assert not refused.ok and refused.code == code and words in refused.message, refused
-        assert re.search(r"\./coglab start \w+( \w+)?( or \./coglab start \w+)*$", refused.message), refused
+        # Python and the console show the same sentence. A command of the shell would be wrong there.
+        assert "./coglab" not in refused.message, refused
 
     trial.run(script)

@@ -136,7 +136,7 @@ def test_stop_ends_a_state_unless_it_ignores_stop(deaf, outcome):
     _, _, record, seconds = walked(work, prepare, ignores_stop=deaf)
     assert record.outcome == outcome and seconds == pytest.approx(1.0 if deaf else 0.0)
     if not deaf:
-        assert "the test" in record.reason and record.reason.endswith("./coglab start reset")
+        assert "the test" in record.reason
         assert record.code == ReasonCode.STOP_LATCHED
 
 

@@ -96,8 +96,7 @@ class LwrNode(unittest.TestCase):
             self.events.publish("hold")
             state = self.wait_state("holding")
             self.assertTrue(state.hold_latched)
-            self.assertTrue(state.reason.endswith("rosservice call /lwr/command reset"), state.reason)
-            self.assertEqual(state.reason_code, ReasonCode.HELD)
+            self.assertEqual((state.reason_code, state.next_event), (ReasonCode.HELD, "reset"))
             answered = self.robot.answered
             wait_for(lambda: self.robot.answered > answered + 100 and max(self.robot.steps[-50:]) < 1e-9, "rest")
             held = self.robot.position[0]

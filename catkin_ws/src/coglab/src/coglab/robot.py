@@ -694,7 +694,7 @@ class Robot:
                 ) from None
         if self._resettable():
             why = self._cell.state().why
-            raise Refused(f"{what} is refused: {_for_python(why) or 'stopped'}; call robot.reset()", 601)
+            raise Refused(f"{what} is refused: {why or 'stopped'}; call robot.reset()", 601)
 
     def _resettable(self) -> bool:
         return bool({"reset", "initialise"} & set(self._cell.state().actions))
@@ -709,7 +709,7 @@ class Robot:
             if answer.ok:
                 return action
             if self._cell.clock() >= end:
-                raise Refused(_for_python(answer.message), answer.code)
+                raise Refused(answer.message, answer.code)
             self._pause(0.1)
 
     def _in_order(self) -> bool:
@@ -730,7 +730,7 @@ class Robot:
             raise Refused(self._wrong_hub(name), ReasonCode.WRONG_STATE)
         answer = cell.submit(action, object_id or "")
         if not answer.ok:
-            raise Refused(_for_python(answer.message), answer.code)
+            raise Refused(answer.message, answer.code)
         found: list[Exchange] = []
 
         def over() -> bool:
@@ -752,7 +752,7 @@ class Robot:
     def _wrong_hub(self, name: str) -> str:
         state = self.state
         if self._resettable():
-            return f"'{name}' is refused: {_for_python(state.why) or 'the robot is stopped'}; call robot.reset()"
+            return f"'{name}' is refused: {state.why or 'the robot is stopped'}; call robot.reset()"
         if name not in self._cell.actions and name not in state.actions:
             known = ", ".join(
                 [*self._cell.actions, *(each for each in state.actions if each not in self._cell.actions)]
@@ -816,11 +816,6 @@ def _raise_refusal(pending: Pending) -> None:
     except PortError as error:
         if error.code < 200:
             raise Refused("; ".join((error.sentence, *error.causes)), error.code) from None
-
-
-def _for_python(sentence: str) -> str:
-    """A sentence of the brain without the command for the shell at its end."""
-    return sentence.partition("; type:")[0].partition("; to go on type:")[0].partition(", type:")[0]
 
 
 def _within_limits(joints: np.ndarray) -> None:

@@ -29,6 +29,7 @@ LONGEST_START = 600.0  # s, longest wait for the hub while nodes still start
 CHANGE_LIMIT = 5.0  # s before an action is refused that the hub does not list: after a hold the list needs a moment
 DEFAULT_ACTIONS = ("exchange_human_to_robot", "exchange_robot_to_human")  # the first one that the hub accepts
 FACTOR_TOPIC = "/coglab_sim/real_time_factor"
+WAYS_OUT = ("reset", "initialise")  # actions that lead out of the states stopped and fault
 SHORT_NAMES = {"receive": "exchange_human_to_robot", "give": "exchange_robot_to_human"}
 OBJECT_PARAMETER = "/coglab_sim/cell/object/id"  # object that the simulated person offers
 
@@ -224,8 +225,9 @@ def status(brain: Brain, _options: argparse.Namespace) -> int:
     factor = brain.factor()
     if factor != 1.0:
         print(f"pace:   the simulated cell runs at {factor:g} of real time: this computer is too busy, or too slow")
-    if brain.state.in_hub and "reset" in brain.state.actions:
-        print("next:   ./coglab start reset")
+    way_out = next((name for name in WAYS_OUT if brain.state.in_hub and name in brain.state.actions), "")
+    if way_out:
+        print(f"next:   when the reason is gone: ./coglab start {way_out}")
     return 0
 
 
@@ -278,7 +280,7 @@ def start(brain: Brain, options: argparse.Namespace) -> int:
             return 0
         if brain.wait_for_state(lambda state: not state.in_hub, 0.5):
             continue  # the hub was left at this moment
-        raise Refused(message)
+        raise Refused(f"{message}; more: ./coglab status")
     state = brain.state.state or "/coglab/state never came"
     raise Refused(f"no hub within {time.monotonic() - begun:.0f} s; the machine is in {state}; more: ./coglab status")
 

@@ -183,8 +183,7 @@ void IdealArmRos::publishState(const IdealArmView& view) {
   message.hold_latched = view.hold_latched;
   message.reason_code = static_cast<std::uint16_t>(coglab_rt::codeOf(block));
   message.reason = coglab_rt::describe(block);
-  const std::string event = coglab_rt::wayOut(block);
-  if (!event.empty()) message.reason += ": rosservice call " + command_.getService() + " " + event;
+  message.next_event = coglab_rt::nextEvent(block);
   message.motion_epoch = view.sample.motion_epoch;
   message.cycle_time = view.sample.cycle_time;
   state_.publish(message);

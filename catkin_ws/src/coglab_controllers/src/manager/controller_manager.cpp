@@ -577,7 +577,7 @@ Answer ControllerManager::motionWelcome(const std::string& controller_id,
     return Answer::refusal(codeOf(now.robot.block),
                            std::string("the robot follows no motion now: ") +
                                coglab_rt::describe(now.robot.block) +
-                               "; see lwr/state, then use lwr/command (reset, start)");
+                               coglab_rt::advice(now.robot.block));
   }
   return {};
 }

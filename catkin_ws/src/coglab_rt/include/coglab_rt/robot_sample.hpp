@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 #include <Eigen/Core>
 
@@ -29,7 +30,7 @@ enum class MotionBlock : std::uint8_t {
   DriveError     ///< a drive reported an error, with or without power; stopped until `start`
 };
 
-/// Text of a MotionBlock for messages to the user.
+/// Cause of a MotionBlock in words; `nextEvent()` ends it.
 inline const char* describe(MotionBlock block) {
   switch (block) {
     case MotionBlock::None:
@@ -37,13 +38,13 @@ inline const char* describe(MotionBlock block) {
     case MotionBlock::Disconnected:
       return "no measurements from the robot controller";
     case MotionBlock::Monitor:
-      return "the robot controller is in monitor mode; send start";
+      return "the robot controller is in monitor mode";
     case MotionBlock::NoPower:
-      return "not all drives have power; check enabling switch and emergency stop, then send start";
+      return "not all drives have power; check enabling switch and emergency stop";
     case MotionBlock::NotStarted:
-      return "command mode without an explicit start; send start";
+      return "command mode without an explicit start";
     case MotionBlock::Held:
-      return "hold is latched; send reset";
+      return "hold is latched";
     case MotionBlock::Stopping:
       return "stop was requested";
     case MotionBlock::Leashed:
@@ -51,26 +52,35 @@ inline const char* describe(MotionBlock block) {
     case MotionBlock::PoorQuality:
       return "the robot controller judged the connection unacceptable: answers were missing or "
              "late; look at answer rate and latency on /diagnostics, relieve this computer or its "
-             "network, then send start";
+             "network";
     case MotionBlock::DriveError:
       return "a drive reported an error; read its message on the pendant, remove the cause, "
-             "acknowledge it there, then send start";
+             "acknowledge it there";
   }
   return "?";
 }
 
-/// The event of `command` that ends the block, such as "start"; empty if there is none.
-inline const char* wayOut(MotionBlock block) {
+/// The event of lwr/command that ends the block when its cause is gone, such as "start"; empty if
+/// there is none.
+inline const char* nextEvent(MotionBlock block) {
   switch (block) {
     case MotionBlock::Monitor:
     case MotionBlock::NoPower:
     case MotionBlock::NotStarted:
+    case MotionBlock::PoorQuality:
+    case MotionBlock::DriveError:
       return "start";
     case MotionBlock::Held:
       return "reset";
     default:
       return "";
   }
+}
+
+/// What to do about the block, for the end of a sentence; empty if no event ends it.
+inline std::string advice(MotionBlock block) {
+  const std::string event = nextEvent(block);
+  return event.empty() ? "" : "; send " + event + " to lwr/command";
 }
 
 /// Data of one measurement for the controllers.

@@ -79,7 +79,7 @@ Diagnosis diagnoseArm(const Snapshot& s, double hot) {
   if (const unsigned drives = s.drive_warning & fri::kAllDrivesOn; drives != 0)
     return {Severity::Warning, "drive warning: " + jointsIn(drives), ReasonCode::DriveWarning};
   const std::string reason = reasonOf(s.sample.block, s.sample.blocking_joint, s.loss);
-  return {Severity::Ok, reason.empty() ? "motion is allowed" : reason,
+  return {Severity::Ok, reason.empty() ? "motion is allowed" : reason + advice(s.sample.block),
           codeOf(s.sample.block, s.loss)};
 }
 
@@ -92,7 +92,8 @@ std::string reasonOf(MotionBlock block, int joint, const CommandModeLoss& loss) 
   std::string reason = describe(block);
   if (block == MotionBlock::Leashed && joint >= 0)
     reason = std::string(kJointNames[joint]) + ": " + reason;
-  const bool lost = block == MotionBlock::Disconnected || std::string(wayOut(block)) == "start";
+  const bool lost = block == MotionBlock::Disconnected || block == MotionBlock::Monitor ||
+                    block == MotionBlock::NoPower || block == MotionBlock::NotStarted;
   if (lost && loss.cause != LossCause::None) reason = describe(loss) + "; now: " + reason;
   return reason;
 }

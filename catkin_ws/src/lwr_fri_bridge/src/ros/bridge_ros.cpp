@@ -335,8 +335,7 @@ void BridgeRos::publishState(const StateView& view) {
   message.hold_latched = view.hold_latched;
   message.reason_code = static_cast<std::uint16_t>(codeOf(view.block, view.loss));
   message.reason = reasonOf(view.block, view.blocking_joint, view.loss);
-  const std::string event = wayOut(view.block);
-  if (!event.empty()) message.reason += ": rosservice call " + command_.getService() + " " + event;
+  message.next_event = nextEvent(view.block);
   message.motion_epoch = view.motion_epoch;
   message.cycle_time = view.cycle_time;
   state_.publish(message);

@@ -76,8 +76,9 @@ void TargetTopic::onMessage(const ros::MessageEvent<const sensor_msgs::JointStat
   if (verdict.fault != TargetFault::None) return countAndSay(verdict, publisher);
   if (now.sample.block != MotionBlock::None) {
     ++not_allowed_;
-    ROS_WARN_THROTTLE(5.0, "lwr: target_joint_states of %s refused: %s", publisher.c_str(),
-                      reasonOf(now.sample.block, now.sample.blocking_joint, now.loss).c_str());
+    ROS_WARN_THROTTLE(5.0, "lwr: target_joint_states of %s refused: %s%s", publisher.c_str(),
+                      reasonOf(now.sample.block, now.sample.blocking_joint, now.loss).c_str(),
+                      advice(now.sample.block).c_str());
     // The leash needs the requested velocity: it is released when no outward motion is requested.
     if (now.sample.block != MotionBlock::Leashed) return;
   }

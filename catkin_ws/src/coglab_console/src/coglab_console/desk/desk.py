@@ -257,7 +257,7 @@ class Desk:
                 "reasons": reasons(now, self.guard, self.experiment.refusals(now)),
                 "guard": {
                     "stop": self.guard.stops,
-                    "cause": self.guard.told(),
+                    "cause": self.guard.told(now.actions if now.in_hub else ()),
                     "lifted": self.guard.lifted,
                     "unacknowledged": self.guard.unacknowledged,
                     "hold": self.guard.needs_hold,

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from .commands import COMMANDS
-from .words import without_advice
+from .words import button
 
 STANDSTILL = ("stopped", "fault")
+WAYS_OUT = ("reset", "initialise")  # actions that end a standstill
 HOLD_TIME = 0.8  # s that a button must be held
 LONGEST_GAP = 0.25  # s between two messages of a held button
 SECOND_THOUGHT = ("feedback", "feedback_order", "contact_learn", "contact_arm", "objects_reload")
@@ -41,11 +42,12 @@ class MotionGuard:
         self.cause, self.unacknowledged, self.needs_hold, self.lifted = cause, True, True, False
         self.stops += 1
 
-    def told(self) -> str:
-        """Text of the page about the newest stop."""
-        if not self.lifted:
-            return self.cause
-        return f"This stop is over, it was lifted without this page: {without_advice(self.cause) or 'no reason given'}"
+    def told(self, actions: Sequence[str] = ()) -> str:
+        """Text of the page about the newest stop. `actions`: those that the state machine takes now."""
+        if self.lifted:
+            return f"This stop is over, it was lifted without this page: {self.cause or 'no reason given'}"
+        press = " or ".join(button(name) for name in actions if name in WAYS_OUT)
+        return f"{self.cause}; when that is over, press {press}" if self.cause and press else self.cause
 
     def observe(self, stopped: bool, cause: str, standstills: int = 0) -> bool:
         """Call this several times a second. `stopped`: the robot stands after a stop or fault; `standstills`: see

@@ -95,12 +95,9 @@ OUTCOMES = {
     "preempted": "broken off",
     "refused": "refused",
 }
-_LONG = sorted((name for name in PHASES if "_" in name), reverse=True)  # names without "_" are ordinary words
-_NAMES = re.compile(rf"(?<![\w/])'?({'|'.join(_LONG)})'?(?![\w/])")
-_PRESSED = re.compile(r"(press|or) (initialise|reset|take|put)\b")
-_TYPED = re.compile(r"type: (\./coglab start \w+(?: or \./coglab start \w+)*)")
-_ADVICE = re.compile(r"; when its cause is away, press .*?(?=, because |$)")
-_CALLED = re.compile(r"(; send \w+)?: rosservice call \S+ \w+|; send (reset|start)\b")
+# Names without "_" are ordinary words, unless they stand in quotation marks.
+_LONG = sorted((name for name in PHASES if "_" in name), reverse=True)
+_NAMES = re.compile(rf"(?<![\w/])'?({'|'.join(_LONG)})'?(?![\w/])|'({'|'.join(BUTTONS)})'")
 
 
 def phase(state: str) -> str:
@@ -135,16 +132,8 @@ def outcome(name: str) -> str:
 
 
 def plain(sentence: str) -> str:
-    """A sentence of the brain or of the arm for the page: words for states and actions, and the button to press instead
-    of the command to type."""
-    pressed = _TYPED.sub(lambda found: "press " + found[1].replace("./coglab start ", ""), _CALLED.sub("", sentence))
-    pressed = _PRESSED.sub(lambda found: f"{found[1]} {BUTTONS[found[2]]}", pressed)
-    return _NAMES.sub(lambda found: BUTTONS.get(found[1]) or f"'{PHASES[found[1]]}'", pressed)
-
-
-def without_advice(sentence: str) -> str:
-    """The sentence of `plain` without its advice."""
-    return _ADVICE.sub("", sentence)
+    """A sentence of the brain or of the arm with the page's words for states and actions."""
+    return _NAMES.sub(lambda found: BUTTONS.get(found[1] or found[2]) or f"'{PHASES[found[1]]}'", sentence)
 
 
 def transition(path: str, before: str, how: str, after: str, reason: str = "") -> str:

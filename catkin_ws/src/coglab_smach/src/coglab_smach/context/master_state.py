@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from coglab_smach.context.context import Context
-from coglab_smach.context.requests import COMMAND, command
 
 
 @dataclass(frozen=True)
@@ -56,8 +55,8 @@ class StateWatch:
         ctx = self._ctx
         failure, hub = ctx.journal.newest_failure(), ctx.requests.hub()
         why = str(failure)
-        if hub in ("stopped", "fault") and COMMAND not in why:
-            why = f"{why or f'the machine is in {hub}'}; to go on {command(*ctx.requests.allowed())}"
+        if hub in ("stopped", "fault"):
+            why = why or f"the machine is in {hub}"
         active = ctx.journal.active()  # of several parallel states, the one that started last is shown
         wait = ctx.journal.wait()
         return MasterState(

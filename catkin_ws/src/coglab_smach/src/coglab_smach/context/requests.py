@@ -16,16 +16,10 @@ if TYPE_CHECKING:
     from coglab_smach.context.context import Context
 
 DATABASE_WAIT = 2.0  # s, time limit of the object database for a trigger
-COMMAND = "./coglab start"  # command that requests an action
 SHORT_NAMES = {"receive": "exchange_human_to_robot", "give": "exchange_robot_to_human"}
 """Short names of actions in a trigger."""
 HUBS = ("wait_without_object", "wait_with_object")
 """States of the master machine that wait for a trigger."""
-
-
-def command(*actions: str) -> str:
-    """Returns the command that the operator must type, for the end of a sentence."""
-    return "type: " + " or ".join(f"{COMMAND} {action}" for action in actions)
 
 
 @dataclass(frozen=True)
@@ -88,28 +82,25 @@ class Requests:
         if not self._hub:
             return TriggerReply(
                 False,
-                f"'{action}' refused: the machine is not in a hub now; to wait until it is in "
-                f"wait_without_object or wait_with_object, {command(action)}",
+                f"'{action}' refused: the machine is not in a hub now; request it again in {' or '.join(HUBS)}",
                 ReasonCode.WRONG_STATE,
             )
         if action not in self._allowed:
             return TriggerReply(
                 False,
-                f"'{action}' refused: {self._hub} takes {', '.join(self._allowed)}; {command(*self._allowed)}",
+                f"'{action}' refused: {self._hub} takes {' or '.join(self._allowed)}",
                 ReasonCode.WRONG_STATE,
             )
         if self._names_object and not object_id:
             return TriggerReply(
                 False,
-                f"'{action}' refused: the hand holds an object that is not known after a restart; "
-                f"name its object_id, {command(action)} OBJECT",
+                f"'{action}' refused: the hand holds an object that is not known after a restart; name its object_id",
                 ReasonCode.OBJECT_UNKNOWN,
             )
         if self._request is not None:
             return TriggerReply(
                 False,
-                f"'{action}' refused: '{self._request.action}' was requested a moment ago; "
-                f"when that is over, {command(action)}",
+                f"'{action}' refused: '{self._request.action}' was requested a moment ago; wait until it is over",
                 ReasonCode.BUSY,
             )
         return None
@@ -175,12 +166,12 @@ def ask_for(
                 return TriggerReply(
                     False,
                     f"'{action}' refused: object '{wanted}' is not in the database; it has: "
-                    f"{', '.join(objects)}; {command(action)} {objects[0] if objects else 'OBJECT'}",
+                    f"{', '.join(objects) or 'none'}",
                     ReasonCode.OBJECT_UNKNOWN,
                 )
         refusal = _delivery_refusal(ctx, action, object_id, delivery) if delivery else None
     except PortError as error:
-        again = f"when the database answers, {command(action)} {wanted or ''}".rstrip()
+        again = "request it again when the database answers"
         return TriggerReply(False, f"'{action}' refused: {error.sentence}; {again}", error.code)
     return refusal or ctx.requests.submit(action, object_id, source, delivery)
 
@@ -200,8 +191,7 @@ def _delivery_refusal(ctx: Context, action: str, object_id: str, delivery: str) 
         return None
     return TriggerReply(
         False,
-        f"'{action}' refused: '{held}' has no delivery '{delivery}'; it has: {', '.join(known)}; "
-        f"{command(action)} {held} delivery:={known[0]}",
+        f"'{action}' refused: '{held}' has no delivery '{delivery}'; it has: {', '.join(known)}",
         ReasonCode.UNKNOWN_NAME,
     )
 

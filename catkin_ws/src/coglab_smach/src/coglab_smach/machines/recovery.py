@@ -10,7 +10,6 @@ from coglab_msgs.msg import ReasonCode, Say
 from coglab_smach.context.context import Context
 from coglab_smach.context.grip import Grip
 from coglab_smach.context.holding import UNKNOWN
-from coglab_smach.context.requests import command
 from coglab_smach.ports.interfaces import Verdict
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.arm import HomeRobot
@@ -46,16 +45,13 @@ class EndMotion(CoglabState):
     def run(self, ud: Any) -> str:
         if self.ctx.stop.pressed():
             ud.grip.stop()
-            self.reason = f"STOP: {self.ctx.stop.reason}; the hand keeps its object; to go on {command('reset')}"
+            self.reason = f"STOP: {self.ctx.stop.reason}; the hand keeps its object"
             return "stopped"
         self.ctx.contact.disarm()
         trouble = "" if arm_is_blocked(self).ok else end_motion(self.ctx, "recovery after a failure")
         blocked = arm_is_blocked(self)
         if blocked.ok:
-            self.reason = (
-                f"the arm is blocked: {blocked.why}; the hand keeps its object; when its cause is away, "
-                f"{command('reset')}"
-            )
+            self.reason = f"the arm is blocked: {blocked.why}; the hand keeps its object"
             self.ctx.journal.stopped(self.reason, blocked.why, blocked.code)
             return "stopped"
         if trouble:
@@ -172,7 +168,7 @@ class SecureHand(CoglabState):
             self.reason = "; ".join((error.sentence, *error.causes))
 
     def _stay(self, why: str) -> str:
-        self.reason = f"the arm stays where it is: {why}; free the object, then {command('reset')}"
+        self.reason = f"the arm stays where it is: {why}; free the object"
         self.ctx.journal.stopped(self.reason, self.reason, ReasonCode.NOT_RELEASED)
         return "stopped"
 

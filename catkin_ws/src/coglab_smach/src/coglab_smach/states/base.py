@@ -16,7 +16,6 @@ from coglab_smach.context.context import Context
 from coglab_smach.context.grip import Grip
 from coglab_smach.context.journal import Failure, Wait
 from coglab_smach.context.parts import built, type_name
-from coglab_smach.context.requests import command
 from coglab_smach.ports.pending import Pending, PortError
 from coglab_smach.states.motion import end_motion
 
@@ -177,7 +176,7 @@ class CoglabState(smach.State):
         if self.asked_to_end():
             raise Interrupted(False, f"{self.label} was preempted")
         if self.ctx.stop.pressed() and not self.ignores_stop:
-            raise Interrupted(True, f"STOP: {self.ctx.stop.reason}; to go on {command('reset')}")
+            raise Interrupted(True, f"STOP: {self.ctx.stop.reason}")
 
     def wait_for(
         self,

@@ -10,7 +10,7 @@ from coglab_msgs.msg import ReasonCode
 
 from coglab_smach.context.context import Context
 from coglab_smach.context.holding import UNKNOWN
-from coglab_smach.context.requests import Request, command
+from coglab_smach.context.requests import Request
 from coglab_smach.ports.pending import PortError
 from coglab_smach.states.base import CoglabState, Interrupted
 
@@ -33,7 +33,7 @@ class WaitForTrigger(CoglabState):
         try:
             self.wait_for(
                 lambda: self.ctx.requests.take() is not None,
-                f"trigger '{self.action}' ({command(self.action)})",
+                f"the operator's request '{self.action}'",
                 code=ReasonCode.WAITS_FOR_OPERATOR,
             )
         finally:
@@ -134,7 +134,7 @@ class Hub(CoglabState):
         if waited <= self.ctx.config.number("hub.blocked_time") or silent:
             return False
         self._code = allowed.code
-        self.reason = f"the arm is blocked: {allowed.why}; when its cause is away, {command('reset')}"
+        self.reason = f"the arm is blocked: {allowed.why}"
         return True
 
     def _learn_what_is_held(self, ud: Any, request: Request) -> str:
@@ -150,7 +150,7 @@ class Hub(CoglabState):
             entry = self.await_pending(self.ctx.database.get_object(ud.object_id), f"entry of '{ud.object_id}'", 5.0)
         except PortError as error:
             self.ctx.holding = ud.object_id = UNKNOWN
-            return f"'{request.action}' refused: {error.sentence}; {command(request.action)} OBJECT"
+            return f"'{request.action}' refused: {error.sentence}; name its object_id"
         ud.object_entry = entry
         ud.grasp_name = entry["default_grasp"]
         ud.grasp = entry["grasps"][ud.grasp_name]
