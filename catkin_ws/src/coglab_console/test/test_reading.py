@@ -20,8 +20,7 @@ SWITCHED = (
 )
 FELL = (
     "the arm does not follow any more: command mode was lost because the robot controller was not run for "
-    "259 ms (load), because the robot controller changed its quality from PERFECT to UNACCEPTABLE; when its cause is "
-    "away, press Go on"
+    "259 ms (load), because the robot controller changed its quality from PERFECT to UNACCEPTABLE"
 )
 
 

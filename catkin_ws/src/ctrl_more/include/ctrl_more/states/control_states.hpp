@@ -14,9 +14,6 @@
 
 namespace ctrl_more {
 
-/// Control mode in which the references are executed.
-enum class ControlMode : std::uint8_t { Task, JointPosition, JointVelocity, JointTorque };
-
 /// References and control efforts. Motion controllers write them and feedback controllers modify
 /// them (Ctrl-MORE paper, section IV-B).
 ///
@@ -222,10 +219,6 @@ class ControlStates {
   double controlPeriod() const { return period_s_; }
   /// Sets the control period [s]; refused unless 0 < period < 1.
   Status setControlPeriod(double period_s);
-  /// Control mode in which the references are executed.
-  ControlMode controlMode() const { return mode_; }
-  /// Sets the control mode.
-  void setControlMode(ControlMode mode) { mode_ = mode; }
 
   /// Signals of one container, in order of declaration.
   std::vector<SignalInfo> signals(ControlContainer container) const;
@@ -260,7 +253,6 @@ class ControlStates {
   SignalTable table_;
   int joints_;
   double period_s_;
-  ControlMode mode_ = ControlMode::Task;
 };
 
 }  // namespace ctrl_more
