@@ -185,7 +185,7 @@ class FeedbackController {
 static inline constexpr Abi thisAbi() {
   return abiOf<FeedbackController, RobotStates, ControlStates, ModifiedControlStates, Description,
                RobotSignalUse, ControlSignalUse, GainSpec, SettingSpec, StateSpec, Setup, Numbers<>,
-               Cycle>(5);
+               Cycle>(6);
 }
 
 /// Makes a controller, which the caller owns. The paper's type for its prototypes.
