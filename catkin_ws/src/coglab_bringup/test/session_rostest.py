@@ -16,8 +16,7 @@ import numpy as np
 import rospkg
 import rospy
 import rostest
-from coglab_bringup.handover import READY_LIMIT
-from coglab_msgs.srv import Start
+from coglab_msgs.msg import MasterState
 from handover_rostest import Handover
 from odd_messages import OddMessages
 from rosgraph_msgs.msg import Log
@@ -132,20 +131,18 @@ class Session(Handover):
         found = subprocess.run(["rosnode", "info", "/robot"], capture_output=True, text=True, timeout=60, check=True)
         pid = int(next(line.split()[1] for line in found.stdout.splitlines() if line.startswith("Pid:")))
         os.kill(pid, signal.SIGKILL)
-        start = rospy.ServiceProxy("/coglab/start", Start)
         end = time.monotonic() + 60.0
-        answer = start("put", "")
-        waits = ("start initialise", "start reset")
-        while not any(words in answer.message for words in waits) and time.monotonic() < end:
+        while not {"initialise", "reset"} & set(self.actions()) and time.monotonic() < end:
             time.sleep(0.2)
-            answer = start("put", "")
         why = rospy.ServiceProxy("/coglab/why", Trigger)().message
         self.assertRegex(why, "silent|blocked|follow")
-        end = time.monotonic() + 2 * READY_LIMIT
-        while "start exchange_human_to_robot" not in answer.message and time.monotonic() < end:
-            self.return_to_hub()
-            answer = start("put", "")
-        self.assertIn("start exchange_human_to_robot", answer.message)
+        self.return_to_hub()
+        self.assertIn("exchange_human_to_robot", self.actions())
+
+    @staticmethod
+    def actions():
+        """Actions that the brain accepts now."""
+        return rospy.wait_for_message("/coglab/state", MasterState, 60.0).actions
 
 
 if __name__ == "__main__":

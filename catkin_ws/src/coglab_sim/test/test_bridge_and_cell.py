@@ -88,7 +88,7 @@ def test_losses_beyond_tolerance_end_mirrored_in_monitor_mode(how, seed):
     assert np.abs(wire.commands[-1] - set_point(fields)).max() < 1e-6  # mirrored
     snapshot = wire.bridge.snapshot()
     assert not snapshot["motion_allowed"] and snapshot["fall_backs"] == 1
-    assert snapshot["supervisor"] == "stopped" and "start" in snapshot["reason"]
+    assert snapshot["supervisor"] == "stopped"
     assert snapshot["lost_measurements"] > 0
     before = wire.cell.position.copy()  # it stands, and only a start gets it going again
     wire.run(1.0)
