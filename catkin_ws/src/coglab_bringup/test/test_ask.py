@@ -128,6 +128,10 @@ def test_hold_status_and_reset(brain):
     assert status == 1 and "reset" in output and "hold" in output
     status, output = ask("start", "reset")
     assert status == 0 and brain.started == [("reset", "")], output
+    brain.started.clear()
+    brain.say("/coglab_master/fault", ["initialise"], "the robot is silent")
+    status, output = ask("status")
+    assert status == 0 and "silent" in output and "./coglab start initialise" in output
 
 
 def test_a_short_name_and_a_delivery_reach_the_brain(brain):
