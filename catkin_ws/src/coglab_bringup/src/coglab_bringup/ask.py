@@ -227,7 +227,7 @@ def status(brain: Brain, _options: argparse.Namespace) -> int:
         print(f"pace:   the simulated cell runs at {factor:g} of real time: this computer is too busy, or too slow")
     way_out = next((name for name in WAYS_OUT if brain.state.in_hub and name in brain.state.actions), "")
     if way_out:
-        print(f"next:   when the reason is gone: ./coglab start {way_out}")
+        print(f"next:   when it is safe: ./coglab start {way_out}")
     return 0
 
 

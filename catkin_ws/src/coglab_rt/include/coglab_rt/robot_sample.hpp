@@ -36,7 +36,8 @@ inline const char* describe(MotionBlock block) {
     case MotionBlock::None:
       return "";
     case MotionBlock::Disconnected:
-      return "no measurements from the robot controller";
+      return "no measurements from the robot controller; check its network cable and whether its "
+             "FRI program runs";
     case MotionBlock::Monitor:
       return "the robot controller is in monitor mode";
     case MotionBlock::NoPower:
