@@ -13,8 +13,9 @@ NO_SENTENCES = set(
     """
     action actions activity active_controller active_type affected causes condition control_mode controller
     controller_id controller_ids controller_type controller_types delivery fri_state frame_id from_state hand held_by
-    holding id mode motion name names next_event object_frame object_id object_ids outcome participant path pattern phalanges phase
-    primitive_id profile quality signal source stage state supervisor to_state type units waiting_for yaml
+    holding id mode motion name names next_event object_frame object_id object_ids outcome participant path pattern
+    phalanges phase primitive_id profile quality signal source stage state supervisor to_state type units waiting_for
+    yaml
     """.split()
 )
 """Strings that are a name, one of a few words that the comment lists, or YAML; `causes` stand behind a reason that has
