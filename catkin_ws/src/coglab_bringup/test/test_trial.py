@@ -12,6 +12,8 @@ from coglab_bringup.demo import keep, unfinished
 from coglab_bringup.handover import NotTaken
 from coglab_bringup.trial_recorder import summarise
 from coglab_msgs.msg import ReasonCode
+from coglab_tools.report import page
+from coglab_tools.trial import read
 
 LIMITS = np.full(7, 2.0)
 
@@ -124,8 +126,20 @@ def test_a_result_that_cannot_be_written_leaves_the_old_one_and_a_sentence(tmp_p
     (tmp_path / "result.json").write_text("old")
     problems = []
     keep(problems, tmp_path, "result.json", write)
-    assert len(problems) == 1 and "No space left on device" in problems[0]
+    assert len(problems) == 1 and "No space left on device" in problems[0] and "make room" in problems[0]
     assert [path.name for path in tmp_path.iterdir()] == ["result.json"]
     assert (tmp_path / "result.json").read_text() == "old"
     keep(problems, tmp_path, "result.json", lambda path: path.write_text("new"))
     assert (tmp_path / "result.json").read_text() == "new" and len(problems) == 1
+
+
+def test_only_a_report_that_cannot_be_written_asks_for_room(tmp_path, monkeypatch):
+    """A recording that cannot be read needs no room."""
+    assert demo.report_on([tmp_path / "trial.yaml"], problems := []) == ""
+    assert len(problems) == 1 and str(tmp_path) in problems[0]
+    assert "roslaunch.log" in problems[0] and "room" not in problems[0]
+    monkeypatch.setattr(read, "read_trial", lambda folder: folder)
+    (tmp_path / "report.html").mkdir()  # no file can take its place
+    monkeypatch.setattr(page, "page_of", lambda trial: "")
+    assert demo.report_on([tmp_path / "trial.yaml"], problems := []) == ""
+    assert len(problems) == 1 and "report.html cannot be written" in problems[0] and "make room" in problems[0]

@@ -100,6 +100,9 @@ class PaceWatch:
             )
 
 
+MAKE_ROOM = "make room, or name another folder: --out DIR"
+
+
 def keep(problems: list[str], folder: Path, name: str, write: Callable[[Path], object]) -> None:
     """Write a file completely or not at all: call `write` with a temporary path, then move the result into `folder`.
     A full disk leaves no partial file. If it fails, `problems` receives a sentence."""
@@ -109,7 +112,7 @@ def keep(problems: list[str], folder: Path, name: str, write: Callable[[Path], o
             for file in Path(part).iterdir():
                 file.replace(folder / file.name)
     except OSError as error:
-        problems.append(f"{folder / name} could not be written ({error.strerror or error})")
+        problems.append(f"{folder / name} could not be written ({error.strerror or error}); {MAKE_ROOM}")
 
 
 def commit_of(top: Path) -> str:
@@ -236,7 +239,7 @@ def run(top: Path, options: argparse.Namespace) -> int:
     if page:
         print(f"[coglab] report of the last handover: {page}", flush=True)
     for problem in problems:
-        print(f"[coglab] error: {problem}; make room, or name another folder: --out DIR", file=sys.stderr)
+        print(f"[coglab] error: {problem}", file=sys.stderr)
     return 1 if problems else status
 
 
@@ -249,9 +252,14 @@ def report_on(records: list[Path], problems: list[str]) -> str:
     page = ""
     for folder in [record.parent for record in records]:
         try:
-            page = str(write_report(read_trial(folder), folder / "report.html"))
+            trial = read_trial(folder)
         except CommandError as error:
-            problems.append(str(error))
+            problems.append(f"no report of a handover: {error}; roslaunch.log has what the recorder said")
+            continue
+        try:
+            page = str(write_report(trial, folder / "report.html"))
+        except CommandError as error:
+            problems.append(f"{error}; {MAKE_ROOM}")
     return page
 
 
