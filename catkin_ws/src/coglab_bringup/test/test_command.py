@@ -15,6 +15,7 @@ from test_choose_smach import function
 
 TOP = Path(__file__).resolve().parents[4]
 ABSENT = "coglab-test-no-such-package"
+HERE = platform.freedesktop_os_release().get("VERSION_CODENAME")
 
 
 def run(*command: object, **environment: str) -> subprocess.CompletedProcess:
@@ -109,39 +110,119 @@ def test_wrong_release(checkout):
 
 
 APT_GET = """#!/bin/sh
-umask >"$UMASK_LOG"
+umask >"$LOGS/umask"
 case "$*" in
-  *indextargets*) . /etc/os-release; printf '%s\n' "$VERSION_CODENAME" "$VERSION_CODENAME-updates" $APT_SUITE ;;
-  *install*) echo "E: Unable to correct problems, you have held broken packages."; exit 100 ;;
+  *indextargets*) . /etc/os-release; echo "$VERSION_CODENAME Debian:1.2/this"; printf '%s\n' "$APT_SUITE" ;;
+  *" -s install "*) [ -n "$PLAN" ] && printf "$PLAN\n" ;;
+  *install*) touch "$LOGS/installed"; printf "$REPORT"; echo "E: You have held broken packages."; exit 100 ;;
+  *update*) printf "$UPDATE"; [ -z "$UPDATE" ] ;;
 esac
 """
+APT_CACHE = """#!/bin/sh
+case "$*" in *" show chosen") printf 'Package: chosen\nInstalled-Size: %s\nSize: %s\n' $SIZES ;; esac
+"""
+CHOSEN = "Inst chosen (1-2 Debian:1.2/this [amd64])"
+
+
+def with_fake_apt(checkout, **variables: str) -> tuple[str, str, bool]:
+    """./coglab build with an apt-get that installs nothing: what it prints, its error, whether it began to install."""
+    fakes = {"apt-get": APT_GET, "apt-cache": APT_CACHE, "dpkg": "#!/bin/sh\nprintf '%s' \"$BROKEN\"\n"}
+    for name, text in fakes.items():
+        (checkout / name).write_text(text)
+        (checkout / name).chmod(0o755)
+    script = 'umask 077; for tool in apt-get apt-cache dpkg; do mount --bind "$1/$tool" /usr/bin/$tool; done'
+    script += '; [ -z "$SMALL_VAR" ] || mount -t tmpfs -o size=1m small /var; exec "$1/coglab" build'
+    none = dict.fromkeys(("APT_SUITE", "PLAN", "REPORT", "UPDATE", "BROKEN", "SMALL_VAR"), "")
+    environment = {**none, "SIZES": "1 1", "LOGS": str(checkout), **variables}
+    ended = run("unshare", "--mount", "sh", "-c", script, "sh", checkout, **environment)
+    assert ended.returncode == 1 and (checkout / "umask").read_text() == "0022\n"
+    (error,) = lines_of(ended.stdout)
+    return ended.stdout, error, (checkout / "installed").exists()
 
 
 @needs("unshare", "--mount", "true")
 @pytest.mark.parametrize(
-    "suite, broken, advice",
+    "variables, advice",
     [
-        ("sid", "", "/etc/apt also names sid"),
-        ("", "bash", "dpkg --configure -a"),
-        ("", "", "to go on by hand: apt-get"),
+        ({"APT_SUITE": "sid Debian:$(VERSION)/unstable"}, "/etc/apt also names sid"),
+        ({"BROKEN": "bash"}, "dpkg --configure -a"),
+        ({}, "to go on by hand: apt-get"),
     ],
 )
-def test_packages_that_cannot_be_installed(checkout, suite, broken, advice):
+def test_packages_that_cannot_be_installed(checkout, variables, advice):
     """An incomplete upgrade of Debian or of a package is named; the caller's umask 077 does not affect Debian's
     packages."""
-    for name, text in (("apt-get", APT_GET), ("dpkg", "#!/bin/sh\nprintf '%s' \"$BROKEN\"\n")):
-        (checkout / name).write_text(text)
-        (checkout / name).chmod(0o755)
-    script = (
-        'umask 077; for tool in apt-get dpkg; do mount --bind "$1/$tool" /usr/bin/$tool; done; exec "$1/coglab" build'
+    shown, error, installed = with_fake_apt(checkout, **variables)
+    assert advice in error and "held broken packages" in shown and installed
+
+
+@needs("unshare", "--mount", "true")
+@pytest.mark.parametrize(
+    "suite, source",
+    [
+        ("other Debian:13.1/stable", "Debian:13.1/stable"),
+        ("sid Debian:$(VERSION)/unstable", "Debian:unstable"),
+        ("other-security Debian-Security:13/stable-security", "Debian-Security:13/stable-security"),
+    ],
+)
+def test_packages_of_another_release_are_not_installed(checkout, suite, source):
+    """Else an entry of a later Debian would upgrade half of this machine, and might remove packages."""
+    plan = f"{CHOSEN}\nInst libc6 [2.36-9] (2.41-12 {source} [amd64])"
+    _, error, installed = with_fake_apt(checkout, APT_SUITE=suite, PLAN=plan)
+    assert f"would take 1 from another, such as libc6 from {suite.split()[0]}: " in error and HERE in error
+    assert "/etc/apt" in error and not installed
+
+
+@needs("unshare", "--mount", "true")
+@pytest.mark.parametrize(
+    "suite, source",
+    [
+        ("other Debian:13.1/stable", "Debian:1.2/this"),  # pinned low: apt-get takes nothing of it
+        ("other Debian:13.1/stable", "Debian:13.1/stable, Debian:1.2/this"),  # the same version is in both
+        (f"{HERE}-updates Debian:1-updates/this-updates", "Debian:1-updates/this-updates"),
+        (f"{HERE}-security Debian-Security:1/this-security", "Debian-Security:1/this-security"),
+        ("", "Debian Backports:this-backports"),
+        ("", "packages.of.a.vendor"),
+    ],
+)
+def test_packages_of_this_release_and_of_vendors_are_installed(checkout, suite, source):
+    _, error, installed = with_fake_apt(
+        checkout, APT_SUITE=suite, PLAN=f"Inst libc6 [2.36-9] (2.41-12 {source} [amd64])"
     )
-    log = checkout / "umask"
-    ended = run(
-        *("unshare", "--mount", "sh", "-c", script, "sh", checkout), APT_SUITE=suite, BROKEN=broken, UMASK_LOG=str(log)
-    )
-    assert ended.returncode == 1 and "held broken packages" in ended.stdout
-    (error,) = lines_of(ended.stdout)
-    assert advice in error and log.read_text() == "0022\n"
+    assert installed and "to go on by hand" in error
+
+
+@needs("unshare", "--mount", "true")
+@pytest.mark.parametrize(
+    "sizes, small, message",
+    [
+        ("10240000000 1048576", "", "needs 13000001 MB, and /usr has "),
+        ("0 20971520", "yes", "needs 20 MB, and /var has "),
+    ],
+)
+def test_packages_that_do_not_fit_are_not_installed(checkout, sizes, small, message):
+    """apt-get itself only looks at the room for its downloads."""
+    _, error, installed = with_fake_apt(checkout, PLAN=CHOSEN, SIZES=sizes, SMALL_VAR=small)
+    assert message in error and "make room" in error and not installed
+
+
+NO_SPACE = " cannot copy extracted data for './usr/x' to '/usr/x.dpkg-new': failed to write (No space left on device)"
+
+
+@needs("unshare", "--mount", "true")
+@pytest.mark.parametrize("report", [NO_SPACE, "E: You don't have enough free space in /var/cache/apt/archives/."])
+def test_a_disk_that_fills_while_packages_are_installed_is_named(checkout, report):
+    _, error, installed = with_fake_apt(checkout, PLAN=CHOSEN, REPORT=report + "\n", BROKEN="bash")
+    assert installed and report.strip() in error and "disk is full" in error and "dpkg --configure -a" in error
+
+
+@needs("unshare", "--mount", "true")
+def test_a_source_that_fails_is_named(checkout):
+    """Not only a mirror of Debian may fail."""
+    failed = "E: Failed to fetch https://vendor.example/InRelease  403 Forbidden"
+    shown, error, installed = with_fake_apt(checkout, UPDATE=f"W: an old key\nErr:3 https://vendor.example\n{failed}\n")
+    assert failed in shown and "Debian mirror" not in error and not installed
+    assert "every source in /etc/apt must answer" in error and "network" in error and "run this again" in error
 
 
 PIP_WITHOUT_NETWORK = """#!/bin/sh
@@ -234,7 +315,6 @@ CATKIN_MAKE = """#!/bin/sh
 [ -e build/CMakeCache.txt ] && echo "old build: kept" || echo "old build: gone"
 exit 1
 """
-HERE = platform.freedesktop_os_release().get("VERSION_CODENAME")
 
 
 @needs("unshare", "--mount", "true")
