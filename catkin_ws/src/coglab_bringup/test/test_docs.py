@@ -11,6 +11,7 @@ import pytest
 
 TOP = Path(__file__).resolve().parents[4]
 SOURCES = TOP / "catkin_ws" / "src"
+TESTS = {path.name for path in SOURCES.glob("*/test/**/test_*.*")}
 PAGES = sorted([*TOP.glob("*.md"), *TOP.glob("docs/*.md"), *SOURCES.glob("*/README.md")])
 
 
@@ -50,11 +51,12 @@ def test_links_exist(page: Path):
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(TOP)))
 def test_named_files_exist(page: Path):
-    """Files named with their path from the top of the checkout; NAME and <...> are placeholders."""
+    """Files named with their path from the top of the checkout, and tests; NAME and <...> are placeholders."""
     named = re.findall(r"`((?:catkin_ws/src|docs|docker|benchmarks)/[\w./-]+\.\w+)`", text_of(page))
     made = ("side_sway", "wrist_damper", "_build", "/cup.yaml", "NAME")  # created by the commands on the page
     missing = [name for name in named if not (TOP / name).exists() and not any(part in name for part in made)]
-    assert not missing
+    tests = set(re.findall(r"`(?:[\w.-]+/)*(test_[a-z\d_]+\.\w+)`", text_of(page)))  # of any package
+    assert missing + sorted(tests - TESTS) == []
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(TOP)))
