@@ -48,8 +48,7 @@ class Cell {
   /// after the measurement.
   void receive(const std::uint8_t* bytes, std::size_t size, double latency);
   /// Second: advances one period. `on_time` false: the caller was late, so that a missing answer
-  /// does not count against the PC. `anew` false: the means of forces continue from the period
-  /// before.
+  /// does not count against the PC. `anew` false: keep averaging forces from the previous period.
   const MeasurementBytes& advance(bool on_time = true, bool anew = true);
 
   bool sent() const { return sent_; }

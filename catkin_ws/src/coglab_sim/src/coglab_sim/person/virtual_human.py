@@ -43,7 +43,7 @@ TOLD_PART = 0.4  # weight of the sign "I have it" was heard
 AGAIN = 0.5  # s without enough touch, after which a person with this habit presses again
 REGRIPS = 0.10  # s in which partly opened fingers close again
 LOOSE = 0.5  # grip at which the fingers stop opening until the person feels that the robot carries
-FEELS = 0.5  # s, longest duration of this pause
+RELEASE_PAUSE = 0.5  # s, longest pause with half-open fingers
 SINK_SPEED = 0.03  # m/s, sinking speed of a relaxed arm during the pause
 CARRIES = 0.7  # if the person feels less than this share of the weight, the robot carries
 # Taking
@@ -480,9 +480,9 @@ class VirtualHuman:
         self._checked = self._load_share(seen) < CARRIES and t - self._since > loosened
         if self._checked:
             return
-        if self.participant.relaxes and self._sunk < SINK_SPEED * FEELS:
+        if self.participant.relaxes and self._sunk < SINK_SPEED * RELEASE_PAUSE:
             self._sink(-SINK_SPEED, dt)
-        elif t - self._since > loosened + FEELS:
+        elif t - self._since > loosened + RELEASE_PAUSE:
             self._go("holding", t)
 
     def _sink(self, speed: float, dt: float) -> None:

@@ -21,11 +21,12 @@ MOST_RISES = 8  # rises: the first one, and continuations after the weight or a 
 FOLLOWS = 0.25  # s, shortest time between two closing orders to the fingers
 UNSEEN = 0.4  # s after the person's hand has gone: an unseen object then counts as still in the fingers
 WITH_HAND = 0.2  # m, largest distance between the person's hand and an object that they have taken back
-FALLS = 0.4  # s after which a falling object is far below its place; also the time for which it is looked for
-RECENT = 0.15  # s, oldest sight that counts there
+FALL_TIME = 0.4  # s, time in which a falling object gets far below its place
+SEARCH_TIME = 0.4  # s after that, time in which the person's hand and the object are looked for
+RECENT = 0.15  # s, oldest sight that counts in this search
 SINKING = 3.0  # s, time limit for sinking with the object, and for rising again
-SETTLES = 0.3  # s before and after, for torques at rest
-TELLS = 1.0  # s after arming within which the contact detector reports the share of the weight
+SETTLING_TIME = 0.3  # s, pause before the torques of the resting arm are measured
+SHARE_LIMIT = 1.0  # s, time limit for the contact detector to report the share of the weight
 LIFTS = 0.8  # N, least load change that counts as "the person holds it": a soft hand (35 N/m) moved by 3 cm gives 1 N
 IN_MOTION = 1.6  # N, largest difference between the weight measured in slow motion and at rest
 
@@ -100,8 +101,8 @@ def _share_at_rest(state: CoglabState) -> float:
         shares.extend([] if share is None else [share])
         return bool(shares)
 
-    state.pause(SETTLES)
-    state.wait_for(has_come, "the weight share from the contact detector", TELLS)
+    state.pause(SETTLING_TIME)
+    state.wait_for(has_come, "the weight share from the contact detector", SHARE_LIMIT)
     return shares[0]
 
 
@@ -278,8 +279,8 @@ class TakeWeight(CoglabState):
         """Returns the failure: "taken back" if the object has moved away with the person's hand."""
         if error.code == ReasonCode.OBJECT_NOT_SEEN and not self.ctx.holding:
             self._way.stop()
-            self.pause(FALLS)
-            end = self.ctx.clock.now() + FALLS
+            self.pause(FALL_TIME)
+            end = self.ctx.clock.now() + SEARCH_TIME
             while self.ctx.clock.now() < end:
                 hand, thing = sight_of(self, hand_name(self.ctx)), sight_of(self, object_id)
                 if hand is not None and thing is not None and max(hand.age, thing.age) <= RECENT:
