@@ -122,7 +122,7 @@ struct Peer {
   std::uint64_t missing = 0;   // packets without an answer in time
 };
 
-/// Sends packets by turns to the bridge and to the echo, on the beat.
+/// Sends one packet to the bridge and one to the echo in each period.
 class Exchange {
  public:
   Exchange(int echo_port, int bridge_port) : fd_(openSocket(target_, kPatience / 1000)) {
@@ -130,8 +130,8 @@ class Exchange {
     bridge_.port = htons(static_cast<std::uint16_t>(bridge_port));
   }
 
-  /// So many packets to one of the two, timed into us(); the other one gets as many beside them,
-  /// whose answers are not timed, but counted like the others.
+  /// Sends `packets` packets to one peer; us() has the times of its answers. Sends as many to the
+  /// other peer, without timing. Missing answers of both are counted.
   void block(bool to_bridge, int packets) {
     Peer& first = to_bridge ? bridge_ : echo_;
     Peer& second = to_bridge ? echo_ : bridge_;
@@ -179,7 +179,8 @@ class Exchange {
     return got_ > 0;
   }
 
-  /// The same after one that was not the answer: what is left of the patience is waited for.
+  /// Receives the next datagram after one that was not the answer: waits for the rest of the time
+  /// limit.
   bool receiveUntil(std::int64_t deadline) {
     const std::int64_t left = std::max<std::int64_t>(deadline - steadyNow(), 0);
     const timespec limit{left / 1'000'000'000, left % 1'000'000'000};

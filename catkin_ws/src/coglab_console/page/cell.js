@@ -109,7 +109,7 @@ export function viewWords() {
   const shown = store.docs.path;
   const model = store.docs.model;
   if (model && !model.robot) return 'No description of the robot: it is not drawn.';
-  if (store.state && !store.state.live) return 'Nothing new from the arm: it is shown as it was last.';
+  if (store.state && !store.state.live) return 'No new data from the arm; this is its last position.';
   if (!shown) return '';
   if (shown.kind === 'refused') return `▲ The next motion could not begin now: ${shown.reason}`;
   const kind = shown.kind === 'running' ? 'Path of this motion' : 'Path of the next motion, if it began now';

@@ -31,7 +31,7 @@ function form(told) {
   return h('form', { onsubmit: (event) => event.preventDefault() },
     field('Participant (a pseudonym, never a name)', participant), field('Number of the participant (row of the Latin square, seed)', number),
     field('Study, for the recordings; may be empty', study),
-    field('Conditions, separated by commas; one with an object (receive ball) chooses it', conditions),
+    field('Conditions, separated by commas. A condition that names an object, such as "receive ball", selects it.', conditions),
     h('div', { class: 'pair' }, field('Repetitions of each', repetitions), field('Order', order.button)), h('div', { class: 'row' }, begin));
 }
 

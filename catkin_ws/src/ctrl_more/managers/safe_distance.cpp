@@ -38,14 +38,23 @@ namespace ctrl_more {
 /// A free touch has the force v sqrt(mu k), mu = 1 / (1/m_person + 1/m_robot), v: speed of arm and
 /// person against each other. docs/equations.md has the source of each figure.
 ///
-/// Block in the central module's file, all optional: `person` (key or list of keys in estimatedData
-/// or measuredData: positions in the base frame, 3 numbers [m], or poses, 7; `person`), `touch`
-/// (those of them that may touch the palm; none), `touch_speed` (0.25 m/s), `robot` (points of the
-/// arm in estimatedData, 3 numbers [m] each, or a pose, 7; `arm_points`, else `ee`), `robot_radius`
-/// (of the arm about those lines, 0 m), `person_speed` (v_h, 1.6 m/s), `reaction_time` (T_r, 0.1
-/// s), `deceleration` (a, 2 m/s^2), `intrusion` (C, 0.12 m), `person_uncertainty` (Z_d, 0.05 m),
-/// `robot_uncertainty` (Z_r, 0.01 m), `max_age` of the person's position (0.2 s), `absent_speed`
-/// (limit while all points of the person are missing or too old, 0 m/s).
+/// Parameters of its block in the central module's file, all optional, with their defaults:
+///
+/// - `person: person`: key or list of keys in estimatedData or measuredData; each is a position in
+///   the base frame (3 numbers, m) or a pose (7)
+/// - `touch: []`: those of `person` that may touch the palm
+/// - `touch_speed: 0.25` m/s: least limit where such a point is nearest to the palm's line
+/// - `robot: arm_points`, else `ee`: points of the arm in estimatedData (3 numbers each, m) or a
+///   pose (7)
+/// - `robot_radius: 0` m: radius of the arm about the lines between these points
+/// - `person_speed: 1.6` m/s: v_h
+/// - `reaction_time: 0.1` s: T_r
+/// - `deceleration: 2` m/s^2: a
+/// - `intrusion: 0.12` m: C
+/// - `person_uncertainty: 0.05` m: Z_d
+/// - `robot_uncertainty: 0.01` m: Z_r
+/// - `max_age: 0.2` s: an older position of the person does not count
+/// - `absent_speed: 0` m/s: limit while all points of the person are missing or too old
 class SafeDistance : public Manager {
  public:
   SafeDistance(const std::string& name, const ConfigNode& block, RobotStates& robot,

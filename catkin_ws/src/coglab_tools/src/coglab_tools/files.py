@@ -34,8 +34,8 @@ def write_whole(path: Path, content: str | bytes) -> Path:
 
 
 def write_by(path: Path, write: Callable[[Path], object]) -> Path:
-    """The same for a program or library that writes by itself: `write` gets a path beside the place, with the same
-    name. CheckFailed as above; other exceptions of `write` pass through, and nothing is left of its file."""
+    """Lets `write` create the file, then moves it into place. `write` gets a path with the same name in a temporary
+    folder. CheckFailed as above; other exceptions of `write` pass through, and nothing is left of its file."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".part-", dir=path.parent) as part:
@@ -50,8 +50,8 @@ def write_by(path: Path, write: Callable[[Path], object]) -> Path:
 
 @contextmanager
 def alone(folder: Path, limit: float = 10.0) -> Iterator[None]:
-    """Within it, no other process or thread is within `alone` of the same folder. CheckFailed after `limit` s, or if
-    the folder cannot be opened."""
+    """While the block runs, nobody else can enter `alone` for this folder: no process, no thread. CheckFailed if it is
+    not free within `limit` s, or cannot be opened."""
     try:
         descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     except OSError as error:

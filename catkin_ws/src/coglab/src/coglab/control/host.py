@@ -77,7 +77,7 @@ def find_class(module: ModuleType, name: str = "") -> tuple[type, int]:
             raise ControlError(f"the file has no controller class '{name}'; it has: {', '.join(found) or 'none'}")
         return found[name]
     if not found and underived:
-        raise ControlError(f"derive {underived} from ctrl_more.FeedbackController, or it is no feedback controller")
+        raise ControlError(f"class {underived} must derive from ctrl_more.FeedbackController")
     if not found:
         raise ControlError(
             f"the file has no class with the methods {', '.join(MOTION_METHODS)} (a motion), and none derived from "
