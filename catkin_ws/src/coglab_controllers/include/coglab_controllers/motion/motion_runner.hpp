@@ -139,8 +139,8 @@ class MotionRunner : public MotionController {
   void arrive(const CycleInput& input);
   void reach(const CycleInput& input);
   void follow();
-  void endQueued(const Reason& why, Reason& told);
-  void tell(int id, const Reason& why, Reason& told);
+  void endQueued(const Reason& why, Reason& summary);
+  void reportEnd(int id, const Reason& why, Reason& summary);
   void giveUp(const Reason& why);
 
   const RunnerPolicy policy_;
@@ -267,9 +267,9 @@ void MotionRunner<Request>::place(Plan& plan) {
   }
   if (stage_ != RunnerStage::Rest) {
     const Reason why(ReasonCode::Superseded, "a newer motion took its place");
-    Reason told;
-    tell(stage_ == RunnerStage::Moving ? current_.id : next_.id, why, told);
-    endQueued(why, told);
+    Reason summary;
+    reportEnd(stage_ == RunnerStage::Moving ? current_.id : next_.id, why, summary);
+    endQueued(why, summary);
   }
   // The motion begins with the next joint state. Without a new one, the commanded state is old.
   next_ = plan;
@@ -367,21 +367,21 @@ void MotionRunner<Request>::follow() {
 }
 
 template <typename Request>
-void MotionRunner<Request>::tell(int id, const Reason& why, Reason& told) {
+void MotionRunner<Request>::reportEnd(int id, const Reason& why, Reason& summary) {
   ends_.push({id, false, why});
   if (policy_.id_name == nullptr) return;
   if (unfinished_++ == 0) {
-    told << "; not executed: " << policy_.id_name << " ";
+    summary << "; not executed: " << policy_.id_name << " ";
   } else {
-    told << ", ";
+    summary << ", ";
   }
-  told << static_cast<std::uint64_t>(id);
+  summary << static_cast<std::uint64_t>(id);
 }
 
 template <typename Request>
-void MotionRunner<Request>::endQueued(const Reason& why, Reason& told) {
+void MotionRunner<Request>::endQueued(const Reason& why, Reason& summary) {
   for (; queued_ > 0; --queued_) {
-    tell(queue_[first_].id, why, told);
+    reportEnd(queue_[first_].id, why, summary);
     first_ = (first_ + 1) % queue_.size();
   }
 }
@@ -389,15 +389,15 @@ void MotionRunner<Request>::endQueued(const Reason& why, Reason& told) {
 template <typename Request>
 void MotionRunner<Request>::giveUp(const Reason& why) {
   if (stage_ == RunnerStage::Rest) return;
-  Reason told = why;
+  Reason summary = why;
   unfinished_ = 0;
-  tell(stage_ == RunnerStage::Moving ? current_.id : next_.id, why, told);
-  endQueued(why, told);
+  reportEnd(stage_ == RunnerStage::Moving ? current_.id : next_.id, why, summary);
+  endQueued(why, summary);
   motion_->stop();
   loop_.open();
   stage_ = RunnerStage::Rest;
   state_ = MotionState::Aborted;
-  reason_ = told;
+  reason_ = summary;
 }
 
 }  // namespace coglab_controllers
