@@ -202,9 +202,9 @@ class Latencies:
 class Watch:
     """A thread that reports a call of the controller longer than `LONGEST`."""
 
-    def __init__(self, tell: Callable[[str], None]) -> None:
-        """`tell`: called with the sentence."""
-        self._tell, self._ended = tell, threading.Event()
+    def __init__(self, report: Callable[[str], None]) -> None:
+        """`report`: called with the sentence."""
+        self._report, self._ended = report, threading.Event()
         self.began = math.inf  # s, start of the running call; infinite: none runs
         threading.Thread(target=self._look, name="watch", daemon=True).start()
 
@@ -213,12 +213,12 @@ class Watch:
         self._ended.set()
 
     def _look(self) -> None:
-        told = math.inf
+        last_reported = math.inf
         while not self._ended.wait(LONGEST / 4):
             began = self.began
-            if time.monotonic() - began > LONGEST and began != told:
-                told = began
-                self._tell(
+            if time.monotonic() - began > LONGEST and began != last_reported:
+                last_reported = began
+                self._report(
                     f"the controller has not returned for {LONGEST:g} s: the robot has let its correction fade, or has "
                     "braked. Ctrl-C ends this process"
                 )
@@ -230,7 +230,7 @@ def serve(
     *,
     ends: Callable[[], bool] = lambda: False,
     period: float = math.inf,
-    tell: Callable[[str], None] = print,
+    report: Callable[[str], None] = print,
     silent: str = "",
 ) -> None:
     """Answer the questions of a slot until the robot lets go or `ends()` is true.
@@ -238,9 +238,9 @@ def serve(
     Each `period` s it reports the delay of the answers and the number of late ones. `silent`: the report if no question
     has come for `SILENT`.
     """
-    watch = Watch(tell)
+    watch = Watch(report)
     try:
-        _serve(slot, host, watch, ends, period, tell, silent)
+        _serve(slot, host, watch, ends, period, report, silent)
     finally:
         watch.end()
 
@@ -251,13 +251,13 @@ def _serve(
     watch: Watch,
     ends: Callable[[], bool],
     period: float,
-    tell: Callable[[str], None],
+    report: Callable[[str], None],
     silent: str,
 ) -> None:
     answer = np.zeros(1, dtype=wire.ANSWER)
     latencies = Latencies()
     late = refused = 0
-    looked = told = asked = time.monotonic()
+    looked = last_report = asked = time.monotonic()
     while not ends():
         question = slot.question()
         if question is not None:
@@ -268,7 +268,7 @@ def _serve(
                 slot.answer(answer)
                 latencies.add(question)
             if asked < 0.0:
-                tell("the robot sends questions again")
+                report("the robot sends questions again")
             asked = time.monotonic()
             more = latencies.note(question)
             late, refused = late + more[0], refused + more[1]
@@ -276,16 +276,16 @@ def _serve(
         if now - looked > ALIVE:
             looked = now
             if not slot.alive():
-                tell("the robot has closed the slot: it has ended, or its controller was unloaded")
+                report("the robot has closed the slot: it has ended, or its controller was unloaded")
                 return
         if silent and asked > 0.0 and now - asked > SILENT:
             asked = -1.0
-            tell(silent)
-        if now - told > period:
-            told = now
+            report(silent)
+        if now - last_report > period:
+            last_report = now
             words = latencies.report()
             if words:
-                tell(f"{words}; {late} cycles late, {refused} answers refused")
+                report(f"{words}; {late} cycles late, {refused} answers refused")
             late = refused = 0
         if question is None:
             time.sleep(POLL)

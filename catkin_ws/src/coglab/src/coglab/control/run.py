@@ -183,7 +183,7 @@ def run(words: list[str]) -> int:
                 print(f"start it: {how}", flush=True)
             if sys.stdin is not None and sys.stdin.isatty():
                 threading.Thread(target=_listen, args=(host, ended), daemon=True).start()
-            serve(connection, host, ends=ended.is_set, period=REPORT, tell=_tell, silent=silent)
+            serve(connection, host, ends=ended.is_set, period=REPORT, report=_report, silent=silent)
     except (ControlError, wire.SlotError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
@@ -218,9 +218,9 @@ def _listen(host: Host, ended: Flag) -> None:
             return
         try:
             host.set(numbers(line.split()))
-            _tell(f"set {line.strip()}" if line.strip() else "NAME=VALUE changes a gain or an argument")
+            _report(f"set {line.strip()}" if line.strip() else "NAME=VALUE changes a gain or an argument")
         except ControlError as error:
-            _tell(f"not changed: {error}")
+            _report(f"not changed: {error}")
 
 
 def _watch(ended: Flag, over: threading.Event) -> None:
@@ -234,7 +234,7 @@ def _watch(ended: Flag, over: threading.Event) -> None:
     os._exit(1)
 
 
-def _tell(text: str) -> None:
+def _report(text: str) -> None:
     print(time.strftime("%H:%M:%S"), text, flush=True)
 
 
