@@ -118,23 +118,23 @@ function sideReason() {
 /** One action button. If it is disabled, the reason stands below it. */
 function oneAction(name, label) {
   const why = h('span', { class: 'why', id: `why-${name}` });
-  let told = '';
-  const tell = (text) => {
-    told = text;
+  let message = '';
+  const showMessage = (text) => {
+    message = text;
     setText(why, text);
     setTimeout(() => {
-      told = '';
+      message = '';
       update();
     }, 4000);
   };
   const mustHold = () => store.docs.desk?.guard.hold ?? true;
-  const button = actionButton(label, { blockedBy: () => blocked(name), mustHold, request: () => argumentsOf(name), tell });
+  const button = actionButton(label, { blockedBy: () => blocked(name), mustHold, request: () => argumentsOf(name), showMessage });
   setAttribute(button, 'aria-describedby', why.id);
   button.dataset.action = name;
   const update = () => {
     const reason = blocked(name);
     setAttribute(button, 'aria-disabled', reason ? 'true' : null);
-    if (!told) setText(why, reason || (mustHold() ? 'press and hold' : ''));
+    if (!message) setText(why, reason || (mustHold() ? 'press and hold' : ''));
   };
   watch(button, update);
   return { button, row: h('div', { class: 'act' }, button, why) };
@@ -178,7 +178,6 @@ export function showCause(place) {
   watch(button, () => {
     const guard = store.docs.desk?.guard;
     const reason = blocked('acknowledge');
-    place.parentElement.classList.toggle('told', Boolean(guard?.unacknowledged));
     button.value = guard?.stop ?? 0; // number of the stop whose cause is shown
     setText(words, guard?.unacknowledged ? guard.cause : guard?.hold ? 'The next motion needs a held button.' : '');
     button.hidden = why.hidden = !guard?.unacknowledged;

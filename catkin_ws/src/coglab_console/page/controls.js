@@ -34,17 +34,17 @@ onDocs(['desk'], updateAll);
 
 /** Shows for 6 s, above the actions, why something was not done. */
 export function refuse(text) {
-  const told = document.getElementById('told');
-  told.textContent = text;
-  told.hidden = false;
+  const refusal = document.getElementById('refusal');
+  refusal.textContent = text;
+  refusal.hidden = false;
   clearTimeout(refuse.timer);
   refuse.timer = setTimeout(() => {
-    told.hidden = true;
+    refusal.hidden = true;
   }, 6000);
 }
 
 /** Sends ten times a second that a button is down, from `hold()` until the server answers or until `release()`. */
-function holding(button, { request, tell }) {
+function holding(button, { request, showMessage }) {
   let timer = null;
   const release = () => {
     if (timer === null) return;
@@ -56,11 +56,11 @@ function holding(button, { request, tell }) {
   const hold = () => {
     const [name, args] = request();
     const once = () => send({ t: 'hold', name, arguments: args }, (answer) => {
-      tell(answer.message);
+      showMessage(answer.message);
       if (!answer.success) refuse(answer.message);
       release();
     });
-    tell('hold …');
+    showMessage('hold …');
     button.classList.add('holding');
     timer = setInterval(once, HOLD_PERIOD);
     once();
@@ -72,9 +72,9 @@ function holding(button, { request, tell }) {
  * A button that acts when pressed, or, if `mustHold()`, after it was held for 0.8 s. Enter works like the mouse.
  * Release, loss of the focus, or a hidden page ends the holding.
  */
-export function actionButton(label, { blockedBy, mustHold, request, tell, answered = () => {} }) {
+export function actionButton(label, { blockedBy, mustHold, request, showMessage, answered = () => {} }) {
   const button = h('button', { type: 'button' }, label, h('span', { class: 'fill' }));
-  const { hold, release } = holding(button, { request, tell });
+  const { hold, release } = holding(button, { request, showMessage });
   let held = false; // the click event at the end of a holding does not count
   const begin = (event) => {
     held = !blockedBy() && mustHold();
@@ -104,12 +104,12 @@ export function actionButton(label, { blockedBy, mustHold, request, tell, answer
   button.addEventListener('click', async () => {
     const reason = held ? '' : blockedBy();
     if (reason) {
-      tell(reason);
+      showMessage(reason);
       refuse(`${label}: ${reason}`);
     } else if (held) held = false;
     else if (!mustHold()) {
       const answer = await command(...request());
-      tell(answer.message);
+      showMessage(answer.message);
       answered(answer);
       if (!answer.success) refuse(answer.message);
     }
@@ -119,11 +119,11 @@ export function actionButton(label, { blockedBy, mustHold, request, tell, answer
 
 /**
  * A button for a command; if disabled, the reason stands below it. { name (of the control in the server's reasons), request,
- * told (element for the answer), answered (callback for it), held (0.8 s), words (accessible name), why (reason element shared by several buttons) }.
+ * message (element for the answer), answered (callback for it), held (0.8 s), words (accessible name), why (reason element shared by several buttons) }.
  */
-export function commandButton(label, { name, request, told, answered, held = false, words = null, why = null }) {
-  const tell = (text) => setText(told, text);
-  const button = actionButton(label, { blockedBy: () => blocked(name), mustHold: () => held, request, tell, answered });
+export function commandButton(label, { name, request, message, answered, held = false, words = null, why = null }) {
+  const showMessage = (text) => setText(message, text);
+  const button = actionButton(label, { blockedBy: () => blocked(name), mustHold: () => held, request, showMessage, answered });
   const reason = why ?? h('span', { class: 'why' });
   reason.id ||= `why-control-${made++}`;
   setAttribute(button, 'aria-describedby', reason.id);

@@ -30,7 +30,7 @@ export function onDocs(names, listener) {
   listener();
 }
 
-export function tell(kind, ...values) {
+export function notify(kind, ...values) {
   for (const listener of listeners[kind]) {
     try {
       listener(...values);
@@ -47,10 +47,10 @@ export function take(message) {
     store.state = message;
     store.stateAt = store.heardAt;
     store.fastest = Math.min(store.fastest, store.heardAt - message.at);
-    tell('state', message);
+    notify('state', message);
   } else if (message.t === 'doc') {
     store.docs[message.name] = message.value;
-    tell('doc', message.name, message.value);
+    notify('doc', message.name, message.value);
   } else if (message.t === 'events') {
     takeEvents(message);
   } else if (message.t === 'you') {
@@ -61,7 +61,7 @@ export function take(message) {
     store.fastest = Infinity;
     store.epoch = message.epoch;
     store.you = message.name;
-    tell('link');
+    notify('link');
   }
 }
 
@@ -75,7 +75,7 @@ function takeEvents(message) {
     store.seq = event.seq;
   }
   store.events.splice(0, Math.max(0, store.events.length - KEPT));
-  tell('events');
+  notify('events');
 }
 
 export function operating() {
@@ -197,7 +197,7 @@ function watch() {
   else if (age > BEHIND) setText(band, `${(age / 1000).toFixed(1)} s behind`);
   if (lost !== store.lost) {
     store.lost = lost;
-    tell('link');
+    notify('link');
   }
   comeBack();
 }

@@ -10,7 +10,7 @@ export function field(label, input) {
 
 const OUTCOMES = [['done', 'The trial is done'], ['failed', 'The robot has failed'], ['repeat', 'Do the trial again'], ['skipped', 'Skip the trial']];
 
-function form(told) {
+function form(message) {
   const study = h('input', { type: 'text', maxlength: 40, autocomplete: 'off', pattern: '[a-z0-9][a-z0-9_.\\-]*' });
   const participant = h('input', { type: 'text', maxlength: 32, autocomplete: 'off', placeholder: 'P07' });
   const number = h('input', { type: 'number', min: 0, max: 9999, value: 0 });
@@ -27,7 +27,7 @@ function form(told) {
     order: order.button.value,
     study: study.value.trim(),
   }];
-  const begin = commandButton('Begin the session', { name: 'session_begin', told, request });
+  const begin = commandButton('Begin the session', { name: 'session_begin', message, request });
   return h('form', { onsubmit: (event) => event.preventDefault() },
     field('Participant (a pseudonym, never a name)', participant), field('Number of the participant (row of the Latin square, seed)', number),
     field('Study, for the recordings; may be empty', study),
@@ -35,16 +35,16 @@ function form(told) {
     h('div', { class: 'pair' }, field('Repetitions of each', repetitions), field('Order', order.button)), h('div', { class: 'row' }, begin));
 }
 
-function running(told, session) {
+function running(message, session) {
   const next = session.trials[session.position];
   const rows = session.trials.map((trial, i) => [i + 1, trial.condition, i === session.position && session.running ? 'under way' : trial.outcome || '·']);
   const around = rows.slice(Math.max(0, session.position - 4), session.position + 9);
   return [
     h('p', {}, `Session of ${session.participant}${session.study ? `, study ${session.study}` : ''}: ${session.position} of ${session.trials.length} trials.`),
     h('div', { class: 'row' },
-      commandButton(next ? `Begin trial ${session.position + 1}: ${next.condition}` : 'All trials are done', { name: 'trial_begin', told, request: () => ['trial_begin', {}] }),
-      ...OUTCOMES.map(([outcome, label]) => commandButton(label, { name: outcome === 'done' ? 'trial_done' : 'trial_end', told, request: () => ['trial_end', { outcome }] })),
-      commandButton('End the session', { name: 'session_end', told, request: () => ['session_end', {}] })),
+      commandButton(next ? `Begin trial ${session.position + 1}: ${next.condition}` : 'All trials are done', { name: 'trial_begin', message, request: () => ['trial_begin', {}] }),
+      ...OUTCOMES.map(([outcome, label]) => commandButton(label, { name: outcome === 'done' ? 'trial_done' : 'trial_end', message, request: () => ['trial_end', { outcome }] })),
+      commandButton('End the session', { name: 'session_end', message, request: () => ['session_end', {}] })),
     table(['Trial', 'Condition', 'Outcome'], around, 'Trials around the present one'),
   ];
 }
@@ -59,21 +59,21 @@ function recorded({ folder = '', recording = false, rows = [] } = {}) {
 }
 
 /** A questionnaire of the live study: one number per item. Items left empty are asked again. */
-function asked(one, of, told) {
+function asked(one, of, message) {
   const inputs = one.items.map(([, text]) => h('input', { type: 'number', min: one.low, max: one.high, step: one.step, 'aria-label': text }));
   const request = () => ['answer', { questionnaire: one.name, of, answers: Object.fromEntries(one.items.flatMap(([item], i) => (inputs[i].value === '' ? [] : [[item, Number(inputs[i].value)]]))) }];
   return h('form', { onsubmit: (event) => event.preventDefault() }, h('h3', {}, one.title), h('p', {}, `${one.low}: ${one.ends[0]}; ${one.high}: ${one.ends[1]}`),
-    ...one.items.map(([, text], i) => field(text, inputs[i])), h('div', { class: 'row' }, commandButton('Write the answers', { name: 'answer', told, words: `Write the answers: ${one.title}`, request })));
+    ...one.items.map(([, text], i) => field(text, inputs[i])), h('div', { class: 'row' }, commandButton('Write the answers', { name: 'answer', message, words: `Write the answers: ${one.title}`, request })));
 }
 
 /** `forms`: those of the last time, so that what is being typed in one stays while another is written. */
-function questions(study, told, forms) {
+function questions(study, message, forms) {
   const before = new Map(forms);
   forms.clear();
   if (!study) return [];
   for (const one of study.questionnaires) {
     const key = JSON.stringify([study.of, one]);
-    forms.set(key, before.get(key) ?? asked(one, study.of, told));
+    forms.set(key, before.get(key) ?? asked(one, study.of, message));
   }
   const stands = study.problem || (study.questionnaires.length ? '' : 'Every questionnaire under this condition is answered.');
   return [h('h2', {}, `Questionnaires of ${study.participant}, condition ${study.condition}, study ${study.study}`), stands ? h('p', {}, stands) : null, ...forms.values()];
@@ -81,7 +81,7 @@ function questions(study, told, forms) {
 
 export function experimentPage(page) {
   page.className = 'page two';
-  const told = h('p', { 'aria-live': 'polite' });
+  const message = h('p', { 'aria-live': 'polite' });
   const left = h('div');
   const text = h('textarea', { id: 'note', rows: 3, maxlength: 500 });
   const notes = h('div');
@@ -92,13 +92,13 @@ export function experimentPage(page) {
     const note = text.value;
     const answer = await command('note', { text: note.trim() });
     sending = false;
-    setText(told, answer.message);
+    setText(message, answer.message);
     if (answer.success && text.value === note) text.value = ''; // keep text typed meanwhile or refused
   } }, 'Add the note');
   const open = h('div');
   const recordings = h('div');
   page.append(
-    h('div', {}, h('h2', {}, 'Session'), left, told, open),
+    h('div', {}, h('h2', {}, 'Session'), left, message, open),
     h('div', {}, h('h2', {}, 'Notes'), field('A note with the current time (M); it goes into the recording, too', text), h('div', { class: 'row' }, add), notes,
       h('h2', {}, 'Recorded handovers'), recordings));
   let shown = '';
@@ -108,7 +108,7 @@ export function experimentPage(page) {
     const key = JSON.stringify([session.participant, session.position, session.running]);
     if (key !== shown) {
       shown = key;
-      left.replaceChildren(...(session.participant ? running(told, session) : [form(told)]));
+      left.replaceChildren(...(session.participant ? running(message, session) : [form(message)]));
     }
     notes.replaceChildren(table(['Time', 'Who', 'Note'], session.notes.slice().reverse().map((note) => [clock(note.stamp), note.who, note.text]), 'Notes'));
   };
@@ -118,7 +118,7 @@ export function experimentPage(page) {
     const key = JSON.stringify(store.docs.study ?? null);
     if (key === before) return; // keep what is being typed
     before = key;
-    open.replaceChildren(...questions(store.docs.study, told, forms).filter(Boolean));
+    open.replaceChildren(...questions(store.docs.study, message, forms).filter(Boolean));
   };
   const drawRecordings = () => recordings.replaceChildren(...recorded(store.docs.recordings).filter(Boolean));
   draw();

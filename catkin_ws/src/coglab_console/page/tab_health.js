@@ -84,7 +84,7 @@ export function healthPage(page) {
   const drawTree = diagnosticsTree(tree);
   const versions = h('div');
   const parameters = h('div', { id: 'parameters' });
-  const told = h('p', { 'aria-live': 'polite' });
+  const message = h('p', { 'aria-live': 'polite' });
   const filter = h('input', { type: 'search', placeholder: 'part of a name', oninput: () => show() });
   let known = [];
   const show = () => parameters.replaceChildren(table(['Parameter', 'Value'], known.filter(([name]) => name.includes(filter.value)).slice(0, 150), 'Parameters'));
@@ -96,7 +96,7 @@ export function healthPage(page) {
   } }, 'Read again');
   const marked = h('p');
   page.append(h('div', {}, h('h2', {}, 'Diagnostics'), tree),
-    h('div', {}, h('h2', {}, 'Versions and browsers'), versions, h('h2', {}, 'Hand'), h('p', {}, 'A complete or forced calibration opens the hand, even if it holds an object: hold the button.'), h('div', { class: 'row' }, commandButton('Complete calibration', { name: 'calibrate_complete', told, held: true, request: () => ['calibrate', { mode: 'complete' }] }), commandButton('Forced calibration', { name: 'calibrate_forced', told, held: true, request: () => ['calibrate', { mode: 'complete', force: true }] })), told,
+    h('div', {}, h('h2', {}, 'Versions and browsers'), versions, h('h2', {}, 'Hand'), h('p', {}, 'A complete or forced calibration opens the hand, even if it holds an object: hold the button.'), h('div', { class: 'row' }, commandButton('Complete calibration', { name: 'calibrate_complete', message, held: true, request: () => ['calibrate', { mode: 'complete' }] }), commandButton('Forced calibration', { name: 'calibrate_forced', message, held: true, request: () => ['calibrate', { mode: 'complete', force: true }] })), message,
       h('h2', {}, 'Parameters'), marked, h('div', { class: 'row' }, read, h('label', {}, 'Filter', filter)), parameters));
   const draw = () => {
     const { rows = [], versions: words = {}, browsers = [] } = store.docs.health ?? {};
@@ -116,18 +116,18 @@ const KEYS = [
 
 export function helpPage(page) {
   page.className = 'page two';
-  const told = h('p', { 'aria-live': 'polite' });
+  const message = h('p', { 'aria-live': 'polite' });
   const link = h('input', { type: 'text', readonly: true, 'aria-label': 'Link for one more browser' });
   const answered = (answer) => {
     link.value = answer.data ?? '';
   };
-  const invite = commandButton('A link for one more browser', { name: 'invite', told, request: () => ['invite', {}], answered });
+  const invite = commandButton('A link for one more browser', { name: 'invite', message, request: () => ['invite', {}], answered });
   page.append(
     h('div', {}, h('h2', {}, 'Keys'), table(['Key', 'Does'], KEYS, 'Keys'),
       h('h2', {}, 'After a stop'), h('p', {}, 'STOP brakes the arm, latches, and ends the action; the hand keeps what it holds. Then two acts: acknowledge the cause, and hold the button of the next motion for 0.8 s. Nothing is ever reset by itself.'),
       h('h2', {}, 'What this is not'), h('p', {}, 'STOP MOTION is software. It has no safety function: the red button of the robot controller is the emergency stop. Whether the robot is real or simulated is decided when the system is launched, never here.')),
     h('div', {}, h('h2', {}, 'One operator'), h('p', {}, 'One browser operates, all others watch; STOP and notes are everybody’s. Taking over is announced to the operator, who has 3 s to keep the control. A browser that has been away for 10 s no longer operates.'),
-      h('div', { class: 'row' }, takeOver(told), invite), h('label', {}, 'Valid once', link), told,
+      h('div', { class: 'row' }, takeOver(message), invite), h('label', {}, 'Valid once', link), message,
       h('h2', {}, 'Who can move the robot'), h('p', {}, 'This page needs a link with a one-time token, and listens on this computer alone unless it was launched otherwise. ROS 1 itself has no authentication: anybody who reaches the ROS master can do everything, without this page. Keep the master on loopback or on a private network. From elsewhere: ssh -L 8790:127.0.0.1:8790 LAB-PC.'),
       h('h2', {}, 'Words of the picture'), h('p', {}, 'Orange: arm. Green: object. Pink: goal. Thin sky-blue path, dashed in 2D: where the next motion would go; thick blue: the motion under way. Sky-blue lines: workspace.'),
       h('p', {}, 'Graph of the state machine, whole: all of the machine, in small letters if necessary; follow: the surroundings of the active state, in readable letters.')));
@@ -135,8 +135,8 @@ export function helpPage(page) {
 }
 
 /** Take over, or keep the control while another browser takes over. */
-export function takeOver(told) {
-  const button = h('button', { type: 'button', onclick: async () => setText(told, (await command(operating() ? 'keep' : 'take_over')).message) }, 'Take over');
+export function takeOver(message) {
+  const button = h('button', { type: 'button', onclick: async () => setText(message, (await command(operating() ? 'keep' : 'take_over')).message) }, 'Take over');
   watch(button, () => {
     const claimant = store.docs.desk?.roles.claimant;
     button.hidden = !store.docs.desk || (operating() && !claimant);

@@ -8,7 +8,7 @@ const JOINTS = ['A1', 'A2', 'E1', 'A3', 'A4', 'A5', 'A6'];
 
 export function contactPage(page) {
   page.className = 'page two';
-  const told = h('p', { 'aria-live': 'polite' });
+  const message = h('p', { 'aria-live': 'polite' });
   const learnt = h('p');
   const detector = h('p');
   const bars = JOINTS.map((name) => {
@@ -24,11 +24,11 @@ export function contactPage(page) {
   page.append(
     h('div', {}, h('h2', {}, title), ...bars.map((bar) => bar.row),
       h('p', {}, 'Input of the contact detector. Bar: the largest change of the last second. Black line: its threshold, k robust standard deviations at rest. ●: the joint counts now.')),
-    h('div', {}, h('h2', {}, 'Noise at rest'), learnt, h('div', { class: 'row' }, commandButton('Learn again at rest', { name: 'contact_learn', told, held: true, request: () => ['contact_learn', {}] })),
+    h('div', {}, h('h2', {}, 'Noise at rest'), learnt, h('div', { class: 'row' }, commandButton('Learn again at rest', { name: 'contact_learn', message, held: true, request: () => ['contact_learn', {}] })),
       h('h2', {}, 'Try the detector'), detector,
       h('div', { class: 'row' }, field('Threshold k', k), field('For, s', timeout),
-        commandButton('Watch for contact', { name: 'contact_arm', told, held: true, request: () => ['contact_arm', { mode: 'contact', k: Number(k.value), timeout: Number(timeout.value) }] }),
-        commandButton('Off', { name: 'contact_arm', told, request: () => ['contact_arm', { mode: 'off' }] })), told));
+        commandButton('Watch for contact', { name: 'contact_arm', message, held: true, request: () => ['contact_arm', { mode: 'contact', k: Number(k.value), timeout: Number(timeout.value) }] }),
+        commandButton('Off', { name: 'contact_arm', message, request: () => ['contact_arm', { mode: 'off' }] })), message));
 
   const onState = (state) => {
     bars.forEach((bar, i) => {
@@ -60,12 +60,12 @@ export function contactPage(page) {
 
 export function objectsPage(page) {
   page.className = 'page two';
-  const told = h('p', { 'aria-live': 'polite' });
+  const message = h('p', { 'aria-live': 'polite' });
   const problems = h('ul', { id: 'object-problems' });
   const list = h('div');
   const entry = h('pre', { tabindex: '0', 'aria-label': 'Entry of the database' });
   page.append(
-    h('div', {}, h('h2', {}, 'Object database'), problems, h('div', { class: 'row' }, commandButton('Read the files again', { name: 'objects_reload', told, held: true, request: () => ['objects_reload', {}] })), told, list,
+    h('div', {}, h('h2', {}, 'Object database'), problems, h('div', { class: 'row' }, commandButton('Read the files again', { name: 'objects_reload', message, held: true, request: () => ['objects_reload', {}] })), message, list,
       h('p', {}, 'A new object: ./coglab object new NAME, then ./coglab object check NAME. The console writes no object file.')),
     h('div', {}, h('h2', {}, 'Entry'), entry));
   const draw = () => {
@@ -110,7 +110,7 @@ export function primitivesPage(page) {
   const bars = h('div');
   const verdict = h('p');
   const answer = h('p', { 'aria-live': 'polite' });
-  const preview = (name, words) => commandButton(words, { name: 'preview', told: answer, words: name ? `${words} of ${name}` : words, request: () => ['preview', { primitive: name }] });
+  const preview = (name, words) => commandButton(words, { name: 'preview', message: answer, words: name ? `${words} of ${name}` : words, request: () => ['preview', { primitive: name }] });
   page.append(h('div', {}, h('h2', {}, 'Primitives, as demonstrated'),
     h('p', {}, 'Preview: the cell shows the path that the arm would take with this primitive toward the goal of the next action. Nothing moves.'), h('div', { class: 'row' }, preview('', 'No preview')), answer, list), h('div', {}, h('h2', {}, 'Recognised reach of the person'), verdict, bars));
   const draw = () => {
@@ -129,25 +129,25 @@ export function primitivesPage(page) {
   };
   draw();
   recognise();
-  let told = 0;
+  let shownSecond = 0;
   const onState = (state) => {
-    if (Math.floor(state.stamp) !== told) recognise(); // its age, once a second
-    told = Math.floor(state.stamp);
+    if (Math.floor(state.stamp) !== shownSecond) recognise(); // its age, once a second
+    shownSecond = Math.floor(state.stamp);
   };
   return { state: onState, docs: { primitives: draw, recognition: recognise } };
 }
 
 export function feedbackPage(page) {
   page.className = 'page';
-  const told = h('p', { 'aria-live': 'polite' });
+  const message = h('p', { 'aria-live': 'polite' });
   const list = h('div');
   const shares = h('div');
-  page.append(h('h2', {}, 'Feedback controllers in execution order'), told, list, h('h2', {}, 'Corrections in the newest cycle'), shares);
+  page.append(h('h2', {}, 'Feedback controllers in execution order'), message, list, h('h2', {}, 'Corrections in the newest cycle'), shares);
   // Rows are rebuilt only if they change, because a button that is held down must stay.
   let made = '';
   let shown = [];
   const why = h('p', { id: 'feedback-why' });
-  const heldButton = (label, words, request) => commandButton(label, { name: 'feedback', told, held: true, words, why, request });
+  const heldButton = (label, words, request) => commandButton(label, { name: 'feedback', message, held: true, words, why, request });
   const verbs = (row) => [row.enabled ? 'disable' : 'enable', row.paused ? 'resume' : 'pause'].map((verb) => heldButton(verb, `${verb} ${row.name}`, () => ['feedback', { verb, name: row.name }]));
   const order = (rows, i, step) => {
     const names = rows.map((row) => row.name);
@@ -167,7 +167,7 @@ export function feedbackPage(page) {
     made = key;
     const silence = store.state?.silent.controllers;
     const since = silence === undefined ? '' : `; silent for ${silence.toFixed(1)} s: the values shown are as old`;
-    setText(document.getElementById('feedback-profile') ?? told, rows.length ? `Profile: ${profile || 'none'}${since}` : 'No feedback controllers are loaded.');
+    setText(document.getElementById('feedback-profile') ?? message, rows.length ? `Profile: ${profile || 'none'}${since}` : 'No feedback controllers are loaded.');
     rows.forEach((row, i) => {
       setText(shown[i].activity, row.activity + (row.waiting ? ` ${row.waiting}` : ''));
       setText(shown[i].why, [...row.reasons, row.fault && `fault: ${row.fault}`].filter(Boolean).join('; ') || '·');

@@ -83,7 +83,7 @@ class RobotDouble:
         self.now = Standing(**READY)
         self.stops: list[str] = []
         self.calls: list[tuple[str, dict]] = []
-        self.told: list[tuple[str, str]] = []
+        self.published: list[tuple[str, str]] = []
         self.marks: list[dict[str, str]] = []
         self.stop_times: list[float] = []
 
@@ -94,8 +94,8 @@ class RobotDouble:
         self.stops.append(who)
         self.stop_times.append(time.monotonic())
 
-    def tell(self, name: str, text: str) -> None:
-        self.told.append((name, text))
+    def publish(self, name: str, text: str) -> None:
+        self.published.append((name, text))
 
     def mark(self, names: dict[str, str]) -> None:
         self.marks.append(names)

@@ -241,7 +241,7 @@ class Console(unittest.TestCase):
         self.assertEqual(self.looked()[0], [])
         self.says("reset", "acknowledge")
         self.button("reset").click()  # refused, and a click would not be enough
-        self.browser.until("return document.getElementById('told').textContent.includes('acknowledge')", LIMIT)
+        self.browser.until("return document.getElementById('refusal').textContent.includes('acknowledge')", LIMIT)
         time.sleep(0.3)
         self.assertTrue(self.arm.hold_latched)
         self.go_on()
@@ -292,17 +292,17 @@ class Console(unittest.TestCase):
         heard = {"note": [], "next_object": []}
         for name, rows in heard.items():
             rospy.Subscriber(f"/coglab/{name}", String, rows.append)
-        teller = {name: rospy.Publisher(f"/coglab/{name}", String, queue_size=5) for name in heard}
+        publishers = {name: rospy.Publisher(f"/coglab/{name}", String, queue_size=5) for name in heard}
         end = time.monotonic() + LIMIT
-        while not all(one.get_num_connections() > 1 for one in teller.values()):  # this test and the console
+        while not all(one.get_num_connections() > 1 for one in publishers.values()):  # this test and the console
             self.assertLess(time.monotonic(), end, "the console does not listen")
             time.sleep(0.05)
-        teller["note"].publish("cup slipped <b>twice</b>")
-        teller["next_object"].publish("ball")
+        publishers["note"].publish("cup slipped <b>twice</b>")
+        publishers["next_object"].publish("ball")
         self.browser.until("return coglab.events().some(e => e.text.endsWith('cup slipped <b>twice</b>'))", LIMIT)
         # The hand holds the mug, which the page goes on showing.
         self.browser.until("return coglab.events().some(e => e.text.endsWith('the next object is ball'))", LIMIT)
-        teller["next_object"].publish("../ball")
+        publishers["next_object"].publish("../ball")
         self.browser.until("return coglab.events().some(e => e.source === 'command' && e.level === 'warning')", LIMIT)
         self.browser.js("document.activeElement.blur()")
         ActionChains(self.browser.driver).send_keys("m").send_keys("by hand").send_keys(Keys.TAB, Keys.ENTER).perform()

@@ -194,7 +194,7 @@ async def test_what_nearly_fits_is_refused_and_begins_nothing(console, client, t
         await ws.receive()
         status, answer = await console.post(client, name, arguments)
         assert status == 409 and where in answer["message"], (status, answer)
-        assert not console.robot.calls and not console.robot.told and not list(tmp_path.iterdir())
+        assert not console.robot.calls and not console.robot.published and not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("body", ['{"name": "note", "arguments": {"text": %s}}', '{"name": %s}', "%s"])
@@ -214,7 +214,7 @@ async def test_what_the_console_cannot_do_is_answered_in_its_own_form_and_it_goe
         await ws.send_str("{}")
         await ws.receive()
         with monkeypatch.context() as broken:
-            broken.setattr(console.robot, "tell", lambda *_: 1 / 0)
+            broken.setattr(console.robot, "publish", lambda *_: 1 / 0)
             status, answer = await console.post(client, "note", {"text": "x"})
         assert status == 500 and not answer["success"] and "ZeroDivisionError" in answer["message"]
         assert (await console.post(client, "note", {"text": "x"}))[0] == 200

@@ -30,7 +30,7 @@ async def test_a_program_asks_with_a_key_and_neither_origin_nor_header(console, 
     key = await key_for(console, client)
     assert (await posted(console, client, "/api/command", bearer(key), NOTE))[0] == 200
     assert (await posted(console, client, "/api/stop", bearer(key)))[0] == 200
-    assert console.robot.stops == ["program 1"] and console.robot.told == [("note", "by a program")]
+    assert console.robot.stops == ["program 1"] and console.robot.published == [("note", "by a program")]
     async with client.ws_connect(f"ws://{console.host}/ws", headers=bearer(key)) as ws:
         await ws.send_str("{}")
         assert (await ws.receive_json())["name"] == "program 1"

@@ -102,7 +102,7 @@ def test_observers_see_cause_of_stop_and_why_they_cannot_acknowledge(desk):
         assert other.js("return document.getElementById('acknowledge').getAttribute('aria-disabled')") == "true"
         assert look(other)[0] == []
         other.js("document.getElementById('acknowledge').click()")
-        other.until("return document.getElementById('told').innerText.includes('browser 1')", 60.0)
+        other.until("return document.getElementById('refusal').innerText.includes('browser 1')", 60.0)
     assert desk.console.desk.guard.unacknowledged
     desk.browser.until("return !document.getElementById('acknowledge').hasAttribute('aria-disabled')", 60.0)
     desk.browser.js("document.getElementById('acknowledge').click()")

@@ -33,12 +33,12 @@ def test_everybody_stops_and_notes(desk):
 def test_notes_and_next_object_are_published_and_received(desk):
     assert ask(desk, "b", "note", text="hesitated")["success"]
     assert ask(desk, "a", "select_object", object_id="mug")["success"]
-    assert desk.backend.told == [("note", "hesitated"), ("select_object", "mug")]
-    desk.told("note", "from a terminal", "/rostopic_1")
-    desk.told("select_object", "ball", "/rostopic_1")
+    assert desk.backend.published == [("note", "hesitated"), ("select_object", "mug")]
+    desk.set_from_topic("note", "from a terminal", "/rostopic_1")
+    desk.set_from_topic("select_object", "ball", "/rostopic_1")
     assert desk.object_id == "ball" and [row["who"] for row in desk.experiment.notes] == ["b", "/rostopic_1"]
     for name, text in (("note", ""), ("note", "x" * 501), ("select_object", "no such; name")):
-        desk.told(name, text, "/x")
+        desk.set_from_topic(name, text, "/x")
     assert desk.object_id == "ball" and len(desk.experiment.notes) == 2
     events = [event["text"] for event in desk.events.since(0)[0] if event["level"] == "warning"]
     assert len(events) == 3 and all(text.startswith("/x: ") for text in events)

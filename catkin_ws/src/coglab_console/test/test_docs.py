@@ -23,6 +23,6 @@ def test_the_printed_program_notes_and_stops(tmp_path):
             bash = await asyncio.create_subprocess_exec("bash", "-euc", script, stdout=asyncio.subprocess.PIPE)
             out, _ = await asyncio.wait_for(bash.communicate(), 120)
             assert out.count(b'"success": true') + out.count(b'"success":true') == 2, out
-            assert console.robot.stops == ["program 1"] and console.robot.told == [("note", "by a program")]
+            assert console.robot.stops == ["program 1"] and console.robot.published == [("note", "by a program")]
 
     asyncio.run(test())

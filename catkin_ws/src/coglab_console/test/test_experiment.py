@@ -91,7 +91,7 @@ def test_outcome_of_a_trial_reaches_its_recording(tmp_path):
     desk.backend.now = replace(desk.backend.now, in_hub=False)
     desk.stop("browser 1")
     desk.experiment.trial_end("failed")
-    assert desk.backend.told == [("note", "STOP by browser 1"), ("note", "trial 3: failed")]
+    assert desk.backend.published == [("note", "STOP by browser 1"), ("note", "trial 3: failed")]
 
 
 def test_a_session_does_not_end_in_the_middle_of_a_trial(tmp_path):

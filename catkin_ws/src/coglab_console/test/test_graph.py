@@ -11,7 +11,7 @@ from topics import Topics
 
 
 @pytest.fixture
-def told(monkeypatch):
+def machines(monkeypatch):
     """SmachGraphs without a master, with its documents and events; its threads end with the test."""
     over = threading.Event()
     topics, published = Topics(), [("/coglab" + graph.STRUCTURE, "smach_msgs/SmachContainerStructure")]
@@ -24,42 +24,42 @@ def told(monkeypatch):
     over.set()
 
 
-def structure(told, path="/M", children=("A", "B")):
+def structure(machines, path="/M", children=("A", "B")):
     message = SmachContainerStructure(path=path, children=list(children))
     message.internal_outcomes, message.outcomes_from, message.outcomes_to = ["ok"], ["A"], ["B"]
-    told.send("/coglab" + graph.STRUCTURE, message)
+    machines.send("/coglab" + graph.STRUCTURE, message)
 
 
-def status(told, active, path="/M"):
-    told.send("/coglab" + graph.STATUS, SmachContainerStatus(path=path, active_states=[active]))
+def status(machines, active, path="/M"):
+    machines.send("/coglab" + graph.STATUS, SmachContainerStatus(path=path, active_states=[active]))
 
 
-def last(told):
-    return told.documents["active"]["/coglab"]["last"]
+def last(machines):
+    return machines.documents["active"]["/coglab"]["last"]
 
 
-def test_a_transition_keeps_its_outcome_also_without_a_reason(told):
-    structure(told)
-    status(told, "A")
-    told.graphs.transition("/M", "A", "ok", "B", "")
-    status(told, "B")  # introspection tells the same, and knows no outcome
-    assert last(told) == {"path": "/M", "from": "A", "outcome": "ok", "to": "B", "reason": ""}
-    told.graphs.transition("/M", "B", "failed", "A", "no contact")
-    status(told, "A")
-    assert (last(told)["outcome"], last(told)["reason"]) == ("failed", "no contact")
+def test_a_transition_keeps_its_outcome_also_without_a_reason(machines):
+    structure(machines)
+    status(machines, "A")
+    machines.graphs.transition("/M", "A", "ok", "B", "")
+    status(machines, "B")  # introspection has the same, without an outcome
+    assert last(machines) == {"path": "/M", "from": "A", "outcome": "ok", "to": "B", "reason": ""}
+    machines.graphs.transition("/M", "B", "failed", "A", "no contact")
+    status(machines, "A")
+    assert (last(machines)["outcome"], last(machines)["reason"]) == ("failed", "no contact")
 
 
-def test_states_are_known_without_published_transitions(told):
-    structure(told)
-    status(told, "A")
-    status(told, "B")
-    status(told, "A")
-    assert (last(told)["from"], last(told)["to"], last(told)["outcome"]) == ("B", "A", "")
+def test_states_are_known_without_published_transitions(machines):
+    structure(machines)
+    status(machines, "A")
+    status(machines, "B")
+    status(machines, "A")
+    assert (last(machines)["from"], last(machines)["to"], last(machines)["outcome"]) == ("B", "A", "")
 
 
-def test_number_of_containers_is_bounded(told):
+def test_number_of_containers_is_bounded(machines):
     for number in range(graph.MAX_CONTAINERS + 30):
-        structure(told, f"/{number}")
-        status(told, "A", f"/{number}")
-    active = told.documents["active"]["/coglab"]["active"]
+        structure(machines, f"/{number}")
+        status(machines, "A", f"/{number}")
+    active = machines.documents["active"]["/coglab"]["active"]
     assert len(active) == graph.MAX_CONTAINERS and "/0/A" in active

@@ -22,7 +22,7 @@ def test_refused_choice_shows_reason_and_old_value(live):
         page.open(live.console.link())
         page.until("return document.getElementById('object').textContent.includes('(default)')", 60.0)
         for field, wish, shown in (("object", "ball", ""), ("speed", "40", "100")):
-            page.js("document.getElementById('told').hidden = true")
+            page.js("document.getElementById('refusal').hidden = true")
             page.js(
                 "const f = document.getElementById(arguments[0]); f.focus(); f.value = arguments[1];"
                 "f.dispatchEvent(new Event('change'))",
@@ -30,7 +30,7 @@ def test_refused_choice_shows_reason_and_old_value(live):
                 wish,
             )
             page.until(
-                "const t = document.getElementById('told'); return !t.hidden && /watches/.test(t.textContent)", 60.0
+                "const t = document.getElementById('refusal'); return !t.hidden && /watches/.test(t.textContent)", 60.0
             )
             assert page.js("return document.getElementById(arguments[0]).value", field) == shown
     assert live.console.desk.object_id == "" and ("speed_scale", {"value": 0.4}) not in live.robot.calls

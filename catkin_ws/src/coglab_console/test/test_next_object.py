@@ -70,7 +70,7 @@ def begin(desk, conditions):
 def test_the_trial_of_the_order_names_the_object_of_its_requests(cell):
     answer = begin(cell, ["Receive Ball", "receive tea_box"])
     assert answer["success"] and "ball" in answer["message"]
-    assert asked(cell, RECEIVE)["object_id"] == "ball" and ("select_object", "ball") in cell.backend.told
+    assert asked(cell, RECEIVE)["object_id"] == "ball" and ("select_object", "ball") in cell.backend.published
     ask(cell, "a", "trial_end", outcome="skipped")
     assert ask(cell, "a", "trial_begin")["success"]
     assert asked(cell, RECEIVE)["object_id"] == "tea_box"

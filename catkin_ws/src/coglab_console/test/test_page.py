@@ -74,7 +74,9 @@ def test_a_click_on_a_disabled_button_says_why(live):
     button = "[data-action=exchange_robot_to_human]"
     page.until(f"return document.querySelector('{button}').hasAttribute('aria-disabled')", 60.0)
     page.js(f"document.querySelector('{button}').click()")
-    words = page.js("const told = document.getElementById('told'); return told.checkVisibility() && told.textContent")
+    words = page.js(
+        "const refusal = document.getElementById('refusal'); return refusal.checkVisibility() && refusal.textContent"
+    )
     assert "Give" in words and "empty" in words
     assert not live.robot.calls
 
@@ -251,5 +253,5 @@ def test_page_without_session_shows_what_to_do_and_that_stop_failed(live):
         page.until("return document.getElementById('lost').textContent.includes('console.url')", 60.0)
         stops = len(live.robot.stops)
         page.js("document.getElementById('stop').click()")
-        page.until("return document.getElementById('told').textContent.includes('red button')", 60.0)
+        page.until("return document.getElementById('refusal').textContent.includes('red button')", 60.0)
         assert len(live.robot.stops) == stops

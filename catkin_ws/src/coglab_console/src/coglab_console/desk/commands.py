@@ -112,8 +112,8 @@ _VALIDATORS = {command.name: _Validator(command.schema()) for command in _ALL}
 def judge(name: Any, arguments: Any) -> Command:
     """Returns the command. Raises BadCommand if the name is unknown or the arguments do not fit the schema."""
     if not isinstance(name, str) or name not in COMMANDS:
-        told = f"'{name[:40]}'" if isinstance(name, str) else f"without a name of letters ({type(name).__name__})"
-        raise BadCommand(f"there is no command {told}; there are: {', '.join(COMMANDS)}")
+        which = f"'{name[:40]}'" if isinstance(name, str) else f"without a name of letters ({type(name).__name__})"
+        raise BadCommand(f"there is no command {which}; there are: {', '.join(COMMANDS)}")
     try:
         error = jsonschema.exceptions.best_match(_VALIDATORS[name].iter_errors(arguments))
     except RecursionError:
@@ -121,8 +121,8 @@ def judge(name: Any, arguments: Any) -> Command:
     if error is not None:
         where = ".".join(str(part) for part in error.absolute_path)
         plain = error.schema.get("description", "") if error.validator == "pattern" else ""
-        told = f"{plain} is expected, got '{error.instance[:40]}'" if plain else error.message[:200]
-        raise BadCommand(f"{name}{': ' + where if where else ''}: {told}")
+        problem = f"{plain} is expected, got '{error.instance[:40]}'" if plain else error.message[:200]
+        raise BadCommand(f"{name}{': ' + where if where else ''}: {problem}")
     return COMMANDS[name]
 
 

@@ -45,7 +45,7 @@ class Backend(Protocol):
     def stop(self, who: str) -> None:
         """Brakes the arm, latches the hold and ends the action. Returns at once; the outcome comes as events."""
 
-    def tell(self, name: str, text: str) -> None:
+    def publish(self, name: str, text: str) -> None:
         """Publishes a note, or the object of the next action, on ROS. Returns at once."""
 
     def mark(self, names: dict[str, str]) -> None:
@@ -148,7 +148,7 @@ class Desk:
             folder,
             now,
             lambda text: events.add("experiment", text, "warning"),
-            lambda text: backend.tell("note", text),
+            lambda text: backend.publish("note", text),
         )
         goes_on = self.experiment.resume()
         if goes_on:
@@ -167,7 +167,7 @@ class Desk:
         self.backend.stop(who)
         self.guard.stop(f"{who} pressed STOP")
         if self.backend.standing().under_way:
-            self.backend.tell("note", f"STOP by {who}")  # a mark in the recording
+            self.backend.publish("note", f"STOP by {who}")  # a mark in the recording
         self.tick()
         return DeskReply(True, "STOP was sent to the arm and to the brain", {"stop": self.guard.stops})
 
@@ -224,7 +224,7 @@ class Desk:
         """An action of the state machine has ended."""
         self.experiment.result(row)
 
-    def told(self, name: str, text: str, who: str) -> None:
+    def set_from_topic(self, name: str, text: str, who: str) -> None:
         """Takes a note, or the object of the next action, from another node. An invalid one becomes a warning event."""
         arguments = {"text": text} if name == "note" else {"object_id": text}
         try:
@@ -257,7 +257,7 @@ class Desk:
                 "reasons": reasons(now, self.guard, self.experiment.refusals(now)),
                 "guard": {
                     "stop": self.guard.stops,
-                    "cause": self.guard.told(now.actions if now.in_hub else ()),
+                    "cause": self.guard.stop_text(now.actions if now.in_hub else ()),
                     "lifted": self.guard.lifted,
                     "unacknowledged": self.guard.unacknowledged,
                     "hold": self.guard.needs_hold,
@@ -299,8 +299,8 @@ class Desk:
             if answer["success"] and name in ("start", "home"):  # a calibration moves only the fingers
                 self.guard.moved(stops)
         if name not in ("parameters", "note", "select_object", "preview"):
-            told = f"{who}: {words_of(name, arguments)}: {answer['message']}"
-            self.events.add("command", told, "info" if answer["success"] else "warning")
+            text = f"{who}: {words_of(name, arguments)}: {answer['message']}"
+            self.events.add("command", text, "info" if answer["success"] else "warning")
         self.tick()
         return answer
 
@@ -318,7 +318,7 @@ class Desk:
         condition = self.experiment.condition()
         named = next((word for word in re.split(r"[^a-z0-9_]+", condition.lower()) if word in now.objects), "")
         if trial[0] and named:
-            self.backend.tell("select_object", named)
+            self.backend.publish("select_object", named)
             self._select(f"trial {trial[0]} ({condition})", named)
 
     def _note(self, who: str, text: str) -> str:
@@ -336,13 +336,13 @@ class Desk:
         """Executes the commands that do not need the robot. Returns None for the others."""
         session = self.experiment
         if name == "note":
-            self.backend.tell("note", given["text"])
+            self.backend.publish("note", given["text"])
             return DeskReply(True, self._note(who, given["text"]))
         if name == "acknowledge":
             # The answer, and thereby the event, contains number and cause of the stop.
             refusal = self.guard.acknowledge(given["stop"])
-            told = f"acknowledged stop {self.guard.stops} ({self.guard.cause}); the first motion needs a held button"
-            return DeskReply(not refusal, refusal or told)
+            done = f"acknowledged stop {self.guard.stops} ({self.guard.cause}); the first motion needs a held button"
+            return DeskReply(not refusal, refusal or done)
         if name == "take_over":
             return DeskReply(True, self.roles.take_over(who))
         if name == "keep":
@@ -350,7 +350,7 @@ class Desk:
         if name == "invite":
             return DeskReply(True, "a link for one more browser, valid once", self._invite())
         if name == "select_object":
-            self.backend.tell("select_object", given["object_id"])
+            self.backend.publish("select_object", given["object_id"])
             return DeskReply(True, self._select(who, given["object_id"]))
         if name == "session_begin":
             return DeskReply(
@@ -368,12 +368,12 @@ class Desk:
         if name == "session_end":
             return DeskReply(True, session.end())
         if name == "trial_begin":
-            told = session.trial_begin()
+            answer = session.trial_begin()
             self.backend.mark(session.names())
             self._follow_trial(self.backend.standing())
-            return DeskReply(True, f"{told}; the next object is {self.object_id or 'the default'}")
+            return DeskReply(True, f"{answer}; the next object is {self.object_id or 'the default'}")
         if name == "trial_end":
-            told = session.trial_end(given["outcome"])
+            answer = session.trial_end(given["outcome"])
             self.backend.mark(session.names())
-            return DeskReply(True, told)
+            return DeskReply(True, answer)
         return None

@@ -70,16 +70,16 @@ def _mark(row: dict) -> tuple:
 class Experiment:
     """At most one session at a time. If the file cannot be written, the session goes on in memory, with a warning.
 
-    `tell` hands a note to the recorder."""
+    `publish_note` sends a note to the recorder."""
 
     def __init__(
         self,
         folder: Path,
         now: Callable[[], float],
         warn: Callable[[str], object],
-        tell: Callable[[str], object] = lambda text: None,
+        publish_note: Callable[[str], object] = lambda text: None,
     ) -> None:
-        self._path, self._now, self._warn, self._tell = folder / FILE, now, warn, tell
+        self._path, self._now, self._warn, self._publish_note = folder / FILE, now, warn, publish_note
         self._close()
         self.notes: list[dict] = []
         self._goes = 0
@@ -241,7 +241,7 @@ class Experiment:
         self._needs("trial_end")
         trial = f"trial {self.position + 1}"
         if self._results:  # the recording of its last action gets the experimenter's judgement
-            self._tell(f"{trial}: {outcome}")
+            self._publish_note(f"{trial}: {outcome}")
         self.running = False
         self.trials[self.position]["outcome"] = outcome
         self.position += outcome != "repeat"

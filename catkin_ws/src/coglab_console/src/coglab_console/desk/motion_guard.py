@@ -42,7 +42,7 @@ class MotionGuard:
         self.cause, self.unacknowledged, self.needs_hold, self.lifted = cause, True, True, False
         self.stops += 1
 
-    def told(self, actions: Sequence[str] = ()) -> str:
+    def stop_text(self, actions: Sequence[str] = ()) -> str:
         """Text of the page about the newest stop. `actions`: those that the state machine takes now."""
         if self.lifted:
             return f"This stop is over, it was lifted without this page: {self.cause or 'no reason given'}"

@@ -57,25 +57,25 @@ class RosBackend:
         self._waiting = threading.Semaphore(MAX_WAITING)
         self._marks: queue.SimpleQueue[dict[str, str]] = queue.SimpleQueue()
         threading.Thread(target=self._write_marks, name="trial_names", daemon=True).start()
-        self._tellers = {
+        self._publishers = {
             "note": rospy.Publisher(NOTES, String, queue_size=20),
             "select_object": rospy.Publisher(NEXT_OBJECT, String, queue_size=5, latch=True),
         }
 
-    def listen(self, told: Callable[[str, str, str], None]) -> None:
-        """Calls `told(name, text, who)` for messages of other nodes on the topics of notes and of the next object."""
+    def listen(self, received: Callable[[str, str, str], None]) -> None:
+        """Calls `received(name, text, who)` for messages of other nodes on the topics of notes and next objects."""
 
         def heard(message: String, name: str) -> None:
             who = message._connection_header.get("callerid", "somebody")
             if who != rospy.get_name():
-                told(name, message.data, who)
+                received(name, message.data, who)
 
         for name, topic in (("note", NOTES), ("select_object", NEXT_OBJECT)):
             rospy.Subscriber(topic, String, heard, name, queue_size=20)
 
-    def tell(self, name: str, text: str) -> None:
+    def publish(self, name: str, text: str) -> None:
         """See Backend."""
-        self._tellers[name].publish(String(text))
+        self._publishers[name].publish(String(text))
 
     def mark(self, names: dict[str, str]) -> None:
         """See Backend."""
@@ -130,7 +130,7 @@ class RosBackend:
     def _ask(service: str, kind: Any, *fields: Any) -> Any:
         return call_service(service, kind, *fields, wait=2.0)
 
-    def _told(self, service: str, kind: Any, *fields: Any) -> DeskReply:
+    def _reply(self, service: str, kind: Any, *fields: Any) -> DeskReply:
         answer = self._ask(service, kind, *fields)
         return DeskReply(
             bool(answer.success), answer.message or ("done" if answer.success else "refused without a reason")
@@ -139,7 +139,7 @@ class RosBackend:
     # --- one method per command, in a thread of its own -------------------------------------------------------
 
     def _start(self, action: str, object_id: str = "", delivery: str = "") -> DeskReply:
-        return self._told("coglab/start", Start, action, f"{object_id}/{delivery}" if delivery else object_id)
+        return self._reply("coglab/start", Start, action, f"{object_id}/{delivery}" if delivery else object_id)
 
     def _calibrate(self, mode: str, force: bool = False) -> DeskReply:
         if self._calibration.get_num_connections() == 0:
@@ -165,24 +165,24 @@ class RosBackend:
         home = lookup(self._view.config(), "postures.home")
         if not isinstance(home, list) or len(home) != 7:
             return DeskReply(False, "postures.home is not in the configuration of the machines (/coglab/config_file)")
-        answer = self._told("controller_manager/switch_controller", SwitchController, HOME_CONTROLLER)
+        answer = self._reply("controller_manager/switch_controller", SwitchController, HOME_CONTROLLER)
         if not answer["success"]:
             return answer
-        return self._told("controller_manager/ptp/add_ptp", AddPtp, [float(value) for value in home], [], [])
+        return self._reply("controller_manager/ptp/add_ptp", AddPtp, [float(value) for value in home], [], [])
 
     def _speed_scale(self, value: float) -> DeskReply:
-        return self._told("controller_manager/speed_scale", SetSpeedScale, float(value))
+        return self._reply("controller_manager/speed_scale", SetSpeedScale, float(value))
 
     def _contact_learn(self) -> DeskReply:
-        return self._told("contact_detector/learn", Learn)
+        return self._reply("contact_detector/learn", Learn)
 
     def _contact_arm(
         self, mode: str, k: float = 0.0, timeout: float = 10.0, joints: list[int] | None = None
     ) -> DeskReply:
-        return self._told("contact_detector/arm", ArmContact, mode, float(timeout), float(k), joints or [], 0.0, 0.0)
+        return self._reply("contact_detector/arm", ArmContact, mode, float(timeout), float(k), joints or [], 0.0, 0.0)
 
     def _objects_reload(self) -> DeskReply:
-        answer = self._told("object_database/reload", Reload)
+        answer = self._reply("object_database/reload", Reload)
         self._view.files_changed()
         return answer
 
@@ -190,11 +190,11 @@ class RosBackend:
         from coglab_tools.command import CommandError
 
         try:
-            told = self._view.study.answer(questionnaire, answers, of)
+            answer = self._view.study.answer(questionnaire, answers, of)
         except CommandError as error:
             return DeskReply(False, str(error))
         self._view.files_changed()
-        return DeskReply(True, told)
+        return DeskReply(True, answer)
 
     def _preview(self, primitive: str) -> DeskReply:
         self._view.preview = primitive
@@ -202,10 +202,10 @@ class RosBackend:
         return DeskReply(True, shown or "the cell shows the path of the next action")
 
     def _feedback(self, verb: str, name: str) -> DeskReply:
-        return self._told(f"controller_manager/feedback/{verb}", FeedbackSelect, [name], "console")
+        return self._reply(f"controller_manager/feedback/{verb}", FeedbackSelect, [name], "console")
 
     def _feedback_order(self, names: list[str]) -> DeskReply:
-        return self._told("controller_manager/feedback/set_execution_order", SetExecutionOrder, names)
+        return self._reply("controller_manager/feedback/set_execution_order", SetExecutionOrder, names)
 
     def _parameters(self) -> DeskReply:
         rows: list[list[str]] = []

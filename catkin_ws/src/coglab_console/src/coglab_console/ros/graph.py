@@ -27,7 +27,7 @@ class Machine:
         self.containers: dict[str, Container] = {}
         self.active: dict[str, list[str]] = {}
         self.last: dict[str, Any] = {}
-        self.tells = False  # True if it publishes transitions with outcome and reason, which introspection lacks
+        self.has_reasons = False  # True if it publishes transitions with outcome and reason, which introspection lacks
         self.heard = time.monotonic()
         self.dirty = True
         self.subscribers: list[rospy.Subscriber] = []
@@ -50,7 +50,7 @@ class SmachGraphs:
         with self._lock:
             for machine in self._machines.values():
                 if path in machine.containers:
-                    machine.tells = True
+                    machine.has_reasons = True
                     machine.last = _step(path, from_state, outcome, to_state, reason)
         self._show()
 
@@ -108,7 +108,7 @@ class SmachGraphs:
             if before == active or (before is None and len(machine.active) >= MAX_CONTAINERS):
                 return
             machine.active[message.path] = active
-            if before and active and not machine.tells:
+            if before and active and not machine.has_reasons:
                 machine.last = _step(message.path, ", ".join(before), "", ", ".join(active), "")
         self._show()
 

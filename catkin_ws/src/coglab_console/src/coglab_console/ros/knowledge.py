@@ -57,7 +57,7 @@ class Knowledge:
         self._entries: dict[str, dict] = {}
         self._config: dict = {}
         self._stamps: dict[str, int] = {}
-        self._told: dict[str, str] = {}
+        self._reported: dict[str, str] = {}
         self._now = threading.Event()
         self._own_frames = view.named
         self._ask: rospy.ServiceProxy | None = None
@@ -90,10 +90,10 @@ class Knowledge:
             ):
                 try:
                     work()
-                    self._told.pop(name, None)
+                    self._reported.pop(name, None)
                 except Exception as error:  # a service or file is missing now: keep the old content
-                    if self._told.get(name) != str(error):
-                        self._told[name] = str(error)
+                    if self._reported.get(name) != str(error):
+                        self._reported[name] = str(error)
                         self._say(f"{name}: {error}", "warning")
             self._now.wait(PERIOD)
             self._now.clear()
@@ -169,8 +169,8 @@ class Knowledge:
                 if not self._view.path_runs():  # a motion may have begun meanwhile
                     self._put("path", found)
             except Exception as error:  # nothing that comes from outside ends this thread
-                if self._told.get("path") != str(error):
-                    self._told["path"] = str(error)
+                if self._reported.get("path") != str(error):
+                    self._reported["path"] = str(error)
                     self._say(f"the path ahead cannot be drawn: {type(error).__name__}: {error}", "warning")
 
     def _path(self) -> dict | None:

@@ -66,7 +66,7 @@ class ConsoleNode:
         backend = RosBackend(self.view, self.stop_path.press, self.real)
         folder = Path(parameters.read("~sessions", str, "") or home / "console_sessions")
         self.desk = Desk(backend, self.events, self.documents, folder, time.time, self.write_link)
-        backend.listen(lambda name, text, who: self.soon(self.desk.told, name, text, who))
+        backend.listen(lambda name, text, who: self.soon(self.desk.set_from_topic, name, text, who))
         self.knowledge = Knowledge(
             self.view, self.put, lambda text, level: self.say("files", text, level), lambda: self.desk.object_id
         )

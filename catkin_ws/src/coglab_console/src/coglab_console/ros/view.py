@@ -352,8 +352,8 @@ class RosView:
     def _on_joints(self, message: JointState) -> None:
         if len(message.name) != len(message.position):
             return
-        told = zip(message.name, message.position, strict=True)
-        ours = {name: value for name, value in told if self._moving is None or name in self._moving}
+        pairs = zip(message.name, message.position, strict=True)
+        ours = {name: value for name, value in pairs if self._moving is None or name in self._moving}
         if not ours or not all(map(math.isfinite, ours.values())):
             return
         self.joints = {**self.joints, **ours} if self._moving else {}
@@ -383,8 +383,8 @@ class RosView:
         if (message.supervisor, message.quality) != (before.supervisor, before.quality):
             bad = message.supervisor in ("stopped", "disconnected")
             words = f"{supervisor(message.supervisor)}, quality {message.quality}"
-            told = f"{words}: {plain(message.reason)}" if message.reason else words
-            self._say("arm", told, "fault" if bad else "info")
+            text = f"{words}: {plain(message.reason)}" if message.reason else words
+            self._say("arm", text, "fault" if bad else "info")
 
     def _on_hand(self, message: HandStatus) -> None:
         before, self.hand = self.hand, message
@@ -405,10 +405,10 @@ class RosView:
     def _on_transition(self, message: Transition) -> None:
         level = {"failed": "warning", "stopped": "fault", "fault": "fault"}.get(message.outcome, "info")
         causes = "".join(f", because {cause}" for cause in message.causes[:4])
-        told = plain(message.reason + causes)
-        words = transition(message.path, message.from_state, message.outcome, message.to_state, told)
+        reason = plain(message.reason + causes)
+        words = transition(message.path, message.from_state, message.outcome, message.to_state, reason)
         self._say("machine", words, level, phase(f"{message.path}/{message.from_state}"))
-        self._transition(message.path, message.from_state, message.outcome, message.to_state, told)
+        self._transition(message.path, message.from_state, message.outcome, message.to_state, reason)
 
     def _on_result(self, message: String) -> None:
         try:

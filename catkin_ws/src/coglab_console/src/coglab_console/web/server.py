@@ -269,13 +269,13 @@ class ConsoleServer:
     async def _listen(self, socket: web.WebSocketResponse, session: Session, client: Client) -> None:
         bad = 0
         async for message in socket:
-            told = self._frame(message, session, client, socket)
-            if told:
+            error = self._frame(message, session, client, socket)
+            if error:
                 bad += 1
                 if bad > MAX_BAD_FRAMES:
                     await socket.close(code=1008, message=b"too many frames that mean nothing")
                     return
-                await asyncio.wait_for(socket.send_str(to_json({"t": "refused", "message": told})), SEND_LIMIT)
+                await asyncio.wait_for(socket.send_str(to_json({"t": "refused", "message": error})), SEND_LIMIT)
 
     def _frame(self, message: WSMessage, session: Session, client: Client, socket: web.WebSocketResponse) -> str:
         """Processes one frame of the browser. Returns an error text, or an empty string."""
