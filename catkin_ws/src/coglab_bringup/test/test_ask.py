@@ -9,8 +9,8 @@ from types import SimpleNamespace
 
 import pytest
 from coglab_bringup import ask as ask_module
-from coglab_bringup.ask import brain_of
-from coglab_bringup.run_directory import free_port, record_run, running_systems
+from coglab_bringup.run_directory import free_port
+from coglab_py.running_systems import brain_of
 
 TOP = Path(__file__).resolve().parents[4]
 HUB = "/coglab_master/wait_without_object"
@@ -167,22 +167,3 @@ def test_the_command_does_not_register_at_the_master(brain):
     assert {name for kind in rosgraph.Master("/test").getSystemState() for _, names in kind for name in names} == {
         "/coglab"
     }
-
-
-def test_no_system_and_several(tmp_path, monkeypatch):
-    from coglab_bringup.ask import find_master
-    from coglab_bringup.usage import Refused
-
-    monkeypatch.setattr("coglab_bringup.ask.DEFAULT_MASTER", "http://127.0.0.1:9")
-    with pytest.raises(Refused, match="./coglab launch"):
-        find_master(tmp_path, 0, "")
-    record_run(tmp_path, 4001, "launch")
-    assert find_master(tmp_path, 0, "http://localhost:11999") == "http://127.0.0.1:4001"
-    record_run(tmp_path, 4002, "demo")
-    with pytest.raises(Refused, match=r"-p 4001 \(launch\), -p 4002 \(demo\)"):
-        find_master(tmp_path, 0, "")
-    assert find_master(tmp_path, 0, "http://127.0.0.1:4002") == "http://127.0.0.1:4002"
-    # an ended system is forgotten, even if another program has its process id now
-    runs = tmp_path / ".coglab" / "runs"
-    (runs / "4002.json").write_text(f'{{"command": "demo", "pid": {os.getpid()}, "start_time": "1"}}')
-    assert running_systems(tmp_path) == {4001: "launch"} and not (runs / "4002.json").exists()

@@ -13,16 +13,16 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from urllib.parse import urlparse
 
 if not __package__:  # ./coglab runs it as a file, in isolated mode
-    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+    SOURCES = Path(__file__).resolve().parents[3]
+    sys.path[:0] = [str(SOURCES / package / "src") for package in ("coglab_bringup", "coglab_py")]
+
+from coglab_py.running_systems import NoSystem, brain_of, find_master, running_systems
 
 from coglab_bringup.ros_wire import Connection, NoAnswer, Reader, call, master_call, subscribe, text
-from coglab_bringup.run_directory import running_systems
 from coglab_bringup.usage import Parser, Refused, master_port
 
-DEFAULT_MASTER = "http://127.0.0.1:11311"  # of a plain roslaunch
 ANSWER_LIMIT = 5.0  # s, longest wait for a service that exists
 STATE_LIMIT = 3.0  # s, longest wait for the latched state
 LONGEST_START = 600.0  # s, longest wait for the hub while nodes still start
@@ -81,38 +81,6 @@ def ask_parser(command: str) -> Parser:
         "-p", type=master_port, default=0, dest="port", metavar="PORT", help="port of the ROS master, if not clear"
     )
     return parser
-
-
-def brain_of(master: str) -> bool:
-    """True if a ROS master answers at this address and the brain is registered there."""
-    before = socket.getdefaulttimeout()
-    socket.setdefaulttimeout(1.0)
-    try:
-        return bool(master_call(master, "lookupService", "/coglab/start"))
-    except NoAnswer:
-        return False
-    finally:
-        socket.setdefaulttimeout(before)
-
-
-def find_master(top: Path, port: int, users_own: str) -> str:
-    """Address of the ROS master to use: the given port, the user's ROS_MASTER_URI if a brain runs there, the only
-    running system, or a plain roslaunch. Refused if there is none or more than one."""
-    systems = running_systems(top)
-    if port:
-        return f"http://127.0.0.1:{port}"
-    if users_own and urlparse(users_own).port not in systems and brain_of(users_own):
-        return users_own
-    if urlparse(users_own).port in systems:
-        return users_own
-    if len(systems) > 1:
-        there = ", ".join(f"-p {number} ({command})" for number, command in systems.items())
-        raise Refused(f"several systems run; choose one: {there}")
-    if systems:
-        return f"http://127.0.0.1:{next(iter(systems))}"
-    if brain_of(DEFAULT_MASTER):
-        return DEFAULT_MASTER
-    raise Refused("no system runs; start one: ./coglab launch")
 
 
 @dataclass
@@ -318,7 +286,7 @@ def main(arguments: list[str]) -> int:
         if options.port and not brain_of(master) and command != "start":
             raise Refused(f"no system answers on port {options.port}; there are: {running_systems(top) or 'none'}")
         return COMMANDS[command](Brain(master), options)
-    except Refused as error:
+    except (NoSystem, Refused) as error:
         print(f"[coglab] error: {error}", file=sys.stderr)
         return 1
 

@@ -7,8 +7,7 @@ import sys
 from pathlib import Path
 
 from coglab.control.run import run
-
-from coglab_bringup.ask import Refused, find_master
+from coglab_py.running_systems import NoSystem, find_master
 
 
 def main(words: list[str]) -> int:
@@ -18,7 +17,7 @@ def main(words: list[str]) -> int:
     own = os.environ.get("COGLAB_USER_MASTER", "")
     try:
         os.environ["ROS_MASTER_URI"] = find_master(Path(os.environ["COGLAB_TOP"]), 0, own)
-    except Refused as error:
+    except NoSystem as error:
         if not own:
             print(f"error: {error}", file=sys.stderr)
             return 1

@@ -15,10 +15,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from coglab_py.node_start import log_without_raising
+from coglab_py.running_systems import record_run
 
 from coglab_bringup import process_tree
 from coglab_bringup.arguments import demo_parser
-from coglab_bringup.run_directory import free_port, print_load, record_run, run_environment
+from coglab_bringup.run_directory import free_port, print_load, run_environment
 from coglab_bringup.usage import Refused
 
 OBJECT = "mug"  # object that the simulated person offers (coglab_sim/config/cell.yaml)

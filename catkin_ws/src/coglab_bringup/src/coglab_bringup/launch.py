@@ -6,8 +6,10 @@ import os
 import sys
 from pathlib import Path
 
+from coglab_py.running_systems import record_run
+
 from coglab_bringup.launch_arguments import judge_launch, split_port, whole_path
-from coglab_bringup.run_directory import free_port, lasting_home, port_is_free, print_load, record_run, run_environment
+from coglab_bringup.run_directory import free_port, lasting_home, port_is_free, print_load, run_environment
 from coglab_bringup.usage import Refused
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import fcntl
-import json
 import os
 import socket
 import tempfile
@@ -74,36 +73,3 @@ def lasting_home(top: Path) -> tuple[Path, int]:
         else:
             os.set_inheritable(lock, True)
             return home, lock
-
-
-def _start_time(process: int) -> str:
-    """Start of a process in ticks since boot, to distinguish it from a later one with its id; empty if it ended."""
-    try:
-        fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
-    except OSError:
-        return ""
-    return fields[19] if fields[0] != "Z" else ""
-
-
-def record_run(top: Path, port: int, command: str) -> None:
-    """Record that this process, or its replacement, runs a system whose ROS master listens on `port`."""
-    folder = top / ".coglab" / "runs"
-    folder.mkdir(parents=True, exist_ok=True)
-    row = {"command": command, "pid": os.getpid(), "start_time": _start_time(os.getpid())}
-    (folder / f"{port}.json").write_text(json.dumps(row) + "\n")
-
-
-def running_systems(top: Path) -> dict[int, str]:
-    """Running systems: command (launch, demo) by port of the ROS master. Removes the records of ended systems."""
-    found = {}
-    for path in sorted((top / ".coglab" / "runs").glob("*.json")):
-        try:
-            row = json.loads(path.read_text())
-            alive = _start_time(int(row["pid"])) == row["start_time"] != ""
-        except (OSError, ValueError, KeyError, TypeError):
-            alive = False
-        if alive:
-            found[int(path.stem)] = row["command"]
-        else:
-            path.unlink(missing_ok=True)
-    return found

@@ -211,7 +211,7 @@ def _running_master() -> str:
     """Address of the running system; empty: that of ROS_MASTER_URI."""
     import os
 
-    from coglab_bringup.ask import Refused, find_master
+    from coglab_py.running_systems import NoSystem, find_master
 
     top = os.environ.get("COGLAB_TOP", "")
     if not top:
@@ -219,7 +219,7 @@ def _running_master() -> str:
     own = os.environ.get("COGLAB_USER_MASTER", "")
     try:
         return find_master(Path(top), 0, own)
-    except Refused as error:
+    except NoSystem as error:
         if not own:
             raise NotThere(str(error)) from None
         return own
