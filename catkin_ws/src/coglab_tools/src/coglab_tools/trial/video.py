@@ -29,7 +29,7 @@ FFMPEG_LIMIT = 300.0  # s
 
 
 class _World:
-    """The recorded trial in the form of a virtual world, for film.Painter."""
+    """The recorded trial in the form of a virtual world, for Painter."""
 
     def __init__(self, trial: Measured) -> None:
         import coglab_controllers as cc
@@ -102,7 +102,7 @@ def write_video(trial: Measured, file: Path) -> dict[str, float]:
             f"the trial {trial.record.id} has no joint positions (lwr/joint_states), so there is nothing to draw"
         )
     try:
-        from coglab_bringup.film import Painter
+        from coglab_tools.trial.painter import Painter
     except ImportError as error:
         raise NotThere(f"the camera is not built ({error}); ./coglab trial video builds it") from None
 
