@@ -1,10 +1,14 @@
-"""The pages of the project: links and named files exist, shell blocks parse, Python blocks compile; README's run."""
+"""The pages of the project: links and named files exist, shell blocks parse, Python blocks compile; README's run.
+The drawing of the packages shows what their package.xml files say."""
 
 from __future__ import annotations
 
 import re
+import runpy
 import subprocess
 import sys
+from graphlib import TopologicalSorter
+from html import unescape
 from pathlib import Path
 
 import pytest
@@ -74,3 +78,17 @@ def test_python_of_the_readme_runs(block: str, tmp_path):
         [sys.executable, "-c", block], text=True, capture_output=True, timeout=300, check=False, cwd=tmp_path
     )
     assert done.returncode == 0, done.stderr
+
+
+def test_the_drawing_of_the_packages_is_up_to_date():
+    """If not: docs/drawings/draw. The form of the picture depends on the version of Graphviz, its arrows do not."""
+    wanted = runpy.run_path(str(TOP / "docs/drawings/draw"))["packages_dot"]()
+    assert text_of(TOP / "docs/drawings/packages.dot") == wanted
+    titles = re.findall(r"<title>(.*?)</title>", text_of(TOP / "docs/images/packages.svg"))
+    drawn = {title for title in map(unescape, titles) if "->" in title}
+    assert drawn == {f"{a}->{b}" for a, b in re.findall(r"^  (\w+) -> (\w+);$", wanted, re.M)}
+
+
+def test_no_package_needs_itself_through_others():
+    arrows = runpy.run_path(str(TOP / "docs/drawings/draw"))["package_arrows"]()
+    TopologicalSorter(arrows).prepare()  # raises CycleError, which names the circle
