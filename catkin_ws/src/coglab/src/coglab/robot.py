@@ -16,6 +16,7 @@ from typing import Any, TypeAlias
 import coglab_controllers as cc
 import numpy as np
 from coglab_msgs.msg import ReasonCode
+from coglab_py.actions import WAYS_OUT
 from coglab_py.packages import package_path
 from coglab_py.pose import Pose
 from coglab_smach.kinematics.reachability import damped_step, default_arm, home_posture, joint_limits, solve
@@ -697,7 +698,7 @@ class Robot:
             raise Refused(f"{what} is refused: {why or 'stopped'}; call robot.reset()", 601)
 
     def _resettable(self) -> bool:
-        return bool({"reset", "initialise"} & set(self._cell.state().actions))
+        return bool(set(WAYS_OUT) & set(self._cell.state().actions))
 
     def _ask_for_reset(self) -> str:
         """Ask for the action that leads out of the stop, and return it. A stop may become a fault meanwhile, which

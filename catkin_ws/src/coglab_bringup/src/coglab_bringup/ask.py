@@ -18,6 +18,7 @@ if not __package__:  # ./coglab runs it as a file, in isolated mode
     SOURCES = Path(__file__).resolve().parents[3]
     sys.path[:0] = [str(SOURCES / package / "src") for package in ("coglab_bringup", "coglab_py")]
 
+from coglab_py.actions import SHORT_NAMES, WAYS_OUT
 from coglab_py.running_systems import NoSystem, brain_of, find_master, running_systems
 
 from coglab_bringup.ros_wire import Connection, NoAnswer, Reader, call, master_call, subscribe, text
@@ -29,8 +30,6 @@ LONGEST_START = 600.0  # s, longest wait for the hub while nodes still start
 CHANGE_LIMIT = 5.0  # s before an action is refused that the hub does not list: after a hold the list needs a moment
 DEFAULT_ACTIONS = ("exchange_human_to_robot", "exchange_robot_to_human")  # the first one that the hub accepts
 FACTOR_TOPIC = "/coglab_sim/real_time_factor"
-WAYS_OUT = ("reset", "initialise")  # actions that lead out of the states stopped and fault
-SHORT_NAMES = {"receive": "exchange_human_to_robot", "give": "exchange_robot_to_human"}
 OBJECT_PARAMETER = "/coglab_sim/cell/object/id"  # object that the simulated person offers
 
 

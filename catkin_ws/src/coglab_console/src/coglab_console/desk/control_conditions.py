@@ -11,6 +11,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from coglab_py.actions import WAYS_OUT
+
 from .commands import STARTS
 from .motion_guard import SECOND_THOUGHT, STANDSTILL, MotionGuard
 from .words import action_of, button, phase
@@ -83,7 +85,7 @@ def _start_reason(action: str, now: Standing) -> str:
         return "the hand is empty"
     if action in ("exchange_human_to_robot", "take") and now.object_id:
         return f"the hand holds {now.object_id}"
-    if action in ("initialise", "reset"):
+    if action in WAYS_OUT:
         return "nothing is stopped" if action == "reset" else "it is initialised"
     words = [button(name) for name in now.actions]
     return f"now only {' or '.join(words)}" if words else f"the phase '{phase(now.state)}' takes nothing"

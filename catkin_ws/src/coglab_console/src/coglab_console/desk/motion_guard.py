@@ -7,11 +7,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from coglab_py.actions import WAYS_OUT
+
 from .commands import COMMANDS
 from .words import button
 
 STANDSTILL = ("stopped", "fault")
-WAYS_OUT = ("reset", "initialise")  # actions that end a standstill
 HOLD_TIME = 0.8  # s that a button must be held
 LONGEST_GAP = 0.25  # s between two messages of a held button
 SECOND_THOUGHT = ("feedback", "feedback_order", "contact_learn", "contact_arm", "objects_reload")

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from coglab_msgs.msg import ReasonCode
+from coglab_py.actions import SHORT_NAMES
 
 from coglab_smach.context.holding import UNKNOWN
 from coglab_smach.ports.pending import Pending, PortError
@@ -16,8 +17,6 @@ if TYPE_CHECKING:
     from coglab_smach.context.context import Context
 
 DATABASE_WAIT = 2.0  # s, time limit of the object database for a trigger
-SHORT_NAMES = {"receive": "exchange_human_to_robot", "give": "exchange_robot_to_human"}
-"""Short names of actions in a trigger."""
 HUBS = ("wait_without_object", "wait_with_object")
 """States of the master machine that wait for a trigger."""
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from coglab_py.actions import SHORT_NAMES, WAYS_OUT
+
 from coglab_smach.context.config import ConfigError
 from coglab_smach.context.context import Context
-from coglab_smach.context.requests import SHORT_NAMES
 from coglab_smach.machines.board import build_put, build_take
 from coglab_smach.machines.exchange_human_to_robot import build_exchange_human_to_robot
 from coglab_smach.machines.exchange_robot_to_human import build_exchange_robot_to_human
@@ -18,7 +19,7 @@ ACTIONS_EMPTY = ("exchange_human_to_robot", "take")
 ACTIONS_HOLDING = ("exchange_robot_to_human", "put")
 LABEL = "coglab_master"
 SHIPPED = ("coglab_init_system", "which_hub", "wait_without_object", "wait_with_object", "stopped", "fault", "recover")
-TAKEN = (*SHIPPED, *ACTIONS_EMPTY, *ACTIONS_HOLDING, *SHORT_NAMES, "reset", "initialise")
+TAKEN = (*SHIPPED, *ACTIONS_EMPTY, *ACTIONS_HOLDING, *SHORT_NAMES, *WAYS_OUT)
 """Names that no action of a user can have."""
 
 

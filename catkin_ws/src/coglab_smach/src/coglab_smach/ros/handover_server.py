@@ -13,11 +13,12 @@ from typing import Any
 
 import rospy
 from coglab_msgs.msg import HandoverFeedback, HandoverGoal, HandoverMark, HandoverResult, ReasonCode
+from coglab_py.actions import SHORT_NAMES, WAYS_OUT
 from coglab_py.steady import ending
 
 from coglab_smach.context.context import Context
 from coglab_smach.context.journal import ActionRecord
-from coglab_smach.context.requests import SHORT_NAMES, TriggerReply, ask_for
+from coglab_smach.context.requests import TriggerReply, ask_for
 
 POLL = 0.02  # s between two looks at the brain
 FEEDBACK_PERIOD = 0.2  # s between two feedback messages without a change
@@ -26,8 +27,6 @@ TIME_LIMIT = 60.0  # s, time limit of a goal that names none
 STOPPING = 10.0  # s for the action to end after STOP
 UNTAKEN = 0.5  # s in which a hub begins an accepted action
 LONGEST_TEXT = 64  # characters of a field
-OPERATORS = ("reset", "initialise")
-"""requests without a record: they end in the next hub"""
 
 
 class HandoverServer:
@@ -195,7 +194,7 @@ class HandoverServer:
         """Returns the result of a request that has left no record: reset and initialise, or an action that the hub
         dropped because it was stopped first."""
         hub, failure = self._ctx.requests.hub(), self._ctx.journal.newest_failure()
-        success = goal.action in OPERATORS and hub not in ("stopped", "fault", "")
+        success = goal.action in WAYS_OUT and hub not in ("stopped", "fault", "")
         result = HandoverResult(
             action=SHORT_NAMES.get(goal.action, goal.action),
             object_id=goal.object_id,
