@@ -17,9 +17,7 @@ from coglab_smach.context.grip import Grip
 from coglab_smach.context.journal import Failure, Wait
 from coglab_smach.context.parts import built, type_name
 from coglab_smach.ports.pending import Pending, PortError
-from coglab_smach.states.motion import end_motion
-
-POLL_PERIOD = 0.01  # s between two polls of a condition; contact must be detected within 60 ms
+from coglab_smach.states.motion import POLL_PERIOD, end_motion
 
 RETOLD = 0.2  # s, smallest extension of a wait that is published again
 

@@ -13,7 +13,7 @@ from coglab_smach.kinematics.motion_time import ptp_time
 from coglab_smach.kinematics.reachability import damped_step, default_arm
 from coglab_smach.ports.pending import Pending, PortError
 
-POLL_PERIOD = 0.01  # s
+POLL_PERIOD = 0.01  # s between two polls of a condition; contact must be detected within 60 ms
 LINEAR = 0.03  # m, longest part of a way for which one step of the Jacobian is exact enough (2 mm)
 SILENCE = 0.5  # s, time limit for a silent robot; the request stays in force
 
