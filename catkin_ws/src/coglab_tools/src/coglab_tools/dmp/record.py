@@ -17,6 +17,7 @@ from coglab.results import Refused
 from coglab_tools.command import CheckFailed, NotThere
 from coglab_tools.dmp.cut import LOW, SHORTEST
 from coglab_tools.dmp.demonstration import Demonstration
+from coglab_tools.dmp.read import MOTOR_CLOSED
 
 PERIOD = 0.005  # s between two looks at the palm or at a tracked hand
 SAME_SIGHT = 0.002  # s; sights with a smaller difference in time are the same one
@@ -24,7 +25,6 @@ STILL = 0.5  # s at rest after a reach, end of a demonstration
 WINDOW = 0.1  # s over which the speed is taken
 FASTEST = 1.5  # m/s; a faster palm is not guided by a hand
 TRACE = 0.1  # s between two lines of the live trace
-MOTOR_CLOSED = 254.0
 
 
 class Trace:
