@@ -105,6 +105,7 @@ DetectorSettings settingsOf(const py::object& settings) {
 }
 
 void bindEvidence(py::module_& module) {
+  module.attr("DECIDED") = kDecided;
   module.def("probability", &probability, py::arg("margin"));
   py::class_<Evidence>(module, "Evidence")
       .def(py::init([](std::string source, double stamp, double until, double margin,
@@ -173,6 +174,7 @@ void bindObserver(py::module_& module) {
 }
 
 void bindThresholds(py::module_& module) {
+  module.attr("VARIANCE_FLOOR") = kVarianceFloor;
   py::class_<Change>(module, "Change")
       .def(py::init([](double stamp, const Joints& torque, const Features& features,
                        const Joints& rate, const Joints& position, const PalmJacobian& jacobian) {

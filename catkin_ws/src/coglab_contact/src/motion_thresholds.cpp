@@ -9,13 +9,12 @@
 namespace coglab_contact {
 namespace {
 
-constexpr double kFloor = 1e-4;      // Nm^2: in a noise-free simulation, rounding must not trigger
-constexpr double kRecent = 0.10;     // s, age of the newest sample of the reference mean
-constexpr double kOld = 0.60;        // s, age of its oldest sample
-constexpr double kLately = 0.25;     // s, age of the oldest sample of the mean for an offset
-constexpr double kMemory = 0.025;    // s, averaging time of speeds and payload torque
-constexpr std::size_t kLeast = 20;   // samples of the reference mean
-constexpr double kLeastFelt = 0.05;  // of the largest singular value
+constexpr double kRecent = 0.10;        // s, age of the newest sample of the reference mean
+constexpr double kOld = 0.60;           // s, age of its oldest sample
+constexpr double kLately = 0.25;        // s, age of the oldest sample of the mean for an offset
+constexpr double kMemory = 0.025;       // s, averaging time of speeds and payload torque
+constexpr std::size_t kLeast = 20;      // samples of the reference mean
+constexpr double kLeastFelt = 0.05;     // of the largest singular value
 const Vector3 kWeight(0.0, 0.0, 9.81);  // m/s^2, acceleration for carrying, base frame
 
 }  // namespace
@@ -44,7 +43,7 @@ Vector3 forceOnPalm(const PalmJacobian& jacobian, const Joints& torque) {
 }
 
 Joints MotionThresholds::deviation(const Features& features) const {
-  return variance.cwiseProduct(features).rowwise().sum().cwiseMax(kFloor).cwiseSqrt();
+  return variance.cwiseProduct(features).rowwise().sum().cwiseMax(kVarianceFloor).cwiseSqrt();
 }
 
 PalmForce MotionThresholds::force(const Change& change) const {

@@ -18,6 +18,8 @@ namespace coglab_contact {
 
 /// Number of terms of the variance.
 constexpr int kFeatures = 6;
+/// Nm^2, lower limit of the variance: in a noise-free simulation, rounding must not trigger.
+constexpr double kVarianceFloor = 1e-4;
 /// Terms of the variance (Nm^2), one row per joint: 1; v (rad/s, fastest joint, averaged over the
 /// memory of the residual); v^2; v^2 in the time of the reference mean; a^2 (rad/s^2, joint with
 /// the largest acceleration); square of the change (Nm) of the torque that carries and accelerates

@@ -12,6 +12,11 @@ ArrayLike: TypeAlias = npt.ArrayLike
 Jacobian: TypeAlias = cc.Chain | Callable[[Array], Array]
 """The chain to the palm, or a function from joint positions [7] (rad) to the palm's [3, 7] matrix (m/rad, base)."""
 
+DECIDED: float
+"""Probability that counts as a contact; one source at its threshold is sufficient."""
+VARIANCE_FLOOR: float
+"""Nm^2, lower limit of the variance of a change: in a noise-free simulation, rounding must not trigger."""
+
 def probability(margin: float) -> float:
     """Probability of a contact from a margin (signal over threshold): 0.99 at 1."""
 

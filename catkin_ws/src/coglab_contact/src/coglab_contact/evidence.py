@@ -12,16 +12,15 @@ from typing import Protocol
 
 import numpy as np
 
-from coglab_contact._core import ContactEvent, Evidence, probability
+from coglab_contact._core import DECIDED, ContactEvent, Evidence, probability
 
-__all__ = ["ContactEvent", "Evidence", "probability"]
+__all__ = ["DECIDED", "ContactEvent", "Evidence", "probability"]
 
 MOMENTUM = "momentum"
 TACTILE = "tactile"
 FINGERS = "finger_motor"
 SIGHT = "sight"
 FUSED = "fused"
-DECIDED = 0.99  # probability that counts as a contact; one source at its threshold is sufficient
 SLOW = 0.03  # m/s of the palm; below, an object seen in the palm stays there
 SPEAKS_TOO = 0.5  # probability from which a source counts as a contributor to the event
 

@@ -32,14 +32,12 @@ from coglab_contact.evidence import (
     probability,
     together,
 )
-from coglab_contact.load import GripAndLoad, LeavingLoad
+from coglab_contact.load import GRAVITY, SETTLING, GripAndLoad, LeavingLoad
 from coglab_contact.moving_contact import MovingContact
 
 IN_MOTION = "contact_in_motion"
 LIFT = "lift"
 RELEASE = "release"
-GRAVITY = 9.81  # m/s^2
-SETTLING = 0.10  # s after arming in which the reference residual of a weight is averaged
 CARRIED = 0.06  # s for which the weight must be present
 OLDEST_SIGHT = 0.15  # s; an older sight of an object is not compared with the palm
 HELD_CENTRE = (0.04, 0.0, 0.0)  # m in ih2_palm, approximate centre of a held object

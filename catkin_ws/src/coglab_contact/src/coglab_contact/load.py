@@ -28,7 +28,7 @@ APART = 2.0  # standard deviations of the load by torques; if touch differs by m
 
 
 GRAVITY = 9.81  # m/s^2
-SETTLING = 0.10  # s after arming in which the weight is averaged
+SETTLING = 0.10  # s after arming in which the weight, or the residual that it causes, is averaged
 CONFIRMED = 0.05  # s for which the load must be gone
 SAME = 0.5  # N, error of the model: apparent change of the weight between two postures
 FAR = 0.2  # rad, joint rotation between two such postures

@@ -21,7 +21,7 @@ import yaml
 from coglab_py.yaml_file import read
 from scipy.optimize import nnls
 
-from coglab_contact._core import Change, Offset, explained
+from coglab_contact._core import VARIANCE_FLOOR, Change, Offset, explained
 
 __all__ = ["FEATURES", "Change", "Offset", "ThresholdError", "Thresholds", "explained", "learn"]
 
@@ -36,7 +36,6 @@ FEATURES = (
 """Terms of the variance (Nm^2): 1; v (rad/s, fastest joint, averaged over the memory of the residual); v^2; v^2 in the
 time of the reference mean; a^2 (rad/s^2, joint with the largest acceleration); and, for each joint, the square of the
 change (Nm) of the torque that carries and accelerates the set payload"""
-FLOOR = 1e-4  # Nm^2, lower limit of the variance: in a noise-free simulation, rounding must not trigger
 CONFIRM = 2  # consecutive samples over the limit
 ALARM_SHARE = 2e-3  # probability with which a reach without contact may exceed the limit
 EULER = 0.5772156649015329
@@ -61,7 +60,7 @@ class Thresholds:
 
     def deviation(self, features: np.ndarray) -> np.ndarray:
         """Returns the standard deviation of each joint's change without contact, Nm, shape (7,)."""
-        return np.sqrt(np.maximum((self.variance * features).sum(axis=1), FLOOR))
+        return np.sqrt(np.maximum((self.variance * features).sum(axis=1), VARIANCE_FLOOR))
 
     def size(self, change: Change, lag: float = 0.0) -> float:
         """Returns the length, in deviations, of the force on the palm that explains a change best. ``lag``: s, of the
@@ -119,7 +118,7 @@ def learn(
     features = np.array([change.features for run in runs for change in run])
     torques = np.array([change.torque for run in runs for change in run])
     rates = np.array([change.rate for run in runs for change in run])
-    weights = 1.0 / np.maximum(np.einsum("kji,ji->kj", features, shares_of(torques, features)), FLOOR)
+    weights = 1.0 / np.maximum(np.einsum("kji,ji->kj", features, shares_of(torques, features)), VARIANCE_FLOOR)
     moved = float(np.sum(weights * torques * rates) / max(1e-9, float(np.sum(weights * rates**2))))
     moved = min(max(moved, -LONGEST_LAG - lag), LONGEST_LAG - lag)
     variance = shares_of(torques - moved * rates, features)
@@ -141,7 +140,7 @@ def shares_of(torques: np.ndarray, features: np.ndarray) -> np.ndarray:
         squares, seen, weight = torques[:, joint] ** 2, features[:, joint], np.ones(len(features))
         for _ in range(4):
             variance[joint] = nnls(seen * weight[:, None], squares * weight)[0]
-            weight = 1.0 / np.maximum(seen @ variance[joint], FLOOR)
+            weight = 1.0 / np.maximum(seen @ variance[joint], VARIANCE_FLOOR)
     return variance
 
 
