@@ -1,8 +1,6 @@
 """The contact detector node without a ROS master: messages, publications, services and learning."""
 
 import importlib.util
-import math
-import threading
 import time
 from pathlib import Path
 from types import SimpleNamespace
@@ -10,12 +8,15 @@ from unittest.mock import MagicMock
 
 import pytest
 import rospy
-from arms import ARM, SHIPPED
+import tf2_ros
+import yaml
+from arms import SHIPPED, URDF
 from coglab_contact.motion_thresholds import Thresholds
 from coglab_contact.moving_contact import MotionRecorder
 from coglab_msgs.msg import ReasonCode
 from coglab_msgs.srv import ArmContactRequest, LearnMotionRequest
-from coglab_py.pace import Pace
+from coglab_py import steady
+from coglab_py.packages import package_path
 from sensor_msgs.msg import JointState
 
 SCRIPT = Path(__file__).resolve().parents[1] / "scripts" / "contact_detector_node.py"
@@ -59,28 +60,21 @@ class Detector:
 
 @pytest.fixture
 def node(monkeypatch, tmp_path):
-    """The node without ROS. ``sent``: its messages by publisher. Learning returns the shipped thresholds."""
+    """The node without a ROS master, with a double of the detector. Learning returns the shipped thresholds."""
     module = script()
-    made = module.ContactDetectorNode.__new__(module.ContactDetectorNode)
-    made.pace, made.last_stamp = Pace(), rospy.Time()
-    made.joints, made.position, made.velocity, made.joint_stamp = JOINTS, None, None, 0.0
-    made.lock, made.last_sample, made.recorder, made.force_stamp = threading.Lock(), None, None, 0.0
-    made.detector, made.base, made.grasp, made.shown = Detector(), "world", None, None
-    made.heard = -math.inf
-    made.moving = MagicMock(load=0.0)
-    made.learnt_file = str(tmp_path / "learnt.yaml")
+    frames = yaml.safe_load(package_path("coglab_perception", "config", "frames.yaml").read_text())
+    given = {"~learnt_file": str(tmp_path / "learnt.yaml"), "perception/frames": frames}
+    monkeypatch.setattr(rospy, "get_param", lambda name, default=None: given.get(name, default))
+    monkeypatch.setattr(rospy, "resolve_name", lambda name: name)
+    for kind in ("Publisher", "Subscriber", "Service"):
+        monkeypatch.setattr(rospy, kind, MagicMock())
+    monkeypatch.setattr(tf2_ros, "Buffer", MagicMock())
+    monkeypatch.setattr(module, "TfListener", MagicMock())
+    monkeypatch.setattr(steady, "SteadyTimer", MagicMock())
+    monkeypatch.setattr(module, "MovingContact", lambda *_: MagicMock(load=0.0))
+    monkeypatch.setattr(module, "FusedDetector", lambda *_, **__: Detector())
     monkeypatch.setattr(MotionRecorder, "learn", lambda self: Thresholds.load(SHIPPED))
-    made.torques, made.arm = SimpleNamespace(resolved_name="/lwr/external_torques"), ARM
-    made.sent, made.said = [], []
-    for name in ("publisher", "margin", "signal", "force"):
-        setattr(made, name, name)
-    monkeypatch.setattr(module, "publish", lambda to, message: made.sent.append((to, message)))
-    monkeypatch.setattr(rospy, "loginfo", lambda *words: None)
-    monkeypatch.setattr(rospy, "logwarn_throttle", lambda *words: made.said.append(words))
-    made.now = 10.0
-    monkeypatch.setattr(rospy.Time, "now", staticmethod(lambda: rospy.Time.from_sec(made.now)))
-    made.pose_of = module.pose_of
-    return made
+    return module.ContactDetectorNode(URDF)
 
 
 def joints(stamp, position=0.0, velocity=(), effort=(), names=JOINTS):
@@ -122,8 +116,10 @@ def test_arming(node):
         node.heard = time.monotonic() - age
         assert node.silent() == silent, age
         assert node.on_arm(request()).success is not silent
-    for mode, when in (("contact", "once the arm is still"), ("load", "once the arm is still"), ("lift", "now")):
-        assert node.on_arm(request(mode)).message == f"watching for {mode} for 6.0 s, {when}"
+    for mode, at_once in (("contact", False), ("load", False), ("lift", True)):
+        armed = node.on_arm(request(mode))
+        assert (armed.success, armed.reason_code, node.detector.armed[0]) == (True, ReasonCode.NONE, mode)
+        assert mode in armed.message and "6.0 s" in armed.message and ("now" in armed.message) == at_once
     assert node.detector.armed[:3] == ("lift", 9.5, 6.0) and list(node.detector.armed[4]) == [2]
     assert [round(v, 3) for v in (node.detector.armed[3], *node.detector.armed[5:])] == [1.0, 0.3, 0.4]
     bad = node.on_arm(request("juggle"))
@@ -171,10 +167,3 @@ def test_the_recording_is_kept_if_the_file_cannot_be_written(node, tmp_path):
     assert node.recorder is gathering and not node.moving.use.called
     (tmp_path / "gone").mkdir()
     assert answered(node, END)[:2] == (True, ReasonCode.NONE)
-
-
-def stamped(message, secs, nsecs=0):
-    """Returns the message with this stamp."""
-    message.header.stamp = rospy.Time()
-    message.header.stamp.secs, message.header.stamp.nsecs = secs, nsecs
-    return message

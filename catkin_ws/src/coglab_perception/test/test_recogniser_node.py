@@ -3,10 +3,12 @@
 import importlib.util
 import time
 from pathlib import Path
-from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import pytest
 import rospy
+import tf2_ros
+import yaml
 from coglab_py import steady
 from geometry_msgs.msg import TransformStamped
 
@@ -21,9 +23,19 @@ def test_no_sight_is_lost_when_the_clock_is_set(monkeypatch, step):
     ros, boot = [1000.0], 50.0
     monkeypatch.setattr(rospy, "get_time", lambda: ros[0])
     monkeypatch.setattr(time, "monotonic", lambda: boot)
-    node = module.RecogniserNode.__new__(module.RecogniserNode)
-    node.base, node.last, node.seen, node.stamps = "world", {}, {}, steady.Stamps()
-    node.buffer = SimpleNamespace(lookup_transform=lambda *_: seen)
+    config = SCRIPT.parents[1] / "config"
+    frames = yaml.safe_load((config / "frames.yaml").read_text())
+    given = {"~patterns": str(config / "patterns.json"), "perception/frames": frames}
+    monkeypatch.setattr(rospy, "get_param", given.get)
+    monkeypatch.setattr(rospy, "resolve_name", lambda name: name)
+    for kind in ("Publisher", "Subscriber"):
+        monkeypatch.setattr(rospy, kind, MagicMock())
+    for part in ("Buffer", "TransformBroadcaster"):
+        monkeypatch.setattr(tf2_ros, part, MagicMock())
+    monkeypatch.setattr(module, "TfListener", MagicMock())
+    monkeypatch.setattr(steady, "SteadyTimer", MagicMock())
+    node = module.RecogniserNode()
+    node.buffer.lookup_transform = lambda *_: seen
     taken = []
     for tick in range(20):
         boot, ros[0] = boot + 0.01, ros[0] + 0.01 + (step if tick == 10 else 0.0)

@@ -4,14 +4,15 @@ import importlib.util
 import json
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import pytest
 import rospy
 from coglab_objects.database import objects_folder
+from coglab_py.packages import package_path
 from coglab_smach.context.journal import ActionRecord, TransitionRecord
 from coglab_smach.context.master_state import MasterState
 from coglab_smach.ports.pending import Polled, PortError, Ready
-from coglab_smach.ros.handover_server import HandoverServer
 
 SCRIPTS = Path(__file__).resolve().parents[1] / "scripts"
 
@@ -23,55 +24,95 @@ def script(name):
     return module
 
 
+class Clock:
+    """Replaces the clock of the brain."""
+
+    t = 100.0
+
+    def now(self):
+        return self.t
+
+    def sleep(self, seconds):
+        self.t += seconds
+
+
 @pytest.fixture
-def master(monkeypatch, tmp_path):
-    module = script("master_node")
-    made = module.MasterNode.__new__(module.MasterNode)
-    made.sent, made.now = [], 100.0
-    monkeypatch.setattr(module, "publish", lambda to, message: made.sent.append((to, message)))
+def module():
+    return script("master_node")
+
+
+@pytest.fixture
+def clock():
+    return Clock()
+
+
+@pytest.fixture
+def sent(monkeypatch, module):
+    """What the node publishes, by topic, and what it logs, by level."""
+    sent = []
+    monkeypatch.setattr(module, "publish", lambda topic, message: sent.append((topic, message)))
     for level in ("loginfo", "logwarn", "logerr"):
-        monkeypatch.setattr(rospy, level, lambda *words, level=level: made.sent.append((level, words)))
+        monkeypatch.setattr(rospy, level, lambda *words, level=level: sent.append((level, words)))
+    return sent
+
+
+@pytest.fixture
+def master(monkeypatch, tmp_path, module, clock, sent):
+    """The node without a ROS master and without its ports. It holds the mug."""
+    given = {
+        "~config_file": str(SCRIPTS.parent / "config" / "machines.yaml"),
+        "~dmp_library": str(package_path("coglab_controllers", "config", "primitives.xml")),
+        "~result_file": str(tmp_path / "results.jsonl"),
+        "~state_file": str(tmp_path / "holding.json"),
+        "~introspection": False,
+    }
+    monkeypatch.setattr(rospy, "has_param", given.__contains__)
+    monkeypatch.setattr(rospy, "get_param", given.get)
+    monkeypatch.setattr(rospy, "search_param", lambda name: None)
+    monkeypatch.setattr(rospy, "resolve_name", lambda name: name)
+    for kind in ("Publisher", "Subscriber", "Service"):
+        monkeypatch.setattr(rospy, kind, lambda name, *_, **__: name)
+    for part in ("RosArm", "RosHand", "RosPerception", "RosDatabase", "RosContact", "ActionServer"):
+        monkeypatch.setattr(module, part, MagicMock())
+    monkeypatch.setattr(module, "PacedClock", lambda pace: clock)
+    stamps = SimpleNamespace(stamp=lambda steady: rospy.Time.from_sec(steady + 1000.0))
+    monkeypatch.setattr(module, "Stamps", lambda: stamps)
     monkeypatch.setattr(rospy.Time, "now", staticmethod(lambda: rospy.Time.from_sec(50.0)))
-    clock = SimpleNamespace(now=lambda: made.now, sleep=lambda s: setattr(made, "now", made.now + s))
-    made.pressed = []
-    stop = SimpleNamespace(press=made.pressed.append)
-    made.ctx = SimpleNamespace(clock=clock, stop=stop, arm=SimpleNamespace(hold=lambda why: made.hold))
-    made.states, made.transitions, made.results, made.spoken = "states", "transitions", "results", "spoken"
-    made.result_file = str(tmp_path / "results.jsonl")
-    made.stamps = SimpleNamespace(stamp=lambda steady: rospy.Time.from_sec(steady + 1000.0))
-    made.typed_results = "typed"
-    made.ctx.holding = "mug"
-    made.handovers = HandoverServer(made.ctx, made.stop, made.stamp, made.utc, made.spawn)
-    made.module = module
-    return made
+    node = module.MasterNode()
+    node.ctx.holding = "mug"
+    sent.clear()
+    return node
 
 
-def test_deadlines_are_published_in_ros_time(master):
+def test_deadlines_are_published_in_ros_time(master, sent):
     for deadline, told in ((0.0, 0.0), (103.5, 53.5), (99.0, 50.001)):
         master.on_state(MasterState("s", True, ("a", "b"), "mug", "why", 3, "rain", 4, deadline))
-        message = master.sent[-1][1]
+        message = sent[-1][1]
         assert message.deadline.to_sec() == pytest.approx(told, abs=1e-6)
     assert (message.state, message.in_hub, message.actions, message.object_id) == ("s", True, ["a", "b"], "mug")
     assert (message.why, message.reason_code, message.waits_for, message.waits_code) == ("why", 3, "rain", 4)
 
 
-def test_stop_is_latched_whatever_the_arm_answers(master):
-    master.hold = Ready("held")
-    answer = master.on_stop(None)
-    assert answer.success and "held" in answer.message
-    master.hold = Polled(lambda: master.now > 101.0, lambda: "held")
-    assert master.on_stop(None).success
-    master.hold, begin = Polled(lambda: False, lambda: None), master.now
-    answer = master.on_stop(None)
-    assert not answer.success and "emergency stop" in answer.message
-    assert master.now - begin == pytest.approx(2.0, abs=0.006)
-    master.hold = Ready(error=PortError("no line"))
-    answer = master.on_stop(None)
-    assert not answer.success and "no line" in answer.message
-    assert len(master.pressed) == 4
+def test_stop_is_latched_whatever_the_arm_answers(master, clock):
+    def stop(answer):
+        master.ctx.stop.reset()
+        master.ctx.arm.hold = lambda why: answer
+        answered = master.on_stop(None)
+        assert master.ctx.stop.pressed()
+        return answered.success, answered.message
+
+    success, message = stop(Ready("held"))
+    assert success and "held" in message
+    assert stop(Polled(lambda: clock.t > 101.0, lambda: "held"))[0]
+    begin = clock.t
+    success, message = stop(Polled(lambda: False, lambda: None))
+    assert not success and "emergency stop" in message
+    assert clock.t - begin == pytest.approx(2.0, abs=0.006)
+    success, message = stop(Ready(error=PortError("no line")))
+    assert not success and "no line" in message
 
 
-def test_transitions_and_results_are_published_and_written(master):
+def test_transitions_and_results_are_published_and_written(master, sent):
     for outcome, level in (
         ("succeeded", "loginfo"),
         ("failed", "logwarn"),
@@ -79,13 +120,13 @@ def test_transitions_and_results_are_published_and_written(master):
         ("stopped", "logwarn"),
     ):
         master.on_transition(TransitionRecord(1.0, "/m", "a", outcome, "b", "why", ("c",), 4))
-        assert master.sent[-1][0] == level
-    told = master.sent[-2][1]
+        assert sent[-1][0] == level
+    told = sent[-2][1]
     assert (told.path, told.from_state, told.outcome, told.to_state) == ("/m", "a", "stopped", "b")
     assert (told.reason, list(told.causes), told.reason_code) == ("why", ["c"], 4)
     record = ActionRecord("take", "mug", 1.0, 3.5, "succeeded", marks={"closed": 2.0})
     master.on_result(record)
-    typed = next(message for to, message in master.sent if to == "typed")
+    typed = next(message for to, message in sent if to == "coglab/handover_results")
     assert (typed.action, typed.success, typed.holding) == ("take", True, "mug")
     assert [t.to_sec() for t in (typed.started, typed.ended, typed.marks[0].stamp)] == [1001.0, 1003.5, 1002.0]
     master.on_result(record)
@@ -93,13 +134,13 @@ def test_transitions_and_results_are_published_and_written(master):
     row = json.loads(lines[0])  # times in ROS time for bags, and in UTC for videos and questionnaires
     assert (row["started_ros"], row["ended_ros"]) == (1001.0, 1003.5) and row["ended_utc"] > row["started_utc"]
     assert row["marks_ros"] == {"closed": 1002.0} and typed.id == f"{row['started_utc']}_take"
-    assert len(lines) == 2 and row["duration_s"] == 2.5 and master.sent[-1][1].data == lines[0]
+    assert len(lines) == 2 and row["duration_s"] == 2.5 and sent[-1][1].data == lines[0]
     master.result_file = str(Path(master.result_file).parent)
     master.on_result(record)
-    assert master.sent[-1][0] == "logerr"
+    assert sent[-1][0] == "logerr"
     master.result_file = ""
     master.on_result(record)
-    assert master.sent[-1][0] == "results"
+    assert sent[-1][0] == "coglab/results"
     assert ActionRecord("take", "mug", 1.0).to_dict() == {
         **{"kind": "take", "object_id": "mug", "outcome": "", "reason": "", "reason_code": 0, "causes": []},
         "delivery": "",
@@ -107,10 +148,10 @@ def test_transitions_and_results_are_published_and_written(master):
     }
 
 
-def test_each_namespace_has_its_own_file_for_the_held_object(master, monkeypatch):
+def test_each_namespace_has_its_own_file_for_the_held_object(master, module, monkeypatch):
     read = {"~state_file": ""}
-    monkeypatch.setattr(master.module.parameters, "read", lambda name, kind, default: read[name])
-    monkeypatch.setattr(master.module.rospkg, "get_ros_home", lambda: "/home/ros")
+    monkeypatch.setattr(module.parameters, "read", lambda name, kind, default: read[name])
+    monkeypatch.setattr(module.rospkg, "get_ros_home", lambda: "/home/ros")
     for namespace, name in (("/", "coglab_holding.json"), ("/two/arms/", "coglab_holding_two_arms.json")):
         monkeypatch.setattr(rospy, "get_namespace", lambda namespace=namespace: namespace)
         assert master.state_file() == f"/home/ros/{name}"
@@ -118,8 +159,8 @@ def test_each_namespace_has_its_own_file_for_the_held_object(master, monkeypatch
     assert master.state_file() == "own.json"
 
 
-def test_a_node_that_cannot_be_configured_ends_with_status_1(monkeypatch):
-    module, said = script("master_node"), []
+def test_a_node_that_cannot_be_configured_ends_with_status_1(module, monkeypatch):
+    said = []
     monkeypatch.setattr(module, "init_node", lambda name: None)
     monkeypatch.setattr(rospy, "logfatal", lambda *words: said.append(words))
     monkeypatch.setattr(module.parameters, "found_above", lambda name, kind: "<robot/>")
