@@ -49,7 +49,8 @@ TEST(Cancel, EndsTheMotionAndItsQueueWithAReason) {
   ASSERT_GT(robot.command.velocity.norm(), 0.05);
   EXPECT_FALSE(robot.manager->report().standing);
   CancelAnswer answer;
-  const CancelOrder order = robot.manager->askCancel("ptp", "the state machine gives up");
+  const std::string why = "the state machine gives up";
+  const CancelOrder order = robot.manager->askCancel("ptp", why);
   EXPECT_FALSE(robot.manager->cancelEnded(order, answer));
   ASSERT_GE(finish(robot, order, answer), 0);
   EXPECT_TRUE(answer.success);
@@ -59,7 +60,7 @@ TEST(Cancel, EndsTheMotionAndItsQueueWithAReason) {
   EXPECT_TRUE(report.standing);
   EXPECT_EQ(report.state, ManagerState::Idle);
   EXPECT_EQ(report.reason.code(), ReasonCode::Cancelled);
-  EXPECT_NE(report.reason.str().find("the state machine gives up"), std::string::npos);
+  EXPECT_NE(report.reason.str().find(why), std::string::npos);
   const std::vector<EndedMotion> ends = endsOf(robot.ptp());
   ASSERT_EQ(ends.size(), ids.size());
   for (std::size_t i = 0; i < ids.size(); ++i) {

@@ -131,8 +131,7 @@ bool overrunsWereJudged() {
   EXPECT_TRUE(report.fault);
   EXPECT_EQ(report.faults, 1u);
   EXPECT_EQ(report.overruns, 13u);
-  EXPECT_NE(report.reason.str().find("too slow 5 times in a row: "), std::string::npos)
-      << report.reason.c_str();
+  EXPECT_NE(report.reason.str().find(" 5 times "), std::string::npos) << report.reason.c_str();
   EXPECT_NE(report.reason.str().find(" ms, allowed 15.000 ms"), std::string::npos);
   EXPECT_EQ(command.velocity, JointVector::Zero().eval());
   return true;

@@ -82,7 +82,7 @@ TEST(FeedbackRequests, OnlyAPresentReasonCanBeWithdrawn) {
   EXPECT_EQ(judgeResume(loaded, {}, "supper").cause(), Cause::UnknownName);
   const Status status = judgeResume(loaded, {"a", "b"}, "lunch");
   EXPECT_EQ(status.cause(), Cause::UnknownName);
-  EXPECT_NE(status.message().find("b for no reason"), std::string::npos) << status.message();
+  EXPECT_NE(status.message().find("b for no"), std::string::npos) << status.message();
 }
 
 }  // namespace

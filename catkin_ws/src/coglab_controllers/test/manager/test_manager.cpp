@@ -24,9 +24,8 @@ TEST(Manager, RefusesBadPluginsAndKeepsTheLoadedOnes) {
   EXPECT_TRUE(refused(manager.load("a", "test/Twin"), {"test/Misbehaving", "registered already"}));
   EXPECT_TRUE(refused(manager.load("a", "test/Twin"), {"registered already"}));  // and again
   EXPECT_TRUE(refused(manager.load("a", "test/Other"), {"has no type", "test/Misbehaving"}));
-  EXPECT_TRUE(
-      refused(manager.load("a", "test/OtherAbi"),
-              {"compiled for another coglab_controllers", "(interface ", "has interface "}));
+  EXPECT_TRUE(refused(manager.load("a", "test/OtherAbi"),
+                      {"another coglab_controllers (interface ", "has interface "}));
   EXPECT_TRUE(
       refused(manager.load("a", "my_lab/Unknown"), {"my_lab/Unknown", "coglab/DmpController"}));
   EXPECT_TRUE(refused(manager.load("dmp", "coglab/DmpController"), {"in use"}));
@@ -228,9 +227,9 @@ TEST(Manager, RefusesLimitsOfOtherJointsThanTheRobotDescriptionHas) {
                         false);
     ADD_FAILURE() << "accepted";
   } catch (const std::runtime_error& error) {
-    EXPECT_NE(std::string(error.what()).find("joint 2 from lwr_base_link is 'lwr_a2'"),
-              std::string::npos)
-        << error.what();
+    for (const char* const name : {"joint 2", "lwr_base_link", "'lwr_a2'"}) {
+      EXPECT_NE(std::string(error.what()).find(name), std::string::npos) << error.what();
+    }
   }
 }
 

@@ -32,7 +32,7 @@ TEST(Unload, GoesWithItsServicesAndItsIdIsFreeAgain) {
   EXPECT_EQ(loaded(manager), std::vector<std::string>{"ptp"});
   EXPECT_EQ(manager.unload("dmp").code, ReasonCode::UnknownName);
   std::string type;
-  EXPECT_TRUE(refused(manager.switchTo("dmp", type), {"'dmp' is not loaded"}));
+  EXPECT_EQ(manager.switchTo("dmp", type).code, ReasonCode::UnknownName);
   EXPECT_TRUE(VirtualRobot::ok(manager.load("dmp", "coglab/DmpController")));
   robot.tick();
 }
@@ -192,8 +192,7 @@ TEST(Unload, RefusesBothTheRunningAndTheRequestedController) {
   std::string type, id;
   const Answer taken = manager.switchTo("slow", type);
   EXPECT_TRUE(VirtualRobot::ok(taken));
-  for (const std::string words : {"took the request but did not confirm it within 0.300000 s: ",
-                                  "has not returned from its code"}) {
+  for (const std::string words : {"did not confirm", "0.300000 s", "'slow'"}) {
     EXPECT_NE(taken.message.find(words), std::string::npos) << taken.message;
   }
   manager.active(id, type);
@@ -205,9 +204,7 @@ TEST(Unload, RefusesBothTheRunningAndTheRequestedController) {
   for (int i = 0; i < 5000 && manager.report().active.str() != "slow"; ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   EXPECT_TRUE(VirtualRobot::ok(manager.unload("ptp")));
-  EXPECT_EQ(manager.unload("slow").message,
-            "'slow' is the active controller; switch_controller to another one, or to '' for none, "
-            "first");
+  EXPECT_TRUE(refused(manager.unload("slow"), {"'slow'", "switch_controller"}));
   stop = true;
   control.join();
 }

@@ -60,11 +60,12 @@ struct Following : ::testing::Test {
     return end;
   }
   void expectRefused(const TrajectoryRequest& request, TrajectoryError error,
-                     const std::string& words) {
+                     const std::string& words, const std::string& more = "") {
     const TrajectoryAnswer answer = controller->follow(request);
     EXPECT_FALSE(answer.success);
     EXPECT_EQ(static_cast<int>(answer.error), static_cast<int>(error)) << answer.message;
     EXPECT_NE(answer.message.find(words), std::string::npos) << answer.message;
+    EXPECT_NE(answer.message.find(more), std::string::npos) << answer.message;
     arm.run(0.05);
     EXPECT_TRUE(arm.manager->report().standing);
   }
@@ -166,9 +167,7 @@ TEST_F(Following, AJointThatLeavesThePathEndsIt) {
   arm.tick();
   const EndedMotion end = runToEnd();
   EXPECT_EQ(JointTrajectory::errorOf(end), TrajectoryError::PathToleranceViolated);
-  EXPECT_NE(end.reason.str().find("more than the tolerance of the path, 0.05 rad"),
-            std::string::npos)
-      << end.reason.str();
+  EXPECT_NE(end.reason.str().find(" 0.05 rad"), std::string::npos) << end.reason.str();
 }
 
 TEST_F(Following, AnArmThatDoesNotArriveInTimeEndsIt) {
@@ -180,8 +179,7 @@ TEST_F(Following, AnArmThatDoesNotArriveInTimeEndsIt) {
   const EndedMotion end = runToEnd();
   EXPECT_EQ(JointTrajectory::errorOf(end), TrajectoryError::GoalToleranceViolated)
       << end.reason.str();
-  EXPECT_NE(end.reason.str().find("tolerance of the goal, 0.000001 rad"), std::string::npos)
-      << end.reason.str();
+  EXPECT_NE(end.reason.str().find(" 0.000001 rad"), std::string::npos) << end.reason.str();
 }
 
 TEST_F(Following, OneThatBeginsLaterWaitsAndAStopMakesItVoid) {
@@ -214,10 +212,10 @@ TEST_F(Following, APointAtTheStartIsWhereTheArmIs) {
   const TrajectoryRequest there = through({home(0.005)});
   ASSERT_TRUE(controller->follow(there).success);
   EXPECT_TRUE(runToEnd().executed);
-  expectRefused(through({home(0.04)}), TrajectoryError::InvalidGoal, "too short for a larger");
+  expectRefused(through({home(0.04)}), TrajectoryError::InvalidGoal, "too short");
   TrajectoryRequest quick = through({home(0.045), home(0.045)});
   quick.points[1].time = 0.1;
-  expectRefused(quick, TrajectoryError::InvalidGoal, "too short for a larger");
+  expectRefused(quick, TrajectoryError::InvalidGoal, "too short");
   quick.points[1].time = 1.0;
   ASSERT_TRUE(controller->follow(quick).success);
   EXPECT_TRUE(runToEnd().executed);
@@ -237,20 +235,20 @@ TEST_F(Following, AnInvalidTrajectoryIsRefusedBeforeTheArmMoves) {
   expectRefused(goal([](Request r) { r.joint_names.pop_back(); }), Error::InvalidJoints,
                 "6 names; expected all 7");
   expectRefused(goal([](Request r) { r.joint_names[2] = "elbow"; }), Error::InvalidJoints,
-                "'elbow', which is no joint");
+                "'elbow'");
   expectRefused(goal([](Request r) { r.joint_names[2] = r.joint_names[0]; }), Error::InvalidJoints,
                 "twice");
   expectRefused(goal([](Request r) { r.points[1].positions.pop_back(); }), Error::InvalidGoal,
-                "positions of point 1 has 6 numbers; expected 7");
+                "positions of point 1", "6 numbers; expected 7");
   expectRefused(goal([](Request r) { r.points[1].velocities.resize(7); }), Error::InvalidGoal,
-                "velocities of point 1 has 7 numbers; expected 0");
+                "velocities of point 1", "7 numbers; expected 0");
   expectRefused(goal([nan](Request r) { r.points[1].positions[3] = nan; }), Error::InvalidGoal,
-                "not finite for joint lwr_a3");
+                "not finite", "joint lwr_a3");
   expectRefused(goal([](Request r) { r.points[2].time = 0.5; }), Error::InvalidGoal,
                 "point 2 is at 0.5 s");
   expectRefused(goal([nan](Request r) { r.points[2].time = nan; }), Error::InvalidGoal, "nan");
   expectRefused(goal([](Request r) { r.points[0].positions[0] += 0.2; }), Error::InvalidGoal,
-                "begins 0.2 rad from where joint lwr_a1 is");
+                "begins 0.2 rad", "joint lwr_a1");
   expectRefused(goal([](Request r) {
                   r.points[2].positions[5] = 2.2;
                   r.points[2].time = 9.0;
@@ -262,7 +260,7 @@ TEST_F(Following, AnInvalidTrajectoryIsRefusedBeforeTheArmMoves) {
                   r.points[0].time = 0.005;
                   r.points[0].positions[0] += 0.01;
                 }),
-                Error::InvalidGoal, "on the way from the arm to the first point");
+                Error::InvalidGoal, "first point");
   // Between the states that are 5 ms apart.
   expectRefused(goal([](Request r) {
                   r.points[1].positions = r.points[0].positions;
@@ -271,28 +269,28 @@ TEST_F(Following, AnInvalidTrajectoryIsRefusedBeforeTheArmMoves) {
                 }),
                 Error::InvalidGoal, "make it slower");
   expectRefused(goal([](Request r) { r.points.resize(10001, r.points[0]); }), Error::InvalidGoal,
-                "10001 points; expected at most 10000");
+                "10001 points", "at most 10000");
   expectRefused(goal([](Request r) {
                   for (auto& point : r.points) point.velocities.assign(7, 0.0);
                   r.points[2].velocities[0] = 0.2;
                 }),
-                Error::InvalidGoal, "expected a last point at rest");
+                Error::InvalidGoal, "last point");
   expectRefused(goal([](Request r) { r.age = 5.0; }), Error::OldHeaderTimestamp, "5 s old");
   TrajectoryRequest later = through({home(0.0), home(0.3)});
   later.age = -61.0;
-  EXPECT_NE(controller->check(later).message.find("begins in 61 s by its stamp; expected at most"),
-            std::string::npos);
+  EXPECT_EQ(controller->check(later).code, ReasonCode::GoalFromFuture);
+  EXPECT_NE(controller->check(later).message.find(" 61 s"), std::string::npos);
   for (const double odd : {-0.5, -2.0, nan}) {
     expectRefused(goal([odd](Request r) { r.goal_time_tolerance = odd; }), Error::InvalidGoal,
                   "goal_time_tolerance is");
     expectRefused(goal([odd](Request r) {
                     r.goal_tolerance = {{"lwr_a1", odd, 0.0, 0.0}};
                   }),
-                  Error::InvalidGoal, "or -1 for no bound");
+                  Error::InvalidGoal, "goal_tolerance of lwr_a1");
     expectRefused(goal([odd](Request r) {
                     r.goal_tolerance = {{"lwr_a1", 0.0, 0.0, odd}};
                   }),
-                  Error::InvalidGoal, "or -1 for no bound");
+                  Error::InvalidGoal, "goal_tolerance of lwr_a1");
   }
   expectRefused(goal([nan](Request r) {
                   r.path_tolerance = {{"lwr_a1", nan, 0.0, 0.0}};

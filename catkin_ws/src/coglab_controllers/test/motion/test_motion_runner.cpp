@@ -81,8 +81,7 @@ TEST_F(Runner, AQueueRunsInOrderFromEachEndAndRefusesWhenFull) {
   EXPECT_EQ(full.status, MotionAnswer::kRejected);
   EXPECT_EQ(full.code, ReasonCode::QueueFull);
   EXPECT_EQ(full.id, -1);
-  EXPECT_EQ(full.message,
-            "the queue is full: 2 motions wait (max_queue 2); wait for the end of one");
+  EXPECT_NE(full.message.find("max_queue 2"), std::string::npos) << full.message;
   arm.run(1.0);
   EXPECT_NEAR(joint() - home, 0.2, 0.01);
   arm.run(1.0);

@@ -40,8 +40,8 @@ template <typename Says>
 void expectRefusals(const std::string& where, Says&& says) {
   for (const std::string wrong : {"-1e9", "1e9", ".nan", ".inf", "[1]", "fast"}) {
     const std::string said = says(wrong);
-    EXPECT_NE(said.find("parameter " + where + ": expected a number from "), std::string::npos)
-        << wrong << ": " << said;
+    EXPECT_NE(said.find("parameter " + where + ": "), std::string::npos) << wrong << ": " << said;
+    EXPECT_NE(said.find(" from "), std::string::npos) << wrong << ": " << said;
     EXPECT_NE(said.find(", got "), std::string::npos) << said;
   }
 }
@@ -55,8 +55,9 @@ TEST(ParameterRanges, OfDmp) {
   }
   EXPECT_EQ(loading("dmp", "{dmp: {max_queue: 99}}"), "") << "it has no queue";
   for (const std::string flag : {"enable_ik_debug", "rotation_first_scaling"}) {
-    EXPECT_NE(loading("dmp", "{dmp: {" + flag + ": 7}}").find("expected true or false, got 7"),
-              std::string::npos);
+    const std::string said = loading("dmp", "{dmp: {" + flag + ": 7}}");
+    EXPECT_NE(said.find("dmp/" + flag + ": "), std::string::npos) << said;
+    EXPECT_NE(said.find("got 7"), std::string::npos) << said;
   }
   EXPECT_NE(loading("dmp", "{dmp: {dmp_file: /nowhere.xml}}").find("/nowhere.xml:0"),
             std::string::npos);
@@ -70,12 +71,11 @@ TEST(ParameterRanges, OfTheSecondTask) {
     EXPECT_EQ(loading("dmp", "{dmp: {second_task: " + fine + "}}"), "") << fine;
   }
   for (const auto& [bad, words] :
-       {std::pair<std::string, std::string>{
-            "elbow", "dmp/second_task: expected orientation or axis or posture or none, got elbow"},
-        {"axis, axis: [0, 0, 0]", "dmp/axis: expected three numbers that are not all zero"},
-        {"axis, axis: [1, 0]", "dmp/axis: expected 3 finite numbers"},
-        {"posture", "dmp/posture: expected seven joint positions (rad)"},
-        {"posture, posture: [0, 0]", "dmp/posture: expected 7 finite numbers"},
+       {std::pair<std::string, std::string>{"elbow", "dmp/second_task: "},
+        {"axis, axis: [0, 0, 0]", "dmp/axis: expected three"},
+        {"axis, axis: [1, 0]", "dmp/axis: expected 3"},
+        {"posture", "dmp/posture: expected seven"},
+        {"posture, posture: [0, 0]", "dmp/posture: expected 7"},
         {"posture, posture: [0, 0, 0, 0, 0, 0, 0], posture_gain: 101", "dmp/posture_gain: "}}) {
     const std::string said = loading("dmp", "{dmp: {second_task: " + bad + "}}");
     EXPECT_NE(said.find(words), std::string::npos) << bad << ": " << said;
@@ -90,8 +90,7 @@ TEST(ParameterRanges, OfPointToPoint) {
   }
   EXPECT_EQ(loading("ptp", "{ptp: {max_queue: 0}}"), "");
   for (const std::string bad : {"-1", "1.5"}) {
-    EXPECT_NE(loading("ptp", "{ptp: {max_queue: " + bad + "}}")
-                  .find("ptp/max_queue: expected a whole number from "),
+    EXPECT_NE(loading("ptp", "{ptp: {max_queue: " + bad + "}}").find("ptp/max_queue: "),
               std::string::npos);
   }
 }
@@ -128,15 +127,13 @@ TEST(ParameterRanges, OfTheManager) {
   }
   for (const std::string name : {"box_min", "box_max", "base_centre"}) {
     for (const std::string bad : {"[1, 2]", "[-1200, 1200, 1600]"}) {
-      EXPECT_NE(starting("{workspace: {" + name + ": " + bad + "}}")
-                    .find(name + ": expected 3 finite numbers"),
+      EXPECT_NE(starting("{workspace: {" + name + ": " + bad + "}}").find(name + ": expected 3"),
                 std::string::npos);
     }
   }
-  EXPECT_NE(starting("{workspace: 7}").find("workspace: expected a block"), std::string::npos);
-  EXPECT_NE(starting("{plugin_paths: {a: b}}").find("expected a list of texts"), std::string::npos);
-  EXPECT_NE(starting("{feedback_file: [a]}").find("feedback_file: expected a text"),
-            std::string::npos);
+  EXPECT_NE(starting("{workspace: 7}").find("workspace: "), std::string::npos);
+  EXPECT_NE(starting("{plugin_paths: {a: b}}").find("plugin_paths: "), std::string::npos);
+  EXPECT_NE(starting("{feedback_file: [a]}").find("feedback_file: "), std::string::npos);
 }
 
 }  // namespace

@@ -135,7 +135,7 @@ TEST_F(Stream, InvalidPosesAreRefused) {
   use("coglab/PoseStream");
   const Answer answer = stream->send({0.5, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0});
   EXPECT_EQ(answer.code, ReasonCode::InvalidArgument);
-  EXPECT_NE(answer.message.find("expected a unit quaternion"), std::string::npos) << answer.message;
+  EXPECT_NE(answer.message.find("quaternion"), std::string::npos) << answer.message;
 }
 
 TEST_F(Stream, OldCommandsAndThoseFromTheFutureAreRefused) {

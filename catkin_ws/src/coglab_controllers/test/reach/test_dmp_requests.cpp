@@ -79,14 +79,14 @@ TEST(DmpRequests, RequestsToAnInactiveControllerNameTheActiveOne) {
   VirtualRobot robot;
   robot.loadBoth("ptp");
   robot.see("human_hand", kGoal);
-  const std::vector<std::string> words = {"'dmp' is not active", "'ptp'", "switch_controller"};
+  const std::vector<std::string> words = {"'dmp'", "'ptp'", "switch_controller"};
   EXPECT_TRUE(refused(robot.dmp().execute(robot.reach()), words));
   EXPECT_TRUE(refused(robot.dmp().switchDmp(robot.reach()), words));
   robot.switchTo("dmp");
   const MotionAnswer answer = robot.ptp().add({std::vector<double>(7, 0.0), {}, {}});
   EXPECT_EQ(answer.status, MotionAnswer::kRejected);
-  EXPECT_NE(answer.message.find("'ptp' is not active; active is 'dmp'"), std::string::npos)
-      << answer.message;
+  EXPECT_EQ(answer.code, ReasonCode::NotActive);
+  EXPECT_NE(answer.message.find("active is 'dmp'"), std::string::npos) << answer.message;
   EXPECT_TRUE(refused(robot.dmp().switchDmp(robot.reach()), {"no motion", "execute_dmp"}));
 }
 

@@ -247,7 +247,7 @@ TEST_F(Table, TheWorkspaceIsThatOfTheBaseAndTheTopicHasTheFrame) {
   ASSERT_TRUE(VirtualRobot::ok(robot.dmp().execute(request)));
   run(5, outside);
   EXPECT_EQ(robot.manager->report().reason.code(), ReasonCode::GoalOutsideWorkspace);
-  EXPECT_NE(robot.reason().find("lower side of the workspace box"), std::string::npos);
+  EXPECT_NE(robot.reason().find("lower side"), std::string::npos);
   EXPECT_LT((robot.dmp().motion().goal() - inTable(border)).norm(), 1e-6);
   request.goal_frame.clear();
   EXPECT_EQ(robot.dmp().setGoal("lwr_base_link", kGoal, 0).code, ReasonCode::UnknownName);
@@ -258,7 +258,7 @@ TEST_F(Table, TheWorkspaceIsThatOfTheBaseAndTheTopicHasTheFrame) {
   robot.frames.frames.erase("table");
   const Answer lost = robot.dmp().execute(request);
   EXPECT_EQ(lost.code, ReasonCode::UnknownName);
-  EXPECT_NE(lost.message.find("'table' (dmp_frame_name) is not known"), std::string::npos);
+  EXPECT_NE(lost.message.find("'table' (dmp_frame_name)"), std::string::npos);
 }
 
 /// If the hand never rests completely, the loop opens after half a second, within another 0.3 s.

@@ -180,8 +180,8 @@ TEST_F(Motion, OtherProgramsAreRefusedWithAReason) {
   const auto refusal = [&](const std::string& hello) {
     return std::string(Connection(address, hello).text);
   };
-  EXPECT_NE(refusal(helloOf(RemoteKind::Motion, 7)).find("the process has 7"), std::string::npos);
-  EXPECT_NE(refusal(helloOf(RemoteKind::Feedback)).find("slot is for a motion"), std::string::npos);
+  EXPECT_NE(refusal(helloOf(RemoteKind::Motion, 7)).find("has 7"), std::string::npos);
+  EXPECT_NE(refusal(helloOf(RemoteKind::Feedback)).find("for a motion"), std::string::npos);
   EXPECT_NE(refusal("GET / HTTP/1.0").find("expected the greeting"), std::string::npos);
   const Connection first(address, helloOf(RemoteKind::Motion));
   EXPECT_STREQ(first.text, "welcome");

@@ -241,11 +241,13 @@ TEST(IdealArm, RefusesWhatItCannotDoAndParametersOutOfRange) {
   EXPECT_EQ(arm.arm.request("joint_impedance stiffness 500").code,
             coglab_rt::ReasonCode::NotSupported);
   EXPECT_TRUE(arm.arm.request("position").success);
-  EXPECT_EQ(arm.arm.request("jump").message,
-            "unknown event 'jump'; expected one of: start, stop, hold, reset, position");
-  EXPECT_EQ(arm.arm.request("cartesian_impedance 1").message,
-            "'cartesian_impedance 1': an ideal arm knows no forces; use position, or an arm with "
-            "physics (arm:=fri)");
+  for (const auto& [event, words] :
+       {std::pair("jump", "'jump'"), std::pair("jump", "start, stop, hold, reset, position"),
+        std::pair("cartesian_impedance 1", "'cartesian_impedance 1'"),
+        std::pair("cartesian_impedance 1", "arm:=fri")}) {
+    const std::string said = arm.arm.request(event).message;
+    EXPECT_NE(said.find(words), std::string::npos) << said;
+  }
   const auto refusal = [](auto&& change) {
     IdealArmConfig bad = config();
     change(bad);
@@ -256,8 +258,9 @@ TEST(IdealArm, RefusesWhatItCannotDoAndParametersOutOfRange) {
     }
     return std::string();
   };
-  EXPECT_EQ(refusal([](IdealArmConfig& c) { c.period = 0.5; }),
-            "parameter period = 0.5 is outside its range 0.001..0.1");
+  const std::string slow = refusal([](IdealArmConfig& c) { c.period = 0.5; });
+  EXPECT_NE(slow.find("period = 0.5"), std::string::npos) << slow;
+  EXPECT_NE(slow.find("0.001..0.1"), std::string::npos) << slow;
   EXPECT_NE(
       refusal([](IdealArmConfig& c) { c.command_timeout = std::nan(""); }).find("command_timeout"),
       std::string::npos);

@@ -27,8 +27,7 @@ class ExitLimit : public ::testing::Test {
 };
 
 TEST_F(ExitLimit, EndsWithStatusZeroAndAMessage) {
-  EXPECT_EXIT(waitForever(milliseconds(50)), ::testing::ExitedWithCode(0),
-              "the ROS master does not answer: ended without unregistering\n$");
+  EXPECT_EXIT(waitForever(milliseconds(50)), ::testing::ExitedWithCode(0), "ROS master.*\n$");
 }
 
 TEST_F(ExitLimit, NotBeforeItsTime) {

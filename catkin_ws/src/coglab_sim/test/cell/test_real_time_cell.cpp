@@ -62,9 +62,8 @@ TEST(FriSocket, SendsReceivesAndReportsTooLongDatagrams) {
     FriSocket("127.0.0.1", port);
     FAIL() << "bound twice";
   } catch (const std::runtime_error& error) {
-    const std::string words = "cannot open a UDP socket for FRI toward 127.0.0.1 from port ";
-    EXPECT_EQ(std::string(error.what()).find(words + std::to_string(port) + ": "), 0U)
-        << error.what();
+    const std::string words = "127.0.0.1 from port " + std::to_string(port) + ": ";
+    EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
   }
 }
 

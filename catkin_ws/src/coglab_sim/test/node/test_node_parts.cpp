@@ -137,11 +137,11 @@ TEST(Faults, AreRefusedByTheirNameAndRange) {
   };
   EXPECT_NE(refusal("earthquake", 1.0).find("known: block"), std::string::npos);
   EXPECT_NE(refusal("block", kNoNumber).find("finite"), std::string::npos);
-  EXPECT_NE(refusal("packet_loss", 1.1).find("outside its range 0..1"), std::string::npos);
-  EXPECT_NE(refusal("lose_packets", -1.0).find("outside its range 0..1e+06"), std::string::npos);
-  EXPECT_NE(refusal("silence", 2e6).find("outside its range 0..1e+06"), std::string::npos);
+  EXPECT_NE(refusal("packet_loss", 1.1).find("range 0..1"), std::string::npos);
+  EXPECT_NE(refusal("lose_packets", -1.0).find("range 0..1e+06"), std::string::npos);
+  EXPECT_NE(refusal("silence", 2e6).find("range 0..1e+06"), std::string::npos);
   EXPECT_NE(refusal("drive_error", 7.0).find("joint 7"), std::string::npos);
-  EXPECT_NE(refusal("reopen", 0.2).find("krc/period = 0.2 is outside"), std::string::npos);
+  EXPECT_NE(refusal("reopen", 0.2).find("krc/period = 0.2"), std::string::npos);
   EXPECT_EQ(refusal("acknowledge", 0.0), "");
 }
 
@@ -236,7 +236,7 @@ TEST(RealTimeCell, UsesItsInputsAndReportsWhyAHandIsRefused) {
   person.hand.position = cell.snapshot().truth.robot_hand.position - Vector3d(0.15, 0.0, 0.0);
   cell.setHuman(person);
   EXPECT_TRUE(running.until([&](Cell&) { return !cell.snapshot().refused_hand.empty(); }));
-  EXPECT_EQ(cell.snapshot().refused_hand.find("the person's hand would stand"), 0U);
+  EXPECT_NE(cell.snapshot().refused_hand.find("person's hand"), std::string::npos);
   person.hand.position = Vector3d(1.0, 0.2, 0.5);
   cell.setHuman(person);
   EXPECT_TRUE(running.until([&](Cell&) { return cell.snapshot().refused_hand.empty(); }));

@@ -54,28 +54,29 @@ TEST_F(PlantCheck, NothingEndsAnObjectThatComesToRest) { EXPECT_EQ(endOf(300), "
 TEST_F(PlantCheck, APositionThatIsNoNumber) {
   ASSERT_EQ(endOf(5), "");
   plant_.model().data()->qpos[plant_.model().object_position] = kNoNumber;
-  EXPECT_EQ(endOf(1),
-            "the simulation diverged at 0.006 s with seed 42: a value is no number; the same seed "
-            "and inputs repeat it");
+  const std::string end = endOf(1);
+  for (const char* const words : {"0.006 s", "seed 42", "no number"}) {
+    EXPECT_NE(end.find(words), std::string::npos) << end;
+  }
 }
 
 TEST_F(PlantCheck, AVelocityOfAFingerThatIsNoNumber) {
   ASSERT_EQ(endOf(5), "");
   plant_.model().data()->qvel[plant_.model().phalanx_velocity[3]] = kNoNumber;
-  EXPECT_NE(endOf(1).find(": a value is no number;"), std::string::npos);
+  EXPECT_NE(endOf(1).find("no number"), std::string::npos);
 }
 
 /// Both lists are as long as ever in memory: the model alone says that they are shorter.
 TEST_F(PlantCheck, ContactsThatAreLeftOut) {
   ASSERT_EQ(endOf(300), "");
   plant_.model().get()->nconmax = 1;
-  EXPECT_NE(endOf(2).find(": more than 1 contacts at a time;"), std::string::npos);
+  EXPECT_NE(endOf(2).find(" 1 contacts"), std::string::npos);
 }
 
 TEST_F(PlantCheck, ConstraintsThatAreLeftOut) {
   ASSERT_EQ(endOf(300), "");
   plant_.model().get()->njmax = 2;
-  EXPECT_NE(endOf(2).find(": more than 2 constraints at a time;"), std::string::npos);
+  EXPECT_NE(endOf(2).find(" 2 constraints"), std::string::npos);
 }
 
 /// Speeds that no body of this cell can have: m/s and rad/s of free bodies, rad/s of a joint.
@@ -96,8 +97,7 @@ TEST_F(PlantCheck, ImplausibleSpeeds) {
     plant_.model().data()->qvel[row.at] = row.good;
     EXPECT_EQ(endOf(1), "");
     plant_.model().data()->qvel[row.at] = row.bad;
-    EXPECT_NE(endOf(1).find(std::string(": ") + row.who + " is faster than anything here can be"),
-              std::string::npos);
+    EXPECT_NE(endOf(1).find(std::string(row.who) + " is faster"), std::string::npos);
     plant_.model().data()->qvel[row.at] = 0.0;
   }
 }

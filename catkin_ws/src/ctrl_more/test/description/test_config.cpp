@@ -27,18 +27,19 @@ TEST(ConfigTest, ReadsScalarsListsAndMapsWithTheirLines) {
 
 TEST(ConfigTest, ErrorsNameFileLineAndField) {
   const ConfigNode root = ConfigNode::fromText("a: x\nb: {c: 1}\nn: .nan\nh: 1e999\n", "f.yaml");
-  EXPECT_EQ(messageOf([&] { root.find("a")->number("gain 'a'"); }),
-            "f.yaml:1: gain 'a' expects a number, got 'x'");
+  const std::string wrong = messageOf([&] { root.find("a")->number("gain 'a'"); });
+  EXPECT_EQ(wrong.rfind("f.yaml:1: gain 'a'", 0), 0u) << wrong;
+  EXPECT_TRUE(contains(wrong, "got 'x'")) << wrong;
   EXPECT_FALSE(messageOf([&] { root.find("b")->number("b"); }).empty());
   EXPECT_FALSE(messageOf([&] { root.find("b")->text("b"); }).empty());
   EXPECT_FALSE(messageOf([&] { root.find("b")->texts("b"); }).empty());
   EXPECT_FALSE(messageOf([&] { root.find("n")->number("n"); }).empty());
   EXPECT_FALSE(messageOf([&] { root.find("h")->number("h"); }).empty());
   EXPECT_FALSE(messageOf([&] { root.find("a")->boolean("a"); }).empty());
-  EXPECT_EQ(messageOf([&] {
-              root.requireKeys("it", {"aa", "b", "n", "h"});
-            }),
-            "f.yaml:1: it has an unknown key 'a'; did you mean 'aa'?");
+  const std::string unknown = messageOf([&] { root.requireKeys("it", {"aa", "b", "n", "h"}); });
+  EXPECT_EQ(unknown.rfind("f.yaml:1: it ", 0), 0u) << unknown;
+  EXPECT_TRUE(contains(unknown, "'a'")) << unknown;
+  EXPECT_TRUE(contains(unknown, "'aa'")) << unknown;
 }
 
 TEST(ConfigTest, HostileFilesAreRefused) {
@@ -91,8 +92,8 @@ TEST(ConfigTest, NumbersAndTruthsAreReadWholeOrNotAtAll) {
   EXPECT_FALSE(truth("false"));
   for (const char* bad : {"True", "yes", "1", "[true]"}) EXPECT_THROW(truth(bad), ConfigError);
   const ConfigNode map = ConfigNode::fromText("a: {b: 1}\nc: 2\n", "f");
-  EXPECT_EQ(messageOf([&] { map.find("a")->numbers("n"); }), "f:1: n expects numbers");
-  EXPECT_EQ(messageOf([&] { map.find("c")->texts("t"); }), "f:2: t expects a list of names");
+  EXPECT_TRUE(contains(messageOf([&] { map.find("a")->numbers("n"); }), "f:1: n expects"));
+  EXPECT_TRUE(contains(messageOf([&] { map.find("c")->texts("t"); }), "f:2: t expects"));
   EXPECT_EQ(map.find("c")->numbers("n"), std::vector<double>{2.0}) << "one number is a list of one";
   EXPECT_EQ(map.find("c")->line(), 2);
 }

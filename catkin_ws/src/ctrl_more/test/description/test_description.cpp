@@ -22,8 +22,8 @@ TEST(Declaration, EachErrorHasOneSentence) {
   const std::vector<std::pair<Way, std::string>> wrong = {
       {[](Description& d) { d.type = ""; }, "no type"},
       {[](Description& d) { d.gain("", 1.0); }, "has no name"},
-      {[](Description& d) { d.gain("k", 1.0).size = 2; }, "as many initial values"},
-      {[](Description& d) { d.gain("k", 1.0).size = 0; }, "as many initial values"},
+      {[](Description& d) { d.gain("k", 1.0).size = 2; }, "initial values"},
+      {[](Description& d) { d.gain("k", 1.0).size = 0; }, "initial values"},
       {[](Description& d) { d.gain("k", 3.1).range(1.0, 3.0); }, "outside its range"},
       {[](Description& d) { d.gain("k", 0.9).range(1.0, 3.0); }, "outside its range"},
       {[](Description& d) { d.gain("k", 1.0), d.setting("k", "a"); }, "'k' twice"},
@@ -37,7 +37,7 @@ TEST(Declaration, EachErrorHasOneSentence) {
        "no text setting"},
       {[](Description& d) { d.measured("imu").maxAge(0.0); }, "age > 0"},
       {[](Description& d) { d.modifies(ControlContainer::JointSpaceReference, "Velocity"); },
-       "task stage cannot modify jointSpaceReference"},
+       "modify jointSpaceReference"},
   };
   for (const auto& each : wrong) {
     const std::vector<std::string> found = faultsOf(each.first);
@@ -67,9 +67,9 @@ TEST(Signals, UseTheExistingSizeIfItIsAllowed) {
   }
   Rig rig;
   EXPECT_TRUE(contains(loaded(rig, two, read).message(), "declare it before"));
-  EXPECT_TRUE(
-      contains(loaded(rig, two, [](ctrl_more::Setup& setup) { setup.read("imu", 8); }).message(),
-               "size 8 was asked for, but 9 or 10 is declared"));
+  const Status eight = loaded(rig, two, [](ctrl_more::Setup& setup) { setup.read("imu", 8); });
+  EXPECT_TRUE(contains(eight.message(), "size 8")) << eight.message();
+  EXPECT_TRUE(contains(eight.message(), "9 or 10")) << eight.message();
   EXPECT_TRUE(loaded(rig, two, [](ctrl_more::Setup& setup) { setup.read("imu", 10); }));
   EXPECT_EQ(rig.robot.find(RobotSource::Measured, "imu").size(), 10);
 }
@@ -102,8 +102,8 @@ TEST(LinkedTypes, AreMadeByNameAndMustHaveTheDescribedType) {
     return "";
   };
   EXPECT_TRUE(contains(refusal("Nothing"), "returned nothing")) << refusal("Nothing");
-  EXPECT_TRUE(contains(refusal("Other"), "describes itself as 'TestController'"));
-  EXPECT_TRUE(contains(refusal("TestControler"), "the program has no controller of type"));
+  EXPECT_TRUE(contains(refusal("Other"), "as 'TestController'"));
+  EXPECT_TRUE(contains(refusal("TestControler"), "'TestControler'"));
   EXPECT_TRUE(contains(refusal("TestControler"), "did you mean 'TestController'"));
   EXPECT_FALSE(prototypes().insert({"Empty", nullptr}));
   const auto refused = prototypes().takeRefused();

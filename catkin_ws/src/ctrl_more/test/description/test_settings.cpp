@@ -26,7 +26,9 @@ TEST(Settings, TextsAreOneOfTheirChoicesAndNeverEmpty) {
   EXPECT_TRUE(values.set("mode", std::string("slow")));
   EXPECT_EQ(values.text("mode"), "slow");
   const Status wrong = values.set("mode", std::string("slw"));
-  EXPECT_EQ(wrong.message(), "'mode' cannot be 'slw'; did you mean 'slow'?");
+  for (const char* const name : {"'mode'", "'slw'", "'slow'"}) {
+    EXPECT_TRUE(contains(wrong.message(), name)) << wrong.message();
+  }
   EXPECT_TRUE(values.set("key", std::string("wrist_imu"))) << "no choices: any";
   EXPECT_FALSE(values.set("key", std::string()));
   EXPECT_EQ(values.text("key"), "wrist_imu");
@@ -46,7 +48,7 @@ TEST(Settings, NumbersHaveTheirCountAndRange) {
     EXPECT_EQ(values.numbers("mount"), (Numbers{0, 0, 1}));
   }
   EXPECT_TRUE(contains(values.set("mount", Numbers{0, 0, 3}).message(), "-1 to 2 1, got 3"));
-  EXPECT_EQ(values.set("mount", Numbers{1}).message(), "'mount' expects 3 numbers, got 1");
+  EXPECT_TRUE(contains(values.set("mount", Numbers{1}).message(), "'mount' expects 3"));
   EXPECT_TRUE(values.set("ends", Numbers{1, 2, 3})) << "any count";
   EXPECT_EQ(values.numbers("ends").size(), 3u);
   EXPECT_FALSE(values.set("ends", Numbers{}));
@@ -68,9 +70,10 @@ TEST(ControllerFiles, SetTheNamedValues) {
     }
     return "";
   };
-  EXPECT_EQ(refusal("\ntype: Y\n"),
-            "f:2: this file is for type 'Y', but the controller is of type 'X'");
-  EXPECT_TRUE(contains(refusal("mode: [1]\n"), "f:1: setting 'mode' expects a text"));
+  for (const char* const name : {"f:2: ", "type 'Y'", "type 'X'"}) {
+    EXPECT_TRUE(contains(refusal("\ntype: Y\n"), name)) << refusal("\ntype: Y\n");
+  }
+  EXPECT_TRUE(contains(refusal("mode: [1]\n"), "f:1: setting 'mode'"));
   EXPECT_TRUE(contains(refusal("kp: {a: 1}\n"), "f:1: gain 'kp' expects numbers"));
   EXPECT_TRUE(contains(refusal("kpp: 1\n"), "did you mean 'kp'"));
 }

@@ -26,11 +26,11 @@ TEST_F(ListFiles, EveryKeyOfABlockHasItsValues) {
     ASSERT_TRUE(rig.manager->unload("Good")) << good;
   }
   EXPECT_TRUE(contains(refusalOf("on_fault: holds"), "did you mean 'hold'"));
-  EXPECT_TRUE(contains(refusalOf("blend_s: -0.1"), "blend_s must not be negative"));
-  EXPECT_TRUE(contains(refusalOf("overrun_us: -0.1"), "overrun_us must not be negative"));
+  EXPECT_TRUE(contains(refusalOf("blend_s: -0.1"), "blend_s must"));
+  EXPECT_TRUE(contains(refusalOf("overrun_us: -0.1"), "overrun_us must"));
   EXPECT_TRUE(contains(refusalOf("enabled: 1"), "true or false"));
-  EXPECT_TRUE(contains(refusalOf("type: [a]"), "type expects a text"));
-  EXPECT_TRUE(contains(refusalOf("configFile: [a]"), "configFile expects a text"));
+  EXPECT_TRUE(contains(refusalOf("type: [a]"), "type expects"));
+  EXPECT_TRUE(contains(refusalOf("configFile: [a]"), "configFile expects"));
   EXPECT_TRUE(contains(refusalOf("configFile: nowhere.yaml"), "configFile of 'Good'"));
   EXPECT_FALSE(rig.manager->has("Good"));
 }
@@ -69,7 +69,7 @@ TEST_F(ListFiles, PartsOfAProfileAreNotUnloaded) {
   ASSERT_TRUE(rig.manager->setProfile("guided", {"Good"}));
   const Status status = rig.manager->unload("Good");
   EXPECT_EQ(status.cause(), Cause::Busy);
-  EXPECT_TRUE(contains(status.message(), "part of profile 'guided'")) << status.message();
+  EXPECT_TRUE(contains(status.message(), "'guided'")) << status.message();
   ASSERT_TRUE(rig.manager->setProfile("guided", {}));
   EXPECT_TRUE(rig.manager->unload("Good"));
 }

@@ -85,16 +85,16 @@ TEST_F(Plugins, BadLibrariesAreRefusedWithAReason) {
                 {"list.yaml:2", "libPath", "libmissing.so", "tried"});
   expectRefused("loadControllers: [A]\nA: {libPath: libnone.so}\n", {"registers no controller"});
   expectRefused("loadControllers: [A]\nA: {libPath: libtwo.so}\n",
-                {"more than one controller", "First, Second", "type"});
+                {"more than one", "First, Second", "type"});
   expectRefused("loadControllers: [A]\nA: {libPath: libunresolved.so}\n", {"cannot be loaded"});
   expectRefused("loadControllers: [A]\nA: {libPath: libthrowing.so}\n", {"no such camera"});
   expectRefused("loadControllers: [A]\nA: {libPath: libwrong_type.so}\n",
                 {"'Registered'", "'Described'"});
   expectRefused("loadControllers: [A]\nA: {libPath: libother_abi.so}\n",
-                {"'OtherAbi' compiled for another ctrl_more",
+                {"'OtherAbi'", "another ctrl_more",
                  "program has interface " + std::to_string(thisAbi().interface), "build it again"});
   expectRefused("loadControllers: [A]\nA: {libPath: libgood.so, type: God}\n",
-                {"no controller of type 'God'", "did you mean 'Good'"});
+                {"type 'God'", "did you mean 'Good'"});
   EXPECT_TRUE(prototypes().types().empty()) << "nothing stays behind";
   EXPECT_TRUE(load("loadControllers: [A]\nA: {libPath: libtwo.so, type: Second}\n").ok());
 }
@@ -314,8 +314,8 @@ TEST_F(TwoBuilds, LibraryThatStaysInMemoryIsLoadedAgain) {
   EXPECT_EQ(prototypes().find("Good"), nullptr) << "not offered while it is not loaded";
   build("rebuilt");
   const LoadReport report = loadIt();
-  EXPECT_TRUE(contains(report.text(), "keeps the old build in memory")) << report.text();
-  EXPECT_TRUE(contains(report.text(), "start the program again"));
+  EXPECT_TRUE(contains(report.text(), "old build")) << report.text();
+  EXPECT_TRUE(contains(report.text(), "start the program"));
 }
 
 // In a separate process, because a fault of the loader would end or block the tests.
@@ -348,15 +348,15 @@ struct HarmfulLibraries : TwoBuilds {
 };
 
 TEST_F(HarmfulLibraries, AreRefusedAndBlockNoOtherThread) {
-  const std::string opened = "while it was opened", described = "'StaticObject' was made";
+  const std::string opened = "it was opened", described = "'StaticObject' was made";
   for (const auto& [fault, parts] : std::map<std::string, std::vector<std::string>>{
            {"open_throw", {"no such camera"}},
            {"open_exit", {"ended the process", opened}},
            {"open_abort", {"crashed", "Aborted", opened}},
            {"open_crash", {"crashed", "Segmentation", opened}},
-           {"open_hang", {"did not return within", opened}},
+           {"open_hang", {"not return", opened}},
            {"describe_exit", {"ended the process", described}},
-           {"describe_hang", {"did not return within", described}}}) {
+           {"describe_hang", {"not return", described}}}) {
     SCOPED_TRACE(fault);
     setenv("CTRL_MORE_TEST_FAULT", fault.c_str(), 1);
     within20s([this, parts = parts] { refused(parts); });

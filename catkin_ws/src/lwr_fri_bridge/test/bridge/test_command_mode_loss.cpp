@@ -65,7 +65,7 @@ TEST(CommandModeLoss, AStalledControllerOnThisComputerIsNamedAndStartedAgainAtRe
   const Vector7 stood = cell.robot.setPoint();
   cell.run(1);
   EXPECT_EQ(cell.bridge.snapshot().sample.block, MotionBlock::NotStarted);
-  EXPECT_NE(cell.reason().find("was not run for"), std::string::npos) << cell.reason();
+  EXPECT_NE(cell.reason().find("not run"), std::string::npos) << cell.reason();
   EXPECT_STREQ(nextEvent(cell.bridge.snapshot().sample.block), "start");
   EXPECT_EQ(cell.watch(200), 1);
   const Snapshot after = cell.bridge.snapshot();
@@ -86,7 +86,7 @@ TEST(CommandModeLoss, ALateFriThreadIsNamedAndStartedAgainAtRest) {
   cell.robot.state = fri::FriState::Monitor;
   cell.run(1);
   EXPECT_EQ(cell.bridge.snapshot().loss.cause, LossCause::ComputerLate);
-  EXPECT_NE(cell.reason().find("ms late with its answers"), std::string::npos) << cell.reason();
+  EXPECT_NE(cell.reason().find("ms late"), std::string::npos) << cell.reason();
   EXPECT_EQ(cell.watch(400), 1);
   EXPECT_EQ(cell.bridge.snapshot().supervisor, SupervisorState::Command);
 }

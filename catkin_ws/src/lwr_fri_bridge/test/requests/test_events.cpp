@@ -51,7 +51,7 @@ TEST(Events, UnknownOnesAreRejectedWithTheList) {
         "joint_impedance damping nan", "cartesian_impedance stiffness 5001 10",
         "cartesian_impedance stiffness 100"}) {
     const std::string error = errorOf(event);
-    EXPECT_NE(error.find("known events: start, hold, reset, stop, position"), std::string::npos)
+    EXPECT_NE(error.find("start, hold, reset, stop, position"), std::string::npos)
         << event << ": " << error;
   }
   EXPECT_NE(errorOf("jump").find("'jump'"), std::string::npos);
@@ -61,9 +61,9 @@ TEST(Events, UnknownOnesAreRejectedWithTheList) {
 TEST(Diagnosis, GivesAHintWhenQualityIsPoor) {
   Snapshot s;
   FriThreadStatistics thread;
-  EXPECT_NE(diagnoseConnection(s, thread, 49938, 12.0)
-                .text.find("no valid packet received on port 49938 for 12 s"),
-            std::string::npos);
+  for (const char* const number : {"port 49938", "12 s"}) {
+    EXPECT_NE(diagnoseConnection(s, thread, 49938, 12.0).text.find(number), std::string::npos);
+  }
   EXPECT_EQ(diagnoseConnection(s, thread, 49938, 12.0).code, ReasonCode::RobotDisconnected);
   EXPECT_EQ(diagnoseArm(s, 70.0).code, ReasonCode::RobotDisconnected);
   s.supervisor = SupervisorState::Monitor;
