@@ -146,7 +146,7 @@ def with_fake_apt(checkout, **variables: str) -> tuple[str, str, bool]:
     [
         ({"APT_SUITE": "sid Debian:$(VERSION)/unstable"}, "/etc/apt also names sid"),
         ({"BROKEN": "bash"}, "dpkg --configure -a"),
-        ({}, "to go on by hand: apt-get"),
+        ({}, "by hand: apt-get"),
     ],
 )
 def test_packages_that_cannot_be_installed(checkout, variables, advice):

@@ -397,16 +397,16 @@ def test_topics_of_the_file_of_signals_that_cannot_be_are_refused_in_words(
 @pytest.mark.parametrize(
     "name, value, words",
     [
-        ("lwr/arm", "toy", "'toy': expected fri, ideal or the file of a library"),
-        ("lwr/start_position", [0.0] * 6, "expected 7 numbers, got 6"),
-        ("controller_manager/speed_scale", 1.5, "speed_scale: expected a number from 0 to 1, got 1.5"),
+        ("lwr/arm", "toy", ("'toy'", "fri, ideal")),
+        ("lwr/start_position", [0.0] * 6, ("7 numbers, got 6",)),
+        ("controller_manager/speed_scale", 1.5, ("speed_scale: ", "0 to 1, got 1.5")),
     ],
 )
-def test_a_parameter_out_of_range_ends_the_start_in_words(name: str, value: object, words: str) -> None:
+def test_a_parameter_out_of_range_ends_the_start_in_words(name: str, value: object, words: tuple[str, ...]) -> None:
     with own_master() as master:
         parameters(master)
         master.setParam("/" + name, value)
         ended = subprocess.run(
             [str(built("lib", "coglab_controllers", "robot_node"))], capture_output=True, text=True, timeout=60.0
         )
-    assert ended.returncode == 1 and words in ended.stderr, ended.stderr[-2000:]
+    assert ended.returncode == 1 and all(word in ended.stderr for word in words), ended.stderr[-2000:]

@@ -65,11 +65,11 @@ def started(master: rosgraph.Master, end: signal.Signals = signal.SIGINT) -> str
 @pytest.mark.parametrize(
     "parameters, words",
     [
-        ({"urdf_file": "/nowhere/arm.urdf"}, "file '/nowhere/arm.urdf' cannot be read; check its path"),
-        ({"feedback_file": "package://nowhere/f.yaml"}, "'package://nowhere/f.yaml': package 'nowhere' was not found"),
+        ({"urdf_file": "/nowhere/arm.urdf"}, "'/nowhere/arm.urdf'"),
+        ({"feedback_file": "package://nowhere/f.yaml"}, "'package://nowhere/f.yaml': package 'nowhere'"),
         (
             {"feedback_file": "package://coglab_controllers"},
-            "'package://coglab_controllers': package 'coglab_controllers' was not found",
+            "'package://coglab_controllers': package 'coglab_controllers'",
         ),
         ({"cycle_time": 7.0}, "parameter controller_manager/cycle_time: expected"),
     ],

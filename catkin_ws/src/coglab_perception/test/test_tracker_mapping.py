@@ -50,7 +50,7 @@ def test_stamps_of_another_clock_are_replaced_by_the_arrival(tmp_path):
         ("human_hand: {}", "one source"),
         ("human_hand: {tf: h, topic: /t, type: PoseStamped}", "one source"),
         ("human_hand: {topic: /t}", "type is missing"),
-        ("human_hand: {topic: /t, type: Pose}", "'Pose' is not one of"),
+        ("human_hand: {topic: /t, type: Pose}", "'Pose'"),
         ("human_hand: {topic: /t, type: MarkerArray}", "needs the id"),
         ("human_hand: {topic: /t, type: PoseStamped, id: 3}", "needs the id"),
         ("human_hand: {tf: h, id: 3}", "no type, namespace or id"),

@@ -65,16 +65,16 @@ def test_reading():
 @pytest.mark.parametrize(
     "data, sentence",
     [
-        ({"xyz": [0, 0]}, "xyz has three finite numbers"),
+        ({"xyz": [0, 0]}, "xyz has three"),
         ({"rpy_deg": [0, float("nan"), 0]}, "rpy_deg has three"),
         ({"quaternion": [0, 0, 0, 0]}, "no direction"),
         ({"quaternion": [0, 0, 1]}, "four finite numbers"),
         ({"quaternion": [0, 0, float("inf"), 1]}, "four finite numbers"),
         ({"quaternion": [[0, 0, 0, 1]]}, "four finite numbers"),
         ({"quaternion": [0, 0, 0.6e-9, 0.6e-9]}, "no direction"),
-        ({"xyz": [0, float("inf"), 0]}, r"xyz has three finite numbers in m, got \[0, inf, 0\]"),
-        ({"xyz": [0, 0, 0, 0]}, "xyz has three finite numbers"),
-        ({"rpy_deg": [0, 0]}, r"rpy_deg has three finite numbers in degrees, got \[0, 0\]"),
+        ({"xyz": [0, float("inf"), 0]}, r"xyz .* m, got \[0, inf, 0\]"),
+        ({"xyz": [0, 0, 0, 0]}, "xyz has three"),
+        ({"rpy_deg": [0, 0]}, r"rpy_deg .* degrees, got \[0, 0\]"),
     ],
 )
 def test_malformed_poses_are_refused(data, sentence):

@@ -24,11 +24,11 @@ def resolve(*arguments):
 @pytest.mark.parametrize(
     "argument, said",
     [
-        ("behaviour:=silly", "there is no 'silly'; there are: normal"),
-        ("profile:=angel", "there is no 'angel'; there are: drawn, patient, accustomed"),
-        ("recorded_person:=stay", "there is no 'stay'; there are: wait, no_wait, leave"),
+        ("behaviour:=silly", "'silly'; there are: normal"),
+        ("profile:=angel", "'angel'; there are: drawn, patient, accustomed"),
+        ("recorded_person:=stay", "'stay'; there are: wait, no_wait, leave"),
         ("recording:=/nope.bag", "/nope.bag: no such file"),
-        ("recording:=/etc/passwd", "a recording is a .csv, .npz or .bag file"),
+        ("recording:=/etc/passwd", ".csv, .npz or .bag"),
     ],
 )
 def test_refused_before_anything_starts(argument, said, capfd):

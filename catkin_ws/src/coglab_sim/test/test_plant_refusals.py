@@ -12,9 +12,9 @@ from grasp_trial import BOARD_TOP, BOX, HOME, URDF
     "change, words",
     [
         ({"shape": "cone"}, "unknown shape 'cone'"),
-        ({"mass": 0.0}, "object/mass = 0 is outside its range 0.01..10"),
-        ({"size": [0.1, 0.0, 0.1]}, r"object/size\[1\] = 0 is outside its range 0.001..2"),
-        ({"center": [0.0, 0.0, 2.01]}, "its centre is more than 2 m from its frame"),
+        ({"mass": 0.0}, r"object/mass = 0 .* 0\.01\.\.10"),
+        ({"size": [0.1, 0.0, 0.1]}, r"object/size\[1\] = 0 .* 0\.001\.\.2"),
+        ({"center": [0.0, 0.0, 2.01]}, "centre .* 2 m"),
         ({"colour": "red"}, "has no parameter 'object/colour'"),
     ],
 )

@@ -126,13 +126,13 @@ def test_a_description_that_holds_no_robot_is_refused_with_its_name(tmp_path, te
 @pytest.mark.parametrize(
     "old, new, words",
     [
-        ("sliding: 0.8", "sliding: 5.001", "/contact/sliding: expected a number in 0..5, got 5.001"),
-        ("motor: 0, pivot", "motor: 5, pivot", r"/fingers/thumb\[0\]/motor: expected a number in 0..4"),
-        ("tendon_stiffness: 50000.0", "", "/tendon_stiffness: expected a value, got nothing"),
-        ("axis: [0.0, 0.0, -1.0]", "axis: [0.0, 0.0, -0.999]", "/axis: expected a vector of length 1"),
-        ("range: [0.0, 1.92]", "range: [0.5, 0.5]", "/range: expected low before high"),
-        ("  index:\n", "  second:\n", "/fingers/index: expected a value, got nothing"),
-        ("mass: 0.018", "mass: 0.9", "phalanges weigh .* more than the whole hand ih2_base_link"),
+        ("sliding: 0.8", "sliding: 5.001", r"/contact/sliding: .* 0\.\.5, got 5\.001"),
+        ("motor: 0, pivot", "motor: 5, pivot", r"/fingers/thumb\[0\]/motor: .* 0\.\.4"),
+        ("tendon_stiffness: 50000.0", "", "/tendon_stiffness: .* nothing"),
+        ("axis: [0.0, 0.0, -1.0]", "axis: [0.0, 0.0, -0.999]", "/axis: .* length 1"),
+        ("range: [0.0, 1.92]", "range: [0.5, 0.5]", "/range: .* low"),
+        ("  index:\n", "  second:\n", "/fingers/index: .* nothing"),
+        ("mass: 0.018", "mass: 0.9", "phalanges .* ih2_base_link"),
         ("palm: ih2_base_link", "palm: [", "cannot be read"),
     ],
 )

@@ -201,9 +201,9 @@ def test_an_arm_that_moves_less_than_1_mrad_in_200_ms_is_at_rest():
 @pytest.mark.parametrize(
     ("there", "hold", "took", "words"),
     [
-        (True, "succeeds", 3.2, "(no answer within 3.0 s), so the arm was held"),
-        (True, "refuses", 3.2, "(no answer within 3.0 s), so the arm was held: held already"),
-        (False, "succeeds", 0.5, "the motion could not be ended: the robot is silent"),
+        (True, "succeeds", 3.2, (" 3.0 s", "held")),
+        (True, "refuses", 3.2, (" 3.0 s", "held already")),
+        (False, "succeeds", 0.5, ("silent",)),
     ],
 )
 def test_the_arm_is_held_if_cancelling_fails_and_a_silent_robot_ends_the_wait(there, hold, took, words):
@@ -215,7 +215,8 @@ def test_the_arm_is_held_if_cancelling_fails_and_a_silent_robot_ends_the_wait(th
         trial.ctx.arm.joint_positions = lambda: None
     with using(trial.clock):
         trouble = end_motion(trial.ctx, "the test")
-    assert trouble.endswith(words) and trial.clock.now() == pytest.approx(took, abs=0.04)
+    assert all(word in trouble for word in words), trouble
+    assert trial.clock.now() == pytest.approx(took, abs=0.04)
     assert len(held) == there
 
 

@@ -63,12 +63,12 @@ def test_answers_written_at_the_same_time_are_all_kept(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", ":1: a line of column names"),
+        ("", ":1: a line"),
         ("condition,effort\n", ":1: the column participant"),
         ("participant,condition,fatigue\n", ":1: the column 'fatigue'"),
         ("participant,condition,effort\nP01,calm,50\nAnna,calm,5\n", ":3: participant: one of P01, P02"),
         ("participant,condition,effort\nP01,loud,50\n", ":2: condition"),
-        ("participant,condition,effort\nP01,calm,52\n", ":2: effort: 0 to 100 in steps of 5"),
+        ("participant,condition,effort\nP01,calm,52\n", ":2: effort: 0 to 100"),
         ("participant,condition,effort\nP01,calm,nan\n", ":2: effort: 0 to 100"),
         ("participant,condition,effort\nP01,calm,high\n", ":2: effort: a number"),
         ("participant,condition,effort\nP01,calm\n", ":2: 3 cells"),

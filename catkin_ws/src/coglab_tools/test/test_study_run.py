@@ -177,7 +177,7 @@ def test_a_worker_of_another_version_is_refused(undisturbed):
     ("old", "new", "words"),
     [
         ("speed: 0.8", "speed: 0.7", r"study.yaml:4: 'conditions' was changed"),
-        ("name: kill", "name: other", r"study.yaml:2: .* a folder holds one study"),
+        ("name: kill", "name: other", r"study.yaml:2: .* one study"),
     ],
 )
 def test_an_edited_study_is_refused(undisturbed, tmp_path, old, new, words):

@@ -156,10 +156,8 @@ def test_a_reach_to_an_unreachable_object_ends_with_its_reason(turned):
     (result,) = checked(trial, RECEIVE)
     assert result.outcome == "failed_empty" and trial.last_hub == "wait_without_object"
     assert re.search(
-        r"the end of the reach within \d+\.\d s expected, it did not happen, because the motion is running with \d\."
-        r"|something touches the hand, and the object is \d\.\d\d m from where it would be held"
-        r"|the reach was given up: the goal went back by"
-        r"|(joint lwr_\w\d is at its stop and|a border of the workspace) blocks the motion",
+        r"end of the reach within \d+\.\d s|the object is \d\.\d\d m|the goal went back"
+        r"|(joint lwr_\w\d|workspace) .*blocks",
         trial.why(),
     ), trial.why()
 

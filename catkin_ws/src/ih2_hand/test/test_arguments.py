@@ -84,7 +84,7 @@ def test_options_out_of_range_are_refused_before_the_port_is_opened(options):
         ("lateral: [1, 2, 3, 4]", "lateral needs 5 whole numbers"),
         ("lateral: [1, 2, 3, 4, 255]", "positions are 0..254"),
         ("lateral: [1, 2, 3, 4, x]", "lateral needs 5 whole numbers"),
-        ("power: [1, 2, 3, 4, 5]", "is not one of cylindrical"),
+        ("power: [1, 2, 3, 4, 5]", "of cylindrical"),
         ("cylindrical: [1, 2, 3, 4, 5]", "second time"),
         ("lateral 1 2 3 4 5", "expected `mode:"),
         ("", "no preshape for lateral"),

@@ -91,7 +91,7 @@ FREE = {"calibrated": False, "holding": False, "busy": None}
         ("fast force", {}, None),
         ("complete force", {"calibrated": True, "holding": True}, None),
         ("fast", {"calibrated": True}, "calibrated already"),
-        ("complete", {"holding": True}, "may hold an object"),
+        ("complete", {"holding": True}, "object"),
         ("fast", {"busy": "hand_open runs"}, "hand_open runs"),
         ("fast force", {"busy": "a calibration runs"}, "a calibration runs"),
         ("", {}, "must be fast"),

@@ -93,14 +93,14 @@ def test_a_port_may_be_closed_twice_and_is_then_lost(far):
 @pytest.mark.parametrize(
     ("error", "exists", "words"),
     [
-        (OSError(errno.ENOENT, "x"), True, "no such port PORT .serial devices here: /dev/a, /dev/b.: plug it in"),
+        (OSError(errno.ENOENT, "x"), True, "no such port PORT .* /dev/a, /dev/b"),
         (OSError(errno.EIO, "x"), False, "no such port PORT"),
         (OSError(errno.EACCES, "x"), True, "no permission for PORT: .*sudo adduser"),
         (OSError(errno.EPERM, "x"), True, "no permission for PORT"),
-        (OSError(errno.EBUSY, "x"), True, "port PORT is busy: end the other program .*fuser PORT"),
+        (OSError(errno.EBUSY, "x"), True, "port PORT is busy: .*fuser PORT"),
         (OSError(errno.EAGAIN, "x"), True, "port PORT is busy"),
         (serial.SerialException("Could not exclusively lock port"), True, "port PORT is busy"),
-        (OSError(errno.EIO, "x"), True, "port PORT cannot be opened .*check that it is the hand's serial device"),
+        (OSError(errno.EIO, "x"), True, "port PORT cannot be opened"),
     ],
 )
 def test_unopenable_port_error_says_what_to_do(monkeypatch, tmp_path, error, exists, words):

@@ -143,9 +143,9 @@ def test_const_refuses_assignment_and_del():
     writable = types.SimpleNamespace(data={})
     type_with_items = type("T", (), {"__setitem__": lambda s, k, v: None, "__delitem__": lambda s, k: None})
     items = view_of(type_with_items())[0].v
-    with pytest.raises(TypeError, match="__setitem__ is not allowed: this T came .* io_keys"):
+    with pytest.raises(TypeError, match="__setitem__ .* T .* io_keys"):
         items["a"] = 1
-    with pytest.raises(TypeError, match="__delitem__ is not allowed: this T came .* io_keys"):
+    with pytest.raises(TypeError, match="__delitem__ .* T .* io_keys"):
         del items["a"]
     assert writable.data == {}
 
