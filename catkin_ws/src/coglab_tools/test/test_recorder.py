@@ -2,12 +2,16 @@
 
 import io
 import json
+import time
 
 import pytest
 import rosbag
+import rospy
 from coglab_msgs.msg import Transition
+from coglab_py.steady import Stamps
 from coglab_tools.trial.record import TrialRecord, find_trials
 from coglab_tools.trial.recorder import Raw, Recorder, configuration_hash
+from coglab_tools.trial.recorder_node import RecorderNode
 from rospy import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -25,6 +29,7 @@ class Cell:
 
     def __init__(self, folder, disk=1e12):
         self.disk, self.said = disk, []
+        self.clock = 0.0  # s by which this computer's clock was set
         self.recorder = Recorder(
             folder, lambda: PARAMETERS, lambda text, wrong: self.said.append((wrong, text)), free=lambda _: self.disk
         )
@@ -36,7 +41,7 @@ class Cell:
             "type": message._type, "md5sum": message._md5sum, "message_definition": message._full_text,
             "callerid": "/coglab", "latching": latching,
         }  # fmt: skip
-        self.recorder.put(Raw(time, topic, stream.getvalue(), header))
+        self.recorder.put(Raw(time, topic, stream.getvalue(), header, time + self.clock))
 
     def move(self, time, source, outcome, target):
         message = Transition(path="/coglab_master", from_state=source, outcome=outcome, to_state=target)
@@ -84,6 +89,45 @@ def test_a_handover_becomes_a_complete_folder_with_the_seconds_before(tmp_path):
         (latched,) = bag.read_messages("/tf_static")
         assert latched.message.data.startswith("kept") and latched.timestamp.to_sec() >= 2014.8
         assert len(list(bag.read_messages("/coglab/transitions"))) == 2
+
+
+@pytest.mark.parametrize("step", [7200.0, -7200.0, -2.5])
+def test_a_step_of_the_clock_neither_cuts_nor_loses_a_handover(tmp_path, step):
+    cell = Cell(tmp_path)
+    cell.clock = 1e9  # set before the handover: all times of the recording are of the new clock
+    cell.run(2010.0, 2020.0)
+    cell.move(2020.0, "wait_without_object", ACTION, ACTION)
+    cell.run(2020.0, 2022.0)
+    cell.clock += step
+    cell.run(2022.0, 2024.0)
+    begun, ended = 2020.0 + cell.clock, 2024.0 + cell.clock  # the brain converts both times by its clock of the end
+    cell.result(2020.0, 2024.0, started_ros=begun, ended_ros=ended)
+    cell.move(2024.01, ACTION, "succeeded", "wait_with_object")
+    cell.run(2024.0, 2028.0)
+    (place,) = find_trials(tmp_path)
+    record = TrialRecord.load(place)
+    assert record.outcome.success and record.object == "mug" and record.duration_s == 4.0
+    assert record.marks == ({"name": "contact", "time_s": 2.0},)
+    assert record.started.startswith("2001-09-09T02:20:20.000")
+    assert record.notes.startswith(f"this computer's clock was set by {step:+.2f} s")
+    with rosbag.Bag(str(place / "trial.bag")) as bag:
+        stamps = [t.to_sec() - 1e9 for _, _, t in bag.read_messages("/lwr/joint_states")]
+        assert stamps == sorted(stamps)
+        assert stamps[0] == pytest.approx(2015.0, abs=0.2) and stamps[-1] == pytest.approx(2025.0, abs=0.2)
+
+
+@pytest.mark.parametrize("simulated", [False, True])
+def test_the_node_follows_simulated_time_but_no_step_of_this_computers_clock(monkeypatch, simulated):
+    node, ahead = RecorderNode.__new__(RecorderNode), 0.0
+    node._stamps = Stamps()
+    monkeypatch.setattr(rospy.rostime, "is_wallclock", lambda: not simulated)
+    monkeypatch.setattr(rospy, "get_time", lambda: 1e9 + time.monotonic() + ahead)
+    before, ros = node._clocks()
+    ahead = -3600.0
+    after, ros_after = node._clocks()
+    assert ros_after - ros == pytest.approx(-3600.0, abs=60.0)
+    assert after - before == pytest.approx(-3600.0 if simulated else 0.0, abs=60.0)
+    assert (after == ros_after) is simulated
 
 
 def test_a_note_belongs_to_the_running_or_the_last_handover(tmp_path):

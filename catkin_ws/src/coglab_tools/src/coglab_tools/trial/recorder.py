@@ -32,6 +32,7 @@ POST_ROLL = 1.0  # s recorded after its result
 NO_RESULT = 3.0  # s, longest wait for the result after the end of the action
 LONGEST = 1800.0  # s, a longer action is cut off
 MOST_WAITING = 100_000  # messages that wait for the disk; older ones are lost, with a note in trial.yaml
+SET = 0.04  # s of ROS time against the recorder's clock that mean that this computer's clock was set
 DISK_CHECK = 1.0  # s between two looks at the free space
 NO_ACTIONS = (*HUBS, "stopped", "fault", "preempted")
 HIDDEN = ".part-"
@@ -43,20 +44,24 @@ class Raw(NamedTuple):
     """A received message."""
 
     time: float
-    """ROS time of receipt, s"""
+    """of receipt by the recorder's clock, which nobody sets, s"""
     topic: str
     """with leading slash"""
     data: bytes
     header: Mapping[str, str]
     """of the connection: type, md5sum, message_definition, callerid, latching"""
+    ros: float
+    """ROS time of receipt, s"""
 
 
 @dataclass
 class _Trial:
-    """A running recording."""
+    """A running recording. Its times are of the recorder's clock."""
 
     action: str
     begun: float
+    offset: float
+    """from the recorder's clock to the times of the bag and of trial.yaml, s: ROS time as it was at the start"""
     part: Path
     bag: Any
     parameters: Mapping[str, Any]
@@ -66,6 +71,8 @@ class _Trial:
     ends: float = float("inf")
     last: float = 0.0
     """time of the newest message, s"""
+    step: float = 0.0
+    """s by which this computer's clock was set since the start"""
     notes: list[str] = field(default_factory=list)
     said: list[tuple[float, str]] = field(default_factory=list)
     """notes of the experimenter: s, text"""
@@ -108,7 +115,8 @@ class Recorder:
         self._waiting.append(message)
 
     def step(self, now: float) -> None:
-        """Write the messages since the last step. `now`: ROS time, s. A full disk ends the recording, not the node."""
+        """Write the messages since the last step. `now`: by the recorder's clock, s. A full disk ends the recording,
+        not the node."""
         try:
             self._drain()
             trial = self._trial
@@ -149,6 +157,7 @@ class Recorder:
             if name.endswith(TRANSITIONS):
                 self._transition(raw)
             if self._trial is not None:
+                _follow_clock(self._trial, raw)
                 self._write(raw.time, raw)
             self._ring.append(raw)
             if name.endswith(RESULTS) and self._trial is not None:
@@ -171,7 +180,7 @@ class Recorder:
             self._begun = message.to_state
             if trial is not None:
                 self._finish()
-            self._begin(message.to_state, raw.time)
+            self._begin(message.to_state, raw.time, raw.ros - raw.time)
 
     def _result(self, raw: Raw) -> None:
         from std_msgs.msg import String
@@ -180,10 +189,15 @@ class Recorder:
         message.deserialize(raw.data)
         try:
             row = json.loads(message.data)
-            fits = trial is not None and row["kind"] == trial.action and float(row["ended_ros"]) > trial.begun
+            if trial is None or row["kind"] != trial.action:
+                return
+            for name in ("started_ros", "ended_ros"):  # the brain has converted both by its clock of the end
+                if name in row:
+                    row[name] = float(row[name]) - trial.step
+            fits = row["ended_ros"] > trial.begun + trial.offset
         except (ValueError, KeyError, TypeError):  # of another node
             return
-        if fits and trial is not None and trial.result is None:
+        if fits and trial.result is None:
             trial.result, trial.ends = row, raw.time + POST_ROLL
 
     def _note(self, raw: Raw) -> None:
@@ -204,7 +218,7 @@ class Recorder:
             except (CommandError, OSError) as error:  # the recording was moved or removed
                 self._say(f"a note was not recorded ({error}): {text}", True)
 
-    def _begin(self, action: str, begun: float) -> None:
+    def _begin(self, action: str, begun: float, offset: float) -> None:
         import rosbag
 
         self.folder.mkdir(parents=True, exist_ok=True)
@@ -218,7 +232,7 @@ class Recorder:
         except BaseException:
             shutil.rmtree(part, ignore_errors=True)
             raise
-        self._trial = _Trial(action, begun, part, bag, {})
+        self._trial = _Trial(action, begun, offset, part, bag, {})
         first = self._ring[0].time if self._ring else begun
         for raw in self._latched.values():
             if raw.time < first:
@@ -243,7 +257,8 @@ class Recorder:
             if name in header:
                 connection[name] = header[name]
         self._trial.last = max(self._trial.last, time)
-        self._trial.bag.write(raw.topic, message, genpy.Time.from_sec(time), raw=True, connection_header=connection)
+        stamp = genpy.Time.from_sec(max(0.0, time + self._trial.offset))
+        self._trial.bag.write(raw.topic, message, stamp, raw=True, connection_header=connection)
 
     def _finish(self) -> None:
         trial = self._trial
@@ -288,6 +303,18 @@ class Recorder:
         )
 
 
+def _follow_clock(trial: _Trial, raw: Raw) -> None:
+    """Note a step of this computer's clock. The times of the recording do not follow it."""
+    step = raw.ros - raw.time - trial.offset
+    by, when = step - trial.step, raw.time - trial.begun
+    if abs(by) > SET:
+        trial.step = step
+        trial.notes.append(
+            f"this computer's clock was set by {by:+.2f} s, {when:.1f} s after the start; times of this recording are "
+            f"of the clock before, and later stamps inside messages differ by {step:+.2f} s"
+        )
+
+
 def _record_of(trial: _Trial) -> TrialRecord:
     row, parameters = trial.result or {}, trial.parameters
     if row:
@@ -299,11 +326,12 @@ def _record_of(trial: _Trial) -> TrialRecord:
         outcome = Outcome(how == "succeeded", code, reason_name(code), reason)
     else:
         outcome = Outcome(False, 0, "NONE", "the recording ended before the action did")
-    begun = float(row.get("started_ros", trial.begun))
-    ended = float(row.get("ended_ros", trial.left[0] if trial.left else max(begun, trial.last)))
+    begun = float(row.get("started_ros", trial.begun + trial.offset))
+    ended = trial.left[0] if trial.left else max(trial.begun, trial.last)
+    ended = float(row.get("ended_ros", ended + trial.offset))
     shift = begun - float(row.get("started", begun))
     marks = sorted((float(when) + shift - begun, str(name)) for name, when in dict(row.get("marks", {})).items())
-    marks += [(when - begun, f"note: {text}") for when, text in trial.said]
+    marks += [(when + trial.offset - begun, f"note: {text}") for when, text in trial.said]
     told = parameters.get("coglab", {})
     told = told.get("trial", {}) if isinstance(told, Mapping) else {}
     told = told if isinstance(told, Mapping) else {}

@@ -4,13 +4,14 @@ topics."""
 from __future__ import annotations
 
 import threading
+import time
 from pathlib import Path
 from typing import Any
 
 import rosgraph
 import rospy
 from coglab_py.node_start import answer, init_node
-from coglab_py.steady import ending, spin, worker
+from coglab_py.steady import Stamps, ending, spin, worker
 
 from coglab_tools.trial.record import trials_folder
 from coglab_tools.trial.recorder import Raw, Recorder
@@ -30,7 +31,7 @@ class RecorderNode:
             raise ValueError(f"~topics is a list of topic names, got {str(topics)[:100]!r}; see config/recorder.yaml")
         least = 1e6 * float(rospy.get_param("~min_free_mb", 500))
         self.recorder = Recorder(folder.absolute(), self._parameters, self._say, least)
-        self._over = threading.Event()
+        self._over, self._stamps = threading.Event(), Stamps()
         self._thread = worker(self._work, "recorder")
         self._thread.start()
         rospy.core.add_preshutdown_hook(lambda _reason: self._end())
@@ -41,11 +42,21 @@ class RecorderNode:
         rospy.loginfo("every handover is recorded into %s", folder)
 
     def _take(self, message: Any, topic: str) -> None:
-        self.recorder.put(Raw(rospy.get_time(), topic, message._buff, message._connection_header))
+        now, ros = self._clocks()
+        self.recorder.put(Raw(now, topic, message._buff, message._connection_header, ros))
+
+    def _clocks(self) -> tuple[float, float]:
+        """Time of the recorder and ROS time, s. The recorder follows /clock if it gives the time, otherwise the steady
+        clock, as this computer's clock may be set during a handover."""
+        if not rospy.rostime.is_wallclock():
+            now = rospy.get_time()
+            return now, now
+        now = time.monotonic()
+        return now, self._stamps.stamp(now).to_sec()
 
     def _work(self) -> None:
         while not self._over.wait(PERIOD) and not ending():
-            self.recorder.step(rospy.get_time())
+            self.recorder.step(self._clocks()[0])
         self.recorder.close()
 
     def _end(self) -> None:
