@@ -176,7 +176,15 @@ class ActionServerWrapper:
 
 
 class _SteadyActionServer(ActionServer):
-    """Publishes its status by the steady clock: actionlib's timer ends when `/clock` steps back."""
+    """Accepts goals after any cancel and any step of the clock.
+
+    actionlib refuses goals that are older than the newest cancel or goal. Its timer, which publishes the status, ends
+    when `/clock` steps back.
+    """
+
+    last_cancel: Any
+    _newest = rospy.Time()
+    """newest stamp of a goal"""
 
     @property
     def status_frequency(self) -> float:
@@ -191,6 +199,21 @@ class _SteadyActionServer(ActionServer):
         super().initialize()
         if self._frequency > 0.0:
             threading.Thread(target=self._publish, name="action_status", daemon=True).start()
+
+    def internal_goal_callback(self, goal: Any) -> None:
+        now = rospy.Time.now()
+        if self.last_cancel > now:  # the clock stepped back
+            self.last_cancel = rospy.Time()
+        stamp = min(goal.goal_id.stamp, now)
+        if self._newest > now:  # likewise; the stamp only orders goals
+            stamp = self._newest
+        goal.goal_id.stamp = stamp
+        self._newest = max(self._newest, stamp)
+        super().internal_goal_callback(goal)
+
+    def internal_cancel_callback(self, goal_id: Any) -> None:
+        goal_id.stamp = min(goal_id.stamp, rospy.Time.now())
+        super().internal_cancel_callback(goal_id)
 
     def _publish(self) -> None:
         while not rospy.is_shutdown():
