@@ -27,6 +27,7 @@ from coglab_msgs.msg import MasterState as MasterStateMessage
 from coglab_msgs.srv import LwrCommand, Start
 from coglab_perception.tf_listener import TfListener
 from coglab_py.pose import Pose
+from coglab_py.steady import Stamps
 from coglab_smach.context.master_state import MasterState
 from coglab_smach.context.requests import TriggerReply
 from coglab_smach.kinematics.reachability import default_arm
@@ -174,7 +175,7 @@ class _RunningBackEnd:
         self._lock = threading.Lock()
         self._results: list[tuple[float, Exchange]] = []
         self._events: deque[Event] = deque(maxlen=KEPT_EVENTS)
-        self._connected = rospy.get_time()
+        self._note_connection()
         self._submitted = time.monotonic()
         self._result_topic = Newest(f"{prefix}coglab/handover_results", HandoverResult, self._on_result)
         self._topics = [
@@ -351,17 +352,23 @@ class _RunningBackEnd:
             )
         )
 
+    def _note_connection(self) -> None:
+        self._stamps, self._connected = Stamps(), time.monotonic()
+
+    def _is_new(self, stamp: rospy.Time) -> bool:
+        """False for a latched message from before the connection. Right also after this computer's clock was set."""
+        return self._stamps.steady(stamp) >= self._connected
+
     def _on_say(self, message: Say) -> None:
-        stamp = message.header.stamp.to_sec()
-        if stamp >= self._connected:  # a latched message is older
-            self._add(Event(stamp, "said", message.text, message.code))
+        if self._is_new(message.header.stamp):
+            self._add(Event(message.header.stamp.to_sec(), "said", message.text, message.code))
 
     def _on_result(self, message: HandoverResult) -> None:
         result = _exchange(message)
         with self._lock:
             self._results.append((time.monotonic(), result))
             del self._results[:-200]
-        if result.ended >= self._connected:
+        if self._is_new(message.ended):
             self._add(Event(result.ended, "result", f"{result.what}: {result.outcome}", result.code))
 
     def _add(self, event: Event) -> None:
