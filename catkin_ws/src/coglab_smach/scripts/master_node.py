@@ -51,6 +51,20 @@ from std_srvs.srv import Trigger, TriggerResponse
 STATE_PERIOD = 0.2  # s, period of coglab/state while nothing changes
 
 
+def append(path: str, line: str) -> None:
+    """Append a line to a file, or nothing: after half a line on a full disk, the next one would be a part of it."""
+    left = f"{line}\n".encode()
+    with open(path, "ab", buffering=0) as stream:
+        length = stream.tell() if stream.seekable() else None
+        try:
+            while left:
+                left = left[stream.write(left) :]
+        except OSError:
+            if length is not None:
+                stream.truncate(length)
+            raise
+
+
 class Memory(HoldingMemory):
     """Publishes the noted object on a latched topic."""
 
@@ -234,8 +248,7 @@ class MasterNode:
         publish(self.results, String(line))
         if self.result_file:
             try:
-                with open(self.result_file, "a", encoding="utf-8") as stream:
-                    stream.write(line + "\n")
+                append(self.result_file, line)
             except OSError as error:
                 rospy.logerr("result file %s cannot be written: %s", self.result_file, error)
 

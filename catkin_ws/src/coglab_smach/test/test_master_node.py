@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import resource
 from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import MagicMock
@@ -146,6 +147,21 @@ def test_transitions_and_results_are_published_and_written(master, sent):
         "delivery": "",
         **{"started": 1.0, "ended": 0.0, "duration_s": -1.0, "marks": {}},
     }
+
+
+def test_a_full_disk_leaves_no_half_result(master, sent):
+    """A later result would be on the same line."""
+    record, file = ActionRecord("take", "mug", 1.0, 3.5, "succeeded"), Path(master.result_file)
+    master.on_result(record)
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (file.stat().st_size + 30, limits[1]))
+        master.on_result(record)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert sent[-1][0] == "logerr"
+    master.on_result(record)
+    assert [json.loads(line)["kind"] for line in file.read_text().splitlines()] == ["take", "take"]
 
 
 def test_each_namespace_has_its_own_file_for_the_held_object(master, module, monkeypatch):
