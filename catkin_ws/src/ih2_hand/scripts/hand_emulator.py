@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import signal
 import sys
 import threading
@@ -55,9 +56,25 @@ def tracer_to(path: str) -> Callable[[str, bytes, float], None]:
     tracer = Tracer()
     out = sys.stdout if path == "-" else open(path, "a", encoding="utf-8")  # closed at the end of the process
 
+    failed = False
+
     def write(direction: str, data: bytes, stamp: float) -> None:
-        for line in tracer.feed(direction, data, stamp):
-            print(line, file=out, flush=True)
+        nonlocal failed
+        if failed:
+            return
+        try:
+            for line in tracer.feed(direction, data, stamp):
+                print(line, file=out, flush=True)
+        except OSError as error:  # such as a full disk: the hand goes on
+            failed = True
+            print(
+                f"hand_emulator: the trace ends, {path} cannot be written: {error.strerror}",
+                file=sys.stderr,
+                flush=True,
+            )
+            with contextlib.suppress(OSError):
+                if out is not sys.stdout:
+                    out.close()
 
     return write
 

@@ -18,11 +18,12 @@ SCRIPT = str(Path(__file__).resolve().parents[1] / "scripts" / "hand_emulator.py
 def start(tmp_path):
     processes = []
 
-    def run(*arguments: str) -> subprocess.Popen:
+    def run(*arguments: str, errors: int | None = None) -> subprocess.Popen:
         process = subprocess.Popen(
             [sys.executable, SCRIPT, "--link", str(tmp_path / "hand"), *arguments],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
+            stderr=errors,
             text=True,
         )
         processes.append(process)
@@ -87,3 +88,16 @@ def test_bad_arguments(tmp_path, arguments):
     )
     assert done.returncode == 2
     assert "hand_emulator:" in done.stderr
+
+
+def test_a_trace_on_a_full_disk_is_reported_once_and_the_hand_goes_on(start, tmp_path):
+    process = start("--calibration-scale", "0", "--trace", "/dev/full", errors=subprocess.PIPE)
+    assert process.stdout.readline().startswith("port")
+    with opened(str(tmp_path / "hand")) as driver:
+        driver.calibration("fast")
+        for _ in range(20):
+            driver.get_finger_position(2)
+    assert process.poll() is None
+    process.terminate()
+    text = process.stderr.read()
+    assert text.count("/dev/full") == 1 and "No space left" in text and "Traceback" not in text, text
