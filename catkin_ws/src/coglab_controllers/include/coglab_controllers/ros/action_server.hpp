@@ -32,6 +32,24 @@ class ActionServer : public actionlib::ActionServerBase<Action> {
     cancels_.shutdown();
   }
 
+ protected:
+  void onGoal(const boost::shared_ptr<const ActionGoal>& goal) {
+    const ros::Time now = ros::Time::now();
+    forgetCancelAfter(now);
+    if (goal->goal_id.stamp <= now) return this->goalCallback(goal);
+    auto believable = boost::make_shared<ActionGoal>(*goal);
+    believable->goal_id.stamp = now;
+    this->goalCallback(believable);
+  }
+
+  void onCancel(const boost::shared_ptr<const actionlib_msgs::GoalID>& cancel) {
+    const ros::Time now = ros::Time::now();
+    if (cancel->stamp <= now) return this->cancelCallback(cancel);
+    auto believable = boost::make_shared<actionlib_msgs::GoalID>(*cancel);
+    believable->stamp = now;
+    this->cancelCallback(believable);
+  }
+
  private:
   static constexpr double kStatusPeriod = 0.2;  // s
   static constexpr double kKept =
@@ -52,20 +70,10 @@ class ActionServer : public actionlib::ActionServerBase<Action> {
                                      });
   }
 
-  void onGoal(const boost::shared_ptr<const ActionGoal>& goal) {
-    const ros::Time now = ros::Time::now();
-    if (goal->goal_id.stamp <= now) return this->goalCallback(goal);
-    auto believable = boost::make_shared<ActionGoal>(*goal);
-    believable->goal_id.stamp = now;
-    this->goalCallback(believable);
-  }
-
-  void onCancel(const boost::shared_ptr<const actionlib_msgs::GoalID>& cancel) {
-    const ros::Time now = ros::Time::now();
-    if (cancel->stamp <= now) return this->cancelCallback(cancel);
-    auto believable = boost::make_shared<actionlib_msgs::GoalID>(*cancel);
-    believable->stamp = now;
-    this->cancelCallback(believable);
+  /// If the clock stepped back, the newest cancel would refuse every goal until its time returns.
+  void forgetCancelAfter(const ros::Time& now) {
+    const boost::recursive_mutex::scoped_lock lock(this->lock_);
+    if (this->last_cancel_ > now) this->last_cancel_ = ros::Time();
   }
 
   void publishResult(const actionlib_msgs::GoalStatus& status, const Result& result) override {
