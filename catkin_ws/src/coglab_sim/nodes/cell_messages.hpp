@@ -13,9 +13,17 @@
 #include <string>
 #include <vector>
 
-#include "coglab_sim/cell.hpp"
+#include "coglab_rt/ros/ros_time.hpp"
+#include "coglab_sim/real_time_cell.hpp"
 
 namespace coglab_sim {
+
+/// Stamp of the messages of a snapshot, however late they are published: the time of its physics
+/// step as ROS time, or the simulated time if that is ROS time.
+inline ros::Time stampOf(const CellSnapshot& snapshot, bool simulated) {
+  ros::Time stamp;
+  return simulated ? stamp.fromSec(snapshot.truth.time) : coglab_rt::toRos(snapshot.stepped_ns);
+}
 
 template <typename Message>
 Vector3d vectorOf(const Message& m) {

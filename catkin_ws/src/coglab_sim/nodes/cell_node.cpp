@@ -28,7 +28,6 @@
 #include "cell_parameters.hpp"
 #include "coglab_rt/ros/logger_service.hpp"
 #include "coglab_rt/ros/node_start.hpp"
-#include "coglab_rt/ros/ros_time.hpp"
 #include "coglab_sim/pace.hpp"
 #include "coglab_sim/real_time_cell.hpp"
 
@@ -260,13 +259,11 @@ class CellNode {
       ROS_WARN_THROTTLE(5.0, "human_hand ignored: %s", snapshot.refused_hand.c_str());
     // All snapshots, so that a late timer loses none.
     for (const CellSnapshot& each : cell_->takeSnapshots()) {
-      ros::Time stamp;
+      const ros::Time stamp = stampOf(each, static_cast<bool>(clock_));
       if (clock_) {
         rosgraph_msgs::Clock clock;
-        clock.clock = stamp.fromSec(each.truth.time);
+        clock.clock = stamp;
         clock_.publish(clock);
-      } else {
-        stamp = coglab_rt::toRos(each.stepped_ns);
       }
       truth_.publish(truthMessage(each.truth, config_.object.id, stamp));
       motor_states_.publish(motorsMessage(each.motors, stamp));

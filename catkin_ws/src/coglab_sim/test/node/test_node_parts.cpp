@@ -224,6 +224,21 @@ TEST(RealTimeCell, LeavesRecordsMessagesAndASnapshot) {
   EXPECT_EQ(snapshot.refused_hand, "");
 }
 
+TEST(RealTimeCell, StampsAreOfThePhysicsStepHoweverLateTheyArePublished) {
+  ros::Time::init();
+  Running running;
+  RealTimeCell& cell = running.cell;
+  ASSERT_TRUE(running.until([&](Cell&) { return cell.snapshot().tick > 20; }));
+  cell.stop();
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  for (const CellSnapshot& each : cell.takeSnapshots()) {
+    const ros::Time stamp = stampOf(each, false);
+    EXPECT_LT(stamp, ros::Time::now() - ros::Duration(0.25));
+    EXPECT_EQ(truthMessage(each.truth, "mug", stamp).header.stamp, stamp);
+    EXPECT_EQ(stampOf(each, true), ros::Time(each.truth.time));
+  }
+}
+
 TEST(RealTimeCell, UsesItsInputsAndReportsWhyAHandIsRefused) {
   Running running;
   RealTimeCell& cell = running.cell;
