@@ -159,7 +159,12 @@ class CellNode {
       }
       log_ << '\n';
     }
-    if (log_.is_open()) log_.flush();
+    if (!log_.is_open()) return;
+    log_.flush();
+    if (log_) return;
+    ROS_ERROR("log_file %s cannot be written any more, its last row may be cut; is the disk full?",
+              settings_.log_file.c_str());
+    log_.close();
   }
 
   void onPush(const geometry_msgs::Wrench& message) {

@@ -244,6 +244,24 @@ class CellNode(unittest.TestCase):
             self.assertEqual(run.returncode, 1)
             self.assertIn(words, run.stdout)
 
+    def test_93_a_log_that_cannot_be_written_any_more_is_reported_once_and_ends_nothing(self) -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            text = Path(folder, "text").read_text
+            with Path(folder, "text").open("w") as output:
+                run = subprocess.Popen(
+                    [cell_binary(), "__name:=full", "_fri_port:=9", "_log_file:=/dev/full"],
+                    stdout=output,
+                    stderr=subprocess.STDOUT,
+                )
+            try:
+                self.assertTrue(wait_for(lambda: "log_file /dev/full" in text()), text())
+                time.sleep(1.0)
+                self.assertIsNone(run.poll(), text())
+                self.assertEqual(text().count("log_file /dev/full"), 1, text())
+            finally:
+                run.terminate()
+                run.wait(60.0)
+
     def test_7_two_robots_in_one_graph(self) -> None:
         """All names are relative: the cell of another namespace finds the bridge of that namespace."""
         second = self.second
