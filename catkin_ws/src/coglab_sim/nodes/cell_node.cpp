@@ -30,6 +30,7 @@
 #include "coglab_rt/ros/node_start.hpp"
 #include "coglab_sim/pace.hpp"
 #include "coglab_sim/real_time_cell.hpp"
+#include "port_wait.hpp"
 
 namespace coglab_sim {
 namespace {
@@ -52,12 +53,20 @@ std::uint16_t publishedPort(const std::string& parameter) {
 
 /// Waits for the bridge's port. @throws std::runtime_error after `limit` s or at shutdown.
 std::uint16_t waitForPort(const std::string& parameter, double limit) {
-  const ros::SteadyTime end = ros::SteadyTime::now() + ros::WallDuration(limit);
+  const ros::SteadyTime begun = ros::SteadyTime::now();
   ROS_INFO("waiting up to %.0f s for the bridge's port in parameter %s", limit, parameter.c_str());
-  while (ros::ok() && ros::SteadyTime::now() < end) {
-    if (const std::uint16_t port = publishedPort(parameter); port != 0) return port;
-    ros::WallDuration(0.1).sleep();
-  }
+  const std::uint16_t port = pollPort(
+      limit, [&] { return publishedPort(parameter); },
+      [&] { return (ros::SteadyTime::now() - begun).toSec(); },
+      [&](double waited) {
+        ROS_WARN("no bridge has set parameter %s for %.0f s; is it starting? Waiting up to %.0f s",
+                 parameter.c_str(), waited, limit);
+      },
+      [] {
+        ros::WallDuration(0.1).sleep();
+        return ros::ok();
+      });
+  if (port != 0) return port;
   throw std::runtime_error("no bridge published its UDP port in parameter " + parameter +
                            " within " + std::to_string(limit) +
                            " s; start the bridge or set ~fri_port");

@@ -8,9 +8,11 @@
 #include <limits>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "cell_faults.hpp"
 #include "cell_messages.hpp"
+#include "port_wait.hpp"
 
 using namespace coglab_sim;
 
@@ -237,6 +239,26 @@ TEST(RealTimeCell, StampsAreOfThePhysicsStepHoweverLateTheyArePublished) {
     EXPECT_EQ(truthMessage(each.truth, "mug", stamp).header.stamp, stamp);
     EXPECT_EQ(stampOf(each, true), ros::Time(each.truth.time));
   }
+}
+
+TEST(PortWait, ALateBridgeIsAwaitedWithReminders) {
+  EXPECT_GE(NodeParameters().port_wait, 600.0);  // a busy computer starts the robot slowly
+  double now = 0.0;
+  std::vector<double> reminders;
+  const auto wait = [&](double limit, double bound_at, double shutdown_at) {
+    now = 0.0;
+    reminders.clear();
+    return pollPort(
+        limit, [&] { return static_cast<std::uint16_t>(now >= bound_at ? 4000 : 0); },
+        [&] { return now; }, [&](double waited) { reminders.push_back(waited); },
+        [&] { return (now += 0.5) < shutdown_at; });
+  };
+  EXPECT_EQ(wait(600.0, 100.0, 1e9), 4000);
+  EXPECT_EQ(reminders, (std::vector<double>{30.0, 60.0, 90.0}));
+  EXPECT_EQ(wait(0.2, 100.0, 1e9), 0);
+  EXPECT_TRUE(reminders.empty());
+  EXPECT_EQ(wait(600.0, 100.0, 10.0), 0);
+  EXPECT_EQ(wait(0.0, 0.0, 1e9), 4000);
 }
 
 TEST(RealTimeCell, UsesItsInputsAndReportsWhyAHandIsRefused) {
