@@ -72,7 +72,9 @@ def running_robot() -> Iterator[subprocess.Popen]:
     with own_master() as master:
         master.setParam("/robot_description", (SOURCES / "lwr_description" / "urdf" / "lwr_ih2.urdf").read_text())
         master.setParam("/lwr", {"arm": "ideal", "rt_priority": 0})
-        master.setParam("/controller_manager", {"load": {"python_motion": "coglab/RemoteMotion"}})
+        patience = {"silent_time": 5.0, "max_age": 0.5}  # s: a busy computer ends no motion
+        manager = {"load": {"python_motion": "coglab/RemoteMotion"}, "python_motion": patience, "silent_time": 5.0}
+        master.setParam("/controller_manager", manager)
         node = subprocess.Popen([node_path("robot_node"), "__name:=robot"])
         try:
             wait(lambda: any(one.robot == node.pid for one in wire.offered()), "the slot")
@@ -134,7 +136,7 @@ def test_motion_of_a_file_moves_the_arm_and_is_stopped(robot):
             wait(lambda: any(m.state == "reached" for m in ends), f"the end: {ends[-1:]}")
 
             ends.clear()
-            assert start([], [], False).success
+            assert start(["duration"], [10.0], False).success  # s: it still runs when the process is stopped
             time.sleep(0.2)
             process.send_signal(signal.SIGSTOP)
             wait(lambda: any(m.state == "aborted" and m.reason for m in ends), "an abort")

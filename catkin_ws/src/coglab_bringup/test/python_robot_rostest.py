@@ -33,7 +33,7 @@ class PythonRobot(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls) -> None:
-        end = time.monotonic() + READY_LIMIT
+        end = time.monotonic() + 5 * READY_LIMIT  # READY_LIMIT is without progress; here nodes still come
         while True:
             try:
                 cls.robot = coglab.connect()

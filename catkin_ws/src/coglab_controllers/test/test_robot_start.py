@@ -5,7 +5,6 @@ from __future__ import annotations
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -19,7 +18,6 @@ from udp_controller import UdpController
 
 SOURCES = Path(__file__).resolve().parents[2]
 LIMIT = 60.0  # s
-MORE = 1.0  # s that a busy port may take beyond a start that ends for a parameter
 
 
 @pytest.fixture(scope="module")
@@ -29,13 +27,12 @@ def master() -> Iterator[rosgraph.Master]:
         yield running
 
 
-def failed_start(master: rosgraph.Master, **parameters: object) -> tuple[float, list[str]]:
-    """Duration (s) and output lines of a start that must fail; in parameter names __ means /."""
+def failed_start(master: rosgraph.Master, **parameters: object) -> list[str]:
+    """Output lines of a start that must fail; in parameter names __ means /."""
     master.setParam("/lwr", {"rt_priority": 0, "lock_memory": False})
     master.setParam("/controller_manager", {"cycle_time": 0.005})
     for name, value in parameters.items():
         master.setParam("/" + name.replace("__", "/"), value)
-    began = time.monotonic()
     ended = subprocess.run(
         [node_path("robot_node")],
         text=True,
@@ -45,17 +42,16 @@ def failed_start(master: rosgraph.Master, **parameters: object) -> tuple[float, 
         stderr=subprocess.STDOUT,
     )
     assert ended.returncode == 1, (ended.returncode, ended.stdout[-3000:])
-    return time.monotonic() - began, [line for line in ended.stdout.splitlines() if line.strip()]
+    return [line for line in ended.stdout.splitlines() if line.strip()]
 
 
-def test_a_busy_port_is_said_first_and_at_once(master):
-    parameter, _ = failed_start(master, lwr__fri_port=70000)
+def test_a_busy_port_is_said_first(master):
+    """A start that waits for the time limit of a request says that first."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", 0))
         port = other.getsockname()[1]
-        busy, lines = failed_start(master, lwr__fri_port=port)
+        lines = failed_start(master, lwr__fri_port=port)
     assert f":{port} (Address already in use)" in lines[0], lines
-    assert busy < parameter + MORE, "no time limit of a request is waited for"
 
 
 @pytest.mark.parametrize("name, value", [("lwr__hot_drive", -300.0), ("controller_manager__cycle_time", 7.0)])
@@ -66,7 +62,7 @@ def test_bad_parameter_ends_the_start_with_a_running_fri_thread(master, name, va
         port = probe.getsockname()[1]
     controller = UdpController(port, period=0.001).start()
     try:
-        _, lines = failed_start(master, lwr__fri_port=port, **{name: value})
+        lines = failed_start(master, lwr__fri_port=port, **{name: value})
     finally:
         controller.close()
     assert any(name.rpartition("__")[2] in line for line in lines), lines

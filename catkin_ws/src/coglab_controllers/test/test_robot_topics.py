@@ -128,7 +128,7 @@ def system() -> Iterator[tuple[TopicArm, subprocess.Popen]]:
     with own_master() as master:
         master.setParam("/robot_description", (SOURCES / "lwr_description" / "urdf" / "lwr_ih2.urdf").read_text())
         master.setParam("/lwr", {"rt_priority": 0})
-        master.setParam("/controller_manager", {"cycle_time": PERIOD, "joint_limits_profile": "t1"})
+        master.setParam("/controller_manager", {"cycle_time": PERIOD, "joint_limits_profile": "t1", "silent_time": 5.0})
         rospy.init_node("topic_arm", disable_signals=True)
         node = subprocess.Popen([node_path("controller_manager_node")])
         try:

@@ -55,9 +55,9 @@ class Peer {
   sockaddr_in to_{};
 };
 
-/// Returns true if a condition becomes true within 5 s.
+/// Returns true if a condition becomes true within 30 s.
 inline bool eventually(const std::function<bool()>& condition) {
-  for (int i = 0; i < 500 && !condition(); ++i)
+  for (int i = 0; i < 3000 && !condition(); ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   return condition();
 }

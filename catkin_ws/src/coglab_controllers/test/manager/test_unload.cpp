@@ -74,7 +74,7 @@ TEST(Unload, WhileACancelWaitsForIt) {
 }
 
 TEST(Unload, RepeatedlyWhileTheCycleRunsAndOtherRequestsArrive) {
-  VirtualRobot robot("", 0.005, false);
+  VirtualRobot robot("plan_timeout: 30.0", 0.005, false);
   std::atomic<bool> stop{false};
   std::thread control([&] {
     while (!stop) {
@@ -192,7 +192,7 @@ TEST(Unload, RefusesBothTheRunningAndTheRequestedController) {
   std::string type, id;
   const Answer taken = manager.switchTo("slow", type);
   EXPECT_TRUE(VirtualRobot::ok(taken));
-  for (const std::string words : {"did not confirm", "0.300000 s", "'slow'"}) {
+  for (const std::string words : {"did not confirm", "2.000000 s", "'slow'"}) {
     EXPECT_NE(taken.message.find(words), std::string::npos) << taken.message;
   }
   manager.active(id, type);

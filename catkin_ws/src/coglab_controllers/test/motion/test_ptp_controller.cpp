@@ -81,18 +81,26 @@ void during(VirtualRobot& robot, Request&& request) {
 TEST(PtpController, MotionThatRacesAHoldIsNotMadeAfterReset) {
   using coglab_rt::MotionBlock;
   for (const bool split : {false, true}) {
-    VirtualRobot robot("", 0.005, false);
+    VirtualRobot robot("plan_timeout: 30.0", 0.005, false);
     during(robot, [&] { robot.loadBoth("ptp"); });
     MotionAnswer first, second;
     during(robot, [&] { first = robot.ptp().add({kThere, {}, {}}); });
     for (int i = 0; i < 2000 && robot.state() != MotionState::Reached; ++i) robot.tick();
     ASSERT_EQ(executed(robot.ptp()), std::vector<int>{first.id});
     // The request is checked while the arm may move, and adopted by the first cycle with the hold.
-    std::thread request([&] { second = robot.ptp().add({{0, 0, 0, 1, 0, 0, 0}, {}, {}}); });
+    std::atomic<bool> answered{false};
+    std::thread request([&] {
+      second = robot.ptp().add({{0, 0, 0, 1, 0, 0, 0}, {}, {}});
+      answered = true;
+    });
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
     robot.sample.block = MotionBlock::Held;
     ++robot.sample.motion_epoch;
-    robot.tick();
+    // on a busy computer the request may come later than this cycle
+    do {
+      robot.tick();
+      std::this_thread::sleep_for(std::chrono::microseconds(100));
+    } while (!answered);
     request.join();
     const JointVector stood = robot.sample.position;
     if (!split) ++robot.sample.motion_epoch;  // a robot behind topics counts the hold alone

@@ -223,7 +223,7 @@ TEST(RequestsWithoutACycle, AreWithdrawnAndLeaveNothing) {
   EXPECT_EQ(lost.status, MotionAnswer::kRejected);
   EXPECT_EQ(lost.code, ReasonCode::NotAdopted);
   EXPECT_EQ(lost.id, -1);
-  EXPECT_TRUE(refused(lost, {"0.3", "does not run", "withdrawn"}));
+  EXPECT_TRUE(refused(lost, {"2.0", "does not run", "withdrawn"}));
   ctrl_more::FeedbackControllersManager& feedback = robot.manager->feedback();
   ASSERT_TRUE(VirtualRobot::ok(robot.manager->load("limits", "JointLimits")));
   ASSERT_TRUE(feedback.setProfile("dmp", {"limits"}).ok());

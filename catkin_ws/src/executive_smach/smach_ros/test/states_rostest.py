@@ -165,7 +165,7 @@ class TestActionState(unittest.TestCase):
 
     def test_exec_timeout_cancels_and_aborts(self):
         before = self.server.cancelled
-        state = action_state(UNTIL_CANCELLED, exec_timeout=rospy.Duration(0.3))
+        state = action_state(UNTIL_CANCELLED, exec_timeout=rospy.Duration(3.0))  # the goal has begun by then
         self.assertEqual(state.execute(self.ud), "aborted")
         self.assertEqual(self.server.cancelled, before + 1)
         self.assertFalse(state.preempt_requested())

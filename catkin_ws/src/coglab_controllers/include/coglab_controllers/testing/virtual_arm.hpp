@@ -45,7 +45,6 @@ class VirtualArm {
         YAML::Load(parameters), readText(description + "/urdf/lwr_ih2.urdf"), limits, lockstep);
     settings.cycle.overrun_time = 0.0;
     settings.clock = [this] { return now_ns; };
-    settings.plan_timeout = 0.3;
     settings.logger = &logger;
     manager = std::make_unique<ControllerManager>(std::move(settings));
     sample.position = kHome;
