@@ -73,6 +73,13 @@ def test_requests_before_a_resynchronisation_expect_no_answer():
     assert "request" in said(tracer, "<", "D4")[0]
 
 
+def test_a_filler_read_with_other_frames_is_named():
+    """A late emulator reads all that waits at once."""
+    meanings = ["motor 1", "incomplete frame", "resynchronisation", "GetFingerStatus motor 0"]
+    lines = said(Tracer(), ">", "4B 01 44 02" + " 41" * 13 + " 4B 00")
+    assert len(lines) == 4 and all(meaning in line for meaning, line in zip(meanings, lines, strict=True))
+
+
 def test_script_explains_hex():
     script = Path(__file__).resolve().parents[1] / "scripts" / "hand_trace.py"
     done = subprocess.run(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from ih2_hand import frames
 from ih2_hand.emulator.parser import FrameParser
 from ih2_hand.status import describe_status
+from ih2_hand.wire_choices import WIRE
 
 _NAMES = {
     frames.STOP_ALL: "StopALL",
@@ -77,11 +78,17 @@ class Tracer:
         return [f"{stamp:14.6f} {direction} {shown.hex(' '):<20} {meaning}" for shown, meaning in lines]
 
     def _to_hand(self, data: bytes) -> list[tuple[bytes, str]]:
-        lines: list[tuple[bytes, str]] = []
-        if data.count(frames.STOP_ALL) == len(data) > 1:
+        # A late reader finds the frames before and after the filler in the same read.
+        before, filler, after = data.partition(WIRE.resync_filler)
+        if before and filler:
+            return self._to_hand(before) + self._to_hand(filler + after)
+        if not filler and data.count(frames.STOP_ALL) == len(data) > 1:
+            filler, after = data, b""
+        if filler:
             self._parser.clear()
             self._asked, self._answer = [], b""
-            return [(data, "StopALL as filler: resynchronisation")]
+            return [(filler, "StopALL as filler: resynchronisation"), *self._to_hand(after)]
+        lines: list[tuple[bytes, str]] = []
         start = 0
         for end, byte in enumerate(data, 1):
             waited = self._parser.waiting
