@@ -40,14 +40,20 @@ class LwrNodeProcesses(unittest.TestCase):
         wait_for(lambda: command("start").success, "start")
         target = rospy.Publisher(f"/{name}/target_joint_states", JointState, queue_size=1)
         twist = Twist(target, [0.5, 0, 0, 0, 0, 0, 0])
-        before = robot.position[0]
+        before, states = robot.position[0], []
+        subscriber = rospy.Subscriber(f"/{name}/state", LwrState, states.append)
 
         def moves() -> bool:
-            if robot.state != 2:  # a late computer has ended command mode
+            if states and not states[-1].motion_allowed:  # a late computer has ended the motion
                 command("start")
             return robot.position[0] > before + 0.2
 
-        wait_for(moves, "motion")
+        try:
+            wait_for(moves, "motion")
+        except AssertionError as error:
+            self.fail(f"{error}; {robot.answered} answers in time, state {robot.state}, {states[-1:]}")
+        finally:
+            subscriber.unregister()
         return node, robot, twist
 
     def end(self, node: subprocess.Popen, robot: UdpController, twist: Twist) -> None:
