@@ -118,7 +118,6 @@ class Console(unittest.TestCase):
 
     def test_03b_held_button_calibrates_hand_and_shows_its_end(self):
         self.page_in(self.in_a_hub())
-        self.says("calibrate", "is calibrated")
         self.browser.tab("Health")
         self.addCleanup(self.browser.tab, "Live")
         found = "[...document.querySelectorAll('#page button')].find((one) => one.innerText === 'Forced calibration')"
