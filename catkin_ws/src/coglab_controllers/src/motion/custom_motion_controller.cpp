@@ -47,9 +47,9 @@ Answer CustomMotionController::readArguments(const MotionRequestByName& request,
       return one.name == name;
     });
     if (found == known.end()) {
-      return Answer::refusal(
-          ReasonCode::UnknownName,
-          "'" + name + "' is no argument of this motion; there are:\n" + describeArguments());
+      return Answer::refusal(ReasonCode::UnknownName,
+                             "'" + name + "' is no argument of this motion; it has " +
+                                 (known.empty() ? "none" : "these:\n" + describeArguments()));
     }
     if (!std::isfinite(value) || value < found->least || value > found->most) {
       std::ostringstream why;
