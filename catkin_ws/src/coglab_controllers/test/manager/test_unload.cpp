@@ -192,7 +192,7 @@ TEST(Unload, RefusesBothTheRunningAndTheRequestedController) {
   std::string type, id;
   const Answer taken = manager.switchTo("slow", type);
   EXPECT_TRUE(VirtualRobot::ok(taken));
-  for (const std::string words : {"did not confirm", "2.000000 s", "'slow'"}) {
+  for (const std::string words : {"did not confirm", "2.000000 s", "'ptp'"}) {
     EXPECT_NE(taken.message.find(words), std::string::npos) << taken.message;
   }
   manager.active(id, type);
