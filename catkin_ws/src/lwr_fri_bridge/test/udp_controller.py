@@ -11,6 +11,10 @@ import lwr_fri_bridge
 IDENTITY = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]
 TURNED = [0, -1, 0, 0.5, 1, 0, 0, 0.1, 0, 0, 1, 0.4]  # the tool's x lies along the base's y
 
+LONGEST_LOSS = 60
+"""Cycles in a row without an answer, after which it leaves command mode. KUKA's controller leaves earlier. Later, the
+bridge would no longer know the reflected answer, and would take this for a restart."""
+
 
 class UdpController:
     """Runs in its own thread from start() to close()."""
@@ -27,7 +31,7 @@ class UdpController:
         self.requests: list[tuple[int, float]] = []  # request, largest step of the cycle before it
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", 0))
-        self._finished = self._counter = self._reflected = 0
+        self._finished = self._counter = self._reflected = self._unanswered = 0
         self._running = True
         self._began = time.monotonic()
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -84,7 +88,10 @@ class UdpController:
                 ("127.0.0.1", self.port),
             )
             due += self.period
+            self._unanswered += 1
             self._take_until(due)
+            if self._unanswered > LONGEST_LOSS:
+                self.state = 1
             time.sleep(max(0.0, due - time.monotonic()))
 
     def _take_until(self, due: float) -> None:
@@ -99,6 +106,7 @@ class UdpController:
                 continue
             self._reflected = answer["counter"]
             self.answered += 1
+            self._unanswered = 0
             step = max(abs(a - b) for a, b in zip(answer["joint_position"], self.position, strict=True))
             if self.state == 2:
                 self.steps.append(step)
