@@ -64,9 +64,9 @@ def test_force_of_the_motor_without_sensor(bench, call, arguments):
     assert bench.sent() == ""
 
 
-@pytest.mark.parametrize("seconds", [0.0049, 0.501, float("nan")])
+@pytest.mark.parametrize("seconds", [0.0049, 0.601, float("nan")])
 def test_a_read_time_limit_out_of_range_is_refused_before_the_port_is_opened(seconds):
-    with pytest.raises(ValueError, match=r"read_timeout .*0\.005\.\.0\.5 s"):
+    with pytest.raises(ValueError, match=r"read_timeout .*0\.005\.\.0\.6 s"):
         HandSerialDriver("/dev/there-is-no-such-port", read_timeout=seconds)
 
 

@@ -43,9 +43,10 @@ CALIBRATIONS = {
 
 DIALECTS = ("legacy", "v17")  # grasp commands of older and newer firmware (W1)
 
-# Bounds of the time limit of a read: longer than the hand's own delay (1 ms), short enough for the caller to react.
+# Bounds of the time limit of a read: longer than the hand's own delay (1 ms); two of the longest end before the
+# node says that hand_status is missing (1.5 s).
 LEAST_READ_TIMEOUT_S = 0.005
-LARGEST_READ_TIMEOUT_S = 0.5
+LARGEST_READ_TIMEOUT_S = 0.6
 
 MILLIAMPERE_PER_COUNT = (0.81, 1.1, 1.1, 1.1, 1.1)  # mA of motor current, by motor (EH1 guide 2.2.2)
 
