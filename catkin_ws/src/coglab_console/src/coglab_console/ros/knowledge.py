@@ -60,7 +60,6 @@ class Knowledge:
         self._reported: dict[str, str] = {}
         self._now = threading.Event()
         self._own_frames = view.named
-        self._ask: rospy.ServiceProxy | None = None
         self._asked = False
         self._recordings = Recordings()
         view.entry = self._entry
@@ -198,17 +197,13 @@ class Knowledge:
         return view.shown("ahead", answer.path) if answer.success else path_ahead.refused(answer.message)
 
     def _predict(self, fields: dict) -> PredictDmpResponse | None:
-        """Requests the predicted path; None if the controller does not run."""
+        """Requests the predicted path; None if the controller does not answer."""
         request = PredictDmpRequest(**fields)
         request.goal_offset = Point(*fields["goal_offset"])
         request.target_orientation = Quaternion(*fields["target_orientation"])
         try:
-            if self._ask is None:
-                wait_for_service(PREDICT, 1.0)
-                self._ask = rospy.ServiceProxy(PREDICT, PredictDmp, persistent=True)
-            return self._ask(request)
+            return call_service(PREDICT, PredictDmp, request, wait=1.0)
         except (rospy.ServiceException, rospy.ROSException):
-            self._ask = None
             return None
 
     def _pace(self) -> float:
