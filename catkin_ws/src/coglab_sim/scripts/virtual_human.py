@@ -67,7 +67,6 @@ class VirtualHumanNode:
         self.pace = Pace().follow("real_time_factor")  # of the cell, in the same namespace
         self.time = self.stepped_at = self.pace.now()  # s, of the person, and of the last step
         self.view = WorldView()
-        self.held_by = ""  # who holds the object
         self.hand = rospy.Publisher("human_hand", HumanHand, queue_size=1, tcp_nodelay=True)
         self.state = rospy.Publisher("human_state", String, queue_size=10, latch=True)
         self.last_phase = ""
@@ -114,9 +113,6 @@ class VirtualHumanNode:
             self.meet(message)
         with self.lock:
             self.view = WorldView(robot, message.hand_closure, held, load)
-            if message.held_by == "human" and self.held_by in ("floor", "none"):
-                self.human.given()  # by place_object, after the object had fallen
-        self.held_by = message.held_by
 
     def meet(self, message: CellTruth) -> None:
         """The cell has another object: the person uses its data from now on."""

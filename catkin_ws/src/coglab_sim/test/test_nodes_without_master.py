@@ -144,12 +144,3 @@ def test_commands_and_words_reach_the_person(monkeypatch):
         late.header.stamp = rospy.Time.from_sec(100.0 - age)
         one.ros.subscribed["/a/say"](late)
     assert [code for _, code in heard] == [Say.I_HAVE_IT, Say.READY_TO_RECEIVE]
-
-
-@pytest.mark.parametrize("before, holds", [("floor", True), ("robot", False), ("", False)])
-def test_a_fallen_object_can_be_given_to_the_person(monkeypatch, before, holds):
-    """place_object puts it into the open hand, which closes; otherwise the person would never come again."""
-    one = Person(monkeypatch, **{"~holds_object": False})
-    one.ros.subscribed["truth/cell"](truth(held_by=before))
-    one.ros.subscribed["truth/cell"](truth(held_by="human"))
-    assert one.node.human.holds() == holds

@@ -133,11 +133,6 @@ class VirtualHuman:
         """True if the person's hand is closed on an object."""
         return self._grip > 0.5
 
-    def given(self) -> None:
-        """Somebody has put the object into the open hand of this person, who closes it at rest."""
-        if self.phase == "idle":
-            self._grip = 1.0
-
     def meets(self, scene: Scene, knows_weight: bool) -> None:
         """Another object is in the cell: takes its mass, friction, size and grips from ``scene``, keeps the rest pose.
         ``knows_weight``: the object lies in the person's hand."""
